@@ -1,0 +1,7 @@
+//! insonify: real-time ultrasound by Monte-Carlo path tracing on Vulkan.
+//!
+//! `scene` and `probe` say what is imaged and with what; `gpu` knows Vulkan and no ultrasound;
+//! `sim` is the frame; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
+
+pub mod probe;
+pub mod scene;

@@ -1,0 +1,38 @@
+//! Widths of the point-spread function along depth (model section 4 and 13.14).
+
+use super::Probe;
+
+/// Ratio of a one-way Gaussian's sigma to wavelength times f-number for an apodised aperture
+/// (model section 4; 0.51 would be an unapodised rectangle).
+const APODISED: f64 = 0.6;
+
+/// Sigma of a Gaussian beam with a fixed focus, mm: waist 0.6 lambda F# at `focus`.
+fn fixed_focus(wavelength: f64, f_number: f64, focus: f64, z: f64) -> f64 {
+    let waist = APODISED * wavelength * f_number;
+    let rayleigh = std::f64::consts::TAU * waist * waist / wavelength;
+    waist * (1.0 + ((z - focus) / rayleigh).powi(2)).sqrt()
+}
+
+impl Probe {
+    /// Axial sigma_z of the two-way envelope in depth, mm: c sqrt(2 ln 2) / (2 pi B f0).
+    pub fn sigma_axial(&self) -> f64 {
+        let sigma_t = (2.0 * std::f64::consts::LN_2).sqrt()
+            / (std::f64::consts::PI * self.bandwidth * self.frequency);
+        self.speed * sigma_t / 2.0
+    }
+
+    /// Lateral two-way sigma at depth `z`, mm: fixed transmit focus times dynamic receive focus.
+    pub fn sigma_lateral(&self, z: f64) -> f64 {
+        let lambda = self.wavelength();
+        let tx = fixed_focus(lambda, self.f_number_transmit, self.focus, z);
+        let rx = APODISED * lambda * self.f_number_receive.max(z / self.aperture);
+        (tx.powi(-2) + rx.powi(-2)).sqrt().recip()
+    }
+
+    /// Elevational two-way sigma at depth `z`, mm: the lens focuses transmit and receive alike.
+    pub fn sigma_elevation(&self, z: f64) -> f64 {
+        let f_number = self.elevation_focus / self.elevation_height;
+        let one_way = fixed_focus(self.wavelength(), f_number, self.elevation_focus, z);
+        one_way / std::f64::consts::SQRT_2
+    }
+}

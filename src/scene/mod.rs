@@ -1,0 +1,100 @@
+//! What is imaged, in world space. Knows no Vulkan.
+//!
+//! Units everywhere after load: mm, microseconds, MHz, hence speed mm/us and impedance MRayl
+//! (g/cm3 times mm/us). Attenuation stays dB/(cm MHz). Angles are radians.
+
+use glam::{Affine3A, DAffine3};
+
+pub mod settings;
+pub mod tissue;
+
+pub use settings::{Imaging, Simulation};
+pub use tissue::Tissue;
+
+use crate::probe::Probe;
+
+/// A triangle mesh in its own object space, mm.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Name as it appears in messages: the scene's mesh name, or the node's name in the file.
+    pub name: String,
+    /// Vertex positions, mm.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit shading normals, one per vertex, outward; vertices are split at creases.
+    pub normals: Vec<[f32; 3]>,
+    /// Vertex indices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// How an interface reflects, seen from one side (model section 2.3, 13.5).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Surface {
+    /// Exponent s of the micro-normal's power-cosine distribution: 0 diffuse, infinity specular.
+    pub roughness: f64,
+    /// Scale tau of the half-normal interface thickness, mm.
+    pub thickness: f64,
+    /// Exponent n_s of the echo lobe.
+    pub specularity: f64,
+    /// Echo gain of this surface, dB.
+    pub gain: f64,
+}
+
+/// One placed mesh with the tissue that it encloses.
+#[derive(Clone, Debug)]
+pub struct Instance {
+    /// Name in messages and label lists.
+    pub name: String,
+    /// Index into [`Scene::meshes`].
+    pub mesh: usize,
+    /// Index into [`Scene::tissues`].
+    pub tissue: usize,
+    /// Where enclosed volumes overlap the highest priority wins; ties go to the one entered last.
+    pub priority: i32,
+    /// World from object space, mm.
+    pub world_from_object: DAffine3,
+    /// Echo properties met from outside and from inside.
+    pub surface: [Surface; 2],
+}
+
+/// A string of point scatterers along a straight line (a wire of a phantom), or a single point.
+#[derive(Clone, Debug)]
+pub struct Wire {
+    /// Ends in world space, mm; equal ends make one point.
+    pub ends: [[f64; 3]; 2],
+    /// Spacing of the points along the wire, mm.
+    pub spacing: f64,
+    /// Amplitude of each point relative to a perfect flat mirror.
+    pub amplitude: f64,
+}
+
+/// Everything that a frame depends on.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// Title.
+    pub name: String,
+    /// Tissue table; meshes and background index it.
+    pub tissues: Vec<Tissue>,
+    /// Tissue outside every mesh: index into [`Scene::tissues`].
+    pub background: usize,
+    /// Triangle meshes.
+    pub meshes: Vec<Mesh>,
+    /// Placed meshes.
+    pub instances: Vec<Instance>,
+    /// Point targets.
+    pub wires: Vec<Wire>,
+    /// Transducer and its geometry.
+    pub probe: Probe,
+    /// Where the probe is: world from probe space (x lateral, y elevation, z depth), rigid, mm.
+    pub world_from_probe: DAffine3,
+    /// Path tracing and scatterers.
+    pub simulation: Simulation,
+    /// Image formation.
+    pub imaging: Imaging,
+}
+
+impl Instance {
+    /// The placement in single precision, as the device sees it.
+    pub fn placement(&self) -> Affine3A {
+        self.world_from_object.as_affine3a()
+    }
+}

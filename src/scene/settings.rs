@@ -1,0 +1,147 @@
+//! What a scene file sets besides anatomy: path tracing, scatterers, image formation.
+
+/// Which paths are followed (model 2.8 and 13.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampling {
+    /// The transmitted path always continues; reflected branches are spawned. Our default, a
+    /// stand-in for the adaptive scheme of Mattausch et al. 2018.
+    MainPath,
+    /// N independent paths, one stochastic choice per interaction (S0, the paper's text).
+    Plain,
+    /// One shared primary, split into N paths at the first interaction (S1).
+    SharedPrimary,
+}
+
+/// What thickness does to the phase of a surface echo (model 2.7b).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Coherence {
+    /// Coherent part at the surface, the rest as static speckle; energy independent of N.
+    Split,
+    /// Every echo at its displaced point with weight 1/N, as the paper describes.
+    Coherent,
+}
+
+/// Where scatterers come from (model 3.4).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ScatterMode {
+    /// One point scatterer per cell of a lattice fixed to the tissue.
+    Lattice,
+    /// Equally spaced samples looked up in a voxel grid, lateral convolution afterwards (paper).
+    Voxel,
+}
+
+/// To what the scatterer lattice is fixed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextureSpace {
+    /// To the instance: speckle moves with the anatomy.
+    Object,
+    /// To the world: anatomy slides through the speckle, as in the paper.
+    World,
+}
+
+/// Path tracing and scatterers.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// Path samples N per (scanline, elevation layer), at least 1.
+    pub paths: u32,
+    /// Sampling scheme.
+    pub sampling: Sampling,
+    /// Most interactions of one path (B_max).
+    pub max_interactions: u32,
+    /// Most reflections of one path.
+    pub max_reflections: u32,
+    /// Paths lighter than this end.
+    pub min_weight: f64,
+    /// Coherence of thick surfaces.
+    pub coherence: Coherence,
+    /// Whether transmitted rays refract at the sampled micro-normal (off: at the smooth normal).
+    pub rough_transmission: bool,
+    /// Whether a reflected path that returns to the transducer's face bounces off it.
+    pub face_reflection: bool,
+    /// Standard deviation of the lateral origin jitter, mm.
+    pub origin_jitter: f64,
+    /// Lateral standard deviation of the beam weight, mm; infinity is off.
+    pub beam_sigma: f64,
+    /// Scatterer mode.
+    pub scatter_mode: ScatterMode,
+    /// Edge of a lattice cell or voxel, mm.
+    pub cell: f64,
+    /// Elevational reach of one layer in cells; 0 visits the whole slab that the layer owns.
+    pub elevation_cells: f64,
+    /// What the lattice is fixed to.
+    pub texture_space: TextureSpace,
+    /// Reflected paths whose attenuation-compensated weight falls below this level, dB, carry no
+    /// volume echoes: they would lie under the display's floor.
+    pub volume_floor: f64,
+    /// Speckle level, dB relative to the calibration (liver 45 dB under a perfect mirror).
+    pub speckle_gain: f64,
+    /// Level of all surface echoes, dB.
+    pub surface_gain: f64,
+    /// Seed of every random number.
+    pub seed: u32,
+}
+
+/// Image formation (model section 5).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Imaging {
+    /// Gain, dB: an echo this far below a perfect mirror is white at zero depth.
+    /// e_ref = 10^(-gain/20).
+    pub gain: f64,
+    /// Displayed dynamic range, dB.
+    pub dynamic_range: f64,
+    /// Attenuation that the time-gain compensation assumes, dB/(cm MHz).
+    pub tgc_attenuation: f64,
+    /// Largest compensation, dB.
+    pub tgc_limit: f64,
+    /// The eight sliders, dB, evenly spaced from face to full depth, interpolated linearly.
+    pub tgc_sliders: [f64; 8],
+    /// RMS of the electronic noise before TGC, dB relative to a perfect mirror; -inf is off.
+    pub noise: f64,
+    /// Exponent of the grey map: v^gamma.
+    pub grey_gamma: f64,
+    /// Scales of the point-spread function: axial, lateral, elevational.
+    pub psf_scale: [f64; 3],
+    /// Height of the B-mode image, pixels; the width follows from the sector.
+    pub image_height: u32,
+}
+
+impl Default for Simulation {
+    fn default() -> Self {
+        Self {
+            paths: 8,
+            sampling: Sampling::MainPath,
+            max_interactions: 10,
+            max_reflections: 3,
+            min_weight: 1e-6,
+            coherence: Coherence::Split,
+            rough_transmission: false,
+            face_reflection: false,
+            origin_jitter: 0.0,
+            beam_sigma: f64::INFINITY,
+            scatter_mode: ScatterMode::Lattice,
+            cell: 0.15,
+            elevation_cells: 1.0,
+            texture_space: TextureSpace::Object,
+            volume_floor: -50.0,
+            speckle_gain: 0.0,
+            surface_gain: 0.0,
+            seed: 1,
+        }
+    }
+}
+
+impl Default for Imaging {
+    fn default() -> Self {
+        Self {
+            gain: 16.0,
+            dynamic_range: 60.0,
+            tgc_attenuation: 0.5,
+            tgc_limit: 80.0,
+            tgc_sliders: [0.0; 8],
+            noise: -116.0,
+            grey_gamma: 1.0,
+            psf_scale: [1.0; 3],
+            image_height: 800,
+        }
+    }
+}
