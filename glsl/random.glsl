@@ -1,0 +1,31 @@
+// Counter-based random numbers: pcg4d (Jarzynski and Olano, JCGT 9(3), 2020).
+
+uvec4 pcg4d(uvec4 v) {
+    v = v * 1664525u + 1013904223u;
+    v.x += v.y * v.w; v.y += v.z * v.x; v.z += v.x * v.y; v.w += v.y * v.z;
+    v ^= v >> 16u;
+    v.x += v.y * v.w; v.y += v.z * v.x; v.z += v.x * v.y; v.w += v.y * v.z;
+    return v;
+}
+
+// [0, 1) with 24 bits.
+float unit(uint bits) { return float(bits >> 8u) * (1.0 / 16777216.0); }
+
+// Standard normal from one word: Box-Muller on two 16-bit uniforms, the first in (0, 1).
+float gaussian(uint bits) {
+    float u = (float(bits >> 16u) + 0.5) * (1.0 / 65536.0);
+    float v = float(bits & 0xffffu) * (6.283185307 / 65536.0);
+    return sqrt(-2.0 * log(u)) * cos(v);
+}
+
+// Keys of the path's decisions. Keyed by (path n, bounce) and never by scanline or layer, so that
+// neighbouring lines share their sampled normals and differ only by geometry.
+const uint PURPOSE_NORMAL = 0u;     // + attempt 0..7
+const uint PURPOSE_THICKNESS = 16u;
+const uint PURPOSE_CHOICE = 17u;
+const uint PURPOSE_JITTER = 18u;
+const uint PURPOSE_PHASE = 19u;
+
+uvec4 path_random(uint path, uint bounce, uint purpose, uint seed) {
+    return pcg4d(uvec4(path, bounce, purpose, seed));
+}

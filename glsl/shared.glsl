@@ -1,0 +1,89 @@
+// The only CPU/GPU contract: structures and constants shared by every kernel.
+// src/sim/layout.rs mirrors it; a test compares every offset by reflection.
+//
+// Only scalars and vec4, so that std430 and #[repr(C)] agree and naga can read the kernels.
+// Units: mm, microseconds, MHz; weights and amplitudes are relative to a perfect flat mirror.
+
+const uint NONE = 0xffffffffu;
+const uint MAX_STACK = 8u;          // media that may enclose one point
+
+const uint SAMPLING_MAIN_PATH = 0u;
+const uint SAMPLING_PLAIN = 1u;
+const uint SAMPLING_SHARED_PRIMARY = 2u;
+
+const uint FLAG_ROUGH_TRANSMISSION = 1u;
+const uint FLAG_FACE_REFLECTION = 2u;
+const uint FLAG_COINCIDENT = 4u;    // some instances share triangles exactly
+const uint FLAG_WORLD_TEXTURE = 8u;
+const uint FLAG_COHERENT = 16u;     // surface coherence as in the paper, no split
+const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the lattice
+
+const uint KIND_CONVEX = 0u;
+const uint KIND_LINEAR = 1u;
+const uint KIND_PHASED = 2u;
+
+// One per frame. Rows of 3x4 matrices are vec4 (rotation row, translation).
+struct Frame {
+    vec4 world_from_probe[3];
+    vec4 probe_from_world[3];
+    uint kind; uint scanlines; uint layers; uint samples;
+    float depth; float radius; float field_of_view; float width;
+    float slice_thickness; float speed; float sample_pitch; float frequency;
+    uint paths; uint sampling; uint max_interactions; uint max_reflections;
+    float min_weight; float volume_floor; uint flags; uint seed;
+    float origin_jitter; float cell; float elevation_reach; float lateral_cut;
+    float surface_scale; float volume_scale; uint segment_capacity; uint background;
+    uint instances; uint points; float face_height; float axial_sigma; // sigma_g of the axial kernel, samples
+    float noise; float inverse_reference; float inverse_range; uint frame_index;
+    uint image_width; uint image_height; float pixel_pitch; float image_left; // mm, left edge in probe x
+    float image_top; float unused0; float unused1; float unused2;             // mm, top edge in probe z
+};
+
+struct Tissue {
+    float speed; float impedance; float absorption; float presence;   // mm/us, MRayl, Np/mm at f0, rho
+    float mean; float sigma; float texture_depth; float texture_length; // calibrated amplitudes, k, mm
+    uint seed; uint unused0; uint unused1; uint unused2;
+};
+
+struct Surface {
+    float roughness; float thickness; float specularity; float gain;  // s, tau mm, n_s, linear
+    float coherence; float unused0; float unused1; float unused2;     // gamma = |E exp(ikq)|
+};
+
+struct Instance {
+    vec4 world_from_object[3];
+    vec4 object_from_world[3];
+    vec4 texture_from_world[3];        // rigid: the frame in which the scatterer lattice rests
+    uint tissue; int priority; uint surface_outside; uint surface_inside;
+    uint first_triangle; uint triangles; uint bvh_root; uint unused0;
+};
+
+// Per axial sample k, at depth k * sample_pitch.
+struct Row {
+    float sigma_lateral; float sigma_elevation;   // two-way widths, mm
+    float volume_gain; float point_gain;          // applied to scatterers and points at deposit
+    float surface_gain;                           // elevation normalisation and compensation at deposit
+    float volume_undo; float surface_undo;        // fixed point and compensation removed in beam
+    float lateral_lines;                          // sigma_lateral in scanline pitches
+    float tgc;                                    // linear, applied to the IQ in detect
+    float compensation;                           // linear, attenuation compensation of a weight at this depth
+    float unused0; float unused1;
+};
+
+// A straight stretch of a path inside one medium.
+struct Segment {
+    vec4 origin_length;    // world mm; length mm
+    vec4 direction_time;   // unit; one-way time at the origin, us
+    vec4 lateral_weight;   // unit lateral axis e_l carried along the path; weight at the origin
+    vec4 spread;           // lateral variance a + 2 b x + c x^2 (mm^2) after rough reflections; path share
+    uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
+};
+
+struct Hit { float t; uint instance; uint primitive; float u; float v; };
+
+// What a frame reports; all counts.
+struct Counters {
+    uint saturated; uint segments_dropped; uint stack_overflow; uint paths_lost;
+    uint rays; uint interactions; uint segments; uint candidates;
+    uint deposits; uint node_visits; uint triangle_tests; uint unused0;
+};

@@ -1,0 +1,99 @@
+//! `#[repr(C)]` mirror of `glsl/shared.glsl`; a test compares every offset by reflection.
+
+use bytemuck::{Pod, Zeroable};
+
+/// Rows of a 3x4 matrix: rotation row, translation.
+pub type Rows = [[f32; 4]; 3];
+
+/// No instance.
+pub const NONE: u32 = u32::MAX;
+/// Media that may enclose one point.
+pub const MAX_STACK: usize = 8;
+
+/// Transmitted rays refract at the sampled micro-normal.
+pub const FLAG_ROUGH_TRANSMISSION: u32 = 1;
+/// Reflected paths bounce off the transducer's face.
+pub const FLAG_FACE_REFLECTION: u32 = 2;
+/// Some instances share triangles exactly.
+pub const FLAG_COINCIDENT: u32 = 4;
+/// The scatterer lattice rests in the world.
+pub const FLAG_WORLD_TEXTURE: u32 = 8;
+/// Surface coherence as in the paper, no split.
+pub const FLAG_COHERENT: u32 = 16;
+/// Paper-like voxel grid instead of the lattice.
+pub const FLAG_VOXEL: u32 = 32;
+
+macro_rules! shared {
+    ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(
+        $(#[$doc])*
+        #[repr(C)]
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+        #[allow(missing_docs, reason = "documented field by field in glsl/shared.glsl")]
+        pub struct $name { $(pub $field: $ty),* }
+
+        impl $name {
+            /// Name and byte offset of every field, for the comparison with the shader's layout.
+            pub const OFFSETS: &'static [(&'static str, usize)] =
+                &[$((stringify!($field), std::mem::offset_of!($name, $field))),*];
+        }
+    )* };
+}
+
+shared! {
+    /// Everything that is constant over one frame.
+    struct Frame {
+        world_from_probe: Rows,
+        probe_from_world: Rows,
+        kind: u32, scanlines: u32, layers: u32, samples: u32,
+        depth: f32, radius: f32, field_of_view: f32, width: f32,
+        slice_thickness: f32, speed: f32, sample_pitch: f32, frequency: f32,
+        paths: u32, sampling: u32, max_interactions: u32, max_reflections: u32,
+        min_weight: f32, volume_floor: f32, flags: u32, seed: u32,
+        origin_jitter: f32, cell: f32, elevation_reach: f32, lateral_cut: f32,
+        surface_scale: f32, volume_scale: f32, segment_capacity: u32, background: u32,
+        instances: u32, points: u32, face_height: f32, axial_sigma: f32,
+        noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
+        image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
+        image_top: f32, unused0: f32, unused1: f32, unused2: f32,
+    }
+    /// Acoustic properties at the centre frequency.
+    struct Tissue {
+        speed: f32, impedance: f32, absorption: f32, presence: f32,
+        mean: f32, sigma: f32, texture_depth: f32, texture_length: f32,
+        seed: u32, unused0: u32, unused1: u32, unused2: u32,
+    }
+    /// Echo properties of one side of a mesh.
+    struct Surface {
+        roughness: f32, thickness: f32, specularity: f32, gain: f32,
+        coherence: f32, unused0: f32, unused1: f32, unused2: f32,
+    }
+    /// A placed mesh.
+    struct Instance {
+        world_from_object: Rows,
+        object_from_world: Rows,
+        texture_from_world: Rows,
+        tissue: u32, priority: i32, surface_outside: u32, surface_inside: u32,
+        first_triangle: u32, triangles: u32, bvh_root: u32, unused0: u32,
+    }
+    /// What one axial sample needs to know.
+    struct Row {
+        sigma_lateral: f32, sigma_elevation: f32,
+        volume_gain: f32, point_gain: f32, surface_gain: f32,
+        volume_undo: f32, surface_undo: f32, lateral_lines: f32,
+        tgc: f32, compensation: f32, unused0: f32, unused1: f32,
+    }
+    /// A straight stretch of a path inside one medium.
+    struct Segment {
+        origin_length: [f32; 4],
+        direction_time: [f32; 4],
+        lateral_weight: [f32; 4],
+        spread: [f32; 4],
+        tissue: u32, instance: u32, line: u32, handedness: f32,
+    }
+    /// What a frame reports.
+    struct Counters {
+        saturated: u32, segments_dropped: u32, stack_overflow: u32, paths_lost: u32,
+        rays: u32, interactions: u32, segments: u32, candidates: u32,
+        deposits: u32, node_visits: u32, triangle_tests: u32, unused0: u32,
+    }
+}

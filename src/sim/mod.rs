@@ -1,0 +1,3 @@
+//! The frame: scene and probe to B-mode image on the device.
+
+pub mod layout;
