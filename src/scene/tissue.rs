@@ -1,4 +1,8 @@
-//! The acoustic table (model section 7).
+//! Acoustic properties of a tissue; the shipped values are in [`table`].
+
+use super::Surface;
+
+pub mod table;
 
 /// Acoustic properties of one tissue.
 #[derive(Clone, Debug, PartialEq)]
@@ -17,11 +21,13 @@ pub struct Tissue {
     pub density_of_scatterers: f64,
     /// Mean over standard deviation of the scatterer amplitude (mu_s / sigma_s).
     pub mean_over_sigma: f64,
-    /// Depth k of the low-frequency texture, 0..=0.5 (model 3.2).
+    /// Depth k of the low-frequency texture, 0..=0.5.
     pub texture_depth: f64,
     /// Length l of the low-frequency texture, mm.
     pub texture_length: f64,
-    /// Where the numbers come from, one line per number that differs; shown to the user.
+    /// How the outside of an organ of this tissue reflects unless a mesh says otherwise.
+    pub surface: Surface,
+    /// Where the numbers come from, one line per number; shown to the user.
     pub source: String,
 }
 
@@ -31,8 +37,18 @@ impl Tissue {
         self.density * self.speed
     }
 
+    /// How a mesh that encloses this tissue reflects unless it says otherwise.
+    pub fn default_surface(&self) -> Surface {
+        self.surface
+    }
+
+    /// The shipped tissue called `name`; [`table::names`] lists them.
+    pub fn shipped(name: &str) -> Option<Self> {
+        table::shipped().into_iter().find(|t| t.name == name)
+    }
+
     /// Decay of the one-way intensity weight at `frequency` MHz, Np/mm: W(d) = W0 exp(-a d)
-    /// equals 10^(-alpha f d_cm / 10) (model 2.4).
+    /// equals 10^(-alpha f d_cm / 10).
     pub fn absorption(&self, frequency: f64) -> f64 {
         self.attenuation * frequency * std::f64::consts::LN_10 / 100.0
     }

@@ -1,0 +1,307 @@
+//! The shipped tissues: single numbers inside the published ranges, a source on each.
+//!
+//! Brightness (echogenicity, texture, surface) has no published calibration: those numbers are
+//! tuned by eye against clinical pictures and say so. Muscle and liver are chosen so that a flat
+//! interface between them reflects -36 dB; the published ranges allow anything from -30 to zero.
+
+use super::{Surface, Tissue};
+
+/// Diagnostics 13:855 (2023), table 4: attenuation at 1 MHz.
+const A: &str = "Diagnostics 13:855 (2023) table 4";
+/// Bioengineering 12:946 (2025), appendix A: density and speed measured ex vivo.
+const B: &str = "Bioengineering 12:946 (2025) appendix A";
+/// Burger et al. 2013 as published with its implementation.
+const BURGER: &str = "Burger et al. 2013, parameter table";
+/// The NVIDIA ray-traced ultrasound simulator, v0.6.0.
+const I4H: &str = "Isaac for Healthcare sensor simulation 0.6.0";
+/// IT'IS tissue database, checked against a stored copy.
+const ITIS: &str = "IT'IS tissue database";
+/// IT'IS tissue database, quoted from memory.
+const ITIS_UNVERIFIED: &str = "IT'IS tissue database, unverified";
+/// Textbook value that nobody here traced to its measurement.
+const UNVERIFIED: &str = "unverified";
+/// Obstetrics: Zana and Lang 1974.
+const ZANA: &str = "Zana and Lang 1974, unverified";
+/// Attenuation of uterine tissues at 5 MHz, divided by 5.
+const UTERUS: &str = "PMC3056396 (at 5 MHz, per MHz)";
+/// Chosen by this project because no source was found.
+const CHOICE: &str = "chosen by this project, no source found";
+
+/// Speed mm/us, density g/cm3, attenuation dB/(cm MHz), each with its source.
+type Bulk = [(f64, &'static str); 3];
+
+/// Echogenicity dB re liver, scatterer probability per cell, texture depth and length mm.
+type Speckle = (f64, f64, f64, f64);
+
+/// Roughness exponent, thickness mm, specularity exponent.
+type Skin = (f64, f64, f64);
+
+const SOFT: Skin = (1000.0, 0.1, 1.0);
+const FLUID: Skin = (1000.0, 0.05, 1.0);
+const BONE: Skin = (100.0, 0.3, 8.0);
+/// No scatterers at all.
+const ANECHOIC: Speckle = (f64::NEG_INFINITY, 1.0, 0.0, 4.0);
+
+const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
+    (
+        "water",
+        [
+            (1.524, "at 37 C, unverified"),
+            (0.993, "at 37 C, unverified"),
+            (0.0022, I4H),
+        ],
+        ANECHOIC,
+        FLUID,
+    ),
+    (
+        "gel",
+        [
+            (1.524, "as water, unverified"),
+            (0.998, UNVERIFIED),
+            (0.0022, I4H),
+        ],
+        ANECHOIC,
+        FLUID,
+    ),
+    (
+        "amniotic_fluid",
+        [(1.525, ZANA), (1.008, ZANA), (0.0075, ZANA)],
+        (-60.0, 1.0, 0.0, 4.0),
+        FLUID,
+    ),
+    (
+        "bile",
+        [(1.540, UNVERIFIED), (1.015, UNVERIFIED), (0.01, UNVERIFIED)],
+        (-60.0, 1.0, 0.0, 4.0),
+        (1000.0, 0.1, 2.0),
+    ),
+    (
+        "urine",
+        [(1.540, UNVERIFIED), (1.015, UNVERIFIED), (0.01, UNVERIFIED)],
+        (-60.0, 1.0, 0.0, 4.0),
+        FLUID,
+    ),
+    (
+        "cyst_fluid",
+        [
+            (1.540, "as bile, unverified"),
+            (1.015, "as bile, unverified"),
+            (0.01, "as bile, unverified"),
+        ],
+        (-60.0, 1.0, 0.0, 4.0),
+        FLUID,
+    ),
+    (
+        "blood",
+        [
+            (1.575, ITIS_UNVERIFIED),
+            (1.050, ITIS_UNVERIFIED),
+            (0.16, A),
+        ],
+        (-32.0, 1.0, 0.0, 4.0),
+        FLUID,
+    ),
+    (
+        "fat",
+        [(1.450, I4H), (0.920, B), (0.63, BURGER)],
+        (0.0, 0.5, 0.35, 5.0),
+        SOFT,
+    ),
+    (
+        "skin",
+        [(1.655, B), (1.131, B), (0.35, A)],
+        (6.0, 1.0, 0.1, 3.0),
+        SOFT,
+    ),
+    (
+        "muscle",
+        [(1.588, ITIS), (1.090, ITIS_UNVERIFIED), (1.09, BURGER)],
+        (-3.0, 0.5, 0.5, 3.0),
+        SOFT,
+    ),
+    (
+        "liver",
+        [
+            (1.555, "between 1.540 (B-mode nominal) and 1.586 (IT'IS)"),
+            (1.080, ITIS_UNVERIFIED),
+            (0.50, A),
+        ],
+        (0.0, 1.0, 0.12, 4.0),
+        (1000.0, 0.1, 2.0),
+    ),
+    (
+        "kidney",
+        [(1.557, ITIS_UNVERIFIED), (1.061, ITIS_UNVERIFIED), (1.0, A)],
+        (-4.0, 1.0, 0.2, 4.0),
+        SOFT,
+    ),
+    (
+        "spleen",
+        [(1.567, UNVERIFIED), (1.054, UNVERIFIED), (0.40, A)],
+        (1.0, 1.0, 0.1, 4.0),
+        SOFT,
+    ),
+    (
+        "myocardium",
+        [
+            (1.570, "between 1.561 (IT'IS, unverified) and 1.586"),
+            (1.081, ITIS_UNVERIFIED),
+            (0.52, A),
+        ],
+        (-3.0, 1.0, 0.25, 4.0),
+        (1000.0, 0.15, 1.0),
+    ),
+    (
+        "uterus",
+        [(1.590, UNVERIFIED), (1.052, UNVERIFIED), (0.83, UTERUS)],
+        (-2.0, 1.0, 0.25, 4.0),
+        SOFT,
+    ),
+    (
+        "fibroid",
+        [(1.590, UNVERIFIED), (1.052, UNVERIFIED), (1.02, UTERUS)],
+        (-8.0, 1.0, 0.35, 5.0),
+        SOFT,
+    ),
+    (
+        "cervix",
+        [(1.590, UNVERIFIED), (1.052, UNVERIFIED), (1.26, UTERUS)],
+        (-3.0, 1.0, 0.2, 4.0),
+        SOFT,
+    ),
+    (
+        "placenta",
+        [(1.541, UNVERIFIED), (1.050, UNVERIFIED), (0.55, UNVERIFIED)],
+        (1.0, 1.0, 0.2, 5.0),
+        SOFT,
+    ),
+    (
+        "fetal_soft_tissue",
+        [(1.540, CHOICE), (1.040, CHOICE), (0.5, CHOICE)],
+        (-1.0, 1.0, 0.2, 4.0),
+        SOFT,
+    ),
+    (
+        "fetal_bone",
+        [(2.400, CHOICE), (1.450, CHOICE), (7.0, CHOICE)],
+        (3.0, 0.5, 0.0, 4.0),
+        BONE,
+    ),
+    (
+        "cortical_bone",
+        [
+            (3.515, ITIS_UNVERIFIED),
+            (1.908, ITIS_UNVERIFIED),
+            (5.0, BURGER),
+        ],
+        (3.0, 0.5, 0.0, 4.0),
+        BONE,
+    ),
+    (
+        "lung",
+        [
+            (0.949, ITIS_UNVERIFIED),
+            (0.394, ITIS_UNVERIFIED),
+            (40.0, A),
+        ],
+        (6.0, 0.5, 0.3, 4.0),
+        (100.0, 0.3, 2.0),
+    ),
+    (
+        "air",
+        [
+            (0.343, "textbook, 20 C"),
+            (0.0012, "textbook, 20 C"),
+            (7.5, A),
+        ],
+        ANECHOIC,
+        (100.0, 0.1, 2.0),
+    ),
+    (
+        "vessel_wall",
+        [(1.570, UNVERIFIED), (1.100, UNVERIFIED), (1.09, BURGER)],
+        (0.0, 1.0, 0.0, 4.0),
+        FLUID,
+    ),
+    (
+        "tumour",
+        [(1.565, CHOICE), (1.070, CHOICE), (0.6, CHOICE)],
+        (-6.0, 1.0, 0.2, 5.0),
+        SOFT,
+    ),
+];
+
+/// Every shipped tissue.
+pub fn shipped() -> Vec<Tissue> {
+    TABLE.iter().map(tissue).collect()
+}
+
+/// Names of the shipped tissues, in the table's order.
+pub fn names() -> impl Iterator<Item = &'static str> {
+    TABLE.iter().map(|row| row.0)
+}
+
+fn tissue(row: &(&str, Bulk, Speckle, Skin)) -> Tissue {
+    let &(name, [speed, density, attenuation], speckle, skin) = row;
+    let (echogenicity, density_of_scatterers, texture_depth, texture_length) = speckle;
+    Tissue {
+        name: name.to_owned(),
+        speed: speed.0,
+        density: density.0,
+        attenuation: attenuation.0,
+        echogenicity,
+        density_of_scatterers,
+        mean_over_sigma: 0.0,
+        texture_depth,
+        texture_length,
+        surface: Surface {
+            roughness: skin.0,
+            thickness: skin.1,
+            specularity: skin.2,
+            gain: 0.0,
+        },
+        source: format!(
+            "speed: {}\ndensity: {}\nattenuation: {}\nechogenicity, texture, surface: tuned by eye",
+            speed.1, density.1, attenuation.1
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn level(a: &str, b: &str) -> f64 {
+        let z = |n| Tissue::shipped(n).expect(n).impedance();
+        20.0 * ((z(b) - z(a)) / (z(b) + z(a))).abs().log10()
+    }
+
+    #[test]
+    fn interfaces_have_the_levels_of_textbooks() {
+        // Half a decibel: the third digit of the tabulated speeds.
+        approx::assert_abs_diff_eq!(level("muscle", "liver"), -36.4, epsilon = 0.5);
+        approx::assert_abs_diff_eq!(level("fat", "muscle"), -17.8, epsilon = 0.5);
+        approx::assert_abs_diff_eq!(level("muscle", "cortical_bone"), -4.4, epsilon = 0.5);
+        assert!(level("muscle", "air") > -0.02);
+    }
+
+    #[test]
+    fn every_tissue_is_physical_named_once_and_sourced() {
+        let all = shipped();
+        for (i, t) in all.iter().enumerate() {
+            assert!(
+                all[..i].iter().all(|other| other.name != t.name),
+                "{}",
+                t.name
+            );
+            assert!(t.speed > 0.3 && t.speed < 4.5, "{}", t.name);
+            assert!(t.density > 0.001 && t.density < 2.1, "{}", t.name);
+            assert!((0.0..=40.0).contains(&t.attenuation), "{}", t.name);
+            assert!((0.0..=0.5).contains(&t.texture_depth) && t.texture_length > 0.0);
+            assert!((0.0..=1.0).contains(&t.density_of_scatterers));
+            assert_eq!(t.source.lines().count(), 4, "{}", t.name);
+            assert!(t.source.lines().all(|l| !l.ends_with(": ")), "{}", t.name);
+        }
+        assert!(Tissue::shipped("placenta").is_some_and(|t| t.source.contains("unverified")));
+    }
+}
