@@ -1,0 +1,31 @@
+#version 460
+#extension GL_GOOGLE_include_directive : require
+// The rays of every (scanline, layer) and what the face returns on the way back; no stage of a
+// frame, it exists so that a test can compare probe.glsl with `Probe::ray` and the harness can
+// show that a kernel runs at all.
+#include "shared.glsl"
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
+// Per line = e * scanlines + l: (origin, elevation), (direction, face_distance), (lateral, 0), (face_normal, 0).
+// The face is sought from a point `depth` along the ray, looking back: exactly `depth` away, or a
+// miss outside the face's height or for a point.
+layout(std430, binding = 1) writeonly buffer RayBuffer { vec4 rays[]; };
+
+#include "probe.glsl"
+
+void main() {
+    uint line = gl_GlobalInvocationID.x;
+    if (line >= frame.scanlines * frame.layers) { return; }
+    uint l = line % frame.scanlines;
+    uint e = line / frame.scanlines;
+    vec3 origin;
+    vec3 direction;
+    vec3 lateral;
+    probe_ray(l, e, origin, direction, lateral);
+    rays[4u * line] = vec4(origin, elevation(e));
+    rays[4u * line + 1u] = vec4(direction, face_distance(origin + frame.depth * direction, -direction));
+    rays[4u * line + 2u] = vec4(lateral, 0.0);
+    rays[4u * line + 3u] = vec4(face_normal(origin), 0.0);
+}

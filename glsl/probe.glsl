@@ -1,0 +1,70 @@
+// Transducer geometry in probe space: x lateral, y elevation, z depth, mm; the face's centre is at 0.
+// The including kernel declares `readonly buffer FrameBuffer { Frame frame; }` first.
+
+// Elevation offset of layer e (cell-centred), mm.
+float elevation(uint e) {
+    return frame.slice_thickness * ((float(e) + 0.5) / float(frame.layers) - 0.5);
+}
+
+// Start, unit direction and unit lateral axis (in the scanline plane, perpendicular to the ray) of
+// scanline l in layer e.
+void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lateral) {
+    float u = (float(l) + 0.5) / float(frame.scanlines) - 0.5;
+    float y = elevation(e);
+    if (frame.kind == KIND_LINEAR) {
+        origin = vec3(frame.width * u, y, 0.0);
+        direction = vec3(0.0, 0.0, 1.0);
+        lateral = vec3(1.0, 0.0, 0.0);
+        return;
+    }
+    float angle = frame.field_of_view * u;
+    float s = sin(angle);
+    float c = cos(angle);
+    direction = vec3(s, 0.0, c);
+    lateral = vec3(c, 0.0, -s);
+    origin = vec3(0.0, y, 0.0);
+    if (frame.kind == KIND_CONVEX) {
+        // radius (cos - 1) as -2 radius sin^2(angle / 2): no cancellation near the middle.
+        float half_sine = sin(0.5 * angle);
+        origin.x = frame.radius * s;
+        origin.z = -2.0 * frame.radius * half_sine * half_sine;
+    }
+}
+
+// A ray leaving the face must not meet it again at its own start.
+const float FACE_T_MIN = 1e-3;
+
+// Distance along the ray (o, d) to the transducer's face, met from the body's side; -1 is a miss.
+// A phased array's face is a point and is never met.
+float face_distance(vec3 o, vec3 d) {
+    float t;
+    if (frame.kind == KIND_LINEAR) {
+        if (d.z >= 0.0) { return -1.0; }
+        t = -o.z / d.z;
+        if (abs(o.x + t * d.x) > 0.5 * frame.width) { return -1.0; }
+    } else if (frame.kind == KIND_CONVEX) {
+        vec2 q = vec2(o.x, o.z + frame.radius);
+        vec2 v = vec2(d.x, d.z);
+        float a = dot(v, v);
+        float b = dot(q, v);
+        float area = q.x * v.y - q.y * v.x;
+        // b^2 - a c, with Lagrange's identity so that nothing cancels far from the face.
+        float discriminant = a * frame.radius * frame.radius - area * area;
+        if (b >= 0.0 || discriminant <= 0.0) { return -1.0; }
+        float distance_to_axis = length(q);
+        float c = (distance_to_axis - frame.radius) * (distance_to_axis + frame.radius);
+        t = c / (sqrt(discriminant) - b);
+        vec2 p = q + t * v;
+        if (abs(atan(p.x, p.y)) > 0.5 * frame.field_of_view) { return -1.0; }
+    } else {
+        return -1.0;
+    }
+    if (t < FACE_T_MIN || abs(o.y + t * d.y) > 0.5 * frame.face_height) { return -1.0; }
+    return t;
+}
+
+// Unit normal of the face at p, towards the body.
+vec3 face_normal(vec3 p) {
+    if (frame.kind == KIND_CONVEX) { return normalize(vec3(p.x, 0.0, p.z + frame.radius)); }
+    return vec3(0.0, 0.0, 1.0);
+}
