@@ -4,5 +4,6 @@
 //! `sim` is the frame; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
 
 pub mod probe;
+pub mod reference;
 pub mod scene;
 pub mod sim;

@@ -1,0 +1,35 @@
+// Closest hit by the device's ray query. Same interface as intersect_bvh.glsl.
+//
+// The includer enables GL_EXT_ray_query and declares instances[] and `tlas`, whose instances carry
+// our instance as custom index and whose meshes hold the triangles in the same order as triangles[].
+
+// The first surface with t_min < t < t_max along origin + t direction, world space; direction need
+// not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
+// Miss: instance NONE, t = t_max. Input that is not finite misses.
+Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
+    Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
+    float size = max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
+    bool finite = all(lessThan(abs(origin), vec3(1e18))) && all(lessThan(abs(direction), vec3(1e18)));
+    // The specification leaves such input undefined.
+    if (!finite || !(size > 1e-18) || !(t_min >= 0.0) || !(t_max >= t_min)) return hit;
+
+    rayQueryEXT query;
+    uint opacity = skip_instance == NONE ? gl_RayFlagsOpaqueEXT : gl_RayFlagsNoOpaqueEXT;
+    rayQueryInitializeEXT(query, tlas, opacity, 0xffu, origin, t_min, direction, t_max);
+    while (rayQueryProceedEXT(query)) {
+        if (rayQueryGetIntersectionTypeEXT(query, false) == gl_RayQueryCandidateIntersectionTriangleEXT
+            && uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false)) != skip_instance) {
+            rayQueryConfirmIntersectionEXT(query);
+        }
+    }
+    if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
+        vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
+        hit.t = rayQueryGetIntersectionTEXT(query, true);
+        hit.instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
+        hit.primitive = instances[hit.instance].first_triangle
+            + uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
+        hit.u = uv.x;
+        hit.v = uv.y;
+    }
+    return hit;
+}
