@@ -1,4 +1,7 @@
 //! The frame: scene and probe to B-mode image on the device.
 
 pub mod bvh;
+pub mod calibration;
 pub mod layout;
+pub mod special;
+pub mod tables;

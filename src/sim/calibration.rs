@@ -1,0 +1,369 @@
+//! Levels: what an echo must be worth so that speckle, points, surfaces and noise show at their
+//! stated brightness, and the fixed-point scales in which they are summed.
+//!
+//! Everything is relative to a perfect flat mirror, which deposits 1 and shows envelope 1.
+
+use std::f64::consts::{LN_10, PI, TAU};
+
+use super::special::{erf, sinc};
+use crate::scene::settings::ScatterMode;
+use crate::scene::{Scene, Tissue};
+
+/// RMS envelope of unattenuated liver relative to a perfect mirror, dB. No source gives it; at
+/// this level a fat/muscle interface (-19.7 dB) stands 25 dB above liver.
+const LIVER_LEVEL: f64 = -45.0;
+/// Largest compensation of surface echoes at deposit, dB. They are up to 45 dB above speckle, so
+/// that they need less to stay above the rounding, and more would cost headroom.
+const SURFACE_COMPENSATION_LIMIT: f64 = 42.0;
+/// Scatterers count up to this many lateral sigmas from the beam axis (amplitude .044).
+pub const LATERAL_CUT: f64 = 2.5;
+/// Largest brightening of layers that sample only a part of the beam, as a power: 30 dB. Beyond,
+/// the layers miss the beam altogether and darkness is the honest picture.
+const ELEVATION_GAIN_LIMIT: f64 = 1000.0;
+/// Fixed-point accumulators stay below this magnitude; i32 has one more bit.
+const HEADROOM: f64 = (1u32 << 30) as f64;
+/// Largest fixed-point scale: one unit is -120 dB re a perfect mirror.
+const LARGEST_SCALE: f64 = (1u32 << 20) as f64;
+
+/// 10^(dB/20).
+pub fn amplitude(decibel: f64) -> f64 {
+    (decibel * LN_10 / 20.0).exp()
+}
+
+/// Largest value of the kernels' Gaussian numbers: Box-Muller on u >= 2^-17.
+fn largest_gaussian() -> f64 {
+    (2.0 * 131_072f64.ln()).sqrt()
+}
+
+/// Largest value of the low-frequency texture: both octaves of value noise at their extreme.
+const LARGEST_TEXTURE: f64 = 1.5 / 0.413_29;
+
+/// Weights w_0 ..= w_R of the lateral smoothing; symmetric. No smoothing below 0.05 lines.
+pub fn lateral_taps(lines: f64) -> Vec<f64> {
+    if lines < 0.05 {
+        return vec![1.0];
+    }
+    gaussian_taps(lines, ((3.0 * lines).ceil() as i32).min(16))
+}
+
+fn gaussian_taps(sigma: f64, radius: i32) -> Vec<f64> {
+    (0..=radius)
+        .map(|j| (-f64::from(j * j) / (2.0 * sigma * sigma)).exp())
+        .collect()
+}
+
+/// Autocorrelation at lag `m` of a symmetric kernel given by its right half.
+fn autocorrelation(taps: &[f64], m: usize) -> f64 {
+    let radius = taps.len() as i64 - 1;
+    let at = |j: i64| taps.get(j.unsigned_abs() as usize).copied().unwrap_or(0.0);
+    (-radius..=radius).map(|j| at(j) * at(j + m as i64)).sum()
+}
+
+/// The levels of one scene. Lengths in mm, gains linear.
+pub struct Calibration<'a> {
+    scene: &'a Scene,
+    /// Sigma of the axial kernel, samples.
+    pub axial_sigma: f64,
+    axial_taps: Vec<f64>,
+}
+
+impl<'a> Calibration<'a> {
+    /// Levels of `scene`.
+    pub fn new(scene: &'a Scene) -> Self {
+        let sigma = scene.probe.sigma_axial() * scene.imaging.psf_scale[0];
+        let samples = sigma / scene.probe.sample_pitch();
+        // Linear splitting convolves with a triangle of variance 1/6 sample^2. A pulse narrower
+        // than that cannot be represented: it shows as the triangle alone.
+        let axial_sigma = (samples * samples - 1.0 / 6.0).max(0.01).sqrt();
+        let radius = ((4.0 * axial_sigma).ceil() as i32).min(32);
+        Self {
+            scene,
+            axial_sigma,
+            axial_taps: gaussian_taps(axial_sigma, radius),
+        }
+    }
+
+    /// Two-way lateral sigma at depth `z`, mm, with the user's scale.
+    pub fn sigma_lateral(&self, z: f64) -> f64 {
+        self.scene.probe.sigma_lateral(z) * self.scene.imaging.psf_scale[1]
+    }
+
+    /// Two-way elevational sigma at depth `z`, mm, with the user's scale.
+    pub fn sigma_elevation(&self, z: f64) -> f64 {
+        self.scene.probe.sigma_elevation(z) * self.scene.imaging.psf_scale[2]
+    }
+
+    /// Lateral sigma in scanline pitches; at most 1000, for a phased array's lines meet at z = 0.
+    pub fn lateral_lines(&self, z: f64) -> f64 {
+        (self.sigma_lateral(z) / self.scene.probe.line_pitch(z).max(1e-9)).min(1000.0)
+    }
+
+    /// Two-way attenuation that the machine assumes down to depth `z`, dB, up to the TGC's limit.
+    pub fn compensation_db(&self, z: f64) -> f64 {
+        let imaging = &self.scene.imaging;
+        (2.0 * imaging.tgc_attenuation * self.scene.probe.frequency * z / 10.0)
+            .min(imaging.tgc_limit)
+    }
+
+    /// Compensation of surface echoes at deposit, dB.
+    pub fn surface_compensation_db(&self, z: f64) -> f64 {
+        self.compensation_db(z).min(SURFACE_COMPENSATION_LIMIT)
+    }
+
+    /// TGC at depth `z`, dB: compensation plus sliders.
+    pub fn tgc_db(&self, z: f64) -> f64 {
+        let sliders = &self.scene.imaging.tgc_sliders;
+        let position = (z / self.scene.probe.depth).clamp(0.0, 1.0) * (sliders.len() - 1) as f64;
+        let i = (position as usize).min(sliders.len() - 2);
+        let f = position - i as f64;
+        self.compensation_db(z) + sliders[i] * (1.0 - f) + sliders[i + 1] * f
+    }
+
+    /// Standard deviation of each component of the noise per sample, such that the axial kernel
+    /// brings its RMS magnitude to the wanted level.
+    pub fn noise(&self) -> f64 {
+        amplitude(self.scene.imaging.noise) / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
+    }
+
+    /// Elevational half-width in which one layer sees scatterers, mm.
+    pub fn elevation_reach(&self) -> f64 {
+        let probe = &self.scene.probe;
+        let half_pitch = probe.slice_thickness / (2.0 * f64::from(probe.elevation_layers));
+        let cells = self.scene.simulation.elevation_cells;
+        if cells > 0.0 {
+            (cells * self.scene.simulation.cell / 2.0).min(half_pitch)
+        } else {
+            half_pitch
+        }
+    }
+
+    fn elevations(&self) -> impl Iterator<Item = f64> + '_ {
+        let probe = &self.scene.probe;
+        (0..probe.elevation_layers).map(|e| probe.elevation(e))
+    }
+
+    /// Sum over the layers of a surface echo's weights exp(-y_e^2 / 2 sigma_e^2).
+    pub fn elevation_weights(&self, z: f64) -> f64 {
+        let sigma = self.sigma_elevation(z);
+        let sum: f64 = self
+            .elevations()
+            .map(|y| (-y * y / (2.0 * sigma * sigma)).exp())
+            .sum();
+        sum.max(1e-12)
+    }
+
+    /// S_e^2: energy of the full elevational beam, sqrt(pi) sigma_e, over what the layers see of
+    /// it, sum_e int_{-reach}^{reach} exp(-(y_e + rho)^2 / sigma_e^2) drho.
+    pub fn elevation_power(&self, z: f64) -> f64 {
+        let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
+        let seen: f64 = self
+            .elevations()
+            .map(|y| erf((y + reach) / sigma) - erf((y - reach) / sigma))
+            .sum();
+        (2.0 / seen.max(1e-12)).min(ELEVATION_GAIN_LIMIT)
+    }
+
+    /// int u^2 over the continuous position of an echo, u the linear split followed by the axial
+    /// kernel, at integer lag `m` between two echoes; samples.
+    fn axial_energy(&self, m: usize) -> f64 {
+        // Both pieces are linear in the fraction f: int f^2 = 1/3, int f(1-f) = 1/6.
+        let at = |m| autocorrelation(&self.axial_taps, m);
+        let below = if m == 0 { 1 } else { m - 1 };
+        2.0 / 3.0 * at(m) + (at(m + 1) + at(below)) / 6.0
+    }
+
+    fn speckle_target(&self) -> f64 {
+        amplitude(LIVER_LEVEL + self.scene.simulation.speckle_gain)
+    }
+
+    /// What a scatterer's calibrated amplitude is multiplied with at depth `z`, before attenuation
+    /// compensation.
+    ///
+    /// Lattice: E|IQ|^2 = C^2 v h^-3 (int u^2 dz) (sqrt(pi) erf(cut)) sqrt(pi) with the factor
+    /// 1/sqrt(sigma_x sigma_e) that makes speckle flat with depth; v = 1 is liver.
+    /// Voxel: E|IQ|^2 = C^2 v S_lateral S_axial sum_e w_e^2; lookups in one voxel are equal, so
+    /// both sums run over pairs, weighted with the probability 1 - distance/h that a lattice
+    /// along the beam puts both into one voxel.
+    pub fn speckle_gain(&self, z: f64) -> f64 {
+        let simulation = &self.scene.simulation;
+        let (h, dz) = (simulation.cell, self.scene.probe.sample_pitch());
+        let energy = match simulation.scatter_mode {
+            ScatterMode::Lattice => {
+                let beam = self.sigma_lateral(z) * self.sigma_elevation(z);
+                let slice = PI * erf(LATERAL_CUT) * beam / self.elevation_power(z);
+                h.powi(-3) * self.axial_energy(0) * dz * slice
+            }
+            ScatterMode::Voxel => {
+                let same = |distance: f64| (1.0 - distance / h).max(0.0);
+                let pair = |m: usize| if m == 0 { 1.0 } else { 2.0 };
+                let phase = self.scene.probe.phase_per_mm() * dz;
+                let axial: f64 = (0..2 * self.axial_taps.len())
+                    .map(|m| {
+                        let m_dz = m as f64;
+                        let carrier = (phase * m_dz).cos() * same(m_dz * dz);
+                        pair(m) * carrier * self.axial_energy(m)
+                    })
+                    .sum();
+                let taps = lateral_taps(self.lateral_lines(z));
+                let pitch = self.scene.probe.line_pitch(z);
+                let lateral: f64 = (0..2 * taps.len())
+                    .map(|m| pair(m) * same(m as f64 * pitch) * autocorrelation(&taps, m))
+                    .sum();
+                let sigma = self.sigma_elevation(z);
+                let layers: f64 = self
+                    .elevations()
+                    .map(|y| (-y * y / (sigma * sigma)).exp())
+                    .sum();
+                // Voxels far longer than the pulse hold next to nothing at the carrier; they may
+                // be dark rather than amplified without limit.
+                axial.max(0.01 * self.axial_energy(0)) * lateral * layers.max(1e-12)
+            }
+        };
+        self.speckle_target() / energy.sqrt()
+    }
+
+    /// What a point's stated amplitude is multiplied with at depth `z`, before compensation: like
+    /// scatterers it brightens where the beam is narrow, 1/sqrt(sigma_x sigma_e), and shows its
+    /// stated amplitude at the transmit focus. sigma_e is taken there too: where the lens focuses
+    /// at another depth, points between the two foci are brighter than stated.
+    pub fn point_gain(&self, z: f64) -> f64 {
+        let area = |z| self.sigma_lateral(z) * self.sigma_elevation(z);
+        (area(self.scene.probe.focus) / area(z)).sqrt()
+    }
+
+    /// Mean and standard deviation of a tissue's scatterer amplitudes, scaled such that the power
+    /// v (1 + k^2) is its echogenicity, with v = rho (sigma^2 + mu^2) - (rho mu)^2 |Phi|^2: the
+    /// carrier kills what repeats from cell to cell. Phi is the characteristic function of the
+    /// uniform position inside a cell, for a beam along a lattice axis; k is the depth of the
+    /// low-frequency texture of unit variance.
+    pub fn scatterer_amplitudes(&self, tissue: &Tissue) -> (f64, f64) {
+        let probe = &self.scene.probe;
+        let simulation = &self.scene.simulation;
+        let phi = match simulation.scatter_mode {
+            ScatterMode::Lattice => {
+                sinc(2.0 * probe.frequency * simulation.cell / tissue.speed)
+            }
+            ScatterMode::Voxel => sinc(2.0 * probe.frequency * probe.sample_pitch() / probe.speed),
+        };
+        let (rho, m) = (tissue.density_of_scatterers, tissue.mean_over_sigma);
+        let variance = rho * (1.0 + m * m) - (rho * m * phi).powi(2);
+        let power = amplitude(tissue.echogenicity).powi(2);
+        if variance <= 0.0 || power == 0.0 {
+            return (0.0, 0.0);
+        }
+        let sigma = (power / (variance * (1.0 + tissue.texture_depth.powi(2)))).sqrt();
+        (m * sigma, sigma)
+    }
+
+    /// Largest amplitude and power over all tissues, with its place at one depth.
+    fn loudest(&self) -> (f64, f64) {
+        self.scene.tissues.iter().fold((0.0, 0.0), |(a, p), tissue| {
+            let (mean, sigma) = self.scatterer_amplitudes(tissue);
+            let largest = (mean.abs() + largest_gaussian() * sigma)
+                * (1.0 + tissue.texture_depth * LARGEST_TEXTURE);
+            // A sample is longer, in mm, where sound is faster.
+            let power = if sigma > 0.0 {
+                amplitude(tissue.echogenicity).powi(2) * tissue.speed / self.scene.probe.speed
+            } else {
+                0.0
+            };
+            (f64::max(a, largest), f64::max(p, power))
+        })
+    }
+
+    /// Bound on one component of the scatterers' sum in one sample at depth `z`, compensated.
+    ///
+    /// Lattice: the terms are independent, of zero mean (random phase), at most M each and of
+    /// total variance V, so Bernstein's inequality bounds the sum by L M / 3 + sqrt((L M / 3)^2 +
+    /// 2 L V) but for a probability of 2 exp(-L) per sample; L = 35 makes that 1e-15, never in
+    /// 1e9 samples. (About 8.4 standard deviations plus 23 times the loudest scatterer.) The
+    /// absolute sum would be an order of magnitude more, for phases that cannot all agree.
+    /// Voxel: per layer at most three lookups reach a sample, with shares that sum to 2: absolute.
+    /// Twice either, since reflected branches may add at most as much again.
+    pub fn scatterer_bound(&self, z: f64) -> f64 {
+        let (largest, power) = self.loudest();
+        let gain = self.speckle_gain(z) * amplitude(self.compensation_db(z));
+        if self.scene.simulation.scatter_mode == ScatterMode::Voxel {
+            return 4.0 * largest * gain * self.elevation_weights(z);
+        }
+        let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
+        let nearest = self.elevations().fold(f64::INFINITY, |n, y| n.min(y.abs()));
+        let beside = (nearest - reach).max(0.0) / sigma;
+        let m = largest * gain * (-beside * beside / 2.0).exp();
+        // The triangle of the linear split has energy 2/3; half the power is in each component.
+        let rms = self.speckle_target() * amplitude(self.compensation_db(z));
+        let v = power * rms * rms * (2.0 / 3.0) / self.axial_energy(0) / 2.0;
+        let l = 35.0;
+        2.0 * (l * m / 3.0 + ((l * m / 3.0).powi(2) + 2.0 * l * v).sqrt())
+    }
+
+    /// Bound on one component of the points' sum in one sample at depth `z`, compensated. Points
+    /// of a wire, weighted with a Gaussian of at most sigma = max(sigma_x, sigma_e, dz), sum to at
+    /// most 1 + sqrt(2 pi) sigma / spacing; the two loudest wires may cross there.
+    pub fn point_bound(&self, z: f64) -> f64 {
+        let widest = self
+            .sigma_lateral(z)
+            .max(self.sigma_elevation(z))
+            .max(self.scene.probe.sample_pitch());
+        let mut sums: Vec<f64> = self
+            .scene
+            .wires
+            .iter()
+            .map(|wire| {
+                let count = super::tables::wire_points(wire).len() as f64;
+                let spacing = super::tables::wire_spacing(wire);
+                let weights = 1.0 + TAU.sqrt() * widest / spacing.max(1e-9);
+                wire.amplitude.abs() * weights.min(count)
+            })
+            .collect();
+        sums.sort_by(|a, b| b.total_cmp(a));
+        let sum: f64 = sums.iter().take(2).sum();
+        sum * self.point_gain(z) * amplitude(self.compensation_db(z))
+    }
+
+    /// Bound on one component of the surface echoes' sum in one sample at depth `z`, compensated.
+    /// N paths of share 1/N add gamma A at most coherently and sqrt(1 - gamma^2) sqrt(N) A when
+    /// all incoherent phases agree, A <= gain; sum <= sqrt(1 + N) (Cauchy and Schwarz). The
+    /// layers' weights sum to 1. Two such interfaces may share a sample.
+    pub fn surface_bound(&self, z: f64) -> f64 {
+        let loudest = self
+            .scene
+            .instances
+            .iter()
+            .flat_map(|instance| instance.surface)
+            .fold(0.0, |gain, surface| f64::max(gain, amplitude(surface.gain)));
+        2.0 * (1.0 + f64::from(self.scene.simulation.paths)).sqrt()
+            * loudest
+            * self.surface_level()
+            * amplitude(self.surface_compensation_db(z))
+    }
+
+    /// Level of all surface echoes, linear.
+    pub fn surface_level(&self) -> f64 {
+        amplitude(self.scene.simulation.surface_gain)
+    }
+
+    /// Fixed-point scales of surface and volume: the largest powers of two up to 2^20 with which
+    /// the bounds above stay below 2^30 in every sample. The kernels clamp and count what is
+    /// beyond.
+    pub fn scales(&self) -> (f64, f64) {
+        let pitch = self.scene.probe.sample_pitch();
+        let (mut surface, mut volume) = (0f64, 0f64);
+        // The bounds vary with the beam's width, slowly: every sixteenth sample, with 5 % spare.
+        for k in (0..self.scene.probe.samples + 16).step_by(16) {
+            let z = f64::from(k.min(self.scene.probe.samples)) * pitch;
+            surface = surface.max(self.surface_bound(z));
+            volume = volume.max(self.scatterer_bound(z) + self.point_bound(z));
+        }
+        (scale(1.05 * surface), scale(1.05 * volume))
+    }
+}
+
+/// Largest power of two up to 2^20 whose product with `bound` is below 2^30.
+fn scale(bound: f64) -> f64 {
+    let mut scale = LARGEST_SCALE;
+    while scale * bound >= HEADROOM {
+        scale /= 2.0;
+    }
+    scale
+}

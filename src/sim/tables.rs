@@ -1,0 +1,275 @@
+//! What the kernels read: a scene as the structures of [`layout`](super::layout), computed in f64.
+
+use std::f64::consts::FRAC_PI_2;
+
+use glam::DAffine3;
+
+use super::calibration::{Calibration, LATERAL_CUT, amplitude};
+use super::layout::{self, Rows};
+use super::special::half_normal_coherence;
+use crate::probe::{Kind, Probe};
+use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, TextureSpace};
+use crate::scene::{Scene, Wire};
+
+/// Roughness at and above which a surface is a perfect mirror.
+const MIRROR: f64 = 1e9;
+/// Most segments kept per line (80 bytes each).
+const LARGEST_SEGMENT_CAPACITY: u32 = 1024;
+
+/// The rows of a 3x4 matrix.
+pub fn matrix_rows(m: &DAffine3) -> Rows {
+    std::array::from_fn(|i| {
+        let row = m.matrix3.row(i);
+        [row.x, row.y, row.z, m.translation[i]].map(|x| x as f32)
+    })
+}
+
+/// The sector's bounding box in probe space: left, top, right, bottom, mm. The top of a convex
+/// face is above z = 0 at its edges.
+fn bounds(probe: &Probe) -> [f64; 4] {
+    let fan = |radius: f64, field_of_view: f64| {
+        let half = field_of_view / 2.0;
+        let outer = radius + probe.depth;
+        let x = if half < FRAC_PI_2 {
+            outer * half.sin()
+        } else {
+            outer
+        };
+        let edge = if half < FRAC_PI_2 { radius } else { outer };
+        [-x, edge * half.cos() - radius, x, probe.depth]
+    };
+    match probe.kind {
+        Kind::Convex {
+            radius,
+            field_of_view,
+        } => fan(radius, field_of_view),
+        Kind::Phased { field_of_view } => fan(0.0, field_of_view),
+        Kind::Linear { width } => [-width / 2.0, 0.0, width / 2.0, probe.depth],
+    }
+}
+
+/// Most segments that the paths of one line can emit, within reason: a null event emits none, so
+/// a path has at most one per interaction and one after the last; on the main path only the first
+/// sample of each branch emits.
+fn segment_capacity(scene: &Scene) -> u32 {
+    let simulation = &scene.simulation;
+    let path = simulation.max_interactions + 1;
+    let paths = match simulation.sampling {
+        Sampling::MainPath => path,
+        Sampling::Plain | Sampling::SharedPrimary => simulation.paths.max(1),
+    };
+    path.saturating_mul(paths).min(LARGEST_SEGMENT_CAPACITY)
+}
+
+/// Everything that is constant over frame `frame_index`. The flag for coincident surfaces is the
+/// world's to add: it depends on triangles.
+pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
+    let calibration = Calibration::new(scene);
+    let (probe, simulation, imaging) = (&scene.probe, &scene.simulation, &scene.imaging);
+    let (kind, radius, field_of_view, width) = match probe.kind {
+        Kind::Convex {
+            radius,
+            field_of_view,
+        } => (0, radius, field_of_view, 0.0),
+        Kind::Linear { width } => (1, 0.0, 0.0, width),
+        Kind::Phased { field_of_view } => (2, 0.0, field_of_view, 0.0),
+    };
+    let flag = |on: bool, flag: u32| if on { flag } else { 0 };
+    let [left, top, right, bottom] = bounds(probe);
+    let pixel_pitch = (bottom - top) / f64::from(imaging.image_height.max(1));
+    let image_width = ((right - left) / pixel_pitch).ceil().max(1.0);
+    let (surface_scale, volume_scale) = calibration.scales();
+    layout::Frame {
+        world_from_probe: matrix_rows(&scene.world_from_probe),
+        probe_from_world: matrix_rows(&scene.world_from_probe.inverse()),
+        kind,
+        scanlines: probe.scanlines,
+        layers: probe.elevation_layers,
+        samples: probe.samples,
+        depth: probe.depth as f32,
+        radius: radius as f32,
+        field_of_view: field_of_view as f32,
+        width: width as f32,
+        slice_thickness: probe.slice_thickness as f32,
+        speed: probe.speed as f32,
+        sample_pitch: probe.sample_pitch() as f32,
+        frequency: probe.frequency as f32,
+        paths: simulation.paths.max(1),
+        sampling: match simulation.sampling {
+            Sampling::MainPath => 0,
+            Sampling::Plain => 1,
+            Sampling::SharedPrimary => 2,
+        },
+        max_interactions: simulation.max_interactions,
+        max_reflections: simulation.max_reflections,
+        min_weight: simulation.min_weight as f32,
+        volume_floor: amplitude(simulation.volume_floor) as f32,
+        flags: flag(
+            simulation.rough_transmission,
+            layout::FLAG_ROUGH_TRANSMISSION,
+        ) | flag(simulation.face_reflection, layout::FLAG_FACE_REFLECTION)
+            | flag(
+                simulation.texture_space == TextureSpace::World,
+                layout::FLAG_WORLD_TEXTURE,
+            )
+            | flag(
+                simulation.coherence == Coherence::Coherent,
+                layout::FLAG_COHERENT,
+            )
+            | flag(
+                simulation.scatter_mode == ScatterMode::Voxel,
+                layout::FLAG_VOXEL,
+            ),
+        seed: simulation.seed,
+        origin_jitter: simulation.origin_jitter as f32,
+        cell: simulation.cell as f32,
+        elevation_reach: calibration.elevation_reach() as f32,
+        lateral_cut: LATERAL_CUT as f32,
+        surface_scale: surface_scale as f32,
+        volume_scale: volume_scale as f32,
+        segment_capacity: segment_capacity(scene),
+        background: scene.background as u32,
+        instances: scene.instances.len() as u32,
+        points: scene.wires.iter().map(|w| wire_points(w).len() as u32).sum(),
+        face_height: probe.elevation_height as f32,
+        axial_sigma: calibration.axial_sigma as f32,
+        noise: calibration.noise() as f32,
+        inverse_reference: amplitude(imaging.gain) as f32,
+        inverse_range: imaging.dynamic_range.recip() as f32,
+        frame_index,
+        image_width: image_width as u32,
+        image_height: imaging.image_height.max(1),
+        pixel_pitch: pixel_pitch as f32,
+        image_left: (-image_width * pixel_pitch / 2.0) as f32,
+        image_top: top as f32,
+        ..layout::Frame::default()
+    }
+}
+
+/// One row per axial sample.
+pub fn rows(scene: &Scene) -> Vec<layout::Row> {
+    let calibration = Calibration::new(scene);
+    let (surface_scale, volume_scale) = calibration.scales();
+    let pitch = scene.probe.sample_pitch();
+    (0..scene.probe.samples)
+        .map(|k| {
+            let z = f64::from(k) * pitch;
+            let compensation = amplitude(calibration.compensation_db(z));
+            let surface = amplitude(calibration.surface_compensation_db(z));
+            let weights = calibration.elevation_weights(z);
+            layout::Row {
+                sigma_lateral: calibration.sigma_lateral(z) as f32,
+                sigma_elevation: calibration.sigma_elevation(z) as f32,
+                volume_gain: (calibration.speckle_gain(z) * compensation) as f32,
+                point_gain: (calibration.point_gain(z) * compensation) as f32,
+                surface_gain: (calibration.surface_level() * surface / weights) as f32,
+                volume_undo: (volume_scale * compensation).recip() as f32,
+                surface_undo: (surface_scale * surface).recip() as f32,
+                lateral_lines: calibration.lateral_lines(z) as f32,
+                tgc: amplitude(calibration.tgc_db(z)) as f32,
+                compensation: compensation as f32,
+                unused0: 0.0,
+                unused1: 0.0,
+            }
+        })
+        .collect()
+}
+
+/// The acoustic table at the probe's frequency, amplitudes calibrated.
+pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
+    let calibration = Calibration::new(scene);
+    scene
+        .tissues
+        .iter()
+        .enumerate()
+        .map(|(i, tissue)| {
+            let (mean, sigma) = calibration.scatterer_amplitudes(tissue);
+            let silent = sigma == 0.0;
+            layout::Tissue {
+                speed: tissue.speed as f32,
+                impedance: tissue.impedance() as f32,
+                absorption: tissue.absorption(scene.probe.frequency) as f32,
+                presence: if silent {
+                    0.0
+                } else {
+                    tissue.density_of_scatterers as f32
+                },
+                mean: mean as f32,
+                sigma: sigma as f32,
+                texture_depth: tissue.texture_depth as f32,
+                // The kernel divides by it; without texture its value is of no matter.
+                texture_length: if tissue.texture_length > 0.0 {
+                    tissue.texture_length as f32
+                } else {
+                    1.0
+                },
+                // Distinct lattices, by Knuth's multiplicative hash of the index.
+                seed: scene.simulation.seed ^ (i as u32 + 1).wrapping_mul(2_654_435_761),
+                ..layout::Tissue::default()
+            }
+        })
+        .collect()
+}
+
+/// Surfaces 2i (outside) and 2i + 1 (inside) of instance i.
+pub fn surfaces(scene: &Scene) -> Vec<layout::Surface> {
+    let phase = scene.probe.phase_per_mm();
+    scene
+        .instances
+        .iter()
+        .flat_map(|instance| instance.surface)
+        .map(|surface| layout::Surface {
+            roughness: surface.roughness.min(MIRROR) as f32,
+            thickness: surface.thickness as f32,
+            specularity: surface.specularity as f32,
+            gain: amplitude(surface.gain) as f32,
+            coherence: half_normal_coherence(phase, surface.thickness) as f32,
+            ..layout::Surface::default()
+        })
+        .collect()
+}
+
+/// Distance between neighbouring points of a wire, mm: the wanted spacing, rounded so that both
+/// ends carry a point. Infinite for a single point.
+pub fn wire_spacing(wire: &Wire) -> f64 {
+    let [a, b] = wire.ends.map(glam::DVec3::from);
+    let length = a.distance(b);
+    let steps = (length / wire.spacing).round().max(1.0);
+    if length == 0.0 {
+        f64::INFINITY
+    } else {
+        length / steps
+    }
+}
+
+/// World positions of a wire's points, mm.
+pub fn wire_points(wire: &Wire) -> Vec<[f64; 3]> {
+    let [a, b] = wire.ends.map(glam::DVec3::from);
+    let steps = (a.distance(b) / wire_spacing(wire)).round() as u32;
+    (0..=steps)
+        .map(|i| {
+            a.lerp(b, f64::from(i) / f64::from(steps.max(1)))
+                .to_array()
+        })
+        .collect()
+}
+
+/// Every point target: world position, mm, and amplitude.
+pub fn points(scene: &Scene) -> Vec<[f32; 4]> {
+    scene
+        .wires
+        .iter()
+        .flat_map(|wire| {
+            wire_points(wire)
+                .into_iter()
+                .map(|[x, y, z]| [x, y, z, wire.amplitude].map(|v| v as f32))
+        })
+        .collect()
+}
+
+/// Grey level of each of 256 log-compressed values: 255 v^gamma.
+pub fn grey_map(imaging: &Imaging) -> Vec<u32> {
+    (0..256)
+        .map(|i| (255.0 * (f64::from(i) / 255.0).powf(imaging.grey_gamma)).round() as u32)
+        .collect()
+}
