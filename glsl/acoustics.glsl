@@ -1,0 +1,61 @@
+// Interfaces between fluids: refraction by sound speeds, pressure reflection, rough normals.
+
+// Signed pressure reflection coefficient at incidence cos_i from medium 1 into 2 (fluid-fluid).
+// Total reflection gives +1; the true phase of the evanescent case is not modelled.
+float reflection(float z1, float c1, float z2, float c2, float cos_i) {
+    float k = c2 / c1;
+    float sin2_t = k * k * (1.0 - cos_i * cos_i);
+    if (sin2_t >= 1.0) return 1.0;
+    float cos_t = sqrt(1.0 - sin2_t);
+    float a = z2 * cos_i;
+    float b = z1 * cos_t;
+    return (a - b) / (a + b);
+}
+
+// Snell's law by sound speeds: sin(t) / c2 = sin(i) / c1. False at total reflection.
+bool refraction(vec3 d, vec3 n, float c1, float c2, out vec3 transmitted) {
+    float k = c2 / c1;
+    float cos_i = -dot(d, n);
+    float sin2_t = k * k * (1.0 - cos_i * cos_i);
+    transmitted = d;
+    if (sin2_t >= 1.0) return false;
+    transmitted = normalize(k * d + (k * cos_i - sqrt(1.0 - sin2_t)) * n);
+    return true;
+}
+
+// Orthonormal frame about n (Duff et al., JCGT 6(1), 2017).
+void basis(vec3 n, out vec3 tangent, out vec3 bitangent) {
+    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    float b = n.x * n.y * a;
+    tangent = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
+    bitangent = vec3(b, s + n.y * n.y * a, -n.y);
+}
+
+// Exponents above this are a mirror: the rms tilt is below 5e-5 rad.
+const float SPECULAR = 1e9;
+
+// Micro-normal about n whose reflection leaves on the near side of the geometric normal: pdf
+// (s+1)/(2 pi) cos^s. False when eight attempts fail.
+bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, uint key, uint seed, out vec3 m) {
+    if (roughness >= SPECULAR) {
+        m = n;
+        return dot(d, m) < 0.0 && dot(d - 2.0 * dot(d, m) * m, n_geometric) > 0.0;
+    }
+    vec3 tangent, bitangent;
+    basis(n, tangent, bitangent);
+    for (uint attempt = 0u; attempt < 8u; ++attempt) {
+        uvec4 bits = path_random(path, key, PURPOSE_NORMAL + attempt, seed);
+        // cos t = u^(1/(s+1)); sin^2 = 1 - exp(-x), by series where 1 - cos^2 would cancel.
+        float x = -2.0 * log(max(unit(bits.x), 1.0 / 16777216.0)) / (roughness + 1.0);
+        float sin2 = x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x);
+        float cos_t = sqrt(1.0 - sin2);
+        float sin_t = sqrt(sin2);
+        float azimuth = 6.283185307 * unit(bits.y);
+        m = normalize(sin_t * cos(azimuth) * tangent + sin_t * sin(azimuth) * bitangent + cos_t * n);
+        float along = dot(d, m);
+        if (along < 0.0 && dot(d - 2.0 * along * m, n_geometric) > 0.0) return true;
+    }
+    m = n;
+    return false;
+}

@@ -1,0 +1,18 @@
+// Complex baseband deposit: an echo at one-way time T lands between two axial samples with the
+// phase of the two-way carrier, so that position is kept to a fraction of a sample.
+
+const float FIXED_LIMIT = 1073741824.0; // 2^30
+
+vec2 carrier(float time) {
+    float angle = -6.283185307 * fract(2.0 * frame.frequency * time);
+    return vec2(cos(angle), sin(angle));
+}
+
+int to_fixed(float value, float scale) {
+    float v = value * scale;
+    if (!(abs(v) < FIXED_LIMIT)) {
+        atomicAdd(counters.saturated, 1u);
+        v = v > 0.0 ? FIXED_LIMIT : (v < 0.0 ? -FIXED_LIMIT : 0.0);
+    }
+    return int(floor(v + 0.5));
+}

@@ -1,0 +1,36 @@
+// Which medium encloses a point: a small stack of instance ids, entered in order.
+
+struct Media { uint count; uint ids[MAX_STACK]; };
+
+// The entry of highest priority; ties go to the one entered last. NONE: the background.
+uint current_instance(Media media) {
+    uint best = NONE;
+    int priority = -2147483647;
+    for (uint i = 0u; i < media.count; ++i) {
+        int p = instances[media.ids[i]].priority;
+        if (p >= priority) { priority = p; best = media.ids[i]; }
+    }
+    return best;
+}
+
+uint tissue_of(uint instance) {
+    return instance == NONE ? frame.background : instances[instance].tissue;
+}
+
+// Entering pushes; leaving removes the last occurrence. False when the stack is full.
+bool cross_interface(inout Media media, uint instance, bool entering) {
+    if (entering) {
+        if (media.count >= MAX_STACK) return false;
+        media.ids[media.count] = instance;
+        media.count += 1u;
+        return true;
+    }
+    uint at = NONE;
+    for (uint i = 0u; i < media.count; ++i) {
+        if (media.ids[i] == instance) at = i;
+    }
+    if (at == NONE) return true;
+    for (uint i = at; i + 1u < media.count; ++i) media.ids[i] = media.ids[i + 1u];
+    media.count -= 1u;
+    return true;
+}

@@ -1,0 +1,339 @@
+// variants: bvh query(RAY_QUERY)
+#version 460
+// Paths of one (scanline, elevation layer) through the anatomy: surface echoes are deposited,
+// stretches inside a medium are written out as segments for scatter. docs/kernels.md has the steps.
+#extension GL_GOOGLE_include_directive : require
+#ifdef RAY_QUERY
+#extension GL_EXT_ray_query : require
+#endif
+#include "shared.glsl"
+#include "random.glsl"
+
+// One thread is one path: x runs over lines, y over paths.
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 2) readonly buffer SurfaceBuffer { Surface surfaces[]; };
+layout(std430, binding = 3) readonly buffer InstanceBuffer { Instance instances[]; };
+layout(std430, binding = 4) readonly buffer VertexBuffer { float vertices[]; };
+layout(std430, binding = 5) readonly buffer NormalBuffer { float normals[]; };
+layout(std430, binding = 6) readonly buffer TriangleBuffer { uint triangles[]; };
+#ifdef RAY_QUERY
+layout(binding = 7) uniform accelerationStructureEXT tlas;
+#else
+layout(std430, binding = 7) readonly buffer NodeBuffer { uvec4 nodes[]; };
+#endif
+layout(std430, binding = 8) readonly buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 9) readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 10) buffer SurfaceEchoBuffer { int surface_echoes[]; };
+layout(std430, binding = 11) buffer SegmentBuffer { Segment segments[]; };
+layout(std430, binding = 12) buffer SegmentCountBuffer { uint segment_count[]; };
+layout(std430, binding = 13) buffer CounterBuffer { Counters counters; };
+
+layout(push_constant) uniform Push { uint path_begin; uint path_count; };
+
+#ifdef RAY_QUERY
+#include "intersect_query.glsl"
+#else
+#include "intersect_bvh.glsl"
+#endif
+#include "surface.glsl"
+#include "probe.glsl"
+#include "transform.glsl"
+#include "acoustics.glsl"
+#include "media.glsl"
+#include "deposit.glsl"
+
+struct Path {
+    vec3 origin; vec3 direction; vec3 lateral;
+    float handedness; float t_min;
+    float weight;       // one-way intensity, which is the two-way amplitude
+    float share;        // part of an echo's amplitude that this path carries
+    float probability;  // of the stochastic choices made so far
+    float time;         // one way, us
+    vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
+    uint interactions; uint reflections; uint crossings;
+    bool branch;
+    Media media;
+};
+
+uint row_of(float time) {
+    float kappa = frame.speed * time / frame.sample_pitch;
+    return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
+}
+
+void deposit_surface(uint line, float time, vec2 amplitude) {
+    uint l = line % frame.scanlines;
+    float y = elevation(line / frame.scanlines);
+    float kappa = frame.speed * time / frame.sample_pitch;
+    float base = floor(kappa);
+    vec2 q = carrier(time);
+    q = vec2(amplitude.x * q.x - amplitude.y * q.y, amplitude.x * q.y + amplitude.y * q.x);
+    for (int i = 0; i < 2; ++i) {
+        float at = base + float(i);
+        if (!(at >= 0.0 && at < float(frame.samples))) continue;
+        uint k = uint(at);
+        float sigma = rows[k].sigma_elevation;
+        float gain = rows[k].surface_gain * exp(-0.5 * y * y / (sigma * sigma));
+        vec2 v = q * gain * (i == 0 ? 1.0 - (kappa - base) : kappa - base);
+        uint slot = 2u * (l * frame.samples + k);
+        int re = to_fixed(v.x, frame.surface_scale);
+        int im = to_fixed(v.y, frame.surface_scale);
+        if (re != 0) atomicAdd(surface_echoes[slot], re);
+        if (im != 0) atomicAdd(surface_echoes[slot + 1u], im);
+    }
+}
+
+// Which part of the volume this path stands for, and how many paths average down its echoes.
+void emit_segment(Path path, uint line, uint n, uint instance, float extent) {
+    bool whole = frame.sampling == SAMPLING_MAIN_PATH
+        || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u);
+    if (whole && n != 0u) return;
+    uint tissue = tissue_of(instance);
+    if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
+    if (path.branch && path.weight * rows[row_of(path.time)].compensation < frame.volume_floor) return;
+    uint slot = atomicAdd(segment_count[line], 1u);
+    if (slot >= frame.segment_capacity) {
+        atomicAdd(counters.segments_dropped, 1u);
+        return;
+    }
+    uint at = line * frame.segment_capacity + slot;
+    float weight = whole ? path.weight : path.weight * path.share;
+    float share = whole ? 1.0 : max(1.0, path.probability / path.share);
+    segments[at].origin_length = vec4(path.origin, extent);
+    segments[at].direction_time = vec4(path.direction, path.time);
+    segments[at].lateral_weight = vec4(path.lateral, weight);
+    segments[at].spread = vec4(path.spread, share);
+    segments[at].tissue = tissue;
+    segments[at].instance = instance;
+    segments[at].line = line;
+    segments[at].handedness = path.handedness;
+}
+
+Path start(uint line, uint n) {
+    vec3 o, d, lateral;
+    probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
+    Path path;
+    path.direction = world_vector(d);
+    path.lateral = world_vector(lateral);
+    float jitter = frame.origin_jitter * gaussian(path_random(n, 0u, PURPOSE_JITTER, frame.seed).x);
+    path.origin = world_point(o) + jitter * path.lateral;
+    path.handedness = 1.0;
+    path.t_min = 0.0;
+    path.weight = 1.0;
+    path.share = 1.0 / float(frame.paths);
+    path.probability = 1.0;
+    path.time = 0.0;
+    path.spread = vec3(0.0);
+    path.interactions = 0u;
+    path.reflections = 0u;
+    path.crossings = 0u;
+    path.branch = false;
+    path.media.count = stacks[line * (MAX_STACK + 1u)];
+    for (uint i = 0u; i < MAX_STACK; ++i) path.media.ids[i] = stacks[line * (MAX_STACK + 1u) + 1u + i];
+    return path;
+}
+
+float clearance(vec3 p) {
+    return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+}
+
+void reflect_path(inout Path path, vec3 m, float roughness) {
+    path.direction = normalize(path.direction - 2.0 * dot(path.direction, m) * m);
+    path.lateral = path.lateral - 2.0 * dot(path.lateral, m) * m;
+    path.handedness = -path.handedness;
+    path.reflections += 1u;
+    if (roughness < SPECULAR) path.spread.z += 4.0 / (roughness + 2.0);
+}
+
+bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
+    vec3 d;
+    if (!refraction(path.direction, n, c1, c2, d) || dot(d, n_geometric) >= 0.0) {
+        if (!refraction(path.direction, n_geometric, c1, c2, d)) return false;
+    }
+    path.lateral = normalize(path.lateral - dot(path.lateral, d) * d);
+    path.direction = d;
+    return true;
+}
+
+// Moves the path along its segment: attenuation, time, widening after rough reflections.
+void advance(inout Path path, float t, Tissue tissue, vec3 position) {
+    path.weight *= exp(-tissue.absorption * t);
+    path.time += t / tissue.speed;
+    path.spread.x += t * (2.0 * path.spread.y + t * path.spread.z);
+    path.spread.y += t * path.spread.z;
+    path.origin = position;
+    path.t_min = clearance(position);
+}
+
+Tissue load_tissue(uint i) {
+    Tissue t;
+    t.speed = tissues[i].speed;
+    t.impedance = tissues[i].impedance;
+    t.absorption = tissues[i].absorption;
+    return t;
+}
+
+Surface load_surface(uint i) {
+    Surface s;
+    s.roughness = surfaces[i].roughness;
+    s.thickness = surfaces[i].thickness;
+    s.specularity = surfaces[i].specularity;
+    s.gain = surfaces[i].gain;
+    s.coherence = surfaces[i].coherence;
+    return s;
+}
+
+// The echo of one interface by one path; m is the sampled micro-normal.
+void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tissue t1, Tissue t2, vec3 m) {
+    float cos_m = -dot(path.direction, m);
+    float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_m);
+    float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
+    if (facing <= 0.0) return;
+    float amplitude = path.weight * r * pow(facing, s.specularity) * s.gain;
+    float q = s.thickness * abs(gaussian(path_random(n, key, PURPOSE_THICKNESS, frame.seed).x));
+    float late = path.time + q / t1.speed;
+    float behind = amplitude * exp(-t1.absorption * q);
+    if ((frame.flags & FLAG_COHERENT) != 0u) {
+        deposit_surface(line, late, vec2(path.share * behind, 0.0));
+        return;
+    }
+    deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0));
+    if (s.coherence >= 1.0) return;
+    vec3 p = texture_point(instance, path.origin) * 2.0;
+    uvec3 cell = uvec3(ivec3(floor(p)));
+    float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
+    float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
+    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)));
+}
+
+void main() {
+    uint line = gl_GlobalInvocationID.x;
+    uint n = path_begin + gl_GlobalInvocationID.y;
+    if (line >= frame.scanlines * frame.layers || gl_GlobalInvocationID.y >= path_count) return;
+
+    Path path = start(line, n);
+    Path main_path = path;
+    bool resume = false;
+    float time_end = frame.depth / frame.speed;
+    uint limit = 64u + frame.max_interactions;
+    uint rays = 0u, interactions = 0u;
+
+    // A main path spawns at most one branch per interaction, and a branch spawns none.
+    for (uint guard = 0u; guard < limit * (frame.max_interactions + 2u); ++guard) {
+        bool alive = path.interactions < frame.max_interactions && path.crossings < limit
+            && path.weight >= frame.min_weight && path.time < time_end;
+        if (!alive) {
+            if (!resume) break;
+            resume = false;
+            path = main_path;
+            continue;
+        }
+        uint before = current_instance(path.media);
+        Tissue t1 = load_tissue(tissue_of(before));
+        float t_end = (time_end - path.time) * t1.speed;
+        float face = path.reflections > 0u ? face_distance(probe_point(path.origin), probe_vector(path.direction)) : -1.0;
+        bool at_face = face > path.t_min && face < t_end;
+        if (at_face) t_end = face;
+        Hit hit = closest_hit(path.origin, path.direction, path.t_min, t_end, NONE);
+        rays += 1u;
+
+        if (hit.instance == NONE) {
+            emit_segment(path, line, n, before, t_end);
+            vec3 end = path.origin + t_end * path.direction;
+            if (at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections) {
+                advance(path, t_end, t1, end);
+                path.interactions += 1u;
+                reflect_path(path, world_vector(face_normal(probe_point(end))), SPECULAR);
+            } else {
+                path.weight = 0.0;
+            }
+            continue;
+        }
+
+        vec3 position = surface_position(hit);
+        vec3 n_geometric = surface_geometric_normal(hit);
+        bool entering = dot(path.direction, n_geometric) < 0.0;
+        Media media = path.media;
+        if (!cross_interface(media, hit.instance, entering)) atomicAdd(counters.stack_overflow, 1u);
+        float past = hit.t + clearance(position);
+        if ((frame.flags & FLAG_COINCIDENT) != 0u) {
+            Hit twin = closest_hit(path.origin, path.direction, max(hit.t - clearance(position), 0.0), past, hit.instance);
+            rays += 1u;
+            if (twin.instance != NONE) {
+                cross_interface(media, twin.instance, dot(path.direction, surface_geometric_normal(twin)) < 0.0);
+                past = max(past, twin.t + clearance(position));
+            }
+        }
+        uint after = current_instance(media);
+        path.crossings += 1u;
+        if (after == before) {
+            path.media = media;
+            path.t_min = past;
+            continue;
+        }
+
+        emit_segment(path, line, n, before, hit.t);
+        advance(path, hit.t, t1, position);
+        path.interactions += 1u;
+        interactions += 1u;
+        uint key = path.interactions + 32u * path.reflections;
+        vec3 n_shading = surface_shading_normal(hit);
+        if (!entering) { n_geometric = -n_geometric; n_shading = -n_shading; }
+        if (!(dot(path.direction, n_shading) < 0.0)) n_shading = n_geometric;
+        Tissue t2 = load_tissue(tissue_of(after));
+        Surface s = load_surface(entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside);
+
+        float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, -dot(path.direction, n_shading));
+        float reflected = r * r;
+        vec3 m;
+        bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, m);
+        if (rough) echo(path, line, n, key, hit.instance, s, t1, t2, m);
+
+        bool can_reflect = rough && path.reflections < frame.max_reflections;
+        float choice = unit(path_random(n, key, PURPOSE_CHOICE, frame.seed).x);
+        bool splits = frame.sampling == SAMPLING_MAIN_PATH && !path.branch;
+        bool reflects;
+        if (splits) {
+            float wanted = clamp(ceil(float(frame.paths) * reflected), 1.0, float(frame.paths));
+            bool strong = reflected >= 0.01;
+            reflects = can_reflect && (strong ? float(n) < wanted : n == 0u && choice < reflected * 100.0);
+            main_path = path;
+            if (reflects) {
+                path.branch = true;
+                path.weight *= strong ? reflected : 0.01;
+                path.share = strong ? 1.0 / wanted : 1.0;
+                path.probability = strong ? 1.0 : reflected * 100.0;
+            }
+            // The main path goes on behind the interface, now or after its branch.
+            vec3 refracting = rough && (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u ? m : n_shading;
+            bool through = reflected < 1.0 && transmit_path(main_path, refracting, n_geometric, t1.speed, t2.speed);
+            main_path.weight = through ? main_path.weight * (1.0 - reflected) : 0.0;
+            main_path.media = media;
+            if (reflects) {
+                resume = true;
+                reflect_path(path, m, s.roughness);
+            } else {
+                path = main_path;
+            }
+            continue;
+        }
+        if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
+        reflects = choice < reflected;
+        path.probability *= reflects ? reflected : 1.0 - reflected;
+        if (reflects) {
+            if (can_reflect) reflect_path(path, m, s.roughness);
+            else path.weight = 0.0;
+        } else {
+            vec3 refracting = rough && (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u ? m : n_shading;
+            path.media = media;
+            if (!transmit_path(path, refracting, n_geometric, t1.speed, t2.speed)) {
+                atomicAdd(counters.paths_lost, 1u);
+                path.weight = 0.0;
+            }
+        }
+    }
+    atomicAdd(counters.rays, rays);
+    if (interactions > 0u) atomicAdd(counters.interactions, interactions);
+}

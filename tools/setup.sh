@@ -1,0 +1,86 @@
+#!/usr/bin/env bash
+# Installs what insonify needs and this machine lacks, and says what it installs. Idempotent, asks
+# nothing. `setup.sh run` is enough to render; without an argument it adds what the tests need
+# (validation layers, spirv-val) and what compiling kernels needs.
+set -eu
+mode=${1:-test}
+
+say() { printf 'setup: %s\n' "$*" >&2; }
+
+manual() {
+  say "$1"
+  say "install by hand, then run this again:"
+  say "  a C compiler and linker (cc), the Vulkan loader (libvulkan.so.1),"
+  say "  a Vulkan driver (your GPU's, or Mesa's lavapipe, 25 or newer for ray query)"
+  [ "$mode" = run ] || say "  the Khronos validation layers, SPIRV-Tools (spirv-val), cmake, a C++ compiler, Python 3"
+  exit 1
+}
+
+command -v cargo >/dev/null || manual "no Rust toolchain: install one first (rustup, Rust 1.95 or newer)"
+
+has_library() { ldconfig -p 2>/dev/null | grep -q "$1"; }
+# A driver is a manifest whose library can be loaded; NVIDIA's and Mesa's land in these folders.
+has_driver() {
+  [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && return 0
+  ls /etc/vulkan/icd.d/*.json /usr/share/vulkan/icd.d/*.json /usr/local/share/vulkan/icd.d/*.json >/dev/null 2>&1
+}
+
+want=()
+command -v cc >/dev/null || want+=(gcc libc6-dev)
+has_library libvulkan.so.1 || want+=(libvulkan1)
+if [ "$mode" != run ]; then
+  ls /usr/share/vulkan/explicit_layer.d/*validation*.json /etc/vulkan/explicit_layer.d/*validation*.json >/dev/null 2>&1 || want+=(vulkan-validationlayers)
+  command -v spirv-val >/dev/null || want+=(spirv-tools)
+  command -v cmake >/dev/null || want+=(cmake)
+  command -v c++ >/dev/null || want+=(g++)
+  command -v make >/dev/null || want+=(make)
+  command -v python3 >/dev/null || want+=(python3)
+fi
+driver=
+has_driver || driver=mesa-vulkan-drivers
+[ ${#want[@]} -eq 0 ] && [ -z "$driver" ] && exit 0
+
+. /etc/os-release 2>/dev/null || true
+case " ${ID:-} ${ID_LIKE:-} " in
+  *" debian "*|*" ubuntu "*) command -v apt-get >/dev/null || manual "no apt-get on ${PRETTY_NAME:-this system}" ;;
+  *) manual "this script knows Debian and Ubuntu, not ${PRETTY_NAME:-this system}; missing: ${want[*]} $driver" ;;
+esac
+if [ "$(id -u)" = 0 ]; then sudo=(); else
+  command -v sudo >/dev/null || manual "needs root to install: ${want[*]} $driver"
+  sudo=(sudo)
+fi
+apt() { "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get "$@" -qq >/dev/null; }
+
+say "apt-get update"
+apt update
+if [ ${#want[@]} -gt 0 ]; then
+  say "installing ${want[*]}"
+  apt install -y --no-install-recommends "${want[@]}"
+fi
+if [ -n "$driver" ]; then
+  # Debian 12's own Mesa has no ray query; its backports have. The line is derived from the
+  # machine's own entry, so that mirror and keyring stay the owner's choice.
+  target=()
+  if [ "${VERSION_CODENAME:-}" = bookworm ] && ! apt-cache policy | grep -q bookworm-backports; then
+    entry=/etc/apt/sources.list.d/insonify-backports
+    if source=$(grep -lsE '^Suites:.*\bbookworm\b' /etc/apt/sources.list.d/*.sources | head -n 1) && [ -n "$source" ]; then
+      uri=$(sed -nE 's/^URIs: *([^ ]+).*/\1/p' "$source" | head -n 1)
+      key=$(sed -nE 's/^(Signed-By: .*)/\1/p' "$source" | head -n 1)
+      say "adding bookworm-backports ($entry.sources) for a Mesa with ray query"
+      printf 'Types: deb\nURIs: %s\nSuites: bookworm-backports\nComponents: main\n%s\n' "$uri" "$key" | "${sudo[@]}" tee "$entry.sources" >/dev/null
+      added=$entry.sources
+    elif line=$(grep -hsE '^deb (\[[^]]*\] )?[^ ]+ bookworm ' /etc/apt/sources.list /etc/apt/sources.list.d/*.list | head -n 1) && [ -n "$line" ]; then
+      say "adding bookworm-backports ($entry.list) for a Mesa with ray query"
+      printf '%s\n' "$line" | sed -E 's/ bookworm .*/ bookworm-backports main/' | "${sudo[@]}" tee "$entry.list" >/dev/null
+      added=$entry.list
+    fi
+    if [ -n "${added:-}" ] && ! apt update; then
+      say "the mirror has no bookworm-backports; taking $added back (the compute tracer works without)"
+      "${sudo[@]}" rm -f "$added"
+      apt update
+    fi
+  fi
+  if apt-cache policy 2>/dev/null | grep -q bookworm-backports; then target=(-t bookworm-backports); fi
+  say "no Vulkan driver found: installing Mesa's, among them the software driver lavapipe"
+  apt install -y --no-install-recommends "${target[@]}" mesa-vulkan-drivers
+fi
