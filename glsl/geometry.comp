@@ -11,7 +11,7 @@ layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 // Per line = e * scanlines + l: (origin, elevation), (direction, face_distance), (lateral, 0), (face_normal, 0).
 // The face is sought from a point `depth` along the ray, looking back: exactly `depth` away, or a
 // miss outside the face's height or for a point.
-layout(std430, binding = 1) writeonly buffer RayBuffer { vec4 rays[]; };
+layout(std430, binding = 1) buffer RayBuffer { vec4 rays[]; };
 
 #include "probe.glsl"
 

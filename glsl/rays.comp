@@ -33,7 +33,7 @@ layout(binding = 4) uniform accelerationStructureEXT tlas;
 layout(std430, binding = 4) readonly buffer Nodes { uvec4 nodes[]; };
 #endif
 layout(std430, binding = 5) readonly buffer Rays { Ray rays[]; };
-layout(std430, binding = 6) writeonly buffer Hits { RayHit hits[]; };
+layout(std430, binding = 6) buffer Hits { RayHit hits[]; };
 
 #ifdef RAY_QUERY
 #include "intersect_query.glsl"

@@ -240,9 +240,7 @@ impl<'a> Calibration<'a> {
         let probe = &self.scene.probe;
         let simulation = &self.scene.simulation;
         let phi = match simulation.scatter_mode {
-            ScatterMode::Lattice => {
-                sinc(2.0 * probe.frequency * simulation.cell / tissue.speed)
-            }
+            ScatterMode::Lattice => sinc(2.0 * probe.frequency * simulation.cell / tissue.speed),
             ScatterMode::Voxel => sinc(2.0 * probe.frequency * probe.sample_pitch() / probe.speed),
         };
         let (rho, m) = (tissue.density_of_scatterers, tissue.mean_over_sigma);
@@ -257,18 +255,21 @@ impl<'a> Calibration<'a> {
 
     /// Largest amplitude and power over all tissues, with its place at one depth.
     fn loudest(&self) -> (f64, f64) {
-        self.scene.tissues.iter().fold((0.0, 0.0), |(a, p), tissue| {
-            let (mean, sigma) = self.scatterer_amplitudes(tissue);
-            let largest = (mean.abs() + largest_gaussian() * sigma)
-                * (1.0 + tissue.texture_depth * LARGEST_TEXTURE);
-            // A sample is longer, in mm, where sound is faster.
-            let power = if sigma > 0.0 {
-                amplitude(tissue.echogenicity).powi(2) * tissue.speed / self.scene.probe.speed
-            } else {
-                0.0
-            };
-            (f64::max(a, largest), f64::max(p, power))
-        })
+        self.scene
+            .tissues
+            .iter()
+            .fold((0.0, 0.0), |(a, p), tissue| {
+                let (mean, sigma) = self.scatterer_amplitudes(tissue);
+                let largest = (mean.abs() + largest_gaussian() * sigma)
+                    * (1.0 + tissue.texture_depth * LARGEST_TEXTURE);
+                // A sample is longer, in mm, where sound is faster.
+                let power = if sigma > 0.0 {
+                    amplitude(tissue.echogenicity).powi(2) * tissue.speed / self.scene.probe.speed
+                } else {
+                    0.0
+                };
+                (f64::max(a, largest), f64::max(p, power))
+            })
     }
 
     /// Bound on one component of the scatterers' sum in one sample at depth `z`, compensated.

@@ -3,5 +3,6 @@
 pub mod bvh;
 pub mod calibration;
 pub mod layout;
+pub mod shaders;
 pub mod special;
 pub mod tables;

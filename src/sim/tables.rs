@@ -130,7 +130,11 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         segment_capacity: segment_capacity(scene),
         background: scene.background as u32,
         instances: scene.instances.len() as u32,
-        points: scene.wires.iter().map(|w| wire_points(w).len() as u32).sum(),
+        points: scene
+            .wires
+            .iter()
+            .map(|w| wire_points(w).len() as u32)
+            .sum(),
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,
         noise: calibration.noise() as f32,
@@ -247,10 +251,7 @@ pub fn wire_points(wire: &Wire) -> Vec<[f64; 3]> {
     let [a, b] = wire.ends.map(glam::DVec3::from);
     let steps = (a.distance(b) / wire_spacing(wire)).round() as u32;
     (0..=steps)
-        .map(|i| {
-            a.lerp(b, f64::from(i) / f64::from(steps.max(1)))
-                .to_array()
-        })
+        .map(|i| a.lerp(b, f64::from(i) / f64::from(steps.max(1))).to_array())
         .collect()
 }
 
