@@ -1,0 +1,45 @@
+// Scan conversion and grey map: one thread per pixel, bilinear in the log-compressed image.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+#include "numbers.glsl"
+
+layout(local_size_x = 16, local_size_y = 8) in;
+layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) readonly buffer LogBuffer { float log_image[]; };
+layout(std430, binding = 2) readonly buffer GreyBuffer { uint grey[256]; };
+layout(std430, binding = 3) writeonly buffer PixelBuffer { uint pixels[]; };
+
+float bilinear(float column, float row) {
+    float c = clamp(column, 0.0, float(frame.scanlines - 1u));
+    float r = clamp(row, 0.0, float(frame.samples - 1u));
+    uint c0 = uint(c);
+    uint r0 = uint(r);
+    uint c1 = min(c0 + 1u, frame.scanlines - 1u);
+    uint r1 = min(r0 + 1u, frame.samples - 1u);
+    float near = mix(log_image[c0 * frame.samples + r0], log_image[c1 * frame.samples + r0], c - float(c0));
+    float far = mix(log_image[c0 * frame.samples + r1], log_image[c1 * frame.samples + r1], c - float(c0));
+    return mix(near, far, r - float(r0));
+}
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    uint j = gl_GlobalInvocationID.y;
+    if (i >= frame.image_width || j >= frame.image_height) { return; }
+    float x = frame.image_left + (float(i) + 0.5) * frame.pixel_pitch;
+    float z = frame.image_top + (float(j) + 0.5) * frame.pixel_pitch;
+    float rho = z;
+    float across = x / frame.width;    // -1/2 .. 1/2 over the face
+    if (frame.kind != KIND_LINEAR) {
+        rho = length(vec2(x, z + frame.radius)) - frame.radius;
+        across = atan(x, z + frame.radius) / frame.field_of_view;
+    }
+    uint pixel = 0u;
+    if (abs(across) <= 0.5 && rho >= 0.0 && rho < frame.depth) {
+        float column = (across + 0.5) * float(frame.scanlines) - 0.5;
+        float v = bilinear(column, rho / frame.sample_pitch);
+        uint level = not_a_number(v) ? 0u : uint(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0));
+        pixel = 0xff000000u | (grey[level] * 0x010101u);
+    }
+    pixels[j * frame.image_width + i] = pixel;
+}
