@@ -8,6 +8,7 @@
     ("origin_bvh", include_bytes!("origin_bvh.spv")),
     ("origin_query", include_bytes!("origin_query.spv")),
     ("rays_bvh", include_bytes!("rays_bvh.spv")),
+    ("rays_count", include_bytes!("rays_count.spv")),
     ("rays_query", include_bytes!("rays_query.spv")),
     ("scatter", include_bytes!("scatter.spv")),
     ("trace_bvh", include_bytes!("trace_bvh.spv")),
