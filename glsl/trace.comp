@@ -221,17 +221,11 @@ void main() {
     uint rays = 0u, interactions = 0u;
 
     // A main path spawns at most one branch per interaction, and a branch spawns none.
-    uint guards = limit * (frame.max_interactions + 2u);
-    for (uint guard = 0u;; ++guard) {
+    for (uint guard = 0u; guard < limit * (frame.max_interactions + 2u); ++guard) {
         bool alive = path.interactions < frame.max_interactions && path.crossings < limit
             && path.weight >= frame.min_weight && path.time < time_end;
-        if (!alive || guard == guards) {
-            if (!resume || guard == guards) {
-                // Inside the loop: naga loses values that a loop carries when they are used after it.
-                atomicAdd(counters.rays, rays);
-                if (interactions > 0u) atomicAdd(counters.interactions, interactions);
-                break;
-            }
+        if (!alive) {
+            if (!resume) break;
             resume = false;
             path = main_path;
             continue;
@@ -340,4 +334,6 @@ void main() {
             }
         }
     }
+    atomicAdd(counters.rays, rays);
+    if (interactions > 0u) atomicAdd(counters.interactions, interactions);
 }

@@ -1,1 +1,9 @@
-fn main() {}
+//! The `insonify` command: parse, run, print one error, exit code.
+
+use std::process::ExitCode;
+
+mod cli;
+
+fn main() -> ExitCode {
+    cli::run()
+}

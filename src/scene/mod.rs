@@ -5,9 +5,22 @@
 
 use glam::{Affine3A, DAffine3};
 
+pub mod check;
+pub mod file;
+pub mod issue;
+mod load_gltf;
+mod load_obj;
+mod load_stl;
+pub mod mesh;
+pub mod normals;
 pub mod settings;
+pub mod shapes;
+pub mod suggest;
 pub mod tissue;
+pub mod topology;
 
+pub use file::SceneError;
+pub use issue::{Issue, Severity, Warning};
 pub use settings::{Imaging, Simulation};
 pub use tissue::Tissue;
 
@@ -26,7 +39,7 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// How an interface reflects, seen from one side (model section 2.3, 13.5).
+/// How an interface reflects, seen from one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {
     /// Exponent s of the micro-normal's power-cosine distribution: 0 diffuse, infinity specular.

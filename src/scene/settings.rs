@@ -1,7 +1,8 @@
 //! What a scene file sets besides anatomy: path tracing, scatterers, image formation.
 
 /// Which paths are followed (model 2.8 and 13.3).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Sampling {
     /// The transmitted path always continues; reflected branches are spawned. Our default, a
     /// stand-in for the adaptive scheme of Mattausch et al. 2018.
@@ -13,7 +14,8 @@ pub enum Sampling {
 }
 
 /// What thickness does to the phase of a surface echo (model 2.7b).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Coherence {
     /// Coherent part at the surface, the rest as static speckle; energy independent of N.
     Split,
@@ -22,7 +24,8 @@ pub enum Coherence {
 }
 
 /// Where scatterers come from (model 3.4).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum ScatterMode {
     /// One point scatterer per cell of a lattice fixed to the tissue.
     Lattice,
@@ -31,7 +34,8 @@ pub enum ScatterMode {
 }
 
 /// To what the scatterer lattice is fixed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum TextureSpace {
     /// To the instance: speckle moves with the anatomy.
     Object,

@@ -237,7 +237,7 @@ pub fn shipped() -> Vec<Tissue> {
 }
 
 /// Names of the shipped tissues, in the table's order.
-pub fn names() -> impl Iterator<Item = &'static str> {
+pub fn names() -> impl Iterator<Item = &'static str> + Clone {
     TABLE.iter().map(|row| row.0)
 }
 

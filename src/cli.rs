@@ -1,0 +1,35 @@
+//! Subcommands, one module each: its arguments and what it does.
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod check;
+
+/// Real-time ultrasound by Monte-Carlo path tracing.
+#[derive(Debug, Parser)]
+#[command(name = "insonify", version)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Check a scene or a mesh and say what it holds; exits 1 on errors
+    Check(check::Check),
+}
+
+/// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
+pub fn run() -> ExitCode {
+    let result = match Cli::parse().command {
+        Command::Check(check) => check.run(),
+    };
+    match result {
+        Ok(code) => code,
+        Err(report) => {
+            eprintln!("{report:?}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,206 @@
+//! What can be wrong with a mesh, and what is worth knowing about it.
+
+use std::path::Path;
+
+use super::issue::Issue;
+use super::mesh::{Soup, Units};
+use super::topology::{self, Edges};
+
+mod coincident;
+mod report;
+
+pub use report::{Report, report};
+
+/// A mesh file should measure between these in its largest direction, mm: from a small cyst to
+/// a tall person. Outside them the unit is wrong far more often than not.
+const SENSIBLE_SIZE: (f64, f64) = (1.0, 2000.0);
+
+/// Measures of a mesh after repair, mm.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Facts {
+    /// Triangles.
+    pub triangles: usize,
+    /// Vertices of distinct position.
+    pub vertices: usize,
+    /// Smallest coordinates, mm.
+    pub min: [f64; 3],
+    /// Largest coordinates, mm.
+    pub max: [f64; 3],
+    /// Enclosed volume, millilitres; none while the mesh is open.
+    pub volume: Option<f64>,
+    /// Edges of a single triangle.
+    pub open_edges: usize,
+    /// Edges of more than two triangles.
+    pub non_manifold_edges: usize,
+}
+
+/// Measures a welded mesh in mm and reports what is wrong with it. `units` is what its file was
+/// read in, for the advice on size. Drops triangles whose corners are not numbers.
+pub(super) fn examine(path: &Path, soup: &mut Soup, units: Units) -> (Facts, Vec<Issue>) {
+    let mut issues = Vec::new();
+    let bad = |p: &[f32; 3]| p.iter().any(|v| !v.is_finite());
+    let not_finite = soup.positions.iter().filter(|p| bad(p)).count();
+    if not_finite > 0 {
+        issues.push(Issue::error(
+            path,
+            not_finite,
+            format!("{not_finite} vertices have coordinates that are not finite numbers"),
+            "export the mesh again",
+        ));
+        let positions = &soup.positions;
+        soup.triangles
+            .retain(|t| t.iter().all(|&i| !bad(&positions[i as usize])));
+    }
+    if soup.triangles.is_empty() {
+        issues.push(Issue::error(
+            path,
+            1,
+            "holds no triangles",
+            "export a triangle mesh with faces",
+        ));
+        return (Facts::default(), issues);
+    }
+    let facts = measure(soup);
+    issues.extend(size(path, &facts, units));
+    if facts.open_edges > 0 {
+        let loops = topology::boundary_loops(soup).len();
+        issues.push(Issue::warning(
+            path,
+            facts.open_edges,
+            format!(
+                "{} open edges in {loops} loops: the mesh encloses nothing there, tissue leaks out",
+                facts.open_edges
+            ),
+            "close it in the modeller or set cap_openings = true",
+        ));
+    }
+    if facts.non_manifold_edges > 0 {
+        issues.push(Issue::warning(
+            path,
+            facts.non_manifold_edges,
+            format!(
+                "{} non-manifold edges (more than two triangles meet)",
+                facts.non_manifold_edges
+            ),
+            "separate the bodies or remove inner faces in the modeller",
+        ));
+    }
+    (facts, issues)
+}
+
+fn measure(soup: &Soup) -> Facts {
+    let mut facts = Facts {
+        triangles: soup.triangles.len(),
+        vertices: soup.positions.len(),
+        min: [f64::INFINITY; 3],
+        max: [f64::NEG_INFINITY; 3],
+        ..Facts::default()
+    };
+    for &i in soup.triangles.iter().flatten() {
+        for (axis, &v) in soup.positions[i as usize].iter().enumerate() {
+            facts.min[axis] = facts.min[axis].min(f64::from(v));
+            facts.max[axis] = facts.max[axis].max(f64::from(v));
+        }
+    }
+    for group in Edges::of(soup).groups() {
+        match group.len() {
+            1 => facts.open_edges += 1,
+            2 => {}
+            _ => facts.non_manifold_edges += 1,
+        }
+    }
+    if facts.open_edges == 0 {
+        facts.volume = Some(topology::volume(soup) / 1000.0);
+    }
+    facts
+}
+
+impl Facts {
+    /// Largest edge of the bounding box, mm.
+    pub fn size(&self) -> f64 {
+        (0..3)
+            .map(|axis| self.max[axis] - self.min[axis])
+            .fold(0.0, f64::max)
+    }
+}
+
+fn size(path: &Path, facts: &Facts, units: Units) -> Option<Issue> {
+    let (least, most) = SENSIBLE_SIZE;
+    let size = facts.size();
+    if (least..=most).contains(&size) {
+        return None;
+    }
+    // Organs measure about a hand's breadth: the unit that comes nearest to it is proposed.
+    let away = |mm: f64| (size / units.0 * mm / 150.0).ln().abs();
+    let guess = Units::NAMES
+        .iter()
+        .filter(|(_, mm)| (least..=most).contains(&(size / units.0 * mm)))
+        .min_by(|a, b| away(a.1).total_cmp(&away(b.1)));
+    let remedy = match guess {
+        Some((name, mm)) => format!(
+            "state its unit: units = \"{name}\" makes it {:.4} mm",
+            size / units.0 * mm
+        ),
+        None => "scale it in the modeller".to_owned(),
+    };
+    Some(Issue::error(
+        path,
+        1,
+        format!("is {size:.4} mm large, which no anatomy is"),
+        remedy,
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::topology::tests::cube;
+    use super::*;
+
+    fn scaled(factor: f32) -> Soup {
+        let mut soup = cube();
+        for p in &mut soup.positions {
+            *p = p.map(|v| v * factor);
+        }
+        soup
+    }
+
+    fn messages(mut soup: Soup) -> Vec<String> {
+        let (_, issues) = examine(Path::new("x"), &mut soup, Units(1.0));
+        issues.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn a_sound_mesh_has_no_findings_and_its_volume() {
+        let mut soup = scaled(100.0);
+        let (facts, issues) = examine(Path::new("x"), &mut soup, Units(1.0));
+        assert!(issues.is_empty(), "{issues:?}");
+        assert_eq!(facts.volume, Some(1000.0));
+        assert_eq!((facts.min, facts.max), ([0.0; 3], [100.0; 3]));
+    }
+
+    #[test]
+    fn planted_faults_are_each_named() {
+        let mut open = scaled(100.0);
+        open.triangles.pop();
+        assert!(messages(open)[0].contains("3 open edges in 1 loops"));
+
+        let mut fin = scaled(100.0);
+        fin.positions.push([50.0, 50.0, 200.0]);
+        fin.triangles.push([0, 1, 8]);
+        assert!(messages(fin).iter().any(|m| m.contains("1 non-manifold")));
+
+        let mut nan = scaled(100.0);
+        nan.positions[3][1] = f32::NAN;
+        assert!(messages(nan)[0].contains("1 vertices have coordinates"));
+
+        assert!(messages(Soup::default())[0].contains("no triangles"));
+    }
+
+    #[test]
+    fn a_tiny_liver_is_refused_with_its_likely_unit() {
+        let found = messages(scaled(0.17));
+        assert!(found[0].starts_with("error"), "{found:?}");
+        assert!(found[0].contains("units = \"m\" makes it 170"), "{found:?}");
+        assert!(messages(scaled(170_000.0))[0].contains("units = \"um\""));
+    }
+}

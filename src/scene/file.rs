@@ -1,0 +1,101 @@
+//! Scene files: TOML with units, checked, every error with its place and a remedy.
+
+use std::path::Path;
+
+use super::{Scene, Warning};
+
+mod anatomy;
+mod document;
+mod error;
+mod parameters;
+mod probe;
+mod schema;
+mod tissues;
+mod units;
+
+pub use error::SceneError;
+
+use document::{Document, Source};
+
+impl Scene {
+    /// Loads a scene file and the meshes that it names. `overrides` are `path = value` pairs put
+    /// in before anything is checked: `probe.depth` = `80 mm`, `mesh.liver.tissue` = `fat`.
+    ///
+    /// # Errors
+    /// The first mistake, with file, line, column and remedy; a mesh that cannot be used counts.
+    pub fn load(
+        path: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<(Self, Vec<Warning>), SceneError> {
+        let source = Source::read(path, overrides)?;
+        let document = source.document()?;
+        let file = document.parse()?;
+        let mut warnings = Vec::new();
+
+        let mut tissues = tissues::Tissues::new(&document, &file.tissues)?;
+        let background =
+            tissues.index("background", file.background.as_deref().unwrap_or("water"))?;
+        let (meshes, instances) =
+            anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
+        let wires = anatomy::wires(&document, &file.wire)?;
+        let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
+        let simulation = parameters::simulation(&document, file.simulation)?;
+        let imaging = parameters::imaging(&document, file.imaging)?;
+        warnings.extend(tissues.unused());
+        let name = file.name.unwrap_or_else(|| {
+            path.file_stem()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned()
+        });
+        let scene = Self {
+            name,
+            tissues: tissues.used(),
+            background,
+            meshes,
+            instances,
+            wires,
+            probe,
+            world_from_probe,
+            simulation,
+            imaging,
+        };
+        warnings.extend(scene.coincidences(path));
+        Ok((scene, warnings))
+    }
+}
+
+/// Fails at `path` unless `value` lies in the closed range; NaN lies in none.
+fn within(
+    document: &Document<'_>,
+    path: &str,
+    value: f64,
+    least: f64,
+    most: f64,
+    unit: &str,
+) -> Result<(), SceneError> {
+    if (least..=most).contains(&value) {
+        return Ok(());
+    }
+    let key = path.rsplit('.').next().unwrap_or(path);
+    let unit = if unit.is_empty() {
+        String::new()
+    } else {
+        format!(" {unit}")
+    };
+    let (message, remedy) = if most.is_infinite() {
+        (
+            format!("{key} is {value}{unit}"),
+            format!("it must be at least {least}{unit}"),
+        )
+    } else {
+        (
+            format!("{key} is {value}{unit}"),
+            format!("it must lie between {least} and {most}{unit}"),
+        )
+    };
+    Err(document.fail(path, message, remedy))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,273 @@
+//! The text of a scene file with its overrides, and where each value stands in it.
+
+use std::borrow::Cow;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::error::{SceneError, advice};
+use super::schema::File;
+use crate::scene::suggest;
+
+/// Largest scene file, bytes: they hold names and numbers, not meshes.
+const MAX_TEXT: u64 = 4 << 20;
+
+/// The text of a scene file and of the overrides.
+pub(super) struct Source {
+    pub path: PathBuf,
+    text: String,
+    overrides: Vec<Override>,
+}
+
+/// One `path = value` of the command line. Its spans count from `start`, past the file's text.
+struct Override {
+    path: String,
+    shown: String,
+    /// `v = value` behind so many blanks that its spans come out in this numbering.
+    padded: String,
+    start: usize,
+}
+
+/// The parsed file with the overrides in place.
+pub(super) struct Document<'s> {
+    pub source: &'s Source,
+    root: DeTable<'s>,
+}
+
+impl Source {
+    /// Reads the file; takes note of the overrides.
+    pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
+        let fail =
+            |cause: String| SceneError::file(path, cause, "check the path of the scene file");
+        let info = std::fs::metadata(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
+        if info.len() > MAX_TEXT || !info.is_file() {
+            return Err(fail("is not a scene file".to_owned()));
+        }
+        let text =
+            std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
+        let mut start = text.len() + 1;
+        let mut all = Vec::new();
+        for (path, value) in overrides {
+            // Whatever is not TOML is taken for a string: shells eat the quotes of "80 mm".
+            let written = match DeValue::parse(value) {
+                Ok(_) => value.clone(),
+                Err(_) => format!("{value:?}"),
+            };
+            let shown = format!("{path} = {written}");
+            let blanks = " ".repeat(start + path.len() - 1);
+            let end = start + shown.len();
+            all.push(Override {
+                path: path.clone(),
+                shown,
+                padded: format!("{blanks}v = {written}"),
+                start,
+            });
+            start = end + 1;
+        }
+        Ok(Self {
+            path: path.to_owned(),
+            text,
+            overrides: all,
+        })
+    }
+
+    /// Parses the text and puts the overrides in.
+    pub fn document(&self) -> Result<Document<'_>, SceneError> {
+        let root = self.table(&self.text)?;
+        let mut document = Document { source: self, root };
+        for set in &self.overrides {
+            let value = self.table(&set.padded)?.into_iter().next();
+            let value = value.expect("the text has one key").1;
+            let key = set.start..set.start + set.path.len();
+            let segments: Vec<_> = set.path.split('.').collect();
+            insert(&mut document.root, &segments, value, &key)
+                .map_err(|(message, remedy)| self.error(key, message, Some(remedy)))?;
+        }
+        Ok(document)
+    }
+
+    fn table<'s>(&self, text: &'s str) -> Result<DeTable<'s>, SceneError> {
+        let table = DeTable::parse(text).map_err(|e| {
+            let span = e.span().unwrap_or(0..0);
+            self.error(span, e.message().to_owned(), None)
+        })?;
+        Ok(table.into_inner())
+    }
+
+    fn error(&self, span: Range<usize>, message: String, remedy: Option<String>) -> SceneError {
+        let set = self.overrides.iter().rev().find(|o| span.start >= o.start);
+        match set {
+            Some(set) => {
+                let local = |at: usize| at.saturating_sub(set.start).min(set.shown.len());
+                let span = local(span.start)..local(span.end);
+                SceneError::at(Path::new("--set"), &set.shown, span, message, remedy)
+            }
+            None => SceneError::at(&self.path, &self.text, span, message, remedy),
+        }
+    }
+}
+
+impl Document<'_> {
+    /// The file as the schema understands it.
+    pub fn parse(&self) -> Result<File, SceneError> {
+        let root = Spanned::new(0..self.source.text.len(), self.root.clone());
+        let deserializer = toml::de::Deserializer::from(root);
+        let mut track = serde_path_to_error::Track::new();
+        let tracked = serde_path_to_error::Deserializer::new(deserializer, &mut track);
+        File::deserialize(tracked).map_err(|e| {
+            let path: Vec<_> = track.path().iter().map(segment).collect();
+            let names: Vec<_> = path.iter().map(String::as_str).collect();
+            let span = e.span().unwrap_or_else(|| self.span(&names));
+            let message = e.message().trim_end();
+            let advice = advice(message);
+            let brief = match advice {
+                Some(_) => message.split(", expected").next().unwrap_or(message),
+                None => message,
+            };
+            let message = format!("{}{brief}", self.readable(&names));
+            self.source.error(span, message, advice)
+        })
+    }
+
+    /// "mesh 3 (`liver`).thickness: " for a path; a number alone is hard to find in a file.
+    fn readable(&self, path: &[&str]) -> String {
+        let mut out = String::new();
+        for (n, part) in path.iter().enumerate() {
+            match part.parse::<usize>() {
+                Ok(index) => {
+                    out.push_str(&format!(" {}", index + 1));
+                    let named = [&path[..=n], &["name"]].concat();
+                    let name = find(&self.root, &named).and_then(|v| v.get_ref().as_str());
+                    out.extend(name.map(|name| format!(" (`{name}`)")));
+                }
+                Err(_) if n == 0 => out.push_str(part),
+                Err(_) => {
+                    out.push('.');
+                    out.push_str(part);
+                }
+            }
+        }
+        if !out.is_empty() {
+            out.push_str(": ");
+        }
+        out
+    }
+
+    /// An error at the value of a dotted path, or at its nearest parent that is in the file.
+    pub fn fail(
+        &self,
+        path: &str,
+        message: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> SceneError {
+        let segments: Vec<_> = path.split('.').collect();
+        self.source
+            .error(self.span(&segments), message.into(), Some(remedy.into()))
+    }
+
+    fn span(&self, path: &[&str]) -> Range<usize> {
+        (1..=path.len())
+            .rev()
+            .find_map(|n| find(&self.root, &path[..n]))
+            .map_or(0..0, Spanned::span)
+    }
+}
+
+fn segment(segment: &serde_path_to_error::Segment) -> String {
+    use serde_path_to_error::Segment;
+    match segment {
+        Segment::Seq { index } => index.to_string(),
+        Segment::Map { key } => key.clone(),
+        Segment::Enum { variant } => variant.clone(),
+        Segment::Unknown => "?".to_owned(),
+    }
+}
+
+/// The value at a path of keys and indices.
+fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeValue<'s>>> {
+    let (first, rest) = path.split_first()?;
+    let mut value = root.get(*first)?;
+    for part in rest {
+        value = match value.get_ref() {
+            DeValue::Table(table) => table.get(*part)?,
+            DeValue::Array(array) => array.get(part.parse::<usize>().ok()?)?,
+            _ => return None,
+        };
+    }
+    Some(value)
+}
+
+type Misfit = (String, String);
+
+/// Puts `value` at a path; elements of arrays of tables are addressed by index or by name.
+fn insert<'s>(
+    table: &mut DeTable<'s>,
+    path: &[&'s str],
+    value: Spanned<DeValue<'s>>,
+    key_span: &Range<usize>,
+) -> Result<(), Misfit> {
+    let (first, rest) = path.split_first().expect("a path has a part");
+    if rest.is_empty() {
+        table.insert(Spanned::new(key_span.clone(), Cow::Borrowed(*first)), value);
+        return Ok(());
+    }
+    if !table.contains_key(*first) {
+        let empty = DeValue::Table(DeTable::new());
+        let key = Spanned::new(key_span.clone(), Cow::Borrowed(*first));
+        table.insert(key, Spanned::new(key_span.clone(), empty));
+    }
+    let inner = table.get_mut(*first).expect("just put in").get_mut();
+    into_value(inner, first, rest, value, key_span)
+}
+
+fn into_value<'s>(
+    target: &mut DeValue<'s>,
+    name: &str,
+    rest: &[&'s str],
+    value: Spanned<DeValue<'s>>,
+    key_span: &Range<usize>,
+) -> Result<(), Misfit> {
+    let array = match target {
+        DeValue::Table(table) => return insert(table, rest, value, key_span),
+        DeValue::Array(array) => array,
+        _ => {
+            return Err((
+                format!("`{name}` has no parts"),
+                "set it as a whole".to_owned(),
+            ));
+        }
+    };
+    let names: Vec<String> = array.iter().filter_map(name_of).collect();
+    let by_name = array
+        .iter()
+        .position(|v| name_of(v).as_deref() == Some(rest[0]));
+    let index = by_name.or_else(|| rest[0].parse().ok().filter(|&i: &usize| i < array.len()));
+    let Some(index) = index else {
+        let remedy = match names.is_empty() {
+            true => format!("`{name}` has {} elements, counted from 0", array.len()),
+            false => suggest::among(rest[0], names.iter().map(String::as_str)),
+        };
+        return Err((format!("there is no {name} `{}`", rest[0]), remedy));
+    };
+    let element = &mut array.as_mut()[index];
+    match rest {
+        [_] => {
+            *element = value;
+            Ok(())
+        }
+        _ => into_value(element.get_mut(), rest[0], &rest[1..], value, key_span),
+    }
+}
+
+fn name_of(value: &Spanned<DeValue<'_>>) -> Option<String> {
+    value
+        .get_ref()
+        .as_table()?
+        .get("name")?
+        .get_ref()
+        .as_str()
+        .map(str::to_owned)
+}

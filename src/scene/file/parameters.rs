@@ -1,0 +1,123 @@
+//! The tables `simulation` and `imaging`.
+
+use super::document::Document;
+use super::error::SceneError;
+use super::schema::{ImagingTable, SimulationTable};
+use super::within;
+use crate::scene::{Imaging, Simulation};
+
+/// Copies the keys that are present: plain ones, then quantities.
+macro_rules! overlay {
+    ($table:ident => $out:ident: $($plain:ident),*; $($quantity:ident),*) => {
+        $(if let Some(value) = $table.$plain { $out.$plain = value; })*
+        $(if let Some(value) = $table.$quantity { $out.$quantity = value.0; })*
+    };
+}
+pub(super) use overlay;
+
+const INF: f64 = f64::INFINITY;
+/// Levels may be switched off (minus infinity) but not boundless.
+const LEVEL: (f64, f64) = (-INF, 200.0);
+
+pub(super) fn simulation(
+    document: &Document<'_>,
+    table: SimulationTable,
+) -> Result<Simulation, SceneError> {
+    let mut out = Simulation::default();
+    overlay!(table => out:
+        paths, sampling, max_interactions, max_reflections, min_weight, coherence,
+        rough_transmission, face_reflection, scatter_mode, elevation_cells, texture_space, seed;
+        origin_jitter, beam_sigma, cell, volume_floor, speckle_gain, surface_gain);
+    for (key, value, (least, most), unit) in [
+        ("paths", f64::from(out.paths), (1.0, 65_536.0), ""),
+        (
+            "max_interactions",
+            f64::from(out.max_interactions),
+            (1.0, 256.0),
+            "",
+        ),
+        (
+            "max_reflections",
+            f64::from(out.max_reflections),
+            (0.0, 256.0),
+            "",
+        ),
+        ("min_weight", out.min_weight, (0.0, 1.0), ""),
+        ("origin_jitter", out.origin_jitter, (0.0, 100.0), "mm"),
+        ("beam_sigma", out.beam_sigma, (1e-3, INF), "mm"),
+        ("cell", out.cell, (0.01, 10.0), "mm"),
+        ("elevation_cells", out.elevation_cells, (0.0, 1000.0), ""),
+        ("volume_floor", out.volume_floor, LEVEL, "dB"),
+        ("speckle_gain", out.speckle_gain, LEVEL, "dB"),
+        ("surface_gain", out.surface_gain, LEVEL, "dB"),
+    ] {
+        within(
+            document,
+            &format!("simulation.{key}"),
+            value,
+            least,
+            most,
+            unit,
+        )?;
+    }
+    Ok(out)
+}
+
+pub(super) fn imaging(document: &Document<'_>, table: ImagingTable) -> Result<Imaging, SceneError> {
+    let mut out = Imaging::default();
+    overlay!(table => out:
+        grey_gamma, psf_scale, image_height;
+        gain, dynamic_range, tgc_attenuation, tgc_limit, noise);
+    if let Some(sliders) = table.tgc_sliders {
+        out.tgc_sliders = sliders.map(|level| level.0);
+    }
+    for (key, value, (least, most), unit) in [
+        ("gain", out.gain, (-200.0, 200.0), "dB"),
+        ("dynamic_range", out.dynamic_range, (1.0, 200.0), "dB"),
+        (
+            "tgc_attenuation",
+            out.tgc_attenuation,
+            (0.0, 100.0),
+            "dB/(cm MHz)",
+        ),
+        ("tgc_limit", out.tgc_limit, (0.0, 200.0), "dB"),
+        ("noise", out.noise, LEVEL, "dB"),
+        ("grey_gamma", out.grey_gamma, (0.01, 100.0), ""),
+        (
+            "image_height",
+            f64::from(out.image_height),
+            (16.0, 8192.0),
+            "pixels",
+        ),
+    ] {
+        within(
+            document,
+            &format!("imaging.{key}"),
+            value,
+            least,
+            most,
+            unit,
+        )?;
+    }
+    for (i, &level) in out.tgc_sliders.iter().enumerate() {
+        within(
+            document,
+            &format!("imaging.tgc_sliders.{i}"),
+            level,
+            -100.0,
+            100.0,
+            "dB",
+        )?;
+    }
+    for (i, &scale) in out.psf_scale.iter().enumerate() {
+        within(
+            document,
+            &format!("imaging.psf_scale.{i}"),
+            scale,
+            0.01,
+            100.0,
+            "",
+        )?;
+    }
+    Ok(out)
+}

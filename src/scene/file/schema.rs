@@ -1,0 +1,233 @@
+//! The keys of a scene file. What is absent keeps its default.
+
+use std::collections::BTreeMap;
+
+use serde::Deserialize;
+
+use super::units::{Angle, Attenuation, Density, Frequency, Impedance, Length, Level, Speed};
+use crate::scene::settings::{Coherence, Sampling, ScatterMode, TextureSpace};
+
+/// The whole file.
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct File {
+    pub name: Option<String>,
+    pub background: Option<String>,
+    #[serde(default)]
+    pub probe: ProbeTable,
+    #[serde(default)]
+    pub simulation: SimulationTable,
+    #[serde(default)]
+    pub imaging: ImagingTable,
+    #[serde(default)]
+    pub mesh: Vec<MeshTable>,
+    #[serde(default)]
+    pub wire: Vec<WireTable>,
+    #[serde(default)]
+    pub tissues: BTreeMap<String, TissueTable>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeTable {
+    pub preset: Option<String>,
+    pub kind: Option<KindName>,
+    pub radius: Option<Length>,
+    pub field_of_view: Option<Angle>,
+    pub width: Option<Length>,
+    pub scanlines: Option<u32>,
+    pub elevation_layers: Option<u32>,
+    pub samples: Option<u32>,
+    pub depth: Option<Length>,
+    pub frequency: Option<Frequency>,
+    pub bandwidth: Option<f64>,
+    pub speed: Option<Speed>,
+    pub focus: Option<Length>,
+    pub f_number_transmit: Option<f64>,
+    pub f_number_receive: Option<f64>,
+    pub aperture: Option<Length>,
+    pub elevation_focus: Option<Length>,
+    pub elevation_height: Option<Length>,
+    pub slice_thickness: Option<Length>,
+    pub pose: Option<PoseTable>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "kebab-case")]
+pub enum KindName {
+    Convex,
+    Linear,
+    Phased,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PoseTable {
+    #[serde(default = "origin")]
+    pub position: [Length; 3],
+    #[serde(default = "z_axis")]
+    pub direction: [f64; 3],
+    #[serde(default = "x_axis")]
+    pub lateral: [f64; 3],
+}
+
+fn origin() -> [Length; 3] {
+    [Length::new(0.0); 3]
+}
+
+fn z_axis() -> [f64; 3] {
+    [0.0, 0.0, 1.0]
+}
+
+fn x_axis() -> [f64; 3] {
+    [1.0, 0.0, 0.0]
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SimulationTable {
+    pub paths: Option<u32>,
+    pub sampling: Option<Sampling>,
+    pub max_interactions: Option<u32>,
+    pub max_reflections: Option<u32>,
+    pub min_weight: Option<f64>,
+    pub coherence: Option<Coherence>,
+    pub rough_transmission: Option<bool>,
+    pub face_reflection: Option<bool>,
+    pub origin_jitter: Option<Length>,
+    pub beam_sigma: Option<Length>,
+    pub scatter_mode: Option<ScatterMode>,
+    pub cell: Option<Length>,
+    pub elevation_cells: Option<f64>,
+    pub texture_space: Option<TextureSpace>,
+    pub volume_floor: Option<Level>,
+    pub speckle_gain: Option<Level>,
+    pub surface_gain: Option<Level>,
+    pub seed: Option<u32>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ImagingTable {
+    pub gain: Option<Level>,
+    pub dynamic_range: Option<Level>,
+    pub tgc_attenuation: Option<Attenuation>,
+    pub tgc_limit: Option<Level>,
+    pub tgc_sliders: Option<[Level; 8]>,
+    pub noise: Option<Level>,
+    pub grey_gamma: Option<f64>,
+    pub psf_scale: Option<[f64; 3]>,
+    pub image_height: Option<u32>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MeshTable {
+    pub name: String,
+    pub file: Option<String>,
+    pub node: Option<String>,
+    pub shape: Option<Shape>,
+    pub units: Option<UnitName>,
+    pub tissue: String,
+    #[serde(default)]
+    pub priority: i32,
+    pub translate: Option<[Length; 3]>,
+    pub rotate: Option<Rotation>,
+    pub scale: Option<f64>,
+    pub roughness: Option<f64>,
+    pub thickness: Option<Length>,
+    pub specularity: Option<f64>,
+    pub surface_gain: Option<Level>,
+    #[serde(default)]
+    pub inside: SurfaceTable,
+    #[serde(default)]
+    pub cap_openings: bool,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum UnitName {
+    Um,
+    Mm,
+    Cm,
+    M,
+    In,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(rename_all = "lowercase", deny_unknown_fields)]
+pub enum Shape {
+    Sphere {
+        radius: Length,
+        #[serde(default = "five")]
+        subdivisions: u32,
+    },
+    Ellipsoid {
+        radii: [Length; 3],
+        #[serde(default = "five")]
+        subdivisions: u32,
+    },
+    Cylinder {
+        radius: Length,
+        length: Length,
+        #[serde(default = "fine")]
+        segments: u32,
+    },
+    Box {
+        size: [Length; 3],
+    },
+    Plane {
+        size: [Length; 2],
+        thickness: Length,
+    },
+}
+
+fn five() -> u32 {
+    5
+}
+
+fn fine() -> u32 {
+    96
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Rotation {
+    pub axis: [f64; 3],
+    pub angle: Angle,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SurfaceTable {
+    pub roughness: Option<f64>,
+    pub thickness: Option<Length>,
+    pub specularity: Option<f64>,
+    pub surface_gain: Option<Level>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WireTable {
+    pub from: [Length; 3],
+    pub to: Option<[Length; 3]>,
+    pub spacing: Option<Length>,
+    #[serde(default = "Level::zero")]
+    pub amplitude: Level,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TissueTable {
+    pub based_on: Option<String>,
+    pub speed: Option<Speed>,
+    pub density: Option<Density>,
+    pub impedance: Option<Impedance>,
+    pub attenuation: Option<Attenuation>,
+    pub echogenicity: Option<Level>,
+    pub density_of_scatterers: Option<f64>,
+    pub mean_over_sigma: Option<f64>,
+    pub texture_depth: Option<f64>,
+    pub texture_length: Option<Length>,
+    pub source: Option<String>,
+}

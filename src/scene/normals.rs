@@ -1,0 +1,130 @@
+//! Shading normals: angle-weighted means over the triangles of a smooth fan, split at creases.
+
+use glam::Vec3;
+
+use super::Mesh;
+use super::mesh::Soup;
+use super::topology::Edges;
+
+/// Splits vertices where neighbouring triangles meet at more than `crease` degrees.
+///
+/// The weights are the corner angles (Thurmer and Wuthrich 1998), so that a normal does not
+/// depend on how a flat part happens to be triangulated.
+pub fn shade(soup: &Soup, crease: f32) -> Mesh {
+    let face = |t: usize| {
+        let [a, b, c] = soup.triangles[t].map(|i| Vec3::from(soup.positions[i as usize]));
+        (b - a).cross(c - a).normalize_or_zero()
+    };
+    let smooth = crease.to_radians().cos();
+    let mut fans = Fans::new(soup.triangles.len() * 3);
+    for pair in Edges::of(soup).manifold() {
+        let [s, t] = pair.map(|e| e.triangle as usize);
+        if face(s).dot(face(t)) < smooth {
+            continue;
+        }
+        for vertex in [pair[0].low, pair[0].high] {
+            fans.unite(corner(soup, s, vertex), corner(soup, t, vertex));
+        }
+    }
+
+    let mut mesh = Mesh {
+        name: soup.name.clone(),
+        ..Mesh::default()
+    };
+    let mut vertex_of_fan = vec![u32::MAX; soup.triangles.len() * 3];
+    for (t, triangle) in soup.triangles.iter().enumerate() {
+        let normal = face(t);
+        let points = triangle.map(|i| Vec3::from(soup.positions[i as usize]));
+        mesh.triangles.push([0, 1, 2].map(|k| {
+            let fan = fans.root(t * 3 + k);
+            if vertex_of_fan[fan] == u32::MAX {
+                vertex_of_fan[fan] = mesh.positions.len() as u32;
+                mesh.positions.push(points[k].to_array());
+                mesh.normals.push([0.0; 3]);
+            }
+            let vertex = vertex_of_fan[fan];
+            let (to_next, to_last) = (
+                points[(k + 1) % 3] - points[k],
+                points[(k + 2) % 3] - points[k],
+            );
+            let sum = &mut mesh.normals[vertex as usize];
+            *sum = (Vec3::from(*sum) + normal * to_next.angle_between(to_last)).to_array();
+            vertex
+        }));
+    }
+    for (t, triangle) in mesh.triangles.iter().enumerate() {
+        for &i in triangle {
+            let sum = Vec3::from(mesh.normals[i as usize]);
+            // Opposite faces of a folded sheet can cancel; any face normal is then as good.
+            let unit = sum.try_normalize().unwrap_or_else(|| face(t));
+            mesh.normals[i as usize] = unit.to_array();
+        }
+    }
+    mesh
+}
+
+fn corner(soup: &Soup, triangle: usize, vertex: u32) -> usize {
+    let k = soup.triangles[triangle].iter().position(|&i| i == vertex);
+    triangle * 3 + k.expect("an edge's vertices belong to its triangles")
+}
+
+/// Union-find over triangle corners.
+struct Fans(Vec<u32>);
+
+impl Fans {
+    fn new(corners: usize) -> Self {
+        Self((0..corners as u32).collect())
+    }
+
+    fn root(&mut self, mut i: usize) -> usize {
+        while self.0[i] as usize != i {
+            self.0[i] = self.0[self.0[i] as usize];
+            i = self.0[i] as usize;
+        }
+        i
+    }
+
+    fn unite(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        let (low, high) = (a.min(b), a.max(b));
+        self.0[high] = low as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wedge(degrees: f32) -> Soup {
+        // Two triangles sharing the x axis, folded by `degrees`.
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        Soup {
+            positions: vec![
+                [0.0; 3],
+                [1.0, 0.0, 0.0],
+                [0.5, 1.0, 0.0],
+                [0.5, -cos, -sin],
+            ],
+            triangles: vec![[0, 1, 2], [1, 0, 3]],
+            ..Soup::default()
+        }
+    }
+
+    #[test]
+    fn creases_split_and_smooth_edges_do_not() {
+        assert_eq!(shade(&wedge(30.0), 40.0).positions.len(), 4);
+        assert_eq!(shade(&wedge(50.0), 40.0).positions.len(), 6);
+    }
+
+    #[test]
+    fn a_smooth_edge_has_the_mean_normal() {
+        let mesh = shade(&wedge(30.0), 40.0);
+        let n = Vec3::from(mesh.normals[0]);
+        // Equal corner angles: the bisector, 15 degrees from either face; f32 rounding.
+        assert!(
+            (n.angle_between(Vec3::Z).to_degrees() - 15.0).abs() < 1e-3,
+            "{n}"
+        );
+        assert!((n.length() - 1.0).abs() < 1e-6);
+    }
+}

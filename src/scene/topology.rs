@@ -1,0 +1,384 @@
+//! Edges of a welded triangle soup, and the repairs that need them: winding, openings, leftovers.
+
+use std::collections::{HashMap, HashSet};
+use std::path::Path;
+
+use glam::DVec3;
+
+use super::issue::Issue;
+use super::mesh::Soup;
+
+/// One side of one triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Edge {
+    /// Smaller vertex index.
+    pub low: u32,
+    /// Larger vertex index.
+    pub high: u32,
+    /// Triangle.
+    pub triangle: u32,
+    /// Whether the triangle runs from `low` to `high`.
+    pub forward: bool,
+}
+
+/// All edges, sorted so that those of the same two vertices are neighbours.
+pub struct Edges(Vec<Edge>);
+
+impl Edges {
+    /// Edges of every triangle.
+    pub fn of(soup: &Soup) -> Self {
+        let mut edges = Vec::with_capacity(soup.triangles.len() * 3);
+        for (t, triangle) in soup.triangles.iter().enumerate() {
+            for k in 0..3 {
+                let (a, b) = (triangle[k], triangle[(k + 1) % 3]);
+                edges.push(Edge {
+                    low: a.min(b),
+                    high: a.max(b),
+                    triangle: t as u32,
+                    forward: a < b,
+                });
+            }
+        }
+        edges.sort_unstable();
+        Self(edges)
+    }
+
+    /// Groups of edges that join the same two vertices.
+    pub fn groups(&self) -> impl Iterator<Item = &[Edge]> {
+        self.0.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
+    }
+
+    /// Edges of exactly two triangles that run in opposite directions.
+    pub fn manifold(&self) -> impl Iterator<Item = [&Edge; 2]> {
+        self.groups().filter_map(|group| match group {
+            [a, b] if a.forward != b.forward => Some([a, b]),
+            _ => None,
+        })
+    }
+}
+
+/// Six times the signed volume of the tetrahedron from `origin` over a triangle.
+fn six_volumes(soup: &Soup, triangle: [u32; 3], origin: DVec3) -> f64 {
+    let [a, b, c] =
+        triangle.map(|i| DVec3::from(soup.positions[i as usize].map(f64::from)) - origin);
+    a.dot(b.cross(c))
+}
+
+/// Enclosed volume in the cube of the soup's unit, positive where faces look outward. Meaningful
+/// for closed meshes; for open ones each opening counts as a cone to the first vertex.
+pub fn volume(soup: &Soup) -> f64 {
+    let Some(first) = soup.positions.first() else {
+        return 0.0;
+    };
+    let origin = DVec3::from(first.map(f64::from));
+    let sum: f64 = soup
+        .triangles
+        .iter()
+        .map(|&t| six_volumes(soup, t, origin))
+        .sum();
+    sum / 6.0
+}
+
+/// Removes triangles that no ray can hit and those that would count one crossing twice.
+pub fn clean(path: &Path, soup: &mut Soup) -> Vec<Issue> {
+    let mut issues = Vec::new();
+    let before = soup.triangles.len();
+    let positions = &soup.positions;
+    // Zero area in double precision from the stored single-precision corners; a triangle with a
+    // corner that is not a number is kept, for the check that names it.
+    soup.triangles.retain(|t| {
+        let [a, b, c] = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+        (b - a).cross(c - a).length_squared() != 0.0
+    });
+    let degenerate = before - soup.triangles.len();
+    if degenerate > 0 {
+        issues.push(Issue::warning(
+            path,
+            degenerate,
+            format!("{degenerate} degenerate triangles (no area) were dropped"),
+            "remove them in the modeller",
+        ));
+    }
+    let mut seen = HashSet::new();
+    let before = soup.triangles.len();
+    soup.triangles.retain(|t| {
+        let start = (0..3).min_by_key(|&k| t[k]).unwrap_or(0);
+        seen.insert([0, 1, 2].map(|k| t[(start + k) % 3]))
+    });
+    let duplicate = before - soup.triangles.len();
+    if duplicate > 0 {
+        issues.push(Issue::warning(
+            path,
+            duplicate,
+            format!("{duplicate} duplicate triangles were dropped"),
+            "remove doubled faces in the modeller",
+        ));
+    }
+    issues
+}
+
+/// Turns triangles so that neighbours agree, the majority of each connected piece deciding; then
+/// turns a closed mesh whose volume is negative.
+pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
+    let mut issues = Vec::new();
+    let (turned, contradictions) = agree(soup);
+    if turned > 0 {
+        issues.push(Issue::warning(
+            path,
+            turned,
+            format!("inconsistent winding: {turned} triangles were turned to agree with their neighbours"),
+            "recalculate normals in the modeller",
+        ));
+    }
+    if contradictions > 0 {
+        issues.push(Issue::warning(
+            path,
+            contradictions,
+            format!(
+                "inconsistent winding: {contradictions} edges cannot agree (a one-sided surface)"
+            ),
+            "make the surface enclose a volume",
+        ));
+    }
+    if volume(soup) < 0.0 && Edges::of(soup).groups().all(|g| g.len() > 1) {
+        for t in &mut soup.triangles {
+            t.swap(1, 2);
+        }
+        issues.push(Issue::warning(
+            path,
+            soup.triangles.len(),
+            "inside out (its volume is negative): all triangles were turned",
+            "flip the normals in the modeller",
+        ));
+    }
+    issues
+}
+
+/// Flood fill over edges of two triangles; returns turned triangles and edges left in conflict.
+fn agree(soup: &mut Soup) -> (usize, usize) {
+    let count = soup.triangles.len();
+    let mut neighbours: Vec<[(u32, bool); 3]> = vec![[(u32::MAX, false); 3]; count];
+    let mut used = vec![0usize; count];
+    for group in Edges::of(soup).groups() {
+        let [a, b] = group else { continue };
+        let same = a.forward != b.forward;
+        for (from, to) in [(a, b), (b, a)] {
+            let t = from.triangle as usize;
+            neighbours[t][used[t]] = (to.triangle, same);
+            used[t] += 1;
+        }
+    }
+    let mut turn: Vec<Option<bool>> = vec![None; count];
+    let (mut turned, mut contradictions) = (0, 0);
+    for start in 0..count {
+        if turn[start].is_some() {
+            continue;
+        }
+        turn[start] = Some(false);
+        let mut piece = vec![start];
+        let mut next = 0;
+        while let Some(&t) = piece.get(next) {
+            next += 1;
+            for &(other, same) in &neighbours[t][..used[t]] {
+                let wanted = turn[t] == Some(same);
+                match turn[other as usize] {
+                    None => {
+                        turn[other as usize] = Some(wanted);
+                        piece.push(other as usize);
+                    }
+                    Some(has) if has == wanted => {}
+                    Some(_) => contradictions += 1,
+                }
+            }
+        }
+        let minority = piece.iter().filter(|&&t| turn[t] == Some(true)).count();
+        let other_way = minority * 2 > piece.len();
+        for t in piece {
+            if (turn[t] == Some(true)) != other_way {
+                soup.triangles[t].swap(1, 2);
+                turned += 1;
+            }
+        }
+    }
+    // Each conflicting edge is met from both of its triangles.
+    (turned, contradictions / 2)
+}
+
+/// Directed open edges: from vertex to vertex as their triangle runs.
+fn open_edges(soup: &Soup) -> Vec<[u32; 2]> {
+    let edges = Edges::of(soup);
+    let open = edges.groups().filter_map(|group| match group {
+        [e] if e.forward => Some([e.low, e.high]),
+        [e] => Some([e.high, e.low]),
+        _ => None,
+    });
+    open.collect()
+}
+
+/// Closed loops of open edges; edges that close no loop are left out.
+pub fn boundary_loops(soup: &Soup) -> Vec<Vec<u32>> {
+    let mut next: HashMap<u32, Vec<u32>> = HashMap::new();
+    let open = open_edges(soup);
+    for &[a, b] in open.iter().rev() {
+        next.entry(a).or_default().push(b);
+    }
+    let mut loops = Vec::new();
+    for &[start, _] in &open {
+        let mut walk = vec![start];
+        while let Some(to) = next.get_mut(&walk[walk.len() - 1]).and_then(Vec::pop) {
+            if to == start {
+                loops.push(walk);
+                break;
+            }
+            walk.push(to);
+        }
+    }
+    loops
+}
+
+/// Closes every boundary loop by a fan of triangles to its centre.
+pub fn cap(path: &Path, soup: &mut Soup) -> Vec<Issue> {
+    let loops = boundary_loops(soup);
+    for ring in &loops {
+        let mut centre = DVec3::ZERO;
+        for &i in ring {
+            centre += DVec3::from(soup.positions[i as usize].map(f64::from));
+        }
+        centre /= ring.len() as f64;
+        let hub = soup.positions.len() as u32;
+        soup.positions.push(centre.as_vec3().to_array());
+        for (k, &a) in ring.iter().enumerate() {
+            let b = ring[(k + 1) % ring.len()];
+            soup.triangles.push([b, a, hub]);
+        }
+    }
+    if loops.is_empty() {
+        return Vec::new();
+    }
+    let mut issues = vec![Issue::warning(
+        path,
+        loops.len(),
+        format!(
+            "{} openings were closed by flat fans (cap_openings)",
+            loops.len()
+        ),
+        "",
+    )];
+    issues.extend(orient(path, soup));
+    issues
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A unit cube, corner at the origin, outward.
+    pub fn cube() -> Soup {
+        let positions = (0..8)
+            .map(|i| [(i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32])
+            .collect();
+        let quads = [
+            [0, 2, 3, 1],
+            [4, 5, 7, 6],
+            [0, 1, 5, 4],
+            [2, 6, 7, 3],
+            [0, 4, 6, 2],
+            [1, 3, 7, 5],
+        ];
+        let triangles = quads
+            .iter()
+            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
+            .collect();
+        Soup {
+            positions,
+            triangles,
+            ..Soup::default()
+        }
+    }
+
+    fn kinds(issues: &[Issue]) -> Vec<usize> {
+        issues.iter().map(|i| i.count).collect()
+    }
+
+    #[test]
+    fn a_sound_cube_is_left_alone() {
+        let mut soup = cube();
+        assert!(clean(Path::new("x"), &mut soup).is_empty());
+        assert!(orient(Path::new("x"), &mut soup).is_empty());
+        assert!(boundary_loops(&soup).is_empty());
+        assert_eq!(volume(&soup), 1.0);
+        assert_eq!(soup.triangles, cube().triangles);
+    }
+
+    #[test]
+    fn planted_flipped_triangles_are_turned_back() {
+        let mut soup = cube();
+        for t in [3, 8] {
+            soup.triangles[t].swap(1, 2);
+        }
+        assert_eq!(kinds(&orient(Path::new("x"), &mut soup)), [2]);
+        assert_eq!(volume(&soup), 1.0);
+    }
+
+    #[test]
+    fn an_inverted_cube_is_turned() {
+        let mut soup = cube();
+        for t in &mut soup.triangles {
+            t.swap(0, 1);
+        }
+        assert_eq!(kinds(&orient(Path::new("x"), &mut soup)), [12]);
+        assert_eq!(volume(&soup), 1.0);
+    }
+
+    #[test]
+    fn duplicates_and_degenerates_are_dropped_and_counted() {
+        let mut soup = cube();
+        soup.triangles.extend([[2, 3, 0], [1, 1, 5], [2, 3, 0]]);
+        soup.triangles.push([3, 1, 0]);
+        // [2, 3, 0] repeats the first triangle from another corner, twice.
+        assert_eq!(kinds(&clean(Path::new("x"), &mut soup)), [1, 3]);
+        assert_eq!(soup.triangles.len(), 12);
+    }
+
+    #[test]
+    fn a_missing_lid_is_one_loop_and_is_capped() {
+        let mut soup = cube();
+        soup.triangles.drain(2..4);
+        assert_eq!(boundary_loops(&soup).len(), 1);
+        assert_eq!(kinds(&cap(Path::new("x"), &mut soup)), [1]);
+        assert!(boundary_loops(&soup).is_empty());
+        assert!((volume(&soup) - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_moebius_strip_is_called_one_sided() {
+        let n = 12u32;
+        let positions = (0..2 * n)
+            .map(|i| {
+                let (angle, side) = (
+                    f64::from(i / 2) / f64::from(n) * std::f64::consts::TAU,
+                    i % 2,
+                );
+                let w = if side == 0 { 0.3 } else { -0.3 };
+                let r = 1.0 + w * (angle / 2.0).cos();
+                [r * angle.cos(), r * angle.sin(), w * (angle / 2.0).sin()].map(|v| v as f32)
+            })
+            .collect();
+        let mut triangles = Vec::new();
+        for i in 0..n {
+            let (a, b) = (2 * i, 2 * i + 1);
+            let (c, d) = if i + 1 < n { (a + 2, b + 2) } else { (1, 0) };
+            triangles.extend([[a, b, d], [a, d, c]]);
+        }
+        let mut soup = Soup {
+            positions,
+            triangles,
+            ..Soup::default()
+        };
+        let issues = orient(Path::new("x"), &mut soup);
+        assert!(
+            issues.iter().any(|i| i.message.contains("one-sided")),
+            "{issues:?}"
+        );
+    }
+}
