@@ -9,7 +9,7 @@
 layout(local_size_x = 128) in;
 layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer LateralBuffer { float lateral[]; };
-layout(std430, binding = 2) writeonly buffer IqBuffer { float iq[]; };
+layout(std430, binding = 2) buffer IqBuffer { float iq[]; };
 
 const int THREADS = 128;
 const int REACH = 32;

@@ -12,7 +12,7 @@ layout(std430, binding = 1) readonly buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 2) readonly buffer SurfaceBuffer { int surface[]; };
 layout(std430, binding = 3) readonly buffer VolumeBuffer { int volume[]; };
 layout(std430, binding = 4) buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 5) writeonly buffer LateralBuffer { float lateral[]; };
+layout(std430, binding = 5) buffer LateralBuffer { float lateral[]; };
 
 // Accumulators at and beyond this magnitude may have lost an echo.
 const int HEADROOM = 1 << 30;

@@ -8,7 +8,7 @@ layout(local_size_x = 64) in;
 layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 2) readonly buffer IqBuffer { float iq[]; };
-layout(std430, binding = 3) writeonly buffer LogBuffer { float log_image[]; };
+layout(std430, binding = 3) buffer LogBuffer { float log_image[]; };
 
 const float DECIBEL_PER_OCTAVE = 6.020599913; // 20 log10(2)
 

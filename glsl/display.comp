@@ -8,7 +8,7 @@ layout(local_size_x = 16, local_size_y = 8) in;
 layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer LogBuffer { float log_image[]; };
 layout(std430, binding = 2) readonly buffer GreyBuffer { uint grey[256]; };
-layout(std430, binding = 3) writeonly buffer PixelBuffer { uint pixels[]; };
+layout(std430, binding = 3) buffer PixelBuffer { uint pixels[]; };
 
 float bilinear(float column, float row) {
     float c = clamp(column, 0.0, float(frame.scanlines - 1u));

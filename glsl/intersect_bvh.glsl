@@ -1,21 +1,15 @@
-// Closest hit by a walk down a two-level bounding volume hierarchy.
+// Closest hit by a walk down a two-level, eight-wide bounding volume hierarchy.
 //
-// The includer declares: instances[], vertices[], triangles[] and
-// `uvec4 nodes[]`, four of them per node: 0 holds the reference of the top level's root in .x.
-// A node has both children's boxes (Aila and Laine 2009):
-//   (lo.x, hi.x, lo.y, hi.y) of child 0, the same of child 1, (lo.z, hi.z) of 0 and 1,
-//   (reference 0, reference 1, -, -).
-// A reference is a node's index, or BVH_LEAF with: an instance (top level), or count - 1 and the
-// first triangle.
+// The includer declares: instances[], vertices[], triangles[] and `uvec4 nodes[]`, five of them per
+// node, the format of Ylitie, Karras, Laine 2017 with each axis' planes together:
+//   corner p (3 floats), exponents of the quantum e per axis and mask of inner children (4 bytes);
+//   first inner child, first primitive, what each of 8 children is (8 bytes);
+//   per axis x, y, z: lower planes of the 8 children (8 bytes), upper planes (8 bytes): p + e byte.
+// A child is 0 (none), 001 and 24 + its slot (inner), or the unary count of its primitives and their
+// offset. Primitives are triangles, or in the top level places in a table of instances, which
+// begins at the node nodes[0].y. The top level's root is the node nodes[0].x; NONE: nothing is placed.
 
-const uint BVH_STACK = 64u;            // the builder refuses deeper trees
-const uint BVH_LEAF = 0x80000000u;
-const uint BVH_COUNT_SHIFT = 27u;
-const uint BVH_FIRST_MASK = 0x07ffffffu;
-
-// Exceeds 1 + 2 gamma_3 (Ize 2013) by the rounding of the sheared vertices below, which is a few
-// ulps of the same distances: a box never misses what the triangle test would hit.
-const float BVH_SLACK = 1.0000012;
+const uint BVH_STACK = 32u;    // the builder refuses deeper trees
 
 #ifdef COUNT
 uint bvh_node_visits = 0u;
@@ -24,11 +18,10 @@ uint bvh_triangle_tests = 0u;
 
 struct BvhRay {
     vec3 origin;
-    vec3 above;        // origin, moved up and down along the axes where the direction is zero:
-    vec3 below;        // there a box is met exactly when it contains the origin
-    vec3 inverse;
+    vec3 inverse;      // of the direction; finite where that is zero
     vec3 shear;        // Woop, Benthin, Wald 2013, section 3.1
     uint axis;         // along which the direction is largest
+    uint octant;       // of the direction, complemented, in each byte
 };
 
 vec3 bvh_permute(vec3 v, uint axis) {
@@ -36,29 +29,40 @@ vec3 bvh_permute(vec3 v, uint axis) {
 }
 
 BvhRay bvh_ray(vec3 origin, vec3 direction) {
-    vec3 size = abs(direction);
-    bvec3 zero = lessThan(size, vec3(1e-30));
-    vec3 margin = max(abs(origin) * 5e-7, vec3(1e-18));
     BvhRay ray;
     ray.origin = origin;
-    ray.above = mix(origin, origin + margin, zero);
-    ray.below = mix(origin, origin - margin, zero);
-    ray.inverse = 1.0 / mix(direction, vec3(1e-30), zero);
+    vec3 size = abs(direction);
+    ray.inverse = 1.0 / mix(direction, vec3(1e-24), lessThan(size, vec3(1e-24)));
+    ray.octant = (ray.inverse.x < 0.0 ? 0u : 0x04040404u) | (ray.inverse.y < 0.0 ? 0u : 0x02020202u)
+        | (ray.inverse.z < 0.0 ? 0u : 0x01010101u);
     ray.axis = size.x > size.y ? (size.x > size.z ? 0u : 2u) : (size.y > size.z ? 1u : 2u);
     vec3 d = bvh_permute(direction, ray.axis);
     ray.shear = vec3(d.x / d.z, d.y / d.z, 1.0 / d.z);
     return ray;
 }
 
-// Distance at which the box is entered; more than t_max: it is missed.
-float bvh_box(BvhRay ray, vec3 lo, vec3 hi, float t_min, float t_max) {
-    vec3 a = (lo - ray.above) * ray.inverse;
-    vec3 b = (hi - ray.below) * ray.inverse;
-    vec3 near = min(a, b);
-    vec3 far = max(a, b);
-    float enter = max(max(near.x, near.y), max(near.z, t_min));
-    float leave = min(min(far.x, far.y), far.z) * BVH_SLACK;
-    return enter <= min(leave, t_max) ? enter : 3.4e38;
+vec4 bvh_bytes(uint word) {
+    return vec4(uvec4(word, word >> 8u, word >> 16u, word >> 24u) & 0xffu);
+}
+
+// Children of four slots that the ray meets before t_max: bits of inner children in traversal order
+// from bit 24, of primitives below.
+uint bvh_children(BvhRay ray, uint meta, uvec3 lo, uvec3 hi, vec3 scale, vec3 near, vec3 far, float t_min, float t_max) {
+    bvec3 negative = lessThan(ray.inverse, vec3(0.0));
+    uvec3 first = mix(lo, hi, negative);
+    uvec3 last = mix(hi, lo, negative);
+    vec4 enter = max(max(bvh_bytes(first.x) * scale.x + near.x, bvh_bytes(first.y) * scale.y + near.y),
+        max(bvh_bytes(first.z) * scale.z + near.z, vec4(t_min)));
+    vec4 leave = min(min(bvh_bytes(last.x) * scale.x + far.x, bvh_bytes(last.y) * scale.y + far.y),
+        min(bvh_bytes(last.z) * scale.z + far.z, vec4(t_max)));
+    bvec4 met = lessThanEqual(enter, leave);
+    uint inner = (((meta & (meta << 1u)) & 0x10101010u) >> 4u) * 0xffu;
+    uint place = (meta ^ (ray.octant & inner)) & 0x1f1f1f1fu;
+    uint bits = (meta >> 5u) & 0x07070707u;
+    return (met.x ? (bits & 0xffu) << (place & 0xffu) : 0u)
+        | (met.y ? ((bits >> 8u) & 0xffu) << ((place >> 8u) & 0xffu) : 0u)
+        | (met.z ? ((bits >> 16u) & 0xffu) << ((place >> 16u) & 0xffu) : 0u)
+        | (met.w ? (bits >> 24u) << (place >> 24u) : 0u);
 }
 
 vec3 bvh_vertex(uint index) {
@@ -91,69 +95,97 @@ void bvh_triangle(BvhRay ray, uint instance, uint triangle, float t_min, inout H
 // Miss: instance NONE, t = t_max. Input that is not finite misses.
 Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
     Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
-    uint reference = nodes[0].x;
+    uint root = nodes[0].x;
     float size = max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
     bool finite = all(lessThan(abs(origin), vec3(1e18))) && all(lessThan(abs(direction), vec3(1e18)));
-    if (reference == NONE || !finite || !(size > 1e-18)) return hit;
+    if (root == NONE || !finite || !(size > 1e-18)) return hit;
 
-    uint stack[BVH_STACK];
+    uvec2 stack[BVH_STACK];
     uint depth = 0u;
     uint instance = NONE;     // whose triangles are walked; NONE: the top level
     uint base = 0u;           // depth of the stack below which the top level lies
     BvhRay ray = bvh_ray(origin, direction);
+    uvec2 inner = uvec2(root, 0x80000000u);   // first child; children yet to visit and their mask
+    uvec2 primitives = uvec2(0u);             // first; those yet to test
     while (true) {
-        if ((reference & BVH_LEAF) == 0u) {
+        if (inner.y > 0x00ffffffu) {
+            uint bit = uint(findMSB(inner.y));
+            uint mask = inner.y & 0xffu;
+            inner.y &= ~(1u << bit);
+            if (inner.y > 0x00ffffffu && depth < BVH_STACK) {
+                stack[depth] = inner;
+                depth += 1u;
+            }
+            uint slot = (bit - 24u) ^ (ray.octant & 0xffu);
+            uint n = 5u * (inner.x + uint(bitCount(mask & ~(0xffffffffu << slot))));
 #ifdef COUNT
             bvh_node_visits += 1u;
 #endif
-            uint n = 4u * reference;
-            vec4 first = uintBitsToFloat(nodes[n]);
-            vec4 second = uintBitsToFloat(nodes[n + 1u]);
-            vec4 both = uintBitsToFloat(nodes[n + 2u]);
-            uvec4 children = nodes[n + 3u];
-            float t0 = bvh_box(ray, vec3(first.xz, both.x), vec3(first.yw, both.y), t_min, hit.t);
-            float t1 = bvh_box(ray, vec3(second.xz, both.z), vec3(second.yw, both.w), t_min, hit.t);
-            bool swap = t1 < t0;
-            if (min(t0, t1) < 3e38) {
-                reference = swap ? children.y : children.x;
-                if (max(t0, t1) < 3e38 && depth < BVH_STACK) {
-                    stack[depth] = swap ? children.x : children.y;
-                    depth += 1u;
-                }
-                continue;
-            }
-        } else if (instance == NONE) {
-            uint entered = reference & ~BVH_LEAF;
-            if (entered != skip_instance) {
-                instance = entered;
-                base = depth;
-                vec4 x = instances[instance].object_from_world[0];
-                vec4 y = instances[instance].object_from_world[1];
-                vec4 z = instances[instance].object_from_world[2];
-                ray = bvh_ray(
-                    vec3(dot(x.xyz, origin) + x.w, dot(y.xyz, origin) + y.w, dot(z.xyz, origin) + z.w),
-                    vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction)));
-                reference = instances[instance].bvh_root;
-                continue;
-            }
+            uvec4 header = nodes[n];
+            uvec4 links = nodes[n + 1u];
+            uvec4 x = nodes[n + 2u];
+            uvec4 y = nodes[n + 3u];
+            uvec4 z = nodes[n + 4u];
+            vec3 quantum = uintBitsToFloat((uvec3(header.w, header.w >> 8u, header.w >> 16u) & 0xffu) << 23u);
+            vec3 scale = quantum * ray.inverse;
+            vec3 corner = (uintBitsToFloat(header.xyz) - ray.origin) * ray.inverse;
+            // Ten ulps of what is added below, and half a thousandth of a quantum: more than the
+            // rounding here, in the sheared vertices and in the builder's quantisation. A ray along
+            // an axis within a face thus meets its box.
+            vec3 margin = (abs(corner) + 512.0 * abs(scale)) * 1e-6;
+            vec3 near = corner - margin;
+            vec3 far = corner + margin;
+            uint hits = bvh_children(ray, links.z, uvec3(x.x, y.x, z.x), uvec3(x.z, y.z, z.z), scale, near, far, t_min, hit.t)
+                | bvh_children(ray, links.w, uvec3(x.y, y.y, z.y), uvec3(x.w, y.w, z.w), scale, near, far, t_min, hit.t);
+            inner = uvec2(links.x, (hits & 0xff000000u) | (header.w >> 24u));
+            primitives = uvec2(links.y, hits & 0x00ffffffu);
         } else {
-            uint begin = reference & BVH_FIRST_MASK;
-            uint count = ((reference & ~BVH_LEAF) >> BVH_COUNT_SHIFT) + 1u;
-            for (uint i = 0u; i < count; i++) {
+            primitives = inner;
+            inner = uvec2(0u);
+        }
+        while (primitives.y != 0u) {
+            uint bit = uint(findLSB(primitives.y));
+            primitives.y &= primitives.y - 1u;
+            uint primitive = primitives.x + bit;
+            if (instance != NONE) {
 #ifdef COUNT
                 bvh_triangle_tests += 1u;
 #endif
-                bvh_triangle(ray, instance, begin + i, t_min, hit);
+                bvh_triangle(ray, instance, primitive, t_min, hit);
+                continue;
             }
+            uint entered = nodes[5u * nodes[0].y + primitive / 4u][primitive % 4u];
+            if (entered == skip_instance) continue;
+            // What is left of the top level waits below `base`.
+            if (primitives.y != 0u && depth < BVH_STACK) {
+                stack[depth] = primitives;
+                depth += 1u;
+            }
+            if (inner.y > 0x00ffffffu && depth < BVH_STACK) {
+                stack[depth] = inner;
+                depth += 1u;
+            }
+            instance = entered;
+            base = depth;
+            vec4 x = instances[instance].object_from_world[0];
+            vec4 y = instances[instance].object_from_world[1];
+            vec4 z = instances[instance].object_from_world[2];
+            ray = bvh_ray(
+                vec3(dot(x.xyz, origin) + x.w, dot(y.xyz, origin) + y.w, dot(z.xyz, origin) + z.w),
+                vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction)));
+            inner = uvec2(instances[instance].bvh_root, 0x80000000u);
+            primitives = uvec2(0u);
         }
-        if (depth == base && instance != NONE) {
-            instance = NONE;
-            base = 0u;
-            ray = bvh_ray(origin, direction);
+        if (inner.y <= 0x00ffffffu) {
+            if (depth == base && instance != NONE) {
+                instance = NONE;
+                base = 0u;
+                ray = bvh_ray(origin, direction);
+            }
+            if (depth == 0u) break;
+            depth -= 1u;
+            inner = stack[depth];
         }
-        if (depth == 0u) break;
-        depth -= 1u;
-        reference = stack[depth];
     }
     return hit;
 }

@@ -1,4 +1,4 @@
-// variants: bvh query(RAY_QUERY)
+// variants: bvh query(RAY_QUERY) count(COUNT)
 // Intersects a list of rays: the tracers without the acoustics, for comparison with brute force.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -221,11 +221,17 @@ void main() {
     uint rays = 0u, interactions = 0u;
 
     // A main path spawns at most one branch per interaction, and a branch spawns none.
-    for (uint guard = 0u; guard < limit * (frame.max_interactions + 2u); ++guard) {
+    uint guards = limit * (frame.max_interactions + 2u);
+    for (uint guard = 0u;; ++guard) {
         bool alive = path.interactions < frame.max_interactions && path.crossings < limit
             && path.weight >= frame.min_weight && path.time < time_end;
-        if (!alive) {
-            if (!resume) break;
+        if (!alive || guard == guards) {
+            if (!resume || guard == guards) {
+                // Inside the loop: naga loses values that a loop carries when they are used after it.
+                atomicAdd(counters.rays, rays);
+                if (interactions > 0u) atomicAdd(counters.interactions, interactions);
+                break;
+            }
             resume = false;
             path = main_path;
             continue;
@@ -334,6 +340,4 @@ void main() {
             }
         }
     }
-    atomicAdd(counters.rays, rays);
-    if (interactions > 0u) atomicAdd(counters.interactions, interactions);
 }

@@ -1,56 +1,16 @@
 //! Levels by brute force: lattices of random scatterers summed in f64 with the numbers that the
 //! kernels read must show the brightness that the tables promise.
 
+#[path = "common/signal.rs"]
+mod signal;
+
 use glam::DAffine3;
 use insonify::probe::{Kind, Probe};
-use insonify::scene::settings::{Imaging, ScatterMode, Simulation};
+use insonify::scene::settings::ScatterMode;
 use insonify::scene::{Instance, Scene, Surface, Tissue, Wire};
 use insonify::sim::calibration::{Calibration, amplitude, lateral_taps};
 use insonify::sim::{layout, tables};
-
-fn tissue(echogenicity: f64) -> Tissue {
-    Tissue {
-        speed: 1.54,
-        echogenicity,
-        density_of_scatterers: 1.0,
-        mean_over_sigma: 0.0,
-        texture_depth: 0.0,
-        ..Tissue::shipped("liver").expect("the shipped table has liver")
-    }
-}
-
-fn scene(probe: Probe) -> Scene {
-    Scene {
-        name: "test".into(),
-        tissues: vec![tissue(0.0)],
-        background: 0,
-        meshes: vec![],
-        instances: vec![],
-        wires: vec![],
-        probe,
-        world_from_probe: DAffine3::IDENTITY,
-        simulation: Simulation::default(),
-        imaging: Imaging::default(),
-    }
-}
-
-/// SplitMix64: independent of the kernels' generator.
-struct Random(u64);
-
-impl Random {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    fn gaussian(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
-        radius * (std::f64::consts::TAU * self.uniform()).cos()
-    }
-}
+use signal::{Random, scene, tissue};
 
 /// Response of sample `k` to a unit echo at index `kappa`: linear split, then the axial kernel.
 fn axial(frame: &layout::Frame, k: f64, kappa: f64) -> f64 {

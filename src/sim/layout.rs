@@ -10,6 +10,20 @@ pub const NONE: u32 = u32::MAX;
 /// Media that may enclose one point.
 pub const MAX_STACK: usize = 8;
 
+/// The transmitted path always continues, reflected branches are spawned.
+pub const SAMPLING_MAIN_PATH: u32 = 0;
+/// Independent paths.
+pub const SAMPLING_PLAIN: u32 = 1;
+/// Paths that part at the first interaction.
+pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
+
+/// Curved array.
+pub const KIND_CONVEX: u32 = 0;
+/// Flat array.
+pub const KIND_LINEAR: u32 = 1;
+/// All lines from one point.
+pub const KIND_PHASED: u32 = 2;
+
 /// Transmitted rays refract at the sampled micro-normal.
 pub const FLAG_ROUGH_TRANSMISSION: u32 = 1;
 /// Reflected paths bounce off the transducer's face.

@@ -70,9 +70,9 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         Kind::Convex {
             radius,
             field_of_view,
-        } => (0, radius, field_of_view, 0.0),
-        Kind::Linear { width } => (1, 0.0, 0.0, width),
-        Kind::Phased { field_of_view } => (2, 0.0, field_of_view, 0.0),
+        } => (layout::KIND_CONVEX, radius, field_of_view, 0.0),
+        Kind::Linear { width } => (layout::KIND_LINEAR, 0.0, 0.0, width),
+        Kind::Phased { field_of_view } => (layout::KIND_PHASED, 0.0, field_of_view, 0.0),
     };
     let flag = |on: bool, flag: u32| if on { flag } else { 0 };
     let [left, top, right, bottom] = bounds(probe);
@@ -96,9 +96,9 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         frequency: probe.frequency as f32,
         paths: simulation.paths.max(1),
         sampling: match simulation.sampling {
-            Sampling::MainPath => 0,
-            Sampling::Plain => 1,
-            Sampling::SharedPrimary => 2,
+            Sampling::MainPath => layout::SAMPLING_MAIN_PATH,
+            Sampling::Plain => layout::SAMPLING_PLAIN,
+            Sampling::SharedPrimary => layout::SAMPLING_SHARED_PRIMARY,
         },
         max_interactions: simulation.max_interactions,
         max_reflections: simulation.max_reflections,

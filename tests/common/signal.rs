@@ -1,0 +1,54 @@
+//! What tests of levels and image formation share: a scene of one tissue, random numbers.
+
+use glam::DAffine3;
+use insonify::probe::Probe;
+use insonify::scene::settings::{Imaging, Simulation};
+use insonify::scene::{Scene, Tissue};
+
+/// Fully developed speckle of liver's attenuation at `echogenicity` dB, without texture.
+pub fn tissue(echogenicity: f64) -> Tissue {
+    Tissue {
+        speed: 1.54,
+        echogenicity,
+        density_of_scatterers: 1.0,
+        mean_over_sigma: 0.0,
+        texture_depth: 0.0,
+        ..Tissue::shipped("liver").expect("the shipped table has liver")
+    }
+}
+
+/// That tissue everywhere, seen with `probe`.
+pub fn scene(probe: Probe) -> Scene {
+    Scene {
+        name: "test".into(),
+        tissues: vec![tissue(0.0)],
+        background: 0,
+        meshes: vec![],
+        instances: vec![],
+        wires: vec![],
+        probe,
+        world_from_probe: DAffine3::IDENTITY,
+        simulation: Simulation::default(),
+        imaging: Imaging::default(),
+    }
+}
+
+/// SplitMix64: independent of the kernels' generator.
+pub struct Random(pub u64);
+
+impl Random {
+    /// Uniform in [0, 1).
+    pub fn uniform(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Standard normal.
+    pub fn gaussian(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.uniform()).ln()).sqrt();
+        radius * (std::f64::consts::TAU * self.uniform()).cos()
+    }
+}
