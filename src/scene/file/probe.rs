@@ -12,7 +12,9 @@ use super::within;
 use crate::probe::{Kind, Probe};
 use crate::scene::suggest;
 
-const PRESETS: [(&str, fn() -> Probe); 5] = [
+type Preset = (&'static str, fn() -> Probe);
+
+const PRESETS: [Preset; 5] = [
     ("paper-table1", Probe::paper_table1),
     ("abdominal", Probe::abdominal),
     ("cardiac", Probe::cardiac),

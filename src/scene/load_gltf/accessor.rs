@@ -127,23 +127,17 @@ impl<'a> Reader<'a> {
         let Some(sparse) = accessor.sparse() else {
             return Ok(());
         };
-        let (count, places, values) = (sparse.count() as usize, sparse.indices(), sparse.values());
+        let (count, places, values) = (sparse.count(), sparse.indices(), sparse.values());
         let width = match places.index_type() {
             sparse::IndexType::U8 => 1,
             sparse::IndexType::U16 => 2,
             sparse::IndexType::U32 => 4,
         };
-        let at = self.run(
-            accessor,
-            &places.view(),
-            places.offset() as usize,
-            width,
-            count,
-        )?;
+        let at = self.run(accessor, &places.view(), places.offset(), width, count)?;
         let new = self.run(
             accessor,
             &values.view(),
-            values.offset() as usize,
+            values.offset(),
             accessor.size(),
             count,
         )?;
