@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::scene::{Mesh, Scene};
+use crate::scene::Scene;
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,7 +11,7 @@ pub struct Hit {
     pub t: f64,
     /// Index into [`Scene::instances`].
     pub instance: usize,
-    /// Index into [`Mesh::triangles`] of the instance's mesh.
+    /// Index into the triangles of the instance's mesh.
     pub triangle: usize,
     /// Barycentric weight of the second vertex.
     pub u: f64,
@@ -19,14 +19,13 @@ pub struct Hit {
     pub v: f64,
 }
 
-/// Ray parameter and barycentric weights (t, u, v) where a ray in object space meets triangle
-/// `triangle`; unbounded in t. Edges count as inside.
+/// Ray parameter and barycentric weights (t, u, v) where a ray meets the triangle of these
+/// `corners`; unbounded in t. Edges count as inside.
 ///
 /// The edge functions are scalar triple products (Pluecker coordinates of the ray and the edge), of
 /// which two triangles that share an edge compute exactly opposite values: no ray passes between.
-pub fn triangle(mesh: &Mesh, triangle: usize, origin: DVec3, direction: DVec3) -> Option<[f64; 3]> {
-    let [a, b, c] = mesh.triangles[triangle]
-        .map(|i| DVec3::from(mesh.positions[i as usize].map(f64::from)) - origin);
+pub fn triangle(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<[f64; 3]> {
+    let [a, b, c] = corners.map(|corner| corner - origin);
     let weights = [
         direction.dot(c.cross(b)),
         direction.dot(a.cross(c)),
@@ -56,7 +55,9 @@ pub fn all_hits(scene: &Scene, origin: DVec3, direction: DVec3, t_min: f64) -> V
         );
         let mesh = &scene.meshes[placed.mesh];
         for index in 0..mesh.triangles.len() {
-            if let Some([t, u, v]) = triangle(mesh, index, o, d)
+            let corners = mesh.triangles[index]
+                .map(|i| DVec3::from(mesh.positions[i as usize].map(f64::from)));
+            if let Some([t, u, v]) = triangle(corners, o, d)
                 && t > t_min
             {
                 hits.push(Hit {
@@ -93,12 +94,8 @@ mod tests {
 
     #[test]
     fn triangle_in_closed_form() {
-        let mesh = Mesh {
-            positions: vec![[0.0; 3], [2.0, 0.0, 0.0], [0.0, 4.0, 0.0]],
-            triangles: vec![[0, 1, 2]],
-            ..Mesh::default()
-        };
-        let at = |x, y| triangle(&mesh, 0, DVec3::new(x, y, -3.0), DVec3::new(0.0, 0.0, 0.5));
+        let corners = [DVec3::ZERO, 2.0 * DVec3::X, 4.0 * DVec3::Y];
+        let at = |x, y| triangle(corners, DVec3::new(x, y, -3.0), DVec3::new(0.0, 0.0, 0.5));
         // Weights are x/2 and y/4; the plane z = 0 lies six half-unit directions away. Binary fractions: exact.
         assert_eq!(at(0.5, 1.0), Some([6.0, 0.25, 0.25]));
         assert_eq!(at(1.0, 0.0), Some([6.0, 0.5, 0.0]), "edges are inside");
@@ -106,7 +103,7 @@ mod tests {
         assert_eq!(at(-1e-9, 1.0), None);
         assert_eq!(at(1.5, 1.5), None);
         assert_eq!(
-            triangle(&mesh, 0, DVec3::ZERO, DVec3::X),
+            triangle(corners, DVec3::ZERO, DVec3::X),
             None,
             "a ray in the plane misses"
         );

@@ -1,3 +1,29 @@
 //! The f64 twin of every kernel: plain loops that share nothing with the device's code.
+//!
+//! One module per kernel, with the kernel's name; what each computes is docs/kernels.md. The inputs
+//! are the structures that the kernels bind ([`layout`](crate::sim::layout)), widened to f64.
 
+pub mod accumulator;
+pub mod acoustics;
+pub mod axial;
+pub mod beam;
+pub mod detect;
+pub mod display;
+#[cfg(test)]
+mod fixture;
+pub mod geometry;
+mod interface;
 pub mod intersect;
+pub mod origin;
+mod path;
+pub mod random;
+pub mod scatter;
+pub mod segment;
+pub mod stack;
+pub mod texture;
+pub mod trace;
+pub mod world;
+
+pub use accumulator::Accumulator;
+pub use segment::Segment;
+pub use world::World;

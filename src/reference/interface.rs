@@ -1,0 +1,156 @@
+//! One meeting of a path with a surface: normals, reflectance and echo.
+
+use glam::DVec3;
+
+use super::Accumulator;
+use super::acoustics::{Fluid, mirror, power_cosine, reflection};
+use super::path::Path;
+use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, gaussian, path_random, pcg4d, unit};
+use super::stack::Stack;
+use super::world::{Crossing, World};
+use crate::sim::layout::{FLAG_COHERENT, Surface, Tissue};
+
+/// Roughness exponents from here on are perfect mirrors.
+pub(super) const MIRROR: f64 = 1e9;
+/// Edge of the cells that share the random phase of a thick surface's echo, mm.
+const PHASE_CELL: f64 = 0.5;
+/// Micro-normals tried.
+const ATTEMPTS: u32 = 8;
+
+/// A sampled micro-normal and where it mirrors the path to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Micro {
+    pub(super) normal: DVec3,
+    pub(super) reflected: DVec3,
+}
+
+/// What a path meets. Normals are unit and turned against the path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interface {
+    /// Of the triangle.
+    pub(super) geometric: DVec3,
+    /// Interpolated.
+    pub(super) shading: DVec3,
+    /// None when no attempt was acceptable: no echo, no reflected path.
+    pub(super) micro: Option<Micro>,
+    /// Before and behind.
+    pub(super) fluids: [Fluid; 2],
+    /// Intensity reflectance R at the shading normal; 1 at total reflection.
+    pub(super) reflectance: f64,
+    pub(super) roughness: f64,
+    surface: Surface,
+    absorption: f64,
+    instance: u32,
+}
+
+fn fluid(tissue: &Tissue) -> Fluid {
+    Fluid {
+        speed: tissue.speed.into(),
+        impedance: tissue.impedance.into(),
+    }
+}
+
+/// The interface at `hit`, where `path` has arrived, with `after` the media behind it.
+pub(super) fn meet(world: &World, path: &Path, hit: &Crossing, after: &Stack) -> Interface {
+    let d = path.direction;
+    let (outward, shading) = world.normals(hit);
+    let outside = d.dot(outward) < 0.0;
+    let geometric = if outside { outward } else { -outward };
+    let shading = if (shading.dot(d) < 0.0) == outside {
+        if outside { shading } else { -shading }
+    } else {
+        geometric
+    };
+    let tissue = |stack| &world.tissues[world.medium(stack).0 as usize];
+    let (before, behind) = (tissue(&path.stack), tissue(after));
+    let fluids = [fluid(before), fluid(behind)];
+    let instance = &world.instances[hit.instance as usize];
+    let surface = world.surfaces[if outside {
+        instance.surface_outside
+    } else {
+        instance.surface_inside
+    } as usize];
+    let roughness = f64::from(surface.roughness);
+    Interface {
+        geometric,
+        shading,
+        micro: micro_normal(world, path, geometric, shading, roughness),
+        fluids,
+        reflectance: reflection(fluids[0], fluids[1], -d.dot(shading)).powi(2),
+        roughness,
+        surface,
+        absorption: before.absorption.into(),
+        instance: hit.instance,
+    }
+}
+
+fn micro_normal(
+    world: &World,
+    path: &Path,
+    geometric: DVec3,
+    shading: DVec3,
+    roughness: f64,
+) -> Option<Micro> {
+    let d = path.direction;
+    let accept = |normal: DVec3| {
+        let reflected = mirror(d, normal);
+        (d.dot(normal) < 0.0 && reflected.dot(geometric) > 0.0)
+            .then_some(Micro { normal, reflected })
+    };
+    if roughness >= MIRROR {
+        return accept(shading);
+    }
+    (0..ATTEMPTS).find_map(|j| {
+        let words = path_random(path.n, path.key(), PURPOSE_NORMAL + j, world.frame.seed);
+        let u = [unit(words[0]), unit(words[1])];
+        accept(power_cosine(shading, roughness, u))
+    })
+}
+
+impl Interface {
+    /// Deposits what returns along the path: the part in phase at the surface, the rest displaced
+    /// by the thickness with a phase that belongs to the surface.
+    pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
+        let Some(micro) = self.micro else { return };
+        let frame = world.frame;
+        let (surface, d) = (&self.surface, path.direction);
+        let r = reflection(self.fluids[0], self.fluids[1], -d.dot(micro.normal));
+        let lobe = (-d.dot(micro.reflected))
+            .max(0.0)
+            .powf(surface.specularity.into());
+        let amplitude = path.weight * r * lobe * f64::from(surface.gain);
+        let words = path_random(path.n, path.key(), PURPOSE_THICKNESS, frame.seed);
+        let q = f64::from(surface.thickness) * gaussian(words[0]).abs();
+        let behind = amplitude * (-self.absorption * q).exp();
+        let time = path.time + q / self.fluids[0].speed;
+        let (l, layer) = path.scanline(frame.scanlines);
+        let y = super::geometry::probe(frame).elevation(layer);
+        let gain = |k: usize| {
+            let row = &world.rows[k];
+            let sigma = f64::from(row.sigma_elevation);
+            f64::from(row.surface_gain)
+                * (-y * y / (2.0 * sigma * sigma)).exp()
+                * f64::from(frame.surface_scale)
+        };
+        if frame.flags & FLAG_COHERENT != 0 {
+            out.deposit(l, time, path.share * behind, 0.0, gain);
+            return;
+        }
+        let coherence = if surface.thickness == 0.0 {
+            1.0
+        } else {
+            f64::from(surface.coherence)
+        };
+        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, gain);
+        let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
+        if rest > 0.0 {
+            let p = world.texture(self.instance).transform_point3(path.origin);
+            let cell = (p / PHASE_CELL).floor().as_i64vec3();
+            let key = path.n.wrapping_mul(0x9e37_79b9).wrapping_add(frame.seed);
+            let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
+            let phase = std::f64::consts::TAU * unit(words[3]);
+            let scale = rest * (path.share * path.probability).sqrt();
+            out.deposit(l, time, scale * behind, phase, gain);
+        }
+    }
+}

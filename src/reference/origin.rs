@@ -1,0 +1,109 @@
+//! Twin of `origin`: which media enclose the start of each line.
+
+use super::geometry::world_line;
+use super::stack::Stack;
+use super::world::{Crossing, World};
+use crate::sim::layout::MAX_STACK;
+
+/// Most crossings followed.
+const CROSSINGS: usize = 64;
+
+/// One stack per line e * scanlines + l, and the number of lines with more than eight media.
+pub fn origin(world: &World) -> (Vec<Stack>, u32) {
+    let mut overflow = 0;
+    let mut stacks = Vec::new();
+    for e in 0..world.frame.layers {
+        for l in 0..world.frame.scanlines {
+            let line = world_line(world.frame, l, e);
+            let mut crossings = world.crossings(line.origin, line.direction, [0.0, f64::INFINITY]);
+            crossings.truncate(CROSSINGS);
+            let mut media = enclosing(&crossings);
+            overflow += u32::from(media.len() > MAX_STACK);
+            media.truncate(MAX_STACK);
+            stacks.push(Stack(media));
+        }
+    }
+    (stacks, overflow)
+}
+
+/// Instances left more often than entered, the one whose last exit is farthest first.
+fn enclosing(crossings: &[Crossing]) -> Vec<u32> {
+    let mut instances: Vec<u32> = Vec::new();
+    for c in crossings.iter().rev().filter(|c| !c.entry) {
+        let own = crossings.iter().filter(|o| o.instance == c.instance);
+        let net: i32 = own.map(|o| if o.entry { -1 } else { 1 }).sum();
+        if net > 0 && !instances.contains(&c.instance) {
+            instances.push(c.instance);
+        }
+    }
+    instances
+}
+
+/// The layout of the device's buffer: per line the count, then eight instances.
+pub fn pack(stacks: &[Stack]) -> Vec<u32> {
+    let mut packed = vec![0; stacks.len() * (MAX_STACK + 1)];
+    for (slot, stack) in packed.chunks_mut(MAX_STACK + 1).zip(stacks) {
+        slot[0] = stack.0.len() as u32;
+        slot[1..=stack.0.len()].copy_from_slice(&stack.0);
+    }
+    packed
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::super::fixture::{Fixture, tissue};
+    use super::*;
+
+    fn spheres(radii: &[f64]) -> Fixture {
+        let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+        for &r in radii {
+            fixture.sphere(DVec3::new(0.3, 0.2, 0.1), r, 24, 0, 0);
+        }
+        fixture
+    }
+
+    #[test]
+    fn nested_spheres_enclose_the_start_from_the_outermost_in() {
+        let mut fixture = spheres(&[5.0, 20.0, 10.0]);
+        // Ahead of the probe, behind it and beside it: none encloses the start.
+        fixture.sphere(DVec3::new(0.0, 0.0, 50.0), 8.0, 24, 0, 0);
+        fixture.sphere(DVec3::new(0.0, 0.0, -50.0), 8.0, 24, 0, 0);
+        fixture.sphere(DVec3::new(30.0, 0.0, 0.0), 8.0, 24, 0, 0);
+        let (stacks, overflow) = origin(&fixture.world());
+        assert_eq!((&stacks[0].0[..], overflow), (&[1, 2, 0][..], 0));
+        assert_eq!(pack(&stacks), [3, 1, 2, 0, 0, 0, 0, 0, 0]);
+    }
+
+    #[test]
+    fn the_outermost_eight_of_ten_are_kept() {
+        let radii: Vec<f64> = (1..=10).map(|i| 2.0 * f64::from(i)).collect();
+        let (stacks, overflow) = origin(&spheres(&radii).world());
+        assert_eq!(
+            (&stacks[0].0[..], overflow),
+            (&[9, 8, 7, 6, 5, 4, 3, 2][..], 1)
+        );
+    }
+
+    #[test]
+    fn lines_differ_where_only_some_start_inside() {
+        let mut fixture = spheres(&[]);
+        fixture.block([0.0, -9.0, -9.0], [9.0, 9.0, 9.0], 0, 0);
+        (fixture.frame.scanlines, fixture.frame.layers) = (4, 2);
+        let (stacks, _) = origin(&fixture.world());
+        let counts: Vec<usize> = stacks.iter().map(|s| s.0.len()).collect();
+        assert_eq!(counts, [0, 0, 1, 1, 0, 0, 1, 1]);
+    }
+
+    #[test]
+    fn a_ray_through_edges_crosses_once() {
+        let mut fixture = spheres(&[]);
+        // The pole is a fan of triangles, and the ray runs through both poles.
+        let turn = glam::DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        fixture.sphere(DVec3::ZERO, 5.0, 12, 0, 0);
+        fixture.instances[0].object_from_world = super::super::fixture::rows_of(&turn);
+        let (stacks, _) = origin(&fixture.world());
+        assert_eq!(stacks[0].0, [0]);
+    }
+}

@@ -1,0 +1,76 @@
+//! A path between two interactions, and how a mirror turns it.
+
+use glam::DVec3;
+
+use super::acoustics::mirror;
+use super::interface::MIRROR;
+use super::stack::Stack;
+
+/// Whether a path was split and how it goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Transmitted path of main-path sampling; spawns branches.
+    Main,
+    /// Reflected off the main path.
+    Branch,
+    /// One stochastic choice at every interaction.
+    Single,
+}
+
+/// A path between two interactions.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    pub(super) role: Role,
+    /// Index n of the path sample.
+    pub(super) n: u32,
+    pub(super) line: u32,
+    /// One-way intensity weight W.
+    pub(super) weight: f64,
+    /// Share p of an echo.
+    pub(super) share: f64,
+    /// Probability Q of the branches taken.
+    pub(super) probability: f64,
+    /// One-way time T, us.
+    pub(super) time: f64,
+    pub(super) origin: DVec3,
+    pub(super) direction: DVec3,
+    pub(super) lateral: DVec3,
+    pub(super) handedness: f64,
+    pub(super) interactions: u32,
+    pub(super) reflections: u32,
+    pub(super) spread: [f64; 3],
+    pub(super) stack: Stack,
+    pub(super) t_min: f64,
+}
+
+impl Path {
+    /// Key of the random numbers at the interaction just reached.
+    pub(super) fn key(&self) -> u32 {
+        self.interactions + 32 * self.reflections
+    }
+
+    /// Scanline and layer.
+    pub(super) fn scanline(&self, scanlines: u32) -> (u32, u32) {
+        (self.line % scanlines, self.line / scanlines)
+    }
+}
+
+/// Distance from `p` below which a surface is the one just left.
+pub(super) fn step(p: DVec3) -> f64 {
+    4e-6 * p.abs().max_element().max(1.0)
+}
+
+/// Turns the path back along `direction`, mirrored by the plane of normal `m`.
+pub(super) fn reflect(path: &mut Path, direction: DVec3, m: DVec3) {
+    path.direction = direction;
+    path.lateral = mirror(path.lateral, m);
+    path.handedness = -path.handedness;
+    path.reflections += 1;
+}
+
+/// The lobe of a rough reflection: its solid-angle variance per axis grows with the distance.
+pub(super) fn widen(path: &mut Path, roughness: f64) {
+    if roughness < MIRROR {
+        path.spread[2] += 4.0 / (roughness + 2.0);
+    }
+}

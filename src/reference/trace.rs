@@ -1,0 +1,338 @@
+//! Twin of `trace`: Monte-Carlo paths, their surface echoes and their segments.
+
+use glam::{DAffine3, DVec3};
+
+use super::geometry::{face, world_line};
+use super::interface::{self, Interface};
+use super::path::{Path, Role, reflect, step, widen};
+use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, gaussian, path_random, unit};
+use super::stack::Stack;
+use super::world::{Crossing, World, affine};
+use super::{Accumulator, Segment, acoustics};
+use crate::sim::layout::{
+    Counters, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, SAMPLING_MAIN_PATH,
+    SAMPLING_SHARED_PRIMARY,
+};
+
+/// Crossings farther apart than this, mm, are not the same surface.
+const COINCIDENT: f64 = 1e-3;
+/// Reflectances below this share one branch.
+const FAINT: f64 = 0.01;
+
+/// What `trace` leaves behind.
+#[derive(Clone, Debug)]
+pub struct Traced {
+    /// Surface echoes, in units of 1 / surface_scale.
+    pub surface: Accumulator,
+    /// Segments per line e * scanlines + l, by path; none is dropped for want of room.
+    pub segments: Vec<Vec<Segment>>,
+    /// Counts; `segments_dropped` is what the frame's capacity would not hold.
+    pub counters: Counters,
+}
+
+struct Tracer<'a> {
+    world: &'a World<'a>,
+    probe_from_world: DAffine3,
+    out: Traced,
+}
+
+/// Follows all paths of all lines; `stacks` are the media at each line's start.
+pub fn trace(world: &World, stacks: &[Stack]) -> Traced {
+    let frame = world.frame;
+    let lines = frame.layers * frame.scanlines;
+    let mut tracer = Tracer {
+        world,
+        probe_from_world: affine(&frame.probe_from_world),
+        out: Traced {
+            surface: Accumulator::new(frame),
+            segments: vec![Vec::new(); lines as usize],
+            counters: Counters::default(),
+        },
+    };
+    for line in 0..lines {
+        for n in 0..frame.paths {
+            let path = tracer.start(line, n, stacks[line as usize].clone());
+            tracer.follow(path);
+        }
+    }
+    let mut out = tracer.out;
+    let sizes = out.segments.iter().map(|s| s.len() as u32);
+    out.counters.segments = sizes.clone().sum();
+    out.counters.segments_dropped = sizes
+        .map(|n| n.saturating_sub(frame.segment_capacity))
+        .sum();
+    out.counters.saturated = out.surface.saturated;
+    out
+}
+
+impl Tracer<'_> {
+    fn start(&self, line: u32, n: u32, stack: Stack) -> Path {
+        let frame = self.world.frame;
+        let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
+        let jitter = gaussian(path_random(n, 0, PURPOSE_JITTER, frame.seed)[0]);
+        Path {
+            role: if frame.sampling == SAMPLING_MAIN_PATH {
+                Role::Main
+            } else {
+                Role::Single
+            },
+            n,
+            line,
+            weight: 1.0,
+            share: 1.0 / f64::from(frame.paths),
+            probability: 1.0,
+            time: 0.0,
+            origin: start.origin + f64::from(frame.origin_jitter) * jitter * start.lateral,
+            direction: start.direction,
+            lateral: start.lateral,
+            handedness: 1.0,
+            interactions: 0,
+            reflections: 0,
+            spread: [0.0; 3],
+            stack,
+            t_min: 0.0,
+        }
+    }
+
+    /// One-way time of the image's bottom.
+    fn end(&self) -> f64 {
+        f64::from(self.world.frame.depth) / f64::from(self.world.frame.speed)
+    }
+
+    fn follow(&mut self, mut path: Path) {
+        let frame = self.world.frame;
+        for _ in 0..64 + frame.max_interactions {
+            let (tissue, _) = self.world.medium(&path.stack);
+            let speed = f64::from(self.world.tissues[tissue as usize].speed);
+            let t_end = (self.end() - path.time) * speed;
+            let range = [path.t_min, t_end];
+            let crossings = self.world.crossings(path.origin, path.direction, range);
+            self.out.counters.rays += 1;
+            let nearest = crossings.first().map_or(t_end, |c| c.t);
+            if let Some((t, normal)) = self.face(&path, nearest) {
+                self.emit(&path, t);
+                let ends = frame.flags & FLAG_FACE_REFLECTION == 0
+                    || path.reflections >= frame.max_reflections;
+                if ends {
+                    return;
+                }
+                self.advance(&mut path, t);
+                let back = acoustics::mirror(path.direction, normal);
+                reflect(&mut path, back, normal);
+            } else {
+                let Some(hit) = crossings.first() else {
+                    self.emit(&path, t_end);
+                    return;
+                };
+                let (after, last) = self.toggled(&path.stack, &crossings);
+                if after.current(self.world.instances) == path.stack.current(self.world.instances) {
+                    path.t_min = last + step(path.origin + last * path.direction);
+                    path.stack = after;
+                    continue;
+                }
+                self.emit(&path, hit.t);
+                self.advance(&mut path, hit.t);
+                let interface = interface::meet(self.world, &path, hit, &after);
+                interface.echo(self.world, &path, &mut self.out.surface);
+                let goes_on = match path.role {
+                    Role::Main => {
+                        self.branch(&path, &interface);
+                        path.weight *= 1.0 - interface.reflectance;
+                        interface.reflectance < 1.0 && self.transmit(&mut path, &interface, after)
+                    }
+                    Role::Branch | Role::Single => self.choose(&mut path, &interface, after),
+                };
+                if !goes_on {
+                    return;
+                }
+            }
+            if self.ended(&path) {
+                return;
+            }
+        }
+    }
+
+    fn ended(&self, path: &Path) -> bool {
+        path.interactions >= self.world.frame.max_interactions
+            || path.weight < f64::from(self.world.frame.min_weight)
+            || path.time >= self.end()
+    }
+
+    /// The transducer's face, for reflected paths, if it is nearer than `limit`.
+    fn face(&self, path: &Path, limit: f64) -> Option<(f64, DVec3)> {
+        if path.reflections == 0 {
+            return None;
+        }
+        let to_probe = &self.probe_from_world;
+        let (o, d) = (
+            to_probe.transform_point3(path.origin),
+            to_probe.transform_vector3(path.direction),
+        );
+        let (t, normal) = face(self.world.frame, o, d, path.t_min)?;
+        let world = affine(&self.world.frame.world_from_probe);
+        (t < limit).then(|| (t, world.transform_vector3(normal).normalize()))
+    }
+
+    /// The stack behind the first of `crossings`, and the distance of the last one that counted.
+    fn toggled(&mut self, stack: &Stack, crossings: &[Crossing]) -> (Stack, f64) {
+        let hit = crossings[0];
+        let mut at_hit = vec![hit];
+        if self.world.frame.flags & FLAG_COINCIDENT != 0 {
+            for c in &crossings[1..] {
+                let new = at_hit.iter().all(|o| o.instance != c.instance);
+                if new && at_hit.len() < 3 && c.t - hit.t <= COINCIDENT {
+                    at_hit.push(*c);
+                }
+            }
+        }
+        let mut after = stack.clone();
+        for c in &at_hit {
+            if !c.entry {
+                after.leave(c.instance);
+            } else if !after.enter(c.instance) {
+                self.out.counters.stack_overflow += 1;
+            }
+        }
+        (after, at_hit[at_hit.len() - 1].t)
+    }
+
+    /// Moves the path by `t` to its next interaction.
+    fn advance(&mut self, path: &mut Path, t: f64) {
+        let (tissue, _) = self.world.medium(&path.stack);
+        let tissue = &self.world.tissues[tissue as usize];
+        path.origin += t * path.direction;
+        path.weight *= (-f64::from(tissue.absorption) * t).exp();
+        path.time += t / f64::from(tissue.speed);
+        let [a, b, c] = path.spread;
+        path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
+        path.interactions += 1;
+        path.t_min = step(path.origin);
+        self.out.counters.interactions += 1;
+    }
+
+    /// The reflected part that main-path sampling splits off, followed to its end.
+    fn branch(&mut self, main: &Path, interface: &Interface) {
+        let frame = self.world.frame;
+        let Some(echo) = interface
+            .micro
+            .filter(|_| main.reflections < frame.max_reflections)
+        else {
+            return;
+        };
+        let (n, big_r) = (f64::from(frame.paths), interface.reflectance);
+        let mut path = Path {
+            role: Role::Branch,
+            ..main.clone()
+        };
+        if big_r >= FAINT {
+            let branches = (n * big_r).ceil().clamp(1.0, n);
+            if f64::from(main.n) >= branches {
+                return;
+            }
+            path.weight *= big_r;
+            path.share = 1.0 / branches;
+        } else {
+            let choice = path_random(main.n, main.key(), PURPOSE_CHOICE, frame.seed)[0];
+            if main.n != 0 || unit(choice) >= big_r / FAINT {
+                return;
+            }
+            path.weight *= FAINT;
+            path.probability = big_r / FAINT;
+            path.share = 1.0;
+        }
+        reflect(&mut path, echo.reflected, echo.normal);
+        widen(&mut path, interface.roughness);
+        if !self.ended(&path) {
+            self.follow(path);
+        }
+    }
+
+    /// Reflects or transmits by chance; whether the path goes on.
+    fn choose(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
+        let frame = self.world.frame;
+        let mut u = unit(path_random(path.n, path.key(), PURPOSE_CHOICE, frame.seed)[0]);
+        if path.role == Role::Single && path.interactions == 1 {
+            u = (f64::from(path.n) + u) / f64::from(frame.paths);
+        }
+        if u >= interface.reflectance {
+            path.probability *= 1.0 - interface.reflectance;
+            return self.transmit(path, interface, after);
+        }
+        path.probability *= interface.reflectance;
+        let Some(micro) = interface
+            .micro
+            .filter(|_| path.reflections < frame.max_reflections)
+        else {
+            return false;
+        };
+        reflect(path, micro.reflected, micro.normal);
+        widen(path, interface.roughness);
+        true
+    }
+
+    /// Refracts into the next medium; false when the path is lost to total reflection.
+    fn transmit(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
+        let rough = self.world.frame.flags & FLAG_ROUGH_TRANSMISSION != 0;
+        let normal = match interface.micro {
+            Some(micro) if rough => micro.normal,
+            _ => interface.shading,
+        };
+        let [before, behind] = interface.fluids;
+        let through = |n| acoustics::refract(before, behind, path.direction, n);
+        let beyond = through(normal).filter(|d| d.dot(interface.geometric) < 0.0);
+        let Some(direction) = beyond.or_else(|| through(interface.geometric)) else {
+            self.out.counters.paths_lost += 1;
+            return false;
+        };
+        path.direction = direction;
+        path.lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
+        path.stack = after;
+        true
+    }
+
+    /// Keeps the stretch of `length` ahead of the path, if scatterers or points can lie there.
+    fn emit(&mut self, path: &Path, length: f64) {
+        let (tissue, instance) = self.world.medium(&path.stack);
+        let scatters = self.world.tissues[tissue as usize].presence > 0.0;
+        let holds_echoes = scatters || !self.world.points.is_empty();
+        // A NaN length is no stretch either.
+        if !holds_echoes || length.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+            return;
+        }
+        let frame = self.world.frame;
+        let unsplit = frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0;
+        let (weight, share) = match path.role {
+            Role::Single if !unsplit => (
+                path.weight * path.share,
+                (path.probability / path.share).max(1.0),
+            ),
+            _ if path.n != 0 => return,
+            Role::Branch => {
+                let row = &self.world.rows[self.out.surface.sample(path.time)];
+                if path.weight * f64::from(row.compensation) < f64::from(frame.volume_floor) {
+                    return;
+                }
+                (path.weight, 1.0)
+            }
+            Role::Main | Role::Single => (path.weight, 1.0),
+        };
+        self.out.segments[path.line as usize].push(Segment {
+            origin: path.origin,
+            length,
+            direction: path.direction,
+            time: path.time,
+            lateral: path.lateral,
+            weight,
+            spread: path.spread,
+            share,
+            tissue,
+            instance,
+            line: path.line,
+            handedness: path.handedness,
+        });
+    }
+}
+
+#[cfg(test)]
+#[path = "trace_tests.rs"]
+mod tests;
