@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod calibration;
 pub mod layout;
+pub mod placement;
 pub mod shaders;
 pub mod special;
 pub mod tables;
