@@ -92,13 +92,13 @@ void bvh_triangle(BvhRay ray, uint instance, uint triangle, float t_min, inout H
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
-// Miss: instance NONE, t = t_max. Input that is not finite misses.
+// Miss: instance NONE, t = t_max. A ray that is none (not finite, no direction, t_min < 0) misses.
 Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
     Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
     uint root = nodes[0].x;
     float size = max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
     bool finite = all(lessThan(abs(origin), vec3(1e18))) && all(lessThan(abs(direction), vec3(1e18)));
-    if (root == NONE || !finite || !(size > 1e-18)) return hit;
+    if (root == NONE || !finite || !(size > 1e-18) || !(t_min >= 0.0) || !(t_max >= t_min)) return hit;
 
     uvec2 stack[BVH_STACK];
     uint depth = 0u;

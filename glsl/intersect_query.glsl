@@ -5,7 +5,7 @@
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
-// Miss: instance NONE, t = t_max. Input that is not finite misses.
+// Miss: instance NONE, t = t_max. A ray that is none (not finite, no direction, t_min < 0) misses.
 Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
     Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
     float size = max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
