@@ -62,14 +62,15 @@ pub fn differences(glsl: &Path, spirv: &Path, compiler: &str) -> Result<Vec<Stri
         Ok(stamped) => stamped,
         Err(error) => return Ok(vec![format!("{}: {error}; {REMEDY}", path.display())]),
     };
+    let variants = source::variants(glsl)?;
     let mut found = Vec::new();
-    for variant in source::variants(glsl)? {
+    for variant in &variants {
         let stem = &variant.stem;
         let Some(entry) = stamped.remove(stem) else {
             found.push(format!("{stem}: not compiled; {REMEDY}"));
             continue;
         };
-        if entry.source != source::hash(glsl, &variant, compiler)? {
+        if entry.source != source::hash(glsl, variant, compiler)? {
             found.push(format!(
                 "{stem}.spv: older than its sources or compiler; {REMEDY}"
             ));
@@ -82,21 +83,13 @@ pub fn differences(glsl: &Path, spirv: &Path, compiler: &str) -> Result<Vec<Stri
             Err(error) => found.push(format!("{stem}.spv: {error}; {REMEDY}")),
         }
     }
-    found.extend(
-        stamped
-            .keys()
-            .map(|stem| format!("{stem}: stamped, but no kernel gives it; {REMEDY}")),
-    );
+    for stem in stamped.keys() {
+        found.push(format!("{stem}: stamped, but no kernel gives it; {REMEDY}"));
+    }
     for entry in fs::read_dir(spirv).map_err(|e| file_error(spirv, e))? {
         let path = entry.map_err(|e| file_error(spirv, e))?.path();
-        let stem = path
-            .file_stem()
-            .unwrap_or_default()
-            .to_string_lossy()
-            .into_owned();
-        if path.extension().is_some_and(|x| x == "spv")
-            && !source::variants(glsl)?.iter().any(|v| v.stem == stem)
-        {
+        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+        if path.extension().is_some_and(|x| x == "spv") && variants.iter().all(|v| v.stem != stem) {
             found.push(format!("{stem}.spv: no kernel gives it; {REMEDY}"));
         }
     }

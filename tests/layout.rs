@@ -1,0 +1,186 @@
+//! `sim::layout` mirrors `glsl/shared.glsl`: names, offsets and strides, by reflection of SPIR-V.
+
+use std::mem::size_of;
+
+use insonify::sim::layout::{Counters, Frame, Instance, Row, Segment, Surface, Tissue};
+use insonify::sim::shaders::{Library, words_of};
+use spirq::ReflectConfig;
+use spirq::ty::{StructType, Type};
+use spirq::var::Variable;
+
+/// Name, size and fields of a structure of `sim::layout`.
+struct Mirror {
+    name: &'static str,
+    size: usize,
+    offsets: &'static [(&'static str, usize)],
+}
+
+macro_rules! mirrors {
+    ($($ty:ident),*) => {
+        [$(Mirror { name: stringify!($ty), size: size_of::<$ty>(), offsets: $ty::OFFSETS }),*]
+    };
+}
+
+fn mirrors() -> [Mirror; 7] {
+    mirrors!(Frame, Tissue, Surface, Instance, Row, Segment, Counters)
+}
+
+/// Types of all storage buffers of a module.
+fn buffers(words: &[u32]) -> Vec<Type> {
+    let entries = ReflectConfig::new()
+        .spv(words.to_vec())
+        .ref_all_rscs(true)
+        .reflect()
+        .unwrap();
+    let variables = entries.into_iter().flat_map(|e| e.vars);
+    variables
+        .filter(|v| matches!(v, Variable::Descriptor { .. }))
+        .map(|v| v.ty().clone())
+        .collect()
+}
+
+/// Structures that stand as elements (with the array's stride) or members of storage blocks.
+fn structures(ty: &Type, stride: Option<usize>, found: &mut Vec<(StructType, Option<usize>)>) {
+    match ty {
+        Type::Array(array) => structures(&array.element_ty, array.stride, found),
+        Type::Struct(structure) => found.push((structure.clone(), stride)),
+        _ => {}
+    }
+}
+
+fn elements(words: &[u32]) -> Vec<(StructType, Option<usize>)> {
+    let mut found = Vec::new();
+    for block in buffers(words) {
+        if let Type::Struct(block) = block {
+            for member in block.members {
+                structures(&member.ty, None, &mut found);
+            }
+        }
+    }
+    found
+}
+
+fn offsets(structure: &StructType) -> Vec<usize> {
+    structure
+        .members
+        .iter()
+        .map(|m| m.offset.unwrap())
+        .collect()
+}
+
+/// In what `structure` of the shader, an array's element, differs from its mirror.
+fn difference(structure: &StructType, stride: Option<usize>, mirror: &Mirror) -> Option<String> {
+    let shader: Vec<_> = structure
+        .members
+        .iter()
+        .map(|m| (m.name.clone().unwrap_or_default(), m.offset.unwrap()))
+        .collect();
+    let here: Vec<_> = mirror
+        .offsets
+        .iter()
+        .map(|(n, o)| ((*n).to_owned(), *o))
+        .collect();
+    let pairs = shader.iter().zip(&here).find(|(s, h)| s != h);
+    if let Some((shader, here)) = pairs {
+        return Some(format!(
+            "{}: {here:?} here, {shader:?} in the shader",
+            mirror.name
+        ));
+    }
+    if shader.len() != here.len() {
+        return Some(format!(
+            "{}: {} fields here, {} in the shader",
+            mirror.name,
+            here.len(),
+            shader.len()
+        ));
+    }
+    (stride != Some(mirror.size)).then(|| {
+        format!(
+            "{}: {} bytes here, stride {stride:?} in the shader",
+            mirror.name, mirror.size
+        )
+    })
+}
+
+fn named() -> Vec<(StructType, Option<usize>)> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/spirv/layout.spv");
+    elements(&words_of(&std::fs::read(path).unwrap()))
+}
+
+#[test]
+fn every_structure_has_the_names_offsets_and_size_of_its_mirror() {
+    let shader = named();
+    assert_eq!(
+        shader.len(),
+        mirrors().len(),
+        "layout.comp mentions every structure"
+    );
+    for mirror in &mirrors() {
+        let (structure, stride) = shader
+            .iter()
+            .find(|(s, _)| s.name() == Some(mirror.name))
+            .unwrap_or_else(|| panic!("{} is not in layout.comp", mirror.name));
+        assert_eq!(difference(structure, *stride, mirror), None);
+    }
+}
+
+#[test]
+fn a_planted_mismatch_is_noticed() {
+    let shader = named();
+    let (structure, stride) = shader
+        .iter()
+        .find(|(s, _)| s.name() == Some("Surface"))
+        .unwrap();
+    let planted = |offsets, size| {
+        difference(
+            structure,
+            *stride,
+            &Mirror {
+                name: "Surface",
+                size,
+                offsets,
+            },
+        )
+    };
+    let mut fields = Surface::OFFSETS.to_vec();
+    fields.swap(1, 2);
+    assert!(planted(fields.leak(), 32).is_some(), "two fields swapped");
+    let mut fields = Surface::OFFSETS.to_vec();
+    fields[3].1 += 4;
+    assert!(planted(fields.leak(), 32).is_some(), "a field moved");
+    assert!(
+        planted(&Surface::OFFSETS[..7], 32).is_some(),
+        "a field missing"
+    );
+    assert!(planted(Surface::OFFSETS, 48).is_some(), "another size");
+    assert!(planted(Surface::OFFSETS, 32).is_none());
+}
+
+/// Optimisation strips the names, but a kernel that lays a shared structure out otherwise (`std140`,
+/// `scalar`, an edited copy) has offsets or a stride that no mirror has. Kernels may have
+/// structures of their own if they are made of vec4 and scalars without a hole.
+#[test]
+fn the_kernels_use_the_same_layout() {
+    let library = Library::embedded();
+    for stem in library.stems() {
+        for (structure, stride) in elements(library.words(stem)) {
+            let found = offsets(&structure);
+            let known = mirrors().iter().any(|m| {
+                m.offsets.iter().map(|f| f.1).eq(found.iter().copied())
+                    && stride.is_none_or(|s| s == m.size)
+            });
+            let mut end = 0;
+            let packed = structure.members.iter().all(|m| {
+                let start = m.offset.unwrap();
+                let whole = start == end;
+                end = start + m.ty.nbyte().unwrap_or(0);
+                whole
+            }) && stride.is_none_or(|s| s == end);
+            assert!(
+                known || packed,
+                "{stem}: a structure with offsets {found:?}, stride {stride:?}"
+            );
+        }
+    }
+}
