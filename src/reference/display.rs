@@ -65,7 +65,7 @@ fn sample(frame: &Frame, log_image: &[f32], column: f64, row: f64) -> f64 {
 /// Opaque greys 0xffgggggg through the map of 256 entries; 0 outside the sector.
 pub fn display(frame: &Frame, log_image: &[f32], grey: &[u32]) -> Vec<u32> {
     let pixel = |level: Option<f64>| match level {
-        Some(v) => 0xff00_0000 | grey[(v * 255.0 + 0.5).floor() as usize] * 0x0001_0101,
+        Some(v) => 0xff00_0000 | (grey[(v * 255.0 + 0.5).floor() as usize] * 0x0001_0101),
         None => 0,
     };
     levels(frame, log_image).into_iter().map(pixel).collect()

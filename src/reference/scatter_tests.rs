@@ -31,13 +31,13 @@ fn magnitude(out: &Accumulator, k: usize) -> f64 {
 
 /// Relative error of a point's echo at 20 mm, off axis, in a tissue of 0.5 dB/(cm MHz) at 3 MHz.
 fn point_error(fixture: &Fixture) -> f64 {
-    let [x, y] = [0.3, -0.5];
+    let [x, y] = [0.3f64, -0.5];
     let out = scatter(&fixture.world(), &[segment(60.0)]);
     // Two-way loss of 2 cm: 2 * 0.5 dB/(cm MHz) * 3 MHz * 2 cm = 6 dB of amplitude.
     let expected = 2.0
         * 10f64.powf(-6.0 / 20.0)
-        * (-x * x / (2.0 * 0.16) as f64).exp()
-        * (-y * y / (2.0 * 0.36) as f64).exp();
+        * (-x * x / (2.0 * 0.16)).exp()
+        * (-y * y / (2.0 * 0.36)).exp();
     let total = magnitude(&out, 80) + magnitude(&out, 81);
     (total / expected - 1.0).abs()
 }
