@@ -1,0 +1,91 @@
+//! The envelope.
+
+use std::f64::consts::{PI, TAU};
+
+use crate::render::twin;
+use crate::scenes::{add_point, linear, silent};
+
+/// Depth (mm) and amplitude of a row of points, some closer than a pulse is long, all near the focus.
+const ECHOES: [(f64, f64); 9] = [
+    (49.0, 1.0),
+    (49.11, 0.8),
+    (49.43, -0.5),
+    (49.9, 0.2),
+    (50.313, 1.0),
+    (50.331, -1.0),
+    (51.0, 0.7),
+    (51.11, 0.7),
+    (51.22, 0.7),
+];
+
+/// Envelope by the Hilbert transform of the radio-frequency line that the echoes make: pulses
+/// exp(-t^2 / 2 sigma^2) cos(2 pi f t) sampled every `pitch` mm of depth from `start` on. `n` samples, periodic.
+fn hilbert([start, pitch]: [f64; 2], n: usize, frequency: f64) -> Vec<f64> {
+    let sigma = 1.540 / 2.0 * (2.0 * std::f64::consts::LN_2).sqrt() / (PI * 0.6 * 7.0);
+    let pulse =
+        |z: f64| (-z * z / (2.0 * sigma * sigma)).exp() * (2.0 * TAU * frequency * z / 1.540).cos();
+    let line: Vec<f64> = (0..n)
+        .map(|k| {
+            ECHOES
+                .iter()
+                .map(|(z, a)| a * pulse(start + k as f64 * pitch - z))
+                .sum()
+        })
+        .collect();
+    let wave = |m: usize, k: usize| (TAU * (m * k % n) as f64 / n as f64).sin_cos();
+    // The analytic signal has no negative frequencies and twice the positive ones.
+    let spectrum: Vec<[f64; 2]> = (1..n / 2)
+        .map(|m| {
+            line.iter()
+                .enumerate()
+                .fold([0.0, 0.0], |[re, im], (k, v)| {
+                    let (sin, cos) = wave(m, k);
+                    [re + v * cos, im - v * sin]
+                })
+        })
+        .collect();
+    (0..n)
+        .map(|k| {
+            let sum = spectrum
+                .iter()
+                .enumerate()
+                .fold([0.0, 0.0], |[x, y], (m, [re, im])| {
+                    let (sin, cos) = wave(m + 1, k);
+                    [x + re * cos - im * sin, y + re * sin + im * cos]
+                });
+            2.0 * sum[0].hypot(sum[1]) / n as f64
+        })
+        .collect()
+}
+
+// At fs = 9 f0, where the radio-frequency line is well sampled and the split hardly shows. 1 % of the largest echo: the
+// pulse at zero frequency, exp(-(2 pi f sigma)^2 / 2) = 4e-4, and the split's varying width.
+#[test]
+fn the_baseband_envelope_is_the_hilbert_envelope() {
+    let mut scene = linear(1, 1.0, silent(1.540, 1.600, 0.0));
+    scene.probe.samples = 8192;
+    // A long focus: points are equally bright over the few millimetres.
+    scene.probe.f_number_transmit = 20.0;
+    let pitch: f64 = 100.0 / 8192.0;
+    for (z, amplitude) in ECHOES {
+        add_point(&mut scene, [0.0, 0.0, z], 0.1 * amplitude);
+    }
+    let frame = twin(&scene).envelope(0);
+    let first = (45.0 / pitch).round() as usize;
+    let n = 1024;
+    let error = |frequency: f64| {
+        let expected = hilbert([first as f64 * pitch, pitch], n, frequency);
+        let got = &frame[first..first + n];
+        // The level of points is another test's business: one factor for the whole line.
+        let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let scale = dot(got, &expected) / dot(got, got);
+        let largest = expected.iter().copied().fold(0.0, f64::max);
+        let pairs = got.iter().zip(&expected);
+        pairs
+            .map(|(g, e)| (scale * g - e).abs())
+            .fold(0.0, f64::max)
+            / largest
+    };
+    assert!(error(7.0) < 0.01, "{}", error(7.0));
+    assert!(error(7.2) > 0.01, "another carrier interferes differently");
+}

@@ -1,0 +1,11 @@
+//! What frames must show whatever computes them: closed forms of acoustics and image formation.
+//! Each expectation is worked out in its test and takes nothing from the code under test.
+
+mod detection;
+mod interfaces;
+mod levels;
+mod profile;
+mod render;
+mod resolution;
+mod scenes;
+mod timing;

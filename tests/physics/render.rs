@@ -1,0 +1,140 @@
+//! Frames by the f64 twins, brute force from rays to pixels.
+
+use glam::DVec3;
+use insonify::reference::world::Geometry;
+use insonify::reference::{Accumulator, Segment, World};
+use insonify::reference::{axial, beam, detect, display, origin, scatter, trace};
+use insonify::scene::Scene;
+use insonify::sim::{layout, tables};
+
+/// A scene as the kernels read it.
+pub struct Inputs {
+    pub frame: layout::Frame,
+    rows: Vec<layout::Row>,
+    tissues: Vec<layout::Tissue>,
+    surfaces: Vec<layout::Surface>,
+    instances: Vec<layout::Instance>,
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    points: Vec<[f32; 4]>,
+}
+
+impl Inputs {
+    /// Rigidly placed meshes only: their texture rests in object space.
+    pub fn new(scene: &Scene) -> Self {
+        let mut inputs = Self {
+            frame: tables::frame(scene, 0),
+            rows: tables::rows(scene),
+            tissues: tables::tissues(scene),
+            surfaces: tables::surfaces(scene),
+            instances: vec![],
+            positions: vec![],
+            normals: vec![],
+            triangles: vec![],
+            points: tables::points(scene),
+        };
+        for (i, instance) in scene.instances.iter().enumerate() {
+            let mesh = &scene.meshes[instance.mesh];
+            let object_from_world = tables::matrix_rows(&instance.world_from_object.inverse());
+            inputs.instances.push(layout::Instance {
+                world_from_object: tables::matrix_rows(&instance.world_from_object),
+                object_from_world,
+                texture_from_world: object_from_world,
+                tissue: instance.tissue as u32,
+                priority: instance.priority,
+                surface_outside: 2 * i as u32,
+                surface_inside: 2 * i as u32 + 1,
+                first_triangle: inputs.triangles.len() as u32,
+                triangles: mesh.triangles.len() as u32,
+                ..layout::Instance::default()
+            });
+            let base = inputs.positions.len() as u32;
+            let moved = mesh.triangles.iter().map(|t| t.map(|v| v + base));
+            inputs.triangles.extend(moved);
+            inputs.positions.extend(&mesh.positions);
+            inputs.normals.extend(&mesh.normals);
+        }
+        inputs
+    }
+
+    pub fn world(&self) -> World<'_> {
+        World {
+            frame: &self.frame,
+            rows: &self.rows,
+            tissues: &self.tissues,
+            surfaces: &self.surfaces,
+            instances: &self.instances,
+            geometry: Geometry {
+                positions: &self.positions,
+                normals: &self.normals,
+                triangles: &self.triangles,
+            },
+            points: &self.points,
+        }
+    }
+
+    /// Segments per line, and the surface echoes.
+    pub fn traced(&self) -> trace::Traced {
+        let world = self.world();
+        trace::trace(&world, &origin::origin(&world).0)
+    }
+}
+
+/// Stages of a frame.
+pub struct Frame {
+    /// Complex baseband after the axial kernel, per line.
+    pub iq: Vec<Vec<[f64; 2]>>,
+    /// Displayed level 0..=1, per line.
+    pub levels: Vec<Vec<f64>>,
+    /// Pixels row by row, 0 outside the sector.
+    pub pixels: Vec<u32>,
+}
+
+impl Frame {
+    /// Magnitude of the baseband along scanline `l`.
+    pub fn envelope(&self, l: usize) -> Vec<f64> {
+        self.iq[l].iter().map(|v| v[0].hypot(v[1])).collect()
+    }
+}
+
+/// What the device's 32-bit buffers would hold.
+fn narrow(a: &Accumulator) -> Vec<i32> {
+    assert_eq!(a.saturated, 0, "echoes fit the fixed point");
+    let fit = |&v: &i64| i32::try_from(v).expect("sums fit the fixed point");
+    a.fixed.iter().map(fit).collect()
+}
+
+/// The frame of `scene`.
+pub fn twin(scene: &Scene) -> Frame {
+    let inputs = Inputs::new(scene);
+    let world = inputs.world();
+    let traced = inputs.traced();
+    let segments: Vec<Segment> = traced.segments.concat();
+    let volume = scatter::scatter(&world, &segments);
+    let single = |v: Vec<f64>| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();
+    let (frame, rows) = (&inputs.frame, &inputs.rows);
+    let lateral = single(beam::beam(
+        frame,
+        rows,
+        &narrow(&traced.surface),
+        &narrow(&volume),
+    ));
+    let iq = axial::axial(frame, &lateral);
+    let levels = detect::detect(frame, rows, &single(iq.clone()));
+    let samples = frame.samples as usize;
+    let grey = tables::grey_map(&scene.imaging);
+    Frame {
+        iq: iq
+            .chunks(2 * samples)
+            .map(|l| l.chunks(2).map(|v| [v[0], v[1]]).collect())
+            .collect(),
+        pixels: display::display(frame, &single(levels.clone()), &grey),
+        levels: levels.chunks(samples).map(<[f64]>::to_vec).collect(),
+    }
+}
+
+/// Angle of a direction in the image plane from the depth axis, rad.
+pub fn angle(d: DVec3) -> f64 {
+    d.x.atan2(d.z)
+}

@@ -1,0 +1,104 @@
+//! Small scenes with known answers.
+
+use glam::DAffine3;
+use insonify::probe::{Kind, Probe};
+use insonify::scene::settings::{Imaging, Simulation};
+use insonify::scene::{Instance, Scene, Surface, Tissue, Wire, shapes};
+
+/// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
+/// with sparse scatterers of liver's brightness.
+pub fn tissue(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
+    Tissue {
+        name: "test".into(),
+        speed,
+        density: impedance / speed,
+        attenuation,
+        echogenicity: 0.0,
+        density_of_scatterers: 1.0,
+        mean_over_sigma: 0.0,
+        texture_depth: 0.0,
+        texture_length: 1.0,
+        surface: mirror(),
+        source: "test".into(),
+    }
+}
+
+/// The same without scatterers.
+pub fn silent(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
+    Tissue {
+        echogenicity: f64::NEG_INFINITY,
+        ..tissue(speed, impedance, attenuation)
+    }
+}
+
+fn mirror() -> Surface {
+    Surface {
+        roughness: f64::INFINITY,
+        thickness: 0.0,
+        specularity: 1.0,
+        gain: 0.0,
+    }
+}
+
+/// `lines` parallel scanlines over `width` mm with the focusing of the paper's Table I, a single
+/// layer, no noise, one path and no reflected paths.
+pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
+    Scene {
+        name: "test".into(),
+        tissues: vec![background],
+        background: 0,
+        meshes: vec![],
+        instances: vec![],
+        wires: vec![],
+        probe: Probe {
+            kind: Kind::Linear { width },
+            scanlines: lines,
+            elevation_layers: 1,
+            ..Probe::paper_table1()
+        },
+        world_from_probe: DAffine3::IDENTITY,
+        simulation: Simulation {
+            paths: 1,
+            max_reflections: 0,
+            ..Simulation::default()
+        },
+        imaging: Imaging {
+            noise: f64::NEG_INFINITY,
+            ..Imaging::default()
+        },
+    }
+}
+
+/// Adds a box of `size` mm, filled with `tissue`, whose front face's middle `at` takes to the place
+/// and direction wanted; later boxes win where they overlap.
+pub fn add_box(scene: &mut Scene, size: [f64; 3], tissue: Tissue, at: DAffine3) {
+    scene
+        .meshes
+        .push(shapes::plane([size[0], size[1]], size[2]));
+    scene.instances.push(Instance {
+        name: "box".into(),
+        mesh: scene.meshes.len() - 1,
+        tissue: scene.tissues.len(),
+        priority: scene.instances.len() as i32,
+        world_from_object: at,
+        surface: [mirror(); 2],
+    });
+    scene.tissues.push(tissue);
+}
+
+/// Adds everything below depth `top` mm.
+pub fn add_layer(scene: &mut Scene, top: f64, tissue: Tissue) {
+    let far = 900.0 - 10.0 * scene.instances.len() as f64;
+    // Off the axis: no ray of a symmetric probe runs along an edge.
+    let at = DAffine3::from_translation(glam::DVec3::new(3.1, 5.3, top));
+    add_box(scene, [far, far, far - top], tissue, at);
+}
+
+/// Adds one point target.
+pub fn add_point(scene: &mut Scene, at: [f64; 3], amplitude: f64) {
+    scene.wires.push(Wire {
+        ends: [at; 2],
+        spacing: 1.0,
+        amplitude,
+    });
+}
