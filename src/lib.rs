@@ -3,6 +3,7 @@
 //! `scene` and `probe` say what is imaged and with what; `gpu` knows Vulkan and no ultrasound;
 //! `sim` is the frame; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
 
+pub mod gpu;
 pub mod probe;
 pub mod reference;
 pub mod scene;

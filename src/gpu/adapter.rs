@@ -1,0 +1,323 @@
+//! The physical devices of the machine: what each offers, what it lacks, and which one is taken.
+
+use std::ffi::{CStr, CString};
+use std::fmt::Write as _;
+
+use ash::{khr, vk};
+
+use super::error::{GpuError, during};
+use super::instance::Instance;
+
+/// Kinds of device, in the order of preference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum AdapterKind {
+    /// A GPU with its own memory.
+    Discrete,
+    /// A GPU that shares the CPU's memory.
+    Integrated,
+    /// A GPU lent to a virtual machine.
+    Virtual,
+    /// A software driver such as lavapipe.
+    Cpu,
+    /// None of these.
+    Other,
+}
+
+impl std::fmt::Display for AdapterKind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Discrete => "discrete GPU",
+            Self::Integrated => "integrated GPU",
+            Self::Virtual => "virtual GPU",
+            Self::Cpu => "CPU",
+            Self::Other => "other",
+        })
+    }
+}
+
+/// One physical device as `insonify info` lists it.
+#[derive(Clone, Debug)]
+pub struct DeviceInfo {
+    /// Position in the loader's list; what `--device INDEX` takes.
+    pub index: usize,
+    /// Name given by the driver.
+    pub name: String,
+    /// Discrete, integrated, ...
+    pub kind: AdapterKind,
+    /// Driver name and version.
+    pub driver: String,
+    /// Vulkan version, such as "1.4.305".
+    pub api_version: String,
+    /// Size of the largest device-local heap in bytes.
+    pub memory_bytes: u64,
+    /// The kernel with hardware ray queries can run.
+    pub ray_query: bool,
+    /// Acceleration structures can be built (even where ray queries are absent).
+    pub acceleration_structure: bool,
+    /// The kernels can run at all.
+    pub usable: bool,
+    /// What it lacks, each with its consequence; empty when it has all that can be used.
+    pub lacks: Vec<String>,
+}
+
+/// A physical device with the features that this layer may enable.
+pub(crate) struct Adapter {
+    pub(crate) physical: vk::PhysicalDevice,
+    pub(crate) info: DeviceInfo,
+    pub(crate) properties: vk::PhysicalDeviceProperties,
+    pub(crate) queue_family: u32,
+    /// 0 where the queue cannot write timestamps.
+    pub(crate) timestamp_bits: u32,
+    pub(crate) buffer_device_address: bool,
+    pub(crate) robust_buffer_access: bool,
+    /// R8 and R16 images can be written by kernels.
+    pub(crate) extended_storage_formats: bool,
+    /// VK_KHR_portability_subset must be enabled where it is offered.
+    pub(crate) portability_subset: bool,
+}
+
+/// Every Vulkan device of the machine, usable or not, in the loader's order.
+pub fn list_devices() -> Result<Vec<DeviceInfo>, GpuError> {
+    let instance = Instance::new(false)?;
+    Ok(adapters(&instance)?.into_iter().map(|a| a.info).collect())
+}
+
+/// One line per device, for error messages.
+fn table(adapters: &[Adapter]) -> String {
+    let mut text = String::new();
+    for Adapter { info, .. } in adapters {
+        let _ = writeln!(
+            text,
+            "  {}: {} ({}, {}, Vulkan {}){}",
+            info.index,
+            info.name,
+            info.kind,
+            info.driver,
+            info.api_version,
+            if info.usable { "" } else { " - not usable" }
+        );
+    }
+    text
+}
+
+/// The device named by `selector` (index, or part of the name in any case), or the best usable one.
+pub(crate) fn choose(instance: &Instance, selector: Option<&str>) -> Result<Adapter, GpuError> {
+    let mut adapters = adapters(instance)?;
+    let chosen = match selector {
+        Some(selector) => {
+            let wanted = selector.to_lowercase();
+            let found = match selector.parse::<usize>() {
+                Ok(index) => (index < adapters.len()).then_some(index),
+                Err(_) => adapters
+                    .iter()
+                    .position(|a| a.info.name.to_lowercase().contains(&wanted)),
+            };
+            let refuse = |problem: String| GpuError::UnknownDevice {
+                selector: selector.into(),
+                problem,
+                available: table(&adapters),
+            };
+            let found = found.ok_or_else(|| refuse("is unknown".into()))?;
+            let info = &adapters[found].info;
+            if !info.usable {
+                return Err(refuse(format!("cannot be used: {}", info.lacks.join("; "))));
+            }
+            Some(found)
+        }
+        None => (0..adapters.len())
+            .filter(|&i| adapters[i].info.usable)
+            .min_by_key(|&i| adapters[i].info.kind),
+    };
+    match chosen {
+        Some(index) => Ok(adapters.swap_remove(index)),
+        None if adapters.is_empty() => Err(GpuError::NoDevice {
+            seen: String::new(),
+        }),
+        None => Err(GpuError::NoDevice {
+            seen: format!(", of these:\n{}", table(&adapters)),
+        }),
+    }
+}
+
+fn adapters(instance: &Instance) -> Result<Vec<Adapter>, GpuError> {
+    // SAFETY: the instance is alive.
+    let physical = unsafe { instance.raw.enumerate_physical_devices() }
+        .map_err(during("listing the Vulkan devices"))?;
+    physical
+        .into_iter()
+        .enumerate()
+        .map(|(index, physical)| probe(instance, index, physical))
+        .collect()
+}
+
+fn probe(
+    instance: &Instance,
+    index: usize,
+    physical: vk::PhysicalDevice,
+) -> Result<Adapter, GpuError> {
+    // SAFETY: `physical` was just listed by this instance.
+    let properties = unsafe { instance.raw.get_physical_device_properties(physical) };
+    // The device may offer more than the instance was made for; only the lesser may be used.
+    let version = properties.api_version.min(instance.api_version);
+    let at_least_1_1 = version >= vk::API_VERSION_1_1;
+    let at_least_1_2 = version >= vk::API_VERSION_1_2;
+    let extensions = device_extensions(instance, physical)?;
+    let has = |name: &CStr| extensions.iter().any(|e| e.as_c_str() == name);
+
+    let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
+    let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let has_accel = at_least_1_2
+        && has(khr::acceleration_structure::NAME)
+        && has(khr::deferred_host_operations::NAME);
+    let has_query = has_accel && has(khr::ray_query::NAME);
+    let mut features = vk::PhysicalDeviceFeatures2::default();
+    if at_least_1_2 {
+        features = features.push_next(&mut address);
+    }
+    if has_accel {
+        features = features.push_next(&mut accel);
+    }
+    if has_query {
+        features = features.push_next(&mut query);
+    }
+    let mut driver = vk::PhysicalDeviceDriverProperties::default();
+    let mut properties2 = vk::PhysicalDeviceProperties2::default();
+    if at_least_1_2 {
+        properties2 = properties2.push_next(&mut driver);
+    }
+    if at_least_1_1 {
+        // SAFETY: both calls are core in 1.1; each structure in the chains is offered by the device.
+        unsafe {
+            instance
+                .raw
+                .get_physical_device_features2(physical, &mut features);
+            instance
+                .raw
+                .get_physical_device_properties2(physical, &mut properties2);
+        }
+    }
+    let core = features.features;
+    let buffer_device_address = address.buffer_device_address == vk::TRUE;
+    let acceleration_structure = accel.acceleration_structure == vk::TRUE && buffer_device_address;
+    let ray_query = query.ray_query == vk::TRUE && acceleration_structure;
+
+    // SAFETY: `physical` belongs to this instance.
+    let families = unsafe {
+        instance
+            .raw
+            .get_physical_device_queue_family_properties(physical)
+    };
+    let family = compute_family(&families);
+    let timestamp_bits = family.map_or(0, |f| families[f as usize].timestamp_valid_bits);
+
+    let mut lacks = Vec::new();
+    if !at_least_1_1 {
+        lacks.push("Vulkan 1.1: cannot be used".into());
+    }
+    if family.is_none() {
+        lacks.push("a queue for compute: cannot be used".into());
+    }
+    if timestamp_bits == 0 {
+        lacks.push("timestamps: stages are not timed".into());
+    }
+    if !acceleration_structure {
+        lacks.push("acceleration structures: the compute tracer is used".into());
+    } else if !ray_query {
+        lacks.push("ray queries: the compute tracer is used".into());
+    }
+    Ok(Adapter {
+        physical,
+        info: DeviceInfo {
+            index,
+            name: text(properties.device_name_as_c_str().ok()),
+            kind: kind(properties.device_type),
+            driver: driver_text(&driver, properties.driver_version),
+            api_version: version_text(properties.api_version),
+            memory_bytes: device_memory(instance, physical),
+            ray_query,
+            acceleration_structure,
+            usable: at_least_1_1 && family.is_some(),
+            lacks,
+        },
+        properties,
+        queue_family: family.unwrap_or(0),
+        timestamp_bits,
+        buffer_device_address,
+        robust_buffer_access: core.robust_buffer_access == vk::TRUE,
+        extended_storage_formats: core.shader_storage_image_extended_formats == vk::TRUE,
+        portability_subset: has(khr::portability_subset::NAME),
+    })
+}
+
+/// A family with graphics if there is one: the window of the same process presents from it, and
+/// it is the one family that every driver runs at full speed.
+fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
+    let find = |flags: vk::QueueFlags| {
+        families
+            .iter()
+            .position(|f| f.queue_flags.contains(flags) && f.queue_count > 0)
+    };
+    find(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS)
+        .or_else(|| find(vk::QueueFlags::COMPUTE))
+        .map(|index| index as u32)
+}
+
+fn device_extensions(
+    instance: &Instance,
+    physical: vk::PhysicalDevice,
+) -> Result<Vec<CString>, GpuError> {
+    // SAFETY: `physical` belongs to this instance.
+    let extensions = unsafe { instance.raw.enumerate_device_extension_properties(physical) }
+        .map_err(during("listing the device extensions"))?;
+    Ok(extensions
+        .iter()
+        .filter_map(|e| e.extension_name_as_c_str().ok().map(CStr::to_owned))
+        .collect())
+}
+
+fn device_memory(instance: &Instance, physical: vk::PhysicalDevice) -> u64 {
+    // SAFETY: `physical` belongs to this instance.
+    let memory = unsafe { instance.raw.get_physical_device_memory_properties(physical) };
+    memory
+        .memory_heaps_as_slice()
+        .iter()
+        .filter(|heap| heap.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL))
+        .map(|heap| heap.size)
+        .max()
+        .unwrap_or(0)
+}
+
+fn kind(kind: vk::PhysicalDeviceType) -> AdapterKind {
+    match kind {
+        vk::PhysicalDeviceType::DISCRETE_GPU => AdapterKind::Discrete,
+        vk::PhysicalDeviceType::INTEGRATED_GPU => AdapterKind::Integrated,
+        vk::PhysicalDeviceType::VIRTUAL_GPU => AdapterKind::Virtual,
+        vk::PhysicalDeviceType::CPU => AdapterKind::Cpu,
+        _ => AdapterKind::Other,
+    }
+}
+
+fn text(name: Option<&CStr>) -> String {
+    name.map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+fn version_text(version: u32) -> String {
+    format!(
+        "{}.{}.{}",
+        vk::api_version_major(version),
+        vk::api_version_minor(version),
+        vk::api_version_patch(version)
+    )
+}
+
+/// Vulkan 1.2 tells the driver's name; older drivers only a number of their own making.
+fn driver_text(driver: &vk::PhysicalDeviceDriverProperties<'_>, version: u32) -> String {
+    let name = text(driver.driver_name_as_c_str().ok());
+    let info = text(driver.driver_info_as_c_str().ok());
+    if name.is_empty() {
+        format!("driver version {version:#x}")
+    } else {
+        format!("{name} {info}").trim_end().to_owned()
+    }
+}

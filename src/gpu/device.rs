@@ -1,0 +1,364 @@
+//! The logical device: features, queue, allocator, object names.
+
+use std::ffi::CString;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::{ext, khr, vk};
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+
+use super::adapter::{self, Adapter, DeviceInfo};
+use super::error::{GpuError, during};
+use super::instance::{Instance, ValidationLog};
+use super::memory::{MemoryUse, MemoryUseCounter};
+
+/// Blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
+/// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
+const DEVICE_BLOCK_BYTES: u64 = 32 << 20;
+const HOST_BLOCK_BYTES: u64 = 16 << 20;
+
+/// How to open a device.
+#[derive(Clone, Debug, Default)]
+pub struct DeviceOptions {
+    /// Index in [`super::list_devices`] or part of a name in any case; `None` takes the best.
+    pub selector: Option<String>,
+    /// Turns the validation layers on, or fails where they are not installed. The environment
+    /// variable `INSONIFY_VALIDATE=1` does the same.
+    pub validate: bool,
+    /// Leaves ray queries and acceleration structures off although the device has them.
+    pub without_ray_query: bool,
+}
+
+/// The limits that kernels and buffers are checked against.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Largest storage buffer, in bytes.
+    pub max_storage_buffer_bytes: u64,
+    /// Largest uniform buffer, in bytes.
+    pub max_uniform_buffer_bytes: u64,
+    /// Largest side of a 2D image, in texels.
+    pub max_image_2d: u32,
+    /// Largest side of a 3D image, in texels.
+    pub max_image_3d: u32,
+    /// Largest push-constant block, in bytes; at least 128 everywhere.
+    pub max_push_constant_bytes: u32,
+    /// Work groups of one dispatch, per axis.
+    pub max_group_count: [u32; 3],
+    /// Threads of one work group, per axis.
+    pub max_group_size: [u32; 3],
+    /// Threads of one work group in all.
+    pub max_group_threads: u32,
+    /// Shared memory of one work group, in bytes.
+    pub max_shared_bytes: u32,
+}
+
+/// What acceleration structures need to know of the device.
+pub(crate) struct AccelSupport {
+    pub(crate) functions: khr::acceleration_structure::Device,
+    pub(crate) scratch_alignment: u64,
+    pub(crate) max_primitives: u64,
+    pub(crate) max_instances: u64,
+}
+
+/// An open Vulkan device. Everything made from it keeps it alive.
+pub struct Device {
+    pub(crate) raw: ash::Device,
+    pub(crate) queue_family: u32,
+    /// Nanoseconds per timestamp tick; 0 where the queue has no timestamps.
+    pub(crate) timestamp_period_ns: f64,
+    pub(crate) timestamp_bits: u32,
+    pub(crate) accel: Option<AccelSupport>,
+    pub(crate) physical: vk::PhysicalDevice,
+    pub(crate) memory_use: MemoryUseCounter,
+    pub(crate) pipeline_cache: vk::PipelineCache,
+    ray_query: bool,
+    info: DeviceInfo,
+    limits: Limits,
+    debug: Option<ext::debug_utils::Device>,
+    queue: Mutex<vk::Queue>,
+    /// `None` only while the device is dropped.
+    allocator: Mutex<Option<Allocator>>,
+    pub(crate) instance: Instance,
+}
+
+impl Device {
+    /// Opens the chosen device with one compute queue.
+    pub fn new(options: &DeviceOptions) -> Result<Arc<Self>, GpuError> {
+        let from_environment = std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1");
+        let instance = Instance::new(options.validate || from_environment)?;
+        let mut adapter = adapter::choose(&instance, options.selector.as_deref())?;
+        if options.without_ray_query {
+            adapter.info.ray_query = false;
+            adapter.info.acceleration_structure = false;
+        }
+        let raw = create_device(&instance, &adapter)?;
+        // SAFETY: the family was enabled with one queue.
+        let queue = unsafe { raw.get_device_queue(adapter.queue_family, 0) };
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.raw.clone(),
+            device: raw.clone(),
+            physical_device: adapter.physical,
+            debug_settings: Default::default(),
+            buffer_device_address: adapter.info.acceleration_structure,
+            allocation_sizes: gpu_allocator::AllocationSizes::new(
+                DEVICE_BLOCK_BYTES,
+                HOST_BLOCK_BYTES,
+            ),
+        });
+        // SAFETY: the device is alive; an empty cache has no precondition.
+        let cache = unsafe { raw.create_pipeline_cache(&Default::default(), None) };
+        let (allocator, pipeline_cache) = match (allocator, cache) {
+            (Ok(allocator), Ok(cache)) => (allocator, cache),
+            (allocator, cache) => {
+                drop(allocator);
+                // SAFETY: nothing made from the device is left but a cache, which goes first.
+                unsafe {
+                    if let Ok(cache) = cache {
+                        raw.destroy_pipeline_cache(cache, None);
+                    }
+                    raw.destroy_device(None);
+                }
+                return Err(GpuError::Vulkan {
+                    code: vk::Result::ERROR_INITIALIZATION_FAILED,
+                    what: "creating the allocator and the pipeline cache".into(),
+                });
+            }
+        };
+        let limits = &adapter.properties.limits;
+        Ok(Arc::new(Self {
+            queue_family: adapter.queue_family,
+            timestamp_period_ns: f64::from(limits.timestamp_period),
+            timestamp_bits: adapter.timestamp_bits,
+            accel: accel_support(&instance, &raw, &adapter),
+            physical: adapter.physical,
+            memory_use: MemoryUseCounter::default(),
+            pipeline_cache,
+            ray_query: adapter.info.ray_query,
+            limits: Limits {
+                max_storage_buffer_bytes: limits.max_storage_buffer_range.into(),
+                max_uniform_buffer_bytes: limits.max_uniform_buffer_range.into(),
+                max_image_2d: limits.max_image_dimension2_d,
+                max_image_3d: limits.max_image_dimension3_d,
+                max_push_constant_bytes: limits.max_push_constants_size,
+                max_group_count: limits.max_compute_work_group_count,
+                max_group_size: limits.max_compute_work_group_size,
+                max_group_threads: limits.max_compute_work_group_invocations,
+                max_shared_bytes: limits.max_compute_shared_memory_size,
+            },
+            debug: (instance.debug_utils)
+                .then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
+            queue: Mutex::new(queue),
+            allocator: Mutex::new(Some(allocator)),
+            info: adapter.info,
+            raw,
+            instance,
+        }))
+    }
+
+    /// What the device is and lacks.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// Name given by the driver.
+    pub fn name(&self) -> &str {
+        &self.info.name
+    }
+
+    /// Driver name and version.
+    pub fn driver(&self) -> &str {
+        &self.info.driver
+    }
+
+    /// Vulkan version of the device, such as "1.4.305".
+    pub fn api_version(&self) -> &str {
+        &self.info.api_version
+    }
+
+    /// Limits that kernels and buffers are checked against.
+    pub fn limits(&self) -> &Limits {
+        &self.limits
+    }
+
+    /// Kernels with ray queries can run.
+    pub fn supports_ray_query(&self) -> bool {
+        self.ray_query
+    }
+
+    /// Acceleration structures can be built.
+    pub fn supports_acceleration_structure(&self) -> bool {
+        self.accel.is_some()
+    }
+
+    /// The validation layers are on.
+    pub fn is_validating(&self) -> bool {
+        self.instance.validating
+    }
+
+    /// Warnings and errors of the validation layers so far; empty without validation.
+    pub fn validation_messages(&self) -> Vec<String> {
+        self.instance.log.messages()
+    }
+
+    /// The list behind [`Self::validation_messages`]; it outlives the device.
+    pub fn validation_log(&self) -> ValidationLog {
+        self.instance.log.clone()
+    }
+
+    /// Bytes of buffers, images and acceleration structures, now and at most so far.
+    pub fn memory(&self) -> MemoryUse {
+        self.memory_use.read()
+    }
+
+    /// Acceleration-structure functions, or an error naming the device.
+    pub(crate) fn require_accel(&self) -> Result<&AccelSupport, GpuError> {
+        self.accel.as_ref().ok_or_else(|| GpuError::Unsupported {
+            device: self.info.name.clone(),
+            feature: "acceleration structures (VK_KHR_acceleration_structure), or they are off"
+                .into(),
+        })
+    }
+
+    pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
+        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Runs `work` with the allocator.
+    pub(crate) fn with_allocator<T>(&self, work: impl FnOnce(&mut Allocator) -> T) -> T {
+        let mut allocator = self
+            .allocator
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        work(allocator.as_mut().expect("the device is alive"))
+    }
+
+    /// Names a Vulkan object for validation messages and profilers.
+    pub(crate) fn set_name<T: vk::Handle>(&self, handle: T, name: &str) {
+        let Some(debug) = &self.debug else { return };
+        // A name is never worth an error: a NUL inside it only shortens it, and a failure of the
+        // call leaves the object nameless.
+        let text = CString::new(name.split('\0').next().unwrap_or_default()).unwrap_or_default();
+        let info = vk::DebugUtilsObjectNameInfoEXT::default()
+            .object_handle(handle)
+            .object_name(&text);
+        // SAFETY: the handle was made from this device by the caller and is alive.
+        let _ = unsafe { debug.set_debug_utils_object_name(&info) };
+    }
+
+    /// Begins a named region of a command buffer (for profilers).
+    pub(crate) fn begin_label(&self, commands: vk::CommandBuffer, name: &str) {
+        let Some(debug) = &self.debug else { return };
+        let text = CString::new(name.split('\0').next().unwrap_or_default()).unwrap_or_default();
+        let label = vk::DebugUtilsLabelEXT::default().label_name(&text);
+        // SAFETY: the caller is recording `commands`.
+        unsafe { debug.cmd_begin_debug_utils_label(commands, &label) };
+    }
+
+    /// Ends the region begun last.
+    pub(crate) fn end_label(&self, commands: vk::CommandBuffer) {
+        let Some(debug) = &self.debug else { return };
+        // SAFETY: the caller is recording `commands` and has begun a region.
+        unsafe { debug.cmd_end_debug_utils_label(commands) };
+    }
+}
+
+impl Drop for Device {
+    fn drop(&mut self) {
+        let allocator = self
+            .allocator
+            .get_mut()
+            .unwrap_or_else(PoisonError::into_inner)
+            .take();
+        // SAFETY: everything made from the device holds it alive, so nothing is left but the cache
+        // and the allocator's blocks. A lost device may be destroyed without waiting.
+        unsafe {
+            let _ = self.raw.device_wait_idle();
+            drop(allocator);
+            self.raw.destroy_pipeline_cache(self.pipeline_cache, None);
+            self.raw.destroy_device(None);
+        }
+    }
+}
+
+fn create_device(instance: &Instance, adapter: &Adapter) -> Result<ash::Device, GpuError> {
+    let priorities = [1.0];
+    let queues = [vk::DeviceQueueCreateInfo::default()
+        .queue_family_index(adapter.queue_family)
+        .queue_priorities(&priorities)];
+    let mut extensions = Vec::new();
+    if adapter.portability_subset {
+        extensions.push(khr::portability_subset::NAME.as_ptr());
+    }
+    let features = vk::PhysicalDeviceFeatures {
+        // Out-of-bounds accesses then have a defined result instead of a random crash; it costs
+        // time on a GPU, so only while validating.
+        robust_buffer_access: (instance.validating && adapter.robust_buffer_access).into(),
+        shader_storage_image_extended_formats: adapter.extended_storage_formats.into(),
+        ..Default::default()
+    };
+    let mut info = vk::DeviceCreateInfo::default()
+        .queue_create_infos(&queues)
+        .enabled_features(&features);
+    let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default()
+        .buffer_device_address(adapter.buffer_device_address);
+    let mut accel =
+        vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    if adapter.info.acceleration_structure {
+        extensions.push(khr::acceleration_structure::NAME.as_ptr());
+        extensions.push(khr::deferred_host_operations::NAME.as_ptr());
+        info = info.push_next(&mut address).push_next(&mut accel);
+    }
+    if adapter.info.ray_query {
+        extensions.push(khr::ray_query::NAME.as_ptr());
+        info = info.push_next(&mut query);
+    }
+    let info = info.enabled_extension_names(&extensions);
+    // SAFETY: extensions and features were found on this device; all pointers outlive the call.
+    unsafe { instance.raw.create_device(adapter.physical, &info, None) }.map_err(during(format!(
+        "opening the device '{}'",
+        adapter.info.name
+    )))
+}
+
+fn accel_support(
+    instance: &Instance,
+    raw: &ash::Device,
+    adapter: &Adapter,
+) -> Option<AccelSupport> {
+    if !adapter.info.acceleration_structure {
+        return None;
+    }
+    let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut accel);
+    // SAFETY: the device offers the extension whose properties are asked for.
+    unsafe {
+        instance
+            .raw
+            .get_physical_device_properties2(adapter.physical, &mut properties);
+    }
+    Some(AccelSupport {
+        functions: khr::acceleration_structure::Device::new(&instance.raw, raw),
+        scratch_alignment: accel
+            .min_acceleration_structure_scratch_offset_alignment
+            .max(1)
+            .into(),
+        max_primitives: accel.max_primitive_count,
+        max_instances: accel.max_instance_count,
+    })
+}
+
+/// A device for tests: the best one, with validation. Panics with the remedy where the driver or
+/// the layer is missing, because a test that skips validation in silence proves nothing.
+pub fn test_device() -> Arc<Device> {
+    let options = DeviceOptions {
+        validate: true,
+        ..Default::default()
+    };
+    match Device::new(&options) {
+        Ok(device) => device,
+        Err(error) => panic!(
+            "the tests need a Vulkan device and the validation layers: {error}\n\
+             ./tools/test.sh installs both"
+        ),
+    }
+}

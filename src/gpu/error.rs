@@ -1,0 +1,163 @@
+//! What can go wrong on the device, with the Vulkan result code kept and a remedy where one is known.
+
+use ash::vk;
+
+/// An error of the Vulkan layer.
+#[derive(Debug, thiserror::Error)]
+pub enum GpuError {
+    /// The Vulkan loader (`libvulkan.so.1`, `vulkan-1.dll`) is missing or too old.
+    #[error(
+        "no usable Vulkan loader: {reason}; install the package libvulkan1 (Debian, Ubuntu), vulkan-loader (Fedora) or vulkan-icd-loader (Arch)"
+    )]
+    Loader {
+        /// The loader's own words.
+        reason: String,
+    },
+    /// No Vulkan device at all, or none that can run the kernels.
+    #[error(
+        "no usable Vulkan device{seen}; install a GPU driver, or the software driver mesa-vulkan-drivers"
+    )]
+    NoDevice {
+        /// The devices seen with what each lacks; empty when there is none.
+        seen: String,
+    },
+    /// `--device` names no device or one that cannot run the kernels.
+    #[error("device '{selector}' {problem}; devices are:\n{available}")]
+    UnknownDevice {
+        /// What was asked for.
+        selector: String,
+        /// Why it cannot be used.
+        problem: String,
+        /// One line per device: index, name, driver.
+        available: String,
+    },
+    /// Validation was asked for, but cannot be had.
+    #[error(
+        "validation was asked for, but {reason}; install the package vulkan-validationlayers, or run without --validate and INSONIFY_VALIDATE"
+    )]
+    ValidationUnavailable {
+        /// Which layer or extension is missing.
+        reason: String,
+    },
+    /// A Vulkan call failed.
+    #[error("Vulkan error {code:?} while {what}")]
+    Vulkan {
+        /// The result code as Vulkan gave it.
+        code: vk::Result,
+        /// What was being done, with the name of the object.
+        what: String,
+    },
+    /// The device stopped answering (driver reset, a kernel that ran past the watchdog).
+    #[error(
+        "the Vulkan device was lost (ERROR_DEVICE_LOST) while {what}; the last pass that had begun is '{last_pass}', of the passes: {passes}"
+    )]
+    DeviceLost {
+        /// What the host was doing.
+        what: String,
+        /// The last timer scope that began on the device.
+        last_pass: String,
+        /// All scopes of the submission in order.
+        passes: String,
+    },
+    /// Device memory could not be had.
+    #[error("no memory for '{name}' ({bytes} bytes): {reason}")]
+    Allocation {
+        /// Name of the buffer or image.
+        name: String,
+        /// Its size in bytes.
+        bytes: u64,
+        /// The allocator's own words.
+        reason: String,
+    },
+    /// A buffer or image beyond what the device takes.
+    #[error(
+        "'{name}' of {what} exceeds the device's {limit_name} of {limit}; lower the quality, or choose another device"
+    )]
+    TooLarge {
+        /// Name of the object.
+        name: String,
+        /// Its size with unit.
+        what: String,
+        /// Vulkan's name of the limit.
+        limit_name: &'static str,
+        /// The limit with unit.
+        limit: String,
+    },
+    /// A copy outside a buffer or image, or data of the wrong length.
+    #[error("{what} of '{name}': bytes {offset}..{end} of {size}")]
+    OutOfBounds {
+        /// The operation.
+        what: &'static str,
+        /// Name of the object.
+        name: String,
+        /// First byte asked for.
+        offset: u64,
+        /// One past the last byte asked for.
+        end: u64,
+        /// Size of the object in bytes.
+        size: u64,
+    },
+    /// SPIR-V that cannot be reflected or is not a kernel of this layer.
+    #[error("kernel '{kernel}': {problem}")]
+    Kernel {
+        /// Name of the kernel.
+        kernel: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The bindings of a dispatch do not fit the kernel.
+    #[error("kernel '{kernel}', {binding}: {problem}")]
+    Binding {
+        /// Name of the kernel.
+        kernel: String,
+        /// Name, set and number of the binding.
+        binding: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// The push constants of a dispatch do not fit the kernel.
+    #[error("kernel '{kernel}': its push constants are {expected} bytes, {given} were given")]
+    PushConstants {
+        /// Name of the kernel.
+        kernel: String,
+        /// Size of the block in the SPIR-V, in bytes.
+        expected: usize,
+        /// Size given, in bytes.
+        given: usize,
+    },
+    /// More work groups than the device takes in one dispatch.
+    #[error("kernel '{kernel}': {groups:?} work groups exceed the device's {limit:?}")]
+    GroupCount {
+        /// Name of the kernel.
+        kernel: String,
+        /// Work groups asked for.
+        groups: [u32; 3],
+        /// maxComputeWorkGroupCount.
+        limit: [u32; 3],
+    },
+    /// Geometry that cannot become an acceleration structure.
+    #[error("acceleration structure '{name}': {problem}")]
+    Geometry {
+        /// Name of the mesh.
+        name: String,
+        /// What is wrong.
+        problem: String,
+    },
+    /// Something this device does not offer.
+    #[error("'{device}' has no {feature}")]
+    Unsupported {
+        /// Name of the device.
+        device: String,
+        /// What is missing.
+        feature: String,
+    },
+}
+
+/// Turns a bare result code into an error that says what was being done; `what` completes the
+/// sentence "Vulkan error X while ...".
+pub(crate) fn during(what: impl Into<String>) -> impl FnOnce(vk::Result) -> GpuError {
+    move |code| GpuError::Vulkan {
+        code,
+        what: what.into(),
+    }
+}

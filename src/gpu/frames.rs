@@ -1,0 +1,286 @@
+//! Slots: what one submission in flight owns, and the two of them that frames take in turn.
+
+use std::any::Any;
+use std::sync::Arc;
+
+use ash::vk;
+
+use super::barrier::HazardCheck;
+use super::commands::Commands;
+use super::descriptors::DescriptorPools;
+use super::device::Device;
+use super::error::{GpuError, during};
+use super::memory::{Buffer, BufferKind};
+use super::timer::{FrameTimings, Timer};
+
+/// Frames that may be under way at a time. What the CPU writes per frame through
+/// [`Commands::write`] is held once per slot; everything else is held once.
+pub const FRAMES_IN_FLIGHT: usize = 2;
+
+/// Smallest staging buffer, in bytes.
+const MIN_STAGING_BYTES: u64 = 64 << 10;
+
+/// Command buffer, fence, descriptors, timer and staging memory of one submission.
+pub(crate) struct Slot {
+    pub(crate) device: Arc<Device>,
+    pub(crate) commands: vk::CommandBuffer,
+    pub(crate) descriptors: DescriptorPools,
+    pub(crate) timer: Timer,
+    pub(crate) hazards: HazardCheck,
+    pool: vk::CommandPool,
+    fence: vk::Fence,
+    /// What the submission uses, kept until it has finished.
+    kept: Vec<Arc<dyn Any + Send + Sync>>,
+    staging: Option<Buffer>,
+    /// Bytes of `staging` taken by this submission.
+    staging_used: u64,
+    pending: bool,
+    frame: u64,
+}
+
+impl Slot {
+    pub(crate) fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
+        let timer = Timer::new(device, name)?;
+        let mut slot = Self {
+            device: device.clone(),
+            commands: vk::CommandBuffer::null(),
+            descriptors: DescriptorPools::new(device),
+            timer,
+            hazards: HazardCheck::default(),
+            pool: vk::CommandPool::null(),
+            fence: vk::Fence::null(),
+            kept: Vec::new(),
+            staging: None,
+            staging_used: 0,
+            pending: false,
+            frame: 0,
+        };
+        let what = || during(format!("creating the command buffer of '{name}'"));
+        let info = vk::CommandPoolCreateInfo::default()
+            .queue_family_index(device.queue_family)
+            .flags(vk::CommandPoolCreateFlags::TRANSIENT);
+        // SAFETY: the family is the device's own; `Drop` destroys the pool.
+        slot.pool = unsafe { device.raw.create_command_pool(&info, None) }.map_err(what())?;
+        let info = vk::CommandBufferAllocateInfo::default()
+            .command_pool(slot.pool)
+            .level(vk::CommandBufferLevel::PRIMARY)
+            .command_buffer_count(1);
+        // SAFETY: the pool was just made and frees the buffer with itself.
+        let buffers = unsafe { device.raw.allocate_command_buffers(&info) }.map_err(what())?;
+        slot.commands = buffers[0];
+        // SAFETY: no precondition; `Drop` destroys the fence.
+        slot.fence =
+            unsafe { device.raw.create_fence(&Default::default(), None) }.map_err(what())?;
+        device.set_name(slot.commands, name);
+        Ok(slot)
+    }
+
+    /// Starts recording; the slot's last submission must have been waited for.
+    pub(crate) fn begin(&mut self) -> Result<(), GpuError> {
+        debug_assert!(!self.pending);
+        self.kept.clear();
+        self.staging_used = 0;
+        self.hazards = HazardCheck::default();
+        self.descriptors.reset()?;
+        let raw = &self.device.raw;
+        let info = vk::CommandBufferBeginInfo::default()
+            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the device has finished with the command buffer.
+        unsafe {
+            raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
+                .and_then(|()| raw.begin_command_buffer(self.commands, &info))
+        }
+        .map_err(during("starting a command buffer"))?;
+        self.timer.begin(self.commands);
+        Ok(())
+    }
+
+    /// Hands the recorded commands to the queue.
+    pub(crate) fn submit(&mut self, frame: u64) -> Result<(), GpuError> {
+        self.timer.end(self.commands);
+        let buffers = [self.commands];
+        let submit = vk::SubmitInfo::default().command_buffers(&buffers);
+        let raw = &self.device.raw;
+        // SAFETY: the buffer was begun and has not been submitted; the fence is not in use. The
+        // guard keeps other threads off the queue.
+        let result = unsafe {
+            raw.end_command_buffer(self.commands)
+                .and_then(|()| raw.reset_fences(&[self.fence]))
+                .and_then(|()| {
+                    let queue = self.device.queue();
+                    raw.queue_submit(*queue, &[submit], self.fence)
+                })
+        };
+        result.map_err(|code| self.failure(code, "submitting"))?;
+        self.pending = true;
+        self.frame = frame;
+        Ok(())
+    }
+
+    /// Waits for the last submission, if one is under way, and returns its times.
+    pub(crate) fn wait(&mut self) -> Result<Option<FrameTimings>, GpuError> {
+        if !self.pending {
+            return Ok(None);
+        }
+        // SAFETY: the fence belongs to the submission under way.
+        unsafe {
+            self.device
+                .raw
+                .wait_for_fences(&[self.fence], true, u64::MAX)
+        }
+        .map_err(|code| self.failure(code, "waiting for a submission"))?;
+        self.pending = false;
+        self.kept.clear();
+        Ok(Some(FrameTimings {
+            frame: self.frame,
+            passes: self.timer.collect()?,
+        }))
+    }
+
+    /// An error that names the last pass where the device is lost.
+    pub(crate) fn failure(&self, code: vk::Result, what: &str) -> GpuError {
+        if code != vk::Result::ERROR_DEVICE_LOST {
+            return during(what)(code);
+        }
+        let (last_pass, passes) = self.timer.last_begun();
+        GpuError::DeviceLost {
+            what: what.into(),
+            last_pass,
+            passes,
+        }
+    }
+
+    /// Keeps `object` alive until the submission has finished.
+    pub(crate) fn keep(&mut self, object: Arc<dyn Any + Send + Sync>) {
+        self.kept.push(object);
+    }
+
+    /// Copies `bytes` into staging memory; returns the buffer and the offset.
+    pub(crate) fn stage(&mut self, bytes: &[u8]) -> Result<(Buffer, u64), GpuError> {
+        // Copies to images need an offset that is a multiple of 4 and of the texel size.
+        let offset = self.staging_used.next_multiple_of(16);
+        let end = offset + bytes.len() as u64;
+        let staging = match &self.staging {
+            Some(staging) if end <= staging.size() => staging.clone(),
+            _ => {
+                // Copies recorded so far still read the old buffer.
+                if let Some(old) = self.staging.take() {
+                    self.keep(old.0);
+                }
+                // All of this frame's bytes, so that the next frame finds room at once.
+                let size = end.next_power_of_two().max(MIN_STAGING_BYTES);
+                let new = self.device.buffer("staging", size, BufferKind::Upload)?;
+                self.staging.insert(new).clone()
+            }
+        };
+        // SAFETY: each submission hands out every byte once, and the last one has finished.
+        unsafe { staging.write_mapped(offset, bytes) };
+        self.staging_used = end;
+        Ok((staging, offset))
+    }
+}
+
+impl Drop for Slot {
+    fn drop(&mut self) {
+        let raw = &self.device.raw;
+        // SAFETY: the submission is waited for (a lost device returns at once); null handles are
+        // ignored, and freeing the pool frees its command buffer.
+        unsafe {
+            if self.pending {
+                let _ = raw.wait_for_fences(&[self.fence], true, u64::MAX);
+            }
+            raw.destroy_fence(self.fence, None);
+            raw.destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+/// Two slots, used in turn.
+pub struct Frames {
+    slots: [Slot; FRAMES_IN_FLIGHT],
+    next: u64,
+    finished: Vec<FrameTimings>,
+}
+
+impl Frames {
+    /// Makes the slots; `name` names their Vulkan objects.
+    pub fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
+        Ok(Self {
+            slots: [
+                Slot::new(device, &format!("{name} 0"))?,
+                Slot::new(device, &format!("{name} 1"))?,
+            ],
+            next: 0,
+            finished: Vec::new(),
+        })
+    }
+
+    /// Number of the frame that [`Self::begin`] starts next; modulo [`FRAMES_IN_FLIGHT`] it is the
+    /// index of what the CPU holds per slot.
+    pub fn next_frame(&self) -> u64 {
+        self.next
+    }
+
+    /// Waits until the frame before the last has finished and starts recording the next.
+    pub fn begin(&mut self) -> Result<Commands<'_>, GpuError> {
+        let frame = self.next;
+        let slot = &mut self.slots[frame as usize % FRAMES_IN_FLIGHT];
+        self.finished.extend(slot.wait()?);
+        self.next += 1;
+        Commands::begin(slot, frame)
+    }
+
+    /// Waits for every frame under way.
+    pub fn wait(&mut self) -> Result<(), GpuError> {
+        // The older frame first, so that the times stay in order.
+        for frame in self.next..self.next + FRAMES_IN_FLIGHT as u64 {
+            let slot = &mut self.slots[frame as usize % FRAMES_IN_FLIGHT];
+            self.finished.extend(slot.wait()?);
+        }
+        Ok(())
+    }
+
+    /// Times of the frames that have finished since the last call, oldest first. Take them now
+    /// and then: they are collected until then.
+    pub fn take_timings(&mut self) -> Vec<FrameTimings> {
+        std::mem::take(&mut self.finished)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk;
+
+    use super::super::{Commands, GpuError, test_device};
+    use super::Slot;
+
+    /// No driver at hand can be made to lose its device, so the code is planted.
+    #[test]
+    fn a_lost_device_names_the_last_pass_that_began() {
+        let device = test_device();
+        let mut slot = Slot::new(&device, "test").unwrap();
+        let mut commands = Commands::begin(&mut slot, 0).unwrap();
+        commands.scope("trace");
+        commands.scope("scatter");
+        drop(commands);
+        let lost = vk::Result::ERROR_DEVICE_LOST;
+        let text = slot.failure(lost, "waiting").to_string();
+        assert!(
+            text.contains("'none'") && text.contains("trace, scatter"),
+            "{text}"
+        );
+
+        slot.submit(0).unwrap();
+        // SAFETY: the device is alive.
+        unsafe { device.raw.device_wait_idle() }.unwrap();
+        let text = slot.failure(lost, "waiting").to_string();
+        assert!(
+            text.contains("ERROR_DEVICE_LOST") && text.contains("'scatter'"),
+            "{text}"
+        );
+        let other = slot.failure(vk::Result::ERROR_OUT_OF_HOST_MEMORY, "waiting");
+        let kept = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
+        assert!(matches!(other, GpuError::Vulkan { code, .. } if code == kept));
+        assert!(device.validation_messages().is_empty());
+    }
+}

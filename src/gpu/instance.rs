@@ -1,0 +1,226 @@
+//! The Vulkan instance: loader, validation layers and the log of their messages.
+
+use std::ffi::{CStr, c_void};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use ash::{ext, khr, vk};
+
+use super::error::{GpuError, during};
+
+const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// Messages kept at most; a mistake in a loop would otherwise fill the memory.
+const MAX_MESSAGES: usize = 1000;
+
+/// Warnings and errors of the validation layers and of this layer's own hazard check.
+///
+/// Clones share one list, so that a test can read what was said while the device was destroyed.
+#[derive(Clone, Debug, Default)]
+pub struct ValidationLog(Arc<Mutex<Vec<String>>>);
+
+impl ValidationLog {
+    /// Every message so far, oldest first.
+    pub fn messages(&self) -> Vec<String> {
+        self.lock().clone()
+    }
+
+    /// Empties the list and returns it.
+    pub fn take(&self) -> Vec<String> {
+        std::mem::take(&mut *self.lock())
+    }
+
+    pub(crate) fn push(&self, message: String) {
+        let mut messages = self.lock();
+        if messages.len() < MAX_MESSAGES {
+            messages.push(message);
+        }
+    }
+
+    /// A list of strings stays usable after a panic elsewhere, so poisoning is ignored.
+    fn lock(&self) -> MutexGuard<'_, Vec<String>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+struct Messenger {
+    functions: ext::debug_utils::Instance,
+    handle: vk::DebugUtilsMessengerEXT,
+}
+
+/// Loader, instance and, with validation, the messenger.
+pub(crate) struct Instance {
+    pub(crate) raw: ash::Instance,
+    pub(crate) api_version: u32,
+    /// Object names and labels are possible.
+    pub(crate) debug_utils: bool,
+    pub(crate) validating: bool,
+    pub(crate) log: ValidationLog,
+    messenger: Option<Messenger>,
+    /// Holds the loader's library open; dropped last.
+    _entry: ash::Entry,
+}
+
+impl Instance {
+    /// Opens the loader and makes an instance; with `validate` also the validation layer with
+    /// synchronization validation, which must then be installed.
+    pub(crate) fn new(validate: bool) -> Result<Self, GpuError> {
+        let loader = |reason: String| GpuError::Loader { reason };
+        // SAFETY: the loader is the system's Vulkan library; its initialisers have no precondition.
+        let entry = unsafe { ash::Entry::load() }.map_err(|e| loader(e.to_string()))?;
+        // SAFETY: the entry was loaded successfully.
+        let loader_version = unsafe { entry.try_enumerate_instance_version() }
+            .map_err(during("asking for the loader's version"))?
+            .unwrap_or(vk::API_VERSION_1_0);
+        if loader_version < vk::API_VERSION_1_1 {
+            return Err(loader("it offers Vulkan 1.0, and 1.1 is needed".into()));
+        }
+        let api_version = loader_version.min(vk::API_VERSION_1_3);
+
+        let mut offered = extension_names(&entry, None)?;
+        let mut layers = Vec::new();
+        if validate {
+            offered.extend(validation_extensions(&entry)?);
+            layers.push(VALIDATION_LAYER.as_ptr());
+        }
+        let has = |name: &CStr| offered.iter().any(|offer| offer.as_c_str() == name);
+        let mut extensions = Vec::new();
+        let debug_utils = has(ext::debug_utils::NAME);
+        if debug_utils {
+            extensions.push(ext::debug_utils::NAME.as_ptr());
+        }
+        // Without it the loader hides MoltenVK's devices.
+        let portability = has(khr::portability_enumeration::NAME);
+        if portability {
+            extensions.push(khr::portability_enumeration::NAME.as_ptr());
+        }
+        if validate {
+            extensions.push(ext::validation_features::NAME.as_ptr());
+        }
+
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"insonify")
+            .api_version(api_version);
+        let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features =
+            vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        let mut info = vk::InstanceCreateInfo::default()
+            .application_info(&application)
+            .enabled_layer_names(&layers)
+            .enabled_extension_names(&extensions);
+        if portability {
+            info.flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+        }
+        if validate {
+            info = info.push_next(&mut features);
+        }
+        // SAFETY: all pointers in `info` outlive the call; layers and extensions are offered.
+        let raw = unsafe { entry.create_instance(&info, None) }
+            .map_err(during("creating the Vulkan instance"))?;
+        let mut instance = Self {
+            raw,
+            api_version,
+            debug_utils,
+            validating: validate,
+            log: ValidationLog::default(),
+            messenger: None,
+            _entry: entry,
+        };
+        if validate {
+            instance.messenger = Some(instance.listen()?);
+        }
+        Ok(instance)
+    }
+
+    fn listen(&self) -> Result<Messenger, GpuError> {
+        let functions = ext::debug_utils::Instance::new(&self._entry, &self.raw);
+        let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+            .message_severity(
+                vk::DebugUtilsMessageSeverityFlagsEXT::WARNING
+                    | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR,
+            )
+            // GENERAL would add the loader's remarks about other drivers on the machine.
+            .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+            .pfn_user_callback(Some(on_message))
+            .user_data(Arc::as_ptr(&self.log.0).cast_mut().cast());
+        // SAFETY: the user data is the log's mutex, which `self` keeps alive past the messenger.
+        let handle = unsafe { functions.create_debug_utils_messenger(&info, None) }
+            .map_err(during("creating the debug messenger"))?;
+        Ok(Messenger { functions, handle })
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: every device of this instance has been destroyed by its owner before.
+        unsafe {
+            if let Some(messenger) = self.messenger.take() {
+                messenger
+                    .functions
+                    .destroy_debug_utils_messenger(messenger.handle, None);
+            }
+            self.raw.destroy_instance(None);
+        }
+    }
+}
+
+/// Extensions of the loader, or of one layer.
+fn extension_names(
+    entry: &ash::Entry,
+    layer: Option<&CStr>,
+) -> Result<Vec<std::ffi::CString>, GpuError> {
+    // SAFETY: the entry is loaded and the layer name, if any, is NUL-terminated.
+    let properties = unsafe { entry.enumerate_instance_extension_properties(layer) }
+        .map_err(during("listing the instance extensions"))?;
+    Ok(properties
+        .iter()
+        .filter_map(|p| p.extension_name_as_c_str().ok().map(CStr::to_owned))
+        .collect())
+}
+
+/// The extensions of the validation layer, or an error saying what is missing.
+fn validation_extensions(entry: &ash::Entry) -> Result<Vec<std::ffi::CString>, GpuError> {
+    let unavailable = |reason: &str| GpuError::ValidationUnavailable {
+        reason: reason.into(),
+    };
+    // SAFETY: the entry is loaded.
+    let layers = unsafe { entry.enumerate_instance_layer_properties() }
+        .map_err(during("listing the instance layers"))?;
+    if !layers
+        .iter()
+        .any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER))
+    {
+        return Err(unavailable(
+            "the layer VK_LAYER_KHRONOS_validation is not installed",
+        ));
+    }
+    let extensions = extension_names(entry, Some(VALIDATION_LAYER))?;
+    let has = |name: &CStr| extensions.iter().any(|e| e.as_c_str() == name);
+    if !has(ext::validation_features::NAME) || !has(ext::debug_utils::NAME) {
+        return Err(unavailable(
+            "the installed layer lacks synchronization validation or debug messages",
+        ));
+    }
+    Ok(extensions)
+}
+
+/// Called by the validation layers, from any thread.
+unsafe extern "system" fn on_message(
+    severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _kind: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    log: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: `log` is the mutex given in `listen`, alive as long as the messenger.
+    let log = unsafe { &*log.cast::<Mutex<Vec<String>>>() };
+    // SAFETY: Vulkan passes a valid structure whose message is NUL-terminated or null.
+    let text = unsafe { data.as_ref() }
+        .filter(|data| !data.p_message.is_null())
+        // SAFETY: checked for null on the line above.
+        .map(|data| unsafe { CStr::from_ptr(data.p_message) }.to_string_lossy())
+        .unwrap_or_default();
+    let mut messages = log.lock().unwrap_or_else(PoisonError::into_inner);
+    if messages.len() < MAX_MESSAGES {
+        messages.push(format!("{severity:?}: {text}"));
+    }
+    vk::FALSE
+}

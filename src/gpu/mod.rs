@@ -1,0 +1,43 @@
+//! The Vulkan layer: devices, memory, kernels, commands, timers, acceleration structures.
+//!
+//! It knows nothing of ultrasound, and it is the only part of the crate that contains `unsafe`.
+//! Rules that hold throughout:
+//! - one compute queue; every submission first waits (on the device) for the one before it, so a
+//!   buffer needs no copy per frame unless the CPU writes it;
+//! - images stay in the GENERAL layout and barriers name two stages, so nothing tracks layouts;
+//! - layouts of descriptors and push constants come from the SPIR-V and every dispatch is checked
+//!   against them;
+//! - whatever a submission uses is kept alive until its fence has been waited for.
+
+mod accel;
+mod adapter;
+mod barrier;
+mod blas;
+mod commands;
+mod descriptors;
+mod device;
+mod error;
+mod frames;
+mod image;
+mod instance;
+mod kernel;
+mod memory;
+mod reflect;
+mod timer;
+mod tlas;
+mod transfer;
+
+pub use adapter::{AdapterKind, DeviceInfo, list_devices};
+pub use barrier::Stage;
+pub use blas::{Blas, BlasInput, BlasOptions};
+pub use commands::{Binding, Commands};
+pub use device::{Device, DeviceOptions, Limits, test_device};
+pub use error::GpuError;
+pub use frames::{FRAMES_IN_FLIGHT, Frames};
+pub use image::{AddressMode, Filter, Image, ImageDim, ImageFormat, Sampler};
+pub use instance::ValidationLog;
+pub use kernel::Kernel;
+pub use memory::{Buffer, BufferKind, MemoryUse};
+pub use reflect::{BindingInfo, BindingKind};
+pub use timer::FrameTimings;
+pub use tlas::{Tlas, TlasInstance};

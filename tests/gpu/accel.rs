@@ -1,0 +1,333 @@
+//! Acceleration structures and ray queries; on a device without them the tests say so.
+
+use std::sync::Arc;
+
+use insonify::gpu::{
+    Binding, Blas, BlasInput, BlasOptions, Buffer, BufferKind, Device, DeviceOptions, GpuError,
+    Kernel, Stage, Tlas, TlasInstance, test_device,
+};
+
+use super::{assert_clean, words};
+
+const ONE: [[u32; 3]; 1] = [[0, 1, 2]];
+
+/// A triangle around the z axis at depth z.
+fn triangle(z: f32) -> [[f32; 3]; 3] {
+    [[-10.0, -10.0, z], [10.0, -10.0, z], [0.0, 15.0, z]]
+}
+
+fn shifted(z: f32) -> [[f32; 4]; 3] {
+    [
+        [1.0, 0.0, 0.0, 0.0],
+        [0.0, 1.0, 0.0, 0.0],
+        [0.0, 0.0, 1.0, z],
+    ]
+}
+
+/// A device with ray queries, or `None` with a line that says that the test is not run.
+fn ray_query_device() -> Option<Arc<Device>> {
+    let device = test_device();
+    if !device.supports_ray_query() {
+        eprintln!("skipped: '{}' has no ray queries", device.name());
+        return None;
+    }
+    Some(device)
+}
+
+/// Two rays along z, one through the middle and one beside everything.
+struct Rays {
+    kernel: Kernel,
+    origins: Buffer,
+    hits: Buffer,
+}
+
+impl Rays {
+    fn new(device: &Arc<Device>) -> Self {
+        let spirv = words(include_bytes!("nearest.spv"));
+        let storage = |name| device.buffer(name, 32, BufferKind::Storage).unwrap();
+        let origins = storage("origins");
+        let values = [[0.0_f32, 0.0, 0.0, 0.0], [100.0, 0.0, 0.0, 0.0]];
+        device
+            .upload(&origins, bytemuck::cast_slice(&values))
+            .unwrap();
+        Self {
+            kernel: Kernel::new(device, "nearest", &spirv, &[]).unwrap(),
+            origins,
+            hits: storage("hits"),
+        }
+    }
+
+    fn record(
+        &self,
+        commands: &mut insonify::gpu::Commands<'_>,
+        tlas: &Tlas,
+    ) -> Result<(), GpuError> {
+        let bindings = [
+            Binding::Tlas(tlas),
+            Binding::Buffer(&self.origins),
+            Binding::Buffer(&self.hits),
+        ];
+        commands.dispatch(
+            &self.kernel,
+            [2, 1, 1],
+            bytemuck::bytes_of(&2_u32),
+            &bindings,
+        )
+    }
+
+    /// Distance, custom index and triangle of the middle ray; the other must miss.
+    fn hit(&self, device: &Arc<Device>) -> [f32; 3] {
+        let hits = device.read_back_as::<[f32; 4]>(&self.hits).unwrap();
+        assert_eq!(hits[1], [-1.0; 4]);
+        [hits[0][0], hits[0][1], hits[0][2]]
+    }
+}
+
+/// Two keyframes of a mesh, swapped in the top level by rebuild and by refit.
+#[test]
+fn keyframes_are_swapped_by_rebuild_and_by_refit() {
+    let Some(device) = ray_query_device() else {
+        return;
+    };
+    let (near, far) = (triangle(20.0), triangle(50.0));
+    let input = |name, positions| BlasInput {
+        name,
+        positions,
+        triangles: &ONE,
+    };
+    let keyframes = [input("near", &near[..]), input("far", &far[..])];
+    let blas = Blas::build_many(&device, &keyframes, BlasOptions::default()).unwrap();
+    assert_eq!((blas[0].name(), blas[1].name()), ("near", "far"));
+    let rays = Rays::new(&device);
+    let mut tlas = Tlas::new(&device, "scene", 2).unwrap();
+    let trace = |tlas: &mut Tlas, keyframe: usize, z: f32, refit: bool| {
+        let instance = TlasInstance {
+            blas: &blas[keyframe],
+            transform: shifted(z),
+            custom_index: 70_000 + keyframe as u32,
+            mask: 0xff,
+        };
+        device
+            .once(|commands| {
+                if refit {
+                    tlas.refit(commands, &[instance])?;
+                } else {
+                    tlas.build(commands, &[instance])?;
+                }
+                commands.barrier(Stage::Build, Stage::Compute);
+                rays.record(commands, tlas)
+            })
+            .unwrap();
+        rays.hit(&device)
+    };
+    // Exact: small whole numbers, and the transform only shifts.
+    assert_eq!(trace(&mut tlas, 0, 0.0, false), [20.0, 70_000.0, 0.0]);
+    assert_eq!(trace(&mut tlas, 1, 0.0, false), [50.0, 70_001.0, 0.0]);
+    assert_eq!(trace(&mut tlas, 0, 5.0, true), [25.0, 70_000.0, 0.0]);
+    assert_eq!(trace(&mut tlas, 1, -8.0, true), [42.0, 70_001.0, 0.0]);
+    drop((blas, rays, tlas));
+    assert_clean(device);
+}
+
+/// Many meshes of different size keep their order, and compaction saves memory.
+#[test]
+fn batches_keep_their_order_and_compaction_saves_memory() {
+    let Some(device) = ray_query_device() else {
+        return;
+    };
+    let meshes: Vec<_> = (1..20_u32)
+        .map(|n| {
+            let z = 10.0 * n as f32;
+            let positions: Vec<_> = (0..n).flat_map(|i| triangle(z + i as f32)).collect();
+            let triangles: Vec<_> = (0..n).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+            (positions, triangles)
+        })
+        .collect();
+    let inputs: Vec<BlasInput> = (meshes.iter())
+        .map(|(positions, triangles)| BlasInput {
+            name: "mesh",
+            positions,
+            triangles,
+        })
+        .collect();
+    let loose = BlasOptions {
+        compact: false,
+        ..Default::default()
+    };
+    let bytes = |all: &[Blas]| all.iter().map(Blas::bytes).sum::<u64>();
+    let loose_bytes = bytes(&Blas::build_many(&device, &inputs, loose).unwrap());
+    let before = device.memory().current;
+    let blas = Blas::build_many(&device, &inputs, BlasOptions::default()).unwrap();
+    assert!(
+        bytes(&blas) <= loose_bytes,
+        "{} {loose_bytes}",
+        bytes(&blas)
+    );
+    // Alignment to 256 bytes is all that may be added: inputs and scratch are gone.
+    let kept = device.memory().current - before;
+    assert!(kept <= bytes(&blas) + 256 * 20, "{kept} {}", bytes(&blas));
+
+    let rays = Rays::new(&device);
+    let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
+    for (n, blas) in blas.iter().enumerate() {
+        let instance = TlasInstance {
+            blas,
+            transform: shifted(0.5),
+            custom_index: 1,
+            mask: 1,
+        };
+        device
+            .once(|commands| {
+                tlas.build(commands, &[instance])?;
+                commands.barrier(Stage::Build, Stage::Compute);
+                rays.record(commands, &tlas)
+            })
+            .unwrap();
+        assert_eq!(rays.hit(&device), [10.0 * (n + 1) as f32 + 0.5, 1.0, 0.0]);
+    }
+    drop((blas, rays, tlas));
+    assert_clean(device);
+}
+
+#[test]
+fn rays_pass_a_scene_without_instances() {
+    let Some(device) = ray_query_device() else {
+        return;
+    };
+    let rays = Rays::new(&device);
+    let mut tlas = Tlas::new(&device, "empty", 4).unwrap();
+    device
+        .once(|commands| {
+            tlas.build(commands, &[])?;
+            commands.barrier(Stage::Build, Stage::Compute);
+            rays.record(commands, &tlas)
+        })
+        .unwrap();
+    assert_eq!(rays.hit(&device), [-1.0; 3]);
+    drop((rays, tlas));
+    assert_clean(device);
+}
+
+/// The layers do not see a trace of a structure that is still being built.
+#[test]
+fn a_missing_barrier_between_build_and_trace_is_reported() {
+    let Some(device) = ray_query_device() else {
+        return;
+    };
+    let positions = triangle(20.0);
+    let input = BlasInput {
+        name: "t",
+        positions: &positions,
+        triangles: &ONE,
+    };
+    let blas = Blas::build_many(&device, &[input], BlasOptions::default()).unwrap();
+    let rays = Rays::new(&device);
+    let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
+    let instance = TlasInstance {
+        blas: &blas[0],
+        transform: shifted(0.0),
+        custom_index: 0,
+        mask: 1,
+    };
+    device
+        .once(|commands| {
+            tlas.build(commands, &[instance])?;
+            rays.record(commands, &tlas)
+        })
+        .unwrap();
+    let messages = device.validation_messages();
+    let reported =
+        |m: &String| m.contains("'nearest' reads 'scene'") && m.contains("Build -> Compute");
+    assert!(messages.iter().any(reported), "{messages:#?}");
+}
+
+#[test]
+fn geometry_that_cannot_be_built_is_refused_by_name() {
+    let Some(device) = ray_query_device() else {
+        return;
+    };
+    let positions = triangle(20.0);
+    let build = |triangles: &[[u32; 3]]| {
+        let input = BlasInput {
+            name: "liver",
+            positions: &positions,
+            triangles,
+        };
+        Blas::build_many(&device, &[input], BlasOptions::default())
+    };
+    let text = build(&[]).err().unwrap().to_string();
+    assert!(
+        text.contains("'liver'") && text.contains("no triangles"),
+        "{text}"
+    );
+    let text = build(&[[0, 1, 2], [0, 1, 3]]).err().unwrap().to_string();
+    assert!(
+        text.contains("triangle 1 is [0, 1, 3], of 3 vertices"),
+        "{text}"
+    );
+
+    let blas = build(&ONE).unwrap();
+    let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
+    let one = TlasInstance {
+        blas: &blas[0],
+        transform: shifted(0.0),
+        custom_index: 0,
+        mask: 1,
+    };
+    let error = device.once(|c| tlas.build(c, &[one, one])).unwrap_err();
+    assert!(
+        error.to_string().contains("2 instances, room for 1"),
+        "{error}"
+    );
+    let wide = TlasInstance {
+        custom_index: 1 << 24,
+        ..one
+    };
+    assert!(device.once(|c| tlas.build(c, &[wide])).is_err());
+    let rays = Rays::new(&device);
+    let error = device.once(|c| rays.record(c, &tlas)).unwrap_err();
+    assert!(error.to_string().contains("has not been built"), "{error}");
+    drop((blas, tlas, rays));
+    assert_clean(device);
+}
+
+/// As on a driver without the extensions: everything but rays works, and the error says why.
+#[test]
+fn a_device_without_ray_queries_runs_kernels_and_refuses_rays() {
+    let options = DeviceOptions {
+        validate: true,
+        without_ray_query: true,
+        ..Default::default()
+    };
+    let device = Device::new(&options).unwrap();
+    assert!(!device.supports_ray_query() && !device.supports_acceleration_structure());
+    let positions = triangle(1.0);
+    let input = BlasInput {
+        name: "t",
+        positions: &positions,
+        triangles: &ONE,
+    };
+    let error = Blas::build_many(&device, &[input], BlasOptions::default())
+        .err()
+        .unwrap();
+    assert!(matches!(error, GpuError::Unsupported { .. }), "{error}");
+    assert!(Tlas::new(&device, "scene", 1).is_err());
+    assert!(device.buffer("scratch", 64, BufferKind::Scratch).is_err());
+    let spirv = words(include_bytes!("nearest.spv"));
+    let error = Kernel::new(&device, "nearest", &spirv, &[]).err().unwrap();
+    assert!(error.to_string().contains("needs ray queries"), "{error}");
+
+    let kernel = super::add_kernel(&device, 1);
+    let [a, b] = ["a", "b"].map(|name| super::buffer_of(&device, name, &[4; 8]));
+    let push = [8, 1_u32];
+    device
+        .once(|commands| {
+            commands.scope("add");
+            let bindings = [Binding::Buffer(&a), Binding::Buffer(&b)];
+            commands.dispatch(&kernel, [8, 1, 1], bytemuck::bytes_of(&push), &bindings)
+        })
+        .unwrap();
+    assert_eq!(device.read_back_as::<u32>(&b).unwrap(), [5; 8]);
+    drop((kernel, a, b));
+    assert_clean(device);
+}
