@@ -1,0 +1,99 @@
+//! OBJ meshes and the scene file.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use glam::Vec3;
+
+use crate::abdomen::Part;
+use crate::check::Surface;
+use crate::pose::{self, Pose};
+
+/// A mesh as Wavefront OBJ with normals; coordinates to 1 um, normals to 1e-3.
+pub fn obj(name: &str, surface: &Surface) -> String {
+    let mut out = format!("# {name}, mm; x left, y posterior, z superior\n");
+    for p in &surface.positions {
+        writeln!(out, "v {:.3} {:.3} {:.3}", p.x, p.y, p.z).expect("strings grow");
+    }
+    for n in &surface.normals {
+        writeln!(out, "vn {:.3} {:.3} {:.3}", n.x, n.y, n.z).expect("strings grow");
+    }
+    for t in &surface.triangles {
+        let [a, b, c] = t.map(|i| i + 1);
+        writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}").expect("strings grow");
+    }
+    out
+}
+
+fn vector(v: Vec3, digits: usize) -> String {
+    format!("[{:.digits$}, {:.digits$}, {:.digits$}]", v.x, v.y, v.z)
+}
+
+fn pose_lines(pose: &Pose, comment: &str) -> String {
+    format!(
+        "{comment}position = {}\n{comment}direction = {}\n{comment}lateral = {}\n",
+        vector(pose.position, 2),
+        vector(pose.direction, 5),
+        vector(pose.lateral, 5),
+    )
+}
+
+/// Tissues that the shipped table lacks.
+const TISSUES: &str = r#"# Dense connective tissue: acoustically near skin, brighter than the muscle on both sides.
+[tissues.fascia]
+based_on = "skin"
+echogenicity = "+5 dB"
+
+# Central echo complex of the kidney: fat with vessels, calyces and septa in between.
+[tissues.renal_sinus]
+based_on = "fat"
+echogenicity = "+6 dB"
+
+# Medulla: darker than cortex by 6-8 dB in the adult.
+[tissues.renal_pyramid]
+based_on = "kidney"
+echogenicity = "-12 dB"
+"#;
+
+/// The scene file for `parts`, whose meshes lie in `folder` beside it.
+pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> String {
+    let mut out = format!(
+        "# An upper abdomen, {triangles} triangles, made by\n\
+         #   {command}\n\
+         # World frame, mm: x to the patient's left, y posterior, z superior. Outside the skin is\n\
+         # coupling gel.\n\
+         name = \"Upper abdomen\"\n\
+         background = \"gel\"\n\n\
+         [probe]\n\
+         preset = \"abdominal\"\n\n"
+    );
+    let default = pose::default();
+    out += &format!("# {}\n[probe.pose]\n", default.title);
+    out += &pose_lines(&default, "");
+    out += "\n# Other views of the same anatomy:\n";
+    for pose in pose::alternatives() {
+        out += &format!("# {}\n{}#\n", pose.title, pose_lines(&pose, "#   "));
+    }
+    out += "\n";
+    out += TISSUES;
+    out += "\n# In rising priority: where two overlap, the later one wins.\n";
+    for (priority, part) in parts.iter().enumerate() {
+        out += &format!(
+            "[[mesh]]\nname = \"{name}\"\nfile = \"{folder}/{name}.obj\"\ntissue = \"{}\"\n\
+             priority = {priority}\n\n",
+            part.tissue,
+            name = part.name,
+        );
+    }
+    out.truncate(out.trim_end().len());
+    out + "\n"
+}
+
+/// Writes `text` to `path`, making its folder.
+pub fn write(path: &Path, text: &str) -> Result<(), String> {
+    let explain = |e: std::io::Error| format!("{}: cannot be written: {e}", path.display());
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(explain)?;
+    }
+    std::fs::write(path, text).map_err(explain)
+}
