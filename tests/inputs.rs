@@ -1,0 +1,304 @@
+//! Bad input: every mesh at hand and scenes with planted mistakes, through the program itself.
+//!
+//! Each file is checked in a process of its own that may use 1 GB of address space (more than it
+//! can ever hold in memory) and 10 s.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use assert_cmd::Command;
+
+const SECONDS: u64 = 10;
+const KILOBYTES: u32 = 1 << 20;
+
+fn shared_data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    if !folder.is_dir() {
+        println!("skipped: no shared data");
+        return None;
+    }
+    Some(folder)
+}
+
+/// Files that look like meshes, readable or not, in a fixed order.
+fn meshes(folder: &Path) -> Vec<PathBuf> {
+    let mut out = Vec::new();
+    let mut todo = vec![folder.to_owned()];
+    while let Some(folder) = todo.pop() {
+        for entry in std::fs::read_dir(folder).expect("readable folder") {
+            let path = entry.expect("readable entry").path();
+            let extension = path
+                .extension()
+                .and_then(|e| e.to_str())
+                .unwrap_or_default();
+            let kinds = ["obj", "stl", "gltf", "glb", "ply", "off"];
+            if path.is_dir() {
+                todo.push(path);
+            } else if kinds.contains(&extension.to_ascii_lowercase().as_str()) {
+                out.push(path);
+            }
+        }
+    }
+    out.sort();
+    out
+}
+
+struct Outcome {
+    code: Option<i32>,
+    text: String,
+}
+
+impl Outcome {
+    fn has(&self, kind: &str) -> bool {
+        self.text.lines().any(|line| line.starts_with(kind))
+    }
+}
+
+fn check(path: &Path) -> Outcome {
+    limited("exec \"$0\" check \"$1\"", path)
+}
+
+fn limited(script: &str, path: &Path) -> Outcome {
+    let output = Command::new("sh")
+        .arg("-c")
+        .arg(format!("ulimit -v {KILOBYTES}; {script}"))
+        .arg(env!("CARGO_BIN_EXE_insonify"))
+        .arg(path)
+        .timeout(Duration::from_secs(SECONDS))
+        .output()
+        .expect("started");
+    let mut text = String::from_utf8_lossy(&output.stdout).into_owned();
+    text.push_str(&String::from_utf8_lossy(&output.stderr));
+    Outcome {
+        code: output.status.code(),
+        text,
+    }
+}
+
+/// What is wrong with an outcome, if anything.
+fn verdict(path: &Path, outcome: &Outcome) -> Option<String> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let names_file = |kind: &str| {
+        let mut lines = outcome.text.lines().filter(|l| l.starts_with(kind));
+        lines.all(|line| line.contains(name.as_ref()) && line.len() > name.len() + kind.len() + 4)
+    };
+    match outcome.code {
+        Some(0) if outcome.has("error:") => Some("errors, but success".to_owned()),
+        Some(1) if !outcome.has("error:") => Some("failed without an error".to_owned()),
+        Some(0 | 1) if names_file("error:") && names_file("warning:") => None,
+        Some(0 | 1) => Some("a finding does not name the file".to_owned()),
+        code => Some(format!("ended with {code:?} (crash, memory or time)")),
+    }
+}
+
+#[test]
+fn every_mesh_is_loaded_or_refused_with_a_reason() {
+    let Some(data) = shared_data() else { return };
+    let mut counts: BTreeMap<String, [usize; 3]> = BTreeMap::new();
+    let mut bad = Vec::new();
+    for path in meshes(&data) {
+        let outcome = check(&path);
+        let inside = path.strip_prefix(&data).expect("inside");
+        let set = inside.components().next().expect("a folder").as_os_str();
+        let kind = match (outcome.has("error:"), outcome.has("warning:")) {
+            (true, _) => 2,
+            (false, true) => 1,
+            _ => 0,
+        };
+        counts
+            .entry(set.to_string_lossy().into_owned())
+            .or_default()[kind] += 1;
+        if let Some(cause) = verdict(&path, &outcome) {
+            bad.push(format!("{}: {cause}\n{}", inside.display(), outcome.text));
+        }
+    }
+    println!("{:30} clean, warnings, refused", "set");
+    for (set, [clean, warned, refused]) in &counts {
+        println!("{set:30} {clean:5} {warned:9} {refused:8}");
+    }
+    assert!(bad.is_empty(), "{}", bad.join("\n"));
+    let real = ["liver-scikit-surgery", "heart-4d-bivme", "baby-makehuman"];
+    for set in real {
+        assert!(
+            counts[set][0] + counts[set][1] > 0,
+            "{set} holds readable meshes"
+        );
+    }
+}
+
+/// Khronos' validator stores its verdict beside each file.
+#[test]
+fn what_the_gltf_validator_refuses_is_not_loaded_in_silence() {
+    let Some(data) = shared_data() else { return };
+    let (mut refused, mut silent) = (0, Vec::new());
+    for path in meshes(&data.join("corpus-gltf-validator")) {
+        let mut report = path.clone().into_os_string();
+        report.push(".report.json");
+        let Ok(text) = std::fs::read_to_string(&report) else {
+            continue;
+        };
+        let report: serde_json::Value = serde_json::from_str(&text).expect("a report");
+        if report["issues"]["numErrors"].as_u64() == Some(0) {
+            continue;
+        }
+        refused += 1;
+        let outcome = check(&path);
+        // That these tiny files hold no triangles is true but not the reason.
+        let reasons = outcome.text.lines().filter(|line| {
+            (line.starts_with("error:") || line.starts_with("warning:"))
+                && !line.contains("holds no triangles")
+        });
+        if reasons.count() == 0 {
+            silent.push(format!("{}\n{}", path.display(), outcome.text));
+        }
+    }
+    println!(
+        "{refused} files with errors of the validator, {} silent",
+        silent.len()
+    );
+    assert!(refused > 200, "the corpus is there");
+    assert!(silent.is_empty(), "{}", silent.join("\n"));
+}
+
+/// The comparator of the tests above rejects what it is there to reject.
+#[test]
+fn planted_outcomes_are_rejected() {
+    let path = Path::new("folder/a.obj");
+    let outcome = |code, text: &str| Outcome {
+        code,
+        text: text.to_owned(),
+    };
+    assert!(verdict(path, &outcome(Some(0), "0 errors")).is_none());
+    assert!(verdict(path, &outcome(Some(1), "error: folder/a.obj: no triangles")).is_none());
+    assert!(verdict(path, &outcome(Some(101), "panicked")).is_some());
+    assert!(verdict(path, &outcome(None, "killed")).is_some());
+    assert!(verdict(path, &outcome(Some(1), "0 errors")).is_some());
+    assert!(
+        verdict(
+            path,
+            &outcome(Some(0), "error: folder/a.obj: cause is here")
+        )
+        .is_some()
+    );
+    assert!(verdict(path, &outcome(Some(1), "error: something went wrong")).is_some());
+}
+
+/// Memory and time limits of the child hold.
+#[test]
+fn the_limits_bite() {
+    // `tail` keeps its input until a line ends; here none does.
+    let hungry = limited(
+        "head -c 1200000000 /dev/zero | tail > /dev/null",
+        Path::new("x"),
+    );
+    assert_eq!(hungry.code, Some(1), "{}", hungry.text);
+    assert!(verdict(Path::new("x"), &hungry).is_some());
+    let slow = limited("exec sleep 60", Path::new("x"));
+    assert!(verdict(Path::new("x"), &slow).is_some(), "{}", slow.text);
+}
+
+#[test]
+fn a_file_that_is_too_large_is_not_read() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let path = folder.path().join("huge.stl");
+    let file = std::fs::File::create(&path).expect("created");
+    // Sparse on disk; larger than what is read.
+    file.set_len(600 << 20).expect("sized");
+    let outcome = check(&path);
+    assert_eq!(outcome.code, Some(1), "{}", outcome.text);
+    assert!(
+        outcome.text.contains("the limit is 256 MB"),
+        "{}",
+        outcome.text
+    );
+}
+
+#[test]
+fn scene_mistakes_show_file_line_column_and_remedy() {
+    let cube = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
+    let mesh = "[[mesh]]\nname = \"organ\"\nfile = \"organ.obj\"\ntissue = \"liver\"\n";
+    for (text, place, cause, remedy) in [
+        (
+            "[probe]\ndept = 3\n".to_owned(),
+            "2:1",
+            "unknown field `dept`",
+            "did you mean `depth`",
+        ),
+        (
+            "[probe]\nfrequency = \"5 mm\"\n".to_owned(),
+            "2:13",
+            "`mm` does not fit",
+            "`MHz`, `kHz`",
+        ),
+        (
+            mesh.replace("organ.obj", "orgn.obj"),
+            "3:8",
+            "orgn.obj",
+            "check the path",
+        ),
+        (
+            mesh.replace("liver", "livre"),
+            "4:10",
+            "unknown tissue `livre`",
+            "did you mean `liver`",
+        ),
+        (
+            format!("{mesh}[tissues.liver]\nimpedance = \"1.75 MRayl\"\n"),
+            "6:13",
+            "differs from density times speed",
+            "2 % are allowed",
+        ),
+        ("[probe\n".to_owned(), "1:7", "unclosed table", ""),
+    ] {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        std::fs::write(folder.path().join("organ.obj"), cube).expect("written");
+        std::fs::write(folder.path().join("s.toml"), &text).expect("written");
+        let output = Command::new(env!("CARGO_BIN_EXE_insonify"))
+            .args(["check", "s.toml"])
+            .current_dir(folder.path())
+            .output()
+            .expect("started");
+        assert_eq!(output.status.code(), Some(1));
+        // The report wraps its lines to the terminal.
+        let shown = String::from_utf8_lossy(&output.stderr);
+        let shown: Vec<_> = shown
+            .split(|c: char| c.is_whitespace() || c == '\u{2502}')
+            .collect();
+        let shown = shown
+            .into_iter()
+            .filter(|w| !w.is_empty())
+            .collect::<Vec<_>>()
+            .join(" ");
+        for wanted in [&format!("s.toml:{place}"), cause, remedy] {
+            assert!(shown.contains(wanted), "{wanted}: {shown}");
+        }
+    }
+}
+
+#[test]
+fn the_real_scenes_are_sound() {
+    if shared_data().is_none() {
+        return;
+    }
+    for (name, triangles) in [
+        ("liver", 70_000),
+        ("heart", 10_000),
+        ("heart_rodero", 120_000),
+    ] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/scenes/{name}.toml"));
+        let (scene, warnings) = insonify::scene::Scene::load(&path, &[]).expect(name);
+        let total: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
+        println!(
+            "{name}: {} meshes, {total} triangles, {} warnings",
+            scene.meshes.len(),
+            warnings.len()
+        );
+        assert!(total > triangles, "{name}: {total}");
+        // Open organs would leak tissue into the picture.
+        assert!(
+            warnings.iter().all(|w| !w.message.contains("open edges")),
+            "{warnings:?}"
+        );
+    }
+}
