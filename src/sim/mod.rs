@@ -7,3 +7,5 @@ pub mod placement;
 pub mod shaders;
 pub mod special;
 pub mod tables;
+pub mod tracer;
+pub mod world;
