@@ -35,6 +35,8 @@ pub struct Limits {
     pub max_storage_buffer_bytes: u64,
     /// Largest uniform buffer, in bytes.
     pub max_uniform_buffer_bytes: u64,
+    /// Storage buffers that one kernel may bind; at least 4 everywhere.
+    pub max_storage_buffers: u32,
     /// Largest side of a 2D image, in texels.
     pub max_image_2d: u32,
     /// Largest side of a 3D image, in texels.
@@ -136,6 +138,7 @@ impl Device {
             limits: Limits {
                 max_storage_buffer_bytes: limits.max_storage_buffer_range.into(),
                 max_uniform_buffer_bytes: limits.max_uniform_buffer_range.into(),
+                max_storage_buffers: limits.max_per_stage_descriptor_storage_buffers,
                 max_image_2d: limits.max_image_dimension2_d,
                 max_image_3d: limits.max_image_dimension3_d,
                 max_push_constant_bytes: limits.max_push_constants_size,

@@ -91,6 +91,15 @@ fn check_limits(device: &Device, reflection: &Reflection) -> Result<(), String> 
             reflection.push_constant_bytes, limits.max_push_constant_bytes
         ));
     }
+    let buffers = (reflection.bindings.iter())
+        .filter(|binding| binding.kind == BindingKind::StorageBuffer)
+        .count();
+    if buffers > limits.max_storage_buffers as usize {
+        return Err(format!(
+            "its {buffers} storage buffers exceed the device's {}",
+            limits.max_storage_buffers
+        ));
+    }
     let traces = (reflection.bindings.iter())
         .any(|binding| binding.kind == BindingKind::AccelerationStructure);
     if traces && !device.supports_ray_query() {

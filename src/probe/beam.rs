@@ -1,9 +1,9 @@
-//! Widths of the point-spread function along depth (model section 4 and 13.14).
+//! Widths of the point-spread function along depth.
 
 use super::Probe;
 
 /// Ratio of a one-way Gaussian's sigma to wavelength times f-number for an apodised aperture
-/// (model section 4; 0.51 would be an unapodised rectangle).
+/// (0.51 would be an unapodised rectangle).
 const APODISED: f64 = 0.6;
 
 /// Sigma of a Gaussian beam with a fixed focus, mm: waist 0.6 lambda F# at `focus`.

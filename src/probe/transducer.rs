@@ -1,4 +1,4 @@
-//! Transducer geometry in probe space: x lateral, y elevation, z depth, mm (model 1 and 2.1).
+//! Transducer geometry in probe space: x lateral, y elevation, z depth, mm.
 
 use glam::DVec3;
 
@@ -141,7 +141,7 @@ impl Probe {
         }
     }
 
-    /// Abdominal curved array: 3.5 MHz, 65 degrees, 160 mm deep (model section 13).
+    /// Abdominal curved array: 3.5 MHz, 65 degrees, 160 mm deep.
     pub fn abdominal() -> Self {
         Self {
             kind: Kind::Convex {
@@ -159,7 +159,7 @@ impl Probe {
         }
     }
 
-    /// Cardiac sector: 3 MHz, 80 degrees, small face (model section 13).
+    /// Cardiac sector: 3 MHz, 80 degrees, small face.
     pub fn cardiac() -> Self {
         Self {
             kind: Kind::Convex {

@@ -134,7 +134,8 @@ fn size(path: &Path, facts: &Facts, units: Units) -> Option<Issue> {
     let away = |mm: f64| (size / units.0 * mm / 150.0).ln().abs();
     let guess = Units::NAMES
         .iter()
-        .filter(|(_, mm)| (least..=most).contains(&(size / units.0 * mm)))
+        // Nobody scans in inches; whoever models in them can say so.
+        .filter(|(name, mm)| *name != "in" && (least..=most).contains(&(size / units.0 * mm)))
         .min_by(|a, b| away(a.1).total_cmp(&away(b.1)));
     let remedy = match guess {
         Some((name, mm)) => format!(

@@ -9,21 +9,47 @@ use super::issue::Issue;
 use super::mesh::{self, MAX_ELEMENTS, Parts, Soup};
 
 mod accessor;
+mod bounds;
 mod buffers;
+mod glb;
+mod reduce;
+mod schema;
+mod validate;
 
 use accessor::Reader;
 
+/// Most commas of the JSON part: each value of the parsed tree takes some 50 bytes of memory.
+const MAX_VALUES: usize = 4_000_000;
+
 pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Parts, Vec<Issue>> {
     let one = |issue: Issue| vec![issue];
-    let gltf = gltf::Gltf::from_slice(bytes).map_err(|e| {
-        one(Issue::error(
-            path,
-            1,
-            format!("is not a valid glTF file: {e}"),
-            "export it again",
-        ))
-    })?;
-    let buffers = buffers::load(path, &gltf).map_err(one)?;
+    let glb::Container {
+        json,
+        binary,
+        mut issues,
+    } = glb::open(path, bytes).map_err(one)?;
+    let root = parse(path, json).map_err(one)?;
+    issues.extend(validate::issues(path, validate::validate(&root)));
+    if issues.iter().any(Issue::is_error) {
+        return Err(issues);
+    }
+    let reduced = reduce::reduce(&root);
+    let invalid = |cause: String| {
+        let message = format!("is not a valid glTF file: {cause}");
+        one(Issue::error(path, 1, message, "export it again"))
+    };
+    let json: gltf::json::Root =
+        serde_json::from_value(reduced.json).map_err(|e| invalid(e.to_string()))?;
+    let gltf = gltf::Document::from_json(json).map_err(|e| invalid(e.to_string()))?;
+    let buffers::Buffers {
+        bytes: buffers,
+        issues: unread,
+    } = buffers::load(path, &gltf, binary, &reduced.buffers);
+    issues.extend(unread);
+    if issues.iter().any(Issue::is_error) {
+        return Err(issues);
+    }
+    issues.extend(validate::issues(path, bounds::check(&root, &buffers)));
     let reader = Reader {
         path,
         buffers: &buffers,
@@ -31,10 +57,16 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     let mut walk = Walk {
         reader,
         parts: Vec::new(),
-        issues: Vec::new(),
+        issues,
         visited: vec![false; gltf.nodes().len()],
         elements: 0,
     };
+    if reduced.without_data > 0 {
+        walk.warn(
+            reduced.without_data,
+            "primitives without stored positions are ignored",
+        );
+    }
     let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
     let roots: Vec<_> = match &scene {
         Some(scene) => scene.nodes().collect(),
@@ -87,8 +119,24 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     })
 }
 
+fn parse(path: &Path, json: &[u8]) -> Result<serde_json::Map<String, serde_json::Value>, Issue> {
+    let fail = |message: String, remedy: &str| Issue::error(path, 1, message, remedy);
+    if json.iter().filter(|&&b| b == b',').count() > MAX_VALUES {
+        return Err(fail(
+            "its JSON part is too large".to_owned(),
+            "store numbers in buffers",
+        ));
+    }
+    let again = "export or copy it again";
+    match serde_json::from_slice(json) {
+        Ok(serde_json::Value::Object(root)) => Ok(root),
+        Ok(_) => Err(fail("its JSON is not an object".to_owned(), again)),
+        Err(e) => Err(fail(format!("is not valid JSON: {e}"), again)),
+    }
+}
+
 /// Nodes that are nobody's child, for files without scenes.
-fn roots(gltf: &gltf::Gltf) -> Vec<gltf::Node<'_>> {
+fn roots(gltf: &gltf::Document) -> Vec<gltf::Node<'_>> {
     let mut child = vec![false; gltf.nodes().len()];
     for node in gltf.nodes() {
         for c in node.children() {
@@ -141,15 +189,6 @@ impl Walk<'_> {
                 .map(|column| column.map(f64::from));
             let matrix = parent * DMat4::from_cols_array_2d(&local);
             if let Some(mesh) = node.mesh().filter(|_| kept) {
-                if node.skin().is_some() {
-                    self.warn(1, "a skinned mesh is read in the pose of its vertices");
-                }
-                if mesh
-                    .primitives()
-                    .any(|p| p.morph_targets().next().is_some())
-                {
-                    self.warn(1, "morph targets are not applied");
-                }
                 let name = node.name().or(mesh.name()).unwrap_or_default();
                 for primitive in mesh.primitives() {
                     self.primitive(name, &primitive, matrix)?;
@@ -174,10 +213,8 @@ impl Walk<'_> {
             self.warn(1, "points or lines are ignored");
             return Ok(());
         }
-        let Some(positions) = primitive.get(&gltf::Semantic::Positions) else {
-            self.warn(1, "a primitive without positions is ignored");
-            return Ok(());
-        };
+        let positions = primitive.get(&gltf::Semantic::Positions);
+        let positions = positions.expect("primitives without positions were left out");
         self.elements += positions.count();
         self.elements += primitive.indices().map_or(0, |a| a.count() / 3);
         if self.elements > MAX_ELEMENTS {

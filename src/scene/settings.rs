@@ -1,6 +1,6 @@
 //! What a scene file sets besides anatomy: path tracing, scatterers, image formation.
 
-/// Which paths are followed (model 2.8 and 13.3).
+/// Which paths are followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Sampling {
@@ -13,7 +13,7 @@ pub enum Sampling {
     SharedPrimary,
 }
 
-/// What thickness does to the phase of a surface echo (model 2.7b).
+/// What thickness does to the phase of a surface echo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Coherence {
@@ -23,7 +23,7 @@ pub enum Coherence {
     Coherent,
 }
 
-/// Where scatterers come from (model 3.4).
+/// Where scatterers come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ScatterMode {
@@ -85,7 +85,7 @@ pub struct Simulation {
     pub seed: u32,
 }
 
-/// Image formation (model section 5).
+/// Image formation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Imaging {
     /// Gain, dB: an echo this far below a perfect mirror is white at zero depth.

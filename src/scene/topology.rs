@@ -121,7 +121,12 @@ pub fn clean(path: &Path, soup: &mut Soup) -> Vec<Issue> {
 /// turns a closed mesh whose volume is negative.
 pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
     let mut issues = Vec::new();
-    let (turned, contradictions) = agree(soup);
+    let Agreement {
+        turned,
+        contradictions,
+        bodies,
+        inward,
+    } = agree(soup);
     if turned > 0 {
         issues.push(Issue::warning(
             path,
@@ -150,12 +155,31 @@ pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
             "inside out (its volume is negative): all triangles were turned",
             "flip the normals in the modeller",
         ));
+    } else if inward > 0 && inward < bodies {
+        issues.push(Issue::warning(
+            path,
+            inward,
+            format!("{inward} of {bodies} closed bodies face inwards: cavities, or inside out"),
+            "flip them in the modeller unless they are cavities",
+        ));
     }
     issues
 }
 
-/// Flood fill over edges of two triangles; returns turned triangles and edges left in conflict.
-fn agree(soup: &mut Soup) -> (usize, usize) {
+/// What a flood fill over all pieces has found.
+#[derive(Default)]
+struct Agreement {
+    /// Triangles turned to agree with the majority of their piece.
+    turned: usize,
+    /// Edges whose triangles cannot agree.
+    contradictions: usize,
+    /// Closed pieces, and how many of them have a negative volume.
+    bodies: usize,
+    inward: usize,
+}
+
+/// Flood fill over edges of two triangles; turns the minority of each piece.
+fn agree(soup: &mut Soup) -> Agreement {
     let count = soup.triangles.len();
     let mut neighbours: Vec<[(u32, bool); 3]> = vec![[(u32::MAX, false); 3]; count];
     let mut used = vec![0usize; count];
@@ -169,7 +193,7 @@ fn agree(soup: &mut Soup) -> (usize, usize) {
         }
     }
     let mut turn: Vec<Option<bool>> = vec![None; count];
-    let (mut turned, mut contradictions) = (0, 0);
+    let mut found = Agreement::default();
     for start in 0..count {
         if turn[start].is_some() {
             continue;
@@ -187,21 +211,29 @@ fn agree(soup: &mut Soup) -> (usize, usize) {
                         piece.push(other as usize);
                     }
                     Some(has) if has == wanted => {}
-                    Some(_) => contradictions += 1,
+                    Some(_) => found.contradictions += 1,
                 }
             }
         }
         let minority = piece.iter().filter(|&&t| turn[t] == Some(true)).count();
         let other_way = minority * 2 > piece.len();
-        for t in piece {
+        let origin = DVec3::from(soup.positions[soup.triangles[start][0] as usize].map(f64::from));
+        let mut six = 0.0;
+        for &t in &piece {
             if (turn[t] == Some(true)) != other_way {
                 soup.triangles[t].swap(1, 2);
-                turned += 1;
+                found.turned += 1;
             }
+            six += six_volumes(soup, soup.triangles[t], origin);
+        }
+        if piece.iter().all(|&t| used[t] == 3) {
+            found.bodies += 1;
+            found.inward += usize::from(six < 0.0);
         }
     }
     // Each conflicting edge is met from both of its triangles.
-    (turned, contradictions / 2)
+    found.contradictions /= 2;
+    found
 }
 
 /// Directed open edges: from vertex to vertex as their triangle runs.
@@ -328,6 +360,25 @@ pub(super) mod tests {
         }
         assert_eq!(kinds(&orient(Path::new("x"), &mut soup)), [12]);
         assert_eq!(volume(&soup), 1.0);
+    }
+
+    #[test]
+    fn one_inverted_body_among_several_is_reported() {
+        let mut soup = cube();
+        let second = cube();
+        soup.positions
+            .extend(second.positions.iter().map(|p| p.map(|v| v * 0.5 + 3.0)));
+        soup.triangles.extend(
+            second
+                .triangles
+                .iter()
+                .map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]),
+        );
+        let issues = orient(Path::new("x"), &mut soup);
+        assert!(
+            issues[0].message.contains("1 of 2 closed bodies"),
+            "{issues:?}"
+        );
     }
 
     #[test]

@@ -9,6 +9,10 @@ use super::Facts;
 use crate::scene::mesh::{self, Inspected, Options};
 use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
 
+/// Distance from a surface at which the tissue around it is looked up, mm: clear of surfaces
+/// that coincide with it, inside the thinnest wall.
+const OUTSIDE: f64 = 0.05;
+
 /// What a file holds and what is wrong with it.
 #[derive(Debug, Default)]
 pub struct Report {
@@ -163,7 +167,7 @@ fn scene(path: &Path) -> Report {
     }
 }
 
-/// Facts in world space, and a vertex of the surface.
+/// Facts in world space, and a point just outside the surface.
 fn world_facts(scene: &Scene, instance: &Instance) -> (Facts, DVec3) {
     let mesh = &scene.meshes[instance.mesh];
     let place = |p: &[f32; 3]| {
@@ -177,14 +181,16 @@ fn world_facts(scene: &Scene, instance: &Instance) -> (Facts, DVec3) {
         positions: mesh.positions.iter().map(place).collect(),
         triangles: mesh.triangles.clone(),
     });
-    let first = soup
-        .positions
-        .first()
-        .map_or(DVec3::ZERO, |p| DVec3::from(p.map(f64::from)));
-    (super::measure(&soup), first)
+    let corner = |i: u32| DVec3::from(soup.positions[i as usize].map(f64::from));
+    let outside = soup.triangles.first().map_or(DVec3::ZERO, |t| {
+        let [a, b, c] = t.map(corner);
+        let outward = (b - a).cross(c - a).normalize_or_zero();
+        (a + b + c) / 3.0 + outward * OUTSIDE
+    });
+    (super::measure(&soup), outside)
 }
 
-/// Tissue at a vertex of an instance without that instance: of the enclosing mesh of highest
+/// Tissue at a point beside an instance without that instance: of the enclosing mesh of highest
 /// priority, or the background. Elsewhere on the surface it may be another.
 fn tissue_around<'s>(scene: &'s Scene, instance: &Instance, point: DVec3) -> &'s str {
     let around = scene

@@ -9,7 +9,8 @@ use crate::scene::issue::Issue;
 /// Where the bytes are.
 pub(super) struct Reader<'a> {
     pub path: &'a Path,
-    pub buffers: &'a [Vec<u8>],
+    /// Bytes by buffer index; those that no geometry needs are absent.
+    pub buffers: &'a [Option<Vec<u8>>],
 }
 
 /// A run of elements inside a buffer.
@@ -48,7 +49,10 @@ impl<'a> Reader<'a> {
                 .checked_add(size)?
                 .checked_add(offset)
         });
-        let buffer = self.buffers.get(view.buffer().index());
+        let buffer = self
+            .buffers
+            .get(view.buffer().index())
+            .and_then(Option::as_ref);
         let bytes = buffer.and_then(|b| {
             let end = view.offset().checked_add(view.length())?;
             b.get(view.offset()..end)

@@ -94,5 +94,119 @@ fn planted_faults_are_errors() {
 fn a_loop_of_nodes_ends_in_an_error() {
     let text = file(r#"{"mesh":0,"children":[1]},{"children":[0]}"#, 4, TRIANGLE);
     let issues = load(&text).err().unwrap_or_default();
-    assert!(issues[0].message.contains("reached twice"), "{issues:?}");
+    assert!(issues[0].message.contains("own ancestor"), "{issues:?}");
+}
+
+/// Findings on a sound file after one replacement.
+fn spoiled(from: &str, to: &str) -> String {
+    let sound = file(r#"{"mesh":0}"#, 4, TRIANGLE);
+    let broken = sound.replacen(from, to, 1);
+    assert_ne!(broken, sound, "{from}");
+    let issues = load(&broken).map_or_else(|issues| issues, |parts| parts.issues);
+    issues.iter().map(|i| format!("{i}\n")).collect()
+}
+
+#[test]
+fn a_sound_file_has_no_findings() {
+    let parts = load(&file(r#"{"mesh":0}"#, 4, TRIANGLE)).expect("readable");
+    assert!(parts.issues.is_empty(), "{:?}", parts.issues);
+}
+
+#[test]
+fn planted_breaches_of_the_specification_are_named_where_they_are() {
+    for (from, to, finding) in [
+        (
+            "\"asset\"",
+            "\"assett\":1,\"asset\"",
+            "warning: x.gltf: /assett: is not a property",
+        ),
+        (
+            "{\"version\":\"2.0\"}",
+            "{\"version\":\"3.0\"}",
+            "error: x.gltf: /asset/version: is 3.0",
+        ),
+        (
+            "\"nodes\":[0]",
+            "\"nodes\":[1]",
+            "error: x.gltf: /scenes/0/nodes/0: names nodes[1]",
+        ),
+        (
+            "{\"mesh\":0}",
+            "{\"mesh\":\"0\"}",
+            "error: x.gltf: /nodes/0/mesh: is not an index",
+        ),
+        (
+            "5126",
+            "5127",
+            "error: x.gltf: /accessors/0/componentType: is 5127",
+        ),
+        (
+            "\"max\":[1,1,0]",
+            "\"max\":[1,2,0]",
+            "warning: x.gltf: /accessors/0: its max is stated",
+        ),
+        (
+            "\"max\":[1,1,0]",
+            "\"max\":[1,1]",
+            "error: x.gltf: /accessors/0/max: should have 3",
+        ),
+        (
+            "\"byteLength\":36}",
+            "\"byteLength\":37}",
+            "error: x.gltf: /bufferViews/0: ends at byte 37",
+        ),
+        (
+            "{\"mesh\":0}",
+            "{\"mesh\":0,\"rotation\":[0,0,0,0.5]}",
+            "error: x.gltf: /nodes/0/rotation: has length",
+        ),
+        (
+            "\"asset\"",
+            "\"cameras\":[{\"type\":\"fisheye\"}],\"asset\"",
+            "warning: x.gltf: /cameras/0/type",
+        ),
+        (
+            "\"asset\"",
+            "\"extensionsUsed\":[\"KHR_draco_mesh_compression\"],\"extensionsRequired\":[\"KHR_draco_mesh_compression\"],\"asset\"",
+            "error: x.gltf: /meshes: the file requires the extension KHR_draco",
+        ),
+    ] {
+        let found = spoiled(from, to);
+        assert!(found.contains(finding), "{finding}:\n{found}");
+    }
+}
+
+#[test]
+fn broken_containers_are_errors() {
+    let json = file(r#"{"mesh":0}"#, 4, TRIANGLE);
+    let glb = |version: u32, length: i64, chunk: i64, kind: &[u8]| {
+        let mut padded = json.clone().into_bytes();
+        padded.resize(padded.len().next_multiple_of(4), b' ');
+        let total = 20 + padded.len() as i64;
+        let mut out = b"glTF".to_vec();
+        out.extend(version.to_le_bytes());
+        out.extend(((total + length) as u32).to_le_bytes());
+        out.extend(((padded.len() as i64 + chunk) as u32).to_le_bytes());
+        out.extend(kind);
+        out.extend(padded);
+        out
+    };
+    let load = |bytes: &[u8]| {
+        let result = read(Path::new("x.glb"), bytes, None);
+        result
+            .map(|_| ())
+            .map_err(|issues| issues[0].message.clone())
+    };
+    assert_eq!(load(&glb(2, 0, 0, b"JSON")), Ok(()));
+    for (bytes, cause) in [
+        (glb(1, 0, 0, b"JSON"), "version 1"),
+        (glb(2, 9, 0, b"JSON"), "declares"),
+        (glb(2, 0, 8, b"JSON"), "beyond the file"),
+        (glb(2, 0, 0, b"BIN\0"), "not JSON"),
+        (b"glTF".to_vec(), "cut off"),
+        (b"gl".to_vec(), "not a GLB"),
+    ] {
+        let message = load(&bytes).expect_err(cause);
+        assert!(message.contains(cause), "{cause}: {message}");
+    }
 }
