@@ -302,3 +302,76 @@ fn the_real_scenes_are_sound() {
         );
     }
 }
+
+/// Damaged copies of sound files: every one is loaded or refused, none panics.
+#[test]
+fn damaged_files_never_panic() {
+    use insonify::scene::{Scene, mesh};
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let obj =
+        "o a\nv 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1/1 3/1 2\nf 1 2 4\nf -3 -2 -1\nf 1 4 3\n";
+    let stl = "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\n\
+        vertex 0 1 0\nendloop\nendfacet\nendsolid a\n";
+    let mut binary = vec![0u8; 84];
+    binary[80] = 2;
+    binary.extend((0..100u8).map(|b| b.wrapping_mul(37)));
+    let gltf = r#"{"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0]}],
+        "nodes":[{"mesh":0,"scale":[1,2,3]}],
+        "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1,"mode":5}]}],
+        "accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3","min":[0,0,0],
+        "max":[1,1,0],"sparse":{"count":1,"indices":{"bufferView":1,"componentType":5121},
+        "values":{"bufferView":0}}},{"bufferView":1,"componentType":5121,"count":3,"type":"SCALAR"}],
+        "bufferViews":[{"buffer":0,"byteLength":36},{"buffer":0,"byteLength":3}],"buffers":[{
+        "byteLength":36,"uri":"data:application/octet-stream;base64,AAAAAAAAAAAAAAAAAACAPwAAAAAAAAAAAAAAAAAAgD8AAAAA"}]}"#;
+    let scene = "name = \"x\"\n[probe]\npreset = \"linear\"\ndepth = \"4 cm\"\n[probe.pose]\n\
+        direction = [0, 0, 1]\n[[mesh]]\nname = \"a\"\nshape = { sphere = { radius = 3, \
+        subdivisions = 1 } }\ntissue = \"fat\"\n[[wire]]\nfrom = [0, 0, 1]\n[tissues.fat]\n\
+        speed = \"1450 m/s\"\n";
+    let mut json = gltf.as_bytes().to_vec();
+    json.resize(json.len().next_multiple_of(4), b' ');
+    let mut glb = b"glTF\x02\0\0\0".to_vec();
+    glb.extend((json.len() as u32 + 20).to_le_bytes());
+    glb.extend((json.len() as u32).to_le_bytes());
+    glb.extend(b"JSON");
+    glb.extend(json);
+    let mut state = 1u64;
+    let mut random = move |below: usize| {
+        // Knuth's MMIX generator.
+        state = state
+            .wrapping_mul(6364136223846793005)
+            .wrapping_add(1442695040888963407);
+        (state >> 33) as usize % below
+    };
+    for (name, sound) in [
+        ("a.obj", obj.as_bytes()),
+        ("a.stl", stl.as_bytes()),
+        ("b.stl", &binary),
+        ("a.gltf", gltf.as_bytes()),
+        ("a.glb", &glb),
+        ("a.toml", scene.as_bytes()),
+    ] {
+        let path = folder.path().join(name);
+        let mut refused = 0;
+        for _ in 0..1500 {
+            let mut bytes = sound.to_vec();
+            for _ in 0..=random(3) {
+                let at = random(bytes.len());
+                match random(4) {
+                    0 => bytes.truncate(at.max(1)),
+                    1 => bytes[at] ^= 1 << random(8),
+                    2 => bytes[at] = b"0123456789-,.[]{}\"\n\xff"[random(20)],
+                    _ => {
+                        let copy = bytes[at..(at + 9).min(bytes.len())].to_vec();
+                        bytes.splice(at..at, copy);
+                    }
+                }
+            }
+            std::fs::write(&path, &bytes).expect("written");
+            refused += usize::from(match name {
+                "a.toml" => Scene::load(&path, &[]).is_err(),
+                _ => mesh::load(&path, &mesh::Options::default()).is_err(),
+            });
+        }
+        println!("{name}: {refused} of 1500 damaged copies were refused");
+    }
+}
