@@ -8,6 +8,10 @@ use glam::DVec3;
 use super::issue::Issue;
 use super::mesh::Soup;
 
+mod winding;
+
+pub use winding::orient;
+
 /// One side of one triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Edge {
@@ -115,125 +119,6 @@ pub fn clean(path: &Path, soup: &mut Soup) -> Vec<Issue> {
         ));
     }
     issues
-}
-
-/// Turns triangles so that neighbours agree, the majority of each connected piece deciding; then
-/// turns a closed mesh whose volume is negative.
-pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
-    let mut issues = Vec::new();
-    let Agreement {
-        turned,
-        contradictions,
-        bodies,
-        inward,
-    } = agree(soup);
-    if turned > 0 {
-        issues.push(Issue::warning(
-            path,
-            turned,
-            format!("inconsistent winding: {turned} triangles were turned to agree with their neighbours"),
-            "recalculate normals in the modeller",
-        ));
-    }
-    if contradictions > 0 {
-        issues.push(Issue::warning(
-            path,
-            contradictions,
-            format!(
-                "inconsistent winding: {contradictions} edges cannot agree (a one-sided surface)"
-            ),
-            "make the surface enclose a volume",
-        ));
-    }
-    if volume(soup) < 0.0 && Edges::of(soup).groups().all(|g| g.len() > 1) {
-        for t in &mut soup.triangles {
-            t.swap(1, 2);
-        }
-        issues.push(Issue::warning(
-            path,
-            soup.triangles.len(),
-            "inside out (its volume is negative): all triangles were turned",
-            "flip the normals in the modeller",
-        ));
-    } else if inward > 0 && inward < bodies {
-        issues.push(Issue::warning(
-            path,
-            inward,
-            format!("{inward} of {bodies} closed bodies face inwards: cavities, or inside out"),
-            "flip them in the modeller unless they are cavities",
-        ));
-    }
-    issues
-}
-
-/// What a flood fill over all pieces has found.
-#[derive(Default)]
-struct Agreement {
-    /// Triangles turned to agree with the majority of their piece.
-    turned: usize,
-    /// Edges whose triangles cannot agree.
-    contradictions: usize,
-    /// Closed pieces, and how many of them have a negative volume.
-    bodies: usize,
-    inward: usize,
-}
-
-/// Flood fill over edges of two triangles; turns the minority of each piece.
-fn agree(soup: &mut Soup) -> Agreement {
-    let count = soup.triangles.len();
-    let mut neighbours: Vec<[(u32, bool); 3]> = vec![[(u32::MAX, false); 3]; count];
-    let mut used = vec![0usize; count];
-    for group in Edges::of(soup).groups() {
-        let [a, b] = group else { continue };
-        let same = a.forward != b.forward;
-        for (from, to) in [(a, b), (b, a)] {
-            let t = from.triangle as usize;
-            neighbours[t][used[t]] = (to.triangle, same);
-            used[t] += 1;
-        }
-    }
-    let mut turn: Vec<Option<bool>> = vec![None; count];
-    let mut found = Agreement::default();
-    for start in 0..count {
-        if turn[start].is_some() {
-            continue;
-        }
-        turn[start] = Some(false);
-        let mut piece = vec![start];
-        let mut next = 0;
-        while let Some(&t) = piece.get(next) {
-            next += 1;
-            for &(other, same) in &neighbours[t][..used[t]] {
-                let wanted = turn[t] == Some(same);
-                match turn[other as usize] {
-                    None => {
-                        turn[other as usize] = Some(wanted);
-                        piece.push(other as usize);
-                    }
-                    Some(has) if has == wanted => {}
-                    Some(_) => found.contradictions += 1,
-                }
-            }
-        }
-        let minority = piece.iter().filter(|&&t| turn[t] == Some(true)).count();
-        let other_way = minority * 2 > piece.len();
-        let origin = DVec3::from(soup.positions[soup.triangles[start][0] as usize].map(f64::from));
-        let mut six = 0.0;
-        for &t in &piece {
-            if (turn[t] == Some(true)) != other_way {
-                soup.triangles[t].swap(1, 2);
-                found.turned += 1;
-            }
-            six += six_volumes(soup, soup.triangles[t], origin);
-        }
-        if piece.iter().all(|&t| used[t] == 3) {
-            found.bodies += 1;
-            found.inward += usize::from(six < 0.0);
-        }
-    }
-    // Each conflicting edge is met from both of its triangles.
-    found.contradictions /= 2;
-    found
 }
 
 /// Directed open edges: from vertex to vertex as their triangle runs.
