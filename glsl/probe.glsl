@@ -59,8 +59,8 @@ float face_distance(vec3 o, vec3 d) {
     } else {
         return -1.0;
     }
-    if (t < FACE_T_MIN || abs(o.y + t * d.y) > 0.5 * frame.face_height) { return -1.0; }
-    return t;
+    // NaN, too, is a miss.
+    return t >= FACE_T_MIN && abs(o.y + t * d.y) <= 0.5 * frame.face_height ? t : -1.0;
 }
 
 // Unit normal of the face at p, towards the body.

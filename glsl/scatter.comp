@@ -82,6 +82,12 @@ uint row_at(float kappa) {
     return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
 }
 
+// A stretch with a number that is none has no echoes. NaN fails every comparison.
+bool is_finite(Stretch s) {
+    return abs(s.extent) < 1e18 && abs(s.time) < 1e18
+        && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)));
+}
+
 // What a rough reflection spreads over many resolution cells averages down.
 float thinning(Stretch s, float x, float sigma_l, float sigma_e) {
     float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
@@ -170,7 +176,7 @@ uvec2 march_plane(Stretch s, int plane, vec2 within) {
     float depth = tissues[s.tissue].texture_depth;
     float factor = s.weight;
     if (depth > 0.0) {
-        vec3 crossing = s.o + clamp(x_middle, 0.0, s.extent) * s.d;
+        vec3 crossing = s.o + x_middle * s.d;
         factor *= 1.0 + depth * tissue_texture(crossing / tissues[s.tissue].texture_length, seed);
     }
 
@@ -255,6 +261,7 @@ uvec2 march_sample(Stretch s, int k) {
 }
 
 void march_point(Stretch s, vec4 point) {
+    if (!is_finite(s)) return;
     vec3 rel = point.xyz - s.o;
     float x = dot(rel, s.d);
     if (!(x >= 0.0 && x < s.extent)) return;
@@ -293,7 +300,7 @@ void main() {
         if (thread < size) {
             uint at = line * frame.segment_capacity + gl_WorkGroupID.y + (batch + thread) * chunks;
             Stretch s = texture_stretch(at);
-            bool scatters = tissues[s.tissue].presence > 0.0;
+            bool scatters = tissues[s.tissue].presence > 0.0 && is_finite(s);
             work_end[thread] = !scatters ? 0u : uint(max(voxel ? voxel_samples(s).y : lattice_planes(s).y, 0));
         }
         barrier();

@@ -251,6 +251,7 @@ void main() {
             if (at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections) {
                 advance(path, t_end, t1, end);
                 path.interactions += 1u;
+                interactions += 1u;
                 reflect_path(path, world_vector(face_normal(probe_point(end))), SPECULAR);
             } else {
                 path.weight = 0.0;
