@@ -4,6 +4,7 @@
 //! `sim` is the frame; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
 
 pub mod gpu;
+pub mod harness;
 pub mod probe;
 pub mod reference;
 pub mod scene;

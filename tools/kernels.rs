@@ -1,2 +1,203 @@
-//! placeholder
-fn main() {}
+//! Runs single kernels against their f64 twins:
+//! `cargo run --release --bin kernels -- list | run NAME [--input DIR] [--output DIR] | check`.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::time::Instant;
+
+use clap::{Parser, Subcommand, ValueEnum};
+use insonify::gpu::{Device, DeviceOptions, Kernel};
+use insonify::harness::{self, Case, SUBJECTS, Size, Subject, dump};
+use insonify::sim::shaders::Library;
+use miette::{Context, IntoDiagnostic, Result, miette};
+
+/// Runs of which the fastest is reported.
+const REPEATS: usize = 5;
+
+#[derive(Parser)]
+#[command(about = "Runs one kernel alone and compares it with its f64 twin")]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Index or part of the name of the Vulkan device.
+    #[arg(long, global = true)]
+    device: Option<String>,
+    /// Turns the validation layers on.
+    #[arg(long, global = true)]
+    validate: bool,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Names every kernel with its variants, bindings and tolerance.
+    List,
+    /// Runs one kernel, prints its error and its time.
+    Run {
+        /// Name of the kernel, see `list`.
+        name: String,
+        /// Folder with NAME.npy for the bindings to replace.
+        #[arg(long)]
+        input: Option<PathBuf>,
+        /// Folder that gets every binding as NAME.npy, before and after the run.
+        #[arg(long)]
+        output: Option<PathBuf>,
+        /// Size of the random inputs.
+        #[arg(long, value_enum, default_value = "standard")]
+        size: Extent,
+    },
+    /// Runs every kernel on every case; fails where one differs from its twin.
+    Check,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Extent {
+    /// A few scanlines.
+    Small,
+    /// The paper's Table I.
+    Standard,
+}
+
+fn main() -> Result<ExitCode> {
+    let arguments = Arguments::parse();
+    let library = Library::embedded();
+    if let Command::List = arguments.command {
+        list();
+        return Ok(ExitCode::SUCCESS);
+    }
+    let device = Device::new(&DeviceOptions {
+        selector: arguments.device.clone(),
+        validate: arguments.validate,
+        ..Default::default()
+    })
+    .into_diagnostic()?;
+    println!("{} ({})", device.name(), device.driver());
+    let passed = match arguments.command {
+        Command::List => true,
+        Command::Run {
+            name,
+            input,
+            output,
+            size,
+        } => {
+            let subject = find(&name)?;
+            let size = match size {
+                Extent::Small => Size::Small,
+                Extent::Standard => Size::Standard,
+            };
+            run(
+                &device,
+                &library,
+                subject,
+                size,
+                input.as_deref(),
+                output.as_deref(),
+            )?
+        }
+        Command::Check => check(&device, &library)?,
+    };
+    let messages = device.validation_messages();
+    for message in &messages {
+        eprintln!("validation: {message}");
+    }
+    Ok(ExitCode::from(u8::from(!passed || !messages.is_empty())))
+}
+
+fn find(name: &str) -> Result<&'static Subject> {
+    let names: Vec<_> = SUBJECTS.iter().map(|s| s.name).collect();
+    let found = SUBJECTS
+        .iter()
+        .find(|s| s.name == name || s.stems.contains(&name));
+    found.ok_or_else(|| miette!("no kernel '{name}'; there are {}", names.join(", ")))
+}
+
+fn list() {
+    for subject in &SUBJECTS {
+        let bindings: Vec<_> = (subject.job)(Case::One, Size::Small)
+            .inputs
+            .iter()
+            .map(|i| i.name)
+            .collect();
+        println!("{:<9} {}", subject.name, subject.stems.join(" "));
+        println!("          bindings:  {}", bindings.join(" "));
+        println!("          tolerance: {}", subject.tolerance);
+    }
+}
+
+/// Variants of a subject that the device can run.
+fn kernels(device: &Arc<Device>, library: &Library, subject: &Subject) -> Result<Vec<Kernel>> {
+    let mut kernels = Vec::new();
+    for stem in subject.stems {
+        if stem.ends_with("_query") && !device.supports_ray_query() {
+            println!("{stem}: not run, the device has no ray query");
+            continue;
+        }
+        kernels.push(Kernel::new(device, stem, library.words(stem), &[]).into_diagnostic()?);
+    }
+    Ok(kernels)
+}
+
+fn run(
+    device: &Arc<Device>,
+    library: &Library,
+    subject: &Subject,
+    size: Size,
+    input: Option<&Path>,
+    output: Option<&Path>,
+) -> Result<bool> {
+    let mut job = (subject.job)(Case::Random, size);
+    if let Some(dir) = input {
+        let found = dump::read(dir, subject, &mut job).map_err(|e| miette!("{e}"))?;
+        println!("from {}: {}", dir.display(), found.join(", "));
+    }
+    println!("tolerance: {}", subject.tolerance);
+    let extent = (subject.extent)(&job);
+    let mut passed = true;
+    for kernel in kernels(device, library, subject)? {
+        let mut fastest = f64::INFINITY;
+        let mut outputs = Vec::new();
+        for _ in 0..REPEATS {
+            let outcome = harness::run(device, &kernel, &job, extent).into_diagnostic()?;
+            fastest = fastest.min(outcome.milliseconds);
+            outputs = outcome.outputs;
+        }
+        println!("{}: {fastest:.3} ms, fastest of {REPEATS}", kernel.name());
+        let start = Instant::now();
+        for check in (subject.check)(&job, &outputs) {
+            println!("  {check}");
+            passed &= check.passed();
+        }
+        println!(
+            "  twin: {:.0} ms on one CPU core",
+            start.elapsed().as_secs_f64() * 1e3
+        );
+        if let Some(dir) = output {
+            let before: Vec<_> = job.inputs.iter().map(|i| i.bytes.clone()).collect();
+            for (when, contents) in [("before", &before), ("after", &outputs)] {
+                let dir = dir.join(kernel.name()).join(when);
+                let written = dump::write(&dir, &job, contents).into_diagnostic();
+                written.wrap_err_with(|| format!("writing {}", dir.display()))?;
+            }
+        }
+    }
+    Ok(passed)
+}
+
+fn check(device: &Arc<Device>, library: &Library) -> Result<bool> {
+    let mut passed = true;
+    for subject in &SUBJECTS {
+        for kernel in kernels(device, library, subject)? {
+            for case in Case::ALL {
+                let job = (subject.job)(case, Size::Small);
+                let extent = (subject.extent)(&job);
+                let outcome = harness::run(device, &kernel, &job, extent).into_diagnostic()?;
+                println!("{} {case:?}: {:.3} ms", kernel.name(), outcome.milliseconds);
+                for check in (subject.check)(&job, &outcome.outputs) {
+                    println!("  {check}");
+                    passed &= check.passed();
+                }
+            }
+        }
+    }
+    Ok(passed)
+}

@@ -1,0 +1,68 @@
+//! `geometry`: the probe's lines and face.
+
+use std::mem::size_of;
+
+use super::{Case, Check, Element, Extent, Input, Job, Size, Subject, inputs};
+use crate::reference::geometry;
+use crate::sim::layout::Frame;
+
+pub const SUBJECT: Subject = Subject {
+    name: "geometry",
+    stems: &["geometry"],
+    tolerance: "4e-6 of the radius or depth: sine, cosine and arctangent of a GPU are good to a few \
+                1e-7, and the face is sought from a rounded point",
+    job,
+    sizes: |job| vec![size_of::<Frame>(), 64 * inputs::lines(&job.one("frame"))],
+    extent: |job| Extent::Threads([inputs::lines(&job.one("frame")) as u32, 1, 1]),
+    check,
+    plant: |job, outputs| {
+        job.edit(outputs, "rays", |rays: &mut [[f32; 4]]| {
+            let middle = rays.len() / 8 * 4;
+            rays[middle + 1][0] += 2e-5;
+        });
+    },
+};
+
+fn job(case: Case, size: Size) -> Job {
+    let mut frame = inputs::frame(case, size);
+    if case == Case::NotFinite {
+        frame.depth = f32::NAN;
+        frame.slice_thickness = f32::INFINITY;
+    }
+    Job {
+        inputs: vec![
+            Input::words("frame", &[frame]),
+            Input::output("rays", Element::Float, 16 * inputs::lines(&frame)),
+        ],
+        push: Vec::new(),
+    }
+}
+
+fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
+    let frame: Frame = job.one("frame");
+    let mut expected: Vec<f64> = Vec::new();
+    for e in 0..frame.layers {
+        for l in 0..frame.scanlines {
+            let line = geometry::line(&frame, l, e);
+            let end = line.origin + f64::from(frame.depth) * line.direction;
+            let face = geometry::face(&frame, end, -line.direction, 1e-3);
+            let normal = match frame.kind {
+                crate::sim::layout::KIND_CONVEX => line.direction,
+                _ => glam::DVec3::Z,
+            };
+            expected.extend(line.origin.to_array());
+            expected.push(geometry::probe(&frame).elevation(e));
+            expected.extend(line.direction.to_array());
+            expected.push(face.map_or(-1.0, |(t, _)| t));
+            expected.extend(line.lateral.to_array());
+            expected.push(0.0);
+            expected.extend(normal.to_array());
+            expected.push(0.0);
+        }
+    }
+    let got: Vec<f32> = job.after(outputs, "rays");
+    let size = f64::from(frame.radius.max(frame.depth));
+    let place = [0, 1, 2, 3, 7];
+    let allowed = |i: usize| 4e-6 * if place.contains(&(i % 16)) { size } else { 1.0 };
+    vec![Check::close("rays", &got, &expected, allowed)]
+}

@@ -1,0 +1,196 @@
+//! Runs one kernel alone on the device and compares it with its f64 twin.
+//!
+//! A [`Subject`] per kernel makes its inputs, says how it is dispatched, checks what it left behind
+//! against [`crate::reference`] and plants an error that the check must catch. `tools/kernels.rs`
+//! runs them by hand, `tests/kernels.rs` runs all of them.
+
+mod axial;
+mod beam;
+pub mod check;
+mod detect;
+mod display;
+pub mod dump;
+mod geometry;
+mod inputs;
+pub mod npy;
+mod origin;
+mod rays;
+mod run;
+mod scatter;
+mod trace;
+mod worlds;
+
+use bytemuck::Pod;
+
+pub use check::Check;
+pub use run::{Outcome, run};
+
+/// Which inputs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Case {
+    /// Random numbers in a plausible frame.
+    Random,
+    /// Nothing to do: no samples, no rays, no segments, no instances.
+    Empty,
+    /// One of everything.
+    One,
+    /// Sizes that no work group divides.
+    Odd,
+    /// NaN and infinity among the inputs.
+    NotFinite,
+}
+
+impl Case {
+    /// All cases.
+    pub const ALL: [Self; 5] = [
+        Self::Random,
+        Self::Empty,
+        Self::One,
+        Self::Odd,
+        Self::NotFinite,
+    ];
+}
+
+/// Size of [`Case::Random`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// A twin needs well under a second.
+    Small,
+    /// 192 scanlines, 7 layers and 2048 samples as in the paper's Table I.
+    Standard,
+}
+
+/// How to read the 32-bit words of a buffer, for dumps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    /// `f32`.
+    Float,
+    /// `u32`, and structures of mixed fields.
+    Word,
+    /// `i32`.
+    Integer,
+}
+
+/// What a kernel finds in one binding.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Input {
+    /// Name, also of its dump.
+    pub name: &'static str,
+    /// Type of its words.
+    pub element: Element,
+    /// Content; empty is no element.
+    pub bytes: Vec<u8>,
+}
+
+impl Input {
+    fn new<T: Pod>(name: &'static str, element: Element, values: &[T]) -> Self {
+        Self {
+            name,
+            element,
+            bytes: bytemuck::cast_slice(values).to_vec(),
+        }
+    }
+
+    fn words<T: Pod>(name: &'static str, values: &[T]) -> Self {
+        Self::new(name, Element::Word, values)
+    }
+
+    fn floats(name: &'static str, values: &[f32]) -> Self {
+        Self::new(name, Element::Float, values)
+    }
+
+    fn integers(name: &'static str, values: &[i32]) -> Self {
+        Self::new(name, Element::Integer, values)
+    }
+
+    /// An output of `count` words that the kernel must overwrite.
+    fn output(name: &'static str, element: Element, count: usize) -> Self {
+        Self::new(name, element, &vec![UNWRITTEN; count])
+    }
+}
+
+/// Content of outputs before the kernel runs: a NaN, and no plausible count or grey.
+const UNWRITTEN: u32 = 0xffa5_a5a5;
+
+/// One run of a kernel: the content of its bindings in binding order, and its push constants.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Job {
+    /// Bindings; where a ray-query variant binds an acceleration structure, the compute variant's
+    /// nodes stand.
+    pub inputs: Vec<Input>,
+    /// Push constants.
+    pub push: Vec<u8>,
+}
+
+impl Job {
+    /// Values of the binding called `name`, before the run.
+    ///
+    /// # Panics
+    /// Where the kernel has no such binding.
+    pub fn get<T: Pod>(&self, name: &str) -> Vec<T> {
+        bytemuck::pod_collect_to_vec(&self.inputs[self.index(name)].bytes)
+    }
+
+    fn one<T: Pod>(&self, name: &str) -> T {
+        self.get(name)[0]
+    }
+
+    fn index(&self, name: &str) -> usize {
+        let found = self.inputs.iter().position(|i| i.name == name);
+        found.unwrap_or_else(|| panic!("no binding '{name}'"))
+    }
+
+    /// Values of the binding called `name` in what a run returned.
+    pub fn after<T: Pod>(&self, outputs: &[Vec<u8>], name: &str) -> Vec<T> {
+        bytemuck::pod_collect_to_vec(&outputs[self.index(name)])
+    }
+
+    /// Changes values in what a run returned: how errors are planted.
+    fn edit<T: Pod>(&self, outputs: &mut [Vec<u8>], name: &str, change: impl FnOnce(&mut [T])) {
+        let mut values = self.after(outputs, name);
+        change(&mut values);
+        outputs[self.index(name)] = bytemuck::cast_slice(&values).to_vec();
+    }
+}
+
+/// Extent of a dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Threads per axis, rounded up to whole work groups.
+    Threads([u32; 3]),
+    /// Work groups per axis.
+    Groups([u32; 3]),
+}
+
+/// One kernel under test.
+pub struct Subject {
+    /// Name of the kernel and of its twin.
+    pub name: &'static str,
+    /// Its variants in `spirv/`; all must give the same.
+    pub stems: &'static [&'static str],
+    /// The tolerance with its reason.
+    pub tolerance: &'static str,
+    /// Makes the inputs of a case.
+    pub job: fn(Case, Size) -> Job,
+    /// Bytes that each binding must have at least, in binding order; checks dumps.
+    pub sizes: fn(&Job) -> Vec<usize>,
+    /// How the frame dispatches it.
+    pub extent: fn(&Job) -> Extent,
+    /// Compares what a run left in the bindings with the twin.
+    pub check: fn(&Job, &[Vec<u8>]) -> Vec<Check>,
+    /// Puts a small error into the outputs of a random case, which `check` must catch.
+    pub plant: fn(&Job, &mut [Vec<u8>]),
+}
+
+/// Every kernel, in the order of a frame after the two that only tests use.
+pub const SUBJECTS: [Subject; 9] = [
+    geometry::SUBJECT,
+    rays::SUBJECT,
+    origin::SUBJECT,
+    trace::SUBJECT,
+    scatter::SUBJECT,
+    beam::SUBJECT,
+    axial::SUBJECT,
+    detect::SUBJECT,
+    display::SUBJECT,
+];

@@ -1,0 +1,110 @@
+//! One dispatch of one kernel.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::{Extent, Job};
+use crate::gpu::{
+    Binding, BindingKind, Blas, BlasInput, BlasOptions, BufferKind, Device, GpuError, Kernel,
+    Stage, Tlas, TlasInstance,
+};
+use crate::sim::layout::Instance;
+
+/// What a run left behind.
+pub struct Outcome {
+    /// Content of every binding in binding order; acceleration structures are as given.
+    pub outputs: Vec<Vec<u8>>,
+    /// Time on the device, milliseconds; NaN where it has no timestamps.
+    pub milliseconds: f64,
+}
+
+/// Uploads `job`, dispatches `kernel` once and reads all bindings back.
+///
+/// # Errors
+/// What the device says; bindings or push constants that do not fit the kernel.
+pub fn run(
+    device: &Arc<Device>,
+    kernel: &Kernel,
+    job: &Job,
+    extent: Extent,
+) -> Result<Outcome, GpuError> {
+    let scene = (kernel.bindings().iter())
+        .any(|b| b.kind == BindingKind::AccelerationStructure)
+        .then(|| build(device, job))
+        .transpose()?;
+    let mut buffers = Vec::new();
+    for input in &job.inputs {
+        let size = input.bytes.len() as u64;
+        let buffer = device.buffer(input.name, size, BufferKind::Storage)?;
+        device.upload(&buffer, &input.bytes)?;
+        buffers.push(buffer);
+    }
+    // By number: what a kernel declares and does not use is not in its SPIR-V.
+    let bindings: Vec<Binding<'_>> = (kernel.bindings().iter())
+        .map(|info| match &scene {
+            Some(tlas) if info.kind == BindingKind::AccelerationStructure => Binding::Tlas(tlas),
+            _ => Binding::Buffer(&buffers[info.binding as usize]),
+        })
+        .collect();
+    let (_, timings) = device.once_timed(|commands| {
+        commands.scope(kernel.name());
+        match extent {
+            Extent::Threads(threads) => commands.dispatch(kernel, threads, &job.push, &bindings),
+            Extent::Groups(groups) => {
+                commands.dispatch_groups(kernel, groups, &job.push, &bindings)
+            }
+        }
+    })?;
+    let mut outputs = Vec::new();
+    for (input, buffer) in job.inputs.iter().zip(&buffers) {
+        let mut bytes = vec![0; input.bytes.len()];
+        device.read_into(buffer, 0, &mut bytes)?;
+        outputs.push(bytes);
+    }
+    let milliseconds = timings.passes.first().map_or(f64::NAN, |pass| pass.1);
+    Ok(Outcome {
+        outputs,
+        milliseconds,
+    })
+}
+
+/// Acceleration structure of the job's instances, vertices and triangles, in their order.
+fn build(device: &Arc<Device>, job: &Job) -> Result<Tlas, GpuError> {
+    let instances: Vec<Instance> = job.get("instances");
+    let positions: Vec<[f32; 3]> = job.get("vertices");
+    let triangles: Vec<[u32; 3]> = job.get("triangles");
+    let mut meshes = BTreeMap::new();
+    let mut blas = Vec::new();
+    for instance in instances.iter().filter(|i| i.triangles > 0) {
+        let range = (instance.first_triangle, instance.triangles);
+        if meshes.contains_key(&range) {
+            continue;
+        }
+        let first = range.0 as usize;
+        let input = BlasInput {
+            name: "mesh",
+            positions: &positions,
+            triangles: &triangles[first..first + range.1 as usize],
+        };
+        meshes.insert(range, blas.len());
+        blas.extend(Blas::build_many(device, &[input], BlasOptions::default())?);
+    }
+    let mut tlas = Tlas::new(device, "scene", instances.len().max(1) as u32)?;
+    let placed: Vec<_> = instances
+        .iter()
+        .enumerate()
+        .filter(|(_, i)| i.triangles > 0)
+        .map(|(index, i)| TlasInstance {
+            blas: &blas[meshes[&(i.first_triangle, i.triangles)]],
+            transform: i.world_from_object,
+            custom_index: index as u32,
+            mask: 0xff,
+        })
+        .collect();
+    device.once(|commands| {
+        tlas.build(commands, &placed)?;
+        commands.barrier(Stage::Build, Stage::Compute);
+        Ok(())
+    })?;
+    Ok(tlas)
+}

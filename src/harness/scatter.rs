@@ -1,0 +1,186 @@
+//! `scatter`: echoes of scatterers and points along segments.
+
+use std::mem::size_of;
+
+use super::check::relative_norm;
+use super::inputs::{Random, lines, rows, samples};
+use super::worlds::Owned;
+use super::{Case, Check, Extent, Input, Job, Size, Subject, trace};
+use crate::reference::{Segment, origin, scatter};
+use crate::sim::layout::{self, Counters, FLAG_VOXEL, Frame, Row, Tissue};
+
+/// Samples of one work group, WINDOW in the kernel.
+const WINDOW: u32 = 2048;
+/// Work groups that share a line's segments.
+const CHUNKS: u32 = 2;
+
+pub const SUBJECT: Subject = Subject {
+    name: "scatter",
+    stems: &["scatter"],
+    tolerance: "norm within 0.2 %: distances of 100 mm round at 8e-6 mm, 3e-4 rad of the carrier, and \
+                a scatterer at the edge of the beam may count or not; in voxel mode 3 %, since 1e-4 \
+                of the samples fall on the other side of a voxel's face",
+    job,
+    sizes,
+    extent: |job| {
+        let frame: Frame = job.one("frame");
+        let windows = frame.samples.div_ceil(WINDOW);
+        Extent::Groups([lines(&frame) as u32, CHUNKS, windows])
+    },
+    check,
+    plant: |job, outputs| {
+        // Everything one sample too late.
+        job.edit(outputs, "volume_echoes", |echoes: &mut [i32]| {
+            echoes.rotate_right(2);
+        });
+    },
+};
+
+fn sizes(job: &Job) -> Vec<usize> {
+    let frame: Frame = job.one("frame");
+    let segments: Vec<layout::Segment> = job.get("segments");
+    let tissues = segments.iter().map(|s| s.tissue as usize + 1).max();
+    vec![
+        size_of::<Frame>(),
+        tissues.unwrap_or(0) * size_of::<Tissue>(),
+        0,
+        frame.samples as usize * size_of::<Row>(),
+        16 * frame.points as usize,
+        lines(&frame) * frame.segment_capacity as usize * size_of::<layout::Segment>(),
+        4 * lines(&frame),
+        8 * samples(&frame),
+        size_of::<Counters>(),
+    ]
+}
+
+/// Segments as `trace`'s twin finds them, in the device's slots.
+fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
+    let owned = Owned::new(job);
+    let mut world = owned.world();
+    let rows = rows(frame);
+    world.rows = &rows;
+    let (stacks, _) = origin::origin(&world);
+    let traced = crate::reference::trace::trace(&world, &stacks);
+    let capacity = frame.segment_capacity as usize;
+    let mut slots = vec![layout::Segment::default(); lines(frame) * capacity];
+    let mut counts = Vec::new();
+    for (slot, found) in slots.chunks_mut(capacity).zip(&traced.segments) {
+        for (slot, segment) in slot.iter_mut().zip(found) {
+            *slot = narrow(segment);
+        }
+        counts.push(found.len().min(capacity) as u32);
+    }
+    (slots, counts)
+}
+
+fn narrow(s: &Segment) -> layout::Segment {
+    let four = |v: glam::DVec3, w: f64| v.extend(w).as_vec4().to_array();
+    layout::Segment {
+        origin_length: four(s.origin, s.length),
+        direction_time: four(s.direction, s.time),
+        lateral_weight: four(s.lateral, s.weight),
+        spread: four(s.spread.into(), s.share),
+        tissue: s.tissue,
+        instance: s.instance,
+        line: s.line,
+        handedness: s.handedness as f32,
+    }
+}
+
+fn job(case: Case, size: Size) -> Job {
+    let mut job = Job {
+        // Finite tissues: here the segments are not.
+        inputs: trace::scene(
+            if case == Case::NotFinite {
+                Case::Random
+            } else {
+                case
+            },
+            size,
+        ),
+        push: Vec::new(),
+    };
+    let mut frame: Frame = job.one("frame");
+    let mut random = Random(9);
+    let points: Vec<[f32; 4]> = (0..if case == Case::Empty { 0 } else { 40 })
+        .map(|_| {
+            let mut within = |low, high| random.within(low, high) as f32;
+            [
+                within(-15.0, 15.0),
+                within(-3.0, 3.0),
+                within(2.0, 58.0),
+                within(0.5, 2.0),
+            ]
+        })
+        .collect();
+    frame.points = points.len() as u32;
+    if case == Case::Odd {
+        frame.flags |= FLAG_VOXEL;
+    }
+    job.inputs[0] = Input::words("frame", &[frame]);
+    let (mut segments, counts) = segments(&job, &frame);
+    if case == Case::NotFinite {
+        spoil(&mut segments, &counts, frame.segment_capacity as usize);
+    }
+    let words = |name| job.inputs[job.index(name)].clone();
+    job.inputs = vec![
+        words("frame"),
+        words("tissues"),
+        words("instances"),
+        Input::floats("rows", bytemuck::cast_slice(&rows(&frame))),
+        Input::floats("points", points.as_flattened()),
+        Input::words("segments", &segments),
+        Input::words("segment_count", &counts),
+        Input::integers("volume_echoes", &vec![0; 2 * samples(&frame)]),
+        Input::words("counters", &[Counters::default()]),
+    ];
+    job
+}
+
+/// One bad number in the first segment of each of nine lines.
+fn spoil(segments: &mut [layout::Segment], counts: &[u32], capacity: usize) {
+    let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let firsts = (0..counts.len()).filter(|&line| counts[line] > 0);
+    for (i, line) in firsts.take(9).enumerate() {
+        let segment = &mut segments[line * capacity];
+        match i / 3 {
+            0 => segment.origin_length[i % 3] = bad[i % 3],
+            1 => segment.origin_length[3] = bad[i % 3],
+            _ => segment.direction_time[3] = bad[i % 3],
+        }
+    }
+}
+
+fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
+    let owned = Owned::new(job);
+    let world = owned.world();
+    let frame = world.frame;
+    let segments: Vec<layout::Segment> = job.get("segments");
+    let counts: Vec<u32> = job.get("segment_count");
+    let held: Vec<Segment> = segments
+        .chunks(frame.segment_capacity as usize)
+        .zip(&counts)
+        .flat_map(|(slots, &count)| slots.iter().take(count as usize))
+        .map(Segment::from)
+        .collect();
+    let twin = scatter::scatter(&world, &held);
+    let echoes: Vec<i32> = job.after(outputs, "volume_echoes");
+    let echoes: Vec<f64> = echoes.into_iter().map(f64::from).collect();
+    let allowed = if frame.flags & FLAG_VOXEL == 0 {
+        2e-3
+    } else {
+        3e-2
+    };
+    let fixed: Vec<f64> = twin.fixed.iter().map(|&x| x as f64).collect();
+    let counters: Counters = job.after(outputs, "counters")[0];
+    let echoed = twin.deposits.iter().any(|&n| n > 0) as u32;
+    vec![
+        Check::one("echo norm", relative_norm(&echoes, &fixed), allowed),
+        Check::equal("saturated", &[counters.saturated], &[twin.saturated]),
+        Check::equal(
+            "echoes at all",
+            &[u32::from(echoes.iter().any(|&e| e != 0.0))],
+            &[echoed],
+        ),
+    ]
+}

@@ -1,0 +1,230 @@
+//! Small worlds for the tracing kernels: ellipsoids and boxes, as the device's buffers and as the
+//! twins read them.
+
+use glam::{DAffine3, DQuat, DVec3};
+
+use super::inputs::Random;
+use super::{Case, Input, Job};
+use crate::reference::World;
+use crate::reference::world::Geometry;
+use crate::scene::{Mesh, shapes};
+use crate::sim::bvh::{MeshBvh, SceneBvh};
+use crate::sim::layout::{Frame, Instance, NONE, Row, Surface, Tissue};
+use crate::sim::placement;
+
+/// The tables and instances of one world.
+#[derive(Default)]
+pub struct Builder {
+    meshes: Vec<Mesh>,
+    placements: Vec<(usize, DAffine3)>,
+    instances: Vec<Instance>,
+}
+
+impl Builder {
+    /// Places a mesh that encloses `tissue`; its sides echo as surfaces 0 (outside) and 1.
+    pub fn place(&mut self, mesh: Mesh, at: DAffine3, tissue: u32, priority: i32) {
+        self.meshes.push(mesh);
+        self.again(self.meshes.len() - 1, at, tissue, priority);
+    }
+
+    /// Places a mesh that has been placed before.
+    pub fn again(&mut self, mesh: usize, at: DAffine3, tissue: u32, priority: i32) {
+        self.placements.push((mesh, at));
+        self.instances.push(Instance {
+            world_from_object: placement::rows(&at),
+            object_from_world: placement::rows(&at.inverse()),
+            texture_from_world: placement::rows(&placement::rigid(&at).inverse()),
+            tissue,
+            priority,
+            surface_outside: 0,
+            surface_inside: 1,
+            ..Instance::default()
+        });
+    }
+
+    /// The five bindings instances, vertices, normals, triangles, nodes.
+    pub fn inputs(mut self) -> Vec<Input> {
+        let trees: Vec<MeshBvh> = self.meshes.iter().map(MeshBvh::build).collect();
+        let (mut vertices, mut normals) = (Vec::new(), Vec::new());
+        let (mut triangles, mut firsts) = (Vec::new(), Vec::new());
+        for (mesh, tree) in self.meshes.iter().zip(&trees) {
+            let base = vertices.len() as u32;
+            firsts.push(triangles.len() as u32);
+            vertices.extend_from_slice(&mesh.positions);
+            normals.extend_from_slice(&mesh.normals);
+            let order = tree.triangle_order.iter();
+            triangles.extend(order.map(|&t| mesh.triangles[t as usize].map(|v| base + v)));
+        }
+        let mut nodes = SceneBvh::new(&trees, &firsts, self.placements.len());
+        nodes.place(&self.placements).expect("a small world");
+        for (instance, &(mesh, _)) in self.instances.iter_mut().zip(&self.placements) {
+            instance.first_triangle = firsts[mesh];
+            instance.triangles = self.meshes[mesh].triangles.len() as u32;
+            instance.bvh_root = nodes.roots[mesh];
+        }
+        vec![
+            Input::words("instances", &self.instances),
+            Input::floats("vertices", vertices.as_flattened()),
+            Input::floats("normals", normals.as_flattened()),
+            Input::words("triangles", &triangles),
+            Input::words("nodes", &nodes.nodes),
+        ]
+    }
+}
+
+/// Tissues 0 (background), 1, 2, 3; contrasts from weak to bone-like.
+pub fn tissues() -> Vec<Tissue> {
+    let tissue = |speed, impedance, absorption, seed| Tissue {
+        speed,
+        impedance,
+        absorption,
+        presence: 0.7,
+        mean: 0.1,
+        sigma: 0.8,
+        texture_depth: 0.3,
+        texture_length: 4.0,
+        seed,
+        ..Tissue::default()
+    };
+    vec![
+        tissue(1.54, 1.63, 0.004, 11),
+        tissue(1.57, 1.70, 0.006, 22),
+        tissue(1.45, 1.38, 0.005, 33),
+        tissue(3.2, 6.0, 0.06, 44),
+    ]
+}
+
+/// Outside: rough, thick, partly coherent. Inside: mirror-like.
+pub fn surfaces() -> Vec<Surface> {
+    vec![
+        Surface {
+            roughness: 60.0,
+            thickness: 0.2,
+            specularity: 3.0,
+            gain: 1.5,
+            coherence: 0.6,
+            ..Surface::default()
+        },
+        Surface {
+            roughness: 1e9,
+            thickness: 0.0,
+            specularity: 1.0,
+            gain: 0.7,
+            coherence: 1.0,
+            ..Surface::default()
+        },
+    ]
+}
+
+/// A world in front of a probe that looks along z. Its poses are random, so that no ray of a case
+/// is likely to run through an edge or along a surface.
+pub fn world(case: Case) -> Builder {
+    let mut random = Random(7);
+    let mut builder = Builder::default();
+    let mut pose = |x: f64, y: f64, z: f64| {
+        let mut r = |s: f64| random.within(-s, s);
+        let axis = DVec3::new(r(1.0), r(1.0), r(1.0)).normalize();
+        let turn = DQuat::from_axis_angle(axis, r(3.0));
+        DAffine3::from_rotation_translation(turn, DVec3::new(x + r(1.0), y + r(1.0), z + r(1.0)))
+    };
+    match case {
+        Case::Empty => {}
+        Case::One => builder.place(shapes::sphere(9.0, 2), pose(0.0, 0.0, 25.0), 1, 0),
+        _ => {
+            // A body around the probe, with nested and overlapping organs and a bone.
+            builder.place(
+                shapes::ellipsoid([60.0, 40.0, 70.0], 3),
+                pose(0.0, 0.0, 20.0),
+                1,
+                0,
+            );
+            builder.place(
+                shapes::ellipsoid([14.0, 11.0, 9.0], 2),
+                pose(3.0, 0.0, 28.0),
+                2,
+                1,
+            );
+            builder.place(shapes::sphere(5.0, 2), pose(2.0, 1.0, 27.0), 0, 2);
+            builder.place(
+                shapes::cuboid([9.13, 30.7, 6.29]),
+                pose(-14.0, 0.0, 40.0),
+                3,
+                5,
+            );
+            builder.place(shapes::cylinder(4.0, 50.3, 24), pose(12.0, 0.0, 33.0), 0, 1);
+            // A second placement of the same mesh, scaled and mirrored.
+            let mirrored = DAffine3::from_scale(DVec3::new(-1.4, 0.8, 1.1));
+            builder.again(2, pose(16.0, 2.0, 47.0) * mirrored, 3, 2);
+        }
+    }
+    builder
+}
+
+/// What the twins read, taken from a job's bindings; bindings that the kernel lacks are empty.
+pub struct Owned {
+    frame: Frame,
+    rows: Vec<Row>,
+    tissues: Vec<Tissue>,
+    surfaces: Vec<Surface>,
+    instances: Vec<Instance>,
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    points: Vec<[f32; 4]>,
+}
+
+impl Owned {
+    /// Collects the bindings of `job`.
+    pub fn new(job: &Job) -> Self {
+        fn optional<T: bytemuck::Pod>(job: &Job, name: &str) -> Vec<T> {
+            let found = job.inputs.iter().find(|i| i.name == name);
+            found.map_or_else(Vec::new, |i| bytemuck::pod_collect_to_vec(&i.bytes))
+        }
+        let frame = optional::<Frame>(job, "frame").first().copied();
+        Self {
+            frame: frame.unwrap_or_default(),
+            rows: optional(job, "rows"),
+            tissues: optional(job, "tissues"),
+            surfaces: optional(job, "surfaces"),
+            instances: optional(job, "instances"),
+            positions: optional(job, "vertices"),
+            normals: optional(job, "normals"),
+            triangles: optional(job, "triangles"),
+            points: optional(job, "points"),
+        }
+    }
+
+    /// Borrows it all.
+    pub fn world(&self) -> World<'_> {
+        World {
+            frame: &self.frame,
+            rows: &self.rows,
+            tissues: &self.tissues,
+            surfaces: &self.surfaces,
+            instances: &self.instances,
+            geometry: Geometry {
+                positions: &self.positions,
+                normals: &self.normals,
+                triangles: &self.triangles,
+            },
+            points: &self.points,
+        }
+    }
+}
+
+/// Bytes of the five bindings of [`Builder::inputs`] as they are in `job`: a dump brings its own.
+pub fn sizes(job: &Job) -> Vec<usize> {
+    let instances: Vec<Instance> = job.get("instances");
+    let triangles: Vec<[u32; 3]> = job.get("triangles");
+    let vertices = triangles.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize;
+    let used = instances.iter().map(|i| i.first_triangle + i.triangles);
+    let roots = instances.iter().map(|i| i.bvh_root).filter(|&r| r != NONE);
+    let needed = [
+        0,
+        12 * vertices,
+        12 * vertices,
+        12 * used.max().unwrap_or(0) as usize,
+        80 * (1 + roots.max().unwrap_or(0) as usize),
+    ];
+    needed.to_vec()
+}
