@@ -201,7 +201,9 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     }
     deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0));
     if (s.coherence >= 1.0) return;
-    vec3 p = texture_point(instance, path.origin) * 2.0;
+    // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
+    // tracer would choose the phase.
+    vec3 p = texture_point(instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
     float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;

@@ -14,6 +14,8 @@ use crate::sim::layout::{FLAG_COHERENT, Surface, Tissue};
 pub(super) const MIRROR: f64 = 1e9;
 /// Edge of the cells that share the random phase of a thick surface's echo, mm.
 const PHASE_CELL: f64 = 0.5;
+/// By how much of a cell the cells are moved off the round numbers at which faces are modelled.
+const PHASE_SHIFT: f64 = 0.381_966;
 /// Micro-normals tried.
 const ATTEMPTS: u32 = 8;
 
@@ -145,7 +147,7 @@ impl Interface {
         let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
         if rest > 0.0 {
             let p = world.texture(self.instance).transform_point3(path.origin);
-            let cell = (p / PHASE_CELL).floor().as_i64vec3();
+            let cell = (p / PHASE_CELL + PHASE_SHIFT).floor().as_i64vec3();
             let key = path.n.wrapping_mul(0x9e37_79b9).wrapping_add(frame.seed);
             let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
             let phase = std::f64::consts::TAU * unit(words[3]);
