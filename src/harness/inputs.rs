@@ -39,6 +39,7 @@ pub fn dimensions(case: Case, size: Size) -> [u32; 3] {
         (Case::Empty, _) => [0, 1, 16],
         (Case::One, _) => [1, 1, 1],
         (Case::Odd, _) => [23, 5, 131],
+        (Case::Modes, _) => [31, 4, 260],
         (Case::NotFinite, _) => [12, 2, 130],
     }
 }
@@ -49,7 +50,7 @@ pub fn frame(case: Case, size: Size) -> Frame {
     let [scanlines, layers, samples] = dimensions(case, size);
     let kind = match case {
         Case::Odd => KIND_LINEAR,
-        Case::One => KIND_PHASED,
+        Case::One | Case::Modes => KIND_PHASED,
         _ => KIND_CONVEX,
     };
     let identity = matrix_rows(&DAffine3::IDENTITY);

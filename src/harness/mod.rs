@@ -34,19 +34,23 @@ pub enum Case {
     Empty,
     /// One of everything.
     One,
-    /// Sizes that no work group divides.
+    /// Sizes that no work group divides; a linear probe, independent paths, voxels.
     Odd,
+    /// The remaining modes: a phased probe, surfaces that coincide, paths that share their first
+    /// stretch, coherent surfaces, a lattice that rests in the world.
+    Modes,
     /// NaN and infinity among the inputs.
     NotFinite,
 }
 
 impl Case {
     /// All cases.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Random,
         Self::Empty,
         Self::One,
         Self::Odd,
+        Self::Modes,
         Self::NotFinite,
     ];
 }

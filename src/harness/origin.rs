@@ -6,7 +6,7 @@ use super::inputs::{frame, lines};
 use super::worlds::{self, Owned};
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::origin;
-use crate::sim::layout::{Counters, Frame, MAX_STACK};
+use crate::sim::layout::{Counters, FLAG_COINCIDENT, Frame, MAX_STACK};
 use crate::sim::placement;
 
 pub const SUBJECT: Subject = Subject {
@@ -41,6 +41,9 @@ fn job(case: Case, size: Size) -> Job {
     }
     if case == Case::NotFinite {
         frame.world_from_probe[1][3] = f32::NAN;
+    }
+    if case == Case::Modes {
+        frame.flags |= FLAG_COINCIDENT;
     }
     let mut inputs = vec![Input::words("frame", &[frame])];
     inputs.extend(worlds::world(case).inputs());

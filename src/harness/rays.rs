@@ -71,7 +71,7 @@ fn job(case: Case, size: Size) -> Job {
         (Case::Random, Size::Standard) => 200_000,
         (Case::Random, Size::Small) => 4000,
         (Case::One, _) => 1,
-        (Case::Odd, _) => 331,
+        (Case::Odd | Case::Modes, _) => 331,
         (Case::NotFinite | Case::Empty, _) => 20,
     };
     let mut ray = |_| {

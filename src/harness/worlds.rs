@@ -129,6 +129,18 @@ pub fn world(case: Case) -> Builder {
     };
     match case {
         Case::Empty => {}
+        Case::Modes => {
+            // Two boxes in one frame share a face exactly; a third encloses both.
+            let at = pose(0.0, 0.0, 30.0);
+            for (x, tissue) in [(-3.5, 1), (4.5, 2)] {
+                let mut half = shapes::cuboid([if tissue == 1 { 7.0 } else { 9.0 }, 24.0, 11.0]);
+                for p in &mut half.positions {
+                    p[0] += x;
+                }
+                builder.place(half, at, tissue, 1);
+            }
+            builder.place(shapes::cuboid([40.0, 60.0, 36.0]), at, 3, 0);
+        }
         Case::One => builder.place(shapes::sphere(9.0, 2), pose(0.0, 0.0, 25.0), 1, 0),
         _ => {
             // A body around the probe, with nested and overlapping organs and a bone.
@@ -146,7 +158,7 @@ pub fn world(case: Case) -> Builder {
             );
             builder.place(shapes::sphere(5.0, 2), pose(2.0, 1.0, 27.0), 0, 2);
             builder.place(
-                shapes::cuboid([9.13, 30.7, 6.29]),
+                shapes::cuboid([9.0, 30.0, 6.0]),
                 pose(-14.0, 0.0, 40.0),
                 3,
                 5,
