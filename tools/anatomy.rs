@@ -57,13 +57,16 @@ enum Scene {
     },
 }
 
-/// Meshes are made with this many times the triangles asked for, or more, and then thinned: the
-/// collapse of flat regions needs some to spare.
-const SPARE: f64 = 1.3;
+/// Meshes are made with this many times the triangles asked for, and then thinned: the collapse of
+/// flat regions needs some to spare.
+const SPARE: f64 = 1.4;
 
-/// Rounds of the search for the cell size; the count goes with its inverse square, so that two
-/// usually do.
-const ROUNDS: usize = 4;
+/// The least spare that is taken before the cells are made smaller again.
+const LEAST_SPARE: f64 = 1.15;
+
+/// Rounds of the search for the cell size. The mesher merges cells where the surface is flat, so
+/// that the count goes with a power of the size between 1 and 2 that the second round tells.
+const ROUNDS: usize = 5;
 
 /// How far the vertices of a thinned mesh may be from the surface, mm; what is farther has lost
 /// its shape, and Newton's steps are not to hide it.
@@ -83,19 +86,7 @@ fn main() -> ExitCode {
 fn abdomen(budget: usize, output: &std::path::Path) -> Result<(), String> {
     let parts = abdomen::parts();
     let fields: Vec<Field> = parts.iter().map(|p| Field::new(&p.field)).collect();
-    let mut scale = 1.0;
-    let fine = (0..ROUNDS).find_map(|_| {
-        let built = build(&parts, &fields, scale);
-        let total = built.as_ref().map_or(0, |b| count(b));
-        println!("cells scaled by {scale:.3}: {total} triangles");
-        let share = total as f64 / (SPARE * budget as f64);
-        if built.is_ok() && share < 1.0 {
-            scale *= 0.97 * share.sqrt() as f32;
-            return None;
-        }
-        Some(built)
-    });
-    let fine = fine.ok_or(format!("no cell size gives {budget} triangles"))??;
+    let fine = finely(&parts, &fields, budget as f64)?;
     let weights: Vec<f64> = parts.iter().map(|p| p.weight).collect();
     let mut surfaces = decimate::decimate(fine, &weights, budget);
 
@@ -131,6 +122,25 @@ fn abdomen(budget: usize, output: &std::path::Path) -> Result<(), String> {
         path.display()
     );
     Ok(())
+}
+
+/// Meshes with at least [`LEAST_SPARE`] times `budget` triangles and cells no coarser than each
+/// part allows.
+fn finely(parts: &[Part], fields: &[Field], budget: f64) -> Result<Vec<Surface>, String> {
+    let mut before: Option<(f64, f64)> = None;
+    let mut scale = 1.0f64;
+    for _ in 0..ROUNDS {
+        let built = build(parts, fields, scale as f32)?;
+        let total = count(&built) as f64;
+        println!("cells scaled by {scale:.3}: {total} triangles");
+        if total >= LEAST_SPARE * budget {
+            return Ok(built);
+        }
+        let power = before.map_or(2.0, |(s, t)| ((total / t).ln() / (s / scale).ln()).max(0.7));
+        before = Some((scale, total));
+        scale *= (total / (SPARE * budget)).powf(1.0 / power);
+    }
+    Err(format!("no cell size gives {budget} triangles"))
 }
 
 fn count(surfaces: &[Surface]) -> usize {

@@ -75,6 +75,9 @@ pub fn parts() -> Vec<Part> {
         part("back-muscles", "muscle", BACK, body::back_muscles(p)),
         part("discs", "muscle", BACK, body::discs(p)),
         part("vertebrae", "cortical_bone", (3.0, 0.1), body::vertebrae(p)),
+        part("colon-wall", "muscle", ORGAN, organs::colon_wall(p)),
+        part("colon-content", "stool", ORGAN, organs::colon_content(p)),
+        part("colon-gas", "air", ORGAN, organs::colon_gas(p)),
         part("kidney", "kidney", ORGAN, organs::kidney(p)),
         part(
             "renal-pyramids",
@@ -112,11 +115,18 @@ const PORTAL_WALL: f32 = 0.9;
 /// Portal branches wider than this radius, mm, show their sheath.
 const WALLED: f32 = 2.3;
 
+/// Box around the liver, mm.
+const LIVER_BOX: (Vec3, Vec3) = (
+    Vec3::new(-136.0, -80.0, -64.0),
+    Vec3::new(60.0, 76.0, 104.0),
+);
+
 /// Portal and hepatic trees, grown apart: radii 6 to 1.4 mm, six generations.
 fn liver_vessels() -> (Vec<Piece>, Vec<Piece>) {
     let liver = Field::new(&organs::liver(&Point::world()));
-    let region = Region::new(&liver, body::LOW, body::HIGH);
-    let mut random = Random(7);
+    let region = Region::new(&liver, LIVER_BOX.0, LIVER_BOX.1);
+    // Of 300 trees the one that shows most of both kinds in the default slice without merging them.
+    let mut random = Random(271);
     let points = region.points(7.0, 11.0, &mut random);
     let trunk = organs::portal_trunk();
     let growth = Growth {

@@ -17,7 +17,7 @@ use crate::pose;
 pub const TORSO: (f32, f32) = (160.0, 105.0);
 
 /// The block that is modelled, mm: the right half and the midline of the upper abdomen.
-pub const LOW: Vec3 = Vec3::new(-165.0, -110.0, -118.0);
+pub const LOW: Vec3 = Vec3::new(-165.0, -110.0, -175.0);
 /// See [`LOW`].
 pub const HIGH: Vec3 = Vec3::new(80.0, 110.0, 130.0);
 
@@ -52,7 +52,7 @@ pub fn wall(p: &Point) -> Tree {
     let torso = elliptic_cylinder(p, TORSO.0, TORSO.1)
         + (pressed * -0.5).exp() * pose::PRESS
         + undulation(p, 0.6, 90.0, 0.4);
-    let block = intersection(p.0.clone() - 74.0, (p.2.clone() - 6.0).abs() - 118.0, 12.0);
+    let block = intersection(p.0.clone() - 74.0, (p.2.clone() + 23.0).abs() - 147.0, 12.0);
     intersection(torso, block, 16.0)
 }
 
@@ -67,11 +67,12 @@ pub fn fascial_layer(p: &Point, depth: f32) -> Tree {
     layer(p, depth, 0.7, phase)
 }
 
-/// Ribs 8 to 11: flat bands, 13 mm high and 7 mm thick (Mohr et al., J Biomech 2007), that follow
-/// the wall and descend forwards.
+/// Ribs 7 to 10: flat bands, 13 mm high and 7 mm thick (Mohr et al., J Biomech 2007), that follow
+/// the wall and descend forwards. The space under the default probe is 5 cm wide: the arm is raised
+/// and the breath held, and its neighbours shade no more than the sector's edges.
 pub fn ribs(p: &Point) -> Tree {
     let wall = wall(p) + RIB;
-    let bands = [-102.0, -52.0, -2.0, 48.0].map(|middle: f32| {
+    let bands = [-65.0, 2.0, 44.0, 86.0].map(|middle: f32| {
         // Height over the rib's line, as seen on the wall: z falls forwards and medially.
         let rise = p.1.clone() * RIB_RISE.1 + p.0.clone() * RIB_RISE.0;
         let bow = undulation(p, 1.5, 110.0, middle);
@@ -82,10 +83,10 @@ pub fn ribs(p: &Point) -> Tree {
     });
     let [a, b, c, d] = bands;
     let all = a.min(b).min(c.min(d));
-    // The bony part ends 3 cm before the midline in front; behind it goes on to the spine.
-    let front = p.0.clone() + p.1.clone() * 0.4 - 10.0;
+    // The bony part ends 7 cm before the midline in front, 3 cm behind.
+    let front = p.0.clone() - p.1.clone() * 0.25 + 47.0;
     let side = intersection(all, front, 5.0);
-    intersection(side, (p.2.clone() - 4.0).abs() - 96.0, 6.0)
+    intersection(side, (p.2.clone() + 23.0).abs() - 125.0, 6.0)
 }
 
 /// Slope of the ribs' lines along x and y.
@@ -103,7 +104,9 @@ fn dome(p: &Point) -> Tree {
     };
     let right = shaft(Vec3::new(-64.0, 0.0, 6.0), Vec3::new(70.0, 80.0, 92.0));
     let left = shaft(Vec3::new(62.0, 0.0, 0.0), Vec3::new(70.0, 80.0, 82.0));
-    union(right, left, 30.0) + undulation(p, 1.2, 70.0, 2.2)
+    // The central tendon, under the heart.
+    let middle = shaft(Vec3::new(0.0, -6.0, 0.0), Vec3::new(74.0, 84.0, 70.0));
+    union(union(right, left, 30.0), middle, 25.0) + undulation(p, 1.2, 70.0, 2.2)
 }
 
 /// The diaphragm with all beneath it: 2.8 mm thick (Boussuges et al., Chest 2009, at rest 2-3 mm).
@@ -126,15 +129,18 @@ pub fn lung(p: &Point) -> Tree {
 /// Middle of the lumbar vertebrae in the section, mm.
 const SPINE: (f32, f32) = (0.0, 50.0);
 
-/// Bodies T12 to L3: 44 x 33 x 27 mm at a pitch of 36 mm (Panjabi et al., Spine 1992), waisted.
+/// Levels of the vertebral bodies, mm.
+const BODIES: [f32; 8] = [-162.0, -126.0, -90.0, -54.0, -18.0, 18.0, 54.0, 90.0];
+
+/// Bodies T11 to L5: 44 x 33 x 27 mm at a pitch of 36 mm (Panjabi et al., Spine 1992), waisted.
 pub fn vertebrae(p: &Point) -> Tree {
-    let bodies = [-90.0, -54.0, -18.0, 18.0, 54.0, 90.0].map(|z: f32| {
+    let bodies = BODIES.map(|z: f32| {
         let q = p.from(Vec3::new(SPINE.0, SPINE.1, z));
         let waist = q.2.square() * (1.0 / 110.0);
         let round = elliptic_cylinder(&q, 20.5, 15.5) - waist.min(2.0);
         intersection(round, q.2.abs() - 13.5, 5.0)
     });
-    let arch = [-90.0, -54.0, -18.0, 18.0, 54.0, 90.0].map(|z: f32| {
+    let arch = BODIES.map(|z: f32| {
         let spinous = (
             Vec3::new(0.0, 76.0, z - 6.0),
             Vec3::new(0.0, 94.0, z - 14.0),

@@ -4,9 +4,15 @@
 //! (iquilezles.org); most are bounds rather than exact distances, which dual contouring and the
 //! Newton projection of the vertices do not mind.
 
+use std::collections::HashMap;
+
 use fidget::context::Tree;
 use fidget::jit::JitShape;
-use glam::Vec3;
+use fidget::shape::EzShape;
+use fidget::types::{Grad, Interval};
+use fidget::vm::VmShape;
+use glam::{IVec3, Vec3};
+use rayon::prelude::*;
 
 /// Coordinates of the point at which a field is evaluated, as expressions.
 #[derive(Clone)]
@@ -124,54 +130,97 @@ pub fn undulation(p: &Point, amplitude: f32, wavelength: f32, phase: f32) -> Tre
 
 /// A field compiled for evaluation at many points.
 pub struct Field {
-    /// The compiled shape, as the mesher takes it.
+    /// Machine code, as the mesher takes it.
     pub shape: JitShape,
+    /// Interpreted: for the many short-lived simplifications, which are not worth compiling.
+    local: VmShape,
 }
 
-/// Points per call: bounds the scratch memory of the evaluators.
-const BATCH: usize = 4096;
+/// Edge of the blocks in which points are evaluated together, mm. In a block most of a large union
+/// is provably far and drops out: a vessel tree evaluates 20 times faster than point by point.
+const BLOCK: f32 = 16.0;
 
 impl Field {
     /// Compiles `tree`.
     pub fn new(tree: &Tree) -> Self {
         Self {
             shape: JitShape::from(tree.clone()),
+            local: VmShape::from(tree.clone()),
         }
     }
 
     /// Field values at `points`, mm.
     pub fn values(&self, points: &[Vec3]) -> Vec<f32> {
-        let tape = self.shape.float_slice_tape(Default::default());
-        let mut eval = JitShape::new_float_slice_eval();
-        let mut out = Vec::with_capacity(points.len());
-        for batch in points.chunks(BATCH) {
-            let [x, y, z] = [0, 1, 2].map(|i| batch.iter().map(|p| p[i]).collect::<Vec<f32>>());
+        self.by_block(points, |shape, at| {
+            let tape = shape.ez_float_slice_tape();
+            let [x, y, z] = [0, 1, 2].map(|i| at.iter().map(|p| p[i]).collect::<Vec<f32>>());
+            let mut eval = VmShape::new_float_slice_eval();
             let values = eval.eval(&tape, &x, &y, &z);
-            out.extend_from_slice(values.expect("the three slices have one length"));
-        }
-        out
+            values.expect("the three slices have one length").to_vec()
+        })
     }
 
     /// Field values, mm, and gradients at `points`.
     pub fn gradients(&self, points: &[Vec3]) -> Vec<(f32, Vec3)> {
-        use fidget::types::Grad;
-        let tape = self.shape.grad_slice_tape(Default::default());
-        let mut eval = JitShape::new_grad_slice_eval();
-        let mut out = Vec::with_capacity(points.len());
-        for batch in points.chunks(BATCH) {
+        self.by_block(points, |shape, at| {
+            let tape = shape.ez_grad_slice_tape();
             let axis = |i: usize| -> Vec<Grad> {
                 let unit = |j: usize| if i == j { 1.0 } else { 0.0 };
-                batch
-                    .iter()
-                    .map(|p| Grad::new(p[i], unit(0), unit(1), unit(2)))
-                    .collect()
+                let seed = |p: &Vec3| Grad::new(p[i], unit(0), unit(1), unit(2));
+                at.iter().map(seed).collect()
             };
-            let values = eval
-                .eval(&tape, &axis(0), &axis(1), &axis(2))
-                .expect("the three slices have one length");
-            out.extend(values.iter().map(|g| (g.v, Vec3::new(g.dx, g.dy, g.dz))));
+            let mut eval = VmShape::new_grad_slice_eval();
+            let values = eval.eval(&tape, &axis(0), &axis(1), &axis(2));
+            let values = values.expect("the three slices have one length");
+            let pair = |g: &Grad| (g.v, Vec3::new(g.dx, g.dy, g.dz));
+            values.iter().map(pair).collect()
+        })
+    }
+
+    /// Evaluates the points of each block with what is left of the field there; results in the
+    /// order of `points`.
+    fn by_block<T: Copy + Default + Send>(
+        &self,
+        points: &[Vec3],
+        evaluate: impl Fn(&VmShape, &[Vec3]) -> Vec<T> + Sync,
+    ) -> Vec<T> {
+        let mut blocks: HashMap<IVec3, Vec<usize>> = HashMap::new();
+        for (i, p) in points.iter().enumerate() {
+            let block = (*p / BLOCK).floor().as_ivec3();
+            blocks.entry(block).or_default().push(i);
+        }
+        let blocks: Vec<Vec<usize>> = blocks.into_values().collect();
+        let results: Vec<Vec<T>> = blocks
+            .par_iter()
+            .map(|block| {
+                let at: Vec<Vec3> = block.iter().map(|&i| points[i]).collect();
+                evaluate(&self.near(&at), &at)
+            })
+            .collect();
+        let mut out = vec![T::default(); points.len()];
+        for (block, values) in blocks.iter().zip(results) {
+            for (&i, value) in block.iter().zip(values) {
+                out[i] = value;
+            }
         }
         out
+    }
+
+    /// The field without the branches that cannot matter within the box of `points`.
+    fn near(&self, points: &[Vec3]) -> VmShape {
+        let low = points.iter().copied().reduce(Vec3::min);
+        let high = points.iter().copied().reduce(Vec3::max);
+        let (Some(low), Some(high)) = (low, high) else {
+            return self.local.clone();
+        };
+        let [x, y, z] = [0, 1, 2].map(|i| Interval::new(low[i], high[i]));
+        let mut eval = VmShape::new_interval_eval();
+        let tape = self.local.ez_interval_tape();
+        let (_, trace) = eval.eval(&tape, x, y, z).expect("no free variables");
+        match trace {
+            Some(trace) => self.local.ez_simplify(trace).expect("its own trace"),
+            None => self.local.clone(),
+        }
     }
 
     /// Box around the zero set within `low..high`, found on a grid of `step` mm and widened by it;

@@ -75,9 +75,10 @@ fn contour(field: &Field, low: Vec3, high: Vec3, cell: f32) -> Surface {
 /// Evens out the triangles along the surface, returns them to the zero set, and sets the normals
 /// to the field's gradient.
 fn relax(field: &Field, surface: &mut Surface, cell: f32) {
-    project(field, surface, cell, 2);
+    newton(field, surface, cell);
     let neighbours = neighbours(surface);
     for _ in 0..SMOOTHING {
+        newton(field, surface, cell);
         let moved: Vec<Vec3> = surface
             .positions
             .iter()
@@ -91,26 +92,24 @@ fn relax(field: &Field, surface: &mut Surface, cell: f32) {
             })
             .collect();
         surface.positions = moved;
-        project(field, surface, cell, 2);
     }
     settle(field, surface, cell);
 }
 
 /// Moves the vertices to the zero set, by at most half of `reach` mm a step, and sets the normals.
 pub fn settle(field: &Field, surface: &mut Surface, reach: f32) {
-    project(field, surface, reach, NEWTON);
+    for _ in 0..NEWTON {
+        newton(field, surface, reach);
+    }
 }
 
-/// `steps` Newton steps along the gradient, each at most half a cell, then the normals.
-fn project(field: &Field, surface: &mut Surface, cell: f32, steps: usize) {
-    for _ in 0..steps {
-        let at = field.gradients(&surface.positions);
-        for (p, (value, gradient)) in surface.positions.iter_mut().zip(at) {
-            let step = gradient * (-value / gradient.length_squared().max(0.05));
-            *p += step.clamp_length_max(0.5 * cell);
-        }
-    }
+/// One Newton step along the gradient; the normals are those before the step.
+fn newton(field: &Field, surface: &mut Surface, reach: f32) {
     let at = field.gradients(&surface.positions);
+    for (p, (value, gradient)) in surface.positions.iter_mut().zip(&at) {
+        let step = *gradient * (-value / gradient.length_squared().max(0.05));
+        *p += step.clamp_length_max(0.5 * reach);
+    }
     surface.normals = at.iter().map(|(_, g)| g.normalize_or(Vec3::Z)).collect();
 }
 

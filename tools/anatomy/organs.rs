@@ -149,7 +149,7 @@ pub fn renal_pyramids(p: &Point) -> Tree {
 /// Inferior vena cava (24 x 20 mm) with the right renal vein.
 pub fn vena_cava(p: &Point) -> Tree {
     let trunk = along(&[
-        (Vec3::new(-19.0, 26.0, -150.0), 11.0),
+        (Vec3::new(-19.0, 26.0, -170.0), 11.0),
         (Vec3::new(-20.0, 23.0, -30.0), 11.0),
         (Vec3::new(-23.0, 17.0, 30.0), 11.5),
         (CAVAL_CONFLUENCE, 12.0),
@@ -171,7 +171,7 @@ pub const CAVAL_CONFLUENCE: Vec3 = Vec3::new(-23.0, 8.0, 74.0);
 /// artery's first centimetres, widened by `wall` mm.
 pub fn aorta(p: &Point, wall: f32) -> Tree {
     let trunk = along(&[
-        (Vec3::new(14.0, 21.0, -150.0), 9.0),
+        (Vec3::new(14.0, 21.0, -170.0), 9.0),
         (Vec3::new(12.0, 20.0, -30.0), 9.6),
         (Vec3::new(11.0, 24.0, 40.0), 10.4),
         (Vec3::new(10.0, 30.0, 150.0), 11.0),
@@ -198,7 +198,7 @@ fn tubes(p: &Point, vessels: &[Vec<Piece>], wall: f32, fillet: f32) -> Tree {
     });
     let whole = union_all(cones.collect(), fillet);
     // Ends inside the body, away from its cut faces.
-    intersection(whole, (p.2.clone() - 6.0).abs() - 104.0, 3.0)
+    intersection(whole, (p.2.clone() + 23.0).abs() - 133.0, 3.0)
 }
 
 /// The main portal vein from the splenic confluence to the porta hepatis: 12 mm wide (normal:
@@ -216,14 +216,51 @@ pub fn portal_trunk() -> Vec<Piece> {
 /// The porta hepatis, mm.
 pub const PORTA: Vec3 = Vec3::new(-42.0, -4.0, 14.0);
 
+/// Hepatic flexure of the colon, haustrated, 4 cm wide (normal: 3-5 cm), shrunk by `wall` mm.
+fn colon(p: &Point, wall: f32) -> Tree {
+    let at = pose::default();
+    let path = [
+        Vec3::new(-96.0, 24.0, -150.0),
+        Vec3::new(-84.0, 16.0, -78.0),
+        at.at(67.0, 80.0, 2.0),
+        Vec3::new(-44.0, -22.0, -68.0),
+        Vec3::new(-20.0, -38.0, -76.0),
+        Vec3::new(20.0, -44.0, -70.0),
+    ];
+    let pieces = path.windows(2);
+    let cones = pieces.map(|w| cone(p, w[0], 17.0 - wall, w[1], 17.0 - wall));
+    let tube = union_all(cones.collect(), 10.0);
+    let haustra = undulation(p, 3.4, 26.0, 0.8);
+    let whole = tube + haustra;
+    let clear_of = union(gallbladder(p) - 4.5, kidney(p) - 2.5, 3.0);
+    let whole = difference(whole, clear_of - wall, 4.0);
+    intersection(whole, cavity(p) + 2.0 + wall, 4.0)
+}
+
+/// The colon with its wall.
+pub fn colon_wall(p: &Point) -> Tree {
+    colon(p, 0.0)
+}
+
+/// What the colon holds: its wall is 2.6 mm thick (normal: under 3 mm).
+pub fn colon_content(p: &Point) -> Tree {
+    colon(p, 2.6)
+}
+
+/// Gas on top of the content: the patient lies on the back, so that gas rises forwards.
+pub fn colon_gas(p: &Point) -> Tree {
+    let level = p.1.clone() * 1.0 - p.0.clone() * 0.15 - 3.0 + undulation(p, 1.5, 19.0, 2.4);
+    intersection(colon(p, 3.4), level, 3.0)
+}
+
 /// A simple cyst of 16 mm in the default slice.
 pub fn cyst(p: &Point) -> Tree {
-    let centre = pose::default().at(-24.0, 58.0, 0.5);
+    let centre = pose::default().at(-11.0, 47.0, 0.5);
     ellipsoid(&p.from(centre), Vec3::new(8.4, 7.6, 8.0)) + undulation(p, 0.4, 14.0, 0.7)
 }
 
 /// A solid lesion of 19 mm in the default slice.
 pub fn lesion(p: &Point) -> Tree {
-    let centre = pose::default().at(-44.0, 88.0, -0.5);
+    let centre = pose::default().at(-36.0, 112.0, -0.5);
     ellipsoid(&p.from(centre), Vec3::new(9.8, 9.0, 9.4)) + undulation(p, 1.3, 13.0, 2.6)
 }

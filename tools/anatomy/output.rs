@@ -44,6 +44,12 @@ const TISSUES: &str = r#"# Dense connective tissue: acoustically near skin, brig
 based_on = "skin"
 echogenicity = "+5 dB"
 
+# Bowel content: water-rich, full of small bubbles that scatter and absorb.
+[tissues.stool]
+based_on = "muscle"
+attenuation = "3 dB/cm/MHz"
+echogenicity = "+3 dB"
+
 # Central echo complex of the kidney: fat with vessels, calyces and septa in between.
 [tissues.renal_sinus]
 based_on = "fat"

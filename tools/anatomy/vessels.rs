@@ -154,33 +154,23 @@ impl Growth<'_> {
         let centre = points.iter().sum::<Vec3>() / points.len() as f32;
         // A bit over half-way: the children still have room to diverge.
         let end = from + (centre - from) * if generation == 0 { 0.5 } else { 0.62 };
-        let length = end.distance(from);
-        if length < 2.0 * radius {
-            return;
-        }
-        let mut best: Option<(f32, Vec<Vec3>)> = None;
-        for candidate in 0..CANDIDATES {
-            let wander = if candidate == 0 { 0.0 } else { 0.28 };
-            let tip = end + random.vector() * (wander * length);
-            let bend = from + (heading * 0.45 + random.vector() * 0.12) * length;
-            let path = parabola(from, bend, tip);
-            let score = self.score(&path, radius, pieces) - 0.1 * tip.distance(end);
-            if best.as_ref().is_none_or(|(s, _)| score > *s) {
-                best = Some((score, path));
+        // Where the points lie all around, the vessel divides at once.
+        let (tip, heading, end_radius) = if end.distance(from) < 2.0 * radius {
+            (from, heading, radius)
+        } else {
+            let path = self.clearest(from, heading, end, radius, random, pieces);
+            // Vessels narrow little between divisions.
+            let end_radius = 0.94 * radius;
+            for (i, pair) in path.windows(2).enumerate() {
+                let at = |i: usize| radius + (end_radius - radius) * i as f32 / PIECES as f32;
+                pieces.push(Piece {
+                    ends: [pair[0], pair[1]],
+                    radii: [at(i), at(i + 1)],
+                });
             }
-        }
-        let Some((_, path)) = best else { return };
-        // Vessels narrow little between divisions.
-        let end_radius = 0.94 * radius;
-        for (i, pair) in path.windows(2).enumerate() {
-            let at = |i: usize| radius + (end_radius - radius) * i as f32 / PIECES as f32;
-            pieces.push(Piece {
-                ends: [pair[0], pair[1]],
-                radii: [at(i), at(i + 1)],
-            });
-        }
-        let tip = path[PIECES];
-        let heading = (tip - path[PIECES - 1]).normalize();
+            let tip = path[PIECES];
+            (tip, (tip - path[PIECES - 1]).normalize(), end_radius)
+        };
         let total = points.len() as f32;
         let halves = split(points, tip);
         for half in halves {
@@ -188,6 +178,31 @@ impl Growth<'_> {
             let child = end_radius * share.cbrt();
             self.branch(tip, heading, child, half, generation + 1, random, pieces);
         }
+    }
+
+    /// Of some random ways from `from`, leaving along `heading`, to about `end`, the clearest.
+    fn clearest(
+        &self,
+        from: Vec3,
+        heading: Vec3,
+        end: Vec3,
+        radius: f32,
+        random: &mut Random,
+        own: &[Piece],
+    ) -> Vec<Vec3> {
+        let length = end.distance(from);
+        let mut best = (f32::NEG_INFINITY, Vec::new());
+        for candidate in 0..CANDIDATES {
+            let wander = if candidate == 0 { 0.0 } else { 0.28 };
+            let tip = end + random.vector() * (wander * length);
+            let bend = from + (heading * 0.45 + random.vector() * 0.12) * length;
+            let path = parabola(from, bend, tip);
+            let score = self.score(&path, radius, own) - 0.1 * tip.distance(end);
+            if candidate == 0 || score > best.0 {
+                best = (score, path);
+            }
+        }
+        best.1
     }
 
     /// Room around a path, mm: from other vessels, from this tree, from the organ's surface.
