@@ -39,6 +39,9 @@ pub const CAVITY: f32 = 30.0;
 /// Depth of the ribs' middle under the skin, mm.
 const RIB: f32 = 22.7;
 
+/// Coupling gel left between the face's middle and the skin, mm.
+const GEL: f32 = 2.0;
+
 /// Distance to the skin, mm, negative inside; its offsets are the layers of the wall.
 pub fn wall(p: &Point) -> Tree {
     let probe = pose::default();
@@ -46,11 +49,11 @@ pub fn wall(p: &Point) -> Tree {
     let gauss = |t: Tree, sigma: f32| (t * (1.0 / sigma)).square();
     // The probe's pressure: curvature PRESS / sigma2 at the middle is the face's 1 / 50 mm along
     // the array; it dies away with depth, so that the fat under the face is compressed.
-    let pressed = gauss(rel.dot(probe.lateral), 21.0)
+    let pressed = gauss(rel.dot(probe.lateral), 22.0)
         + gauss(rel.dot(probe.direction.cross(probe.lateral)), 20.0)
         + gauss(rel.dot(probe.direction), 40.0);
     let torso = elliptic_cylinder(p, TORSO.0, TORSO.1)
-        + (pressed * -0.5).exp() * pose::PRESS
+        + (pressed * -0.5).exp() * (pose::PRESS + GEL)
         + undulation(p, 0.6, 90.0, 0.4);
     let block = intersection(p.0.clone() - 74.0, (p.2.clone() + 23.0).abs() - 147.0, 12.0);
     intersection(torso, block, 16.0)
