@@ -1,0 +1,104 @@
+//! The kernels of image formation, each run alone on the device, with validation.
+
+use std::sync::Arc;
+
+use bytemuck::Pod;
+use insonify::gpu::{Device, Kernel, test_device};
+use insonify::harness::{self, Element, Extent, Input, Job};
+use insonify::sim::layout::{Counters, Frame, Row};
+use insonify::sim::shaders::Library;
+
+/// Device and kernels.
+pub struct Stages {
+    device: Arc<Device>,
+    library: Library,
+}
+
+fn input<T: Pod>(name: &'static str, values: &[T]) -> Input {
+    Input {
+        name,
+        element: Element::Word,
+        bytes: bytemuck::cast_slice(values).to_vec(),
+    }
+}
+
+fn values<T: Pod>(bytes: &[u8]) -> Vec<T> {
+    bytemuck::pod_collect_to_vec(bytes)
+}
+
+impl Stages {
+    pub fn new() -> Self {
+        Self {
+            device: test_device(),
+            library: Library::embedded(),
+        }
+    }
+
+    /// Content of the bindings after a run; no validation message may have come.
+    fn run(&self, stem: &str, inputs: Vec<Input>, threads: [u32; 2]) -> Vec<Vec<u8>> {
+        let kernel = Kernel::new(&self.device, stem, self.library.words(stem), &[])
+            .expect("the kernel fits the device");
+        let job = Job {
+            inputs,
+            push: vec![],
+        };
+        let extent = Extent::Threads([threads[0], threads[1], 1]);
+        let outcome = harness::run(&self.device, &kernel, &job, extent).expect("the kernel runs");
+        assert_eq!(self.device.validation_messages(), Vec::<String>::new());
+        outcome.outputs
+    }
+
+    /// Accumulators to complex samples; also the saturated samples.
+    pub fn beam(
+        &self,
+        frame: &Frame,
+        rows: &[Row],
+        surface: &[i32],
+        volume: &[i32],
+    ) -> (Vec<f32>, u32) {
+        let inputs = vec![
+            input("frame", &[*frame]),
+            input("rows", rows),
+            input("surface", surface),
+            input("volume", volume),
+            input("counters", &[Counters::default()]),
+            input("lateral", &vec![0f32; surface.len()]),
+        ];
+        let after = self.run("beam", inputs, [frame.samples, frame.scanlines]);
+        let counters: Vec<Counters> = values(&after[4]);
+        (values(&after[5]), counters[0].saturated)
+    }
+
+    /// Complex samples through the axial kernel.
+    pub fn axial(&self, frame: &Frame, lateral: &[f32]) -> Vec<f32> {
+        let inputs = vec![
+            input("frame", &[*frame]),
+            input("lateral", lateral),
+            input("iq", &vec![0f32; lateral.len()]),
+        ];
+        values(&self.run("axial", inputs, [frame.samples, frame.scanlines])[2])
+    }
+
+    /// Log-compressed envelope.
+    pub fn detect(&self, frame: &Frame, rows: &[Row], iq: &[f32]) -> Vec<f32> {
+        let inputs = vec![
+            input("frame", &[*frame]),
+            input("rows", rows),
+            input("iq", iq),
+            input("log image", &vec![0f32; iq.len() / 2]),
+        ];
+        values(&self.run("detect", inputs, [frame.samples, frame.scanlines])[3])
+    }
+
+    /// Pixels.
+    pub fn display(&self, frame: &Frame, log: &[f32], grey: &[u32]) -> Vec<u32> {
+        let size = [frame.image_width, frame.image_height];
+        let inputs = vec![
+            input("frame", &[*frame]),
+            input("log image", log),
+            input("grey map", grey),
+            input("pixels", &vec![0u32; (size[0] * size[1]) as usize]),
+        ];
+        values(&self.run("display", inputs, size)[3])
+    }
+}
