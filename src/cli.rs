@@ -5,6 +5,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 
 mod check;
+mod info;
+mod render;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
 #[derive(Debug, Parser)]
@@ -18,12 +20,18 @@ struct Cli {
 enum Command {
     /// Check a scene or a mesh and say what it holds; exits 1 on errors
     Check(check::Check),
+    /// List the Vulkan devices and what each lacks
+    Info(info::Info),
+    /// Render a scene to a B-mode image
+    Render(Box<render::Render>),
 }
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Check(check) => check.run(),
+        Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
+        Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
     };
     match result {
         Ok(code) => code,

@@ -39,7 +39,7 @@ impl Scene {
             anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
         let wires = anatomy::wires(&document, &file.wire)?;
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
-        let simulation = parameters::simulation(&document, file.simulation)?;
+        let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
         let imaging = parameters::imaging(&document, file.imaging)?;
         warnings.extend(tissues.unused());
         let name = file.name.unwrap_or_else(|| {

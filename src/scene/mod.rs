@@ -105,6 +105,13 @@ pub struct Scene {
     pub imaging: Imaging,
 }
 
+impl Scene {
+    /// Triangles of all placed meshes.
+    pub fn triangles(&self) -> usize {
+        self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len()).sum()
+    }
+}
+
 impl Instance {
     /// The placement in single precision, as the device sees it.
     pub fn placement(&self) -> Affine3A {

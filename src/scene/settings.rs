@@ -64,8 +64,6 @@ pub struct Simulation {
     pub face_reflection: bool,
     /// Standard deviation of the lateral origin jitter, mm.
     pub origin_jitter: f64,
-    /// Lateral standard deviation of the beam weight, mm; infinity is off.
-    pub beam_sigma: f64,
     /// Scatterer mode.
     pub scatter_mode: ScatterMode,
     /// Edge of a lattice cell or voxel, mm.
@@ -109,6 +107,34 @@ pub struct Imaging {
     pub image_height: u32,
 }
 
+/// How much work a frame is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// Suits a software driver.
+    Draft,
+    /// A proof: many paths, a fine lattice, the whole slice.
+    Reference,
+}
+
+impl Simulation {
+    /// Replaces the scene's path and scatterer counts.
+    pub fn set_quality(&mut self, quality: Quality) {
+        match quality {
+            Quality::Draft => {
+                self.paths = self.paths.min(2);
+                self.elevation_cells = 1.0;
+                self.cell *= 4.0 / 3.0;
+            }
+            Quality::Reference => {
+                self.paths = self.paths.max(32);
+                self.elevation_cells = 0.0;
+                self.cell *= 2.0 / 3.0;
+                self.volume_floor = self.volume_floor.min(-80.0);
+            }
+        }
+    }
+}
+
 impl Default for Simulation {
     fn default() -> Self {
         Self {
@@ -121,7 +147,6 @@ impl Default for Simulation {
             rough_transmission: false,
             face_reflection: false,
             origin_jitter: 0.0,
-            beam_sigma: f64::INFINITY,
             scatter_mode: ScatterMode::Lattice,
             cell: 0.15,
             elevation_cells: 1.0,

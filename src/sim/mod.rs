@@ -2,10 +2,201 @@
 
 pub mod bvh;
 pub mod calibration;
+pub mod dump;
 pub mod layout;
+mod passes;
 pub mod placement;
 pub mod shaders;
 pub mod special;
+mod stages;
 pub mod tables;
 pub mod tracer;
 pub mod world;
+
+use std::sync::Arc;
+
+use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Stage};
+use crate::scene::Scene;
+use shaders::Library;
+use passes::Passes;
+use stages::{Batches, Buffers, Kernels, Tables};
+pub use tracer::Tracer;
+use world::World;
+
+/// Why a scene cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// The Vulkan layer failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The geometry does not fit the tracer.
+    #[error(transparent)]
+    World(#[from] world::WorldError),
+}
+
+/// A scene on the device, ready to be imaged frame by frame.
+pub struct Simulator {
+    device: Arc<Device>,
+    frames: Frames,
+    passes: Passes,
+    coincident: bool,
+}
+
+impl Simulator {
+    /// Uploads `scene` and builds its acceleration structures for `tracer`.
+    ///
+    /// # Errors
+    /// Device out of memory, a binding over the device's limit, geometry too deep for the tracer.
+    pub fn new(device: &Arc<Device>, library: &Library, scene: &Scene, tracer: Tracer) -> Result<Self, SimError> {
+        let world = World::new(device, scene, tracer)?;
+        let coincident = scene.coincident_triangles() > 0;
+        let (frame, batches) = frame_constants(scene, coincident, 0);
+        let tables = Tables {
+            tissues: scene.tissues.len(),
+            surfaces: 2 * scene.instances.len(),
+            points: frame.points as usize,
+        };
+        let buffers = Buffers::new(device, &frame, &tables)?;
+        let simulator = Self {
+            device: Arc::clone(device),
+            frames: Frames::new(device, "frame")?,
+            coincident,
+            passes: Passes {
+                kernels: Kernels::new(device, library, tracer)?,
+                buffers,
+                world,
+                frame,
+                batches,
+            },
+        };
+        simulator.upload_tables(scene)?;
+        Ok(simulator)
+    }
+
+    fn upload_tables(&self, scene: &Scene) -> Result<(), GpuError> {
+        let b = &self.passes.buffers;
+        let (rows, tissues) = (tables::rows(scene), tables::tissues(scene));
+        let (surfaces, points) = (tables::surfaces(scene), tables::points(scene));
+        let grey = tables::grey_map(&scene.imaging);
+        self.device.upload_many(&[
+            (&b.rows, 0, bytemuck::cast_slice(&rows)),
+            (&b.tissues, 0, bytemuck::cast_slice(&tissues)),
+            (&b.surfaces, 0, bytemuck::cast_slice(&surfaces)),
+            (&b.points, 0, bytemuck::cast_slice(&points)),
+            (&b.grey, 0, bytemuck::cast_slice(&grey)),
+        ])
+    }
+
+    /// Simulates one frame of `scene` as it stands: pose, placements and settings may differ from
+    /// those at creation, sizes (lines, samples, meshes, image) may not. `index` selects the noise.
+    /// Returns the timings of the frames that have finished since the last call.
+    ///
+    /// # Errors
+    /// What Vulkan says; a lost device names the last pass.
+    pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
+        let passes = &mut self.passes;
+        (passes.frame, passes.batches) = frame_constants(scene, self.coincident, index);
+        let mut cmd = self.frames.begin()?;
+        cmd.scope("update");
+        cmd.write(&passes.buffers.frame, 0, bytemuck::bytes_of(&passes.frame))?;
+        if passes.world.update(&mut cmd, scene)? && passes.world.tracer() == Tracer::RayQuery {
+            cmd.barrier(Stage::Build, Stage::Compute);
+        }
+        passes.clear(&mut cmd);
+        passes.origin(&mut cmd)?;
+        for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
+            passes.trace(&mut cmd, begin)?;
+            passes.scatter(&mut cmd)?;
+        }
+        passes.beam(&mut cmd)?;
+        passes.axial(&mut cmd)?;
+        passes.detect(&mut cmd)?;
+        passes.display(&mut cmd)?;
+        cmd.submit()?;
+        Ok(self.frames.take_timings())
+    }
+
+    /// Waits for the frames in flight; their timings, oldest first.
+    ///
+    /// # Errors
+    /// A lost device, with the last pass that had begun.
+    pub fn wait(&mut self) -> Result<Vec<FrameTimings>, SimError> {
+        self.frames.wait()?;
+        Ok(self.frames.take_timings())
+    }
+
+    /// Constants of the last frame.
+    pub fn constants(&self) -> &layout::Frame {
+        &self.passes.frame
+    }
+
+    /// The B-mode image of the last frame: width, height, RGBA bytes row by row; transparent outside
+    /// the sector.
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
+        let bytes = self.read(|b| &b.pixels)?;
+        let size = 4 * self.passes.frame.image_width as usize * self.passes.frame.image_height as usize;
+        Ok((self.passes.frame.image_width, self.passes.frame.image_height, bytes[..size].to_vec()))
+    }
+
+    /// What the last frame counted.
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn counters(&mut self) -> Result<layout::Counters, SimError> {
+        let bytes = self.read(|b| &b.counters)?;
+        Ok(bytemuck::pod_read_unaligned(&bytes[..size_of::<layout::Counters>()]))
+    }
+
+    /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K].
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn echoes(&mut self) -> Result<[Vec<i32>; 2], SimError> {
+        let surface = self.read(|b| &b.surface_echoes)?;
+        let volume = self.read(|b| &b.volume_echoes)?;
+        Ok([surface, volume].map(|bytes| bytemuck::pod_collect_to_vec(&bytes)))
+    }
+
+    /// Echoes after the lateral stage, with noise, before the axial kernel: complex pairs, [L][K].
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn lateral(&mut self) -> Result<Vec<f32>, SimError> {
+        Ok(bytemuck::pod_collect_to_vec(&self.read(|b| &b.lateral)?))
+    }
+
+    /// Complex baseband before TGC, relative to a perfect mirror: complex pairs, [L][K].
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn iq(&mut self) -> Result<Vec<f32>, SimError> {
+        Ok(bytemuck::pod_collect_to_vec(&self.read(|b| &b.iq)?))
+    }
+
+    /// Log-compressed envelope, 0..1: [L][K].
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn log_image(&mut self) -> Result<Vec<f32>, SimError> {
+        Ok(bytemuck::pod_collect_to_vec(&self.read(|b| &b.log_image)?))
+    }
+
+    fn read(&mut self, buffer: impl Fn(&Buffers) -> &Buffer) -> Result<Vec<u8>, SimError> {
+        self.frames.wait()?;
+        Ok(self.device.read_back(buffer(&self.passes.buffers))?)
+    }
+}
+
+/// The frame's constants, with what only the world and the buffers' sizes decide.
+fn frame_constants(scene: &Scene, coincident: bool, index: u32) -> (layout::Frame, Batches) {
+    let mut frame = tables::frame(scene, index);
+    if coincident {
+        frame.flags |= layout::FLAG_COINCIDENT;
+    }
+    let batches = Batches::new(&frame);
+    frame.segment_capacity = batches.capacity;
+    (frame, batches)
+}

@@ -22,12 +22,14 @@ const LEVEL: (f64, f64) = (-INF, 200.0);
 pub(super) fn simulation(
     document: &Document<'_>,
     table: SimulationTable,
+    frequency: f64,
 ) -> Result<Simulation, SceneError> {
-    let mut out = Simulation::default();
+    // The lattice follows the wavelength: 0.15 mm at 7 MHz.
+    let mut out = Simulation { cell: 1.05 / frequency, ..Simulation::default() };
     overlay!(table => out:
         paths, sampling, max_interactions, max_reflections, min_weight, coherence,
         rough_transmission, face_reflection, scatter_mode, elevation_cells, texture_space, seed;
-        origin_jitter, beam_sigma, cell, volume_floor, speckle_gain, surface_gain);
+        origin_jitter, cell, volume_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
         ("paths", f64::from(out.paths), (1.0, 65_536.0), ""),
         (
@@ -44,7 +46,6 @@ pub(super) fn simulation(
         ),
         ("min_weight", out.min_weight, (0.0, 1.0), ""),
         ("origin_jitter", out.origin_jitter, (0.0, 100.0), "mm"),
-        ("beam_sigma", out.beam_sigma, (1e-3, INF), "mm"),
         ("cell", out.cell, (0.01, 10.0), "mm"),
         ("elevation_cells", out.elevation_cells, (0.0, 1000.0), ""),
         ("volume_floor", out.volume_floor, LEVEL, "dB"),

@@ -95,7 +95,6 @@ pub struct SimulationTable {
     pub rough_transmission: Option<bool>,
     pub face_reflection: Option<bool>,
     pub origin_jitter: Option<Length>,
-    pub beam_sigma: Option<Length>,
     pub scatter_mode: Option<ScatterMode>,
     pub cell: Option<Length>,
     pub elevation_cells: Option<f64>,

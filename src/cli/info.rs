@@ -1,0 +1,35 @@
+//! `insonify info`: what this machine can run.
+
+use miette::{IntoDiagnostic, Result};
+
+/// Lists the Vulkan devices with what each lacks.
+#[derive(Debug, clap::Args)]
+pub struct Info {}
+
+/// Runs the command.
+///
+/// # Errors
+/// No Vulkan loader.
+pub fn run(_: &Info) -> Result<()> {
+    println!("insonify {}", env!("CARGO_PKG_VERSION"));
+    let devices = insonify::gpu::list_devices().into_diagnostic()?;
+    if devices.is_empty() {
+        println!("no Vulkan device; install a GPU driver, or the software driver mesa-vulkan-drivers");
+    }
+    for device in devices {
+        println!(
+            "{}: {} ({}, {}, Vulkan {}, {:.1} GiB){}",
+            device.index,
+            device.name,
+            device.kind,
+            device.driver,
+            device.api_version,
+            device.memory_bytes as f64 / f64::from(1 << 30),
+            if device.usable { "" } else { " - cannot be used" }
+        );
+        for lack in &device.lacks {
+            println!("   lacks {lack}");
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,331 @@
+//! `insonify render`: a scene to a B-mode image.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{Context, IntoDiagnostic, Result, miette};
+use serde_json::{Map, Value, json};
+
+use insonify::gpu::{Device, DeviceOptions, FrameTimings};
+use insonify::scene::{Scene, settings::Quality};
+use insonify::sim::dump::{self, Axis};
+use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
+
+/// Which tracer follows the rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum TracerChoice {
+    /// Ray query where the device has it, else the compute BVH.
+    Auto,
+    /// The device's ray-tracing hardware, or its emulation.
+    RayQuery,
+    /// Our BVH in a compute kernel; runs everywhere.
+    Bvh,
+}
+
+/// Arguments of `insonify render`.
+#[derive(Debug, clap::Args)]
+pub struct Render {
+    /// Scene file (.toml).
+    scene: PathBuf,
+    /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here].
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// How many paths and scatterers: draft suits a software driver, standard is the scene's own
+    /// settings, reference is a proof.
+    #[arg(long, value_enum, default_value = "standard")]
+    quality: QualityChoice,
+    /// Frames to simulate; the last is written, timings are over all.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// Seed of every random number; replaces the scene's.
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Tracer.
+    #[arg(long, value_enum, default_value = "auto")]
+    tracer: TracerChoice,
+    /// Vulkan device: part of its name, or its index in `insonify info`.
+    #[arg(long)]
+    device: Option<String>,
+    /// Overrides an entry of the scene file, e.g. --set simulation.paths=32 --set probe.depth="80 mm".
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = override_of)]
+    overrides: Vec<(String, String)>,
+    /// Writes every stage as a numbered array with its axes into this folder.
+    #[arg(long, value_name = "DIR")]
+    dump: Option<PathBuf>,
+    /// Writes settings, timings, memory and counters as one JSON object.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+    /// Runs with Vulkan's validation layers and fails on any message.
+    #[arg(long)]
+    validate: bool,
+    /// Compiles the kernels of this folder instead of using the built-in ones.
+    #[cfg(feature = "compile")]
+    #[arg(long, value_name = "DIR")]
+    glsl: Option<PathBuf>,
+}
+
+/// `--quality`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum QualityChoice {
+    /// Few paths, coarse lattice.
+    Draft,
+    /// The scene's settings.
+    Standard,
+    /// Many paths, fine lattice, whole slice.
+    Reference,
+}
+
+fn override_of(text: &str) -> Result<(String, String), String> {
+    text.split_once('=')
+        .map(|(path, value)| (path.trim().to_owned(), value.trim().to_owned()))
+        .ok_or_else(|| format!("'{text}' is not PATH=VALUE"))
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Everything that the user or the device can get wrong, said once.
+pub fn run(args: &Render) -> Result<()> {
+    let (mut scene, warnings) = Scene::load(&args.scene, &args.overrides)?;
+    for warning in &warnings {
+        eprintln!("warning: {warning}");
+    }
+    if let Some(seed) = args.seed {
+        scene.simulation.seed = seed;
+    }
+    match args.quality {
+        QualityChoice::Draft => scene.simulation.set_quality(Quality::Draft),
+        QualityChoice::Standard => {}
+        QualityChoice::Reference => scene.simulation.set_quality(Quality::Reference),
+    }
+    let device = Device::new(&DeviceOptions {
+        selector: args.device.clone(),
+        validate: args.validate,
+        without_ray_query: args.tracer == TracerChoice::Bvh,
+    })
+    .into_diagnostic()?;
+    let tracer = choose_tracer(args.tracer, &device)?;
+    let library = library(args)?;
+
+    let loaded = Instant::now();
+    let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
+    let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
+
+    let (timings, frame_ms) = simulate(&mut simulator, &scene, args.frames)?;
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
+    let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
+    save_png(&output, width, height, &rgba)?;
+    println!("{}", output.display());
+    if let Some(dir) = &args.dump {
+        dump_stages(&mut simulator, &scene, dir, (width, height, &rgba))?;
+    }
+
+    let counters = simulator.counters().into_diagnostic()?;
+    if counters.saturated > 0 {
+        eprintln!("warning: {} samples saturated; lower surface_gain or speckle_gain", counters.saturated);
+    }
+    if counters.segments_dropped > 0 {
+        eprintln!("warning: {} path segments did not fit and were dropped; lower simulation.max_interactions", counters.segments_dropped);
+    }
+    if counters.stack_overflow > 0 {
+        eprintln!("warning: {} crossings of more than 8 nested meshes were ignored", counters.stack_overflow);
+    }
+    let messages = device.validation_messages();
+    if let Some(file) = &args.json {
+        let memory = device.memory();
+        let report = json!({
+            "scene": args.scene.display().to_string(),
+            "settings": settings(&scene),
+            "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
+            "tracer": tracer.to_string(),
+            "triangles": scene.triangles(),
+            "build_ms": build_ms,
+            "stages_ms": stage_statistics(&timings),
+            "frame_ms": statistics(&frame_ms),
+            "memory": { "host_peak_bytes": host_peak_bytes(), "device_peak_bytes": memory.peak },
+            "counters": {
+                "rays": counters.rays, "interactions": counters.interactions, "segments": counters.segments,
+                "candidates": counters.candidates, "deposits": counters.deposits,
+                "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
+                "paths_lost": counters.paths_lost,
+            },
+            "saturated_samples": counters.saturated,
+            "validation_messages": messages,
+        });
+        let text = serde_json::to_string_pretty(&report).into_diagnostic()? + "\n";
+        std::fs::write(file, text).into_diagnostic().wrap_err_with(|| format!("writing {}", file.display()))?;
+    }
+    if args.validate && !messages.is_empty() {
+        return Err(miette!("{} validation messages, the first: {}", messages.len(), messages[0]));
+    }
+    Ok(())
+}
+
+/// The tracer to use; `auto` says in one line why it falls back.
+fn choose_tracer(choice: TracerChoice, device: &Device) -> Result<Tracer> {
+    let wanted = match choice {
+        TracerChoice::Auto => None,
+        TracerChoice::RayQuery => Some(Tracer::RayQuery),
+        TracerChoice::Bvh => Some(Tracer::Bvh),
+    };
+    if wanted == Some(Tracer::RayQuery) && !device.supports_ray_query() {
+        return Err(miette!(
+            help = "use --tracer bvh, which runs everywhere, or another --device",
+            "{} has no ray query",
+            device.name()
+        ));
+    }
+    let (tracer, why) = Tracer::choose(wanted, device);
+    if let Some(why) = why {
+        eprintln!("{why}");
+    }
+    Ok(tracer)
+}
+
+#[cfg(feature = "compile")]
+fn library(args: &Render) -> Result<Library> {
+    match &args.glsl {
+        Some(dir) => Library::with_sources(dir).into_diagnostic(),
+        None => Ok(Library::embedded()),
+    }
+}
+
+#[cfg(not(feature = "compile"))]
+fn library(_: &Render) -> Result<Library> {
+    Ok(Library::embedded())
+}
+
+/// All frames; GPU timings of each and the wall time between submissions, ms.
+fn simulate(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<(Vec<FrameTimings>, Vec<f64>)> {
+    // Hidden by indicatif itself when standard error is no terminal; silent under a second.
+    let bar = ProgressBar::new(u64::from(frames)).with_style(
+        ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left").expect("a valid template"),
+    );
+    let start = Instant::now();
+    let (mut timings, mut frame_ms) = (Vec::new(), Vec::new());
+    for index in 0..frames {
+        let begun = Instant::now();
+        timings.extend(simulator.frame(scene, index).into_diagnostic()?);
+        if frames <= 2 || index + 1 == frames {
+            timings.extend(simulator.wait().into_diagnostic()?);
+        }
+        frame_ms.push(begun.elapsed().as_secs_f64() * 1e3);
+        if start.elapsed().as_secs() >= 1 {
+            bar.set_position(u64::from(index) + 1);
+        }
+    }
+    bar.finish_and_clear();
+    Ok((timings, frame_ms))
+}
+
+fn default_output(scene: &Path) -> PathBuf {
+    PathBuf::from(scene.file_stem().unwrap_or_default()).with_extension("png")
+}
+
+fn save_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
+    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let image = image::GrayImage::from_raw(width, height, grey).expect("one byte per pixel");
+    image.save(path).into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
+}
+
+fn dump_stages(simulator: &mut Simulator, scene: &Scene, dir: &Path, image: (u32, u32, &[u8])) -> Result<()> {
+    std::fs::create_dir_all(dir).into_diagnostic().wrap_err_with(|| format!("creating {}", dir.display()))?;
+    let frame = *simulator.constants();
+    let (lines, samples) = (frame.scanlines as usize, frame.samples as usize);
+    let pitch = scene.probe.sample_pitch();
+    let axis = |name, unit, start, step, size| Axis { name, unit, start, step, size };
+    let scanline = || axis("scanline", "1", 0.0, 1.0, lines);
+    let depth = || axis("depth", "mm", 0.0, pitch, samples);
+    let complex = || axis("complex", "real, imaginary", 0.0, 1.0, 2);
+    let write = |name: &str, meaning: &str, axes: &[Axis], data: &[f32]| {
+        dump::stage(dir, name, meaning, axes, data).into_diagnostic().wrap_err_with(|| format!("writing {name}"))
+    };
+
+    let echoes = simulator.echoes().into_diagnostic()?;
+    let rows = insonify::sim::tables::rows(scene);
+    let undone: Vec<f32> = [(&echoes[0], true), (&echoes[1], false)]
+        .into_iter()
+        .flat_map(|(ints, surface)| {
+            let rows = &rows;
+            ints.iter().take(2 * lines * samples).enumerate().map(move |(i, &v)| {
+                let row = &rows[i / 2 % samples];
+                v as f32 * if surface { row.surface_undo } else { row.volume_undo }
+            })
+        })
+        .collect();
+    write(
+        "0_echoes",
+        "deposited echoes relative to a perfect mirror, complex baseband, before any kernel",
+        &[axis("kind", "surface, volume", 0.0, 1.0, 2), scanline(), depth(), complex()],
+        &undone,
+    )?;
+    let lateral = simulator.lateral().into_diagnostic()?;
+    let factor = dump::rf_oversampling(&scene.probe);
+    let rf = dump::rf(&scene.probe, frame.axial_sigma, lines, samples, &lateral, factor);
+    write(
+        "1_rf",
+        "radio-frequency line before TGC",
+        &[scanline(), axis("depth", "mm", 0.0, pitch / factor as f64, samples * factor)],
+        &rf,
+    )?;
+    let iq = simulator.iq().into_diagnostic()?;
+    write("2_iq", "complex baseband before TGC", &[scanline(), depth(), complex()], &iq[..2 * lines * samples])?;
+    let envelope: Vec<f32> = iq
+        .chunks_exact(2)
+        .take(lines * samples)
+        .enumerate()
+        .map(|(i, z)| z[0].hypot(z[1]) * rows[i % samples].tgc)
+        .collect();
+    write("3_envelope", "envelope after TGC", &[scanline(), depth()], &envelope)?;
+    let log = simulator.log_image().into_diagnostic()?;
+    write("4_log", "log-compressed envelope, 0 black to 1 white", &[scanline(), depth()], &log[..lines * samples])?;
+    save_png(&dir.join("5_bmode.png"), image.0, image.1, image.2)?;
+    let (x, z, pixel) = (f64::from(frame.image_left), f64::from(frame.image_top), f64::from(frame.pixel_pitch));
+    let axes = [
+        axis("depth", "mm", z + pixel / 2.0, pixel, image.1 as usize),
+        axis("lateral", "mm", x + pixel / 2.0, pixel, image.0 as usize),
+    ];
+    dump::sidecar(dir, "5_bmode", "scan-converted B-mode image, pixel centres in probe space", &axes).into_diagnostic()
+}
+
+fn settings(scene: &Scene) -> Value {
+    json!({
+        "probe": format!("{:?}", scene.probe),
+        "simulation": format!("{:?}", scene.simulation),
+        "imaging": format!("{:?}", scene.imaging),
+    })
+}
+
+/// Median and 99th percentile (nearest rank).
+fn statistics(values: &[f64]) -> Value {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = |q: f64| sorted.get(((sorted.len() as f64 * q).ceil() as usize).saturating_sub(1));
+    json!({ "median": rank(0.5), "p99": rank(0.99) })
+}
+
+/// Per stage, in frame order; a stage that ran more than once per frame counts whole.
+fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
+    let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
+    for (index, frame) in timings.iter().enumerate() {
+        for (name, ms) in &frame.passes {
+            let at = stages.iter().position(|(n, _)| n == name).unwrap_or_else(|| {
+                stages.push((name.clone(), Vec::new()));
+                stages.len() - 1
+            });
+            stages[at].1.resize(index + 1, 0.0);
+            stages[at].1[index] += ms;
+        }
+    }
+    stages.into_iter().map(|(name, ms)| (name, statistics(&ms))).collect()
+}
+
+/// Largest resident size of this process so far, where the system tells it.
+fn host_peak_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}

@@ -1,0 +1,147 @@
+//! The stages of a frame, each recorded with its bindings and the barrier behind it.
+
+use super::World;
+use super::layout;
+use super::stages::{Batches, Buffers, Kernels, SCATTER_WINDOW, lines};
+use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
+
+/// What the stages work on.
+pub(super) struct Passes {
+    pub(super) kernels: Kernels,
+    pub(super) buffers: Buffers,
+    pub(super) world: World,
+    pub(super) frame: layout::Frame,
+    pub(super) batches: Batches,
+}
+
+impl Passes {
+    pub(super) fn clear(&self, cmd: &mut Commands) {
+        let b = &self.buffers;
+        for buffer in [&b.surface_echoes, &b.volume_echoes, &b.segment_count, &b.counters] {
+            cmd.fill(buffer, 0);
+        }
+        cmd.barrier(Stage::Transfer, Stage::Compute);
+    }
+
+    pub(super) fn origin(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        let (b, w) = (&self.buffers, &self.world);
+        cmd.scope("origin");
+        cmd.dispatch(
+            &self.kernels.origin,
+            [lines(&self.frame), 1, 1],
+            &[],
+            &[
+                Binding::Buffer(&b.frame),
+                Binding::Buffer(w.instances()),
+                Binding::Buffer(w.vertices()),
+                Binding::Buffer(w.triangles()),
+                w.structure(),
+                Binding::Buffer(&b.stacks),
+                Binding::Buffer(&b.counters),
+            ],
+        )?;
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        Ok(())
+    }
+
+    pub(super) fn trace(&self, cmd: &mut Commands, path_begin: u32) -> Result<(), GpuError> {
+        let (b, w) = (&self.buffers, &self.world);
+        if path_begin > 0 {
+            cmd.barrier(Stage::Compute, Stage::Transfer);
+            cmd.fill(&b.segment_count, 0);
+            cmd.barrier(Stage::Transfer, Stage::Compute);
+        }
+        let count = self.batches.paths.min(self.frame.paths - path_begin);
+        cmd.scope("trace");
+        cmd.dispatch(
+            &self.kernels.trace,
+            [lines(&self.frame), count, 1],
+            bytemuck::cast_slice(&[path_begin, count]),
+            &[
+                Binding::Buffer(&b.frame),
+                Binding::Buffer(&b.tissues),
+                Binding::Buffer(&b.surfaces),
+                Binding::Buffer(w.instances()),
+                Binding::Buffer(w.vertices()),
+                Binding::Buffer(w.normals()),
+                Binding::Buffer(w.triangles()),
+                w.structure(),
+                Binding::Buffer(&b.stacks),
+                Binding::Buffer(&b.rows),
+                Binding::Buffer(&b.surface_echoes),
+                Binding::Buffer(&b.segments),
+                Binding::Buffer(&b.segment_count),
+                Binding::Buffer(&b.counters),
+            ],
+        )?;
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        Ok(())
+    }
+
+    pub(super) fn scatter(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        let (b, w) = (&self.buffers, &self.world);
+        // Long lists are shared among workgroups; 64 segments keep one busy.
+        let chunks = self.frame.segment_capacity.div_ceil(64).clamp(1, 16);
+        cmd.scope("scatter");
+        cmd.dispatch_groups(
+            &self.kernels.scatter,
+            [lines(&self.frame), chunks, self.frame.samples.div_ceil(SCATTER_WINDOW)],
+            &[],
+            &[
+                Binding::Buffer(&b.frame),
+                Binding::Buffer(&b.tissues),
+                Binding::Buffer(w.instances()),
+                Binding::Buffer(&b.rows),
+                Binding::Buffer(&b.points),
+                Binding::Buffer(&b.segments),
+                Binding::Buffer(&b.segment_count),
+                Binding::Buffer(&b.volume_echoes),
+                Binding::Buffer(&b.counters),
+            ],
+        )?;
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        Ok(())
+    }
+
+    pub(super) fn beam(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        let b = &self.buffers;
+        let bindings = [&b.frame, &b.rows, &b.surface_echoes, &b.volume_echoes, &b.counters, &b.lateral];
+        self.per_sample(cmd, "beam", &self.kernels.beam, &bindings)
+    }
+
+    pub(super) fn axial(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        let b = &self.buffers;
+        self.per_sample(cmd, "axial", &self.kernels.axial, &[&b.frame, &b.lateral, &b.iq])
+    }
+
+    pub(super) fn detect(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        let b = &self.buffers;
+        self.per_sample(cmd, "detect", &self.kernels.detect, &[&b.frame, &b.rows, &b.iq, &b.log_image])
+    }
+
+    fn per_sample(&self, cmd: &mut Commands, name: &str, kernel: &Kernel, buffers: &[&Buffer]) -> Result<(), GpuError> {
+        let bindings: Vec<Binding> = buffers.iter().map(|b| Binding::Buffer(b)).collect();
+        cmd.scope(name);
+        cmd.dispatch(kernel, [self.frame.samples, self.frame.scanlines, 1], &[], &bindings)?;
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        Ok(())
+    }
+
+    pub(super) fn display(&self, cmd: &mut Commands) -> Result<(), GpuError> {
+        let b = &self.buffers;
+        cmd.scope("display");
+        cmd.dispatch(
+            &self.kernels.display,
+            [self.frame.image_width, self.frame.image_height, 1],
+            &[],
+            &[
+                Binding::Buffer(&b.frame),
+                Binding::Buffer(&b.log_image),
+                Binding::Buffer(&b.grey),
+                Binding::Buffer(&b.pixels),
+            ],
+        )?;
+        cmd.barrier(Stage::Compute, Stage::Transfer);
+        Ok(())
+    }
+}

@@ -1,0 +1,134 @@
+//! Buffers and kernels of the frame, sized once for its geometry.
+
+use std::sync::Arc;
+
+use super::layout;
+use super::shaders::Library;
+use super::tracer::Tracer;
+use crate::gpu::{Buffer, BufferKind, Device, GpuError, Kernel};
+
+/// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
+const SEGMENT_BUDGET: u64 = 96 << 20;
+/// Axial samples that one workgroup of `scatter` gathers (WINDOW in the kernel).
+pub(super) const SCATTER_WINDOW: u32 = 2048;
+
+/// How the paths of a frame are dealt out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Batches {
+    /// Segments that one line may hold; no batch can exceed it.
+    pub(super) capacity: u32,
+    /// Paths traced before their segments are scattered.
+    pub(super) paths: u32,
+}
+
+impl Batches {
+    /// Capacity from the sampling scheme: only path 0 of the main-path scheme writes segments, its
+    /// own and those of one branch per interaction; otherwise every path writes its own. A path of
+    /// B interactions has at most B + 1 segments.
+    pub(super) fn new(frame: &layout::Frame) -> Self {
+        let per_path = frame.max_interactions + 1;
+        let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
+        let affordable = u32::try_from(SEGMENT_BUDGET / line_bytes.max(1)).unwrap_or(u32::MAX);
+        if frame.sampling == layout::SAMPLING_MAIN_PATH {
+            // A branch at interaction i has B - i left, hence B - i + 1 segments.
+            let all = per_path + frame.max_interactions * per_path / 2;
+            return Self {
+                capacity: all.min(affordable.max(1)),
+                paths: frame.paths,
+            };
+        }
+        let paths = (affordable / per_path).clamp(1, frame.paths);
+        Self {
+            capacity: paths * per_path,
+            paths,
+        }
+    }
+}
+
+/// Lines of a frame: scanlines times elevation layers.
+pub(super) fn lines(frame: &layout::Frame) -> u32 {
+    frame.scanlines * frame.layers
+}
+
+/// Everything that is not geometry.
+pub(super) struct Buffers {
+    pub(super) frame: Buffer,
+    pub(super) rows: Buffer,
+    pub(super) tissues: Buffer,
+    pub(super) surfaces: Buffer,
+    pub(super) points: Buffer,
+    pub(super) grey: Buffer,
+    pub(super) stacks: Buffer,
+    pub(super) segments: Buffer,
+    pub(super) segment_count: Buffer,
+    pub(super) surface_echoes: Buffer,
+    pub(super) volume_echoes: Buffer,
+    pub(super) lateral: Buffer,
+    pub(super) iq: Buffer,
+    pub(super) log_image: Buffer,
+    pub(super) pixels: Buffer,
+    pub(super) counters: Buffer,
+}
+
+/// Numbers of table entries.
+pub(super) struct Tables {
+    pub(super) tissues: usize,
+    pub(super) surfaces: usize,
+    pub(super) points: usize,
+}
+
+impl Buffers {
+    pub(super) fn new(device: &Arc<Device>, frame: &layout::Frame, tables: &Tables) -> Result<Self, GpuError> {
+        let new = |name: &str, count: u64, each: usize| {
+            device.buffer(name, (count * each as u64).max(16), BufferKind::Storage)
+        };
+        let samples = u64::from(frame.scanlines) * u64::from(frame.samples);
+        let lines = u64::from(lines(frame));
+        let segments = lines * u64::from(frame.segment_capacity);
+        let pixels = u64::from(frame.image_width) * u64::from(frame.image_height);
+        Ok(Self {
+            frame: new("frame", 1, size_of::<layout::Frame>())?,
+            rows: new("rows", u64::from(frame.samples), size_of::<layout::Row>())?,
+            tissues: new("tissues", tables.tissues as u64, size_of::<layout::Tissue>())?,
+            surfaces: new("surfaces", tables.surfaces as u64, size_of::<layout::Surface>())?,
+            points: new("points", tables.points as u64, 16)?,
+            grey: new("grey map", 256, 4)?,
+            stacks: new("media stacks", lines * (layout::MAX_STACK as u64 + 1), 4)?,
+            segments: new("segments", segments, size_of::<layout::Segment>())?,
+            segment_count: new("segment count", lines, 4)?,
+            surface_echoes: new("surface echoes", samples, 8)?,
+            volume_echoes: new("volume echoes", samples, 8)?,
+            lateral: new("lateral", samples, 8)?,
+            iq: new("iq", samples, 8)?,
+            log_image: new("log image", samples, 4)?,
+            pixels: new("pixels", pixels, 4)?,
+            counters: new("counters", 1, size_of::<layout::Counters>())?,
+        })
+    }
+}
+
+/// The kernels of a frame.
+pub(super) struct Kernels {
+    pub(super) origin: Kernel,
+    pub(super) trace: Kernel,
+    pub(super) scatter: Kernel,
+    pub(super) beam: Kernel,
+    pub(super) axial: Kernel,
+    pub(super) detect: Kernel,
+    pub(super) display: Kernel,
+}
+
+impl Kernels {
+    pub(super) fn new(device: &Arc<Device>, library: &Library, tracer: Tracer) -> Result<Self, GpuError> {
+        let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
+        Ok(Self {
+            origin: kernel(&format!("origin_{}", tracer.suffix()))?,
+            trace: kernel(&format!("trace_{}", tracer.suffix()))?,
+            scatter: kernel("scatter")?,
+            beam: kernel("beam")?,
+            axial: kernel("axial")?,
+            detect: kernel("detect")?,
+            display: kernel("display")?,
+        })
+    }
+}
