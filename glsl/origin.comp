@@ -31,7 +31,7 @@ layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
 #include "probe.glsl"
 #include "transform.glsl"
 
-const uint MAX_OPEN = 16u;      // instances that may be entered or left on the way
+const uint MAX_OPEN = 32u;      // instances that may be entered or left on the way
 const uint MAX_CROSSINGS = 64u;
 
 // Net exits per instance; an instance whose entries and exits balance frees its slot.

@@ -5,7 +5,7 @@
 // Units: mm, microseconds, MHz; weights and amplitudes are relative to a perfect flat mirror.
 
 const uint NONE = 0xffffffffu;
-const uint MAX_STACK = 8u;          // media that may enclose one point
+const uint MAX_STACK = 16u;         // media that may enclose one point
 
 const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;

@@ -130,7 +130,7 @@ pub fn run(args: &Render) -> Result<()> {
         eprintln!("warning: {} path segments did not fit and were dropped; lower simulation.max_interactions", counters.segments_dropped);
     }
     if counters.stack_overflow > 0 {
-        eprintln!("warning: {} crossings of more than 8 nested meshes were ignored", counters.stack_overflow);
+        eprintln!("warning: {} crossings of more than 16 nested meshes were ignored", counters.stack_overflow);
     }
     let messages = device.validation_messages();
     if let Some(file) = &args.json {

@@ -8,7 +8,7 @@ pub type Rows = [[f32; 4]; 3];
 /// No instance.
 pub const NONE: u32 = u32::MAX;
 /// Media that may enclose one point.
-pub const MAX_STACK: usize = 8;
+pub const MAX_STACK: usize = 16;
 
 /// The transmitted path always continues, reflected branches are spawned.
 pub const SAMPLING_MAIN_PATH: u32 = 0;
