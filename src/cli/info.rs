@@ -14,7 +14,9 @@ pub fn run(_: &Info) -> Result<()> {
     println!("insonify {}", env!("CARGO_PKG_VERSION"));
     let devices = insonify::gpu::list_devices().into_diagnostic()?;
     if devices.is_empty() {
-        println!("no Vulkan device; install a GPU driver, or the software driver mesa-vulkan-drivers");
+        println!(
+            "no Vulkan device; install a GPU driver, or the software driver mesa-vulkan-drivers"
+        );
     }
     for device in devices {
         println!(
@@ -25,7 +27,11 @@ pub fn run(_: &Info) -> Result<()> {
             device.driver,
             device.api_version,
             device.memory_bytes as f64 / f64::from(1 << 30),
-            if device.usable { "" } else { " - cannot be used" }
+            if device.usable {
+                ""
+            } else {
+                " - cannot be used"
+            }
         );
         for lack in &device.lacks {
             println!("   lacks {lack}");

@@ -114,7 +114,10 @@ pub fn run(args: &Render) -> Result<()> {
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
     let (timings, frame_ms) = simulate(&mut simulator, &scene, args.frames)?;
-    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
+    let output = args
+        .output
+        .clone()
+        .unwrap_or_else(|| default_output(&args.scene));
     let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
     save_png(&output, width, height, &rgba)?;
     println!("{}", output.display());
@@ -124,13 +127,22 @@ pub fn run(args: &Render) -> Result<()> {
 
     let counters = simulator.counters().into_diagnostic()?;
     if counters.saturated > 0 {
-        eprintln!("warning: {} samples saturated; lower surface_gain or speckle_gain", counters.saturated);
+        eprintln!(
+            "warning: {} samples saturated; lower surface_gain or speckle_gain",
+            counters.saturated
+        );
     }
     if counters.segments_dropped > 0 {
-        eprintln!("warning: {} path segments did not fit and were dropped; lower simulation.max_interactions", counters.segments_dropped);
+        eprintln!(
+            "warning: {} path segments did not fit and were dropped; lower simulation.max_interactions",
+            counters.segments_dropped
+        );
     }
     if counters.stack_overflow > 0 {
-        eprintln!("warning: {} crossings of more than 16 nested meshes were ignored", counters.stack_overflow);
+        eprintln!(
+            "warning: {} crossings of more than 16 nested meshes were ignored",
+            counters.stack_overflow
+        );
     }
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
@@ -155,10 +167,16 @@ pub fn run(args: &Render) -> Result<()> {
             "validation_messages": messages,
         });
         let text = serde_json::to_string_pretty(&report).into_diagnostic()? + "\n";
-        std::fs::write(file, text).into_diagnostic().wrap_err_with(|| format!("writing {}", file.display()))?;
+        std::fs::write(file, text)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("writing {}", file.display()))?;
     }
     if args.validate && !messages.is_empty() {
-        return Err(miette!("{} validation messages, the first: {}", messages.len(), messages[0]));
+        return Err(miette!(
+            "{} validation messages, the first: {}",
+            messages.len(),
+            messages[0]
+        ));
     }
     Ok(())
 }
@@ -198,10 +216,15 @@ fn library(_: &Render) -> Result<Library> {
 }
 
 /// All frames; GPU timings of each and the wall time between submissions, ms.
-fn simulate(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<(Vec<FrameTimings>, Vec<f64>)> {
+fn simulate(
+    simulator: &mut Simulator,
+    scene: &Scene,
+    frames: u32,
+) -> Result<(Vec<FrameTimings>, Vec<f64>)> {
     // Hidden by indicatif itself when standard error is no terminal; silent under a second.
     let bar = ProgressBar::new(u64::from(frames)).with_style(
-        ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left").expect("a valid template"),
+        ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
+            .expect("a valid template"),
     );
     let start = Instant::now();
     let (mut timings, mut frame_ms) = (Vec::new(), Vec::new());
@@ -227,20 +250,38 @@ fn default_output(scene: &Path) -> PathBuf {
 fn save_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
     let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
     let image = image::GrayImage::from_raw(width, height, grey).expect("one byte per pixel");
-    image.save(path).into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
+    image
+        .save(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("writing {}", path.display()))
 }
 
-fn dump_stages(simulator: &mut Simulator, scene: &Scene, dir: &Path, image: (u32, u32, &[u8])) -> Result<()> {
-    std::fs::create_dir_all(dir).into_diagnostic().wrap_err_with(|| format!("creating {}", dir.display()))?;
+fn dump_stages(
+    simulator: &mut Simulator,
+    scene: &Scene,
+    dir: &Path,
+    image: (u32, u32, &[u8]),
+) -> Result<()> {
+    std::fs::create_dir_all(dir)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("creating {}", dir.display()))?;
     let frame = *simulator.constants();
     let (lines, samples) = (frame.scanlines as usize, frame.samples as usize);
     let pitch = scene.probe.sample_pitch();
-    let axis = |name, unit, start, step, size| Axis { name, unit, start, step, size };
+    let axis = |name, unit, start, step, size| Axis {
+        name,
+        unit,
+        start,
+        step,
+        size,
+    };
     let scanline = || axis("scanline", "1", 0.0, 1.0, lines);
     let depth = || axis("depth", "mm", 0.0, pitch, samples);
     let complex = || axis("complex", "real, imaginary", 0.0, 1.0, 2);
     let write = |name: &str, meaning: &str, axes: &[Axis], data: &[f32]| {
-        dump::stage(dir, name, meaning, axes, data).into_diagnostic().wrap_err_with(|| format!("writing {name}"))
+        dump::stage(dir, name, meaning, axes, data)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("writing {name}"))
     };
 
     let echoes = simulator.echoes().into_diagnostic()?;
@@ -249,45 +290,93 @@ fn dump_stages(simulator: &mut Simulator, scene: &Scene, dir: &Path, image: (u32
         .into_iter()
         .flat_map(|(ints, surface)| {
             let rows = &rows;
-            ints.iter().take(2 * lines * samples).enumerate().map(move |(i, &v)| {
-                let row = &rows[i / 2 % samples];
-                v as f32 * if surface { row.surface_undo } else { row.volume_undo }
-            })
+            ints.iter()
+                .take(2 * lines * samples)
+                .enumerate()
+                .map(move |(i, &v)| {
+                    let row = &rows[i / 2 % samples];
+                    v as f32
+                        * if surface {
+                            row.surface_undo
+                        } else {
+                            row.volume_undo
+                        }
+                })
         })
         .collect();
     write(
         "0_echoes",
         "deposited echoes relative to a perfect mirror, complex baseband, before any kernel",
-        &[axis("kind", "surface, volume", 0.0, 1.0, 2), scanline(), depth(), complex()],
+        &[
+            axis("kind", "surface, volume", 0.0, 1.0, 2),
+            scanline(),
+            depth(),
+            complex(),
+        ],
         &undone,
     )?;
     let lateral = simulator.lateral().into_diagnostic()?;
     let factor = dump::rf_oversampling(&scene.probe);
-    let rf = dump::rf(&scene.probe, frame.axial_sigma, lines, samples, &lateral, factor);
+    let rf = dump::rf(
+        &scene.probe,
+        frame.axial_sigma,
+        lines,
+        samples,
+        &lateral,
+        factor,
+    );
     write(
         "1_rf",
         "radio-frequency line before TGC",
-        &[scanline(), axis("depth", "mm", 0.0, pitch / factor as f64, samples * factor)],
+        &[
+            scanline(),
+            axis("depth", "mm", 0.0, pitch / factor as f64, samples * factor),
+        ],
         &rf,
     )?;
     let iq = simulator.iq().into_diagnostic()?;
-    write("2_iq", "complex baseband before TGC", &[scanline(), depth(), complex()], &iq[..2 * lines * samples])?;
+    write(
+        "2_iq",
+        "complex baseband before TGC",
+        &[scanline(), depth(), complex()],
+        &iq[..2 * lines * samples],
+    )?;
     let envelope: Vec<f32> = iq
         .chunks_exact(2)
         .take(lines * samples)
         .enumerate()
         .map(|(i, z)| z[0].hypot(z[1]) * rows[i % samples].tgc)
         .collect();
-    write("3_envelope", "envelope after TGC", &[scanline(), depth()], &envelope)?;
+    write(
+        "3_envelope",
+        "envelope after TGC",
+        &[scanline(), depth()],
+        &envelope,
+    )?;
     let log = simulator.log_image().into_diagnostic()?;
-    write("4_log", "log-compressed envelope, 0 black to 1 white", &[scanline(), depth()], &log[..lines * samples])?;
+    write(
+        "4_log",
+        "log-compressed envelope, 0 black to 1 white",
+        &[scanline(), depth()],
+        &log[..lines * samples],
+    )?;
     save_png(&dir.join("5_bmode.png"), image.0, image.1, image.2)?;
-    let (x, z, pixel) = (f64::from(frame.image_left), f64::from(frame.image_top), f64::from(frame.pixel_pitch));
+    let (x, z, pixel) = (
+        f64::from(frame.image_left),
+        f64::from(frame.image_top),
+        f64::from(frame.pixel_pitch),
+    );
     let axes = [
         axis("depth", "mm", z + pixel / 2.0, pixel, image.1 as usize),
         axis("lateral", "mm", x + pixel / 2.0, pixel, image.0 as usize),
     ];
-    dump::sidecar(dir, "5_bmode", "scan-converted B-mode image, pixel centres in probe space", &axes).into_diagnostic()
+    dump::sidecar(
+        dir,
+        "5_bmode",
+        "scan-converted B-mode image, pixel centres in probe space",
+        &axes,
+    )
+    .into_diagnostic()
 }
 
 fn settings(scene: &Scene) -> Value {
@@ -311,15 +400,21 @@ fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
     let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
     for (index, frame) in timings.iter().enumerate() {
         for (name, ms) in &frame.passes {
-            let at = stages.iter().position(|(n, _)| n == name).unwrap_or_else(|| {
-                stages.push((name.clone(), Vec::new()));
-                stages.len() - 1
-            });
+            let at = stages
+                .iter()
+                .position(|(n, _)| n == name)
+                .unwrap_or_else(|| {
+                    stages.push((name.clone(), Vec::new()));
+                    stages.len() - 1
+                });
             stages[at].1.resize(index + 1, 0.0);
             stages[at].1[index] += ms;
         }
     }
-    stages.into_iter().map(|(name, ms)| (name, statistics(&ms))).collect()
+    stages
+        .into_iter()
+        .map(|(name, ms)| (name, statistics(&ms)))
+        .collect()
 }
 
 /// Largest resident size of this process so far, where the system tells it.

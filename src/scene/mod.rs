@@ -108,7 +108,10 @@ pub struct Scene {
 impl Scene {
     /// Triangles of all placed meshes.
     pub fn triangles(&self) -> usize {
-        self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len()).sum()
+        self.instances
+            .iter()
+            .map(|i| self.meshes[i.mesh].triangles.len())
+            .sum()
     }
 }
 

@@ -50,7 +50,8 @@ pub struct Simulation {
     pub paths: u32,
     /// Sampling scheme.
     pub sampling: Sampling,
-    /// Most interactions of one path (B_max).
+    /// Most interactions of one path (B_max), transmissions included: an abdominal wall alone has
+    /// nine interfaces.
     pub max_interactions: u32,
     /// Most reflections of one path.
     pub max_reflections: u32,
@@ -140,7 +141,7 @@ impl Default for Simulation {
         Self {
             paths: 8,
             sampling: Sampling::MainPath,
-            max_interactions: 10,
+            max_interactions: 32,
             max_reflections: 3,
             min_weight: 1e-6,
             coherence: Coherence::Split,

@@ -12,8 +12,17 @@ use crate::probe::Probe;
 /// # Errors
 /// What the file system says.
 pub fn write_npy(path: &Path, shape: &[usize], data: &[f32]) -> std::io::Result<()> {
-    assert_eq!(shape.iter().product::<usize>(), data.len(), "shape and data of {}", path.display());
-    let shape = shape.iter().map(|n| format!("{n},")).collect::<Vec<_>>().join(" ");
+    assert_eq!(
+        shape.iter().product::<usize>(),
+        data.len(),
+        "shape and data of {}",
+        path.display()
+    );
+    let shape = shape
+        .iter()
+        .map(|n| format!("{n},"))
+        .collect::<Vec<_>>()
+        .join(" ");
     let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}");
     // The header ends in a newline and, with the ten bytes before it, fills whole lines of 64.
     let padding = 63 - (10 + header.len()) % 64;
@@ -21,7 +30,11 @@ pub fn write_npy(path: &Path, shape: &[usize], data: &[f32]) -> std::io::Result<
     header.push('\n');
     let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
     file.write_all(b"\x93NUMPY\x01\x00")?;
-    file.write_all(&u16::try_from(header.len()).expect("a short header").to_le_bytes())?;
+    file.write_all(
+        &u16::try_from(header.len())
+            .expect("a short header")
+            .to_le_bytes(),
+    )?;
     file.write_all(header.as_bytes())?;
     file.write_all(bytemuck::cast_slice(data))?;
     file.flush()
@@ -45,7 +58,13 @@ pub struct Axis {
 ///
 /// # Errors
 /// What the file system says.
-pub fn stage(dir: &Path, name: &str, meaning: &str, axes: &[Axis], data: &[f32]) -> std::io::Result<()> {
+pub fn stage(
+    dir: &Path,
+    name: &str,
+    meaning: &str,
+    axes: &[Axis],
+    data: &[f32],
+) -> std::io::Result<()> {
     let shape: Vec<usize> = axes.iter().map(|axis| axis.size).collect();
     write_npy(&dir.join(format!("{name}.npy")), &shape, data)?;
     sidecar(dir, name, meaning, axes)
@@ -60,7 +79,8 @@ pub fn sidecar(dir: &Path, name: &str, meaning: &str, axes: &[Axis]) -> std::io:
         .iter()
         .map(|a| json!({"name": a.name, "unit": a.unit, "start": a.start, "step": a.step, "size": a.size}))
         .collect();
-    let text = serde_json::to_string_pretty(&json!({"meaning": meaning, "axes": axes})).expect("plain JSON");
+    let text = serde_json::to_string_pretty(&json!({"meaning": meaning, "axes": axes}))
+        .expect("plain JSON");
     std::fs::write(dir.join(format!("{name}.json")), text + "\n")
 }
 
@@ -72,7 +92,14 @@ pub fn rf_oversampling(probe: &Probe) -> usize {
 
 /// RF lines from the complex baseband before the axial kernel ([L][K] pairs): the Gaussian kernel
 /// is evaluated at the finer positions, so nothing is interpolated. Shape [L][K * factor].
-pub fn rf(probe: &Probe, sigma: f32, lines: usize, samples: usize, lateral: &[f32], factor: usize) -> Vec<f32> {
+pub fn rf(
+    probe: &Probe,
+    sigma: f32,
+    lines: usize,
+    samples: usize,
+    lateral: &[f32],
+    factor: usize,
+) -> Vec<f32> {
     let reach = (4.0 * sigma).ceil() as isize;
     let cycles = 2.0 * probe.frequency * probe.sample_pitch() / probe.speed;
     let mut out = Vec::with_capacity(lines * samples * factor);

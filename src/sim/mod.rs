@@ -17,8 +17,8 @@ use std::sync::Arc;
 
 use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Stage};
 use crate::scene::Scene;
-use shaders::Library;
 use passes::Passes;
+use shaders::Library;
 use stages::{Batches, Buffers, Kernels, Tables};
 pub use tracer::Tracer;
 use world::World;
@@ -47,7 +47,12 @@ impl Simulator {
     ///
     /// # Errors
     /// Device out of memory, a binding over the device's limit, geometry too deep for the tracer.
-    pub fn new(device: &Arc<Device>, library: &Library, scene: &Scene, tracer: Tracer) -> Result<Self, SimError> {
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        tracer: Tracer,
+    ) -> Result<Self, SimError> {
         let world = World::new(device, scene, tracer)?;
         let coincident = scene.coincident_triangles() > 0;
         let (frame, batches) = frame_constants(scene, coincident, 0);
@@ -137,8 +142,13 @@ impl Simulator {
     /// What Vulkan says.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
         let bytes = self.read(|b| &b.pixels)?;
-        let size = 4 * self.passes.frame.image_width as usize * self.passes.frame.image_height as usize;
-        Ok((self.passes.frame.image_width, self.passes.frame.image_height, bytes[..size].to_vec()))
+        let size =
+            4 * self.passes.frame.image_width as usize * self.passes.frame.image_height as usize;
+        Ok((
+            self.passes.frame.image_width,
+            self.passes.frame.image_height,
+            bytes[..size].to_vec(),
+        ))
     }
 
     /// What the last frame counted.
@@ -147,7 +157,9 @@ impl Simulator {
     /// What Vulkan says.
     pub fn counters(&mut self) -> Result<layout::Counters, SimError> {
         let bytes = self.read(|b| &b.counters)?;
-        Ok(bytemuck::pod_read_unaligned(&bytes[..size_of::<layout::Counters>()]))
+        Ok(bytemuck::pod_read_unaligned(
+            &bytes[..size_of::<layout::Counters>()],
+        ))
     }
 
     /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K].

@@ -17,7 +17,12 @@ pub(super) struct Passes {
 impl Passes {
     pub(super) fn clear(&self, cmd: &mut Commands) {
         let b = &self.buffers;
-        for buffer in [&b.surface_echoes, &b.volume_echoes, &b.segment_count, &b.counters] {
+        for buffer in [
+            &b.surface_echoes,
+            &b.volume_echoes,
+            &b.segment_count,
+            &b.counters,
+        ] {
             cmd.fill(buffer, 0);
         }
         cmd.barrier(Stage::Transfer, Stage::Compute);
@@ -80,12 +85,20 @@ impl Passes {
 
     pub(super) fn scatter(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let (b, w) = (&self.buffers, &self.world);
-        // Long lists are shared among workgroups; 64 segments keep one busy.
-        let chunks = self.frame.segment_capacity.div_ceil(64).clamp(1, 16);
+        // Lists of many paths are shared among workgroups: each clears and flushes its own window.
+        let chunks = self
+            .batches
+            .paths_with_segments(&self.frame)
+            .div_ceil(8)
+            .clamp(1, 16);
         cmd.scope("scatter");
         cmd.dispatch_groups(
             &self.kernels.scatter,
-            [lines(&self.frame), chunks, self.frame.samples.div_ceil(SCATTER_WINDOW)],
+            [
+                lines(&self.frame),
+                chunks,
+                self.frame.samples.div_ceil(SCATTER_WINDOW),
+            ],
             &[],
             &[
                 Binding::Buffer(&b.frame),
@@ -105,24 +118,52 @@ impl Passes {
 
     pub(super) fn beam(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let b = &self.buffers;
-        let bindings = [&b.frame, &b.rows, &b.surface_echoes, &b.volume_echoes, &b.counters, &b.lateral];
+        let bindings = [
+            &b.frame,
+            &b.rows,
+            &b.surface_echoes,
+            &b.volume_echoes,
+            &b.counters,
+            &b.lateral,
+        ];
         self.per_sample(cmd, "beam", &self.kernels.beam, &bindings)
     }
 
     pub(super) fn axial(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let b = &self.buffers;
-        self.per_sample(cmd, "axial", &self.kernels.axial, &[&b.frame, &b.lateral, &b.iq])
+        self.per_sample(
+            cmd,
+            "axial",
+            &self.kernels.axial,
+            &[&b.frame, &b.lateral, &b.iq],
+        )
     }
 
     pub(super) fn detect(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let b = &self.buffers;
-        self.per_sample(cmd, "detect", &self.kernels.detect, &[&b.frame, &b.rows, &b.iq, &b.log_image])
+        self.per_sample(
+            cmd,
+            "detect",
+            &self.kernels.detect,
+            &[&b.frame, &b.rows, &b.iq, &b.log_image],
+        )
     }
 
-    fn per_sample(&self, cmd: &mut Commands, name: &str, kernel: &Kernel, buffers: &[&Buffer]) -> Result<(), GpuError> {
+    fn per_sample(
+        &self,
+        cmd: &mut Commands,
+        name: &str,
+        kernel: &Kernel,
+        buffers: &[&Buffer],
+    ) -> Result<(), GpuError> {
         let bindings: Vec<Binding> = buffers.iter().map(|b| Binding::Buffer(b)).collect();
         cmd.scope(name);
-        cmd.dispatch(kernel, [self.frame.samples, self.frame.scanlines, 1], &[], &bindings)?;
+        cmd.dispatch(
+            kernel,
+            [self.frame.samples, self.frame.scanlines, 1],
+            &[],
+            &bindings,
+        )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
         Ok(())
     }

@@ -23,15 +23,16 @@ pub(super) struct Batches {
 
 impl Batches {
     /// Capacity from the sampling scheme: only path 0 of the main-path scheme writes segments, its
-    /// own and those of one branch per interaction; otherwise every path writes its own. A path of
+    /// own and those of its branches; otherwise every path writes its own. A path of
     /// B interactions has at most B + 1 segments.
     pub(super) fn new(frame: &layout::Frame) -> Self {
         let per_path = frame.max_interactions + 1;
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
         let affordable = u32::try_from(SEGMENT_BUDGET / line_bytes.max(1)).unwrap_or(u32::MAX);
         if frame.sampling == layout::SAMPLING_MAIN_PATH {
-            // A branch at interaction i has B - i left, hence B - i + 1 segments.
-            let all = per_path + frame.max_interactions * per_path / 2;
+            // The main path's own, and three times as many for its branches, most of which end under
+            // the volume floor; what does not fit is counted and reported.
+            let all = 4 * per_path;
             return Self {
                 capacity: all.min(affordable.max(1)),
                 paths: frame.paths,
@@ -41,6 +42,17 @@ impl Batches {
         Self {
             capacity: paths * per_path,
             paths,
+        }
+    }
+}
+
+impl Batches {
+    /// Paths of one line that write segments of their own.
+    pub(super) fn paths_with_segments(&self, frame: &layout::Frame) -> u32 {
+        if frame.sampling == layout::SAMPLING_MAIN_PATH {
+            1
+        } else {
+            self.paths
         }
     }
 }
@@ -78,7 +90,11 @@ pub(super) struct Tables {
 }
 
 impl Buffers {
-    pub(super) fn new(device: &Arc<Device>, frame: &layout::Frame, tables: &Tables) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        device: &Arc<Device>,
+        frame: &layout::Frame,
+        tables: &Tables,
+    ) -> Result<Self, GpuError> {
         let new = |name: &str, count: u64, each: usize| {
             device.buffer(name, (count * each as u64).max(16), BufferKind::Storage)
         };
@@ -89,8 +105,16 @@ impl Buffers {
         Ok(Self {
             frame: new("frame", 1, size_of::<layout::Frame>())?,
             rows: new("rows", u64::from(frame.samples), size_of::<layout::Row>())?,
-            tissues: new("tissues", tables.tissues as u64, size_of::<layout::Tissue>())?,
-            surfaces: new("surfaces", tables.surfaces as u64, size_of::<layout::Surface>())?,
+            tissues: new(
+                "tissues",
+                tables.tissues as u64,
+                size_of::<layout::Tissue>(),
+            )?,
+            surfaces: new(
+                "surfaces",
+                tables.surfaces as u64,
+                size_of::<layout::Surface>(),
+            )?,
             points: new("points", tables.points as u64, 16)?,
             grey: new("grey map", 256, 4)?,
             stacks: new("media stacks", lines * (layout::MAX_STACK as u64 + 1), 4)?,
@@ -119,7 +143,11 @@ pub(super) struct Kernels {
 }
 
 impl Kernels {
-    pub(super) fn new(device: &Arc<Device>, library: &Library, tracer: Tracer) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        tracer: Tracer,
+    ) -> Result<Self, GpuError> {
         let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
         Ok(Self {
             origin: kernel(&format!("origin_{}", tracer.suffix()))?,

@@ -25,7 +25,10 @@ pub(super) fn simulation(
     frequency: f64,
 ) -> Result<Simulation, SceneError> {
     // The lattice follows the wavelength: 0.15 mm at 7 MHz.
-    let mut out = Simulation { cell: 1.05 / frequency, ..Simulation::default() };
+    let mut out = Simulation {
+        cell: 1.05 / frequency,
+        ..Simulation::default()
+    };
     overlay!(table => out:
         paths, sampling, max_interactions, max_reflections, min_weight, coherence,
         rough_transmission, face_reflection, scatter_mode, elevation_cells, texture_space, seed;
