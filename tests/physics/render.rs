@@ -1,11 +1,14 @@
-//! Frames by the f64 twins, brute force from rays to pixels.
+//! Frames by the f64 twins, brute force from rays to pixels, and by the device with either tracer.
+
+use std::sync::Arc;
 
 use glam::DVec3;
+use insonify::gpu;
 use insonify::reference::world::Geometry;
 use insonify::reference::{Accumulator, Segment, World};
 use insonify::reference::{axial, beam, detect, display, origin, scatter, trace};
 use insonify::scene::Scene;
-use insonify::sim::{layout, tables};
+use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
 
 /// A scene as the kernels read it.
 pub struct Inputs {
@@ -131,6 +134,57 @@ pub fn twin(scene: &Scene) -> Frame {
             .collect(),
         pixels: display::display(frame, &single(levels.clone()), &grey),
         levels: levels.chunks(samples).map(<[f64]>::to_vec).collect(),
+    }
+}
+
+/// What computes frames, and its name.
+pub type Renderer = (&'static str, Box<dyn Fn(&Scene) -> Frame>);
+
+/// The twins, and the device with either tracer.
+pub fn renderers() -> [Renderer; 3] {
+    let device = gpu::test_device();
+    let other = device.clone();
+    [
+        ("twins", Box::new(twin)),
+        ("bvh", Box::new(move |s| on(&device, s, Tracer::Bvh))),
+        ("query", Box::new(move |s| on(&other, s, Tracer::RayQuery))),
+    ]
+}
+
+/// The frame of `scene` by the device. Nothing may be lost on the way, and validation is silent.
+fn on(device: &Arc<gpu::Device>, scene: &Scene, tracer: Tracer) -> Frame {
+    let mut simulator = Simulator::new(device, &Library::embedded(), scene, tracer)
+        .unwrap_or_else(|e| panic!("{tracer}: {e}"));
+    let mut read = || {
+        simulator.frame(scene, 0)?;
+        let counters = simulator.counters()?;
+        assert_eq!(
+            [
+                counters.saturated,
+                counters.segments_dropped,
+                counters.stack_overflow
+            ],
+            [0; 3],
+            "{tracer}: saturated, dropped, overflown"
+        );
+        Ok::<_, insonify::sim::SimError>((
+            simulator.iq()?,
+            simulator.log_image()?,
+            simulator.pixels()?.2,
+        ))
+    };
+    let (iq, levels, pixels) = read().unwrap_or_else(|e| panic!("{tracer}: {e}"));
+    drop(simulator);
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
+    let samples = scene.probe.samples as usize;
+    let wide = |v: &[f32]| v.iter().map(|&x| f64::from(x)).collect::<Vec<f64>>();
+    Frame {
+        iq: iq
+            .chunks(2 * samples)
+            .map(|l| wide(l).chunks(2).map(|v| [v[0], v[1]]).collect())
+            .collect(),
+        levels: levels.chunks(samples).map(wide).collect(),
+        pixels: bytemuck::pod_collect_to_vec(&pixels),
     }
 }
 
