@@ -1,7 +1,7 @@
 // Closest hit by a walk down a two-level, eight-wide bounding volume hierarchy.
 //
-// The includer declares: instances[], vertices[], triangles[] and `uvec4 nodes[]`, five of them per
-// node, the format of Ylitie, Karras, Laine 2017 with each axis' planes together:
+// The includer includes triangle.glsl and declares `uvec4 nodes[]`, five of them per node, the format
+// of Ylitie, Karras, Laine 2017 with each axis' planes together:
 //   corner p (3 floats), exponents of the quantum e per axis and mask of inner children (4 bytes);
 //   first inner child, first primitive, what each of 8 children is (8 bytes);
 //   per axis x, y, z: lower planes of the 8 children (8 bytes), upper planes (8 bytes): p + e byte.
@@ -19,14 +19,9 @@ uint bvh_triangle_tests = 0u;
 struct BvhRay {
     vec3 origin;
     vec3 inverse;      // of the direction; finite where that is zero
-    vec3 shear;        // Woop, Benthin, Wald 2013, section 3.1
-    uint axis;         // along which the direction is largest
     uint octant;       // of the direction, complemented, in each byte
+    ShearedRay sheared;
 };
-
-vec3 bvh_permute(vec3 v, uint axis) {
-    return axis == 0u ? v.yzx : (axis == 1u ? v.zxy : v);
-}
 
 BvhRay bvh_ray(vec3 origin, vec3 direction) {
     BvhRay ray;
@@ -35,9 +30,7 @@ BvhRay bvh_ray(vec3 origin, vec3 direction) {
     ray.inverse = 1.0 / mix(direction, vec3(1e-24), lessThan(size, vec3(1e-24)));
     ray.octant = (ray.inverse.x < 0.0 ? 0u : 0x04040404u) | (ray.inverse.y < 0.0 ? 0u : 0x02020202u)
         | (ray.inverse.z < 0.0 ? 0u : 0x01010101u);
-    ray.axis = size.x > size.y ? (size.x > size.z ? 0u : 2u) : (size.y > size.z ? 1u : 2u);
-    vec3 d = bvh_permute(direction, ray.axis);
-    ray.shear = vec3(d.x / d.z, d.y / d.z, 1.0 / d.z);
+    ray.sheared = sheared_ray(origin, direction);
     return ray;
 }
 
@@ -65,29 +58,10 @@ uint bvh_children(BvhRay ray, uint meta, uvec3 lo, uvec3 hi, vec3 scale, vec3 ne
         | (met.w ? (bits >> 24u) << (place >> 24u) : 0u);
 }
 
-vec3 bvh_vertex(uint index) {
-    return vec3(vertices[3u * index], vertices[3u * index + 1u], vertices[3u * index + 2u]);
-}
-
-// Watertight: products are rounded alike for both triangles of an edge (`precise`: no fused
-// multiply-add), and rounding is monotonic, so that an edge function has its true sign or is zero;
-// zero counts as inside for both.
 void bvh_triangle(BvhRay ray, uint instance, uint triangle, float t_min, inout Hit hit) {
-    vec3 a = bvh_permute(bvh_vertex(triangles[3u * triangle]) - ray.origin, ray.axis);
-    vec3 b = bvh_permute(bvh_vertex(triangles[3u * triangle + 1u]) - ray.origin, ray.axis);
-    vec3 c = bvh_permute(bvh_vertex(triangles[3u * triangle + 2u]) - ray.origin, ray.axis);
-    precise vec2 p = a.xy - ray.shear.xy * a.z;
-    precise vec2 q = b.xy - ray.shear.xy * b.z;
-    precise vec2 r = c.xy - ray.shear.xy * c.z;
-    precise float u = r.x * q.y - r.y * q.x;
-    precise float v = p.x * r.y - p.y * r.x;
-    precise float w = q.x * p.y - q.y * p.x;
-    if (min(u, min(v, w)) < 0.0 && max(u, max(v, w)) > 0.0) return;
-    float determinant = u + v + w;
-    if (determinant == 0.0) return;
-    float inverse = 1.0 / determinant;
-    float t = (u * a.z + v * b.z + w * c.z) * ray.shear.z * inverse;
-    if (t > t_min && t < hit.t) hit = Hit(t, instance, triangle, v * inverse, w * inverse);
+    TriangleHit h = triangle_hit(ray.sheared, triangle);
+    if (min(h.edges.x, min(h.edges.y, h.edges.z)) < 0.0 && max(h.edges.x, max(h.edges.y, h.edges.z)) > 0.0) return;
+    if (h.sum != 0.0 && h.t > t_min && h.t < hit.t) hit = Hit(h.t, instance, triangle, h.u, h.v);
 }
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
@@ -167,12 +141,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             }
             instance = entered;
             base = depth;
-            vec4 x = instances[instance].object_from_world[0];
-            vec4 y = instances[instance].object_from_world[1];
-            vec4 z = instances[instance].object_from_world[2];
-            ray = bvh_ray(
-                vec3(dot(x.xyz, origin) + x.w, dot(y.xyz, origin) + y.w, dot(z.xyz, origin) + z.w),
-                vec3(dot(x.xyz, direction), dot(y.xyz, direction), dot(z.xyz, direction)));
+            ray = bvh_ray(object_point(instance, origin), object_direction(instance, direction));
             inner = uvec2(instances[instance].bvh_root, 0x80000000u);
             primitives = uvec2(0u);
         }

@@ -1,7 +1,8 @@
 // Closest hit by the device's ray query. Same interface as intersect_bvh.glsl.
 //
-// The includer enables GL_EXT_ray_query and declares instances[] and `tlas`, whose instances carry
-// our instance as custom index and whose meshes hold the triangles in the same order as triangles[].
+// The includer enables GL_EXT_ray_query, includes triangle.glsl, and declares `tlas`, whose
+// instances carry our instance as custom index and whose meshes hold the triangles in the same order
+// as triangles[].
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
@@ -30,6 +31,14 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             + uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
         hit.u = uv.x;
         hit.v = uv.y;
+        // The device only chooses the triangle; where it is met, both tracers must say alike.
+        ShearedRay ray = sheared_ray(object_point(hit.instance, origin), object_direction(hit.instance, direction));
+        TriangleHit h = triangle_hit(ray, hit.primitive);
+        if (h.sum != 0.0 && h.t > t_min && h.t < t_max) {
+            hit.t = h.t;
+            hit.u = h.u;
+            hit.v = h.v;
+        }
     }
     return hit;
 }

@@ -22,6 +22,7 @@ layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
 layout(std430, binding = 6) buffer StackBuffer { uint stacks[]; };
 layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
 
+#include "triangle.glsl"
 #ifdef RAY_QUERY
 #include "intersect_query.glsl"
 #else

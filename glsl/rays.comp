@@ -35,6 +35,7 @@ layout(std430, binding = 4) readonly buffer Nodes { uvec4 nodes[]; };
 layout(std430, binding = 5) readonly buffer Rays { Ray rays[]; };
 layout(std430, binding = 6) buffer Hits { RayHit hits[]; };
 
+#include "triangle.glsl"
 #ifdef RAY_QUERY
 #include "intersect_query.glsl"
 #else

@@ -33,6 +33,7 @@ layout(std430, binding = 13) buffer CounterBuffer { Counters counters; };
 
 layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 
+#include "triangle.glsl"
 #ifdef RAY_QUERY
 #include "intersect_query.glsl"
 #else
