@@ -67,7 +67,8 @@ struct Row {
     float lateral_lines;                          // sigma_lateral in scanline pitches
     float tgc;                                    // linear, applied to the IQ in detect
     float compensation;                           // linear, attenuation compensation of a weight at this depth
-    float unused0; float unused1;
+    float incoherent_gain;                        // keeps incoherent surface echoes at their energy through the averages
+    float unused0;
 };
 
 // A straight stretch of a path inside one medium.

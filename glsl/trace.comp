@@ -64,7 +64,7 @@ uint row_of(float time) {
     return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
 }
 
-void deposit_surface(uint line, float time, vec2 amplitude) {
+void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent) {
     uint l = line % frame.scanlines;
     float y = elevation(line / frame.scanlines);
     float kappa = frame.speed * time / frame.sample_pitch;
@@ -77,6 +77,7 @@ void deposit_surface(uint line, float time, vec2 amplitude) {
         uint k = uint(at);
         float sigma = rows[k].sigma_elevation;
         float gain = rows[k].surface_gain * exp(-0.5 * y * y / (sigma * sigma));
+        if (incoherent) gain *= rows[k].incoherent_gain;
         vec2 v = q * gain * (i == 0 ? 1.0 - (kappa - base) : kappa - base);
         uint slot = 2u * (l * frame.samples + k);
         int re = to_fixed(v.x, frame.surface_scale);
@@ -197,10 +198,10 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     float late = path.time + q / t1.speed;
     float behind = amplitude * exp(-t1.absorption * q);
     if ((frame.flags & FLAG_COHERENT) != 0u) {
-        deposit_surface(line, late, vec2(path.share * behind, 0.0));
+        deposit_surface(line, late, vec2(path.share * behind, 0.0), false);
         return;
     }
-    deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0));
+    deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0), false);
     if (s.coherence >= 1.0) return;
     // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
     // tracer would choose the phase.
@@ -208,7 +209,7 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     uvec3 cell = uvec3(ivec3(floor(p)));
     float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
-    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)));
+    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)), true);
 }
 
 void main() {

@@ -245,8 +245,9 @@ fn sums_cannot_reach_the_accumulators_end() {
     // Every path's echo in phase, split as the tracer does, on every layer.
     let paths = f64::from(frame.paths);
     let gamma = f64::from(surface.coherence);
-    let shares = gamma + (1.0 - gamma * gamma).sqrt() * paths.sqrt();
     let row = rows[2047];
+    let incoherent = paths.sqrt() * f64::from(row.incoherent_gain);
+    let shares = gamma + (1.0 - gamma * gamma).sqrt() * incoherent;
     let weights = Calibration::new(&scene).elevation_weights(2047.0 * scene.probe.sample_pitch());
     let sum = shares * f64::from(surface.gain) * f64::from(row.surface_gain) * weights;
     let fixed = sum * f64::from(frame.surface_scale);

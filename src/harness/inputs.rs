@@ -106,6 +106,7 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 volume_gain: 1.0 + 0.01 * depth,
                 point_gain: 0.8,
                 surface_gain: 1.2 - 0.005 * depth,
+                incoherent_gain: 1.5 + 0.01 * depth,
                 volume_undo: 1.0 / 65536.0,
                 surface_undo: 1.0 / (65536.0 * (1.2 - 0.005 * depth)),
                 lateral_lines: 0.03 + 0.06 * depth,

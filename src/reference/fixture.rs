@@ -50,6 +50,7 @@ impl Fixture {
             volume_gain: 1.0,
             point_gain: 1.0,
             surface_gain: 1.0,
+            incoherent_gain: 1.0,
             compensation: 1.0,
             ..Row::default()
         };

@@ -152,7 +152,8 @@ impl Interface {
             let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
             let phase = std::f64::consts::TAU * unit(words[3]);
             let scale = rest * (path.share * path.probability).sqrt();
-            out.deposit(l, time, scale * behind, phase, gain);
+            let incoherent = |k: usize| gain(k) * f64::from(world.rows[k].incoherent_gain);
+            out.deposit(l, time, scale * behind, phase, incoherent);
         }
     }
 }

@@ -73,17 +73,18 @@ mod tests {
         fixture.sphere(DVec3::new(30.0, 0.0, 0.0), 8.0, 24, 0, 0);
         let (stacks, overflow) = origin(&fixture.world());
         assert_eq!((&stacks[0].0[..], overflow), (&[1, 2, 0][..], 0));
-        assert_eq!(pack(&stacks), [3, 1, 2, 0, 0, 0, 0, 0, 0]);
+        let mut packed = vec![3, 1, 2, 0];
+        packed.resize(MAX_STACK + 1, 0);
+        assert_eq!(pack(&stacks), packed);
     }
 
     #[test]
-    fn the_outermost_eight_of_ten_are_kept() {
-        let radii: Vec<f64> = (1..=10).map(|i| 2.0 * f64::from(i)).collect();
+    fn of_more_than_fit_the_outermost_are_kept() {
+        let most = MAX_STACK as u32;
+        let radii: Vec<f64> = (1..=most + 2).map(|i| 2.0 * f64::from(i)).collect();
         let (stacks, overflow) = origin(&spheres(&radii).world());
-        assert_eq!(
-            (&stacks[0].0[..], overflow),
-            (&[9, 8, 7, 6, 5, 4, 3, 2][..], 1)
-        );
+        let outermost: Vec<u32> = (2..most + 2).rev().collect();
+        assert_eq!((&stacks[0].0, overflow), (&outermost, 1));
     }
 
     #[test]

@@ -84,10 +84,10 @@ mod tests {
         assert_eq!(stack.0, [3, 1, 2]);
         stack.leave(7);
         assert_eq!(stack.0, [3, 1, 2]);
-        for i in 0..5 {
+        for i in 3..MAX_STACK as u32 {
             assert!(stack.enter(i));
         }
-        assert!(!stack.enter(9), "eight is full");
+        assert!(!stack.enter(9), "full");
         assert_eq!(stack.0.len(), MAX_STACK);
     }
 }

@@ -38,6 +38,9 @@ fn largest_gaussian() -> f64 {
 /// Largest value of the low-frequency texture: both octaves of value noise at their extreme.
 const LARGEST_TEXTURE: f64 = 1.5 / 0.413_29;
 
+/// Edge of the cells in which incoherent surface echoes share a phase, mm (docs/kernels.md).
+const PHASE_CELL: f64 = 0.5;
+
 /// Weights w_0 ..= w_R of the lateral smoothing; symmetric. No smoothing below 0.05 lines.
 pub fn lateral_taps(lines: f64) -> Vec<f64> {
     if lines < 0.05 {
@@ -150,6 +153,35 @@ impl<'a> Calibration<'a> {
             .map(|y| (-y * y / (2.0 * sigma * sigma)).exp())
             .sum();
         sum.max(1e-12)
+    }
+
+    /// What keeps an incoherent surface echo at its energy through the averages over layers and
+    /// over neighbouring scanlines: 1 / sqrt(P_e P_l), P = sum_ij w_i w_j c(|i - j| pitch) /
+    /// (sum w)^2 with c the chance that two points lie in one phase cell, 1 - distance / cell.
+    /// Without it interfaces would fade as layers are added.
+    pub fn incoherent_gain(&self, z: f64) -> f64 {
+        let kept = |weights: &[f64], pitch: f64| {
+            let chance =
+                |i: usize, j: usize| (1.0 - i.abs_diff(j) as f64 * pitch / PHASE_CELL).max(0.0);
+            let sum: f64 = weights.iter().sum();
+            let pairs: f64 = (0..weights.len())
+                .flat_map(|i| (0..weights.len()).map(move |j| (i, j)))
+                .map(|(i, j)| weights[i] * weights[j] * chance(i, j))
+                .sum();
+            pairs / (sum * sum).max(1e-24)
+        };
+        let probe = &self.scene.probe;
+        let sigma = self.sigma_elevation(z);
+        let layers: Vec<f64> = self
+            .elevations()
+            .map(|y| (-y * y / (2.0 * sigma * sigma)).exp())
+            .collect();
+        let half = lateral_taps(self.lateral_lines(z));
+        let lines: Vec<f64> = half.iter().skip(1).rev().chain(&half).copied().collect();
+        let layer_pitch = probe.slice_thickness / f64::from(probe.elevation_layers);
+        (kept(&layers, layer_pitch) * kept(&lines, probe.line_pitch(z)))
+            .sqrt()
+            .recip()
     }
 
     /// S_e^2: energy of the full elevational beam, sqrt(pi) sigma_e, over what the layers see of
@@ -324,7 +356,8 @@ impl<'a> Calibration<'a> {
 
     /// Bound on one component of the surface echoes' sum in one sample at depth `z`, compensated.
     /// N paths of share 1/N add gamma A at most coherently and sqrt(1 - gamma^2) sqrt(N) A when
-    /// all incoherent phases agree, A <= gain; sum <= sqrt(1 + N) (Cauchy and Schwarz). The
+    /// all incoherent phases agree, times their gain G, A <= gain; sum <= sqrt(1 + N G^2) (Cauchy
+    /// and Schwarz). The
     /// layers' weights sum to 1. Two such interfaces may share a sample.
     pub fn surface_bound(&self, z: f64) -> f64 {
         let loudest = self
@@ -333,7 +366,8 @@ impl<'a> Calibration<'a> {
             .iter()
             .flat_map(|instance| instance.surface)
             .fold(0.0, |gain, surface| f64::max(gain, amplitude(surface.gain)));
-        2.0 * (1.0 + f64::from(self.scene.simulation.paths)).sqrt()
+        let incoherent = f64::from(self.scene.simulation.paths) * self.incoherent_gain(z).powi(2);
+        2.0 * (1.0 + incoherent).sqrt()
             * loudest
             * self.surface_level()
             * amplitude(self.surface_compensation_db(z))

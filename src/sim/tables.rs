@@ -172,8 +172,8 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 lateral_lines: calibration.lateral_lines(z) as f32,
                 tgc: amplitude(calibration.tgc_db(z)) as f32,
                 compensation: compensation as f32,
+                incoherent_gain: calibration.incoherent_gain(z) as f32,
                 unused0: 0.0,
-                unused1: 0.0,
             }
         })
         .collect()

@@ -112,7 +112,12 @@ fn a_slice_is_as_thick_as_the_lens_makes_it() {
         let frame = render(&scene);
         for z in depths {
             let k = (z * 20.48).round() as usize;
-            let peak = |l| frame.envelope(l)[k - 40..k + 40].iter().copied().fold(0.0, f64::max);
+            let peak = |l| {
+                frame.envelope(l)[k - 40..k + 40]
+                    .iter()
+                    .copied()
+                    .fold(0.0, f64::max)
+            };
             let profile: Vec<f64> = (0..lines as usize).map(peak).collect();
             let sigma = gaussian_beam(10.0, 60.0, z) / std::f64::consts::SQRT_2;
             let ratio = width(&profile) * step / (FWHM * sigma);
