@@ -90,7 +90,7 @@ fn override_of(text: &str) -> Result<(String, String), String> {
 pub fn run(args: &Render) -> Result<()> {
     let (mut scene, warnings) = Scene::load(&args.scene, &args.overrides)?;
     for warning in &warnings {
-        eprintln!("warning: {warning}");
+        eprintln!("{warning}");
     }
     if let Some(seed) = args.seed {
         scene.simulation.seed = seed;

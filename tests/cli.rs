@@ -1,0 +1,202 @@
+//! The command line as a user meets it: files written, figures reported, mistakes explained.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+/// A small frame, so that a software driver takes well under a second.
+const SMALL: [&str; 6] = [
+    "--set",
+    "probe.scanlines=48",
+    "--set",
+    "probe.samples=512",
+    "--set",
+    "probe.elevation_layers=2",
+];
+
+fn insonify(args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_insonify"))
+        .args(args)
+        .output()
+        .expect("the program starts")
+}
+
+fn render(scene: &str, more: &[&str]) -> Output {
+    insonify(&[&["render", scene], &SMALL[..], more].concat())
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+fn path(path: &Path) -> &str {
+    path.to_str().expect("a plain path")
+}
+
+#[test]
+fn render_writes_picture_stages_and_figures_without_a_validation_message() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (png, json, dump) = (
+        dir.path().join("a.png"),
+        dir.path().join("a.json"),
+        dir.path().join("stages"),
+    );
+    for tracer in ["bvh", "ray-query"] {
+        let out = render(
+            "scenes/phantom.toml",
+            &[
+                "--tracer",
+                tracer,
+                "-o",
+                path(&png),
+                "--json",
+                path(&json),
+                "--dump",
+                path(&dump),
+                "--frames",
+                "3",
+                "--validate",
+            ],
+        );
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        let image = image::open(&png).expect("a PNG").into_luma8();
+        let bright = image.pixels().filter(|p| p.0[0] > 60).count();
+        assert!(
+            bright * 5 > (image.width() * image.height()) as usize,
+            "{bright} bright pixels"
+        );
+        let figures: Value =
+            serde_json::from_slice(&std::fs::read(&json).expect("figures")).expect("JSON");
+        assert_eq!(figures["tracer"], tracer);
+        assert_eq!(figures["saturated_samples"], 0);
+        assert_eq!(figures["validation_messages"], Value::Array(vec![]));
+        for key in [
+            "settings",
+            "device",
+            "stages_ms",
+            "frame_ms",
+            "memory",
+            "counters",
+        ] {
+            assert!(figures[key].is_object(), "{key}");
+        }
+        for stage in [
+            "origin", "trace", "scatter", "beam", "axial", "detect", "display",
+        ] {
+            assert!(
+                figures["stages_ms"][stage]["p99"].as_f64() > Some(0.0),
+                "{stage}"
+            );
+        }
+        assert!(figures["memory"]["device_peak_bytes"].as_u64() > Some(100_000));
+        for (name, values) in [
+            ("0_echoes", 2 * 48 * 512 * 2),
+            ("2_iq", 48 * 512 * 2),
+            ("3_envelope", 48 * 512),
+            ("4_log", 48 * 512),
+        ] {
+            let size = std::fs::metadata(dump.join(name).with_extension("npy"))
+                .expect(name)
+                .len();
+            assert_eq!(size % 64, (values * 4) % 64, "{name} has a padded header");
+            let axes: Value = serde_json::from_slice(
+                &std::fs::read(dump.join(name).with_extension("json")).expect(name),
+            )
+            .expect("JSON");
+            let sizes = axes["axes"].as_array().expect("axes").iter();
+            let count: u64 = sizes.map(|a| a["size"].as_u64().expect("a size")).product();
+            assert_eq!(count, values, "{name}");
+        }
+        assert!(dump.join("1_rf.npy").exists() && dump.join("5_bmode.png").exists());
+    }
+}
+
+#[test]
+fn every_sampling_scatter_mode_and_probe_renders() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let png = dir.path().join("a.png");
+    let modes = [
+        "simulation.sampling=plain",
+        "simulation.sampling=shared-primary",
+        "simulation.scatter_mode=voxel",
+        "simulation.coherence=coherent",
+        "simulation.texture_space=world",
+        "simulation.face_reflection=true",
+        "simulation.rough_transmission=true",
+        "probe.preset=linear",
+        "probe.preset=phased",
+        "probe.preset=paper-table1",
+    ];
+    for mode in modes {
+        let out = render(
+            "scenes/abdomen.toml",
+            &[
+                "--set",
+                mode,
+                "--quality",
+                "draft",
+                "-o",
+                path(&png),
+                "--validate",
+            ],
+        );
+        assert!(out.status.success(), "{mode}: {}", text(&out.stderr));
+        let image = image::open(&png).expect("a PNG").into_luma8();
+        let lit = image.pixels().filter(|p| p.0[0] > 30).count();
+        assert!(lit > 1000, "{mode}: {lit} pixels are lit");
+    }
+}
+
+#[test]
+fn mistakes_are_explained() {
+    let cases: [(&[&str], &str); 5] = [
+        (&["render", "scenes/nowhere.toml"], "nowhere.toml"),
+        (
+            &["render", "scenes/phantom.toml", "--set", "probe.dept=3"],
+            "depth",
+        ),
+        (
+            &[
+                "render",
+                "scenes/phantom.toml",
+                "--set",
+                "probe.depth=5 MHz",
+            ],
+            "mm",
+        ),
+        (
+            &[
+                "render",
+                "scenes/phantom.toml",
+                "--device",
+                "no such device",
+            ],
+            "no such device",
+        ),
+        (
+            &["render", "scenes/phantom.toml", "--set", "nonsense"],
+            "PATH=VALUE",
+        ),
+    ];
+    for (args, needle) in cases {
+        let out = insonify(args);
+        assert!(!out.status.success(), "{args:?}");
+        assert!(
+            text(&out.stderr).contains(needle),
+            "{args:?}: {}",
+            text(&out.stderr)
+        );
+    }
+}
+
+#[test]
+fn info_lists_this_machine() {
+    let out = insonify(&["info"]);
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert!(
+        text(&out.stdout).contains("Vulkan 1."),
+        "{}",
+        text(&out.stdout)
+    );
+}
