@@ -113,7 +113,7 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
-    let (timings, frame_ms) = simulate(&mut simulator, &scene, args.frames)?;
+    let timings = simulate(&mut simulator, &scene, args.frames)?;
     let output = args
         .output
         .clone()
@@ -155,7 +155,7 @@ pub fn run(args: &Render) -> Result<()> {
             "triangles": scene.triangles(),
             "build_ms": build_ms,
             "stages_ms": stage_statistics(&timings),
-            "frame_ms": statistics(&frame_ms),
+            "frame_ms": statistics(&timings.iter().map(FrameTimings::total_ms).collect::<Vec<_>>()),
             "memory": { "host_peak_bytes": host_peak_bytes(), "device_peak_bytes": memory.peak },
             "counters": {
                 "rays": counters.rays, "interactions": counters.interactions, "segments": counters.segments,
@@ -215,32 +215,26 @@ fn library(_: &Render) -> Result<Library> {
     Ok(Library::embedded())
 }
 
-/// All frames; GPU timings of each and the wall time between submissions, ms.
-fn simulate(
-    simulator: &mut Simulator,
-    scene: &Scene,
-    frames: u32,
-) -> Result<(Vec<FrameTimings>, Vec<f64>)> {
+/// All frames; the device's timings of each.
+fn simulate(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<Vec<FrameTimings>> {
     // Hidden by indicatif itself when standard error is no terminal; silent under a second.
     let bar = ProgressBar::new(u64::from(frames)).with_style(
         ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
             .expect("a valid template"),
     );
     let start = Instant::now();
-    let (mut timings, mut frame_ms) = (Vec::new(), Vec::new());
+    let mut timings = Vec::new();
     for index in 0..frames {
-        let begun = Instant::now();
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         if frames <= 2 || index + 1 == frames {
             timings.extend(simulator.wait().into_diagnostic()?);
         }
-        frame_ms.push(begun.elapsed().as_secs_f64() * 1e3);
         if start.elapsed().as_secs() >= 1 {
             bar.set_position(u64::from(index) + 1);
         }
     }
     bar.finish_and_clear();
-    Ok((timings, frame_ms))
+    Ok(timings)
 }
 
 fn default_output(scene: &Path) -> PathBuf {
