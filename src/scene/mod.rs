@@ -3,7 +3,7 @@
 //! Units everywhere after load: mm, microseconds, MHz, hence speed mm/us and impedance MRayl
 //! (g/cm3 times mm/us). Attenuation stays dB/(cm MHz). Angles are radians.
 
-use glam::{Affine3A, DAffine3};
+use glam::DAffine3;
 
 pub mod check;
 pub mod file;
@@ -112,12 +112,5 @@ impl Scene {
             .iter()
             .map(|i| self.meshes[i.mesh].triangles.len())
             .sum()
-    }
-}
-
-impl Instance {
-    /// The placement in single precision, as the device sees it.
-    pub fn placement(&self) -> Affine3A {
-        self.world_from_object.as_affine3a()
     }
 }
