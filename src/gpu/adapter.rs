@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use ash::{khr, vk};
 
 use super::error::{GpuError, during};
-use super::instance::Instance;
+use super::instance::{Instance, LOADER_LISTS};
 
 /// Kinds of device, in the order of preference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -140,9 +140,11 @@ pub(crate) fn choose(instance: &Instance, selector: Option<&str>) -> Result<Adap
 }
 
 fn adapters(instance: &Instance) -> Result<Vec<Adapter>, GpuError> {
+    let changing = LOADER_LISTS.write();
     // SAFETY: the instance is alive.
     let physical = unsafe { instance.raw.enumerate_physical_devices() }
         .map_err(during("listing the Vulkan devices"))?;
+    drop(changing);
     physical
         .into_iter()
         .enumerate()

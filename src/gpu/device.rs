@@ -8,7 +8,7 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::adapter::{self, Adapter, DeviceInfo};
 use super::error::{GpuError, during};
-use super::instance::{Instance, ValidationLog};
+use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::memory::{MemoryUse, MemoryUseCounter};
 
 /// Blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
@@ -112,6 +112,7 @@ impl Device {
             (Ok(allocator), Ok(cache)) => (allocator, cache),
             (allocator, cache) => {
                 drop(allocator);
+                let _changing = LOADER_LISTS.write();
                 // SAFETY: nothing made from the device is left but a cache, which goes first.
                 unsafe {
                     if let Ok(cache) = cache {
@@ -243,6 +244,7 @@ impl Device {
         let info = vk::DebugUtilsObjectNameInfoEXT::default()
             .object_handle(handle)
             .object_name(&text);
+        let _listed = LOADER_LISTS.read();
         // SAFETY: the handle was made from this device by the caller and is alive.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
     }
@@ -271,6 +273,7 @@ impl Drop for Device {
             .get_mut()
             .unwrap_or_else(PoisonError::into_inner)
             .take();
+        let _changing = LOADER_LISTS.write();
         // SAFETY: everything made from the device holds it alive, so nothing is left but the cache
         // and the allocator's blocks. A lost device may be destroyed without waiting.
         unsafe {
@@ -316,6 +319,7 @@ fn create_device(instance: &Instance, adapter: &Adapter) -> Result<ash::Device, 
         info = info.push_next(&mut query);
     }
     let info = info.enabled_extension_names(&extensions);
+    let _changing = LOADER_LISTS.write();
     // SAFETY: extensions and features were found on this device; all pointers outlive the call.
     unsafe { instance.raw.create_device(adapter.physical, &info, None) }.map_err(during(format!(
         "opening the device '{}'",

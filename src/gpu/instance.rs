@@ -1,7 +1,7 @@
 //! The Vulkan instance: loader, validation layers and the log of their messages.
 
-use std::ffi::{CStr, c_void};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::ffi::{CStr, c_char, c_void};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 use ash::{ext, khr, vk};
 
@@ -41,6 +41,10 @@ impl ValidationLog {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+/// The loader (1.4.309) walks its lists of instances, drivers and devices without a lock when an
+/// object is named through a layer: whoever changes the lists writes, whoever names reads.
+pub(super) static LOADER_LISTS: RwLock<()> = RwLock::new(());
 
 struct Messenger {
     functions: ext::debug_utils::Instance,
@@ -93,7 +97,11 @@ impl Instance {
         if portability {
             extensions.push(khr::portability_enumeration::NAME.as_ptr());
         }
-        if validate {
+        // Layers since 1.3.268 take settings; older ones know only the feature.
+        let settable = validate && has(ext::layer_settings::NAME);
+        if settable {
+            extensions.push(ext::layer_settings::NAME.as_ptr());
+        } else if validate {
             extensions.push(ext::validation_features::NAME.as_ptr());
         }
 
@@ -103,6 +111,11 @@ impl Instance {
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        // What shaders access is checked by default in older layers, on request in newer ones.
+        let yes = [vk::TRUE];
+        let settings = [c"validate_sync", c"syncval_shader_accesses_heuristic"]
+            .map(|name| switched_on(name, &yes));
+        let mut settings = vk::LayerSettingsCreateInfoEXT::default().settings(&settings);
         let mut info = vk::InstanceCreateInfo::default()
             .application_info(&application)
             .enabled_layer_names(&layers)
@@ -110,12 +123,16 @@ impl Instance {
         if portability {
             info.flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
         }
-        if validate {
+        if settable {
+            info = info.push_next(&mut settings);
+        } else if validate {
             info = info.push_next(&mut features);
         }
+        let changing = LOADER_LISTS.write();
         // SAFETY: all pointers in `info` outlive the call; layers and extensions are offered.
         let raw = unsafe { entry.create_instance(&info, None) }
             .map_err(during("creating the Vulkan instance"))?;
+        drop(changing);
         let mut instance = Self {
             raw,
             api_version,
@@ -151,6 +168,7 @@ impl Instance {
 
 impl Drop for Instance {
     fn drop(&mut self) {
+        let _changing = LOADER_LISTS.write();
         // SAFETY: every device of this instance has been destroyed by its owner before.
         unsafe {
             if let Some(messenger) = self.messenger.take() {
@@ -161,6 +179,18 @@ impl Drop for Instance {
             self.raw.destroy_instance(None);
         }
     }
+}
+
+/// A setting of the validation layer.
+fn switched_on<'a>(name: &'a CStr, yes: &'a [vk::Bool32; 1]) -> vk::LayerSettingEXT<'a> {
+    let mut setting = vk::LayerSettingEXT::default()
+        .layer_name(VALIDATION_LAYER)
+        .setting_name(name)
+        .ty(vk::LayerSettingTypeEXT::BOOL32)
+        .values(bytemuck::cast_slice(yes));
+    // ash counts bytes, Vulkan counts values.
+    setting.value_count = 1;
+    setting
 }
 
 /// Extensions of the loader, or of one layer.
@@ -195,7 +225,8 @@ fn validation_extensions(entry: &ash::Entry) -> Result<Vec<std::ffi::CString>, G
     }
     let extensions = extension_names(entry, Some(VALIDATION_LAYER))?;
     let has = |name: &CStr| extensions.iter().any(|e| e.as_c_str() == name);
-    if !has(ext::validation_features::NAME) || !has(ext::debug_utils::NAME) {
+    let configurable = has(ext::layer_settings::NAME) || has(ext::validation_features::NAME);
+    if !configurable || !has(ext::debug_utils::NAME) {
         return Err(unavailable(
             "the installed layer lacks synchronization validation or debug messages",
         ));
@@ -212,15 +243,19 @@ unsafe extern "system" fn on_message(
 ) -> vk::Bool32 {
     // SAFETY: `log` is the mutex given in `listen`, alive as long as the messenger.
     let log = unsafe { &*log.cast::<Mutex<Vec<String>>>() };
-    // SAFETY: Vulkan passes a valid structure whose message is NUL-terminated or null.
-    let text = unsafe { data.as_ref() }
-        .filter(|data| !data.p_message.is_null())
-        // SAFETY: checked for null on the line above.
-        .map(|data| unsafe { CStr::from_ptr(data.p_message) }.to_string_lossy())
-        .unwrap_or_default();
+    // SAFETY: Vulkan passes a valid structure, or null.
+    let data = unsafe { data.as_ref() };
+    let text = |of: fn(&vk::DebugUtilsMessengerCallbackDataEXT<'_>) -> *const c_char| {
+        data.map(of)
+            .filter(|text| !text.is_null())
+            // SAFETY: texts of the structure are NUL-terminated or null.
+            .map(|text| unsafe { CStr::from_ptr(text) }.to_string_lossy())
+            .unwrap_or_default()
+    };
+    let (name, text) = (text(|d| d.p_message_id_name), text(|d| d.p_message));
     let mut messages = log.lock().unwrap_or_else(PoisonError::into_inner);
     if messages.len() < MAX_MESSAGES {
-        messages.push(format!("{severity:?}: {text}"));
+        messages.push(format!("{severity:?}: {name}: {text}"));
     }
     vk::FALSE
 }
