@@ -1,11 +1,13 @@
 //! What frames must show whatever computes them: closed forms of acoustics and image formation.
 //! Each expectation is worked out in its test and takes nothing from the code under test.
 
+mod check;
 mod detection;
 mod interfaces;
 mod levels;
 mod profile;
 mod render;
 mod resolution;
+mod rows;
 mod scenes;
 mod timing;
