@@ -263,19 +263,28 @@ void main() {
             continue;
         }
 
+        float past = hit.t + clearance(surface_position(hit));
+        Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+        if ((frame.flags & FLAG_COINCIDENT) != 0u) {
+            float from = max(hit.t - clearance(surface_position(hit)), 0.0);
+            other = closest_hit(path.origin, path.direction, from, past, hit.instance);
+            rays += 1u;
+            if (other.instance != NONE) past = max(past, other.t + clearance(surface_position(hit)));
+            // Rounding chooses which of the two is found first; it must not choose whose echo it is.
+            if (other.instance < hit.instance) {
+                Hit found = hit;
+                hit = other;
+                other = found;
+            }
+        }
         vec3 position = surface_position(hit);
         vec3 n_geometric = surface_geometric_normal(hit);
         bool entering = dot(path.direction, n_geometric) < 0.0;
         Media media = path.media;
         if (!cross_interface(media, hit.instance, entering)) atomicAdd(counters.stack_overflow, 1u);
-        float past = hit.t + clearance(position);
-        if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-            Hit twin = closest_hit(path.origin, path.direction, max(hit.t - clearance(position), 0.0), past, hit.instance);
-            rays += 1u;
-            if (twin.instance != NONE) {
-                cross_interface(media, twin.instance, dot(path.direction, surface_geometric_normal(twin)) < 0.0);
-                past = max(past, twin.t + clearance(position));
-            }
+        if (other.instance != NONE
+            && !cross_interface(media, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0)) {
+            atomicAdd(counters.stack_overflow, 1u);
         }
         uint after = current_instance(media);
         path.crossings += 1u;

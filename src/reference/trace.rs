@@ -30,6 +30,16 @@ pub struct Traced {
     pub counters: Counters,
 }
 
+/// One meeting with a surface, or with two that coincide.
+struct Toggled {
+    /// Whose echo it is.
+    hit: Crossing,
+    /// Media behind.
+    after: Stack,
+    /// Distance of the last crossing that counted.
+    last: f64,
+}
+
 struct Tracer<'a> {
     world: &'a World<'a>,
     probe_from_world: DAffine3,
@@ -120,11 +130,11 @@ impl Tracer<'_> {
                 let back = acoustics::mirror(path.direction, normal);
                 reflect(&mut path, back, normal);
             } else {
-                let Some(hit) = crossings.first() else {
+                if crossings.is_empty() {
                     self.emit(&path, t_end);
                     return;
-                };
-                let (after, last) = self.toggled(&path.stack, &crossings);
+                }
+                let Toggled { hit, after, last } = self.toggled(&path.stack, &crossings);
                 if after.current(self.world.instances) == path.stack.current(self.world.instances) {
                     path.t_min = last + step(path.origin + last * path.direction);
                     path.stack = after;
@@ -132,7 +142,7 @@ impl Tracer<'_> {
                 }
                 self.emit(&path, hit.t);
                 self.advance(&mut path, hit.t);
-                let interface = interface::meet(self.world, &path, hit, &after);
+                let interface = interface::meet(self.world, &path, &hit, &after);
                 interface.echo(self.world, &path, &mut self.out.surface);
                 let goes_on = match path.role {
                     Role::Main => {
@@ -173,27 +183,30 @@ impl Tracer<'_> {
         (t < limit).then(|| (t, world.transform_vector3(normal).normalize()))
     }
 
-    /// The stack behind the first of `crossings`, and the distance of the last one that counted.
-    fn toggled(&mut self, stack: &Stack, crossings: &[Crossing]) -> (Stack, f64) {
-        let hit = crossings[0];
-        let mut at_hit = vec![hit];
+    /// What the first of `crossings` does to the media.
+    fn toggled(&mut self, stack: &Stack, crossings: &[Crossing]) -> Toggled {
+        let nearest = crossings[0];
+        let mut here = vec![nearest];
         if self.world.frame.flags & FLAG_COINCIDENT != 0 {
-            for c in &crossings[1..] {
-                let new = at_hit.iter().all(|o| o.instance != c.instance);
-                if new && at_hit.len() < 3 && c.t - hit.t <= COINCIDENT {
-                    at_hit.push(*c);
-                }
-            }
+            let other = crossings[1..]
+                .iter()
+                .find(|c| c.instance != nearest.instance && c.t - nearest.t <= COINCIDENT);
+            here.extend(other);
+            here.sort_by_key(|c| c.instance);
         }
         let mut after = stack.clone();
-        for c in &at_hit {
+        for c in &here {
             if !c.entry {
                 after.leave(c.instance);
             } else if !after.enter(c.instance) {
                 self.out.counters.stack_overflow += 1;
             }
         }
-        (after, at_hit[at_hit.len() - 1].t)
+        Toggled {
+            hit: here[0],
+            after,
+            last: here.iter().map(|c| c.t).fold(nearest.t, f64::max),
+        }
     }
 
     /// Moves the path by `t` to its next interaction.
