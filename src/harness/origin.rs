@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use super::inputs::{frame, lines};
-use super::worlds::{self, Owned};
+use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::origin;
 use crate::sim::layout::{Counters, FLAG_COINCIDENT, Frame, MAX_STACK};
@@ -57,7 +57,7 @@ fn job(case: Case, size: Size) -> Job {
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
-    let owned = Owned::new(job);
+    let owned = worlds::owned(job);
     let (expected, overflow) = origin::origin(&owned.world());
     let got: Vec<Vec<u32>> = job
         .after::<[u32; MAX_STACK + 1]>(outputs, "stacks")

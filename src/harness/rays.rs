@@ -6,8 +6,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::inputs::Random;
-use super::worlds::{self, Owned};
+use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
+use crate::reference::Owned;
 use crate::sim::layout::NONE;
 
 /// As in `rays.comp`.
@@ -123,7 +124,7 @@ struct Worst {
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
-    let owned = Owned::new(job);
+    let owned = worlds::owned(job);
     let hits: Vec<Hit> = job.after(outputs, "hits");
     let rays: Vec<Ray> = job.get("rays");
     let mut worst = Worst::default();

@@ -4,8 +4,7 @@ use std::mem::size_of;
 
 use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, samples};
-use super::worlds::Owned;
-use super::{Case, Check, Extent, Input, Job, Size, Subject, trace};
+use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
 use crate::sim::layout::{self, Counters, FLAG_VOXEL, Frame, Row, Tissue};
 
@@ -55,7 +54,7 @@ fn sizes(job: &Job) -> Vec<usize> {
 
 /// Segments as `trace`'s twin finds them, in the device's slots.
 fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
-    let owned = Owned::new(job);
+    let owned = worlds::owned(job);
     let mut world = owned.world();
     let rows = rows(frame);
     world.rows = &rows;
@@ -152,7 +151,7 @@ fn spoil(segments: &mut [layout::Segment], counts: &[u32], capacity: usize) {
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
-    let owned = Owned::new(job);
+    let owned = worlds::owned(job);
     let world = owned.world();
     let frame = world.frame;
     let segments: Vec<layout::Segment> = job.get("segments");

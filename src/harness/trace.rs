@@ -4,7 +4,7 @@ use std::mem::size_of;
 
 use super::check::relative_norm;
 use super::inputs::{frame, lines, rows, samples};
-use super::worlds::{self, Owned};
+use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use crate::sim::layout::{
@@ -113,7 +113,7 @@ fn job(case: Case, size: Size) -> Job {
         }
         rows[40].sigma_elevation = f32::INFINITY;
     }
-    let (stacks, _) = origin::origin(&Owned::new(&job).world());
+    let (stacks, _) = origin::origin(&worlds::owned(&job).world());
     let segments = lines(&frame) * frame.segment_capacity as usize;
     let segments = segments * size_of::<layout::Segment>() / 4;
     job.push = bytemuck::bytes_of(&[0, frame.paths]).to_vec();
@@ -129,7 +129,7 @@ fn job(case: Case, size: Size) -> Job {
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
-    let owned = Owned::new(job);
+    let owned = worlds::owned(job);
     let world = owned.world();
     let frame = world.frame;
     let stacks: Vec<_> = job

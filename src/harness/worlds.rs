@@ -5,11 +5,10 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use super::inputs::Random;
 use super::{Case, Input, Job};
-use crate::reference::World;
-use crate::reference::world::Geometry;
+use crate::reference::Owned;
 use crate::scene::{Mesh, shapes};
 use crate::sim::bvh::{MeshBvh, SceneBvh};
-use crate::sim::layout::{Frame, Instance, NONE, Row, Surface, Tissue};
+use crate::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use crate::sim::placement;
 
 /// The tables and instances of one world.
@@ -172,55 +171,23 @@ pub fn world(case: Case) -> Builder {
     builder
 }
 
-/// What the twins read, taken from a job's bindings; bindings that the kernel lacks are empty.
-pub struct Owned {
-    frame: Frame,
-    rows: Vec<Row>,
-    tissues: Vec<Tissue>,
-    surfaces: Vec<Surface>,
-    instances: Vec<Instance>,
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    points: Vec<[f32; 4]>,
-}
-
-impl Owned {
-    /// Collects the bindings of `job`.
-    pub fn new(job: &Job) -> Self {
-        fn optional<T: bytemuck::Pod>(job: &Job, name: &str) -> Vec<T> {
-            let found = job.inputs.iter().find(|i| i.name == name);
-            found.map_or_else(Vec::new, |i| bytemuck::pod_collect_to_vec(&i.bytes))
-        }
-        let frame = optional::<Frame>(job, "frame").first().copied();
-        Self {
-            frame: frame.unwrap_or_default(),
-            rows: optional(job, "rows"),
-            tissues: optional(job, "tissues"),
-            surfaces: optional(job, "surfaces"),
-            instances: optional(job, "instances"),
-            positions: optional(job, "vertices"),
-            normals: optional(job, "normals"),
-            triangles: optional(job, "triangles"),
-            points: optional(job, "points"),
-        }
+/// What the twins read, taken from a job's bindings; what the kernel does not bind is empty.
+pub fn owned(job: &Job) -> Owned {
+    fn optional<T: bytemuck::Pod>(job: &Job, name: &str) -> Vec<T> {
+        let found = job.inputs.iter().find(|i| i.name == name);
+        found.map_or_else(Vec::new, |i| bytemuck::pod_collect_to_vec(&i.bytes))
     }
-
-    /// Borrows it all.
-    pub fn world(&self) -> World<'_> {
-        World {
-            frame: &self.frame,
-            rows: &self.rows,
-            tissues: &self.tissues,
-            surfaces: &self.surfaces,
-            instances: &self.instances,
-            geometry: Geometry {
-                positions: &self.positions,
-                normals: &self.normals,
-                triangles: &self.triangles,
-            },
-            points: &self.points,
-        }
+    let frame = optional::<Frame>(job, "frame").first().copied();
+    Owned {
+        frame: frame.unwrap_or_default(),
+        rows: optional(job, "rows"),
+        tissues: optional(job, "tissues"),
+        surfaces: optional(job, "surfaces"),
+        instances: optional(job, "instances"),
+        positions: optional(job, "vertices"),
+        normals: optional(job, "normals"),
+        triangles: optional(job, "triangles"),
+        points: optional(job, "points"),
     }
 }
 

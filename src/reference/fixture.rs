@@ -2,21 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::world::{Geometry, World};
+pub use super::Owned as Fixture;
 use crate::sim::layout::{Frame, Instance, Row, Rows, Surface, Tissue};
-
-/// An owned world.
-pub struct Fixture {
-    pub frame: Frame,
-    pub rows: Vec<Row>,
-    pub tissues: Vec<Tissue>,
-    pub surfaces: Vec<Surface>,
-    pub instances: Vec<Instance>,
-    pub points: Vec<[f32; 4]>,
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-}
 
 pub fn rows_of(m: &DAffine3) -> Rows {
     std::array::from_fn(|i| {
@@ -90,51 +77,29 @@ impl Fixture {
                 coherence: 1.0,
                 ..Surface::default()
             }],
-            instances: Vec::new(),
-            points: Vec::new(),
-            positions: Vec::new(),
-            normals: Vec::new(),
-            triangles: Vec::new(),
-        }
-    }
-
-    pub fn world(&self) -> World<'_> {
-        World {
-            frame: &self.frame,
-            rows: &self.rows,
-            tissues: &self.tissues,
-            surfaces: &self.surfaces,
-            instances: &self.instances,
-            geometry: Geometry {
-                positions: &self.positions,
-                normals: &self.normals,
-                triangles: &self.triangles,
-            },
-            points: &self.points,
+            ..Self::default()
         }
     }
 
     /// Triangles as flat corner triples, outward, with a normal per corner.
-    fn place(&mut self, corners: &[[DVec3; 2]], tissue: u32, priority: i32, at: &DAffine3) {
-        let first = self.triangles.len() as u32;
-        for triangle in corners.chunks(3) {
-            let base = self.positions.len() as u32;
-            self.triangles.push([base, base + 1, base + 2]);
-            for [p, n] in triangle {
-                self.positions.push(p.as_vec3().to_array());
-                self.normals.push(n.as_vec3().to_array());
-            }
-        }
-        self.instances.push(Instance {
-            world_from_object: rows_of(at),
-            object_from_world: rows_of(&at.inverse()),
-            texture_from_world: rows_of(&at.inverse()),
-            tissue,
-            priority,
-            first_triangle: first,
-            triangles: self.triangles.len() as u32 - first,
-            ..Instance::default()
-        });
+    fn place_flat(&mut self, corners: &[[DVec3; 2]], tissue: u32, priority: i32, at: &DAffine3) {
+        let positions: Vec<_> = corners.iter().map(|c| c[0].as_vec3().to_array()).collect();
+        let normals: Vec<_> = corners.iter().map(|c| c[1].as_vec3().to_array()).collect();
+        let indices: Vec<u32> = (0..corners.len() as u32).collect();
+        let (triangles, _) = indices.as_chunks::<3>();
+        self.place(
+            &positions,
+            &normals,
+            triangles,
+            Instance {
+                world_from_object: rows_of(at),
+                object_from_world: rows_of(&at.inverse()),
+                texture_from_world: rows_of(&at.inverse()),
+                tissue,
+                priority,
+                ..Instance::default()
+            },
+        );
     }
 
     /// An axis-aligned box.
@@ -178,7 +143,7 @@ impl Fixture {
                 }
             }
         }
-        self.place(&corners, tissue, priority, at);
+        self.place_flat(&corners, tissue, priority, at);
     }
 
     /// A sphere of 2 n^2 triangles with exact normals.
@@ -204,6 +169,6 @@ impl Fixture {
                 corners.extend([a, c, b, a, d, c]);
             }
         }
-        self.place(&corners, tissue, priority, &DAffine3::IDENTITY);
+        self.place_flat(&corners, tissue, priority, &DAffine3::IDENTITY);
     }
 }

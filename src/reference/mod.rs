@@ -15,6 +15,7 @@ pub mod geometry;
 mod interface;
 pub mod intersect;
 pub mod origin;
+mod owned;
 mod path;
 pub mod random;
 pub mod scatter;
@@ -25,5 +26,6 @@ pub mod trace;
 pub mod world;
 
 pub use accumulator::Accumulator;
+pub use owned::Owned;
 pub use segment::Segment;
 pub use world::World;

@@ -1,86 +1,53 @@
 //! Frames by the f64 twins, brute force from rays to pixels, and by the device with either tracer.
 
+use std::ops::Deref;
 use std::sync::Arc;
 
 use glam::DVec3;
 use insonify::gpu;
-use insonify::reference::world::Geometry;
-use insonify::reference::{Accumulator, Segment, World};
-use insonify::reference::{axial, beam, detect, display, origin, scatter, trace};
+use insonify::reference::{Accumulator, Owned, Segment};
+use insonify::reference::{axial, beam, detect, display, scatter};
 use insonify::scene::Scene;
 use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
 
 /// A scene as the kernels read it.
-pub struct Inputs {
-    pub frame: layout::Frame,
-    rows: Vec<layout::Row>,
-    tissues: Vec<layout::Tissue>,
-    surfaces: Vec<layout::Surface>,
-    instances: Vec<layout::Instance>,
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-    points: Vec<[f32; 4]>,
-}
+pub struct Inputs(Owned);
 
 impl Inputs {
     /// Rigidly placed meshes only: their texture rests in object space.
     pub fn new(scene: &Scene) -> Self {
-        let mut inputs = Self {
+        let mut inputs = Owned {
             frame: tables::frame(scene, 0),
             rows: tables::rows(scene),
             tissues: tables::tissues(scene),
             surfaces: tables::surfaces(scene),
-            instances: vec![],
-            positions: vec![],
-            normals: vec![],
-            triangles: vec![],
             points: tables::points(scene),
+            ..Owned::default()
         };
-        for (i, instance) in scene.instances.iter().enumerate() {
-            let mesh = &scene.meshes[instance.mesh];
-            let object_from_world = tables::matrix_rows(&instance.world_from_object.inverse());
-            inputs.instances.push(layout::Instance {
-                world_from_object: tables::matrix_rows(&instance.world_from_object),
+        for (i, placed) in scene.instances.iter().enumerate() {
+            let mesh = &scene.meshes[placed.mesh];
+            let object_from_world = tables::matrix_rows(&placed.world_from_object.inverse());
+            let instance = layout::Instance {
+                world_from_object: tables::matrix_rows(&placed.world_from_object),
                 object_from_world,
                 texture_from_world: object_from_world,
-                tissue: instance.tissue as u32,
-                priority: instance.priority,
+                tissue: placed.tissue as u32,
+                priority: placed.priority,
                 surface_outside: 2 * i as u32,
                 surface_inside: 2 * i as u32 + 1,
-                first_triangle: inputs.triangles.len() as u32,
-                triangles: mesh.triangles.len() as u32,
                 ..layout::Instance::default()
-            });
-            let base = inputs.positions.len() as u32;
-            let moved = mesh.triangles.iter().map(|t| t.map(|v| v + base));
-            inputs.triangles.extend(moved);
-            inputs.positions.extend(&mesh.positions);
-            inputs.normals.extend(&mesh.normals);
+            };
+            inputs.place(&mesh.positions, &mesh.normals, &mesh.triangles, instance);
         }
-        inputs
+        Self(inputs)
     }
+}
 
-    pub fn world(&self) -> World<'_> {
-        World {
-            frame: &self.frame,
-            rows: &self.rows,
-            tissues: &self.tissues,
-            surfaces: &self.surfaces,
-            instances: &self.instances,
-            geometry: Geometry {
-                positions: &self.positions,
-                normals: &self.normals,
-                triangles: &self.triangles,
-            },
-            points: &self.points,
-        }
-    }
+impl Deref for Inputs {
+    type Target = Owned;
 
-    /// Segments per line, and the surface echoes.
-    pub fn traced(&self) -> trace::Traced {
-        let world = self.world();
-        trace::trace(&world, &origin::origin(&world).0)
+    fn deref(&self) -> &Owned {
+        &self.0
     }
 }
 
