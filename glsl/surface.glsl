@@ -48,3 +48,30 @@ vec3 surface_shading_normal(Hit hit) {
         + hit.v * vec3(normals[c], normals[c + 1u], normals[c + 2u]);
     return surface_to_world(hit.instance, n);
 }
+
+// How fast the interpolated normal turns along the direction `along` (world, any length): radians per
+// mm, unsigned.
+float surface_curvature(Hit hit, vec3 along) {
+    uint i = triangles[3u * hit.primitive];
+    uint j = triangles[3u * hit.primitive + 1u];
+    uint k = triangles[3u * hit.primitive + 2u];
+    vec3 corner = surface_vertex(i);
+    vec4 to_j = vec4(surface_vertex(j) - corner, 0.0);
+    vec4 to_k = vec4(surface_vertex(k) - corner, 0.0);
+    vec3 u, v;
+    for (int row = 0; row < 3; ++row) {
+        u[row] = dot(instances[hit.instance].world_from_object[row], to_j);
+        v[row] = dot(instances[hit.instance].world_from_object[row], to_k);
+    }
+    vec3 n = surface_to_world(hit.instance, vec3(normals[3u * i], normals[3u * i + 1u], normals[3u * i + 2u]));
+    vec3 n_u = surface_to_world(hit.instance, vec3(normals[3u * j], normals[3u * j + 1u], normals[3u * j + 2u])) - n;
+    vec3 n_v = surface_to_world(hit.instance, vec3(normals[3u * k], normals[3u * k + 1u], normals[3u * k + 2u])) - n;
+    vec3 across = cross(u, v);
+    float area2 = dot(across, across);
+    float size = dot(along, along);
+    if (!(area2 > 0.0) || !(size > 0.0)) return 0.0;
+    // `along`, projected into the triangle, in coordinates of its edges.
+    float a = dot(cross(along, v), across) / area2;
+    float b = dot(cross(u, along), across) / area2;
+    return abs(dot(a * n_u + b * n_v, along)) / size;
+}

@@ -43,6 +43,7 @@ layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 #include "probe.glsl"
 #include "transform.glsl"
 #include "acoustics.glsl"
+#include "footprint.glsl"
 #include "media.glsl"
 #include "deposit.glsl"
 
@@ -141,12 +142,13 @@ float clearance(vec3 p) {
     return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
 }
 
-void reflect_path(inout Path path, vec3 m, float roughness) {
+void reflect_path(inout Path path, vec3 m, float roughness, float turn) {
     path.direction = normalize(path.direction - 2.0 * dot(path.direction, m) * m);
     path.lateral = path.lateral - 2.0 * dot(path.lateral, m) * m;
     path.handedness = -path.handedness;
     path.reflections += 1u;
     if (roughness < SPECULAR) path.spread.z += 4.0 / (roughness + 2.0);
+    path.spread.z += min(turn * turn, 1.0);
 }
 
 bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
@@ -256,7 +258,7 @@ void main() {
                 advance(path, t_end, t1, end);
                 path.interactions += 1u;
                 interactions += 1u;
-                reflect_path(path, world_vector(face_normal(probe_point(end))), SPECULAR);
+                reflect_path(path, world_vector(face_normal(probe_point(end))), SPECULAR, 0.0);
             } else {
                 path.weight = 0.0;
             }
@@ -305,50 +307,58 @@ void main() {
         Tissue t2 = load_tissue(tissue_of(after));
         Surface s = load_surface(entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside);
 
-        float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, -dot(path.direction, n_shading));
-        float reflected = r * r;
+        float cos_i = -dot(path.direction, n_shading);
+        float width = 0.0;
+        if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
+            float sigma = rows[row_of(path.time)].sigma_lateral;
+            // In the plane of incidence; along the image where there is none.
+            vec3 along = path.direction + cos_i * n_shading + 0.01 * path.lateral;
+            width = surface_curvature(hit, along) * sqrt(sigma * sigma + path.spread.x);
+        }
+        float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
+        float turn = 2.0 * width / max(cos_i, 1e-3);
         vec3 m;
         bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, m);
         if (rough) echo(path, line, n, key, hit.instance, s, t1, t2, m);
 
         bool can_reflect = rough && path.reflections < frame.max_reflections;
-        float choice = unit(path_random(n, key, PURPOSE_CHOICE, frame.seed).x);
         bool splits = frame.sampling == SAMPLING_MAIN_PATH && !path.branch;
         bool reflects;
         if (splits) {
             float wanted = clamp(ceil(float(frame.paths) * reflected), 1.0, float(frame.paths));
-            bool strong = reflected >= 0.01;
-            reflects = can_reflect && (strong ? float(n) < wanted : n == 0u && choice < reflected * 100.0);
+            reflects = can_reflect && float(n) < wanted;
             main_path = path;
             if (reflects) {
                 path.branch = true;
-                path.weight *= strong ? reflected : 0.01;
-                path.share = strong ? 1.0 / wanted : 1.0;
-                path.probability = strong ? 1.0 : reflected * 100.0;
+                path.weight *= reflected;
+                path.share = 1.0 / wanted;
             }
             // The main path goes on behind the interface, now or after its branch.
             vec3 refracting = rough && (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u ? m : n_shading;
-            bool through = reflected < 1.0 && transmit_path(main_path, refracting, n_geometric, t1.speed, t2.speed);
+            bool through = reflected < 1.0
+                && (transmit_path(main_path, refracting, n_geometric, t1.speed, t2.speed) || width > 0.0);
             main_path.weight = through ? main_path.weight * (1.0 - reflected) : 0.0;
             main_path.media = media;
             if (reflects) {
                 resume = true;
-                reflect_path(path, m, s.roughness);
+                reflect_path(path, m, s.roughness, turn);
             } else {
                 path = main_path;
             }
             continue;
         }
+        float choice = unit(path_random(n, key, PURPOSE_CHOICE, frame.seed).x);
         if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
         reflects = choice < reflected;
         path.probability *= reflects ? reflected : 1.0 - reflected;
         if (reflects) {
-            if (can_reflect) reflect_path(path, m, s.roughness);
+            if (can_reflect) reflect_path(path, m, s.roughness, turn);
             else path.weight = 0.0;
         } else {
             vec3 refracting = rough && (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u ? m : n_shading;
             path.media = media;
-            if (!transmit_path(path, refracting, n_geometric, t1.speed, t2.speed)) {
+            // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
+            if (!transmit_path(path, refracting, n_geometric, t1.speed, t2.speed) && !(width > 0.0)) {
                 atomicAdd(counters.paths_lost, 1u);
                 path.weight = 0.0;
             }

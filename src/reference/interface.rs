@@ -4,11 +4,12 @@ use glam::DVec3;
 
 use super::Accumulator;
 use super::acoustics::{Fluid, mirror, power_cosine, reflection};
+use super::footprint;
 use super::path::Path;
 use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, gaussian, path_random, pcg4d, unit};
 use super::stack::Stack;
 use super::world::{Crossing, World};
-use crate::sim::layout::{FLAG_COHERENT, Surface, Tissue};
+use crate::sim::layout::{FLAG_COHERENT, FLAG_FOOTPRINT, Row, Surface, Tissue};
 
 /// Roughness exponents from here on are perfect mirrors.
 pub(super) const MIRROR: f64 = 1e9;
@@ -37,8 +38,13 @@ pub(super) struct Interface {
     pub(super) micro: Option<Micro>,
     /// Before and behind.
     pub(super) fluids: [Fluid; 2],
-    /// Intensity reflectance R at the shading normal; 1 at total reflection.
+    /// Intensity reflectance R at the shading normal, where the surface curves its mean over the
+    /// beam; 1 at total reflection.
     pub(super) reflectance: f64,
+    /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
+    pub(super) width: f64,
+    /// Deviation of the reflected direction over the beam, rad.
+    pub(super) turn: f64,
     pub(super) roughness: f64,
     surface: Surface,
     absorption: f64,
@@ -52,8 +58,15 @@ fn fluid(tissue: &Tissue) -> Fluid {
     }
 }
 
-/// The interface at `hit`, where `path` has arrived, with `after` the media behind it.
-pub(super) fn meet(world: &World, path: &Path, hit: &Crossing, after: &Stack) -> Interface {
+/// The interface at `hit`, where `path` has arrived, with `after` the media behind it; `row` is that
+/// of the path's time.
+pub(super) fn meet(
+    world: &World,
+    row: &Row,
+    path: &Path,
+    hit: &Crossing,
+    after: &Stack,
+) -> Interface {
     let d = path.direction;
     let (outward, shading) = world.normals(hit);
     let outside = d.dot(outward) < 0.0;
@@ -73,12 +86,23 @@ pub(super) fn meet(world: &World, path: &Path, hit: &Crossing, after: &Stack) ->
         instance.surface_inside
     } as usize];
     let roughness = f64::from(surface.roughness);
+    let cos_i = -d.dot(shading);
+    let width = if world.frame.flags & FLAG_FOOTPRINT == 0 {
+        0.0
+    } else {
+        let sigma = f64::from(row.sigma_lateral);
+        // In the plane of incidence; along the image where there is none.
+        let along = d + cos_i * shading + 0.01 * path.lateral;
+        world.curvature(hit, along) * sigma.hypot(path.spread[0].sqrt())
+    };
     Interface {
         geometric,
         shading,
         micro: micro_normal(world, path, geometric, shading, roughness),
         fluids,
-        reflectance: reflection(fluids[0], fluids[1], -d.dot(shading)).powi(2),
+        reflectance: footprint::reflectance(fluids[0], fluids[1], cos_i, width),
+        width,
+        turn: 2.0 * width / cos_i.max(1e-3),
         roughness,
         surface,
         absorption: before.absorption.into(),

@@ -11,6 +11,7 @@ pub mod detect;
 pub mod display;
 #[cfg(test)]
 mod fixture;
+mod footprint;
 pub mod geometry;
 mod interface;
 pub mod intersect;

@@ -68,9 +68,11 @@ pub(super) fn reflect(path: &mut Path, direction: DVec3, m: DVec3) {
     path.reflections += 1;
 }
 
-/// The lobe of a rough reflection: its solid-angle variance per axis grows with the distance.
-pub(super) fn widen(path: &mut Path, roughness: f64) {
+/// The lobe of a rough reflection, and the `turn` of a curved one, rad: their variance per axis grows
+/// with the distance.
+pub(super) fn widen(path: &mut Path, roughness: f64, turn: f64) {
     if roughness < MIRROR {
         path.spread[2] += 4.0 / (roughness + 2.0);
     }
+    path.spread[2] += (turn * turn).min(1.0);
 }

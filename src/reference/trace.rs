@@ -16,8 +16,6 @@ use crate::sim::layout::{
 
 /// Crossings farther apart than this, mm, are not the same surface.
 const COINCIDENT: f64 = 1e-3;
-/// Reflectances below this share one branch.
-const FAINT: f64 = 0.01;
 
 /// What `trace` leaves behind.
 #[derive(Clone, Debug)]
@@ -142,7 +140,8 @@ impl Tracer<'_> {
                 }
                 self.emit(&path, hit.t);
                 self.advance(&mut path, hit.t);
-                let interface = interface::meet(self.world, &path, &hit, &after);
+                let row = &self.world.rows[self.out.surface.sample(path.time)];
+                let interface = interface::meet(self.world, row, &path, &hit, &after);
                 interface.echo(self.world, &path, &mut self.out.surface);
                 let goes_on = match path.role {
                     Role::Main => {
@@ -237,24 +236,14 @@ impl Tracer<'_> {
             role: Role::Branch,
             ..main.clone()
         };
-        if big_r >= FAINT {
-            let branches = (n * big_r).ceil().clamp(1.0, n);
-            if f64::from(main.n) >= branches {
-                return;
-            }
-            path.weight *= big_r;
-            path.share = 1.0 / branches;
-        } else {
-            let choice = path_random(main.n, main.key(), PURPOSE_CHOICE, frame.seed)[0];
-            if main.n != 0 || unit(choice) >= big_r / FAINT {
-                return;
-            }
-            path.weight *= FAINT;
-            path.probability = big_r / FAINT;
-            path.share = 1.0;
+        let branches = (n * big_r).ceil().clamp(1.0, n);
+        if f64::from(main.n) >= branches {
+            return;
         }
+        path.weight *= big_r;
+        path.share = 1.0 / branches;
         reflect(&mut path, echo.reflected, echo.normal);
-        widen(&mut path, interface.roughness);
+        widen(&mut path, interface.roughness, interface.turn);
         if !self.ended(&path) {
             self.follow(path);
         }
@@ -279,7 +268,7 @@ impl Tracer<'_> {
             return false;
         };
         reflect(path, micro.reflected, micro.normal);
-        widen(path, interface.roughness);
+        widen(path, interface.roughness, interface.turn);
         true
     }
 
@@ -293,7 +282,9 @@ impl Tracer<'_> {
         let [before, behind] = interface.fluids;
         let through = |n| acoustics::refract(before, behind, path.direction, n);
         let beyond = through(normal).filter(|d| d.dot(interface.geometric) < 0.0);
-        let Some(direction) = beyond.or_else(|| through(interface.geometric)) else {
+        // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
+        let straight = (interface.width > 0.0).then_some(path.direction);
+        let Some(direction) = beyond.or_else(|| through(interface.geometric)).or(straight) else {
             self.out.counters.paths_lost += 1;
             return false;
         };

@@ -130,6 +130,25 @@ impl World<'_> {
         )
     }
 
+    /// How fast the interpolated normal turns along the direction `along` (world, any length), rad/mm.
+    pub fn curvature(&self, crossing: &Crossing, along: DVec3) -> f64 {
+        let instance = &self.instances[crossing.instance as usize];
+        let to_world = affine(&instance.world_from_object).matrix3;
+        let turn = affine(&instance.object_from_world).matrix3.transpose();
+        let [a, b, c] = self.corners(crossing.triangle);
+        let (u, v) = (to_world * (b - a), to_world * (c - a));
+        let [n, n_u, n_v] = self.geometry.triangles[crossing.triangle]
+            .map(|i| (turn * widen(self.geometry.normals[i as usize])).normalize_or_zero());
+        let across = u.cross(v);
+        let (area2, size) = (across.length_squared(), along.length_squared());
+        if area2 == 0.0 || size == 0.0 {
+            return 0.0;
+        }
+        let a = along.cross(v).dot(across) / area2;
+        let b = u.cross(along).dot(across) / area2;
+        (a * (n_u - n) + b * (n_v - n)).dot(along).abs() / size
+    }
+
     /// Index of the tissue where `stack` encloses a point, and of the instance or NONE.
     pub fn medium(&self, stack: &Stack) -> (u32, u32) {
         match stack.current(self.instances) {

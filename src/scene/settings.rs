@@ -63,6 +63,9 @@ pub struct Simulation {
     pub rough_transmission: bool,
     /// Whether a reflected path that returns to the transducer's face bounces off it.
     pub face_reflection: bool,
+    /// Whether a curved surface reflects by its mean over the beam's lateral width (off: as the ray
+    /// meets it, geometric acoustics).
+    pub beam_footprint: bool,
     /// Standard deviation of the lateral origin jitter, mm.
     pub origin_jitter: f64,
     /// Scatterer mode.
@@ -147,6 +150,7 @@ impl Default for Simulation {
             coherence: Coherence::Split,
             rough_transmission: false,
             face_reflection: false,
+            beam_footprint: true,
             origin_jitter: 0.0,
             scatter_mode: ScatterMode::Lattice,
             cell: 0.15,

@@ -36,6 +36,8 @@ pub const FLAG_WORLD_TEXTURE: u32 = 8;
 pub const FLAG_COHERENT: u32 = 16;
 /// Paper-like voxel grid instead of the lattice.
 pub const FLAG_VOXEL: u32 = 32;
+/// Reflectances of curved surfaces averaged over the beam.
+pub const FLAG_FOOTPRINT: u32 = 64;
 
 macro_rules! shared {
     ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(

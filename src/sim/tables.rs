@@ -119,7 +119,8 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
             | flag(
                 simulation.scatter_mode == ScatterMode::Voxel,
                 layout::FLAG_VOXEL,
-            ),
+            )
+            | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT),
         seed: simulation.seed,
         origin_jitter: simulation.origin_jitter as f32,
         cell: simulation.cell as f32,

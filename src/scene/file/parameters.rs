@@ -31,7 +31,7 @@ pub(super) fn simulation(
     };
     overlay!(table => out:
         paths, sampling, max_interactions, max_reflections, min_weight, coherence,
-        rough_transmission, face_reflection, scatter_mode, elevation_cells, texture_space, seed;
+        rough_transmission, face_reflection, beam_footprint, scatter_mode, elevation_cells, texture_space, seed;
         origin_jitter, cell, volume_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
         ("paths", f64::from(out.paths), (1.0, 65_536.0), ""),

@@ -94,6 +94,7 @@ pub struct SimulationTable {
     pub coherence: Option<Coherence>,
     pub rough_transmission: Option<bool>,
     pub face_reflection: Option<bool>,
+    pub beam_footprint: Option<bool>,
     pub origin_jitter: Option<Length>,
     pub scatter_mode: Option<ScatterMode>,
     pub cell: Option<Length>,
