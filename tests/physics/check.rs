@@ -45,6 +45,21 @@ impl Figure {
     }
 }
 
+impl std::fmt::Display for Figure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self {
+            what,
+            measured,
+            expected,
+            tolerance,
+        } = self;
+        write!(
+            f,
+            "{what}: {measured}, expected {expected} within {tolerance}"
+        )
+    }
+}
+
 /// One line, or one cloud of dots.
 #[derive(Clone, Debug)]
 pub struct Curve {
@@ -64,12 +79,68 @@ pub struct Plot {
     pub curves: Vec<Curve>,
 }
 
+impl Curve {
+    /// What was measured.
+    pub fn dots(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self {
+            label: label.into(),
+            points,
+            line: false,
+        }
+    }
+
+    /// The closed form.
+    pub fn line(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self {
+            line: true,
+            ..Self::dots(label, points)
+        }
+    }
+}
+
+impl Plot {
+    /// On linear axes.
+    pub fn linear(title: impl Into<String>, axes: [&str; 2], curves: Vec<Curve>) -> Self {
+        Self {
+            title: title.into(),
+            axes: axes.map(String::from),
+            logarithmic: [false; 2],
+            curves,
+        }
+    }
+
+    /// It has names, something to draw, and only points that its axes can show.
+    pub fn is_drawable(&self) -> bool {
+        let shows = |p: &[f64; 2]| {
+            let on = |i: usize| p[i].is_finite() && (!self.logarithmic[i] || p[i] > 0.0);
+            on(0) && on(1)
+        };
+        let named = !self.title.is_empty() && self.axes.iter().all(|a| !a.is_empty());
+        let drawn =
+            |c: &Curve| !c.label.is_empty() && !c.points.is_empty() && c.points.iter().all(shows);
+        named
+            && self.curves.iter().all(drawn)
+            && self.curves.iter().any(|c| c.line)
+            && self.curves.iter().any(|c| !c.line)
+    }
+}
+
 /// Grey levels row by row.
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub title: String,
     pub width: u32,
     pub grey: Vec<u8>,
+}
+
+impl Picture {
+    /// It has a name and whole rows.
+    pub fn is_drawable(&self) -> bool {
+        !self.title.is_empty()
+            && !self.grey.is_empty()
+            && self.width > 0
+            && self.grey.len().is_multiple_of(self.width as usize)
+    }
 }
 
 /// What a check found.
@@ -97,6 +168,11 @@ impl Outcome {
         });
     }
 
+    /// Every plot and every picture can be shown.
+    pub fn is_drawable(&self) -> bool {
+        self.plots.iter().all(Plot::is_drawable) && self.pictures.iter().all(Picture::is_drawable)
+    }
+
     /// Figures that do not hold.
     pub fn failures(&self) -> Vec<&Figure> {
         self.figures.iter().filter(|f| !f.holds()).collect()
@@ -117,33 +193,37 @@ pub struct Bench {
 
 impl Bench {
     pub fn new() -> Self {
+        let device = gpu::test_device();
         Self {
-            device: gpu::test_device(),
-            renderers: renderers(),
+            renderers: renderers(&device),
+            device,
         }
     }
 }
 
-/// The check holds, and notices its planted error.
+/// The check holds, notices its planted error, and leaves the validation layers silent.
 ///
 /// # Panics
 /// With the figures, if not.
 pub fn prove(check: &Check) {
     let bench = Bench::new();
+    let title = format!("{} {}", check.row, check.name);
     let right = (check.run)(&bench, Physics::Right);
+    let list =
+        |figures: Vec<&Figure>| -> String { figures.iter().map(|f| format!("\n{f}")).collect() };
     assert!(
         right.holds(),
-        "{} {}: {:#?}",
-        check.row,
-        check.name,
-        right.failures()
+        "{title}: {}\n{}",
+        list(right.failures()),
+        check.claim
     );
+    assert!(right.is_drawable(), "{title}: {:#?}", right.plots);
     let wrong = (check.run)(&bench, Physics::Planted);
     assert!(
         !wrong.holds(),
-        "{} {}: not noticed: {}",
-        check.row,
-        check.name,
-        check.planted
+        "{title}: not noticed: {}{}",
+        check.planted,
+        list(wrong.figures.iter().collect())
     );
+    assert_eq!(bench.device.validation_messages(), Vec::<String>::new());
 }

@@ -10,6 +10,8 @@ use insonify::reference::{axial, beam, detect, display, scatter};
 use insonify::scene::Scene;
 use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
 
+use crate::check::Picture;
+
 /// A scene as the kernels read it.
 pub struct Inputs(Owned);
 
@@ -66,6 +68,16 @@ impl Frame {
     pub fn envelope(&self, l: usize) -> Vec<f64> {
         self.iq[l].iter().map(|v| v[0].hypot(v[1])).collect()
     }
+
+    /// Its pixels, of the height that `scene` asks for; white outside the sector.
+    pub fn picture(&self, title: impl Into<String>, scene: &Scene) -> Picture {
+        let grey = |&p: &u32| if p >> 24 == 0 { 255 } else { (p & 0xff) as u8 };
+        Picture {
+            title: title.into(),
+            width: self.pixels.len() as u32 / scene.imaging.image_height,
+            grey: self.pixels.iter().map(grey).collect(),
+        }
+    }
 }
 
 /// What the device's 32-bit buffers would hold.
@@ -108,9 +120,8 @@ pub fn twin(scene: &Scene) -> Frame {
 pub type Renderer = (&'static str, Box<dyn Fn(&Scene) -> Frame>);
 
 /// The twins, and the device with either tracer.
-pub fn renderers() -> [Renderer; 3] {
-    let device = gpu::test_device();
-    let other = device.clone();
+pub fn renderers(device: &Arc<gpu::Device>) -> [Renderer; 3] {
+    let (device, other) = (device.clone(), device.clone());
     [
         ("twins", Box::new(twin)),
         ("bvh", Box::new(move |s| on(&device, s, Tracer::Bvh))),

@@ -4,7 +4,7 @@ use crate::check::Check;
 
 macro_rules! rows {
     ($($module:ident::$name:ident),* $(,)?) => {
-        /// All checks, in the order of the table.
+        /// All checks, in the order of the table's rows.
         pub fn all() -> Vec<Check> {
             vec![$(crate::$module::$name()),*]
         }
@@ -22,5 +22,28 @@ macro_rules! rows {
 }
 
 rows! {
+    interfaces::what_a_wall_lets_through_is_the_fluid_fresnel_law_at_every_angle,
+    interfaces::refraction_is_snells_law_by_speeds_and_total_reflection_switches_there,
     timing::a_plate_shows_at_its_time_of_flight,
+    interfaces::transmission_is_beer_lambert_times_fresnel,
+    resolution::a_point_is_as_long_as_its_pulse,
+    resolution::a_point_is_as_wide_as_the_beam_at_its_depth,
+    resolution::a_slice_is_as_thick_as_the_lens_makes_it,
+    detection::the_baseband_envelope_is_the_hilbert_envelope,
+    levels::matched_compensation_makes_homogeneous_tissue_flat,
+    levels::sliders_add_their_decibels_at_their_depths,
+    levels::sectors_have_the_area_of_their_geometry,
+}
+
+#[test]
+fn rows_are_in_order_and_names_are_unique() {
+    let checks = all();
+    let number = |c: &Check| -> u32 {
+        let digits = c.row.strip_prefix('T').expect(c.row);
+        digits.parse().expect(c.row)
+    };
+    assert!(checks.is_sorted_by_key(number));
+    assert!(checks.iter().all(|c| (1..=35).contains(&number(c))));
+    let names: std::collections::HashSet<_> = checks.iter().map(|c| c.name).collect();
+    assert_eq!(names.len(), checks.len());
 }
