@@ -1,8 +1,21 @@
 #!/usr/bin/env bash
-# Every test, with all set-up that they need. Arguments go to the test runner.
+# Every test, with all set-up that they need. `--long` first runs also those that take minutes: the statistics
+# over many seeds. Other arguments go to the test runner.
 set -eu
 cd "$(dirname "$0")/.."
+long=()
+if [ "${1:-}" = --long ]; then
+  shift
+  long=(--include-ignored)
+fi
 ./tools/setup.sh
 export INSONIFY_VALIDATE=1
 [ -e ../shared/data ] || echo "skipped: no shared data (tests on real meshes)"
-cargo test --features anatomy "$@"
+if [ ${#long[@]} -eq 0 ]; then
+  cargo test --features anatomy "$@"
+else
+  case " $* " in
+  *" -- "*) cargo test --features anatomy "$@" "${long[@]}" ;;
+  *) cargo test --features anatomy "$@" -- "${long[@]}" ;;
+  esac
+fi

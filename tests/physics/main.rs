@@ -3,11 +3,16 @@
 
 mod check;
 mod detection;
+mod grain;
 mod interfaces;
 mod levels;
+mod moments;
+mod pictures;
 mod profile;
 mod render;
 mod resolution;
 mod rows;
 mod scenes;
+mod speckle;
+mod sweep;
 mod timing;
