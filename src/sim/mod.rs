@@ -172,6 +172,22 @@ impl Simulator {
         Ok([surface, volume].map(|bytes| bytemuck::pod_collect_to_vec(&bytes)))
     }
 
+    /// Segments of the last frame per line e * scanlines + l, in no particular order; where the paths
+    /// were traced in several batches, those of the last batch.
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn segments(&mut self) -> Result<Vec<Vec<layout::Segment>>, SimError> {
+        let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read(|b| &b.segment_count)?);
+        let segments: Vec<layout::Segment> =
+            bytemuck::pod_collect_to_vec(&self.read(|b| &b.segments)?);
+        let capacity = self.passes.frame.segment_capacity as usize;
+        let lines = segments.chunks(capacity).zip(&counts);
+        Ok(lines
+            .map(|(line, &count)| line[..capacity.min(count as usize)].to_vec())
+            .collect())
+    }
+
     /// Echoes after the lateral stage, with noise, before the axial kernel: complex pairs, [L][K].
     ///
     /// # Errors

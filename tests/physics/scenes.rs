@@ -31,7 +31,8 @@ pub fn silent(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
     }
 }
 
-fn mirror() -> Surface {
+/// A perfectly smooth, thin surface.
+pub fn mirror() -> Surface {
     Surface {
         roughness: f64::INFINITY,
         thickness: 0.0,
