@@ -3,19 +3,22 @@
 
 mod check;
 mod detection;
+mod energy;
 mod grain;
 mod interfaces;
 mod levels;
 mod moments;
-mod pictures;
 mod paths;
+mod pictures;
 mod profile;
 mod refraction;
 mod render;
 mod resolution;
 mod reverberation;
+mod roughness;
 mod rows;
 mod scenes;
 mod speckle;
 mod sweep;
+mod thickness;
 mod timing;

@@ -8,6 +8,7 @@ use insonify::scene::{Instance, Mesh, Scene, Tissue};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
 use crate::paths::{Range, TRACERS};
+use crate::pictures::shown;
 use crate::render::Inputs;
 use crate::scenes::{add_point, linear, mirror, silent, tissue};
 
@@ -197,12 +198,11 @@ fn picture(bench: &Bench, speed: f64) -> Picture {
     let mut scene = cylinder(160, [-16.0, 16.0], around, tissue(speed, 1.55, 0.5));
     scene.probe.samples = 1024;
     scene.imaging.image_height = 480;
-    let pixels = (bench.renderers[1].1)(&scene).pixels;
-    Picture {
-        title: "A slower cylinder in speckle, dark beside its back".into(),
-        width: (pixels.len() / 480) as u32,
-        grey: pixels.iter().map(|p| *p as u8).collect(),
-    }
+    shown(
+        bench,
+        "A slower cylinder in speckle, dark beside its back",
+        &scene,
+    )
 }
 
 /// T21.
@@ -226,8 +226,14 @@ fn critical_impact(bench: &Bench, physics: Physics) -> Outcome {
     };
     // 0.1 um apart about the onset.
     let half = 0.01;
-    let scene = rays(401, [expected - half, expected + half], speed);
-    let wide = rays(251, [0.0, 5.02], speed);
+    // The law of a ray: a beam of finite width has no sharp onset.
+    let geometric = |lines, between| {
+        let mut scene = rays(lines, between, speed);
+        scene.simulation.beam_footprint = false;
+        scene
+    };
+    let scene = geometric(401, [expected - half, expected + half]);
+    let wide = geometric(251, [0.0, 5.02]);
     let mut plot = Plot {
         title: "Transmission into a faster cylinder".into(),
         axes: ["impact parameter, mm".into(), "1 - R".into()],

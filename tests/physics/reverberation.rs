@@ -5,8 +5,9 @@ use insonify::scene::Scene;
 use insonify::scene::settings::Sampling;
 use insonify::sim::Tracer;
 
-use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
+use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS, centroid, echo};
+use crate::pictures::shown;
 use crate::scenes::{add_box, add_layer, add_point, linear, silent};
 
 /// Pressure reflection coefficients of the slab's faces. The second detour passes the front face
@@ -234,12 +235,8 @@ fn mirror_image(bench: &Bench, physics: Physics) -> Outcome {
     if physics == Physics::Right {
         let mut scene = mirrored(96, 48.0, Some(45.0));
         scene.imaging.image_height = 400;
-        let pixels = (bench.renderers[1].1)(&scene).pixels;
-        out.pictures.push(Picture {
-            title: "A mirror at 45 degrees: the target right of it, its image below".into(),
-            width: (pixels.len() / 400) as u32,
-            grey: pixels.iter().map(|p| *p as u8).collect(),
-        });
+        let title = "A mirror at 45 degrees: the target right of it, its image below";
+        out.pictures.push(shown(bench, title, &scene));
     }
     out
 }
