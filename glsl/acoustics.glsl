@@ -35,6 +35,19 @@ void basis(vec3 n, out vec3 tangent, out vec3 bitangent) {
 // Exponents above this are a mirror: the rms tilt is below 5e-5 rad.
 const float SPECULAR = 1e9;
 
+// Direction about n with pdf (s+1)/(2 pi) cos^s, from two uniforms.
+vec3 power_cosine(vec3 n, float exponent, vec2 u) {
+    vec3 tangent, bitangent;
+    basis(n, tangent, bitangent);
+    // cos t = u^(1/(s+1)); sin^2 = 1 - exp(-x), by series where 1 - cos^2 would cancel.
+    float x = -2.0 * log(max(u.x, 1.0 / 16777216.0)) / (exponent + 1.0);
+    float sin2 = x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x);
+    float cos_t = sqrt(1.0 - sin2);
+    float sin_t = sqrt(sin2);
+    float azimuth = 6.283185307 * u.y;
+    return normalize(sin_t * cos(azimuth) * tangent + sin_t * sin(azimuth) * bitangent + cos_t * n);
+}
+
 // Micro-normal about n whose reflection leaves on the near side of the geometric normal: pdf
 // (s+1)/(2 pi) cos^s. False when eight attempts fail.
 bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, uint key, uint seed, out vec3 m) {
@@ -42,17 +55,9 @@ bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, 
         m = n;
         return dot(d, m) < 0.0 && dot(d - 2.0 * dot(d, m) * m, n_geometric) > 0.0;
     }
-    vec3 tangent, bitangent;
-    basis(n, tangent, bitangent);
     for (uint attempt = 0u; attempt < 8u; ++attempt) {
         uvec4 bits = path_random(path, key, PURPOSE_NORMAL + attempt, seed);
-        // cos t = u^(1/(s+1)); sin^2 = 1 - exp(-x), by series where 1 - cos^2 would cancel.
-        float x = -2.0 * log(max(unit(bits.x), 1.0 / 16777216.0)) / (roughness + 1.0);
-        float sin2 = x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x);
-        float cos_t = sqrt(1.0 - sin2);
-        float sin_t = sqrt(sin2);
-        float azimuth = 6.283185307 * unit(bits.y);
-        m = normalize(sin_t * cos(azimuth) * tangent + sin_t * sin(azimuth) * bitangent + cos_t * n);
+        m = power_cosine(n, roughness, vec2(unit(bits.x), unit(bits.y)));
         float along = dot(d, m);
         if (along < 0.0 && dot(d - 2.0 * along * m, n_geometric) > 0.0) return true;
     }

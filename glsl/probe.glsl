@@ -31,6 +31,13 @@ void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lat
     }
 }
 
+// Amplitude factor of an echo `off` mm beside the geometric scanline.
+float beam_weight(float off) {
+    if (frame.beam_width <= 0.0) return 1.0;
+    float q = off / frame.beam_width;
+    return exp(-0.5 * q * q);
+}
+
 // A ray leaving the face must not meet it again at its own start.
 const float FACE_T_MIN = 1e-3;
 

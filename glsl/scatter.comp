@@ -19,6 +19,7 @@ layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 
 #include "transform.glsl"
+#include "probe.glsl"
 #include "texture.glsl"
 #include "deposit.glsl"
 
@@ -40,6 +41,7 @@ struct Stretch {
     float extent; float time; float weight;
     vec3 spread; float share;
     float speed; float absorption;
+    vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
     uint tissue; uint instance;
 };
 
@@ -62,6 +64,13 @@ Stretch world_stretch(uint at) {
     s.instance = segments[at].instance;
     s.speed = tissues[s.tissue].speed;
     s.absorption = tissues[s.tissue].absorption;
+    s.off = vec2(0.0);
+    if (frame.beam_width > 0.0) {
+        uint line = segments[at].line;
+        vec3 o, d, lateral;
+        probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
+        s.off = vec2(dot(probe_point(s.o) - o, lateral), dot(probe_vector(s.d), lateral));
+    }
     return s;
 }
 
@@ -88,12 +97,14 @@ bool is_finite(Stretch s) {
         && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)));
 }
 
-// What a rough reflection spreads over many resolution cells averages down.
+// What a rough reflection spreads over many resolution cells averages down; what lies off the
+// scanline is heard less.
 float thinning(Stretch s, float x, float sigma_l, float sigma_e) {
     float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
-    if (variance <= 0.0) return 1.0;
+    float beam = beam_weight(s.off.x + x * s.off.y);
+    if (variance <= 0.0) return beam;
     float cells = sqrt((1.0 + variance / (sigma_l * sigma_l)) * (1.0 + variance / (sigma_e * sigma_e)));
-    return min(1.0, sqrt(s.share / cells));
+    return beam * min(1.0, sqrt(s.share / cells));
 }
 
 void deposit(float kappa, float time, float amplitude, bool point) {
@@ -285,7 +296,7 @@ void main() {
     uint available = line < lines ? min(segment_count[line], frame.segment_capacity) : 0u;
     window_begin = gl_WorkGroupID.z * WINDOW;
     uint layer = line / frame.scanlines;
-    layer_y = frame.slice_thickness * ((float(layer) + 0.5) / float(frame.layers) - 0.5);
+    layer_y = elevation(layer);
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
 
     for (uint i = thread; i < 2u * WINDOW; i += THREADS) echoes[i] = 0;

@@ -37,7 +37,10 @@ struct Frame {
     uint instances; uint points; float face_height; float axial_sigma; // sigma_g of the axial kernel, samples
     float noise; float inverse_reference; float inverse_range; uint frame_index;
     uint image_width; uint image_height; float pixel_pitch; float image_left; // mm, left edge in probe x
-    float image_top; float unused0; float unused1; float unused2;             // mm, top edge in probe z
+    float image_top;                                                          // mm, top edge in probe z
+    float beam_width;                                                         // mm, sigma of the beam weight; 0: none
+    float emission_lobe;                                                      // exponent of the cosine; 0: none
+    float unused0;
 };
 
 struct Tissue {

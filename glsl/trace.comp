@@ -90,8 +90,9 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent) {
 
 // Which part of the volume this path stands for, and how many paths average down its echoes.
 void emit_segment(Path path, uint line, uint n, uint instance, float extent) {
-    bool whole = frame.sampling == SAMPLING_MAIN_PATH
-        || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u);
+    bool alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+    bool whole = alike && (frame.sampling == SAMPLING_MAIN_PATH
+        || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
     if (whole && n != 0u) return;
     uint tissue = tissue_of(instance);
     if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
@@ -120,15 +121,20 @@ Path start(uint line, uint n) {
     Path path;
     path.direction = world_vector(d);
     path.lateral = world_vector(lateral);
-    float jitter = frame.origin_jitter * gaussian(path_random(n, 0u, PURPOSE_JITTER, frame.seed).x);
-    path.origin = world_point(o) + jitter * path.lateral;
+    uvec4 bits = path_random(n, 0u, PURPOSE_JITTER, frame.seed);
+    path.origin = world_point(o) + frame.origin_jitter * gaussian(bits.x) * path.lateral;
+    path.spread = vec3(frame.origin_jitter * frame.origin_jitter, 0.0, 0.0);
+    if (frame.emission_lobe > 0.0) {
+        path.direction = power_cosine(path.direction, frame.emission_lobe, vec2(unit(bits.y), unit(bits.z)));
+        path.lateral = normalize(path.lateral - dot(path.lateral, path.direction) * path.direction);
+        path.spread.z = 1.0 / (frame.emission_lobe + 2.0);
+    }
     path.handedness = 1.0;
     path.t_min = 0.0;
     path.weight = 1.0;
     path.share = 1.0 / float(frame.paths);
     path.probability = 1.0;
     path.time = 0.0;
-    path.spread = vec3(0.0);
     path.interactions = 0u;
     path.reflections = 0u;
     path.crossings = 0u;
@@ -189,13 +195,20 @@ Surface load_surface(uint i) {
     return s;
 }
 
+// Distance of a point from the geometric scanline in the image plane, mm.
+float off_axis(uint line, vec3 position) {
+    vec3 o, d, lateral;
+    probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
+    return dot(probe_point(position) - o, lateral);
+}
+
 // The echo of one interface by one path; m is the sampled micro-normal.
 void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tissue t1, Tissue t2, vec3 m) {
     float cos_m = -dot(path.direction, m);
     float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_m);
     float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
     if (facing <= 0.0) return;
-    float amplitude = path.weight * r * pow(facing, s.specularity) * s.gain;
+    float amplitude = path.weight * r * pow(facing, s.specularity) * s.gain * beam_weight(off_axis(line, path.origin));
     float q = s.thickness * abs(gaussian(path_random(n, key, PURPOSE_THICKNESS, frame.seed).x));
     float late = path.time + q / t1.speed;
     float behind = amplitude * exp(-t1.absorption * q);
@@ -258,7 +271,11 @@ void main() {
                 advance(path, t_end, t1, end);
                 path.interactions += 1u;
                 interactions += 1u;
-                reflect_path(path, world_vector(face_normal(probe_point(end))), SPECULAR, 0.0);
+                vec3 normal = world_vector(face_normal(probe_point(end)));
+                float cos_face = dot(path.direction, normal);
+                float retro = path.weight * path.share * beam_weight(off_axis(line, end));
+                if (cos_face < 0.0) deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false);
+                reflect_path(path, normal, SPECULAR, 0.0);
             } else {
                 path.weight = 0.0;
             }

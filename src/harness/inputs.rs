@@ -77,6 +77,8 @@ pub fn frame(case: Case, size: Size) -> Frame {
         volume_floor: 1e-6,
         seed: 0x5eed,
         origin_jitter: 0.05,
+        emission_lobe: 3000.0,
+        beam_width: 4.0,
         cell: 0.3,
         elevation_reach: 0.9,
         lateral_cut: 2.5,

@@ -57,6 +57,16 @@ pub fn line(frame: &Frame, l: u32, e: u32) -> Line {
     }
 }
 
+/// Amplitude factor of an echo `off` mm beside the geometric scanline.
+pub fn beam_weight(frame: &Frame, off: f64) -> f64 {
+    let sigma = f64::from(frame.beam_width);
+    if sigma > 0.0 {
+        (-off * off / (2.0 * sigma * sigma)).exp()
+    } else {
+        1.0
+    }
+}
+
 /// Scanline `l` of layer `e` in world space.
 pub fn world_line(frame: &Frame, l: u32, e: u32) -> Line {
     let place: DAffine3 = affine(&frame.world_from_probe);

@@ -133,6 +133,20 @@ fn micro_normal(
     })
 }
 
+/// Gain per sample of surface echoes in the layer of `path`, with the fixed-point scale.
+pub(super) fn gain<'a>(world: &'a World, path: &Path) -> impl Fn(usize) -> f64 + 'a {
+    let frame = world.frame;
+    let (_, layer) = path.scanline(frame.scanlines);
+    let y = super::geometry::probe(frame).elevation(layer);
+    move |k| {
+        let row = &world.rows[k];
+        let sigma = f64::from(row.sigma_elevation);
+        f64::from(row.surface_gain)
+            * (-y * y / (2.0 * sigma * sigma)).exp()
+            * f64::from(frame.surface_scale)
+    }
+}
+
 impl Interface {
     /// Deposits what returns along the path: the part in phase at the surface, the rest displaced
     /// by the thickness with a phase that belongs to the surface.
@@ -144,22 +158,15 @@ impl Interface {
         let lobe = (-d.dot(micro.reflected))
             .max(0.0)
             .powf(surface.specularity.into());
-        let amplitude = path.weight * r * lobe * f64::from(surface.gain);
+        let amplitude = path.weight * r * lobe * f64::from(surface.gain) * path.beam_weight(frame);
         let words = path_random(path.n, path.key(), PURPOSE_THICKNESS, frame.seed);
         let q = f64::from(surface.thickness) * gaussian(words[0]).abs();
         let behind = amplitude * (-self.absorption * q).exp();
         let time = path.time + q / self.fluids[0].speed;
-        let (l, layer) = path.scanline(frame.scanlines);
-        let y = super::geometry::probe(frame).elevation(layer);
-        let gain = |k: usize| {
-            let row = &world.rows[k];
-            let sigma = f64::from(row.sigma_elevation);
-            f64::from(row.surface_gain)
-                * (-y * y / (2.0 * sigma * sigma)).exp()
-                * f64::from(frame.surface_scale)
-        };
+        let (l, _) = path.scanline(frame.scanlines);
+        let gain = gain(world, path);
         if frame.flags & FLAG_COHERENT != 0 {
-            out.deposit(l, time, path.share * behind, 0.0, gain);
+            out.deposit(l, time, path.share * behind, 0.0, &gain);
             return;
         }
         let coherence = if surface.thickness == 0.0 {
@@ -167,7 +174,7 @@ impl Interface {
         } else {
             f64::from(surface.coherence)
         };
-        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, gain);
+        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, &gain);
         let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
         if rest > 0.0 {
             let p = world.texture(self.instance).transform_point3(path.origin);

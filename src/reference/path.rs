@@ -3,8 +3,10 @@
 use glam::DVec3;
 
 use super::acoustics::mirror;
+use super::geometry::{beam_weight, world_line};
 use super::interface::MIRROR;
 use super::stack::Stack;
+use crate::sim::layout::Frame;
 
 /// Whether a path was split and how it goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +49,13 @@ impl Path {
     /// Key of the random numbers at the interaction just reached.
     pub(super) fn key(&self) -> u32 {
         self.interactions + 32 * self.reflections
+    }
+
+    /// Amplitude factor for how far off the geometric scanline the path is.
+    pub(super) fn beam_weight(&self, frame: &Frame) -> f64 {
+        let (l, layer) = self.scanline(frame.scanlines);
+        let line = world_line(frame, l, layer);
+        beam_weight(frame, (self.origin - line.origin).dot(line.lateral))
     }
 
     /// Scanline and layer.

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3, I64Vec3};
 
-use super::geometry::probe;
+use super::geometry::{beam_weight, probe, world_line};
 use super::texture::{factor, scatterer};
 use super::world::World;
 use super::{Accumulator, Segment};
@@ -24,6 +24,8 @@ struct Tube<'a> {
     elevation: DVec3,
     scanline: u32,
     layer_offset: f64,
+    /// Distance from the geometric scanline, mm: at the start and per mm.
+    off: [f64; 2],
 }
 
 /// Echoes of all segments, in units of 1 / volume_scale.
@@ -50,7 +52,11 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
 impl<'a> Tube<'a> {
     fn new(world: &'a World, segment: &'a Segment, space: DAffine3) -> Self {
         let elevation = segment.handedness * segment.direction.cross(segment.lateral);
-        let layer = segment.line / world.frame.scanlines;
+        let (l, layer) = (
+            segment.line % world.frame.scanlines,
+            segment.line / world.frame.scanlines,
+        );
+        let line = world_line(world.frame, l, layer);
         Self {
             world,
             segment,
@@ -59,8 +65,12 @@ impl<'a> Tube<'a> {
             direction: space.transform_vector3(segment.direction),
             lateral: space.transform_vector3(segment.lateral),
             elevation: space.transform_vector3(elevation),
-            scanline: segment.line % world.frame.scanlines,
+            scanline: l,
             layer_offset: probe(world.frame).elevation(layer),
+            off: [
+                (segment.origin - line.origin).dot(line.lateral),
+                segment.direction.dot(line.lateral),
+            ],
         }
     }
 
@@ -73,7 +83,7 @@ impl<'a> Tube<'a> {
         &self.world.rows[out.sample(time)]
     }
 
-    /// Weight at distance `x`: absorbed, and averaged down where a rough reflection has spread the
+    /// Weight at distance `x`: absorbed, less off the scanline, and averaged down where a rough reflection has spread the
     /// path over many resolution cells.
     fn weight(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.spread;
@@ -81,7 +91,10 @@ impl<'a> Tube<'a> {
         let wider = |sigma: f32| (1.0 + variance / f64::from(sigma).powi(2)).sqrt();
         let cells = wider(row.sigma_lateral) * wider(row.sigma_elevation);
         let averaged = (self.segment.share / cells).sqrt().min(1.0);
-        self.segment.weight * (-f64::from(self.tissue.absorption) * x).exp() * averaged
+        self.segment.weight
+            * (-f64::from(self.tissue.absorption) * x).exp()
+            * averaged
+            * beam_weight(self.world.frame, self.off[0] + x * self.off[1])
     }
 
     /// Echo of something of `amplitude` at `p`, seen at distances up to `cut` sigmas and `reach` mm.

@@ -77,7 +77,17 @@ impl Tracer<'_> {
     fn start(&self, line: u32, n: u32, stack: Stack) -> Path {
         let frame = self.world.frame;
         let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
-        let jitter = gaussian(path_random(n, 0, PURPOSE_JITTER, frame.seed)[0]);
+        let words = path_random(n, 0, PURPOSE_JITTER, frame.seed);
+        let (jitter, lobe) = (
+            f64::from(frame.origin_jitter),
+            f64::from(frame.emission_lobe),
+        );
+        let (mut direction, mut lateral, mut fan) = (start.direction, start.lateral, 0.0);
+        if lobe > 0.0 {
+            direction = acoustics::power_cosine(direction, lobe, [unit(words[1]), unit(words[2])]);
+            lateral = (lateral - lateral.dot(direction) * direction).normalize();
+            fan = 1.0 / (lobe + 2.0);
+        }
         Path {
             role: if frame.sampling == SAMPLING_MAIN_PATH {
                 Role::Main
@@ -90,13 +100,13 @@ impl Tracer<'_> {
             share: 1.0 / f64::from(frame.paths),
             probability: 1.0,
             time: 0.0,
-            origin: start.origin + f64::from(frame.origin_jitter) * jitter * start.lateral,
-            direction: start.direction,
-            lateral: start.lateral,
+            origin: start.origin + jitter * gaussian(words[0]) * start.lateral,
+            direction,
+            lateral,
             handedness: 1.0,
             interactions: 0,
             reflections: 0,
-            spread: [0.0; 3],
+            spread: [jitter * jitter, 0.0, fan],
             stack,
             t_min: 0.0,
         }
@@ -125,6 +135,7 @@ impl Tracer<'_> {
                     return;
                 }
                 self.advance(&mut path, t);
+                self.face_echo(&path, normal);
                 let back = acoustics::mirror(path.direction, normal);
                 reflect(&mut path, back, normal);
             } else {
@@ -180,6 +191,18 @@ impl Tracer<'_> {
         let (t, normal) = face(self.world.frame, o, d, path.t_min)?;
         let world = affine(&self.world.frame.world_from_probe);
         (t < limit).then(|| (t, world.transform_vector3(normal).normalize()))
+    }
+
+    /// What the transducer's face, a perfect mirror, sends back along the path.
+    fn face_echo(&mut self, path: &Path, normal: DVec3) {
+        let cos = -path.direction.dot(normal);
+        let lobe = (2.0 * cos * cos - 1.0).max(0.0);
+        if cos > 0.0 {
+            let amplitude = path.share * path.weight * lobe * path.beam_weight(self.world.frame);
+            let gain = interface::gain(self.world, path);
+            let (l, _) = path.scanline(self.world.frame.scanlines);
+            self.out.surface.deposit(l, path.time, amplitude, 0.0, gain);
+        }
     }
 
     /// What the first of `crossings` does to the media.
@@ -294,6 +317,12 @@ impl Tracer<'_> {
         true
     }
 
+    /// Whether the volume echoes of a branch would be drowned.
+    fn is_faint(&self, path: &Path) -> bool {
+        let row = &self.world.rows[self.out.surface.sample(path.time)];
+        path.weight * f64::from(row.compensation) < f64::from(self.world.frame.volume_floor)
+    }
+
     /// Keeps the stretch of `length` ahead of the path, if scatterers or points can lie there.
     fn emit(&mut self, path: &Path, length: f64) {
         let (tissue, instance) = self.world.medium(&path.stack);
@@ -305,20 +334,15 @@ impl Tracer<'_> {
         }
         let frame = self.world.frame;
         let unsplit = frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0;
+        let alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+        if path.role == Role::Branch && self.is_faint(path) {
+            return;
+        }
         let (weight, share) = match path.role {
-            Role::Single if !unsplit => (
-                path.weight * path.share,
-                (path.probability / path.share).max(1.0),
-            ),
+            _ if !alike => own_share(path),
+            Role::Single if !unsplit => own_share(path),
             _ if path.n != 0 => return,
-            Role::Branch => {
-                let row = &self.world.rows[self.out.surface.sample(path.time)];
-                if path.weight * f64::from(row.compensation) < f64::from(frame.volume_floor) {
-                    return;
-                }
-                (path.weight, 1.0)
-            }
-            Role::Main | Role::Single => (path.weight, 1.0),
+            _ => (path.weight, 1.0),
         };
         self.out.segments[path.line as usize].push(Segment {
             origin: path.origin,
@@ -335,6 +359,14 @@ impl Tracer<'_> {
             handedness: path.handedness,
         });
     }
+}
+
+/// Weight and share of a path that speaks for itself only.
+fn own_share(path: &Path) -> (f64, f64) {
+    (
+        path.weight * path.share,
+        (path.probability / path.share).max(1.0),
+    )
 }
 
 #[cfg(test)]

@@ -68,6 +68,11 @@ pub struct Simulation {
     pub beam_footprint: bool,
     /// Standard deviation of the lateral origin jitter, mm.
     pub origin_jitter: f64,
+    /// Exponent of the cosine lobe about the scanline in which paths start; infinity: along it.
+    pub emission_lobe: f64,
+    /// Standard deviation, mm, of the weight of echoes off the geometric scanline, where refraction
+    /// and reflection lead; infinity: all count alike.
+    pub beam_width: f64,
     /// Scatterer mode.
     pub scatter_mode: ScatterMode,
     /// Edge of a lattice cell or voxel, mm.
@@ -152,6 +157,8 @@ impl Default for Simulation {
             face_reflection: false,
             beam_footprint: true,
             origin_jitter: 0.0,
+            emission_lobe: f64::INFINITY,
+            beam_width: f64::INFINITY,
             scatter_mode: ScatterMode::Lattice,
             cell: 0.15,
             elevation_cells: 1.0,

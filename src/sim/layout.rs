@@ -70,7 +70,7 @@ shared! {
         instances: u32, points: u32, face_height: f32, axial_sigma: f32,
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
-        image_top: f32, unused0: f32, unused1: f32, unused2: f32,
+        image_top: f32, beam_width: f32, emission_lobe: f32, unused0: f32,
     }
     /// Acoustic properties at the centre frequency.
     struct Tissue {

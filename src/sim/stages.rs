@@ -22,19 +22,17 @@ pub(super) struct Batches {
 }
 
 impl Batches {
-    /// Capacity from the sampling scheme: only path 0 of the main-path scheme writes segments, its
-    /// own and those of its branches; otherwise every path writes its own. A path of
-    /// B interactions has at most B + 1 segments.
+    /// Capacity from the sampling scheme. A path of B interactions has at most B + 1 segments; one of
+    /// the main-path scheme also those of its branches, three times as many, most of which end under
+    /// the volume floor: what does not fit is counted and reported.
     pub(super) fn new(frame: &layout::Frame) -> Self {
-        let per_path = frame.max_interactions + 1;
+        let branches = frame.sampling == layout::SAMPLING_MAIN_PATH;
+        let per_path = (frame.max_interactions + 1) * if branches { 4 } else { 1 };
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
         let affordable = u32::try_from(SEGMENT_BUDGET / line_bytes.max(1)).unwrap_or(u32::MAX);
-        if frame.sampling == layout::SAMPLING_MAIN_PATH {
-            // The main path's own, and three times as many for its branches, most of which end under
-            // the volume floor; what does not fit is counted and reported.
-            let all = 4 * per_path;
+        if one_speaks_for_all(frame) {
             return Self {
-                capacity: all.min(affordable.max(1)),
+                capacity: per_path.min(affordable.max(1)),
                 paths: frame.paths,
             };
         }
@@ -46,10 +44,16 @@ impl Batches {
     }
 }
 
+/// Path 0 alone writes segments: in the main-path scheme, where all paths start alike.
+fn one_speaks_for_all(frame: &layout::Frame) -> bool {
+    let alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+    frame.sampling == layout::SAMPLING_MAIN_PATH && alike
+}
+
 impl Batches {
     /// Paths of one line that write segments of their own.
     pub(super) fn paths_with_segments(&self, frame: &layout::Frame) -> u32 {
-        if frame.sampling == layout::SAMPLING_MAIN_PATH {
+        if one_speaks_for_all(frame) {
             1
         } else {
             self.paths

@@ -48,6 +48,11 @@ fn bounds(probe: &Probe) -> [f64; 4] {
     }
 }
 
+/// Kernels read 0 as "none"; infinity is no number to compute with.
+fn finite_or_zero(x: f64) -> f32 {
+    if x.is_finite() { x as f32 } else { 0.0 }
+}
+
 /// Most segments that the paths of one line can emit, within reason: a null event emits none, so
 /// a path has at most one per interaction and one after the last; on the main path only the first
 /// sample of each branch emits.
@@ -123,6 +128,8 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
             | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT),
         seed: simulation.seed,
         origin_jitter: simulation.origin_jitter as f32,
+        beam_width: finite_or_zero(simulation.beam_width),
+        emission_lobe: finite_or_zero(simulation.emission_lobe),
         cell: simulation.cell as f32,
         elevation_reach: calibration.elevation_reach() as f32,
         lateral_cut: LATERAL_CUT as f32,

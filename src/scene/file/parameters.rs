@@ -31,8 +31,9 @@ pub(super) fn simulation(
     };
     overlay!(table => out:
         paths, sampling, max_interactions, max_reflections, min_weight, coherence,
-        rough_transmission, face_reflection, beam_footprint, scatter_mode, elevation_cells, texture_space, seed;
-        origin_jitter, cell, volume_floor, speckle_gain, surface_gain);
+        rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, elevation_cells,
+        texture_space, seed;
+        origin_jitter, beam_width, cell, volume_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
         ("paths", f64::from(out.paths), (1.0, 65_536.0), ""),
         (
@@ -49,6 +50,8 @@ pub(super) fn simulation(
         ),
         ("min_weight", out.min_weight, (0.0, 1.0), ""),
         ("origin_jitter", out.origin_jitter, (0.0, 100.0), "mm"),
+        ("emission_lobe", out.emission_lobe, (1.0, INF), ""),
+        ("beam_width", out.beam_width, (0.01, INF), "mm"),
         ("cell", out.cell, (0.01, 10.0), "mm"),
         ("elevation_cells", out.elevation_cells, (0.0, 1000.0), ""),
         ("volume_floor", out.volume_floor, LEVEL, "dB"),

@@ -96,6 +96,8 @@ pub struct SimulationTable {
     pub face_reflection: Option<bool>,
     pub beam_footprint: Option<bool>,
     pub origin_jitter: Option<Length>,
+    pub emission_lobe: Option<f64>,
+    pub beam_width: Option<Length>,
     pub scatter_mode: Option<ScatterMode>,
     pub cell: Option<Length>,
     pub elevation_cells: Option<f64>,
