@@ -1,10 +1,10 @@
 //! Runs `rays.comp` on the device.
 
-use std::sync::{Arc, Mutex, OnceLock};
+use std::sync::{Arc, Mutex};
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-use insonify::gpu::{Binding, Buffer, BufferKind, Device, Kernel, test_device};
+use insonify::gpu::{Binding, Buffer, BufferKind, Device, Kernel};
 use insonify::scene::Scene;
 use insonify::sim::layout::NONE;
 use insonify::sim::shaders::Library;
@@ -47,23 +47,16 @@ pub struct Traced {
 
 /// A scene on the device with one tracer.
 pub struct Rig {
-    device: Arc<Device>,
+    pub device: Arc<Device>,
     kernel: Kernel,
-    world: World,
+    pub world: World,
     meshes: Vec<usize>,
     /// Stands in for one of the world's buffers after an error was planted.
-    spoilt: Option<(usize, Buffer)>,
-}
-
-/// One device for all tests: validation makes opening one slow. Dispatches take turns.
-fn device() -> Arc<Device> {
-    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
-    DEVICE.get_or_init(test_device).clone()
+    pub spoilt: Option<(usize, Buffer)>,
 }
 
 impl Rig {
-    pub fn new(scene: &Scene, tracer: Tracer) -> Self {
-        let device = device();
+    pub fn on(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> Self {
         assert!(
             device.supports_ray_query(),
             "'{}' has no ray queries: both tracers are tested",
@@ -74,14 +67,14 @@ impl Rig {
             Tracer::Bvh => "rays_count",
             Tracer::RayQuery => "rays_query",
         };
-        let kernel = Kernel::new(&device, stem, Library::embedded().words(stem), &[]).unwrap();
-        let world = World::new(&device, scene, tracer).unwrap();
+        let kernel = Kernel::new(device, stem, Library::embedded().words(stem), &[]).unwrap();
+        let world = World::new(device, scene, tracer).unwrap();
         Self {
             kernel,
             world,
             meshes: scene.instances.iter().map(|i| i.mesh).collect(),
             spoilt: None,
-            device,
+            device: device.clone(),
         }
     }
 
@@ -149,51 +142,5 @@ impl Rig {
 
     pub fn found(&self, rays: &[Ray]) -> Vec<Option<Found>> {
         self.trace(rays).into_iter().map(|hit| hit.found).collect()
-    }
-
-    /// The scene with its instances moved.
-    pub fn update(&mut self, scene: &Scene) -> bool {
-        let world = &mut self.world;
-        self.device
-            .once(|commands| Ok(world.update(commands, scene).unwrap()))
-            .unwrap()
-    }
-
-    /// No validation message so far.
-    pub fn assert_silent(&self) {
-        let messages = self.device.validation_messages();
-        assert!(messages.is_empty(), "{messages:#?}");
-    }
-
-    /// Exchanges the planes of one child of the first mesh's root along x.
-    pub fn swap_a_bound(&mut self) {
-        let Binding::Buffer(nodes) = self.world.structure() else {
-            panic!("not this tracer")
-        };
-        let mut bytes = self.device.read_back(nodes).unwrap();
-        let root = 80 * self.world.rows()[0].bvh_root as usize;
-        // After corner, exponents, links and kinds: eight lower planes, eight upper planes.
-        let child = (0..8)
-            .find(|i| bytes[root + 24 + i] != 0)
-            .expect("a root has children");
-        bytes.swap(root + 32 + child, root + 40 + child);
-        self.spoil(4, &bytes);
-    }
-
-    /// Makes one triangle a point.
-    pub fn drop_a_triangle(&mut self) {
-        let mut indices: Vec<u32> = self.device.read_back_as(self.world.triangles()).unwrap();
-        indices[301] = indices[300];
-        indices[302] = indices[300];
-        self.spoil(3, bytemuck::cast_slice(&indices));
-    }
-
-    fn spoil(&mut self, slot: usize, bytes: &[u8]) {
-        let buffer = self
-            .device
-            .buffer("spoilt", bytes.len() as u64, BufferKind::Storage)
-            .unwrap();
-        self.device.upload(&buffer, bytes).unwrap();
-        self.spoilt = Some((slot, buffer));
     }
 }

@@ -6,8 +6,10 @@ mod compare;
 mod device;
 mod placements;
 mod rays;
+mod suite;
+mod walk;
 
-use compare::{Found, Verdict, clear_hits, expected, judge};
+use compare::{Found, Verdict, by_aim, expected, judge, slips};
 use device::{Rig, Traced};
 use glam::{DAffine3, DVec3};
 use insonify::reference::intersect::Hit;
@@ -15,6 +17,7 @@ use insonify::scene::{Scene, shapes};
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
 use rays::{Random, Ray, aimed_at_seams, corners, placement, rays, scene};
+use walk::{clear_hits, walk};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
@@ -69,29 +72,14 @@ fn wrong(
     expected: &[Option<Hit>],
     found: &[Option<Found>],
 ) -> [usize; 2] {
-    let wrong = |i: usize| judge(scene, &rays[i], expected[i], found[i]) == Verdict::Wrong;
-    let bad: Vec<usize> = (0..rays.len())
-        .into_par_iter()
-        .filter(|&i| wrong(i))
-        .collect();
+    let bad = compare::wrong(scene, rays, expected, found);
     for &i in bad.iter().take(5) {
         println!(
             "{:?}: expected {:?}, found {:?}",
             rays[i], expected[i], found[i]
         );
     }
-    let aimed = bad.iter().filter(|&&i| aimed_at_seams(i)).count();
-    [aimed, bad.len() - aimed]
-}
-
-/// Of rays aimed at vertices and edges to the last bit, how many may slip through. Ours none. The
-/// device's own triangle test is not ours to mend: Mesa 25's software driver lets up to 195 in
-/// 10,000 through (a box, of whose few edges each is hit often), and none elsewhere.
-fn slips(tracer: Tracer, aimed: usize) -> usize {
-    match tracer {
-        Tracer::Bvh => 0,
-        Tracer::RayQuery => aimed * 400 / 10_000,
-    }
+    by_aim(&bad)
 }
 
 /// T33: a million rays, none of which may differ by more than single precision explains.
@@ -149,34 +137,6 @@ fn a_closed_mesh_never_leaks() {
             rig.assert_silent();
         }
     }
-}
-
-/// Every surface along the ray, nearest first, as the path tracer walks it: past each hit by a
-/// margin of rounding, and what lies within the margin in other instances by skipping.
-fn walk(rig: &Rig, rays: &[Ray], margin: f64) -> Vec<Vec<(f64, usize, bool)>> {
-    let mut found = vec![Vec::new(); rays.len()];
-    let mut active: Vec<(usize, Ray)> = rays.iter().copied().enumerate().collect();
-    for _ in 0..64 {
-        let list: Vec<Ray> = active.iter().map(|a| a.1).collect();
-        let hits = rig.trace(&list);
-        active = active
-            .iter()
-            .zip(&hits)
-            .filter_map(|(&(i, ray), hit)| {
-                let Found { t, instance, .. } = hit.found?;
-                found[i].push((t, instance, hit.geometric.dot(ray.direction()) < 0.0));
-                Some((
-                    i,
-                    Ray {
-                        t_min: (t + margin) as f32,
-                        ..ray
-                    },
-                ))
-            })
-            .collect();
-    }
-    assert!(active.is_empty(), "a ray meets more than 64 surfaces");
-    found
 }
 
 /// T33: entries and exits alternate along rays that begin and end outside.

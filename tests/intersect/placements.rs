@@ -4,10 +4,10 @@ use glam::{DAffine3, DVec3};
 use insonify::scene::shapes;
 use rayon::prelude::*;
 
-use super::compare::clear_hits;
 use super::device::Rig;
 use super::rays::{Ray, aimed_at_seams, baked, placement, rays, scene};
-use super::{TRACERS, shape, walk};
+use super::walk::{clear_hits, walk};
+use super::{TRACERS, shape};
 
 fn away_from_seams(rays: Vec<Ray>) -> Vec<Ray> {
     rays.into_iter()

@@ -3,6 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
+use crate::hilbert::envelope;
 use crate::scenes::{add_point, linear, silent};
 
 /// Depth (mm) and amplitude of a row of points, some closer than a pulse is long, all near the focus.
@@ -32,30 +33,7 @@ fn hilbert([start, pitch]: [f64; 2], n: usize, frequency: f64) -> Vec<f64> {
                 .sum()
         })
         .collect();
-    let wave = |m: usize, k: usize| (TAU * (m * k % n) as f64 / n as f64).sin_cos();
-    // The analytic signal has no negative frequencies and twice the positive ones.
-    let spectrum: Vec<[f64; 2]> = (1..n / 2)
-        .map(|m| {
-            line.iter()
-                .enumerate()
-                .fold([0.0, 0.0], |[re, im], (k, v)| {
-                    let (sin, cos) = wave(m, k);
-                    [re + v * cos, im - v * sin]
-                })
-        })
-        .collect();
-    (0..n)
-        .map(|k| {
-            let sum = spectrum
-                .iter()
-                .enumerate()
-                .fold([0.0, 0.0], |[x, y], (m, [re, im])| {
-                    let (sin, cos) = wave(m + 1, k);
-                    [x + re * cos - im * sin, y + re * sin + im * cos]
-                });
-            2.0 * sum[0].hypot(sum[1]) / n as f64
-        })
-        .collect()
+    envelope(&line)
 }
 
 /// T26.

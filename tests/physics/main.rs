@@ -2,10 +2,15 @@
 //! Each expectation is worked out in its test and takes nothing from the code under test.
 
 mod check;
+mod conversion;
 mod detection;
+mod determinism;
 mod energy;
+mod formation;
 mod grain;
+mod hilbert;
 mod interfaces;
+mod intersections;
 mod levels;
 mod moments;
 mod paths;
@@ -18,7 +23,10 @@ mod reverberation;
 mod roughness;
 mod rows;
 mod scenes;
+#[path = "../common/signal.rs"]
+mod signal;
 mod speckle;
+mod stages;
 mod sweep;
 mod thickness;
 mod timing;

@@ -43,9 +43,15 @@ rows! {
     thickness::thick_surfaces_lose_coherence_and_keep_energy,
     energy::the_energy_of_paths_is_absorbed_or_leaves,
     detection::the_baseband_envelope_is_the_hilbert_envelope,
+    formation::detection_shows_the_hilbert_envelope,
     levels::matched_compensation_makes_homogeneous_tissue_flat,
     levels::sliders_add_their_decibels_at_their_depths,
+    formation::matched_gain_makes_decaying_speckle_flat_for_every_probe,
     levels::sectors_have_the_area_of_their_geometry,
+    conversion::scan_conversion_is_exact_for_every_probe,
+    intersections::placements_are_transforms_of_the_mesh,
+    intersections::closest_hits_are_those_of_brute_force_in_double_precision,
+    determinism::a_frame_repeats_bit_for_bit_and_both_tracers_show_it,
 }
 
 #[test]

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use bytemuck::Pod;
-use insonify::gpu::{Device, Kernel, test_device};
+use insonify::gpu::{Device, Kernel};
 use insonify::harness::{self, Element, Extent, Input, Job};
+use insonify::probe::Probe;
 use insonify::sim::layout::{Counters, Frame, Row};
 use insonify::sim::shaders::Library;
 
@@ -27,9 +28,9 @@ fn values<T: Pod>(bytes: &[u8]) -> Vec<T> {
 }
 
 impl Stages {
-    pub fn new() -> Self {
+    pub fn new(device: &Arc<Device>) -> Self {
         Self {
-            device: test_device(),
+            device: device.clone(),
             library: Library::embedded(),
         }
     }
@@ -100,5 +101,55 @@ impl Stages {
             input("pixels", &vec![0u32; (size[0] * size[1]) as usize]),
         ];
         values(&self.run("display", inputs, size)[3])
+    }
+}
+
+/// A convex, a linear and a phased array.
+pub fn every_kind() -> [(&'static str, Probe); 3] {
+    [
+        ("convex", Probe::paper_table1()),
+        ("linear", Probe::linear()),
+        ("phased", Probe::phased()),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use insonify::gpu::test_device;
+    use insonify::sim::tables;
+
+    use super::*;
+    use crate::signal::scene;
+
+    /// The accumulators' end is reported once per sample, whichever of its four numbers reached it.
+    #[test]
+    fn saturation_is_counted() {
+        let scene = scene(Probe {
+            scanlines: 3,
+            samples: 50,
+            ..Probe::linear()
+        });
+        let (frame, rows) = (tables::frame(&scene, 0), tables::rows(&scene));
+        let (mut surface, mut volume) = (vec![0; 300], vec![0; 300]);
+        surface[0] = 1 << 30;
+        volume[1] = i32::MIN;
+        volume[299] = -(1 << 30);
+        volume[100] = (1 << 30) - 1;
+        let (_, saturated) = Stages::new(&test_device()).beam(&frame, &rows, &surface, &volume);
+        assert_eq!(saturated, 2);
+    }
+
+    /// What the log image must be at the ends of the envelope's range.
+    #[test]
+    fn detection_of_nothing_and_of_everything() {
+        let scene = scene(Probe {
+            scanlines: 1,
+            samples: 4,
+            ..Probe::linear()
+        });
+        let (frame, rows) = (tables::frame(&scene, 0), tables::rows(&scene));
+        let iq = [0.0, 0.0, 1e9, 0.0, f32::NAN, 0.0, f32::INFINITY, 0.0];
+        let log = Stages::new(&test_device()).detect(&frame, &rows, &iq);
+        assert_eq!(log, [0.0, 1.0, 0.0, 1.0]);
     }
 }

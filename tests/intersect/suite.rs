@@ -1,0 +1,67 @@
+//! What only this suite does with the device: one for all tests, moving instances, planted errors.
+
+use std::sync::{Arc, OnceLock};
+
+use insonify::gpu::{Binding, BufferKind, Device, test_device};
+use insonify::scene::Scene;
+use insonify::sim::tracer::Tracer;
+
+use super::device::Rig;
+
+/// One device for all tests: validation makes opening one slow. Dispatches take turns.
+fn device() -> Arc<Device> {
+    static DEVICE: OnceLock<Arc<Device>> = OnceLock::new();
+    DEVICE.get_or_init(test_device).clone()
+}
+
+impl Rig {
+    pub fn new(scene: &Scene, tracer: Tracer) -> Self {
+        Self::on(&device(), scene, tracer)
+    }
+
+    /// The scene with its instances moved.
+    pub fn update(&mut self, scene: &Scene) -> bool {
+        let world = &mut self.world;
+        self.device
+            .once(|commands| Ok(world.update(commands, scene).unwrap()))
+            .unwrap()
+    }
+
+    /// No validation message so far.
+    pub fn assert_silent(&self) {
+        let messages = self.device.validation_messages();
+        assert!(messages.is_empty(), "{messages:#?}");
+    }
+
+    /// Exchanges the planes of one child of the first mesh's root along x.
+    pub fn swap_a_bound(&mut self) {
+        let Binding::Buffer(nodes) = self.world.structure() else {
+            panic!("not this tracer")
+        };
+        let mut bytes = self.device.read_back(nodes).unwrap();
+        let root = 80 * self.world.rows()[0].bvh_root as usize;
+        // After corner, exponents, links and kinds: eight lower planes, eight upper planes.
+        let child = (0..8)
+            .find(|i| bytes[root + 24 + i] != 0)
+            .expect("a root has children");
+        bytes.swap(root + 32 + child, root + 40 + child);
+        self.spoil(4, &bytes);
+    }
+
+    /// Makes one triangle a point.
+    pub fn drop_a_triangle(&mut self) {
+        let mut indices: Vec<u32> = self.device.read_back_as(self.world.triangles()).unwrap();
+        indices[301] = indices[300];
+        indices[302] = indices[300];
+        self.spoil(3, bytemuck::cast_slice(&indices));
+    }
+
+    fn spoil(&mut self, slot: usize, bytes: &[u8]) {
+        let buffer = self
+            .device
+            .buffer("spoilt", bytes.len() as u64, BufferKind::Storage)
+            .unwrap();
+        self.device.upload(&buffer, bytes).unwrap();
+        self.spoilt = Some((slot, buffer));
+    }
+}
