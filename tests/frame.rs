@@ -9,9 +9,9 @@ use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
-/// A shipped scene at a size that a software driver renders in seconds.
-fn shipped(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
+/// A scene at a size that a software driver renders in seconds.
+fn small(file: &str) -> Scene {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let smaller = [
         ("probe.scanlines", "96"),
         ("probe.elevation_layers", "3"),
@@ -19,7 +19,7 @@ fn shipped(name: &str) -> Scene {
         ("imaging.image_height", "400"),
     ]
     .map(|(key, value)| (key.to_owned(), value.to_owned()));
-    Scene::load(&path, &smaller).expect(name).0
+    Scene::load(&path, &smaller).expect(file).0
 }
 
 /// What a frame left behind.
@@ -100,18 +100,35 @@ fn agree(device: &Arc<Device>, scene: &Scene, [bvh, query]: &[Shot; 2]) {
     assert!(planted > 0.001, "half a decibel is noticed: {planted}");
 }
 
-fn repeats_and_agrees(name: &str) {
-    let (device, scene) = (test_device(), shipped(name));
+fn repeats_and_agrees(file: &str) {
+    let (device, scene) = (test_device(), small(file));
     agree(&device, &scene, &repeats(&device, &scene));
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
 #[test]
 fn the_phantom_repeats_and_both_tracers_agree() {
-    repeats_and_agrees("phantom");
+    repeats_and_agrees("scenes/phantom.toml");
 }
 
 #[test]
 fn the_abdomen_repeats_and_both_tracers_agree() {
-    repeats_and_agrees("abdomen");
+    repeats_and_agrees("scenes/abdomen.toml");
+}
+
+/// Anatomy from patients, as it comes: open valves closed by coincident caps, crossing vessels.
+#[test]
+fn both_tracers_agree_on_real_anatomy() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    if !root.join("../shared/data").exists() {
+        println!("skipped: no shared data");
+        return;
+    }
+    let device = test_device();
+    for name in ["liver", "heart", "heart_rodero"] {
+        let scene = small(&format!("tests/scenes/{name}.toml"));
+        let shots = [Tracer::Bvh, Tracer::RayQuery].map(|t| shoot(&device, &scene, t));
+        agree(&device, &scene, &shots);
+    }
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
