@@ -50,13 +50,13 @@ vec3 power_cosine(vec3 n, float exponent, vec2 u) {
 
 // Micro-normal about n whose reflection leaves on the near side of the geometric normal: pdf
 // (s+1)/(2 pi) cos^s. False when eight attempts fail.
-bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, uint key, uint seed, out vec3 m) {
+bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, uint key, uint seed, bool sobol, out vec3 m) {
     if (roughness >= SPECULAR) {
         m = n;
         return dot(d, m) < 0.0 && dot(d - 2.0 * dot(d, m) * m, n_geometric) > 0.0;
     }
     for (uint attempt = 0u; attempt < 8u; ++attempt) {
-        uvec4 bits = path_random(path, key, PURPOSE_NORMAL + attempt, seed);
+        uvec4 bits = sobol ? path_sobol(path, key, PURPOSE_NORMAL + attempt, seed) : path_random(path, key, PURPOSE_NORMAL + attempt, seed);
         m = power_cosine(n, roughness, vec2(unit(bits.x), unit(bits.y)));
         float along = dot(d, m);
         if (along < 0.0 && dot(d - 2.0 * along * m, n_geometric) > 0.0) return true;

@@ -29,3 +29,34 @@ const uint PURPOSE_PHASE = 19u;
 uvec4 path_random(uint path, uint bounce, uint purpose, uint seed) {
     return pcg4d(uvec4(path, bounce, purpose, seed));
 }
+
+// Each bit flipped by a hash of the lower ones (Laine and Karras 2011, constants of Burley 2020).
+uint laine_karras(uint x, uint seed) {
+    x += seed;
+    x ^= x * 0x6c50b47cu;
+    x ^= x * 0xb82f1e52u;
+    x ^= x * 0xc7afe638u;
+    x ^= x * 0x8d22f6e6u;
+    return x;
+}
+
+// Owen scrambling: each bit flipped by a hash of the higher ones.
+uint owen(uint x, uint seed) {
+    return bitfieldReverse(laine_karras(bitfieldReverse(x), seed));
+}
+
+// As path_random, but over the paths x and y are the first two dimensions of a Sobol sequence, Owen
+// scrambled, its order shuffled so that the decisions of one path know nothing of each other (Burley,
+// JCGT 9(4), 2020): the first 2^k paths cover the unit square evenly.
+uvec4 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
+    uvec4 key = pcg4d(uvec4(0x9e3779b9u, bounce, purpose, seed));
+    uint index = owen(path, key.x);
+    uint second = 0u;
+    uint direction = 0x80000000u;
+    for (uint i = index; i != 0u; i >>= 1u) {
+        if ((i & 1u) != 0u) second ^= direction;
+        direction ^= direction >> 1u;
+    }
+    uvec4 bits = path_random(path, bounce, purpose, seed);
+    return uvec4(owen(bitfieldReverse(index), key.y), owen(second, key.z), bits.z, bits.w);
+}

@@ -18,6 +18,7 @@ const uint FLAG_WORLD_TEXTURE = 8u;
 const uint FLAG_COHERENT = 16u;     // surface coherence as in the paper, no split
 const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the lattice
 const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged over the beam
+const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;

@@ -60,6 +60,11 @@ struct Path {
     Media media;
 };
 
+uvec4 draw(uint n, uint key, uint purpose) {
+    if ((frame.flags & FLAG_SOBOL) != 0u) return path_sobol(n, key, purpose, frame.seed);
+    return path_random(n, key, purpose, frame.seed);
+}
+
 uint row_of(float time) {
     float kappa = frame.speed * time / frame.sample_pitch;
     return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
@@ -121,7 +126,7 @@ Path start(uint line, uint n) {
     Path path;
     path.direction = world_vector(d);
     path.lateral = world_vector(lateral);
-    uvec4 bits = path_random(n, 0u, PURPOSE_JITTER, frame.seed);
+    uvec4 bits = draw(n, 0u, PURPOSE_JITTER);
     path.origin = world_point(o) + frame.origin_jitter * gaussian(bits.x) * path.lateral;
     path.spread = vec3(frame.origin_jitter * frame.origin_jitter, 0.0, 0.0);
     if (frame.emission_lobe > 0.0) {
@@ -209,7 +214,8 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
     if (facing <= 0.0) return;
     float amplitude = path.weight * r * pow(facing, s.specularity) * s.gain * beam_weight(off_axis(line, path.origin));
-    float q = s.thickness * abs(gaussian(path_random(n, key, PURPOSE_THICKNESS, frame.seed).x));
+    uvec4 words = draw(n, key, PURPOSE_THICKNESS);
+    float q = s.thickness * abs(gaussian(words.x & 0xffff0000u | words.y >> 16u));
     float late = path.time + q / t1.speed;
     float behind = amplitude * exp(-t1.absorption * q);
     if ((frame.flags & FLAG_COHERENT) != 0u) {
@@ -335,7 +341,7 @@ void main() {
         float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
         float turn = 2.0 * width / max(cos_i, 1e-3);
         vec3 m;
-        bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, m);
+        bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, (frame.flags & FLAG_SOBOL) != 0u, m);
         if (rough) echo(path, line, n, key, hit.instance, s, t1, t2, m);
 
         bool can_reflect = rough && path.reflections < frame.max_reflections;
@@ -364,7 +370,7 @@ void main() {
             }
             continue;
         }
-        float choice = unit(path_random(n, key, PURPOSE_CHOICE, frame.seed).x);
+        float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
         if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
         reflects = choice < reflected;
         path.probability *= reflects ? reflected : 1.0 - reflected;

@@ -9,8 +9,8 @@ use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use crate::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_ROUGH_TRANSMISSION, FLAG_WORLD_TEXTURE, Frame, MAX_STACK, Row, SAMPLING_MAIN_PATH,
-    SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, Surface, Tissue,
+    FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, MAX_STACK, Row,
+    SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, Surface, Tissue,
 };
 
 pub const SUBJECT: Subject = Subject {
@@ -81,11 +81,11 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
         ),
         Case::Modes => (
             SAMPLING_SHARED_PRIMARY,
-            FLAG_COINCIDENT | FLAG_COHERENT | FLAG_WORLD_TEXTURE | FLAG_FOOTPRINT,
+            FLAG_COINCIDENT | FLAG_COHERENT | FLAG_WORLD_TEXTURE | FLAG_FOOTPRINT | FLAG_SOBOL,
             6,
         ),
         Case::One => (SAMPLING_SHARED_PRIMARY, 0, 1),
-        _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT, 8),
+        _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL, 8),
     };
     let mut tissues = worlds::tissues();
     if case == Case::NotFinite {

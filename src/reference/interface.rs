@@ -6,7 +6,7 @@ use super::Accumulator;
 use super::acoustics::{Fluid, mirror, power_cosine, reflection};
 use super::footprint;
 use super::path::Path;
-use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, gaussian, path_random, pcg4d, unit};
+use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, draw, gaussian, pcg4d, unit};
 use super::stack::Stack;
 use super::world::{Crossing, World};
 use crate::sim::layout::{FLAG_COHERENT, FLAG_FOOTPRINT, Row, Surface, Tissue};
@@ -127,7 +127,7 @@ fn micro_normal(
         return accept(shading);
     }
     (0..ATTEMPTS).find_map(|j| {
-        let words = path_random(path.n, path.key(), PURPOSE_NORMAL + j, world.frame.seed);
+        let words = draw(world.frame, path.n, path.key(), PURPOSE_NORMAL + j);
         let u = [unit(words[0]), unit(words[1])];
         accept(power_cosine(shading, roughness, u))
     })
@@ -159,8 +159,9 @@ impl Interface {
             .max(0.0)
             .powf(surface.specularity.into());
         let amplitude = path.weight * r * lobe * f64::from(surface.gain) * path.beam_weight(frame);
-        let words = path_random(path.n, path.key(), PURPOSE_THICKNESS, frame.seed);
-        let q = f64::from(surface.thickness) * gaussian(words[0]).abs();
+        let words = draw(frame, path.n, path.key(), PURPOSE_THICKNESS);
+        let q =
+            f64::from(surface.thickness) * gaussian(words[0] & 0xffff_0000 | words[1] >> 16).abs();
         let behind = amplitude * (-self.absorption * q).exp();
         let time = path.time + q / self.fluids[0].speed;
         let (l, _) = path.scanline(frame.scanlines);

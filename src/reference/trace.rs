@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use super::geometry::{face, world_line};
 use super::interface::{self, Interface};
 use super::path::{Path, Role, reflect, step, widen};
-use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, gaussian, path_random, unit};
+use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
 use super::stack::Stack;
 use super::world::{Crossing, World, affine};
 use super::{Accumulator, Segment, acoustics};
@@ -77,7 +77,7 @@ impl Tracer<'_> {
     fn start(&self, line: u32, n: u32, stack: Stack) -> Path {
         let frame = self.world.frame;
         let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
-        let words = path_random(n, 0, PURPOSE_JITTER, frame.seed);
+        let words = draw(frame, n, 0, PURPOSE_JITTER);
         let (jitter, lobe) = (
             f64::from(frame.origin_jitter),
             f64::from(frame.emission_lobe),
@@ -275,7 +275,7 @@ impl Tracer<'_> {
     /// Reflects or transmits by chance; whether the path goes on.
     fn choose(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
         let frame = self.world.frame;
-        let mut u = unit(path_random(path.n, path.key(), PURPOSE_CHOICE, frame.seed)[0]);
+        let mut u = unit(draw(frame, path.n, path.key(), PURPOSE_CHOICE)[0]);
         if path.role == Role::Single && path.interactions == 1 {
             u = (f64::from(path.n) + u) / f64::from(frame.paths);
         }

@@ -13,6 +13,16 @@ pub enum Sampling {
     SharedPrimary,
 }
 
+/// Where the paths' random decisions come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Sequence {
+    /// A Sobol sequence over the paths, Owen-scrambled: less noise with as many paths.
+    Sobol,
+    /// Independent numbers.
+    Random,
+}
+
 /// What thickness does to the phase of a surface echo.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -50,6 +60,8 @@ pub struct Simulation {
     pub paths: u32,
     /// Sampling scheme.
     pub sampling: Sampling,
+    /// Where their random decisions come from.
+    pub sequence: Sequence,
     /// Most interactions of one path (B_max), transmissions included: an abdominal wall alone has
     /// nine interfaces.
     pub max_interactions: u32,
@@ -149,6 +161,7 @@ impl Default for Simulation {
         Self {
             paths: 8,
             sampling: Sampling::MainPath,
+            sequence: Sequence::Sobol,
             max_interactions: 32,
             max_reflections: 3,
             min_weight: 1e-6,

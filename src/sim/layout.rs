@@ -38,6 +38,8 @@ pub const FLAG_COHERENT: u32 = 16;
 pub const FLAG_VOXEL: u32 = 32;
 /// Reflectances of curved surfaces averaged over the beam.
 pub const FLAG_FOOTPRINT: u32 = 64;
+/// Paths draw from a Sobol sequence.
+pub const FLAG_SOBOL: u32 = 128;
 
 macro_rules! shared {
     ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(

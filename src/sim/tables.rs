@@ -8,7 +8,7 @@ use super::calibration::{Calibration, LATERAL_CUT, amplitude};
 use super::layout::{self, Rows};
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
-use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, TextureSpace};
+use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::{Scene, Wire};
 
 /// Roughness at and above which a surface is a perfect mirror.
@@ -125,7 +125,8 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
                 simulation.scatter_mode == ScatterMode::Voxel,
                 layout::FLAG_VOXEL,
             )
-            | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT),
+            | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT)
+            | flag(simulation.sequence == Sequence::Sobol, layout::FLAG_SOBOL),
         seed: simulation.seed,
         origin_jitter: simulation.origin_jitter as f32,
         beam_width: finite_or_zero(simulation.beam_width),

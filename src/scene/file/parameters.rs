@@ -30,7 +30,7 @@ pub(super) fn simulation(
         ..Simulation::default()
     };
     overlay!(table => out:
-        paths, sampling, max_interactions, max_reflections, min_weight, coherence,
+        paths, sampling, sequence, max_interactions, max_reflections, min_weight, coherence,
         rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, elevation_cells,
         texture_space, seed;
         origin_jitter, beam_width, cell, volume_floor, speckle_gain, surface_gain);

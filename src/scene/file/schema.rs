@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Deserialize;
 
 use super::units::{Angle, Attenuation, Density, Frequency, Impedance, Length, Level, Speed};
-use crate::scene::settings::{Coherence, Sampling, ScatterMode, TextureSpace};
+use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
 
 /// The whole file.
 #[derive(Debug, Deserialize)]
@@ -88,6 +88,7 @@ fn x_axis() -> [f64; 3] {
 pub struct SimulationTable {
     pub paths: Option<u32>,
     pub sampling: Option<Sampling>,
+    pub sequence: Option<Sequence>,
     pub max_interactions: Option<u32>,
     pub max_reflections: Option<u32>,
     pub min_weight: Option<f64>,
