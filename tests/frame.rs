@@ -106,6 +106,33 @@ fn repeats_and_agrees(file: &str) {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
+/// What one simulator shows after its settings were changed is what a new one shows.
+#[test]
+fn changed_settings_take_effect_from_frame_to_frame() {
+    let device = test_device();
+    let before = small("scenes/phantom.toml");
+    let mut after = before.clone();
+    // Scales, gains, surfaces and tissues: each reaches the kernels by another table.
+    after.simulation.paths = 4 * before.simulation.paths;
+    after.simulation.surface_gain = -3.0;
+    after.imaging.tgc_sliders[4] = 5.0;
+    after.tissues[0].echogenicity -= 4.0;
+    for instance in &mut after.instances {
+        instance.surface[0].thickness = 0.3;
+    }
+    let mut simulator =
+        Simulator::new(&device, &Library::embedded(), &before, Tracer::Bvh).expect("a simulator");
+    simulator.frame(&before, 0).expect("a frame");
+    let first = simulator.echoes().expect("echoes");
+    simulator.frame(&after, 0).expect("a frame");
+    let changed = Shot {
+        echoes: simulator.echoes().expect("echoes"),
+        pixels: simulator.pixels().expect("pixels").2,
+    };
+    assert!(first != changed.echoes, "a change is noticed");
+    assert!(changed == shoot(&device, &after, Tracer::Bvh));
+}
+
 #[test]
 fn the_phantom_repeats_and_both_tracers_agree() {
     repeats_and_agrees("scenes/phantom.toml");

@@ -70,7 +70,7 @@ pub struct Instance {
 }
 
 /// A string of point scatterers along a straight line (a wire of a phantom), or a single point.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Wire {
     /// Ends in world space, mm; equal ends make one point.
     pub ends: [[f64; 3]; 2],

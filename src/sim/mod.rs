@@ -16,7 +16,8 @@ pub mod world;
 use std::sync::Arc;
 
 use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Stage};
-use crate::scene::Scene;
+use crate::probe::Probe;
+use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use passes::Passes;
 use shaders::Library;
 use stages::{Batches, Buffers, Kernels, Tables};
@@ -40,6 +41,31 @@ pub struct Simulator {
     frames: Frames,
     passes: Passes,
     coincident: bool,
+    settings: Settings,
+}
+
+/// What the tables on the device were made of.
+#[derive(PartialEq)]
+struct Settings {
+    probe: Probe,
+    simulation: Simulation,
+    imaging: Imaging,
+    tissues: Vec<Tissue>,
+    surfaces: Vec<[Surface; 2]>,
+    wires: Vec<Wire>,
+}
+
+impl Settings {
+    fn of(scene: &Scene) -> Self {
+        Self {
+            probe: scene.probe.clone(),
+            simulation: scene.simulation.clone(),
+            imaging: scene.imaging.clone(),
+            tissues: scene.tissues.clone(),
+            surfaces: scene.instances.iter().map(|i| i.surface).collect(),
+            wires: scene.wires.clone(),
+        }
+    }
 }
 
 impl Simulator {
@@ -66,6 +92,7 @@ impl Simulator {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
             coincident,
+            settings: Settings::of(scene),
             passes: Passes {
                 kernels: Kernels::new(device, library, tracer)?,
                 buffers,
@@ -93,12 +120,21 @@ impl Simulator {
     }
 
     /// Simulates one frame of `scene` as it stands: pose, placements and settings may differ from
-    /// those at creation, sizes (lines, samples, meshes, image) may not. `index` selects the noise.
+    /// those before, sizes (lines, samples, meshes, tissues, points, image; paths where each has
+    /// segments of its own) may not exceed those at creation. A change of settings waits for the
+    /// frames in flight. `index` selects the noise.
     /// Returns the timings of the frames that have finished since the last call.
     ///
     /// # Errors
     /// What Vulkan says; a lost device names the last pass.
     pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
+        let settings = Settings::of(scene);
+        if settings != self.settings {
+            // The tables carry scales and levels that belong to the frame's constants.
+            self.frames.wait()?;
+            self.upload_tables(scene)?;
+            self.settings = settings;
+        }
         let passes = &mut self.passes;
         (passes.frame, passes.batches) = frame_constants(scene, self.coincident, index);
         let mut cmd = self.frames.begin()?;
