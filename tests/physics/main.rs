@@ -1,7 +1,9 @@
 //! What frames must show whatever computes them: closed forms of acoustics and image formation.
 //! Each expectation is worked out in its test and takes nothing from the code under test.
 
+mod brightness;
 mod check;
+mod convergence;
 mod conversion;
 mod detection;
 mod determinism;

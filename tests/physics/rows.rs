@@ -41,6 +41,8 @@ rows! {
     roughness::rough_surfaces_have_the_power_cosine_lobe,
     thickness::thickness_delays_echoes_by_a_half_normal,
     thickness::thick_surfaces_lose_coherence_and_keep_energy,
+    brightness::brightness_behind_the_abdominal_wall_does_not_depend_on_paths,
+    convergence::images_converge_with_the_root_of_the_paths,
     energy::the_energy_of_paths_is_absorbed_or_leaves,
     detection::the_baseband_envelope_is_the_hilbert_envelope,
     formation::detection_shows_the_hilbert_envelope,
