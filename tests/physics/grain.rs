@@ -122,27 +122,15 @@ fn compare(out: &mut Outcome, name: &str, way: &str, rows: &[Vec<f64>], pitch: f
     out.compare(what, measured, expected, SIZE * expected);
     let at = |lag: usize| lag as f64 * pitch;
     let law = |lag| [at(lag), (-at(lag).powi(2) / (2.0 * sigma * sigma)).exp()];
-    out.plots.push(Plot {
-        title: format!("Autocovariance of intensity {way}, sigma {sigma:.3} mm"),
-        axes: ["distance, mm".into(), "covariance / variance".into()],
-        logarithmic: [false; 2],
-        curves: vec![
-            Curve {
-                label: "exp(-d^2 / 2 sigma^2)".into(),
-                points: (0..=lags).map(law).collect(),
-                line: true,
-            },
-            Curve {
-                label: "measured".into(),
-                points: covariance
-                    .iter()
-                    .enumerate()
-                    .map(|(l, v)| [at(l), *v])
-                    .collect(),
-                line: false,
-            },
+    let measured = covariance.iter().enumerate().map(|(l, v)| [at(l), *v]);
+    out.plots.push(Plot::linear(
+        format!("Autocovariance of intensity {way}, sigma {sigma:.3} mm"),
+        ["distance, mm", "covariance / variance"],
+        vec![
+            Curve::line("exp(-d^2 / 2 sigma^2)", (0..=lags).map(law).collect()),
+            Curve::dots("measured", measured.collect()),
         ],
-    });
+    ));
 }
 
 /// T13.
@@ -165,19 +153,11 @@ const SHIFTS: [f64; 5] = [0.05, 0.5, 1.0, 1.5, 2.0];
 pub fn motion(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];
-    let mut plot = Plot {
-        title: "Speckle left after a lateral shift of the probe".into(),
-        axes: ["shift / sigma".into(), "correlation of intensity".into()],
-        logarithmic: [false; 2],
-        curves: vec![Curve {
-            label: "exp(-d^2 / 2 sigma^2)".into(),
-            points: (0..=50)
-                .map(|i| f64::from(i) / 20.0)
-                .map(|d| [d, law(d)])
-                .collect(),
-            line: true,
-        }],
-    };
+    let shifts = (0..=50).map(|i| f64::from(i) / 20.0);
+    let mut curves = vec![Curve::line(
+        "exp(-d^2 / 2 sigma^2)",
+        shifts.map(|d| [d, law(d)]).collect(),
+    )];
     for degrees in [0.0f64, 17.0] {
         let mut scene = homogeneous(48, 1.0, seed);
         if physics == Physics::Planted {
@@ -200,13 +180,16 @@ pub fn motion(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
             out.compare(what, measured, law(shift), 0.05);
             points.push([shift, measured]);
         }
-        plot.curves.push(Curve {
-            label: format!("measured, lattice at {degrees} degrees"),
+        curves.push(Curve::dots(
+            format!("measured, lattice at {degrees} degrees"),
             points,
-            line: false,
-        });
+        ));
     }
-    out.plots.push(plot);
+    out.plots.push(Plot::linear(
+        "Speckle left after a lateral shift of the probe",
+        ["shift / sigma", "correlation of intensity"],
+        curves,
+    ));
     out
 }
 

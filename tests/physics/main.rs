@@ -3,6 +3,7 @@
 
 mod brightness;
 mod check;
+mod contrast;
 mod convergence;
 mod conversion;
 mod detection;
@@ -13,6 +14,7 @@ mod grain;
 mod hilbert;
 mod interfaces;
 mod intersections;
+mod invariance;
 mod levels;
 mod moments;
 mod paths;
@@ -25,6 +27,7 @@ mod reverberation;
 mod roughness;
 mod rows;
 mod scenes;
+mod shadow;
 #[path = "../common/signal.rs"]
 mod signal;
 mod speckle;

@@ -1,15 +1,19 @@
-//! Pictures as a user sees them.
+//! Pictures as a user sees them: shipped tissues under the linear small-parts array, everything at its default.
 
+use glam::{DAffine3, DVec3};
 use insonify::probe::Probe;
-use insonify::scene::Scene;
 use insonify::scene::settings::{Imaging, Simulation};
+use insonify::scene::{Scene, Tissue};
 
 use crate::check::{Bench, Picture};
-use crate::scenes::{linear, tissue};
+use crate::scenes::{add_box, add_sphere, linear};
 
-/// Liver's attenuation and echoes seen by the linear small-parts array, everything else at its default.
-pub fn scene() -> Scene {
-    let mut scene = linear(1, 1.0, tissue(1.540, 1.630, 0.5));
+fn shipped(name: &str) -> Tissue {
+    Tissue::shipped(name).unwrap_or_else(|| panic!("no {name}"))
+}
+
+fn liver() -> Scene {
+    let mut scene = linear(1, 1.0, shipped("liver"));
     scene.probe = Probe::linear();
     scene.simulation = Simulation::default();
     scene.imaging = Imaging {
@@ -21,15 +25,41 @@ pub fn scene() -> Scene {
 
 /// What the display shows of `scene`.
 pub fn shown(bench: &Bench, title: &str, scene: &Scene) -> Picture {
-    let pixels = (bench.renderers[1].1)(scene).pixels;
-    Picture {
-        title: title.into(),
-        width: pixels.len() as u32 / scene.imaging.image_height,
-        grey: pixels.iter().map(|p| (p & 255) as u8).collect(),
+    (bench.renderers[1].1)(scene).picture(title, scene)
+}
+
+/// Both sides of the only instance reflect as its tissue's surface does.
+fn seen(bench: &Bench, title: &str, mut scene: Scene) -> Picture {
+    if let [instance] = scene.instances.as_mut_slice() {
+        instance.surface = [scene.tissues[instance.tissue].default_surface(); 2];
     }
+    shown(bench, title, &scene)
 }
 
 /// Speckle and nothing else.
 pub fn homogeneous(bench: &Bench) -> Picture {
-    shown(bench, "Homogeneous tissue, linear array", &scene())
+    seen(bench, "Liver", liver())
+}
+
+/// A ball of water of 10 mm: a cyst whose walls reflect 5 %, 19 dB above liver's speckle.
+pub fn cyst(bench: &Bench) -> Picture {
+    let mut scene = liver();
+    let centre = DVec3::new(0.0, 0.0, 17.0);
+    add_sphere(&mut scene, 5.0, shipped("water"), centre);
+    seen(bench, "Cyst in liver", scene)
+}
+
+/// A plate of bone that lies a little askew: as the shadow is measured, and with the reflected paths that mirror the
+/// tissue above it into its shadow, as they do in patients.
+pub fn bone(bench: &Bench) -> [Picture; 2] {
+    let mut scene = liver();
+    let at =
+        DAffine3::from_translation(DVec3::new(0.1, 0.1, 14.0)) * DAffine3::from_rotation_y(0.07);
+    add_box(&mut scene, [14.0, 30.0, 5.0], shipped("cortical_bone"), at);
+    let mut straight = scene.clone();
+    straight.simulation.max_reflections = 0;
+    [
+        seen(bench, "Bone in liver, without reflected paths", straight),
+        seen(bench, "Bone in liver", scene),
+    ]
 }

@@ -1,9 +1,9 @@
 //! Small scenes with known answers.
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
 use insonify::scene::settings::{Imaging, Simulation};
-use insonify::scene::{Instance, Scene, Surface, Tissue, Wire, shapes};
+use insonify::scene::{Instance, Mesh, Scene, Surface, Tissue, Wire, shapes};
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.
@@ -70,28 +70,35 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
     }
 }
 
-/// Adds a box of `size` mm, filled with `tissue`, whose front face's middle `at` takes to the place
-/// and direction wanted; later boxes win where they overlap.
-pub fn add_box(scene: &mut Scene, size: [f64; 3], tissue: Tissue, at: DAffine3) {
-    scene
-        .meshes
-        .push(shapes::plane([size[0], size[1]], size[2]));
+/// Adds a mirror-like body that `at` takes to its place; later bodies win where they overlap.
+pub fn add_body(scene: &mut Scene, mesh: Mesh, tissue: Tissue, at: DAffine3) {
     scene.instances.push(Instance {
-        name: "box".into(),
-        mesh: scene.meshes.len() - 1,
+        name: mesh.name.clone(),
+        mesh: scene.meshes.len(),
         tissue: scene.tissues.len(),
         priority: scene.instances.len() as i32,
         world_from_object: at,
         surface: [mirror(); 2],
     });
+    scene.meshes.push(mesh);
     scene.tissues.push(tissue);
+}
+
+/// Adds a box of `size` mm whose front face's middle `at` takes to the place and direction wanted.
+pub fn add_box(scene: &mut Scene, size: [f64; 3], tissue: Tissue, at: DAffine3) {
+    add_body(
+        scene,
+        shapes::plane([size[0], size[1]], size[2]),
+        tissue,
+        at,
+    );
 }
 
 /// Adds everything below depth `top` mm.
 pub fn add_layer(scene: &mut Scene, top: f64, tissue: Tissue) {
     let far = 900.0 - 10.0 * scene.instances.len() as f64;
     // Off the axis: no ray of a symmetric probe runs along an edge.
-    let at = DAffine3::from_translation(glam::DVec3::new(3.1, 5.3, top));
+    let at = DAffine3::from_translation(DVec3::new(3.1, 5.3, top));
     add_box(scene, [far, far, far - top], tissue, at);
 }
 
@@ -102,4 +109,10 @@ pub fn add_point(scene: &mut Scene, at: [f64; 3], amplitude: f64) {
         spacing: 1.0,
         amplitude,
     });
+}
+
+/// Adds a ball of `radius` mm around `centre`, made of 20 480 triangles: its faces are up to 2.5e-4 of the radius inside.
+pub fn add_sphere(scene: &mut Scene, radius: f64, tissue: Tissue, centre: DVec3) {
+    let at = DAffine3::from_translation(centre);
+    add_body(scene, shapes::sphere(radius, 5), tissue, at);
 }

@@ -145,27 +145,15 @@ fn histogram(envelopes: &[f64], power: f64) -> Plot {
     }
     let centre = |i: usize| (i as f64 + 0.5) * width;
     let density = |x: f64| 2.0 * x * (-x * x).exp();
-    Plot {
-        title: "Envelope of homogeneous speckle".into(),
-        axes: ["envelope / RMS".into(), "probability density".into()],
-        logarithmic: [false; 2],
-        curves: vec![
-            Curve {
-                label: "Rayleigh".into(),
-                points: (0..BINS).map(|i| [centre(i), density(centre(i))]).collect(),
-                line: true,
-            },
-            Curve {
-                label: "measured".into(),
-                points: bins
-                    .iter()
-                    .enumerate()
-                    .map(|(i, v)| [centre(i), *v])
-                    .collect(),
-                line: false,
-            },
+    let points = |v: &dyn Fn(usize) -> f64| (0..BINS).map(|i| [centre(i), v(i)]).collect();
+    Plot::linear(
+        "Envelope of homogeneous speckle",
+        ["envelope / RMS", "probability density"],
+        vec![
+            Curve::line("Rayleigh", points(&|i| density(centre(i)))),
+            Curve::dots("measured", points(&|i| bins[i])),
         ],
-    }
+    )
 }
 
 /// T10.
@@ -296,26 +284,20 @@ pub fn sparse(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         scene.simulation.cell = h;
         let law = (0..40).map(|i| 0.04 * 25f64.powf(f64::from(i) / 39.0));
         [
-            Curve {
-                label: format!("law, cells of {h} mm"),
-                points: law.map(|d| [d, kurtosis_law(&scene, d)]).collect(),
-                line: true,
-            },
-            Curve {
-                label: format!("measured, cells of {h} mm"),
-                points,
-                line: false,
-            },
+            Curve::line(
+                format!("law, cells of {h} mm"),
+                law.map(|d| [d, kurtosis_law(&scene, d)]).collect(),
+            ),
+            Curve::dots(format!("measured, cells of {h} mm"), points),
         ]
     });
     out.plots.push(Plot {
-        title: "Kurtosis of sparse speckle".into(),
-        axes: [
-            "scatterers per lattice cell".into(),
-            "E e^4 / (E e^2)^2".into(),
-        ],
         logarithmic: [true, false],
-        curves: curves.collect(),
+        ..Plot::linear(
+            "Kurtosis of sparse speckle",
+            ["scatterers per lattice cell", "E e^4 / (E e^2)^2"],
+            curves.collect(),
+        )
     });
     out
 }
