@@ -49,6 +49,7 @@ rows! {
     brightness::brightness_behind_the_abdominal_wall_does_not_depend_on_paths,
     invariance::brightness_depends_on_neither_layers_nor_samples,
     invariance::sampling_schemes_agree,
+    invariance::tissue_mirrored_by_a_rough_wall_has_the_level_of_many_paths,
     invariance::a_frame_moves_with_its_scene,
     convergence::images_converge_at_least_with_the_root_of_the_paths,
     energy::the_energy_of_paths_is_absorbed_or_leaves,

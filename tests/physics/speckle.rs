@@ -50,7 +50,7 @@ pub fn sigma_lateral(scene: &Scene, z: f64) -> f64 {
 }
 
 /// Elevational two-way sigma, mm: the lens focuses transmit and receive alike.
-fn sigma_elevation(scene: &Scene, z: f64) -> f64 {
+pub fn sigma_elevation(scene: &Scene, z: f64) -> f64 {
     let f_number = scene.probe.elevation_focus / scene.probe.elevation_height;
     one_way(f_number, scene.probe.elevation_focus, z) / std::f64::consts::SQRT_2
 }
