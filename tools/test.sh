@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Every test, with all set-up that they need. `--long` first runs also those that take minutes: the statistics
-# over many seeds. Other arguments go to the test runner.
+# Every test, with all set-up that they need. As the first argument, `--long` adds the tests that take minutes:
+# statistics over many seeds. Other arguments go to the test runner.
 set -eu
 cd "$(dirname "$0")/.."
 long=()
