@@ -133,6 +133,20 @@ fn changed_settings_take_effect_from_frame_to_frame() {
     assert!(changed == shoot(&device, &after, Tracer::Bvh));
 }
 
+/// Without a least weight paths end where the image ends: the same frame as with a tiny one.
+#[test]
+fn no_least_weight_is_a_tiny_one() {
+    let device = test_device();
+    let with = |least: f64| {
+        let mut scene = small("scenes/phantom.toml");
+        scene.simulation.min_weight = least;
+        shoot(&device, &scene, Tracer::Bvh)
+    };
+    let tiny = with(1e-12);
+    assert!(with(0.0) == tiny);
+    assert!(with(0.5) != tiny, "a large one is noticed");
+}
+
 #[test]
 fn the_phantom_repeats_and_both_tracers_agree() {
     repeats_and_agrees("scenes/phantom.toml");

@@ -11,6 +11,8 @@ use crate::probe::{Kind, Probe};
 use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::{Scene, Wire};
 
+/// The kernel ends a path by setting its weight to 0, which has to be below every limit.
+const LEAST_WEIGHT: f32 = 1e-30;
 /// Roughness at and above which a surface is a perfect mirror.
 const MIRROR: f64 = 1e9;
 /// Most segments kept per line (80 bytes each).
@@ -107,7 +109,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         },
         max_interactions: simulation.max_interactions,
         max_reflections: simulation.max_reflections,
-        min_weight: simulation.min_weight as f32,
+        min_weight: (simulation.min_weight as f32).max(LEAST_WEIGHT),
         volume_floor: amplitude(simulation.volume_floor) as f32,
         flags: flag(
             simulation.rough_transmission,
