@@ -15,8 +15,6 @@ use crate::scene::{Scene, Wire};
 const LEAST_WEIGHT: f32 = 1e-30;
 /// Roughness at and above which a surface is a perfect mirror.
 const MIRROR: f64 = 1e9;
-/// Most segments kept per line (80 bytes each).
-const LARGEST_SEGMENT_CAPACITY: u32 = 1024;
 
 /// The rows of a 3x4 matrix.
 pub fn matrix_rows(m: &DAffine3) -> Rows {
@@ -55,21 +53,8 @@ fn finite_or_zero(x: f64) -> f32 {
     if x.is_finite() { x as f32 } else { 0.0 }
 }
 
-/// Most segments that the paths of one line can emit, within reason: a null event emits none, so
-/// a path has at most one per interaction and one after the last; on the main path only the first
-/// sample of each branch emits.
-fn segment_capacity(scene: &Scene) -> u32 {
-    let simulation = &scene.simulation;
-    let path = simulation.max_interactions + 1;
-    let paths = match simulation.sampling {
-        Sampling::MainPath => path,
-        Sampling::Plain | Sampling::SharedPrimary => simulation.paths.max(1),
-    };
-    path.saturating_mul(paths).min(LARGEST_SEGMENT_CAPACITY)
-}
-
-/// Everything that is constant over frame `frame_index`. The flag for coincident surfaces is the
-/// world's to add: it depends on triangles.
+/// Everything that is constant over frame `frame_index`, but for the flag of coincident surfaces,
+/// which depends on triangles, and the segments that a line may hold, which depend on the buffers.
 pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
     let calibration = Calibration::new(scene);
     let (probe, simulation, imaging) = (&scene.probe, &scene.simulation, &scene.imaging);
@@ -138,7 +123,6 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         lateral_cut: LATERAL_CUT as f32,
         surface_scale: surface_scale as f32,
         volume_scale: volume_scale as f32,
-        segment_capacity: segment_capacity(scene),
         background: scene.background as u32,
         instances: scene.instances.len() as u32,
         points: scene
