@@ -5,6 +5,7 @@
 
 pub mod gpu;
 pub mod harness;
+pub mod npy;
 pub mod probe;
 pub mod reference;
 pub mod scene;

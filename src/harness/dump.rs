@@ -6,7 +6,8 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::{Element, Job, Subject, npy};
+use super::{Element, Job, Subject};
+use crate::npy;
 
 /// Writes every binding of a job, or of what a run left behind.
 ///
@@ -18,10 +19,12 @@ pub fn write(dir: &Path, job: &Job, contents: &[Vec<u8>]) -> std::io::Result<()>
         npy::write(
             &dir.join(format!("{}.npy", input.name)),
             input.element,
+            &[bytes.len() / 4],
             bytes,
         )?;
     }
-    npy::write(&dir.join("push.npy"), Element::Word, &job.push)
+    let words = [job.push.len() / 4];
+    npy::write(&dir.join("push.npy"), Element::Word, &words, &job.push)
 }
 
 /// Replaces the bindings of `job` that the folder has; returns their names. Bindings that the
@@ -120,9 +123,15 @@ mod tests {
         assert!(empty.contains("frame, lateral, iq"), "{empty}");
         let path = dir.path().join("2_lateral.npy");
         let lateral = job.inputs[1].bytes.clone();
-        npy::write(&path, Element::Float, &lateral).unwrap();
+        npy::write(&path, Element::Float, &[lateral.len() / 4], &lateral).unwrap();
         assert_eq!(read(dir.path(), subject, &mut job).unwrap(), ["lateral"]);
-        npy::write(&path, Element::Float, &lateral[8..]).unwrap();
+        npy::write(
+            &path,
+            Element::Float,
+            &[lateral.len() / 4 - 2],
+            &lateral[8..],
+        )
+        .unwrap();
         let error = read(dir.path(), subject, &mut job).unwrap_err();
         assert!(
             error.contains("lateral has") && error.contains("dump frame.npy"),

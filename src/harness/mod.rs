@@ -12,7 +12,6 @@ mod display;
 pub mod dump;
 mod geometry;
 mod inputs;
-pub mod npy;
 mod origin;
 mod rays;
 mod run;
@@ -22,6 +21,7 @@ mod worlds;
 
 use bytemuck::Pod;
 
+pub use crate::npy::Element;
 pub use check::Check;
 pub use run::{Outcome, run};
 
@@ -62,17 +62,6 @@ pub enum Size {
     Small,
     /// 192 scanlines, 7 layers and 2048 samples as in the paper's Table I.
     Standard,
-}
-
-/// How to read the 32-bit words of a buffer, for dumps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Element {
-    /// `f32`.
-    Float,
-    /// `u32`, and structures of mixed fields.
-    Word,
-    /// `i32`.
-    Integer,
 }
 
 /// What a kernel finds in one binding.

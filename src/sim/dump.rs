@@ -1,44 +1,11 @@
 //! Each stage by number and name, as arrays with their axes beside them.
 
-use std::io::Write;
 use std::path::Path;
 
 use serde_json::json;
 
+use crate::npy::{self, Element};
 use crate::probe::Probe;
-
-/// Writes a C-ordered little-endian f32 array in NumPy's format 1.0.
-///
-/// # Errors
-/// What the file system says.
-pub fn write_npy(path: &Path, shape: &[usize], data: &[f32]) -> std::io::Result<()> {
-    assert_eq!(
-        shape.iter().product::<usize>(),
-        data.len(),
-        "shape and data of {}",
-        path.display()
-    );
-    let shape = shape
-        .iter()
-        .map(|n| format!("{n},"))
-        .collect::<Vec<_>>()
-        .join(" ");
-    let mut header = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({shape}), }}");
-    // The header ends in a newline and, with the ten bytes before it, fills whole lines of 64.
-    let padding = 63 - (10 + header.len()) % 64;
-    header.extend(std::iter::repeat_n(' ', padding));
-    header.push('\n');
-    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
-    file.write_all(b"\x93NUMPY\x01\x00")?;
-    file.write_all(
-        &u16::try_from(header.len())
-            .expect("a short header")
-            .to_le_bytes(),
-    )?;
-    file.write_all(header.as_bytes())?;
-    file.write_all(bytemuck::cast_slice(data))?;
-    file.flush()
-}
 
 /// One axis of a dumped array.
 pub struct Axis {
@@ -66,7 +33,8 @@ pub fn stage(
     data: &[f32],
 ) -> std::io::Result<()> {
     let shape: Vec<usize> = axes.iter().map(|axis| axis.size).collect();
-    write_npy(&dir.join(format!("{name}.npy")), &shape, data)?;
+    let path = dir.join(format!("{name}.npy"));
+    npy::write(&path, Element::Float, &shape, bytemuck::cast_slice(data))?;
     sidecar(dir, name, meaning, axes)
 }
 

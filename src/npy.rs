@@ -1,8 +1,18 @@
 //! NumPy files of little-endian 32-bit words, format 1.0 and 2.0.
 
+use std::io::Write;
 use std::path::Path;
 
-use super::Element;
+/// How to read the 32-bit words of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Element {
+    /// `f32`.
+    Float,
+    /// `u32`, and structures of mixed fields.
+    Word,
+    /// `i32`.
+    Integer,
+}
 
 impl Element {
     fn descr(self) -> &'static str {
@@ -14,22 +24,36 @@ impl Element {
     }
 }
 
-/// Writes words as a one-dimensional array.
+/// Writes words as an array of `shape` in C order.
+///
+/// # Panics
+/// When the shape does not hold exactly these words.
 ///
 /// # Errors
 /// What the file system says.
-pub fn write(path: &Path, element: Element, bytes: &[u8]) -> std::io::Result<()> {
+pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> std::io::Result<()> {
+    assert_eq!(
+        4 * shape.iter().product::<usize>(),
+        bytes.len(),
+        "shape and data of {}",
+        path.display()
+    );
     let descr = element.descr();
-    let count = bytes.len() / 4;
+    let shape: Vec<_> = shape.iter().map(|n| format!("{n},")).collect();
+    let shape = shape.join(" ");
     let mut header =
-        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({count},), }}");
+        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': ({shape}), }}");
     // The header ends in a newline and, with the ten bytes before it, fills whole lines of 64.
     let padding = 63 - (10 + header.len()) % 64;
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
-    let length = (header.len() as u16).to_le_bytes();
-    let file = [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), bytes].concat();
-    std::fs::write(path, file)
+    let length = u16::try_from(header.len()).expect("a short header");
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    file.write_all(b"\x93NUMPY\x01\x00")?;
+    file.write_all(&length.to_le_bytes())?;
+    file.write_all(header.as_bytes())?;
+    file.write_all(bytes)?;
+    file.flush()
 }
 
 /// Reads the data of an array of 32-bit words of any shape, as bytes in C order.
@@ -104,7 +128,7 @@ mod tests {
         let path = dir.path().join("a.npy");
         let data: Vec<u8> = (0..48).collect();
         for element in [Element::Float, Element::Word, Element::Integer] {
-            write(&path, element, &data).unwrap();
+            write(&path, element, &[3, 4], &data).unwrap();
             assert_eq!(read(&path).unwrap(), data);
         }
         let file = std::fs::read(&path).unwrap();
@@ -129,7 +153,7 @@ mod tests {
         };
         assert!(with("<i4", "<f8").contains("32-bit"));
         assert!(with("False", "True ").contains("C order"));
-        assert!(with("(12,)", "(-2,)").contains("shape"));
-        assert!(with("(12,)", "(9e9)").contains("shape"));
+        assert!(with("(3, 4,)", "(-2, 4,)").contains("shape"));
+        assert!(with("(3, 4,)", "(9e9)").contains("shape"));
     }
 }
