@@ -6,6 +6,7 @@
 pub mod gpu;
 pub mod harness;
 pub mod npy;
+pub mod output;
 pub mod probe;
 pub mod reference;
 pub mod scene;

@@ -1,7 +1,7 @@
 //! The command line as a user meets it: files written, figures reported, mistakes explained.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 use serde_json::Value;
 
@@ -199,4 +199,33 @@ fn info_lists_this_machine() {
         "{}",
         text(&out.stdout)
     );
+}
+
+/// A program whose reader has left before the first line.
+fn unread(program: &str, args: &[&str]) -> Output {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let child = Command::new(program)
+        .args(args)
+        .stdout(writer)
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program starts");
+    child.wait_with_output().expect("the program ends")
+}
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    let insonify = env!("CARGO_BIN_EXE_insonify");
+    for (program, args, code) in [
+        (insonify, &["info"][..], 0),
+        (insonify, &["check", "scenes/phantom.toml"], 0),
+        (insonify, &["check", "scenes/nowhere.toml"], 1),
+        (env!("CARGO_BIN_EXE_kernels"), &["list"], 0),
+    ] {
+        let out = unread(program, args);
+        let said = text(&out.stderr);
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+        assert_eq!(out.status.code(), Some(code), "{args:?}: {said}");
+    }
 }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::{env, fs};
 
+use insonify::output;
 use insonify::sim::shaders::stamp::{self, Entry};
 use insonify::sim::shaders::{Error, bytes_of, compiler, source, validate};
 
@@ -47,7 +48,7 @@ fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String
     for variant in source::variants(glsl)? {
         let bytes = bytes_of(&compiler::compile(glsl, &variant)?);
         let stem = variant.stem.clone();
-        println!("{stem}: {} bytes", bytes.len());
+        output::line(format_args!("{stem}: {} bytes", bytes.len()));
         if !variant.keep_names {
             table += &format!("    (\"{stem}\", include_bytes!(\"{stem}.spv\")),\n");
         }

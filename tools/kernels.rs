@@ -9,6 +9,7 @@ use std::time::Instant;
 use clap::{Parser, Subcommand, ValueEnum};
 use insonify::gpu::{Device, DeviceOptions, Kernel};
 use insonify::harness::{self, Case, SUBJECTS, Size, Subject, dump};
+use insonify::output;
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 
@@ -71,7 +72,7 @@ fn main() -> Result<ExitCode> {
         ..Default::default()
     })
     .into_diagnostic()?;
-    println!("{} ({})", device.name(), device.driver());
+    output::line(format_args!("{} ({})", device.name(), device.driver()));
     let passed = match arguments.command {
         Command::List => true,
         Command::Run {
@@ -118,9 +119,13 @@ fn list() {
             .iter()
             .map(|i| i.name)
             .collect();
-        println!("{:<9} {}", subject.name, subject.stems.join(" "));
-        println!("          bindings:  {}", bindings.join(" "));
-        println!("          tolerance: {}", subject.tolerance);
+        output::line(format_args!(
+            "{:<9} {}",
+            subject.name,
+            subject.stems.join(" ")
+        ));
+        output::line(format_args!("          bindings:  {}", bindings.join(" ")));
+        output::line(format_args!("          tolerance: {}", subject.tolerance));
     }
 }
 
@@ -129,7 +134,7 @@ fn kernels(device: &Arc<Device>, library: &Library, subject: &Subject) -> Result
     let mut kernels = Vec::new();
     for stem in subject.stems {
         if stem.ends_with("_query") && !device.supports_ray_query() {
-            println!("{stem}: not run, the device has no ray query");
+            output::line(format_args!("{stem}: not run, the device has no ray query"));
             continue;
         }
         kernels.push(Kernel::new(device, stem, library.words(stem), &[]).into_diagnostic()?);
@@ -148,9 +153,9 @@ fn run(
     let mut job = (subject.job)(Case::Random, size);
     if let Some(dir) = input {
         let found = dump::read(dir, subject, &mut job).map_err(|e| miette!("{e}"))?;
-        println!("from {}: {}", dir.display(), found.join(", "));
+        output::line(format_args!("from {}: {}", dir.display(), found.join(", ")));
     }
-    println!("tolerance: {}", subject.tolerance);
+    output::line(format_args!("tolerance: {}", subject.tolerance));
     let extent = (subject.extent)(&job);
     let mut passed = true;
     for kernel in kernels(device, library, subject)? {
@@ -161,16 +166,19 @@ fn run(
             fastest = fastest.min(outcome.milliseconds);
             outputs = outcome.outputs;
         }
-        println!("{}: {fastest:.3} ms, fastest of {REPEATS}", kernel.name());
+        output::line(format_args!(
+            "{}: {fastest:.3} ms, fastest of {REPEATS}",
+            kernel.name()
+        ));
         let start = Instant::now();
         for check in (subject.check)(&job, &outputs) {
-            println!("  {check}");
+            output::line(format_args!("  {check}"));
             passed &= check.passed();
         }
-        println!(
+        output::line(format_args!(
             "  twin: {:.0} ms on one CPU core",
             start.elapsed().as_secs_f64() * 1e3
-        );
+        ));
         if let Some(dir) = output {
             let before: Vec<_> = job.inputs.iter().map(|i| i.bytes.clone()).collect();
             for (when, contents) in [("before", &before), ("after", &outputs)] {
@@ -191,9 +199,13 @@ fn check(device: &Arc<Device>, library: &Library) -> Result<bool> {
                 let job = (subject.job)(case, Size::Small);
                 let extent = (subject.extent)(&job);
                 let outcome = harness::run(device, &kernel, &job, extent).into_diagnostic()?;
-                println!("{} {case:?}: {:.3} ms", kernel.name(), outcome.milliseconds);
+                output::line(format_args!(
+                    "{} {case:?}: {:.3} ms",
+                    kernel.name(),
+                    outcome.milliseconds
+                ));
                 for check in (subject.check)(&job, &outcome.outputs) {
-                    println!("  {check}");
+                    output::line(format_args!("  {check}"));
                     passed &= check.passed();
                 }
             }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Args;
+use insonify::output;
 use insonify::scene::check;
 
 /// Arguments of `insonify check`.
@@ -17,7 +18,7 @@ impl Check {
     /// Prints the report.
     pub fn run(&self) -> miette::Result<ExitCode> {
         let report = check::report(&self.file);
-        println!("{report}");
+        output::line(&report);
         let passed = report.passed();
         match report.error {
             Some(error) => Err(error.into()),

@@ -1,5 +1,6 @@
 //! `insonify info`: what this machine can run.
 
+use insonify::output;
 use miette::{IntoDiagnostic, Result};
 
 /// Lists the Vulkan devices with what each lacks.
@@ -11,15 +12,15 @@ pub struct Info {}
 /// # Errors
 /// No Vulkan loader.
 pub fn run(_: &Info) -> Result<()> {
-    println!("insonify {}", env!("CARGO_PKG_VERSION"));
+    output::line(format_args!("insonify {}", env!("CARGO_PKG_VERSION")));
     let devices = insonify::gpu::list_devices().into_diagnostic()?;
     if devices.is_empty() {
-        println!(
+        output::line(format_args!(
             "no Vulkan device; install a GPU driver, or the software driver mesa-vulkan-drivers"
-        );
+        ));
     }
     for device in devices {
-        println!(
+        output::line(format_args!(
             "{}: {} ({}, {}, Vulkan {}, {:.1} GiB){}",
             device.index,
             device.name,
@@ -32,9 +33,9 @@ pub fn run(_: &Info) -> Result<()> {
             } else {
                 " - cannot be used"
             }
-        );
+        ));
         for lack in &device.lacks {
-            println!("   lacks {lack}");
+            output::line(format_args!("   lacks {lack}"));
         }
     }
     Ok(())

@@ -8,6 +8,7 @@ use miette::{Context, IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use insonify::gpu::{Device, DeviceOptions, FrameTimings};
+use insonify::output;
 use insonify::scene::{Scene, settings::Quality};
 use insonify::sim::dump::{self, Axis};
 use insonify::sim::shaders::Library;
@@ -120,7 +121,7 @@ pub fn run(args: &Render) -> Result<()> {
         .unwrap_or_else(|| default_output(&args.scene));
     let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
     save_png(&output, width, height, &rgba)?;
-    println!("{}", output.display());
+    output::line(format_args!("{}", output.display()));
     if let Some(dir) = &args.dump {
         dump_stages(&mut simulator, &scene, dir, (width, height, &rgba))?;
     }
