@@ -10,7 +10,7 @@ use serde_json::{Map, Value, json};
 use insonify::gpu::{Device, DeviceOptions, FrameTimings};
 use insonify::output;
 use insonify::scene::{Scene, settings::Quality};
-use insonify::sim::dump::{self, Axis};
+use insonify::sim::dump;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
@@ -120,10 +120,10 @@ pub fn run(args: &Render) -> Result<()> {
         .clone()
         .unwrap_or_else(|| default_output(&args.scene));
     let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
-    save_png(&output, width, height, &rgba)?;
+    dump::png(&output, width, height, &rgba).into_diagnostic()?;
     output::line(format_args!("{}", output.display()));
     if let Some(dir) = &args.dump {
-        dump_stages(&mut simulator, &scene, dir, (width, height, &rgba))?;
+        dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
     }
 
     let counters = simulator.counters().into_diagnostic()?;
@@ -240,138 +240,6 @@ fn simulate(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<Vec
 
 fn default_output(scene: &Path) -> PathBuf {
     PathBuf::from(scene.file_stem().unwrap_or_default()).with_extension("png")
-}
-
-fn save_png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
-    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
-    let image = image::GrayImage::from_raw(width, height, grey).expect("one byte per pixel");
-    image
-        .save(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("writing {}", path.display()))
-}
-
-fn dump_stages(
-    simulator: &mut Simulator,
-    scene: &Scene,
-    dir: &Path,
-    image: (u32, u32, &[u8]),
-) -> Result<()> {
-    std::fs::create_dir_all(dir)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("creating {}", dir.display()))?;
-    let frame = *simulator.constants();
-    let (lines, samples) = (frame.scanlines as usize, frame.samples as usize);
-    let pitch = scene.probe.sample_pitch();
-    let axis = |name, unit, start, step, size| Axis {
-        name,
-        unit,
-        start,
-        step,
-        size,
-    };
-    let scanline = || axis("scanline", "1", 0.0, 1.0, lines);
-    let depth = || axis("depth", "mm", 0.0, pitch, samples);
-    let complex = || axis("complex", "real, imaginary", 0.0, 1.0, 2);
-    let write = |name: &str, meaning: &str, axes: &[Axis], data: &[f32]| {
-        dump::stage(dir, name, meaning, axes, data)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("writing {name}"))
-    };
-
-    let echoes = simulator.echoes().into_diagnostic()?;
-    let rows = insonify::sim::tables::rows(scene);
-    let undone: Vec<f32> = [(&echoes[0], true), (&echoes[1], false)]
-        .into_iter()
-        .flat_map(|(ints, surface)| {
-            let rows = &rows;
-            ints.iter()
-                .take(2 * lines * samples)
-                .enumerate()
-                .map(move |(i, &v)| {
-                    let row = &rows[i / 2 % samples];
-                    v as f32
-                        * if surface {
-                            row.surface_undo
-                        } else {
-                            row.volume_undo
-                        }
-                })
-        })
-        .collect();
-    write(
-        "0_echoes",
-        "deposited echoes relative to a perfect mirror, complex baseband, before any kernel",
-        &[
-            axis("kind", "surface, volume", 0.0, 1.0, 2),
-            scanline(),
-            depth(),
-            complex(),
-        ],
-        &undone,
-    )?;
-    let lateral = simulator.lateral().into_diagnostic()?;
-    let factor = dump::rf_oversampling(&scene.probe);
-    let rf = dump::rf(
-        &scene.probe,
-        frame.axial_sigma,
-        lines,
-        samples,
-        &lateral,
-        factor,
-    );
-    write(
-        "1_rf",
-        "radio-frequency line before TGC",
-        &[
-            scanline(),
-            axis("depth", "mm", 0.0, pitch / factor as f64, samples * factor),
-        ],
-        &rf,
-    )?;
-    let iq = simulator.iq().into_diagnostic()?;
-    write(
-        "2_iq",
-        "complex baseband before TGC",
-        &[scanline(), depth(), complex()],
-        &iq[..2 * lines * samples],
-    )?;
-    let envelope: Vec<f32> = iq
-        .chunks_exact(2)
-        .take(lines * samples)
-        .enumerate()
-        .map(|(i, z)| z[0].hypot(z[1]) * rows[i % samples].tgc)
-        .collect();
-    write(
-        "3_envelope",
-        "envelope after TGC",
-        &[scanline(), depth()],
-        &envelope,
-    )?;
-    let log = simulator.log_image().into_diagnostic()?;
-    write(
-        "4_log",
-        "log-compressed envelope, 0 black to 1 white",
-        &[scanline(), depth()],
-        &log[..lines * samples],
-    )?;
-    save_png(&dir.join("5_bmode.png"), image.0, image.1, image.2)?;
-    let (x, z, pixel) = (
-        f64::from(frame.image_left),
-        f64::from(frame.image_top),
-        f64::from(frame.pixel_pitch),
-    );
-    let axes = [
-        axis("depth", "mm", z + pixel / 2.0, pixel, image.1 as usize),
-        axis("lateral", "mm", x + pixel / 2.0, pixel, image.0 as usize),
-    ];
-    dump::sidecar(
-        dir,
-        "5_bmode",
-        "scan-converted B-mode image, pixel centres in probe space",
-        &axes,
-    )
-    .into_diagnostic()
 }
 
 fn settings(scene: &Scene) -> Value {

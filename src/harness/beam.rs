@@ -63,7 +63,7 @@ fn job(case: Case, size: Size) -> Job {
             Input::floats("rows", bytemuck::cast_slice(&rows)),
             Input::integers("surface", &surface),
             Input::integers("volume", &volume),
-            Input::words("counters", &[Counters::default()]),
+            Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
             Input::output("lateral", Element::Float, surface.len()),
         ],
         push: Vec::new(),

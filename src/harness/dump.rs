@@ -1,12 +1,11 @@
 //! Jobs to and from a folder: `NAME.npy` per binding, `push.npy` for push constants.
 //!
-//! A binding is also found under a leading number, so that stages of `insonify render --dump`
-//! (`2_lateral.npy`) can be replayed; `frame.npy` says how large everything is.
+//! The folder that `insonify render --dump` writes will do as well.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::{Element, Job, Subject};
+use super::{Element, Job, Role, Subject};
 use crate::npy;
 
 /// Writes every binding of a job, or of what a run left behind.
@@ -27,27 +26,37 @@ pub fn write(dir: &Path, job: &Job, contents: &[Vec<u8>]) -> std::io::Result<()>
     npy::write(&dir.join("push.npy"), Element::Word, &words, &job.push)
 }
 
-/// Replaces the bindings of `job` that the folder has; returns their names. Bindings that the
-/// kernel only writes are made as large as the others ask for.
+/// Replaces the bindings of `job` that the kernel reads and the folder has; returns their names.
+/// Accumulators and outputs begin anew, as large as the frame asks for.
 ///
 /// # Errors
 /// A sentence on an array that cannot be read or is too small for the frame.
 pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static str>, String> {
+    let kernels = dir.join(crate::sim::dump::KERNELS);
+    let dir = if kernels.is_dir() { &kernels } else { dir };
+    let load = |name: &str| {
+        let path = dir.join(format!("{name}.npy"));
+        path.exists().then(|| npy::read(&path)).transpose()
+    };
     let mut found = Vec::new();
-    for input in &mut job.inputs {
-        if let Some(path) = file(dir, input.name)? {
-            input.bytes = npy::read(&path)?;
+    for input in job.inputs.iter_mut().filter(|i| i.role == Role::Read) {
+        if let Some(bytes) = load(input.name)? {
+            input.bytes = bytes;
             found.push(input.name);
         }
     }
-    if let Some(path) = file(dir, "push")? {
-        job.push = npy::read(&path)?;
+    // A dump of a frame has those of the one kernel that takes any.
+    if !job.push.is_empty()
+        && let Some(bytes) = load("push")?
+    {
+        job.push = bytes;
         found.push("push");
     }
     if found.is_empty() {
         let names: Vec<_> = job.inputs.iter().map(|i| i.name).collect();
         return Err(format!(
-            "{}: none of {} is there as NAME.npy; `kernels run {} --output DIR` writes them",
+            "{}: none of {} is there as NAME.npy; `kernels run {} --output DIR` and \
+             `insonify render --dump DIR` write them",
             dir.display(),
             names.join(", "),
             subject.name
@@ -61,34 +70,19 @@ pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static
     }
     let needed = (subject.sizes)(job);
     for (input, needed) in job.inputs.iter_mut().zip(needed) {
-        if input.bytes.len() >= needed {
-            continue;
-        }
-        if found.contains(&input.name) {
+        if input.role != Role::Read {
+            input.begin(needed / 4);
+        } else if input.bytes.len() < needed {
             return Err(format!(
-                "{}: {} has {} bytes and the frame asks for {needed}; dump frame.npy from the same run",
+                "{}: {} has {} bytes and the frame asks for {needed}; dump it and frame.npy from the \
+                 same run",
                 dir.display(),
                 input.name,
                 input.bytes.len()
             ));
         }
-        input.bytes.resize(needed, 0);
     }
     Ok(found)
-}
-
-/// `NAME.npy` or `2_NAME.npy`.
-fn file(dir: &Path, name: &str) -> Result<Option<PathBuf>, String> {
-    let entries = fs::read_dir(dir).map_err(|e| format!("{}: {e}", dir.display()))?;
-    for entry in entries {
-        let path = entry.map_err(|e| format!("{}: {e}", dir.display()))?.path();
-        let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-        let plain = stem.trim_start_matches(|c: char| c.is_ascii_digit() || c == '_');
-        if plain == name && path.extension().is_some_and(|x| x == "npy") {
-            return Ok(Some(path));
-        }
-    }
-    Ok(None)
 }
 
 #[cfg(test)]
@@ -115,27 +109,21 @@ mod tests {
     }
 
     #[test]
-    fn numbered_stages_are_found_and_arrays_too_small_refused() {
+    fn a_folder_of_nothing_and_arrays_too_small_are_refused() {
         let subject = SUBJECTS.iter().find(|s| s.name == "axial").unwrap();
         let mut job = (subject.job)(Case::Odd, Size::Small);
         let dir = tempfile::tempdir().unwrap();
         let empty = read(dir.path(), subject, &mut job).unwrap_err();
         assert!(empty.contains("frame, lateral, iq"), "{empty}");
-        let path = dir.path().join("2_lateral.npy");
-        let lateral = job.inputs[1].bytes.clone();
-        npy::write(&path, Element::Float, &[lateral.len() / 4], &lateral).unwrap();
-        assert_eq!(read(dir.path(), subject, &mut job).unwrap(), ["lateral"]);
-        npy::write(
-            &path,
-            Element::Float,
-            &[lateral.len() / 4 - 2],
-            &lateral[8..],
-        )
-        .unwrap();
-        let error = read(dir.path(), subject, &mut job).unwrap_err();
-        assert!(
-            error.contains("lateral has") && error.contains("dump frame.npy"),
-            "{error}"
-        );
+        let path = dir.path().join("lateral.npy");
+        let words = job.inputs[1].bytes.len() / 4;
+        for (words, fits) in [(words, true), (words - 2, false)] {
+            let lateral = &job.inputs[1].bytes[..4 * words];
+            npy::write(&path, Element::Float, &[words], lateral).unwrap();
+            match read(dir.path(), subject, &mut job) {
+                Ok(found) => assert!(fits && found == ["lateral"], "{found:?}"),
+                Err(e) => assert!(!fits && e.contains("lateral has"), "{e}"),
+            }
+        }
     }
 }

@@ -64,11 +64,24 @@ pub enum Size {
     Standard,
 }
 
+/// What a kernel does with a binding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Role {
+    /// Reads it.
+    Read,
+    /// Adds to it: zero before a run.
+    Sum,
+    /// Overwrites it.
+    Write,
+}
+
 /// What a kernel finds in one binding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
     /// Name, also of its dump.
     pub name: &'static str,
+    /// What the kernel does with it.
+    pub role: Role,
     /// Type of its words.
     pub element: Element,
     /// Content; empty is no element.
@@ -79,6 +92,7 @@ impl Input {
     fn new<T: Pod>(name: &'static str, element: Element, values: &[T]) -> Self {
         Self {
             name,
+            role: Role::Read,
             element,
             bytes: bytemuck::cast_slice(values).to_vec(),
         }
@@ -96,9 +110,29 @@ impl Input {
         Self::new(name, Element::Integer, values)
     }
 
+    /// An accumulator of `count` words.
+    fn sum(name: &'static str, element: Element, count: usize) -> Self {
+        let mut input = Self::new::<u32>(name, element, &[]);
+        input.role = Role::Sum;
+        input.begin(count);
+        input
+    }
+
     /// An output of `count` words that the kernel must overwrite.
     fn output(name: &'static str, element: Element, count: usize) -> Self {
-        Self::new(name, element, &vec![UNWRITTEN; count])
+        let mut input = Self::new::<u32>(name, element, &[]);
+        input.role = Role::Write;
+        input.begin(count);
+        input
+    }
+
+    /// Makes it `count` words long, as a kernel that does not read it finds it.
+    fn begin(&mut self, count: usize) {
+        let word = match self.role {
+            Role::Write => UNWRITTEN,
+            Role::Read | Role::Sum => 0,
+        };
+        self.bytes = bytemuck::cast_slice(&vec![word; count]).to_vec();
     }
 }
 

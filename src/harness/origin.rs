@@ -49,7 +49,11 @@ fn job(case: Case, size: Size) -> Job {
     inputs.extend(worlds::world(case).inputs());
     let stacks = (MAX_STACK + 1) * lines(&frame);
     inputs.push(Input::output("stacks", Element::Word, stacks));
-    inputs.push(Input::words("counters", &[Counters::default()]));
+    inputs.push(Input::sum(
+        "counters",
+        Element::Word,
+        size_of::<Counters>() / 4,
+    ));
     Job {
         inputs,
         push: Vec::new(),

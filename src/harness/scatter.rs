@@ -4,7 +4,7 @@ use std::mem::size_of;
 
 use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, samples};
-use super::{Case, Check, Extent, Input, Job, Size, Subject, trace, worlds};
+use super::{Case, Check, Element, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
 use crate::sim::layout::{self, Counters, FLAG_VOXEL, Frame, Row, Tissue};
 
@@ -130,8 +130,8 @@ fn job(case: Case, size: Size) -> Job {
         Input::floats("points", points.as_flattened()),
         Input::words("segments", &segments),
         Input::words("segment_count", &counts),
-        Input::integers("volume_echoes", &vec![0; 2 * samples(&frame)]),
-        Input::words("counters", &[Counters::default()]),
+        Input::sum("volume_echoes", Element::Integer, 2 * samples(&frame)),
+        Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
     ];
     job
 }

@@ -120,10 +120,10 @@ fn job(case: Case, size: Size) -> Job {
     job.inputs.extend([
         Input::words("stacks", &origin::pack(&stacks)),
         Input::floats("rows", bytemuck::cast_slice(&rows)),
-        Input::integers("surface_echoes", &vec![0; 2 * samples(&frame)]),
+        Input::sum("surface_echoes", Element::Integer, 2 * samples(&frame)),
         Input::output("segments", Element::Word, segments),
-        Input::words("segment_count", &vec![0_u32; lines(&frame)]),
-        Input::words("counters", &[Counters::default()]),
+        Input::sum("segment_count", Element::Word, lines(&frame)),
+        Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
     ]);
     job
 }

@@ -178,8 +178,14 @@ pub fn owned(job: &Job) -> Owned {
         found.map_or_else(Vec::new, |i| bytemuck::pod_collect_to_vec(&i.bytes))
     }
     let frame = optional::<Frame>(job, "frame").first().copied();
+    let frame = frame.unwrap_or_default();
+    let mut points = optional(job, "points");
+    if points.is_empty() {
+        // `trace` binds none and only asks whether there are any.
+        points.resize(frame.points as usize, [0.0; 4]);
+    }
     Owned {
-        frame: frame.unwrap_or_default(),
+        frame,
         rows: optional(job, "rows"),
         tissues: optional(job, "tissues"),
         surfaces: optional(job, "surfaces"),
@@ -187,7 +193,7 @@ pub fn owned(job: &Job) -> Owned {
         positions: optional(job, "vertices"),
         normals: optional(job, "normals"),
         triangles: optional(job, "triangles"),
-        points: optional(job, "points"),
+        points,
     }
 }
 

@@ -1,92 +1,66 @@
-//! Each stage by number and name, as arrays with their axes beside them.
+//! The last frame in a folder: stages to look at, and what every kernel had bound.
 
-use std::path::Path;
+mod bindings;
+mod rf;
+mod stages;
 
-use serde_json::json;
+use std::path::{Path, PathBuf};
 
-use crate::npy::{self, Element};
-use crate::probe::Probe;
+use super::{SimError, Simulator};
+use crate::scene::Scene;
 
-/// One axis of a dumped array.
-pub struct Axis {
-    /// What it runs over.
-    pub name: &'static str,
-    /// Unit of `start` and `step`.
-    pub unit: &'static str,
-    /// Coordinate of the first entry.
-    pub start: f64,
-    /// Distance between entries.
-    pub step: f64,
-    /// Entries.
-    pub size: usize,
+/// Folder in a dump with what the kernels had bound.
+pub const KERNELS: &str = "kernels";
+
+/// Why a frame was not dumped.
+#[derive(Debug, thiserror::Error)]
+pub enum DumpError {
+    /// The frame cannot be read back, or its geometry not laid out.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A file or folder cannot be written.
+    #[error("writing {path}: {cause}")]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
 }
 
-/// Writes `NAME.npy` and its sidecar `NAME.json` (axes from slowest to fastest, meaning).
-///
-/// # Errors
-/// What the file system says.
-pub fn stage(
-    dir: &Path,
-    name: &str,
-    meaning: &str,
-    axes: &[Axis],
-    data: &[f32],
-) -> std::io::Result<()> {
-    let shape: Vec<usize> = axes.iter().map(|axis| axis.size).collect();
-    let path = dir.join(format!("{name}.npy"));
-    npy::write(&path, Element::Float, &shape, bytemuck::cast_slice(data))?;
-    sidecar(dir, name, meaning, axes)
-}
-
-/// Writes the sidecar `NAME.json` of a stage.
-///
-/// # Errors
-/// What the file system says.
-pub fn sidecar(dir: &Path, name: &str, meaning: &str, axes: &[Axis]) -> std::io::Result<()> {
-    let axes: Vec<_> = axes
-        .iter()
-        .map(|a| json!({"name": a.name, "unit": a.unit, "start": a.start, "step": a.step, "size": a.size}))
-        .collect();
-    let text = serde_json::to_string_pretty(&json!({"meaning": meaning, "axes": axes}))
-        .expect("plain JSON");
-    std::fs::write(dir.join(format!("{name}.json")), text + "\n")
-}
-
-/// Samples of the RF line per axial sample, so that its rate is at least four times f0.
-pub fn rf_oversampling(probe: &Probe) -> usize {
-    let rate = probe.speed / (2.0 * probe.sample_pitch());
-    (4.0 * probe.frequency / rate).ceil().max(1.0) as usize
-}
-
-/// RF lines from the complex baseband before the axial kernel ([L][K] pairs): the Gaussian kernel
-/// is evaluated at the finer positions, so nothing is interpolated. Shape [L][K * factor].
-pub fn rf(
-    probe: &Probe,
-    sigma: f32,
-    lines: usize,
-    samples: usize,
-    lateral: &[f32],
-    factor: usize,
-) -> Vec<f32> {
-    let reach = (4.0 * sigma).ceil() as isize;
-    let cycles = 2.0 * probe.frequency * probe.sample_pitch() / probe.speed;
-    let mut out = Vec::with_capacity(lines * samples * factor);
-    for l in 0..lines {
-        for i in 0..samples * factor {
-            let kappa = i as f64 / factor as f64;
-            let centre = kappa.round() as isize;
-            let first = (centre - reach).max(0);
-            let last = (centre + reach).min(samples as isize - 1);
-            let (mut re, mut im) = (0.0, 0.0);
-            for j in first..=last {
-                let weight = (-0.5 * ((kappa - j as f64) / f64::from(sigma)).powi(2)).exp();
-                let at = 2 * (l * samples + j as usize);
-                re += weight * f64::from(lateral[at]);
-                im += weight * f64::from(lateral[at + 1]);
-            }
-            let phase = std::f64::consts::TAU * (cycles * kappa).fract();
-            out.push((re * phase.cos() - im * phase.sin()) as f32);
+impl DumpError {
+    fn file(path: &Path, cause: impl ToString) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            cause: cause.to_string(),
         }
     }
-    out
+}
+
+/// Writes the last frame of `scene` into `dir`, which is made where it does not exist: the stages
+/// by number and name (`0_echoes.npy` to `5_bmode.png`) with their axes beside them (`.json`), and
+/// in [`KERNELS`] the bindings of every kernel by name, as `kernels run NAME --input DIR` reads
+/// them.
+///
+/// # Errors
+/// What the file system or the device says.
+pub fn frame(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
+    for dir in [dir, &dir.join(KERNELS)] {
+        std::fs::create_dir_all(dir).map_err(|e| DumpError::file(dir, e))?;
+    }
+    stages::write(simulator, scene, dir)?;
+    bindings::write(simulator, scene, &dir.join(KERNELS))
+}
+
+/// Writes an image, RGBA bytes row by row, as 8-bit grey PNG: its red channel.
+///
+/// # Errors
+/// What the file system says.
+///
+/// # Panics
+/// When `rgba` has not `4 * width * height` bytes.
+pub fn png(path: &Path, width: u32, height: u32, rgba: &[u8]) -> Result<(), DumpError> {
+    let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
+    let image = image::GrayImage::from_raw(width, height, grey).expect("one byte per pixel");
+    image.save(path).map_err(|e| DumpError::file(path, e))
 }

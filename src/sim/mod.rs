@@ -20,7 +20,8 @@ use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use passes::Passes;
 use shaders::Library;
-use stages::{Batches, Buffers, Kernels, Tables};
+use stages::{Batches, Buffers, Kernels};
+use tables::Tables;
 pub use tracer::Tracer;
 use world::World;
 
@@ -42,6 +43,7 @@ pub struct Simulator {
     passes: Passes,
     coincident: bool,
     settings: Settings,
+    tables: Tables,
 }
 
 /// What the tables on the device were made of.
@@ -82,17 +84,14 @@ impl Simulator {
         let world = World::new(device, scene, tracer)?;
         let coincident = scene.coincident_triangles() > 0;
         let (frame, batches) = frame_constants(scene, coincident, 0);
-        let tables = Tables {
-            tissues: scene.tissues.len(),
-            surfaces: 2 * scene.instances.len(),
-            points: frame.points as usize,
-        };
+        let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &tables)?;
         let simulator = Self {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
             coincident,
             settings: Settings::of(scene),
+            tables,
             passes: Passes {
                 kernels: Kernels::new(device, library, tracer)?,
                 buffers,
@@ -101,21 +100,18 @@ impl Simulator {
                 batches,
             },
         };
-        simulator.upload_tables(scene)?;
+        simulator.upload_tables()?;
         Ok(simulator)
     }
 
-    fn upload_tables(&self, scene: &Scene) -> Result<(), GpuError> {
-        let b = &self.passes.buffers;
-        let (rows, tissues) = (tables::rows(scene), tables::tissues(scene));
-        let (surfaces, points) = (tables::surfaces(scene), tables::points(scene));
-        let grey = tables::grey_map(&scene.imaging);
+    fn upload_tables(&self) -> Result<(), GpuError> {
+        let (b, t) = (&self.passes.buffers, &self.tables);
         self.device.upload_many(&[
-            (&b.rows, 0, bytemuck::cast_slice(&rows)),
-            (&b.tissues, 0, bytemuck::cast_slice(&tissues)),
-            (&b.surfaces, 0, bytemuck::cast_slice(&surfaces)),
-            (&b.points, 0, bytemuck::cast_slice(&points)),
-            (&b.grey, 0, bytemuck::cast_slice(&grey)),
+            (&b.rows, 0, bytemuck::cast_slice(&t.rows)),
+            (&b.tissues, 0, bytemuck::cast_slice(&t.tissues)),
+            (&b.surfaces, 0, bytemuck::cast_slice(&t.surfaces)),
+            (&b.points, 0, bytemuck::cast_slice(&t.points)),
+            (&b.grey, 0, bytemuck::cast_slice(&t.grey)),
         ])
     }
 
@@ -132,7 +128,8 @@ impl Simulator {
         if settings != self.settings {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            self.upload_tables(scene)?;
+            self.tables = Tables::new(scene);
+            self.upload_tables()?;
             self.settings = settings;
         }
         let passes = &mut self.passes;
@@ -169,6 +166,11 @@ impl Simulator {
     /// Constants of the last frame.
     pub fn constants(&self) -> &layout::Frame {
         &self.passes.frame
+    }
+
+    /// The tables as they are on the device.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
     }
 
     /// The B-mode image of the last frame: width, height, RGBA bytes row by row; transparent outside

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::layout;
 use super::shaders::Library;
+use super::tables::Tables;
 use super::tracer::Tracer;
 use crate::gpu::{Buffer, BufferKind, Device, GpuError, Kernel};
 
@@ -86,13 +87,6 @@ pub(super) struct Buffers {
     pub(super) counters: Buffer,
 }
 
-/// Numbers of table entries.
-pub(super) struct Tables {
-    pub(super) tissues: usize,
-    pub(super) surfaces: usize,
-    pub(super) points: usize,
-}
-
 impl Buffers {
     pub(super) fn new(
         device: &Arc<Device>,
@@ -111,15 +105,15 @@ impl Buffers {
             rows: new("rows", u64::from(frame.samples), size_of::<layout::Row>())?,
             tissues: new(
                 "tissues",
-                tables.tissues as u64,
+                tables.tissues.len() as u64,
                 size_of::<layout::Tissue>(),
             )?,
             surfaces: new(
                 "surfaces",
-                tables.surfaces as u64,
+                tables.surfaces.len() as u64,
                 size_of::<layout::Surface>(),
             )?,
-            points: new("points", tables.points as u64, 16)?,
+            points: new("points", tables.points.len() as u64, 16)?,
             grey: new("grey map", 256, 4)?,
             stacks: new("media stacks", lines * (layout::MAX_STACK as u64 + 1), 4)?,
             segments: new("segments", segments, size_of::<layout::Segment>())?,

@@ -145,6 +145,33 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
     }
 }
 
+/// What does not change from frame to frame, in the device's layout.
+pub struct Tables {
+    /// One per axial sample.
+    pub rows: Vec<layout::Row>,
+    /// In the scene's order.
+    pub tissues: Vec<layout::Tissue>,
+    /// Two per instance.
+    pub surfaces: Vec<layout::Surface>,
+    /// World position, mm, and amplitude.
+    pub points: Vec<[f32; 4]>,
+    /// Grey level of each of 256 values.
+    pub grey: Vec<u32>,
+}
+
+impl Tables {
+    /// The tables of `scene`.
+    pub fn new(scene: &Scene) -> Self {
+        Self {
+            rows: rows(scene),
+            tissues: tissues(scene),
+            surfaces: surfaces(scene),
+            points: points(scene),
+            grey: grey_map(&scene.imaging),
+        }
+    }
+}
+
 /// One row per axial sample.
 pub fn rows(scene: &Scene) -> Vec<layout::Row> {
     let calibration = Calibration::new(scene);

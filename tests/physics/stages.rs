@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 use insonify::gpu::{Device, Kernel};
-use insonify::harness::{self, Element, Extent, Input, Job};
+use insonify::harness::{self, Element, Extent, Input, Job, Role};
 use insonify::probe::Probe;
 use insonify::sim::layout::{Counters, Frame, Row};
 use insonify::sim::shaders::Library;
@@ -18,6 +18,7 @@ pub struct Stages {
 fn input<T: Pod>(name: &'static str, values: &[T]) -> Input {
     Input {
         name,
+        role: Role::Read,
         element: Element::Word,
         bytes: bytemuck::cast_slice(values).to_vec(),
     }
