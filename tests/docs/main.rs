@@ -1,0 +1,313 @@
+//! `docs/scenes.md` against the program: every key, type, choice, default, range, preset and
+//! shipped tissue, and the examples. The program is asked through what it says to mistakes, so
+//! that a key added to the schema is missed here without anyone listing it.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use insonify::scene::tissue::table;
+use insonify::scene::{Scene, SceneError, check};
+
+mod schema;
+mod values;
+
+use schema::{Takes, explore, type_name};
+use values::{of_values, place, settings};
+
+/// Loads a scene of this text.
+fn load(text: &str, set: &[(String, String)]) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("scene.toml");
+    std::fs::write(&file, text).expect("written");
+    Scene::load(&file, set).map(|(scene, _)| scene)
+}
+
+/// One row of a table: the heading's path and the cells.
+struct Row<'d> {
+    table: &'d str,
+    head: Vec<&'d str>,
+    cells: Vec<&'d str>,
+}
+
+fn rows(document: &str) -> Vec<Row<'_>> {
+    let (mut table, mut head, mut out) = ("", Vec::new(), Vec::new());
+    for line in document.lines() {
+        if line.starts_with('#') {
+            let code = line.split('`').nth(1).unwrap_or_default();
+            table = code.trim_matches(['[', ']']);
+        }
+        if !line.starts_with('|') {
+            head.clear();
+            continue;
+        }
+        let line = line.trim_matches('|');
+        let cells: Vec<_> = line
+            .split('|')
+            .map(|c| c.trim().trim_matches('`'))
+            .collect();
+        match head.is_empty() {
+            true => head = cells,
+            false if cells[0].starts_with("---") => {}
+            false => out.push(Row {
+                table,
+                head: head.clone(),
+                cells,
+            }),
+        }
+    }
+    out
+}
+
+/// What is wrong with the table of units: each is compared with those that the program offers
+/// instead of one that does not exist, at the first key of that type.
+fn of_units(document: &str) -> Vec<String> {
+    let all = rows(document);
+    let mut faults = Vec::new();
+    for row in all.iter().filter(|r| r.head[0] == "Type") {
+        let key = all
+            .iter()
+            .find(|key| key.head[0] == "Key" && key.cells[1] == row.cells[0]);
+        let Some(key) = key else {
+            faults.push(format!("no key is a {}", row.cells[0]));
+            continue;
+        };
+        let (text, at) = place(&format!("{}.{}", key.table, key.cells[0]));
+        let error = load(&text, &[(at, "1 parsec".to_owned())]).expect_err("no such unit");
+        let real = error.message.split("takes ").nth(1).unwrap_or_default();
+        let told = row.cells[1].split(';').next().unwrap_or_default();
+        let names = |list: &str| list.replace('`', "");
+        if names(real) != names(told) {
+            faults.push(format!("{}: {told}, not {real}", row.cells[0]));
+        }
+    }
+    faults
+}
+
+/// What is wrong with the tables of keys.
+fn of_keys(document: &str, schema: &BTreeMap<String, Takes>) -> Vec<String> {
+    let mut faults = Vec::new();
+    let mut named = Vec::new();
+    for row in rows(document).iter().filter(|r| r.head[0] == "Key") {
+        let &[key, kind, default, stated, _] = row.cells.as_slice() else {
+            faults.push(format!(
+                "{}: a row has {} cells",
+                row.table,
+                row.cells.len()
+            ));
+            continue;
+        };
+        let path = match row.table {
+            "" => key.to_owned(),
+            table => format!("{table}.{key}"),
+        };
+        match schema.get(&path) {
+            Some(Takes::Choices(choices)) => {
+                let mut told: Vec<_> = stated.split('"').skip(1).step_by(2).collect();
+                let mut real: Vec<_> = choices.iter().map(String::as_str).collect();
+                told.sort_unstable();
+                real.sort_unstable();
+                if kind != "one of" || told != real {
+                    faults.push(format!("{path}: {kind} {told:?}, not one of {real:?}"));
+                }
+            }
+            Some(Takes::Value(wanted)) if type_name(wanted) != kind => {
+                faults.push(format!("{path}: {kind}, but the program wants {wanted}"));
+            }
+            Some(Takes::Value(_)) => {}
+            None if kind == "table" && schema.keys().any(|k| k.starts_with(&path)) => continue,
+            None => {
+                faults.push(format!("{path} does not exist"));
+                continue;
+            }
+        }
+        faults.extend(of_values(&path, kind, default, stated));
+        named.push(path);
+    }
+    let missing = schema.keys().filter(|key| !named.contains(key));
+    faults.extend(missing.map(|key| format!("{key} is not described")));
+    faults
+}
+
+fn of_presets(document: &str) -> Vec<String> {
+    let mut faults = Vec::new();
+    for row in rows(document)
+        .iter()
+        .filter(|r| r.head[0] == "Preset value")
+    {
+        for (preset, &value) in row.head.iter().zip(&row.cells).skip(1) {
+            let base = ("probe.preset".to_owned(), (*preset).to_owned());
+            let key = (format!("probe.{}", row.cells[0]), value.to_owned());
+            let plain = load("", std::slice::from_ref(&base)).map(|s| settings(&s));
+            let set = match value {
+                // Left empty: the key must not fit this kind of probe.
+                "" => match load("", &[base, (key.0.clone(), "1 deg".to_owned())]) {
+                    Err(_) => continue,
+                    Ok(scene) => Ok(settings(&scene)),
+                },
+                _ => load("", &[base, key.clone()]).map(|s| settings(&s)),
+            };
+            match (plain, set) {
+                (Ok(plain), Ok(set)) if plain == set && !value.is_empty() => {}
+                (_, Err(error)) => faults.push(format!("{preset}: {key:?}: {error}")),
+                _ => faults.push(format!("{preset}: {key:?} is not its value")),
+            }
+        }
+    }
+    faults
+}
+
+fn of_tissues(document: &str) -> Vec<String> {
+    let mut told = BTreeMap::new();
+    for row in rows(document).iter().filter(|r| r.head[0] == "Tissue") {
+        let numbers: Vec<f64> = row.cells[1..]
+            .iter()
+            .filter_map(|c| c.parse().ok())
+            .collect();
+        told.insert(row.cells[0].to_owned(), numbers);
+    }
+    let real: BTreeMap<_, _> = table::shipped()
+        .into_iter()
+        .map(|t| {
+            let s = t.surface;
+            let numbers = vec![
+                t.speed,
+                t.density,
+                t.attenuation,
+                t.echogenicity,
+                t.density_of_scatterers,
+                t.texture_depth,
+                t.texture_length,
+                s.roughness,
+                s.thickness,
+                s.specularity,
+            ];
+            (t.name, numbers)
+        })
+        .collect();
+    let names = real.keys().chain(told.keys());
+    let mut faults: Vec<_> = names
+        .filter(|n| real.get(*n) != told.get(*n))
+        .map(|n| format!("tissue {n}: {:?}, not {:?}", real.get(n), told.get(n)))
+        .collect();
+    faults.dedup();
+    faults
+}
+
+/// Loads the examples as `insonify check` does, each beside the shipped meshes that it names.
+fn of_examples(document: &str) -> Vec<String> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+    let mut faults = Vec::new();
+    let examples = document.split("```toml\n").skip(1);
+    for example in examples.map(|e| e.split("```").next().unwrap_or_default()) {
+        let folder = tempfile::tempdir().expect("a folder");
+        for mesh in example.lines().filter_map(|l| l.strip_prefix("file = ")) {
+            let mesh = mesh.trim_matches('"');
+            let to = folder.path().join(mesh);
+            std::fs::create_dir_all(to.parent().expect("a folder")).expect("made");
+            std::fs::copy(root.join(mesh), to).expect(mesh);
+        }
+        let file = folder.path().join("example.toml");
+        std::fs::write(&file, example).expect("written");
+        let report = check::report(&file);
+        if !report.passed() || !report.issues.is_empty() {
+            faults.push(format!("example: {report}\n{:?}", report.error));
+        }
+    }
+    faults
+}
+
+fn document() -> String {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scenes.md");
+    std::fs::read_to_string(path).expect("the document")
+}
+
+#[test]
+fn the_reference_names_every_key_as_the_program_takes_it() {
+    let mut schema = BTreeMap::new();
+    explore("", "", "", &mut schema);
+    let depth = |path: &str| schema.keys().filter(|k| k.starts_with(path)).count();
+    assert!(
+        depth("mesh.shape.") >= 10 && depth("tissues.NAME.") >= 11,
+        "{schema:?}"
+    );
+    let real = document();
+    assert_eq!(of_keys(&real, &schema), [""; 0]);
+
+    let row = |key: &str| {
+        let start = format!("| `{key}` |");
+        let line = real.lines().find(|l| l.starts_with(&start)).expect(key);
+        format!("{line}\n")
+    };
+    for (from, to, noticed) in [
+        (
+            row("paths"),
+            String::new(),
+            "simulation.paths is not described",
+        ),
+        (
+            row("sphere.radius"),
+            String::new(),
+            "mesh.shape.sphere.radius is not described",
+        ),
+        (
+            row("paths"),
+            row("paths").replace("paths", "path"),
+            "simulation.path does not exist",
+        ),
+        (
+            row("seed"),
+            row("seed").replace("integer", "number"),
+            "simulation.seed: number",
+        ),
+        (
+            row("seed"),
+            row("seed").replace('1', "2"),
+            "simulation.seed: 2 is not the default",
+        ),
+        (
+            row("cell"),
+            row("cell").replace("0.01 to", "0.02 to"),
+            "simulation.cell: range 0.02",
+        ),
+        (
+            row("sequence"),
+            row("sequence").replace(", `\"random\"`", ""),
+            "simulation.sequence: one",
+        ),
+    ] {
+        let faults = of_keys(&real.replace(&from, &to), &schema);
+        assert!(
+            faults.iter().any(|f| f.starts_with(noticed)),
+            "{noticed}: {faults:?}"
+        );
+    }
+}
+
+#[test]
+fn the_reference_states_the_presets_and_the_shipped_tissues() {
+    let real = document();
+    assert_eq!(of_presets(&real), [""; 0]);
+    assert_eq!(of_tissues(&real), [""; 0]);
+    let wrong = real.replace("| 3.5 MHz |", "| 3.6 MHz |");
+    assert_eq!(of_presets(&wrong).len(), 1);
+    let wrong = real.replace("| `air` | 0.343", "| `air` | 0.344");
+    assert_eq!(of_tissues(&wrong).len(), 1);
+}
+
+#[test]
+fn the_reference_states_the_units() {
+    let real = document();
+    assert_eq!(of_units(&real), [""; 0]);
+    for (from, to) in [("`mm`, `cm`", "`mm`, `inch`"), ("| level |", "| tone |")] {
+        assert_eq!(of_units(&real.replacen(from, to, 1)).len(), 1, "{from}");
+    }
+}
+
+#[test]
+fn the_examples_of_the_reference_load() {
+    let real = document();
+    assert_eq!(real.matches("```toml").count(), 2);
+    assert_eq!(of_examples(&real), [""; 0]);
+    let wrong = real.replace("paths = 16", "pathz = 16");
+    assert_eq!(of_examples(&wrong).len(), 1);
+}
