@@ -3,6 +3,9 @@
 //! `scene` and `probe` say what is imaged and with what; `gpu` knows Vulkan and no ultrasound;
 //! `sim` is the frame; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
 
+// Of what others may use: tools and tests have no such items.
+#![warn(missing_docs)]
+
 pub mod gpu;
 pub mod harness;
 pub mod npy;

@@ -192,8 +192,12 @@ pub struct Bench {
 }
 
 impl Bench {
+    #[cfg(test)]
     pub fn new() -> Self {
-        let device = gpu::test_device();
+        Self::on(gpu::test_device())
+    }
+
+    pub fn on(device: Arc<gpu::Device>) -> Self {
         Self {
             renderers: renderers(&device),
             device,
@@ -201,29 +205,77 @@ impl Bench {
     }
 }
 
-/// The check holds, notices its planted error, and leaves the validation layers silent.
+/// What a check found, and what it found with its error planted: the verdict of tests and report.
+pub struct Examined {
+    pub right: Outcome,
+    planted: Outcome,
+    /// Of the validation layers, in the meantime.
+    pub messages: Vec<String>,
+}
+
+impl Examined {
+    /// The planted error showed.
+    pub fn noticed(&self) -> bool {
+        !self.planted.holds()
+    }
+
+    /// Every figure holds and can be shown, the planted error showed, and the validation layers are
+    /// silent.
+    pub fn holds(&self) -> bool {
+        self.right.holds() && self.right.is_drawable() && self.noticed() && self.messages.is_empty()
+    }
+
+    /// Why it does not hold, in lines; empty if it does.
+    pub fn complaints(&self, check: &Check) -> String {
+        let mut lines: Vec<String> = self
+            .right
+            .failures()
+            .iter()
+            .map(|f| f.to_string())
+            .collect();
+        if self.right.figures.is_empty() {
+            lines.push("nothing was measured".into());
+        }
+        if !self.right.is_drawable() {
+            lines.push("a plot or picture cannot be drawn".into());
+        }
+        if !self.noticed() {
+            let figures = self
+                .planted
+                .figures
+                .iter()
+                .map(|f| format!("\n        {f}"));
+            let figures: String = figures.collect();
+            lines.push(format!("not noticed: {}{figures}", check.planted));
+        }
+        lines.extend(self.messages.iter().cloned());
+        lines.iter().map(|line| format!("     {line}\n")).collect()
+    }
+}
+
+/// Runs a check, and runs it with its error planted.
+pub fn examine(check: &Check, bench: &Bench) -> Examined {
+    let before = bench.device.validation_messages().len();
+    Examined {
+        right: (check.run)(bench, Physics::Right),
+        planted: (check.run)(bench, Physics::Planted),
+        messages: bench.device.validation_messages().split_off(before),
+    }
+}
+
+/// The check holds.
 ///
 /// # Panics
-/// With the figures, if not.
+/// With what does not.
+#[cfg(test)]
 pub fn prove(check: &Check) {
-    let bench = Bench::new();
-    let title = format!("{} {}", check.row, check.name);
-    let right = (check.run)(&bench, Physics::Right);
-    let list =
-        |figures: Vec<&Figure>| -> String { figures.iter().map(|f| format!("\n{f}")).collect() };
+    let found = examine(check, &Bench::new());
     assert!(
-        right.holds(),
-        "{title}: {}\n{}",
-        list(right.failures()),
-        check.claim
+        found.holds(),
+        "{} {}: {}\n{}",
+        check.row,
+        check.name,
+        check.claim,
+        found.complaints(check)
     );
-    assert!(right.is_drawable(), "{title}: {:#?}", right.plots);
-    let wrong = (check.run)(&bench, Physics::Planted);
-    assert!(
-        !wrong.holds(),
-        "{title}: not noticed: {}{}",
-        check.planted,
-        list(wrong.figures.iter().collect())
-    );
-    assert_eq!(bench.device.validation_messages(), Vec::<String>::new());
 }

@@ -1,7 +1,5 @@
 //! Second-order statistics of speckle: the size of its grains, and what probe motion leaves of them.
 
-use std::f64::consts::LN_2;
-
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
 use insonify::scene::settings::ScatterMode;
@@ -209,6 +207,6 @@ fn the_envelopes_covariance_is_narrower() {
         (slope - 0.25 / (4.0 / std::f64::consts::PI - 1.0)).abs() < 1e-3,
         "{slope}"
     );
-    let ratio = envelope_width() / (8.0 * LN_2).sqrt();
+    let ratio = envelope_width() / (8.0 * std::f64::consts::LN_2).sqrt();
     assert!((ratio - 0.963).abs() < 0.001, "{ratio}");
 }

@@ -1,8 +1,10 @@
-//! What frames must show whatever computes them: closed forms of acoustics and image formation.
-//! Each expectation is worked out in its test and takes nothing from the code under test.
+// What frames must show whatever computes them: closed forms of acoustics and image formation.
+// Each expectation is worked out in its test and takes nothing from the code under test.
+// tools/validate.rs includes this file: the report shows what the tests prove.
 
 mod brightness;
 mod check;
+mod cole;
 mod contrast;
 mod convergence;
 mod conversion;
@@ -17,8 +19,12 @@ mod intersections;
 mod invariance;
 mod levels;
 mod moments;
+#[path = "../../tools/validate/page.rs"]
+mod page;
 mod paths;
 mod pictures;
+#[path = "../../tools/validate/plot.rs"]
+mod plot;
 mod profile;
 mod refraction;
 mod render;
@@ -32,6 +38,7 @@ mod shadow;
 mod signal;
 mod speckle;
 mod stages;
+#[cfg(test)]
 mod sweep;
 mod thickness;
 mod timing;

@@ -13,8 +13,8 @@ use crate::render::Inputs;
 use crate::scenes::{add_point, linear, mirror, silent, tissue};
 
 /// Radius of the cylinder, depth of its axis, and how far behind it the rays are looked at, mm.
-const RADIUS: f64 = 5.0;
-const AXIS: f64 = 30.0;
+pub const RADIUS: f64 = 5.0;
+pub const AXIS: f64 = 30.0;
 const BEHIND: f64 = 20.0;
 /// Speed around it, mm/us.
 const AROUND: f64 = 1.540;
@@ -62,7 +62,7 @@ fn cylinder(lines: u32, [from, to]: [f64; 2], around: Tissue, inside: Tissue) ->
 }
 
 /// Rays only: a point far away makes paths leave segments in silence.
-fn rays(lines: u32, between: [f64; 2], inside: f64) -> Scene {
+pub fn rays(lines: u32, between: [f64; 2], inside: f64) -> Scene {
     let (a, b) = (silent(AROUND, 1.6, 0.0), silent(inside, 1.55, 0.0));
     let mut scene = cylinder(lines, between, a, b);
     scene.probe.samples = 64;
@@ -71,7 +71,7 @@ fn rays(lines: u32, between: [f64; 2], inside: f64) -> Scene {
 }
 
 /// Segments of every line, in order of time, as the twins or a tracer make them.
-fn traced(bench: &Bench, scene: &Scene) -> Vec<(String, Vec<Vec<Segment>>)> {
+pub fn traced(bench: &Bench, scene: &Scene) -> Vec<(String, Vec<Vec<Segment>>)> {
     let mut all = vec![("twins".to_owned(), Inputs::new(scene).traced().segments)];
     for tracer in TRACERS {
         let shot = Range::new(bench, scene, tracer).shoot(scene);
@@ -84,7 +84,7 @@ fn traced(bench: &Bench, scene: &Scene) -> Vec<(String, Vec<Vec<Segment>>)> {
 }
 
 /// Lateral place of line `l` of `scene`, mm.
-fn offset(scene: &Scene, l: usize) -> f64 {
+pub fn offset(scene: &Scene, l: usize) -> f64 {
     scene.world_from_probe.translation.x + scene.probe.ray(l as u32, 0).0.x
 }
 

@@ -10,12 +10,12 @@ use crate::render::{Frame, Renderer};
 use crate::scenes::{add_point, linear, silent};
 
 /// Gaussian: full width at half maximum over sigma.
-const FWHM: f64 = 2.354_82;
+pub const FWHM: f64 = 2.354_82;
 /// Wavelength of 7 MHz at 1540 m/s, mm.
 const WAVELENGTH: f64 = 0.22;
 
 /// A silent medium with the machine's speed of sound.
-fn points(lines: u32, width: f64, at: &[[f64; 3]]) -> Scene {
+pub fn points(lines: u32, width: f64, at: &[[f64; 3]]) -> Scene {
     let mut scene = linear(lines, width, silent(1.540, 1.600, 0.0));
     for &p in at {
         add_point(&mut scene, p, 0.1);
@@ -111,7 +111,7 @@ fn pulse_plot(pulse: Vec<[f64; 2]>, sigma: f64) -> Plot {
 }
 
 /// Sigma of a one-way Gaussian beam: waist 0.6 lambda F# at `focus`.
-fn gaussian_beam(f_number: f64, focus: f64, z: f64) -> f64 {
+pub fn gaussian_beam(f_number: f64, focus: f64, z: f64) -> f64 {
     let waist = 0.6 * WAVELENGTH * f_number;
     let rayleigh = 2.0 * PI * waist * waist / WAVELENGTH;
     waist * (1.0 + ((z - focus) / rayleigh).powi(2)).sqrt()

@@ -63,7 +63,7 @@ fn series(m: i32) -> f64 {
 }
 
 /// Scanline of `scene` averaged over seeds, at gain 0 dB.
-fn mean_line(bench: &Bench, scene: &Scene, tracer: Tracer) -> Vec<[f64; 2]> {
+pub fn mean_line(bench: &Bench, scene: &Scene, tracer: Tracer) -> Vec<[f64; 2]> {
     let mut range = Range::new(bench, scene, tracer);
     let mut scene = scene.clone();
     let gain = 10f64.powf(scene.simulation.surface_gain / 20.0);

@@ -63,6 +63,7 @@ rows! {
     intersections::placements_are_transforms_of_the_mesh,
     intersections::closest_hits_are_those_of_brute_force_in_double_precision,
     determinism::a_frame_repeats_bit_for_bit_and_both_tracers_show_it,
+    cole::points_and_scatterers_are_those_of_a_convolution_simulator,
 }
 
 #[test]

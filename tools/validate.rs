@@ -1,0 +1,107 @@
+//! Every check of the validation table as a page:
+//! `cargo run --release --bin validate [-- --output DIR] [--only T5,T9]` writes `index.html`.
+
+use std::path::PathBuf;
+use std::process::{Command, ExitCode};
+
+use clap::Parser;
+use insonify::gpu::{Device, DeviceOptions};
+use miette::{IntoDiagnostic, Result, WrapErr, miette};
+
+// The tests' own modules: what they prove is what the page shows.
+include!("../tests/physics/main.rs");
+
+#[derive(Parser)]
+#[command(about = "Runs every physics check and writes the validation report")]
+struct Arguments {
+    /// Folder that gets index.html.
+    #[arg(long, default_value = "target/validation")]
+    output: PathBuf,
+    /// Rows to run, such as T5,T9; all without it.
+    #[arg(long, value_delimiter = ',')]
+    only: Vec<String>,
+    /// Index or part of the name of the Vulkan device.
+    #[arg(long)]
+    device: Option<String>,
+    /// Turns the validation layers on.
+    #[arg(long)]
+    validate: bool,
+}
+
+fn main() -> Result<ExitCode> {
+    let arguments = Arguments::parse();
+    let mut checks = rows::all();
+    let rows: Vec<&str> = checks.iter().map(|c| c.row).collect();
+    for row in &arguments.only {
+        if !rows.contains(&row.as_str()) {
+            let known = rows.join(", ");
+            return Err(miette!("no check for row '{row}'; there are {known}"));
+        }
+    }
+    checks.retain(|c| arguments.only.is_empty() || arguments.only.iter().any(|r| r == c.row));
+    let device = Device::new(&DeviceOptions {
+        selector: arguments.device,
+        validate: arguments.validate,
+        ..Default::default()
+    })
+    .into_diagnostic()?;
+    if !device.supports_ray_query() {
+        return Err(miette!(
+            "'{}' has no ray queries, and the checks use both tracers: choose another with --device, \
+             or install the software driver (tools/setup.sh)",
+            device.name()
+        ));
+    }
+    let provenance = page::Provenance {
+        device: device.name().into(),
+        driver: device.driver().into(),
+        commit: commit(),
+    };
+    println!("{} ({})", provenance.device, provenance.driver);
+    let bench = check::Bench::on(device);
+    let mut examined = vec![];
+    for check in checks {
+        let found = check::examine(&check, &bench);
+        let verdict = if found.holds() {
+            "holds"
+        } else {
+            "DOES NOT HOLD"
+        };
+        println!("{:<4} {}: {verdict}", check.row, check.name);
+        print!("{}", found.complaints(&check));
+        examined.push((check, found));
+    }
+    let html = page::page(&provenance, &rows, &examined);
+    let path = arguments.output.join("index.html");
+    std::fs::create_dir_all(&arguments.output)
+        .and_then(|()| std::fs::write(&path, html))
+        .into_diagnostic()
+        .wrap_err_with(|| format!("cannot write {}", path.display()))?;
+    println!("{}", path.display());
+    let holds = examined.iter().all(|(_, found)| found.holds());
+    Ok(if holds {
+        ExitCode::SUCCESS
+    } else {
+        ExitCode::FAILURE
+    })
+}
+
+/// The commit that this was built in, as git tells it.
+fn commit() -> String {
+    let git = |arguments: &[&str]| {
+        let output = Command::new("git")
+            .args(["-C", env!("CARGO_MANIFEST_DIR")])
+            .args(arguments)
+            .output();
+        let output = output.ok().filter(|o| o.status.success())?;
+        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    match (
+        git(&["rev-parse", "--short=12", "HEAD"]),
+        git(&["status", "--porcelain"]),
+    ) {
+        (Some(commit), Some(changes)) if changes.is_empty() => commit,
+        (Some(commit), _) => format!("{commit}, with changes"),
+        _ => "unknown (no git)".into(),
+    }
+}
