@@ -2,6 +2,7 @@
 // Each expectation is worked out in its test and takes nothing from the code under test.
 // tools/validate.rs includes this file: the report shows what the tests prove.
 
+mod apertures;
 mod brightness;
 mod check;
 mod cole;
@@ -12,6 +13,7 @@ mod detection;
 mod determinism;
 mod energy;
 mod formation;
+mod full_wave;
 mod grain;
 mod hilbert;
 mod interfaces;

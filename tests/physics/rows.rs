@@ -64,6 +64,9 @@ rows! {
     intersections::closest_hits_are_those_of_brute_force_in_double_precision,
     determinism::a_frame_repeats_bit_for_bit_and_both_tracers_show_it,
     cole::points_and_scatterers_are_those_of_a_convolution_simulator,
+    apertures::points_are_as_wide_as_through_real_apertures,
+    full_wave::a_slab_echoes_as_in_a_full_wave_simulation,
+    full_wave::a_cylinder_shadows_as_in_a_full_wave_simulation,
 }
 
 #[test]
