@@ -66,7 +66,7 @@ pub fn page(provenance: &Provenance, rows: &[&str], examined: &[(Check, Examined
          <p>Every figure below is measured in a picture or a path that the simulator computed and held \
          against a closed form. The same comparisons are the project's tests. Each is also made with an error \
          planted and has to notice it. <b>twins</b> are implementations in double precision on the \
-         CPU; <b>bvh</b> and <b>query</b> are the device with the compute tracer and with hardware ray queries.</p>\n\
+         CPU; <b>bvh</b> and <b>query</b> (<b>ray-query</b>) are the device with the compute tracer and with hardware ray queries.</p>\n\
          <table><tr><th>Device</th><td>{}</td></tr><tr><th>Driver</th><td>{}</td></tr>\
          <tr><th>Commit</th><td>{}</td></tr><tr><th>Verdict</th><td class='{}'>{verdict}</td></tr></table>\n",
         escape(device),
