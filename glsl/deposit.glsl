@@ -8,11 +8,12 @@ vec2 carrier(float time) {
     return vec2(cos(angle), sin(angle));
 }
 
-int to_fixed(float value, float scale) {
+// `dither` in [0, 1): 0.5 rounds to the nearest; uniform ones keep the mean of what is less than a unit.
+int to_fixed(float value, float scale, float dither) {
     float v = value * scale;
     if (!(abs(v) < FIXED_LIMIT)) {
         atomicAdd(counters.saturated, 1u);
         v = v > 0.0 ? FIXED_LIMIT : (v < 0.0 ? -FIXED_LIMIT : 0.0);
     }
-    return int(floor(v + 0.5));
+    return int(floor(v + dither));
 }

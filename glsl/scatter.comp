@@ -118,8 +118,8 @@ void deposit(float kappa, float time, float amplitude, bool point) {
         if (slot >= WINDOW) continue;
         float gain = point ? rows[k].point_gain : rows[k].volume_gain;
         vec2 v = q * gain * (i == 0 ? 1.0 - (kappa - base) : kappa - base);
-        atomicAdd(echoes[2u * slot], to_fixed(v.x, frame.volume_scale));
-        atomicAdd(echoes[2u * slot + 1u], to_fixed(v.y, frame.volume_scale));
+        atomicAdd(echoes[2u * slot], to_fixed(v.x, frame.volume_scale, 0.5));
+        atomicAdd(echoes[2u * slot + 1u], to_fixed(v.y, frame.volume_scale, 0.5));
     }
 }
 

@@ -70,7 +70,13 @@ uint row_of(float time) {
     return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
 }
 
-void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent) {
+// Each of N paths deposits an N-th: rounded alike, faint echoes would vanish as N grows. The dither
+// belongs to the interaction.
+uvec4 dither_words(uint line, uint n, uint key) {
+    return pcg4d(uvec4(line, n, key, frame.seed ^ 0x51ed270bu));
+}
+
+void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uvec4 dither) {
     uint l = line % frame.scanlines;
     float y = elevation(line / frame.scanlines);
     float kappa = frame.speed * time / frame.sample_pitch;
@@ -86,8 +92,8 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent) {
         if (incoherent) gain *= rows[k].incoherent_gain;
         vec2 v = q * gain * (i == 0 ? 1.0 - (kappa - base) : kappa - base);
         uint slot = 2u * (l * frame.samples + k);
-        int re = to_fixed(v.x, frame.surface_scale);
-        int im = to_fixed(v.y, frame.surface_scale);
+        int re = to_fixed(v.x, frame.surface_scale, unit(dither[2 * i]));
+        int im = to_fixed(v.y, frame.surface_scale, unit(dither[2 * i + 1]));
         if (re != 0) atomicAdd(surface_echoes[slot], re);
         if (im != 0) atomicAdd(surface_echoes[slot + 1u], im);
     }
@@ -95,7 +101,8 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent) {
 
 // Which part of the volume this path stands for, and how many paths average down its echoes.
 void emit_segment(Path path, uint line, uint n, uint instance, float extent) {
-    bool alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+    bool alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0
+        && (frame.flags & FLAG_ROUGH_TRANSMISSION) == 0u;
     bool whole = alike && (frame.sampling == SAMPLING_MAIN_PATH
         || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
     if (whole && n != 0u) return;
@@ -218,11 +225,12 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     float q = s.thickness * abs(gaussian(words.x & 0xffff0000u | words.y >> 16u));
     float late = path.time + q / t1.speed;
     float behind = amplitude * exp(-t1.absorption * q);
+    uvec4 dither = dither_words(line, n, key);
     if ((frame.flags & FLAG_COHERENT) != 0u) {
-        deposit_surface(line, late, vec2(path.share * behind, 0.0), false);
+        deposit_surface(line, late, vec2(path.share * behind, 0.0), false, dither);
         return;
     }
-    deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0), false);
+    deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0), false, dither);
     if (s.coherence >= 1.0) return;
     // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
     // tracer would choose the phase.
@@ -230,7 +238,7 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     uvec3 cell = uvec3(ivec3(floor(p)));
     float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
-    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)), true);
+    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)), true, dither);
 }
 
 void main() {
@@ -280,7 +288,10 @@ void main() {
                 vec3 normal = world_vector(face_normal(probe_point(end)));
                 float cos_face = dot(path.direction, normal);
                 float retro = path.weight * path.share * beam_weight(off_axis(line, end));
-                if (cos_face < 0.0) deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false);
+                if (cos_face < 0.0) {
+                    uvec4 dither = dither_words(line, n, path.interactions + 32u * path.reflections);
+                    deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false, dither);
+                }
                 reflect_path(path, normal, SPECULAR, 0.0);
             } else {
                 path.weight = 0.0;

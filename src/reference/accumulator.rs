@@ -24,9 +24,12 @@ pub struct Accumulator {
     frequency: f64,
 }
 
+/// Rounding to the nearest unit.
+pub const NEAREST: [f64; 4] = [0.5; 4];
+
 /// Fixed point as the device rounds it; also whether it was clamped.
-fn to_fixed(scaled: f64) -> (i64, bool) {
-    let rounded = (scaled + 0.5).floor();
+fn to_fixed(scaled: f64, dither: f64) -> (i64, bool) {
+    let rounded = (scaled + dither).floor();
     (rounded.clamp(-LIMIT, LIMIT) as i64, rounded.abs() > LIMIT)
 }
 
@@ -58,7 +61,8 @@ impl Accumulator {
 
     /// One echo of `amplitude` at one-way time `time` (us) on scanline `l`, turned by `phase` (rad)
     /// beyond the carrier and split linearly over two samples; `gain` is per sample and includes the
-    /// fixed-point scale. Echoes at no finite time are lost.
+    /// fixed-point scale. `dither` is added before rounding down: real and imaginary part of the first
+    /// sample, then of the second. Echoes at no finite time are lost.
     pub fn deposit(
         &mut self,
         l: u32,
@@ -66,6 +70,7 @@ impl Accumulator {
         amplitude: f64,
         phase: f64,
         gain: impl Fn(usize) -> f64,
+        dither: [f64; 4],
     ) {
         let kappa = self.kappa(time);
         if !kappa.is_finite() {
@@ -75,7 +80,7 @@ impl Accumulator {
         let (sin, cos) = (phase - TAU * (turns - turns.floor())).sin_cos();
         let k = kappa.floor() as i64;
         let f = kappa - kappa.floor();
-        for (k, share) in [(k, 1.0 - f), (k + 1, f)] {
+        for (i, (k, share)) in [(k, 1.0 - f), (k + 1, f)].into_iter().enumerate() {
             if !(0..self.samples).contains(&k) {
                 continue;
             }
@@ -83,7 +88,7 @@ impl Accumulator {
             let scaled = share * amplitude * gain(k as usize);
             self.deposits[at] += 1;
             for (part, value) in [scaled * cos, scaled * sin].into_iter().enumerate() {
-                let (fixed, clamped) = to_fixed(value);
+                let (fixed, clamped) = to_fixed(value, dither[2 * i + part]);
                 self.exact[2 * at + part] += value;
                 self.fixed[2 * at + part] += fixed;
                 self.saturated += u32::from(clamped);
@@ -137,9 +142,9 @@ mod tests {
         let mut overwritten = Accumulator::new(&frame());
         for (l, kappa, amplitude) in echoes {
             let time = kappa * 0.25 / 1.5;
-            sum.deposit(l as u32, time, amplitude, 0.0, |_| 1.0);
+            sum.deposit(l as u32, time, amplitude, 0.0, |_| 1.0, NEAREST);
             let mut one = Accumulator::new(&frame());
-            one.deposit(l as u32, time, amplitude, 0.0, |_| 1.0);
+            one.deposit(l as u32, time, amplitude, 0.0, |_| 1.0, NEAREST);
             for (to, &from) in overwritten.exact.iter_mut().zip(&one.exact) {
                 if from != 0.0 {
                     *to = from;
@@ -158,11 +163,11 @@ mod tests {
     #[test]
     fn fixed_point_rounds_each_term_and_reports_clamping() {
         let mut a = Accumulator::new(&frame());
-        a.deposit(0, 0.0, 0.4, 0.0, |_| 1.0);
-        a.deposit(0, 0.0, 0.4, 0.0, |_| 1.0);
+        a.deposit(0, 0.0, 0.4, 0.0, |_| 1.0, NEAREST);
+        a.deposit(0, 0.0, 0.4, 0.0, |_| 1.0, NEAREST);
         assert_eq!((a.fixed[0], a.saturated), (0, 0));
         assert!((a.exact[0] - 0.8).abs() < 1e-15);
-        a.deposit(0, 0.0, -2e9, 0.0, |_| 1.0);
+        a.deposit(0, 0.0, -2e9, 0.0, |_| 1.0, NEAREST);
         assert_eq!((a.fixed[0], a.saturated), (-(1 << 30), 1));
     }
 }

@@ -166,8 +166,9 @@ impl Interface {
         let time = path.time + q / self.fluids[0].speed;
         let (l, _) = path.scanline(frame.scanlines);
         let gain = gain(world, path);
+        let dither = path.dither(frame);
         if frame.flags & FLAG_COHERENT != 0 {
-            out.deposit(l, time, path.share * behind, 0.0, &gain);
+            out.deposit(l, time, path.share * behind, 0.0, &gain, dither);
             return;
         }
         let coherence = if surface.thickness == 0.0 {
@@ -175,7 +176,14 @@ impl Interface {
         } else {
             f64::from(surface.coherence)
         };
-        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, &gain);
+        out.deposit(
+            l,
+            path.time,
+            coherence * path.share * amplitude,
+            0.0,
+            &gain,
+            dither,
+        );
         let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
         if rest > 0.0 {
             let p = world.texture(self.instance).transform_point3(path.origin);
@@ -185,7 +193,7 @@ impl Interface {
             let phase = std::f64::consts::TAU * unit(words[3]);
             let scale = rest * (path.share * path.probability).sqrt();
             let incoherent = |k: usize| gain(k) * f64::from(world.rows[k].incoherent_gain);
-            out.deposit(l, time, scale * behind, phase, incoherent);
+            out.deposit(l, time, scale * behind, phase, incoherent, dither);
         }
     }
 }

@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::acoustics::mirror;
 use super::geometry::{beam_weight, world_line};
 use super::interface::MIRROR;
+use super::random::{pcg4d, unit};
 use super::stack::Stack;
 use crate::sim::layout::Frame;
 
@@ -56,6 +57,11 @@ impl Path {
         let (l, layer) = self.scanline(frame.scanlines);
         let line = world_line(frame, l, layer);
         beam_weight(frame, (self.origin - line.origin).dot(line.lateral))
+    }
+
+    /// What is added before rounding down: per sample of a deposit, real and imaginary part.
+    pub(super) fn dither(&self, frame: &Frame) -> [f64; 4] {
+        pcg4d([self.line, self.n, self.key(), frame.seed ^ 0x51ed_270b]).map(unit)
     }
 
     /// Scanline and layer.

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DVec3, I64Vec3};
 
+use super::accumulator::NEAREST;
 use super::geometry::{beam_weight, probe, world_line};
 use super::texture::{factor, scatterer};
 use super::world::World;
@@ -123,9 +124,14 @@ impl<'a> Tube<'a> {
             .exp();
         let scale = f64::from(self.world.frame.volume_scale);
         let amplitude = self.weight(x, row) * amplitude * beam;
-        out.deposit(self.scanline, time, amplitude, 0.0, |k| {
-            f64::from(gain(&self.world.rows[k])) * scale
-        });
+        out.deposit(
+            self.scanline,
+            time,
+            amplitude,
+            0.0,
+            |k| f64::from(gain(&self.world.rows[k])) * scale,
+            NEAREST,
+        );
     }
 
     /// Every lattice cell that touches the tube. Pieces own disjoint ranges of x, so that no
@@ -207,9 +213,14 @@ impl<'a> Tube<'a> {
             let slice = (-self.layer_offset.powi(2) / (2.0 * sigma * sigma)).exp();
             let amplitude = self.weight(x, row) * s.amplitude * factor(self.tissue, p) * slice;
             let time = (k as f64 + s.offset.x - 0.5) * pitch / speed;
-            out.deposit(self.scanline, time, amplitude, 0.0, |k| {
-                f64::from(self.world.rows[k].volume_gain) * scale
-            });
+            out.deposit(
+                self.scanline,
+                time,
+                amplitude,
+                0.0,
+                |k| f64::from(self.world.rows[k].volume_gain) * scale,
+                NEAREST,
+            );
         }
     }
 

@@ -201,7 +201,9 @@ impl Tracer<'_> {
             let amplitude = path.share * path.weight * lobe * path.beam_weight(self.world.frame);
             let gain = interface::gain(self.world, path);
             let (l, _) = path.scanline(self.world.frame.scanlines);
-            self.out.surface.deposit(l, path.time, amplitude, 0.0, gain);
+            let dither = path.dither(self.world.frame);
+            let surface = &mut self.out.surface;
+            surface.deposit(l, path.time, amplitude, 0.0, gain, dither);
         }
     }
 
@@ -334,7 +336,9 @@ impl Tracer<'_> {
         }
         let frame = self.world.frame;
         let unsplit = frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0;
-        let alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+        let alike = frame.origin_jitter <= 0.0
+            && frame.emission_lobe <= 0.0
+            && frame.flags & FLAG_ROUGH_TRANSMISSION == 0;
         if path.role == Role::Branch && self.is_faint(path) {
             return;
         }

@@ -47,7 +47,9 @@ impl Batches {
 
 /// Path 0 alone writes segments: in the main-path scheme, where all paths start alike.
 fn one_speaks_for_all(frame: &layout::Frame) -> bool {
-    let alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+    let alike = frame.origin_jitter <= 0.0
+        && frame.emission_lobe <= 0.0
+        && frame.flags & layout::FLAG_ROUGH_TRANSMISSION == 0;
     frame.sampling == layout::SAMPLING_MAIN_PATH && alike
 }
 

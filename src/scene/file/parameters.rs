@@ -35,7 +35,7 @@ pub(super) fn simulation(
         texture_space, seed;
         origin_jitter, beam_width, cell, volume_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
-        ("paths", f64::from(out.paths), (1.0, 65_536.0), ""),
+        ("paths", f64::from(out.paths), (1.0, 65_535.0), ""),
         (
             "max_interactions",
             f64::from(out.max_interactions),
