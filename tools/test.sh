@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
-# Every test, with all set-up that they need. As the first argument, `--long` adds the tests that take minutes:
-# statistics over many seeds. Other arguments go to the test runner.
+# Every test, with all set-up that they need, but for those that compile kernels: `--features compile`
+# adds them, with SHADERC_LIB_DIR set as in .ci/run. As the first argument, `--long` adds the tests
+# that take minutes: statistics over many seeds. Other arguments go to `cargo test`.
 set -eu
 cd "$(dirname "$0")/.."
 long=()
