@@ -60,7 +60,13 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
             ],
         );
         assert!(out.status.success(), "{}", text(&out.stderr));
-        let image = image::open(&png).expect("a PNG").into_luma8();
+        assert!(!png.exists(), "one image per frame");
+        let [first, last] = ["a.0000.png", "a.0002.png"].map(|name| {
+            let png = dir.path().join(name);
+            image::open(&png).expect("a PNG").into_luma8()
+        });
+        assert!(first != last, "each frame has its noise");
+        let image = last;
         let bright = image.pixels().filter(|p| p.0[0] > 60).count();
         assert!(
             bright * 5 > (image.width() * image.height()) as usize,
@@ -70,6 +76,15 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
             serde_json::from_slice(&std::fs::read(&json).expect("figures")).expect("JSON");
         assert_eq!(figures["tracer"], tracer);
         assert_eq!(figures["saturated_samples"], 0);
+        let counts = &figures["settings"]["counts"];
+        assert_eq!(
+            [
+                &counts["lines"],
+                &counts["paths_per_line"],
+                &counts["paths"]
+            ],
+            [96, 8, 96 * 8]
+        );
         assert_eq!(figures["validation_messages"], Value::Array(vec![]));
         for key in [
             "settings",
@@ -146,6 +161,29 @@ fn every_sampling_scatter_mode_and_probe_renders() {
         let lit = image.pixels().filter(|p| p.0[0] > 30).count();
         assert!(lit > 1000, "{mode}: {lit} pixels are lit");
     }
+}
+
+#[test]
+fn quality_sets_the_counts_that_the_user_does_not() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (png, json) = (dir.path().join("a.png"), dir.path().join("a.json"));
+    let counts = |more: &[&str]| {
+        let files = ["-o", path(&png), "--json", path(&json), "--tracer", "bvh"];
+        let out = render("scenes/phantom.toml", &[&files, more].concat());
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        let figures: Value =
+            serde_json::from_slice(&std::fs::read(&json).expect("figures")).expect("JSON");
+        figures["settings"]["counts"].clone()
+    };
+    let proof = counts(&["--quality", "reference"]);
+    assert_eq!(proof["paths_per_line"], 128);
+    assert_eq!(proof["elevation_cells"], 0.0);
+    let mixed = counts(&["--quality", "reference", "--set", "simulation.paths=3"]);
+    assert_eq!(mixed["paths_per_line"], 3);
+    assert_eq!(mixed["cell_mm"], proof["cell_mm"]);
+    // Which draft depends on the device, and that it is less than the proof does not.
+    let draft = counts(&["--quality", "draft"]);
+    assert!(draft["paths_per_line"].as_u64() < Some(128));
 }
 
 #[test]
@@ -282,4 +320,21 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
         "{}",
         text(&out.stderr)
     );
+}
+
+/// Kernels compiled from the checked-in sources are the checked-in kernels.
+#[cfg(feature = "compile")]
+#[test]
+fn kernels_from_a_folder_of_sources_make_the_same_picture() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let [embedded, compiled] = [&[][..], &["--glsl", "glsl"]].map(|more| {
+        let png = dir.path().join("a.png");
+        let args = ["-o", path(&png), "--tracer", "bvh"];
+        let out = render("scenes/phantom.toml", &[&args, more].concat());
+        assert!(out.status.success(), "{}", text(&out.stderr));
+        std::fs::read(&png).expect("a picture")
+    });
+    assert!(embedded == compiled);
+    let nowhere = render("scenes/phantom.toml", &["--glsl", "nowhere"]);
+    assert!(text(&nowhere.stderr).contains("nowhere"));
 }

@@ -7,9 +7,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 use miette::{Context, IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
-use insonify::gpu::{Device, DeviceOptions, FrameTimings};
+use super::images::Images;
+use insonify::gpu::{AdapterKind, Device, DeviceOptions, FrameTimings};
 use insonify::output;
-use insonify::scene::{Scene, settings::Quality};
+use insonify::scene::Scene;
+use insonify::scene::settings::{Machine, Quality, Simulation};
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
@@ -30,14 +32,16 @@ pub enum TracerChoice {
 pub struct Render {
     /// Scene file (.toml).
     scene: PathBuf,
-    /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here].
+    /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here]. With several
+    /// frames NAME.png becomes NAME.0000.png, NAME.0001.png, ...; `{}` or `%04d` in the name says
+    /// where the number goes.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// How many paths and scatterers: draft suits a software driver, standard is the scene's own
-    /// settings, reference is a proof.
-    #[arg(long, value_enum, default_value = "standard")]
-    quality: QualityChoice,
-    /// Frames to simulate; the last is written, timings are over all.
+    /// Path and scatterer counts that suit the device [default: the scene's own]. Counts that --set
+    /// gives stay.
+    #[arg(long, value_enum)]
+    quality: Option<QualityChoice>,
+    /// Frames to simulate; each is written, timings are over all. --dump takes the last.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
     /// Seed of every random number; replaces the scene's.
@@ -70,11 +74,11 @@ pub struct Render {
 /// `--quality`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum QualityChoice {
-    /// Few paths, coarse lattice.
+    /// A first look. Software driver: 2 paths, lattice 4/3 as coarse. GPU: 8 paths.
     Draft,
-    /// The scene's settings.
+    /// Software driver: 8 paths, one lattice cell per layer. GPU: 32 paths, two cells.
     Standard,
-    /// Many paths, fine lattice, whole slice.
+    /// A proof, on any device: 128 paths, lattice 2/3 as coarse, the whole slice.
     Reference,
 }
 
@@ -96,17 +100,15 @@ pub fn run(args: &Render) -> Result<()> {
     if let Some(seed) = args.seed {
         scene.simulation.seed = seed;
     }
-    match args.quality {
-        QualityChoice::Draft => scene.simulation.set_quality(Quality::Draft),
-        QualityChoice::Standard => {}
-        QualityChoice::Reference => scene.simulation.set_quality(Quality::Reference),
-    }
     let device = Device::new(&DeviceOptions {
         selector: args.device.clone(),
         validate: args.validate,
         without_ray_query: args.tracer == TracerChoice::Bvh,
     })
     .into_diagnostic()?;
+    if let Some(quality) = args.quality {
+        set_quality(&mut scene.simulation, quality, &device, &args.overrides);
+    }
     let tracer = choose_tracer(args.tracer, &device)?;
     let library = library(args)?;
 
@@ -114,14 +116,13 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
-    let timings = simulate(&mut simulator, &scene, args.frames)?;
     let output = args
         .output
         .clone()
         .unwrap_or_else(|| default_output(&args.scene));
-    let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
-    dump::png(&output, width, height, &rgba).into_diagnostic()?;
-    output::line(format_args!("{}", output.display()));
+    let images = Images::new(&output, args.frames);
+    let timings = simulate(&mut simulator, &scene, args.frames, &images)?;
+    output::line(&images);
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
     }
@@ -216,8 +217,13 @@ fn library(_: &Render) -> Result<Library> {
     Ok(Library::embedded())
 }
 
-/// All frames; the device's timings of each.
-fn simulate(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<Vec<FrameTimings>> {
+/// All frames, each written as an image; the device's timings of each.
+fn simulate(
+    simulator: &mut Simulator,
+    scene: &Scene,
+    frames: u32,
+    images: &Images,
+) -> Result<Vec<FrameTimings>> {
     // Hidden by indicatif itself when standard error is no terminal; silent under a second.
     let bar = ProgressBar::new(u64::from(frames)).with_style(
         ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
@@ -227,15 +233,44 @@ fn simulate(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<Vec
     let mut timings = Vec::new();
     for index in 0..frames {
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
-        if frames <= 2 || index + 1 == frames {
-            timings.extend(simulator.wait().into_diagnostic()?);
-        }
+        let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
+        dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?;
         if start.elapsed().as_secs() >= 1 {
             bar.set_position(u64::from(index) + 1);
         }
     }
+    timings.extend(simulator.wait().into_diagnostic()?);
     bar.finish_and_clear();
     Ok(timings)
+}
+
+/// Takes the counts of `quality` for this device, but for those that the user set by hand.
+fn set_quality(
+    simulation: &mut Simulation,
+    quality: QualityChoice,
+    device: &Device,
+    overrides: &[(String, String)],
+) {
+    let quality = match quality {
+        QualityChoice::Draft => Quality::Draft,
+        QualityChoice::Standard => Quality::Standard,
+        QualityChoice::Reference => Quality::Reference,
+    };
+    let machine = match device.info().kind {
+        AdapterKind::Cpu => Machine::Software,
+        _ => Machine::Gpu,
+    };
+    let by_hand = simulation.clone();
+    simulation.set_quality(quality, machine);
+    for (key, _) in overrides {
+        match key.as_str() {
+            "simulation.paths" => simulation.paths = by_hand.paths,
+            "simulation.cell" => simulation.cell = by_hand.cell,
+            "simulation.elevation_cells" => simulation.elevation_cells = by_hand.elevation_cells,
+            "simulation.volume_floor" => simulation.volume_floor = by_hand.volume_floor,
+            _ => {}
+        }
+    }
 }
 
 fn default_output(scene: &Path) -> PathBuf {
@@ -243,9 +278,21 @@ fn default_output(scene: &Path) -> PathBuf {
 }
 
 fn settings(scene: &Scene) -> Value {
+    let (probe, simulation) = (&scene.probe, &scene.simulation);
+    let lines = probe.scanlines * probe.elevation_layers;
     json!({
-        "probe": format!("{:?}", scene.probe),
-        "simulation": format!("{:?}", scene.simulation),
+        "counts": {
+            "lines": lines,
+            "samples": probe.samples,
+            "paths_per_line": simulation.paths,
+            "paths": u64::from(lines) * u64::from(simulation.paths),
+            "cell_mm": simulation.cell,
+            "scatterer_cells_per_mm3": simulation.cell.powi(-3),
+            "elevation_cells": simulation.elevation_cells,
+            "volume_floor_db": simulation.volume_floor,
+        },
+        "probe": format!("{probe:?}"),
+        "simulation": format!("{simulation:?}"),
         "imaging": format!("{:?}", scene.imaging),
     })
 }

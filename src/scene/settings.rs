@@ -131,27 +131,40 @@ pub struct Imaging {
 /// How much work a frame is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
-    /// Suits a software driver.
+    /// As fast as can be, for trying things out.
     Draft,
-    /// A proof: many paths, a fine lattice, the whole slice.
+    /// What the machine does in reasonable time.
+    Standard,
+    /// A proof, on any machine: many paths, a fine lattice, the whole slice.
     Reference,
 }
 
+/// What does the work.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Machine {
+    /// A software driver: every path and scatterer costs time.
+    Software,
+    /// A GPU: a frame of few paths leaves most of it idle.
+    Gpu,
+}
+
 impl Simulation {
-    /// Replaces the scene's path and scatterer counts.
-    pub fn set_quality(&mut self, quality: Quality) {
-        match quality {
-            Quality::Draft => {
-                self.paths = self.paths.min(2);
-                self.elevation_cells = 1.0;
-                self.cell *= 4.0 / 3.0;
+    /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
+    pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
+        let (paths, cell, elevation_cells, volume_floor) = match (quality, machine) {
+            (Quality::Draft, Machine::Software) => (2, 4.0 / 3.0, 1.0, -50.0),
+            (Quality::Standard, Machine::Software) | (Quality::Draft, Machine::Gpu) => {
+                (8, 1.0, 1.0, -50.0)
             }
-            Quality::Reference => {
-                self.paths = self.paths.max(32);
-                self.elevation_cells = 0.0;
-                self.cell *= 2.0 / 3.0;
-                self.volume_floor = self.volume_floor.min(-80.0);
-            }
+            (Quality::Standard, Machine::Gpu) => (32, 1.0, 2.0, -60.0),
+            (Quality::Reference, _) => (128, 2.0 / 3.0, 0.0, -80.0),
+        };
+        self.paths = paths;
+        self.elevation_cells = elevation_cells;
+        self.volume_floor = volume_floor;
+        // A voxel's edge is a look, not a cost: there is one lookup per sample whatever its size.
+        if self.scatter_mode == ScatterMode::Lattice {
+            self.cell *= cell;
         }
     }
 }
@@ -197,5 +210,54 @@ impl Default for Imaging {
             psf_scale: [1.0; 3],
             image_height: 800,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_quality_does_more_than_the_one_before_and_a_gpu_no_less() {
+        use Machine::{Gpu, Software};
+        let made = |quality, machine| {
+            let mut simulation = Simulation::default();
+            simulation.set_quality(quality, machine);
+            simulation
+        };
+        let more = |a: &Simulation, b: &Simulation| {
+            let reach = |s: &Simulation| match s.elevation_cells {
+                0.0 => f64::INFINITY,
+                n => n,
+            };
+            a.paths <= b.paths && a.cell >= b.cell && reach(a) <= reach(b)
+        };
+        for machine in [Software, Gpu] {
+            let [draft, standard, proof] =
+                [Quality::Draft, Quality::Standard, Quality::Reference].map(|q| made(q, machine));
+            assert!(more(&draft, &standard) && draft != standard);
+            assert!(more(&standard, &proof) && standard != proof);
+        }
+        let standard = made(Quality::Standard, Software);
+        assert_eq!(
+            standard,
+            Simulation::default(),
+            "the defaults suit a software driver"
+        );
+        assert!(more(&standard, &made(Quality::Standard, Gpu)));
+        assert_eq!(
+            made(Quality::Reference, Software),
+            made(Quality::Reference, Gpu)
+        );
+    }
+
+    #[test]
+    fn voxels_keep_their_size() {
+        let mut simulation = Simulation {
+            scatter_mode: ScatterMode::Voxel,
+            ..Simulation::default()
+        };
+        simulation.set_quality(Quality::Reference, Machine::Gpu);
+        assert_eq!(simulation.cell, Simulation::default().cell);
     }
 }
