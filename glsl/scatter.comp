@@ -25,6 +25,7 @@ layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 
 const uint THREADS = 128u;
 const uint WINDOW = 2048u;   // samples per workgroup: 16 KiB of shared memory
+const float POINT_SHIFT = 0.01234;   // of a layer's pitch
 const uint BATCH = 32u;      // segments whose work is shared out at once
 
 shared int echoes[2u * WINDOW];
@@ -277,7 +278,10 @@ void march_point(Stretch s, vec4 point) {
     float x = dot(rel, s.d);
     if (!(x >= 0.0 && x < s.extent)) return;
     float rho_e = dot(rel, s.e_e);
-    if (abs(rho_e) > 0.5 * frame.slice_thickness / float(frame.layers)) return;
+    // Layers meet off the round numbers at which points lie: rounding must not give one to two, or none.
+    float pitch = frame.slice_thickness / float(frame.layers);
+    float height = rho_e - POINT_SHIFT * pitch;
+    if (!(height >= -0.5 * pitch && height < 0.5 * pitch)) return;
     float rho_l = dot(rel, s.e_l);
     float time = s.time + x / s.speed;
     float at = frame.speed * time / frame.sample_pitch;

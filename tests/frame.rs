@@ -173,3 +173,35 @@ fn both_tracers_agree_on_real_anatomy() {
     }
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
+
+/// A kernel edited while the program runs takes effect in the next frame.
+#[cfg(feature = "compile")]
+#[test]
+fn edited_kernels_replace_those_of_a_running_simulator() {
+    let sources = tempfile::tempdir().expect("a folder");
+    let glsl = Path::new(env!("CARGO_MANIFEST_DIR")).join("glsl");
+    for entry in glsl.read_dir().expect("kernels") {
+        let file = entry.expect("a kernel").path();
+        let copy = sources.path().join(file.file_name().expect("a name"));
+        std::fs::copy(&file, copy).expect("a copy");
+    }
+    let (device, scene) = (test_device(), small("scenes/phantom.toml"));
+    let mut library = Library::with_sources(sources.path()).expect("kernels that compile");
+    let mut simulator =
+        Simulator::new(&device, &library, &scene, Tracer::Bvh).expect("a simulator");
+    let shown = |simulator: &mut Simulator| {
+        simulator.frame(&scene, 0).expect("a frame");
+        simulator.pixels().expect("pixels").2
+    };
+    let before = shown(&mut simulator);
+    let display = sources.path().join("display.comp");
+    let text = std::fs::read_to_string(&display).expect("the kernel");
+    let edited = text.replace("0xff000000u", "0xfe000000u");
+    assert_ne!(edited, text);
+    std::fs::write(&display, edited).expect("the edited kernel");
+    assert_eq!(library.poll().expect("it compiles"), ["display"]);
+    assert!(shown(&mut simulator) == before, "not yet taken over");
+    simulator.reload(&library).expect("pipelines");
+    assert!(shown(&mut simulator) != before);
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
+}

@@ -110,7 +110,7 @@ pub fn run(args: &Render) -> Result<()> {
         set_quality(&mut scene.simulation, quality, &device, &args.overrides);
     }
     let tracer = choose_tracer(args.tracer, &device)?;
-    let library = library(args)?;
+    let mut library = library(args)?;
 
     let loaded = Instant::now();
     let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
@@ -121,7 +121,7 @@ pub fn run(args: &Render) -> Result<()> {
         .clone()
         .unwrap_or_else(|| default_output(&args.scene));
     let images = Images::new(&output, args.frames);
-    let timings = simulate(&mut simulator, &scene, args.frames, &images)?;
+    let timings = simulate(&mut simulator, &mut library, &scene, args.frames, &images)?;
     output::line(&images);
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
@@ -217,9 +217,27 @@ fn library(_: &Render) -> Result<Library> {
     Ok(Library::embedded())
 }
 
+/// Takes over kernels whose sources have changed; a mistake in them is told, and the last good ones
+/// stay.
+#[cfg(feature = "compile")]
+fn reload(simulator: &mut Simulator, library: &mut Library) {
+    match library.poll() {
+        Ok(stems) if stems.is_empty() => {}
+        Ok(stems) => match simulator.reload(library) {
+            Ok(()) => eprintln!("reloaded {}", stems.join(", ")),
+            Err(error) => eprintln!("warning: {error}; the last kernels stay"),
+        },
+        Err(error) => eprintln!("warning: {error}; the last kernels stay"),
+    }
+}
+
+#[cfg(not(feature = "compile"))]
+fn reload(_: &mut Simulator, _: &mut Library) {}
+
 /// All frames, each written as an image; the device's timings of each.
 fn simulate(
     simulator: &mut Simulator,
+    library: &mut Library,
     scene: &Scene,
     frames: u32,
     images: &Images,
@@ -232,6 +250,7 @@ fn simulate(
     let start = Instant::now();
     let mut timings = Vec::new();
     for index in 0..frames {
+        reload(simulator, library);
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
         dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?;

@@ -14,6 +14,10 @@ const PIECE: f64 = 2.0;
 /// Points are seen this many lateral sigmas off the axis.
 const POINT_CUT: f64 = 4.0;
 
+/// Layers meet this part of their pitch off the round numbers at which points lie: rounding must not
+/// give one to two layers, or to none.
+const POINT_SHIFT: f64 = 0.012_34;
+
 /// A segment seen from one space: world or its texture's.
 struct Tube<'a> {
     world: &'a World<'a>,
@@ -84,8 +88,8 @@ impl<'a> Tube<'a> {
         &self.world.rows[out.sample(time)]
     }
 
-    /// Weight at distance `x`: absorbed, less off the scanline, and averaged down where a rough reflection has spread the
-    /// path over many resolution cells.
+    /// Weight at distance `x`: absorbed, less off the scanline, and averaged down where a rough
+    /// reflection has spread the path over many resolution cells.
     fn weight(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.spread;
         let variance = a + 2.0 * b * x + c * x * x;
@@ -226,11 +230,15 @@ impl<'a> Tube<'a> {
 
     fn points(&self, out: &mut Accumulator) {
         let frame = self.world.frame;
-        let reach = f64::from(frame.slice_thickness) / (2.0 * f64::from(frame.layers));
+        let pitch = f64::from(frame.slice_thickness) / f64::from(frame.layers);
         for point in self.world.points {
             let [x, y, z, amplitude] = point.map(f64::from);
             let p = DVec3::new(x, y, z);
-            self.echo(p, amplitude, [POINT_CUT, reach], |r| r.point_gain, out);
+            let height = (p - self.origin).dot(self.elevation) / pitch - POINT_SHIFT;
+            if (-0.5..0.5).contains(&height) {
+                let everywhere = [POINT_CUT, f64::INFINITY];
+                self.echo(p, amplitude, everywhere, |r| r.point_gain, out);
+            }
         }
     }
 }

@@ -154,6 +154,16 @@ impl Simulator {
         Ok(self.frames.take_timings())
     }
 
+    /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
+    ///
+    /// # Errors
+    /// A kernel that the device refuses; the simulator keeps the ones that it had.
+    pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
+        self.frames.wait()?;
+        self.passes.kernels = Kernels::new(&self.device, library, self.passes.world.tracer())?;
+        Ok(())
+    }
+
     /// Waits for the frames in flight; their timings, oldest first.
     ///
     /// # Errors
