@@ -19,7 +19,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
-    /// Check a scene or a mesh and say what it holds; exits 1 on errors
+    /// Check a scene, a mesh or a volume and say what it holds; exits 1 on errors
     Check(check::Check),
     /// List the Vulkan devices and what each lacks
     Info(info::Info),

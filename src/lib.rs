@@ -14,3 +14,4 @@ pub mod probe;
 pub mod reference;
 pub mod scene;
 pub mod sim;
+pub mod volume;

@@ -6,17 +6,22 @@ use std::process::ExitCode;
 use clap::Args;
 use insonify::output;
 use insonify::scene::check;
+use insonify::volume::{self, Volume};
 
 /// Arguments of `insonify check`.
 #[derive(Debug, Args)]
 pub struct Check {
-    /// A scene (.toml) or a mesh (.obj, .gltf, .glb, .stl)
+    /// A scene (.toml), a mesh (.obj, .gltf, .glb, .stl) or a volume (.mha, .mhd, .nrrd, .nhdr,
+    /// .nii, .nii.gz)
     file: PathBuf,
 }
 
 impl Check {
     /// Prints the report.
     pub fn run(&self) -> miette::Result<ExitCode> {
+        if volume::is_volume(&self.file) {
+            return self.volume();
+        }
         let report = check::report(&self.file);
         output::line(&report);
         let passed = report.passed();
@@ -25,5 +30,18 @@ impl Check {
             None if passed => Ok(ExitCode::SUCCESS),
             None => Ok(ExitCode::FAILURE),
         }
+    }
+
+    fn volume(&self) -> miette::Result<ExitCode> {
+        let (volume, warnings) = Volume::load(&self.file).inspect_err(|_| {
+            output::line("1 errors, 0 warnings");
+        })?;
+        output::line(self.file.display());
+        output::line(&volume);
+        for warning in &warnings {
+            output::line(warning);
+        }
+        output::line(format!("0 errors, {} warnings", warnings.len()));
+        Ok(ExitCode::SUCCESS)
     }
 }

@@ -65,16 +65,11 @@ pub fn report(path: &Path) -> Report {
         .unwrap_or_default();
     match extension.to_ascii_lowercase().as_str() {
         "toml" => scene(path),
-        "mha" | "mhd" | "nrrd" | "nhdr" | "nii" | "gz" | "dcm" => refuse(
-            path,
-            "volumes cannot be read by this version",
-            "scenes, .obj, .gltf, .glb and .stl can",
-        ),
         _ if mesh::is_mesh(path) => mesh_file(path),
         _ => refuse(
             path,
-            "neither a scene nor a mesh by its extension",
-            "give a .toml, .obj, .gltf, .glb or .stl file",
+            "neither a scene nor a mesh nor a volume by its extension",
+            "give a .toml, .obj, .gltf, .glb, .stl, .mha, .mhd, .nrrd, .nhdr, .nii or .nii.gz file",
         ),
     }
 }
@@ -253,14 +248,12 @@ mod tests {
     }
 
     #[test]
-    fn volumes_and_strangers_are_refused_plainly() {
-        for (name, cause) in [
-            ("a.mha", "volumes cannot be read"),
-            ("a.docx", "neither a scene"),
-        ] {
-            let report = report(Path::new(name));
-            assert!(!report.passed());
-            assert!(report.issues[0].message.contains(cause), "{report}");
-        }
+    fn strangers_are_refused_plainly() {
+        let report = report(Path::new("a.docx"));
+        assert!(!report.passed());
+        assert!(
+            report.issues[0].message.contains("neither a scene"),
+            "{report}"
+        );
     }
 }

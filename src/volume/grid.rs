@@ -1,0 +1,106 @@
+//! Where voxels lie: the one place where frames of files become LPS.
+
+use glam::{DAffine3, DMat3, DVec3};
+
+/// Smallest volume of the box that the unit vectors of the axes span; below it two axes are as
+/// good as parallel (three degrees apart, the third upright) and positions mean nothing.
+const MIN_DETERMINANT: f64 = 0.05;
+
+/// Anatomical frame that a file is written in. The letters say where x, y and z grow to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Frame {
+    /// Left, posterior, superior: DICOM, ITK and this program.
+    Lps,
+    /// Right, anterior, superior: NIfTI and 3D Slicer.
+    Ras,
+    /// Left, anterior, superior.
+    Las,
+    /// None is stated; taken for LPS.
+    Unstated,
+}
+
+impl Frame {
+    /// Signs that turn a point of this frame into LPS.
+    fn lps_signs(self) -> DVec3 {
+        match self {
+            Self::Lps | Self::Unstated => DVec3::ONE,
+            Self::Ras => DVec3::new(-1.0, -1.0, 1.0),
+            Self::Las => DVec3::new(1.0, -1.0, 1.0),
+        }
+    }
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Lps => "LPS",
+            Self::Ras => "RAS",
+            Self::Las => "LAS",
+            Self::Unstated => "not stated, taken for LPS",
+        }
+    }
+}
+
+/// Position of voxels in the frame and the unit of a file.
+pub(super) struct Grid {
+    /// Step from a voxel to the next along each axis.
+    pub steps: [DVec3; 3],
+    /// Centre of the first voxel.
+    pub origin: DVec3,
+    /// Frame of these vectors.
+    pub frame: Frame,
+    /// mm per unit of these vectors.
+    pub unit: f64,
+}
+
+impl Grid {
+    /// Voxel indices (integers at centres) to LPS in mm.
+    ///
+    /// # Errors
+    /// What is wrong with the numbers, in words.
+    pub fn world_from_voxel(&self) -> Result<DAffine3, String> {
+        let finite = self.steps.iter().all(|s| s.is_finite()) && self.origin.is_finite();
+        if !finite {
+            return Err("direction or origin is not a finite number".to_owned());
+        }
+        for (axis, step) in ["first", "second", "third"].iter().zip(self.steps) {
+            if step.length() == 0.0 || !step.length().is_finite() {
+                return Err(format!(
+                    "the {axis} axis has a step of length {}",
+                    step.length()
+                ));
+            }
+        }
+        let [a, b, c] = self.steps.map(DVec3::normalize);
+        let determinant = DMat3::from_cols(a, b, c).determinant();
+        // Also false for a step so short that it has no direction.
+        if !determinant.is_finite() || determinant.abs() < MIN_DETERMINANT {
+            return Err(format!(
+                "the direction is singular: its unit axes span {determinant:.4}"
+            ));
+        }
+        let place = |v: DVec3| v * self.frame.lps_signs() * self.unit;
+        let [x, y, z] = self.steps.map(place);
+        Ok(DAffine3::from_mat3_translation(
+            DMat3::from_cols(x, y, z),
+            place(self.origin),
+        ))
+    }
+}
+
+/// Steps of a volume of two or three axes whose directions are the rows of `rows` (`n` by `n`,
+/// n at least 2; what lies beyond three is left out), of these spacings.
+pub(super) fn steps(n: usize, rows: &[f64], spacings: &[f64]) -> [DVec3; 3] {
+    std::array::from_fn(|axis| {
+        if axis >= n {
+            return DVec3::Z;
+        }
+        let at = |k: usize| if k < n { rows[axis * n + k] } else { 0.0 };
+        DVec3::new(at(0), at(1), at(2)) * spacings[axis]
+    })
+}
+
+/// The first three of `values`, zeros after their end.
+pub(super) fn point(values: &[f64]) -> DVec3 {
+    let at = |k: usize| values.get(k).copied().unwrap_or(0.0);
+    DVec3::new(at(0), at(1), at(2))
+}

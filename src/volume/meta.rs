@@ -1,0 +1,265 @@
+//! MetaImage headers (.mha, .mhd), as MetaIO and ITK read them: the rows of the direction matrix
+//! are the directions of the axes, and the frame is LPS.
+
+use std::path::Path;
+
+use super::error::VolumeError;
+use super::fields::{Field, Fields};
+use super::grid::{self, Frame, Grid};
+use super::header::{Header, unused};
+use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
+use super::voxels::VoxelType;
+use super::{Format, Warning};
+
+/// Most axes that are read. MetaIO takes ten.
+const MAX_AXES: usize = 10;
+
+const ORIGIN: [&str; 3] = ["Offset", "Position", "Origin"];
+const DIRECTION: [&str; 3] = ["TransformMatrix", "Rotation", "Orientation"];
+const BIG_ENDIAN: [&str; 2] = ["BinaryDataByteOrderMSB", "ElementByteOrderMSB"];
+/// Keys that are used, or that change nothing here. `AnatomicalOrientation` names the axes, which
+/// the direction gives exactly.
+const KNOWN: [&str; 29] = [
+    "ObjectType",
+    "ObjectSubType",
+    "NDims",
+    "Name",
+    "ID",
+    "ParentID",
+    "Color",
+    "Comment",
+    "CompressedData",
+    "CompressedDataSize",
+    "BinaryData",
+    "CenterOfRotation",
+    "AnatomicalOrientation",
+    "ElementSpacing",
+    "ElementSize",
+    "DimSize",
+    "HeaderSize",
+    "Modality",
+    "ElementMin",
+    "ElementMax",
+    "ElementNumberOfChannels",
+    "ElementType",
+    "ElementDataFile",
+    "DistanceUnits",
+    "Kinds",
+    "AcquisitionDate",
+    "CreationDate",
+    "SequenceID",
+    "TransformType",
+];
+
+pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+    let bytes = source::prefix(path, MAX_HEADER)?;
+    let (fields, data) = fields(path, &bytes)?;
+    if let Some(object) = fields.find(&["ObjectType"])
+        && !object.value.eq_ignore_ascii_case("Image")
+    {
+        return Err(fields.error(
+            object,
+            "is no image",
+            "give a MetaImage of ObjectType Image",
+        ));
+    }
+    let axes = fields.need("NDims")?;
+    let n: usize = fields.number(axes)?;
+    if !(2..=MAX_AXES).contains(&n) {
+        return Err(fields.error(axes, "2 to 10 axes can be read", "give a volume"));
+    }
+    let dims = fields.sizes(fields.need("DimSize")?, n)?;
+    let frames = dims
+        .iter()
+        .skip(3)
+        .try_fold(1usize, |p, &d| p.checked_mul(d));
+    let spacings = match fields.find(&["ElementSpacing", "ElementSize"]) {
+        Some(field) => fields.spacings(field, n)?,
+        None => vec![1.0; n],
+    };
+    let identity = || {
+        (0..n * n)
+            .map(|i| f64::from(u8::from(i % (n + 1) == 0)))
+            .collect()
+    };
+    let rows = fields.find(&DIRECTION).map(|f| fields.numbers(f, n * n));
+    let rows: Vec<f64> = rows.transpose()?.unwrap_or_else(identity);
+    let origin = fields.find(&ORIGIN).map(|f| fields.numbers(f, n));
+    let origin: Vec<f64> = origin.transpose()?.unwrap_or_default();
+    let channels = match fields.find(&["ElementNumberOfChannels"]) {
+        Some(field) => fields.sizes(field, 1)?[0],
+        None => 1,
+    };
+    let big_endian = fields.find(&BIG_ENDIAN).is_some_and(truth);
+    let mut out = Header {
+        format: Format::MetaImage,
+        kind: kind(&fields)?,
+        big_endian,
+        channels,
+        size: [dims[0], dims[1], dims.get(2).copied().unwrap_or(1)],
+        // A product beyond all numbers is refused with the sizes.
+        frames: frames.unwrap_or(usize::MAX),
+        grid: Grid {
+            steps: grid::steps(n, &rows, &spacings),
+            origin: grid::point(&origin),
+            frame: Frame::Lps,
+            unit: unit(&fields)?,
+        },
+        scale: None,
+        payload: payload(&fields, data)?,
+        warnings: unused(path, &unused_keys(&fields)).into_iter().collect(),
+    };
+    out.warnings.extend(stacked(&fields, n));
+    Ok(out)
+}
+
+/// Fields up to the one that says where the voxels are, and the byte after it.
+fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, u64), VolumeError> {
+    let mut list = Vec::new();
+    let mut at = 0;
+    for (line, text) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+        at += text.len() as u64;
+        let text = String::from_utf8_lossy(text);
+        if text.trim().is_empty() {
+            continue;
+        }
+        let Some((key, value)) = text.split_once('=') else {
+            return Err(VolumeError::line(
+                path,
+                line + 1,
+                "is not of the form `Key = value`",
+                "give a MetaImage; its header ends with ElementDataFile",
+            ));
+        };
+        list.push(Field {
+            line: line + 1,
+            key: key.trim().to_owned(),
+            value: value.trim().to_owned(),
+        });
+        if key.trim() == "ElementDataFile" {
+            return Ok((Fields { path, list }, at));
+        }
+    }
+    Err(VolumeError::file(
+        path,
+        "the header does not end: ElementDataFile is missing",
+        "export or copy it again",
+    ))
+}
+
+fn truth(field: &Field) -> bool {
+    ["true", "1", "t", "y", "yes"].contains(&field.value.to_ascii_lowercase().as_str())
+}
+
+fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
+    let field = fields.need("ElementType")?;
+    // MetaIO: a LONG has 32 bits in files.
+    Ok(match field.value.trim_end_matches("_ARRAY") {
+        "MET_UCHAR" => VoxelType::U8,
+        "MET_CHAR" => VoxelType::I8,
+        "MET_USHORT" => VoxelType::U16,
+        "MET_SHORT" => VoxelType::I16,
+        "MET_UINT" | "MET_ULONG" => VoxelType::U32,
+        "MET_INT" | "MET_LONG" => VoxelType::I32,
+        "MET_FLOAT" => VoxelType::F32,
+        "MET_DOUBLE" => VoxelType::F64,
+        _ => {
+            return Err(fields.error(
+                field,
+                "this type cannot be read",
+                "save it as MET_UCHAR, MET_SHORT or MET_FLOAT",
+            ));
+        }
+    })
+}
+
+fn unit(fields: &Fields) -> Result<f64, VolumeError> {
+    let Some(field) = fields.find(&["DistanceUnits"]) else {
+        return Ok(1.0);
+    };
+    match field.value.as_str() {
+        "mm" | "?" => Ok(1.0),
+        "um" => Ok(1e-3),
+        "cm" => Ok(10.0),
+        _ => Err(fields.error(field, "no unit that MetaImage knows", "write mm, um or cm")),
+    }
+}
+
+fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
+    let place = fields.need("ElementDataFile")?;
+    let local = place.value.eq_ignore_ascii_case("LOCAL");
+    if place.value.starts_with("LIST") || place.value.contains('%') {
+        return Err(fields.error(
+            place,
+            "volumes in one file per slice cannot be read",
+            "save the volume to one file",
+        ));
+    }
+    let file = if local {
+        fields.path.to_owned()
+    } else {
+        source::detached(fields.path, &place.value).map_err(|cause| {
+            fields.error(
+                place,
+                &cause,
+                "put the data beside the header and name it there",
+            )
+        })?
+    };
+    let skip = match fields.find(&["HeaderSize"]) {
+        None => Skip::Bytes(0),
+        Some(field) => match fields.number(field)? {
+            -1i64 => Skip::AllButLast,
+            bytes => Skip::Bytes(u64::try_from(bytes).map_err(|_| {
+                fields.error(field, "no number of bytes", "write -1 or the bytes to skip")
+            })?),
+        },
+    };
+    let compressed = fields.find(&["CompressedData"]).is_some_and(truth);
+    let text = fields.find(&["BinaryData"]).is_some_and(|f| !truth(f));
+    let offset = if local { after_header } else { 0 };
+    Ok(Payload {
+        file,
+        offset,
+        lines: 0,
+        skip: if local || compressed {
+            Skip::Bytes(0)
+        } else {
+            skip
+        },
+        coding: match (compressed, text) {
+            (true, _) => Coding::Zlib,
+            (false, true) => Coding::Text,
+            (false, false) => Coding::Raw,
+        },
+    })
+}
+
+/// A warning where the third axis is none of space: a plane, or frames of a sequence. Plus calls
+/// the third axis of reconstructed volumes a list as well; only sequences have fields per frame.
+fn stacked(fields: &Fields, n: usize) -> Option<Warning> {
+    let sequence = fields.list.iter().any(|f| f.key.starts_with("Seq_Frame"));
+    let message = match (n, sequence) {
+        (2, _) => "is a plane: one slice of 1 mm",
+        (_, true) => "is a tracked sequence: its frames are stacked, their poses ignored",
+        _ => return None,
+    };
+    Some(Warning::warning(
+        fields.path,
+        1,
+        message,
+        "reconstruct a volume from it",
+    ))
+}
+
+fn unused_keys<'f>(fields: &'f Fields) -> Vec<&'f str> {
+    let known = KNOWN
+        .iter()
+        .chain(&ORIGIN)
+        .chain(&DIRECTION)
+        .chain(&BIG_ENDIAN);
+    let known: Vec<_> = known.collect();
+    let keys = fields.list.iter().map(|f| f.key.as_str());
+    keys.filter(|key| !known.iter().any(|k| k.eq_ignore_ascii_case(key)))
+        .collect()
+}

@@ -1,0 +1,167 @@
+//! Volumes acquired elsewhere: MetaImage, NRRD and NIfTI-1 files, placed in LPS and mm.
+//!
+//! Knows no Vulkan and no ultrasound. Frames and units of the files are turned into LPS and mm in
+//! `grid`, once. Nothing that a header says makes the program allocate or unpack more than the
+//! header declares and the file can hold (`source`).
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+
+/// What is worth knowing about a volume that could be loaded.
+pub use crate::scene::Warning;
+
+mod error;
+mod fields;
+mod grid;
+mod header;
+mod meta;
+mod nifti;
+mod nrrd;
+mod report;
+mod source;
+#[cfg(test)]
+mod tests;
+mod voxels;
+
+pub use error::{Place, VolumeError};
+pub use grid::Frame;
+pub use voxels::{Statistics, VoxelType, Voxels};
+
+/// Format of a volume file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// MetaImage (.mha, .mhd).
+    MetaImage,
+    /// Nearly raw raster data (.nrrd, .nhdr).
+    Nrrd,
+    /// NIfTI-1 (.nii, .nii.gz).
+    Nifti,
+}
+
+impl Format {
+    /// Name.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::MetaImage => "MetaImage",
+            Self::Nrrd => "NRRD",
+            Self::Nifti => "NIfTI-1",
+        }
+    }
+}
+
+/// A scalar volume.
+#[derive(Clone, Debug)]
+pub struct Volume {
+    /// Format of its file.
+    pub format: Format,
+    /// Frame that its file is written in.
+    pub frame: Frame,
+    /// Type of the values in its file.
+    pub stored_as: VoxelType,
+    /// Voxels along each axis, all at least 1.
+    pub size: [usize; 3],
+    /// Voxel indices (integers at voxel centres) to LPS, mm.
+    pub world_from_voxel: DAffine3,
+    /// Values, first axis fastest.
+    pub voxels: Voxels,
+    /// Range and mean of the values.
+    pub statistics: Statistics,
+}
+
+/// Cosine between two axes from which on they are called not perpendicular.
+const SHEAR: f64 = 1e-3;
+
+/// Extensions of volume files, DICOM with them, which is recognised to be refused.
+const EXTENSIONS: [&str; 8] = [
+    ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom",
+];
+
+/// Whether a file is a volume by its extension, readable or not.
+pub fn is_volume(path: &Path) -> bool {
+    let name = path.to_string_lossy().to_ascii_lowercase();
+    EXTENSIONS.iter().any(|e| name.ends_with(e))
+}
+
+impl Volume {
+    /// Reads a volume by the extension of its file. Of several values per voxel the first is
+    /// read, of several volumes the first; slices of a tracked sequence are stacked as they come.
+    ///
+    /// # Errors
+    /// Where the file, or the data file that it names, is missing, cut off or wrong.
+    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+        let name = path.to_string_lossy().to_ascii_lowercase();
+        let is = |ends: &[&str]| ends.iter().any(|e| name.ends_with(e));
+        if is(&[".mha", ".mhd"]) {
+            meta::header(path)?.load(path)
+        } else if is(&[".nrrd", ".nhdr"]) {
+            nrrd::header(path)?.load(path)
+        } else if is(&[".nii", ".nii.gz"]) {
+            nifti::header(path)?.load(path)
+        } else if is(&[".dcm", ".dicom"]) {
+            Err(VolumeError::file(
+                path,
+                "DICOM cannot be read by this version",
+                "convert it to .nrrd, .mha or .nii.gz",
+            ))
+        } else {
+            Err(VolumeError::file(
+                path,
+                "is no volume by its extension",
+                "give a .mha, .mhd, .nrrd, .nhdr, .nii or .nii.gz file",
+            ))
+        }
+    }
+
+    /// Distance of voxel centres along each axis, mm.
+    pub fn spacing(&self) -> DVec3 {
+        let m = self.world_from_voxel.matrix3;
+        DVec3::new(m.x_axis.length(), m.y_axis.length(), m.z_axis.length())
+    }
+
+    /// Unit vectors of the axes in LPS.
+    pub fn directions(&self) -> [DVec3; 3] {
+        let m = self.world_from_voxel.matrix3;
+        [m.x_axis, m.y_axis, m.z_axis].map(DVec3::normalize)
+    }
+
+    /// Box in LPS around the voxels, whole voxels and not only their centres: smallest and
+    /// largest corner, mm.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let size = DVec3::from(self.size.map(|n| n as f64));
+        let corners = (0..8u32).map(|i| {
+            let upper = DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1)));
+            self.world_from_voxel
+                .transform_point3(upper * size - DVec3::splat(0.5))
+        });
+        corners.fold(
+            (DVec3::INFINITY, DVec3::NEG_INFINITY),
+            |(low, high), corner| (low.min(corner), high.max(corner)),
+        )
+    }
+
+    /// Value of the voxel at these indices.
+    ///
+    /// # Panics
+    /// When there is no such voxel.
+    pub fn value(&self, [i, j, k]: [usize; 3]) -> f64 {
+        let [x, y, z] = self.size;
+        assert!(
+            i < x && j < y && k < z,
+            "voxel ({i}, {j}, {k}) of {x} x {y} x {z}"
+        );
+        self.voxels.get(i + x * (j + y * k))
+    }
+
+    fn warn_of_shear(&self, path: &Path, warnings: &mut Vec<Warning>) {
+        let [a, b, c] = self.directions();
+        let largest = [a.dot(b), b.dot(c), c.dot(a)]
+            .iter()
+            .fold(0.0f64, |m, d| m.max(d.abs()));
+        if largest > SHEAR {
+            let degrees = largest.acos().to_degrees();
+            let message = format!("the axes are not perpendicular ({degrees:.2} degrees apart)");
+            warnings.push(Warning::warning(path, 1, message, ""));
+        }
+    }
+}

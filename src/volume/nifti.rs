@@ -1,0 +1,245 @@
+//! NIfTI-1 headers (.nii, .nii.gz), by nifti1.h of the NIfTI working group. Coordinates are RAS.
+
+use std::io::Read;
+use std::path::Path;
+
+use glam::{DQuat, DVec3};
+
+use super::Format;
+use super::error::VolumeError;
+use super::grid::{Frame, Grid};
+use super::header::Header;
+use super::source::{Coding, Payload, Skip};
+use super::voxels::VoxelType;
+
+/// Bytes of a header.
+const LENGTH: u64 = 348;
+const EXPORT: &str = "export it again as NIfTI-1 in one file (.nii or .nii.gz)";
+
+/// The bytes of a header and their order.
+struct Raw<'p> {
+    path: &'p Path,
+    bytes: Vec<u8>,
+    big: bool,
+}
+
+impl Raw<'_> {
+    fn array<const N: usize>(&self, at: usize) -> [u8; N] {
+        let mut out: [u8; N] = self.bytes[at..at + N].try_into().expect("N bytes");
+        if self.big {
+            out.reverse();
+        }
+        out
+    }
+
+    fn i16(&self, at: usize) -> i16 {
+        i16::from_le_bytes(self.array(at))
+    }
+
+    fn f32(&self, at: usize) -> f64 {
+        f64::from(f32::from_le_bytes(self.array(at)))
+    }
+
+    fn error(&self, at: usize, message: impl Into<String>, remedy: &str) -> VolumeError {
+        VolumeError::byte(self.path, at as u64, message, remedy)
+    }
+}
+
+pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+    let packed = path
+        .extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let mut payload = Payload {
+        file: path.to_owned(),
+        offset: 0,
+        lines: 0,
+        skip: Skip::Bytes(0),
+        coding: if packed { Coding::Gzip } else { Coding::Raw },
+    };
+    let raw = raw(path, &payload)?;
+    let offset = raw.f32(108);
+    // A float that has to hold a position: 0 means the end of the header.
+    if !(offset == 0.0 || (LENGTH as f64..1e9).contains(&offset)) {
+        let message = format!("vox_offset is {offset}: the voxels cannot begin there");
+        return Err(raw.error(108, message, EXPORT));
+    }
+    payload.skip = Skip::Bytes((offset as u64).max(LENGTH + 4));
+    let dims = dims(&raw)?;
+    let (kind, channels) = kind(&raw)?;
+    let (slope, intercept) = (raw.f32(112), raw.f32(116));
+    // A slope of 0 means that nothing is scaled.
+    let scale = (slope != 0.0 && (slope, intercept) != (1.0, 0.0)).then_some((slope, intercept));
+    if !(slope.is_finite() && intercept.is_finite()) {
+        return Err(raw.error(112, "scl_slope or scl_inter is not a finite number", EXPORT));
+    }
+    let (grid, placed) = grid(&raw)?;
+    let mut further = dims.iter().skip(3);
+    let frames = further.try_fold(1usize, |p, &d| p.checked_mul(d));
+    let size = [0, 1, 2].map(|k| dims.get(k).copied().unwrap_or(1));
+    let mut out = Header {
+        format: Format::Nifti,
+        kind,
+        big_endian: raw.big,
+        channels,
+        size,
+        frames: frames.unwrap_or(usize::MAX),
+        grid,
+        scale,
+        payload,
+        warnings: Vec::new(),
+    };
+    if !placed {
+        let message = "neither qform nor sform is set: only the spacing is known, RAS is assumed";
+        out.warn(
+            path,
+            1,
+            message,
+            "register it or export it with its position",
+        );
+    }
+    if dims.len() == 2 {
+        out.warn(
+            path,
+            1,
+            "is a plane: one slice",
+            "reconstruct a volume from it",
+        );
+    }
+    Ok(out)
+}
+
+fn raw<'p>(path: &'p Path, payload: &Payload) -> Result<Raw<'p>, VolumeError> {
+    let mut bytes = Vec::new();
+    let read = payload.stream(1)?.take(LENGTH).read_to_end(&mut bytes);
+    if let Err(error) = read {
+        let message = format!("the header cannot be read: {error}");
+        return Err(VolumeError::byte(path, bytes.len() as u64, message, EXPORT));
+    }
+    let length = bytes.first_chunk::<4>().map(|b| i32::from_le_bytes(*b));
+    let big = match length {
+        Some(348) => false,
+        Some(length) if length.swap_bytes() == 348 => true,
+        Some(length) if length == 540 || length.swap_bytes() == 540 => {
+            return Err(VolumeError::byte(path, 0, "NIfTI-2 cannot be read", EXPORT));
+        }
+        _ => {
+            let message = "is not NIfTI-1: sizeof_hdr is not 348";
+            return Err(VolumeError::byte(path, 0, message, EXPORT));
+        }
+    };
+    if (bytes.len() as u64) < LENGTH {
+        let message = format!(
+            "is cut off: {} of {LENGTH} bytes of the header",
+            bytes.len()
+        );
+        return Err(VolumeError::byte(path, bytes.len() as u64, message, EXPORT));
+    }
+    if bytes[344..348] != *b"n+1\0" {
+        let message = "is not NIfTI-1 in one file: the magic is not `n+1`";
+        return Err(VolumeError::byte(path, 344, message, EXPORT));
+    }
+    Ok(Raw { path, bytes, big })
+}
+
+fn dims(raw: &Raw) -> Result<Vec<usize>, VolumeError> {
+    let count = raw.i16(40);
+    if !(2..=7).contains(&count) {
+        let message = format!("dim[0] is {count}: 2 to 7 axes are possible");
+        return Err(raw.error(40, message, EXPORT));
+    }
+    let axes = 1..=count as usize;
+    axes.map(|axis| {
+        let at = 40 + 2 * axis;
+        let size = raw.i16(at);
+        usize::try_from(size)
+            .ok()
+            .filter(|&s| s > 0)
+            .ok_or_else(|| {
+                let message = format!("dim[{axis}] is {size}: an axis holds at least one voxel");
+                raw.error(at, message, EXPORT)
+            })
+    })
+    .collect()
+}
+
+/// Type and values per voxel.
+fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
+    let code = raw.i16(70);
+    let (kind, channels) = match code {
+        2 => (VoxelType::U8, 1),
+        4 => (VoxelType::I16, 1),
+        8 => (VoxelType::I32, 1),
+        16 => (VoxelType::F32, 1),
+        64 => (VoxelType::F64, 1),
+        128 => (VoxelType::U8, 3),
+        256 => (VoxelType::I8, 1),
+        512 => (VoxelType::U16, 1),
+        768 => (VoxelType::U32, 1),
+        2304 => (VoxelType::U8, 4),
+        _ => {
+            let message = format!("datatype {code} cannot be read");
+            return Err(raw.error(70, message, "save it as 8- or 16-bit integers or as floats"));
+        }
+    };
+    let (bits, expected) = (raw.i16(72), 8 * kind.bytes() * channels);
+    if usize::try_from(bits) != Ok(expected) {
+        let message = format!("bitpix is {bits}, datatype {code} has {expected}");
+        return Err(raw.error(72, message, EXPORT));
+    }
+    Ok((kind, channels))
+}
+
+/// Position of voxels by sform, else qform, else spacing alone; and whether one of the first two
+/// is set.
+fn grid(raw: &Raw) -> Result<(Grid, bool), VolumeError> {
+    let (qform, sform) = (raw.i16(252) > 0, raw.i16(254) > 0);
+    let vector = |at: usize, stride: usize| {
+        DVec3::new(raw.f32(at), raw.f32(at + stride), raw.f32(at + 2 * stride))
+    };
+    let (steps, origin) = if sform {
+        ([280, 284, 288].map(|at| vector(at, 16)), vector(292, 16))
+    } else {
+        let spacing = vector(80, 4);
+        if !(spacing.is_finite() && spacing.cmpgt(DVec3::ZERO).all()) {
+            let message = format!("pixdim is {spacing}: a spacing has to be above zero");
+            return Err(raw.error(80, message, "state the distance between voxels"));
+        }
+        let q = vector(256, 4);
+        let sound = q.is_finite() && q.length_squared() <= 1.0 + 1e-4;
+        if qform && !sound {
+            let message = format!("the quaternion {q} is longer than one");
+            return Err(raw.error(256, message, EXPORT));
+        }
+        let rotation = if qform {
+            let real = (1.0 - q.length_squared()).max(0.0).sqrt();
+            DQuat::from_xyzw(q.x, q.y, q.z, real).normalize()
+        } else {
+            DQuat::IDENTITY
+        };
+        // pixdim[0] below zero mirrors the third axis.
+        let handed = if qform && raw.f32(76) < 0.0 {
+            -1.0
+        } else {
+            1.0
+        };
+        let steps = [
+            rotation * DVec3::X * spacing.x,
+            rotation * DVec3::Y * spacing.y,
+            rotation * DVec3::Z * spacing.z * handed,
+        ];
+        (steps, if qform { vector(268, 4) } else { DVec3::ZERO })
+    };
+    let unit = match raw.bytes[123] & 7 {
+        1 => 1e3,
+        3 => 1e-3,
+        // mm, or not stated, which is mm with everybody.
+        _ => 1.0,
+    };
+    let grid = Grid {
+        steps,
+        origin,
+        frame: Frame::Ras,
+        unit,
+    };
+    Ok((grid, qform || sform))
+}

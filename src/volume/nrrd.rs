@@ -1,0 +1,259 @@
+//! NRRD headers (.nrrd, .nhdr), by the definition of the format
+//! (teem.sourceforge.net/nrrd/format.html).
+
+use std::path::Path;
+
+use super::Format;
+use super::error::VolumeError;
+use super::fields::{Field, Fields};
+use super::grid::Frame;
+use super::header::{Header, unused};
+use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
+use super::voxels::VoxelType;
+
+mod space;
+
+/// Most axes of a NRRD file (`NRRD_DIM_MAX`).
+const MAX_AXES: usize = 16;
+
+/// Fields that are used, or that change nothing here.
+const KNOWN: [&str; 32] = [
+    "type",
+    "dimension",
+    "space",
+    "space dimension",
+    "sizes",
+    "space directions",
+    "space origin",
+    "spacings",
+    "axis mins",
+    "axismins",
+    "kinds",
+    "endian",
+    "encoding",
+    "data file",
+    "datafile",
+    "line skip",
+    "lineskip",
+    "byte skip",
+    "byteskip",
+    "space units",
+    "units",
+    "labels",
+    "content",
+    "min",
+    "max",
+    "old min",
+    "oldmin",
+    "old max",
+    "oldmax",
+    "measurement frame",
+    "centers",
+    "centerings",
+];
+
+pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+    let bytes = source::prefix(path, MAX_HEADER)?;
+    let (fields, pairs, data) = fields(path, &bytes)?;
+    let dimension = fields.need("dimension")?;
+    let n: usize = fields.number(dimension)?;
+    if !(1..=MAX_AXES).contains(&n) {
+        return Err(fields.error(dimension, "1 to 16 axes are possible", "correct it"));
+    }
+    let sizes = fields.sizes(fields.need("sizes")?, n)?;
+    let (directions, frame) = space::directions(&fields, n)?;
+    let (first, count) = space::spatial(&fields, n, directions.as_deref())?;
+    let stacked = count == 2 && n > first + 2;
+    let used = first + count + usize::from(stacked);
+    let product = |sizes: &[usize]| sizes.iter().try_fold(1usize, |p, &s| p.checked_mul(s));
+    let kind = kind(&fields)?;
+    let payload = payload(&fields, data)?;
+    let big_endian = match fields.find(&["endian"]) {
+        Some(field) => match field.value.to_ascii_lowercase().as_str() {
+            "little" => false,
+            "big" => true,
+            _ => return Err(fields.error(field, "no byte order", "write little or big")),
+        },
+        None if kind.bytes() == 1 || payload.coding == Coding::Text => false,
+        None => {
+            return Err(VolumeError::file(
+                path,
+                "the header lacks `endian`",
+                "add `endian: little` or `endian: big`",
+            ));
+        }
+    };
+    let mut out = Header {
+        format: Format::Nrrd,
+        kind,
+        big_endian,
+        channels: product(&sizes[..first]).unwrap_or(usize::MAX),
+        size: [0, 1, 2].map(|k| {
+            if first + k < used {
+                sizes[first + k]
+            } else {
+                1
+            }
+        }),
+        frames: product(&sizes[used..]).unwrap_or(usize::MAX),
+        grid: space::grid(&fields, n, first, count, directions.as_deref(), frame)?,
+        scale: None,
+        payload,
+        warnings: Vec::new(),
+    };
+    let strange = fields.list.iter().map(|f| f.key.as_str());
+    let strange = strange.filter(|key| !KNOWN.iter().any(|k| k.eq_ignore_ascii_case(key)));
+    let ignored: Vec<_> = strange.chain(pairs.iter().map(String::as_str)).collect();
+    out.warnings.extend(unused(path, &ignored));
+    if stacked {
+        let message = "is a sequence of planes: its frames are stacked, 1 mm apart";
+        out.warn(path, 1, message, "reconstruct a volume from it");
+    } else if count == 2 {
+        let message = "is a plane: one slice of 1 mm";
+        out.warn(path, 1, message, "reconstruct a volume from it");
+    }
+    if frame == Frame::Unstated {
+        let message = "no anatomical frame is stated; LPS is assumed";
+        out.warn(
+            path,
+            1,
+            message,
+            "add `space: left-posterior-superior` or what it is",
+        );
+    }
+    Ok(out)
+}
+
+/// Fields, the keys of key/value pairs, and the byte after the empty line that ends the header.
+fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, Vec<String>, u64), VolumeError> {
+    let (mut list, mut pairs, mut at) = (Vec::new(), Vec::new(), 0);
+    for (line, text) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
+        at += text.len() as u64;
+        let text = String::from_utf8_lossy(text);
+        let text = text.trim_end();
+        if line == 0 {
+            let version = text.strip_prefix("NRRD").filter(|v| v.len() == 4);
+            if version
+                .and_then(|v| v.parse::<u32>().ok())
+                .is_none_or(|v| v > 5)
+            {
+                return Err(VolumeError::line(
+                    path,
+                    1,
+                    "does not begin with NRRD and a version up to 0005",
+                    "give a NRRD file",
+                ));
+            }
+        } else if text.is_empty() {
+            return Ok((Fields { path, list }, pairs, at));
+        } else if text.starts_with('#') {
+            // A comment.
+        } else if let Some((key, value)) = text.split_once(':') {
+            if value.starts_with('=') {
+                pairs.push(key.to_owned());
+                continue;
+            }
+            list.push(Field {
+                line: line + 1,
+                key: key.trim().to_owned(),
+                value: value.trim().to_owned(),
+            });
+        } else {
+            return Err(VolumeError::line(
+                path,
+                line + 1,
+                "is neither `field: value` nor `key:=value`, and no empty line ended the header",
+                "export or copy the file again",
+            ));
+        }
+    }
+    if bytes.len() as u64 == MAX_HEADER {
+        return Err(VolumeError::file(
+            path,
+            format!("the header is longer than {MAX_HEADER} bytes"),
+            "export the file again",
+        ));
+    }
+    Ok((Fields { path, list }, pairs, at))
+}
+
+fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
+    let field = fields.need("type")?;
+    Ok(match field.value.to_ascii_lowercase().as_str() {
+        "signed char" | "int8" | "int8_t" => VoxelType::I8,
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => VoxelType::U8,
+        "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
+            VoxelType::I16
+        }
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
+            VoxelType::U16
+        }
+        "int" | "signed int" | "int32" | "int32_t" => VoxelType::I32,
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => VoxelType::U32,
+        "float" => VoxelType::F32,
+        "double" => VoxelType::F64,
+        _ => {
+            return Err(fields.error(
+                field,
+                "this type cannot be read",
+                "save it as uchar, short or float",
+            ));
+        }
+    })
+}
+
+fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
+    let encoding = fields.need("encoding")?;
+    let coding = match encoding.value.to_ascii_lowercase().as_str() {
+        "raw" => Coding::Raw,
+        "gzip" | "gz" => Coding::Gzip,
+        "ascii" | "text" | "txt" => Coding::Text,
+        _ => {
+            return Err(fields.error(
+                encoding,
+                "this encoding cannot be read",
+                "save it with raw, gzip or ascii",
+            ));
+        }
+    };
+    let lines = match fields.find(&["line skip", "lineskip"]) {
+        Some(field) => fields.number(field)?,
+        None => 0,
+    };
+    let skip = match fields.find(&["byte skip", "byteskip"]) {
+        None => Skip::Bytes(0),
+        Some(field) => match fields.number(field)? {
+            -1i64 if coding != Coding::Text => Skip::AllButLast,
+            bytes => Skip::Bytes(u64::try_from(bytes).map_err(|_| {
+                fields.error(field, "no number of bytes", "write -1 or the bytes to skip")
+            })?),
+        },
+    };
+    let (file, offset) = match fields.find(&["data file", "datafile"]) {
+        None => (fields.path.to_owned(), after_header),
+        Some(field) if field.value.starts_with("LIST") || field.value.contains('%') => {
+            return Err(fields.error(
+                field,
+                "volumes in several files cannot be read",
+                "save the volume to one file",
+            ));
+        }
+        Some(field) => {
+            let file = source::detached(fields.path, &field.value).map_err(|cause| {
+                fields.error(
+                    field,
+                    &cause,
+                    "put the data beside the header and name it there",
+                )
+            })?;
+            (file, 0)
+        }
+    };
+    Ok(Payload {
+        file,
+        offset,
+        lines,
+        skip,
+        coding,
+    })
+}

@@ -1,0 +1,53 @@
+//! What `insonify check` says of a volume.
+
+use std::fmt;
+
+use glam::DVec3;
+
+use super::Volume;
+
+fn vector(v: DVec3) -> String {
+    // Turns -0 into 0.
+    let v = v + DVec3::ZERO;
+    format!("({:.3}, {:.3}, {:.3})", v.x, v.y, v.z)
+}
+
+impl fmt::Display for Volume {
+    /// Format, type, size, placement in LPS and mm, and values, line by line.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [x, y, z] = self.size;
+        let spacing = self.spacing();
+        let [i, j, k] = self.directions().map(vector);
+        let (low, high) = self.bounds();
+        writeln!(
+            f,
+            "  {}, {x} x {y} x {z} voxels, {}",
+            self.format.name(),
+            self.stored_as.name()
+        )?;
+        writeln!(
+            f,
+            "  spacing {:.4} x {:.4} x {:.4} mm",
+            spacing.x, spacing.y, spacing.z
+        )?;
+        writeln!(f, "  orientation in the file: {}", self.frame.name())?;
+        writeln!(f, "  direction of the axes {i}, {j}, {k} in LPS")?;
+        writeln!(
+            f,
+            "  first voxel at {} mm, box {} to {} mm in LPS",
+            vector(self.world_from_voxel.translation),
+            vector(low),
+            vector(high)
+        )?;
+        let values = self.statistics;
+        if values.not_finite == self.voxels.len() {
+            write!(f, "  no value is a finite number")
+        } else {
+            write!(
+                f,
+                "  values {} to {}, mean {:.3}",
+                values.min, values.max, values.mean
+            )
+        }
+    }
+}

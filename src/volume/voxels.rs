@@ -1,0 +1,260 @@
+//! Voxel types and values.
+
+use std::io::{BufReader, Read};
+
+use super::error::VolumeError;
+use super::source::Payload;
+
+/// Type of a value in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum VoxelType {
+    U8,
+    I8,
+    U16,
+    I16,
+    U32,
+    I32,
+    F32,
+    F64,
+}
+
+impl VoxelType {
+    /// Bytes of one value.
+    pub fn bytes(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::U16 | Self::I16 => 2,
+            Self::U32 | Self::I32 | Self::F32 => 4,
+            Self::F64 => 8,
+        }
+    }
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::U8 => "8-bit unsigned integer",
+            Self::I8 => "8-bit signed integer",
+            Self::U16 => "16-bit unsigned integer",
+            Self::I16 => "16-bit signed integer",
+            Self::U32 => "32-bit unsigned integer",
+            Self::I32 => "32-bit signed integer",
+            Self::F32 => "32-bit float",
+            Self::F64 => "64-bit float",
+        }
+    }
+}
+
+/// Values, first axis fastest. 8- and 16-bit integers stay what they are; everything else is f32,
+/// which is what a 3D texture can hold.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(missing_docs)]
+pub enum Voxels {
+    U8(Vec<u8>),
+    I8(Vec<i8>),
+    U16(Vec<u16>),
+    I16(Vec<i16>),
+    F32(Vec<f32>),
+}
+
+/// Range and mean of values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Statistics {
+    /// Smallest finite value.
+    pub min: f64,
+    /// Largest finite value.
+    pub max: f64,
+    /// Mean of the finite values; 0 where there is none.
+    pub mean: f64,
+    /// Values that are infinite or no number.
+    pub not_finite: usize,
+}
+
+/// Calls `$body` with the slice of values, whatever their type.
+macro_rules! values {
+    ($voxels:expr, $v:ident => $body:expr) => {
+        match $voxels {
+            Voxels::U8($v) => $body,
+            Voxels::I8($v) => $body,
+            Voxels::U16($v) => $body,
+            Voxels::I16($v) => $body,
+            Voxels::F32($v) => $body,
+        }
+    };
+}
+
+impl Voxels {
+    /// Number of voxels.
+    pub fn len(&self) -> usize {
+        values!(self, v => v.len())
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Value of voxel `index`.
+    ///
+    /// # Panics
+    /// When there is no such voxel.
+    pub fn get(&self, index: usize) -> f64 {
+        values!(self, v => f64::from(v[index]))
+    }
+
+    /// Range and mean.
+    pub fn statistics(&self) -> Statistics {
+        values!(self, v => statistics(v.iter().map(|&x| f64::from(x))))
+    }
+
+    /// `slope * value + intercept`, as f32.
+    pub(super) fn scaled(&self, slope: f64, intercept: f64) -> Self {
+        let scale = |x: f64| (slope * x + intercept) as f32;
+        Self::F32(values!(self, v => v.iter().map(|&x| scale(f64::from(x))).collect()))
+    }
+
+    /// Values from bytes; of every `channels` values the first. Also how many were rounded.
+    pub(super) fn decode(
+        bytes: &[u8],
+        kind: VoxelType,
+        big: bool,
+        channels: usize,
+    ) -> (Self, usize) {
+        let mut rounded = 0;
+        let mut round = |exact: f64| {
+            let single = exact as f32;
+            rounded += usize::from(f64::from(single) != exact && exact.is_finite());
+            single
+        };
+        let step = kind.bytes() * channels;
+        macro_rules! read {
+            ($t:ty) => {
+                bytes.chunks_exact(step).map(|value| {
+                    let (value, _) = value.split_first_chunk().expect("a step holds a value");
+                    if big {
+                        <$t>::from_be_bytes(*value)
+                    } else {
+                        <$t>::from_le_bytes(*value)
+                    }
+                })
+            };
+        }
+        let voxels = match kind {
+            VoxelType::U8 => Self::U8(read!(u8).collect()),
+            VoxelType::I8 => Self::I8(read!(i8).collect()),
+            VoxelType::U16 => Self::U16(read!(u16).collect()),
+            VoxelType::I16 => Self::I16(read!(i16).collect()),
+            VoxelType::F32 => Self::F32(read!(f32).collect()),
+            VoxelType::U32 => Self::F32(read!(u32).map(|x| round(f64::from(x))).collect()),
+            VoxelType::I32 => Self::F32(read!(i32).map(|x| round(f64::from(x))).collect()),
+            // Decimal fractions are never exact in single precision; only a lost range matters.
+            VoxelType::F64 => Self::F32(read!(f64).map(|x| x as f32).collect()),
+        };
+        (voxels, rounded)
+    }
+}
+
+fn statistics(values: impl Iterator<Item = f64>) -> Statistics {
+    let mut out = Statistics {
+        min: f64::INFINITY,
+        max: f64::NEG_INFINITY,
+        mean: 0.0,
+        not_finite: 0,
+    };
+    let (mut sum, mut count) = (0.0, 0usize);
+    for value in values {
+        if value.is_finite() {
+            out.min = out.min.min(value);
+            out.max = out.max.max(value);
+            sum += value;
+            count += 1;
+        } else {
+            out.not_finite += 1;
+        }
+    }
+    out.mean = sum / count.max(1) as f64;
+    out
+}
+
+/// Longest number in text, bytes.
+const MAX_WORD: usize = 64;
+
+/// `total` numbers in text as the bytes of little-endian values, of which the first `kept` are
+/// returned; also whether more follow.
+pub(super) fn parse_text(
+    payload: &Payload,
+    kind: VoxelType,
+    total: u64,
+    kept: u64,
+) -> Result<(Vec<u8>, bool), VolumeError> {
+    let mut bytes = BufReader::new(payload.stream(total)?).bytes();
+    let (mut out, mut count, mut at) = (Vec::new(), 0, payload.offset);
+    let mut word = String::new();
+    loop {
+        let byte = bytes.next().transpose();
+        let byte = byte.map_err(|e| {
+            VolumeError::byte(
+                &payload.file,
+                at,
+                format!("cannot be read: {e}"),
+                "copy it again",
+            )
+        })?;
+        at += 1;
+        let separator = byte.is_none_or(|b| b.is_ascii_whitespace() || b == b',');
+        match byte {
+            Some(byte) if !separator && word.len() < MAX_WORD => word.push(char::from(byte)),
+            Some(_) if !separator => return Err(no_number(payload, at, &word, kind)),
+            _ if word.is_empty() => {}
+            _ if count == total => return Ok((out, true)),
+            _ => {
+                let value =
+                    encode(&word, kind).ok_or_else(|| no_number(payload, at, &word, kind))?;
+                if count < kept {
+                    out.extend(value);
+                }
+                count += 1;
+                word.clear();
+            }
+        }
+        if byte.is_none() {
+            break;
+        }
+    }
+    if count < total {
+        return Err(VolumeError::byte(
+            &payload.file,
+            at,
+            format!("is cut off: {count} of {total} numbers are there"),
+            "export or copy it again, or correct the sizes in the header",
+        ));
+    }
+    Ok((out, false))
+}
+
+fn no_number(payload: &Payload, at: u64, word: &str, kind: VoxelType) -> VolumeError {
+    VolumeError::byte(
+        &payload.file,
+        at.saturating_sub(word.len() as u64 + 1),
+        format!("`{word}` is not a {}", kind.name()),
+        "correct it or the type in the header",
+    )
+}
+
+fn encode(word: &str, kind: VoxelType) -> Option<Vec<u8>> {
+    macro_rules! parse {
+        ($t:ty) => {
+            word.parse::<$t>().ok()?.to_le_bytes().to_vec()
+        };
+    }
+    Some(match kind {
+        VoxelType::U8 => parse!(u8),
+        VoxelType::I8 => parse!(i8),
+        VoxelType::U16 => parse!(u16),
+        VoxelType::I16 => parse!(i16),
+        VoxelType::U32 => parse!(u32),
+        VoxelType::I32 => parse!(i32),
+        VoxelType::F32 => parse!(f32),
+        VoxelType::F64 => parse!(f64),
+    })
+}

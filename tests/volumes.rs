@@ -1,0 +1,217 @@
+//! Volumes of others: values and positions against those that ITK reads from the same files, and
+//! the program on every file at hand, cut and changed too.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use assert_cmd::Command;
+use insonify::volume::{Volume, is_volume};
+
+/// What one file may take. It is address space, more than the program ever holds in memory.
+const KILOBYTES: u32 = 1 << 20;
+const SECONDS: u64 = 10;
+
+const SETS: [&str; 3] = ["corpus-nrrd-nifti", "us-plus", "us-itkultrasound"];
+
+fn shared_data() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
+    if !folder.is_dir() {
+        println!("skipped: no shared data");
+        return None;
+    }
+    Some(folder)
+}
+
+fn volumes(folder: &Path) -> Vec<PathBuf> {
+    let (mut out, mut todo) = (Vec::new(), vec![folder.to_owned()]);
+    while let Some(folder) = todo.pop() {
+        for entry in std::fs::read_dir(folder).expect("readable folder") {
+            let path = entry.expect("readable entry").path();
+            if path.is_dir() {
+                todo.push(path);
+            } else if is_volume(&path) {
+                out.push(path);
+            }
+        }
+    }
+    out.sort();
+    out
+}
+
+/// Exit code and what was printed.
+fn check(path: &Path) -> (Option<i32>, String) {
+    let output = Command::new("sh")
+        .arg("-c")
+        .arg(format!("ulimit -v {KILOBYTES}; exec \"$0\" check \"$1\""))
+        .arg(env!("CARGO_BIN_EXE_insonify"))
+        .arg(path)
+        .timeout(Duration::from_secs(SECONDS))
+        .output()
+        .expect("started");
+    let text = [output.stdout, output.stderr].concat();
+    (
+        output.status.code(),
+        String::from_utf8_lossy(&text).into_owned(),
+    )
+}
+
+/// What ITK reads, by file: `size=(..)`, `comp=1`, `sp=(..)`, `origin=(..)`, `min=`, `max=`, `mean=`.
+fn facts(data: &Path) -> BTreeMap<PathBuf, String> {
+    let mut out = BTreeMap::new();
+    for set in SETS {
+        let text = std::fs::read_to_string(data.join(set).join("facts-volume.txt"));
+        for line in text.expect("facts").lines() {
+            let (path, facts) = line.split_once(": ").expect("`path: facts`");
+            let path = path.strip_prefix("keep/").unwrap_or(path);
+            out.insert(data.join(path), facts.to_owned());
+        }
+    }
+    out
+}
+
+fn numbers(facts: &str, key: &str) -> Vec<f64> {
+    let rest = facts.split_once(&format!(" {key}=")).expect(key).1;
+    let value = match rest.strip_prefix('(') {
+        Some(inner) => inner.split(')').next(),
+        None => rest.split(' ').next(),
+    };
+    let words = value.expect("a value").split(',').map(str::trim);
+    words.filter_map(|w| w.parse().ok()).collect()
+}
+
+/// What differs between a volume and what ITK reads of its file, with this error put in.
+fn difference(volume: &Volume, facts: &str, planted: f64) -> Option<String> {
+    let facts = format!(" {facts}");
+    let size = volume.size.map(|n| n as f64).to_vec();
+    let spacing = volume.spacing().to_array().to_vec();
+    let origin = volume.world_from_voxel.translation.to_array().to_vec();
+    let values = volume.statistics;
+    // The facts are rounded: lengths to 1e-3 or five digits, means to 1e-3; single precision
+    // adds 6e-8 of a value.
+    for (key, found, tolerance) in [
+        ("size", size, 0.0),
+        ("sp", spacing, 1e-5),
+        ("origin", origin, 6e-4),
+        ("min", vec![values.min], 1e-2),
+        ("max", vec![values.max], 1e-2),
+        ("mean", vec![values.mean], 6e-4),
+    ] {
+        for (found, expected) in found.iter().zip(numbers(&facts, key)) {
+            if (found + planted - expected).abs() > tolerance + 1e-7 * expected.abs() {
+                return Some(format!("{key}: {found}, ITK reads {expected}"));
+            }
+        }
+    }
+    None
+}
+
+#[test]
+fn values_and_positions_are_those_that_itk_reads() {
+    let Some(data) = shared_data() else { return };
+    let (mut compared, mut bad) = (0, Vec::new());
+    for (path, facts) in facts(&data) {
+        let loaded = Volume::load(&path);
+        if facts.contains("ERROR") || facts.contains("zero-size") {
+            // Four axes of which three are of space: ITK refuses them, the format allows them.
+            let fine = path.ends_with("test_simple4d_raw.nrrd");
+            assert_eq!(loaded.is_ok(), fine, "{}", path.display());
+            continue;
+        }
+        let (volume, _) = loaded.unwrap_or_else(|e| panic!("{e}"));
+        let axes = numbers(&format!(" {facts}"), "size").len();
+        if !facts.contains("comp=1 ") || axes > 3 {
+            // Only the first channel or volume is read: values over all are no comparison.
+            continue;
+        }
+        compared += 1;
+        bad.extend(difference(&volume, &facts, 0.0).map(|d| format!("{}: {d}", path.display())));
+        assert!(difference(&volume, &facts, 0.02).is_some());
+    }
+    println!("{compared} volumes compared");
+    assert!(bad.is_empty(), "{}", bad.join("\n"));
+    assert!(compared >= 30, "{compared}");
+}
+
+#[test]
+fn every_encoding_of_the_ball_gives_the_same_voxels() {
+    let Some(data) = shared_data() else { return };
+    let folder = data.join("corpus-nrrd-nifti/pynrrd/nrrd/tests/data");
+    let load = |name: &str| {
+        let (volume, _) = Volume::load(&folder.join(format!("BallBinary30x30x30{name}")))
+            .unwrap_or_else(|e| panic!("{e}"));
+        volume.voxels
+    };
+    let plain = load(".nrrd");
+    for name in [
+        ".nhdr",
+        ".nii.gz",
+        "_byteskip_minus_one.nhdr",
+        "_byteskip_minus_one_nifti.nhdr",
+        "_gz.nrrd",
+        "_gz_byteskip_minus_one.nrrd",
+        "_gz_lineskip.nrrd",
+    ] {
+        assert!(load(name) == plain, "{name}");
+    }
+    // Its header takes the header of the NIfTI file for voxels.
+    assert!(load("_nifti.nhdr") != plain);
+}
+
+#[test]
+fn check_describes_or_refuses_every_file() {
+    let Some(data) = shared_data() else { return };
+    let mut counts = [0; 2];
+    for set in SETS.iter().chain(&["us-dicom-pydicom"]) {
+        for path in volumes(&data.join(set)) {
+            let (code, text) = check(&path);
+            match code {
+                Some(0) => assert!(
+                    text.contains("values ") && text.contains("0 errors"),
+                    "{text}"
+                ),
+                Some(1) => assert!(
+                    text.contains("help:") && text.contains("1 errors"),
+                    "{text}"
+                ),
+                _ => panic!("{}: {code:?}\n{text}", path.display()),
+            }
+            counts[usize::from(code == Some(1))] += 1;
+        }
+    }
+    println!("{} described, {} refused", counts[0], counts[1]);
+    assert!(counts[0] > 40 && counts[1] > 5, "{counts:?}");
+}
+
+#[test]
+fn cut_and_changed_files_are_refused_within_bounds() {
+    let Some(data) = shared_data() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut files = volumes(&data.join("corpus-nrrd-nifti"));
+    files.push(data.join("us-plus/TestImages/SpinePhantomFreehandReconstructed.mha"));
+    for path in files {
+        let whole = std::fs::read(&path).expect("readable");
+        let beside = path.extension().is_some_and(|e| e == "nhdr" || e == "mhd");
+        let copy = folder.path().join(path.file_name().expect("a name"));
+        for part in [0, 1, 200, whole.len() / 2, whole.len() - 9] {
+            std::fs::write(&copy, &whole[..part.min(whole.len())]).expect("written");
+            let refused = Volume::load(&copy).is_err();
+            assert!(refused || beside, "{} cut at {part}", path.display());
+        }
+        // Sizes blown up in place of what they are; nothing may be allocated for them.
+        let text = String::from_utf8_lossy(&whole[..whole.len().min(400)]).into_owned();
+        for (key, huge) in [
+            ("sizes: ", "60000 60000 1"),
+            ("DimSize = ", "1500 1500 1700"),
+        ] {
+            let Some(at) = text.find(key) else { continue };
+            let end = at + text[at..].find('\n').expect("a line");
+            let axes = text[at + key.len()..end].split_whitespace().count();
+            let blown = huge.split(' ').take(axes).collect::<Vec<_>>().join(" ");
+            let changed = [&whole[..at + key.len()], blown.as_bytes(), &whole[end..]].concat();
+            std::fs::write(&copy, changed).expect("written");
+            let (code, text) = check(&copy);
+            assert_eq!(code, Some(1), "{}\n{text}", path.display());
+        }
+    }
+}
