@@ -1,6 +1,9 @@
 //! Whole frames of the shipped scenes on the device: a frame repeats exactly, both tracers show
 //! the same image, and nothing is lost on the way.
 
+#[path = "common/shared_data.rs"]
+mod shared_data;
+
 use std::path::Path;
 use std::sync::Arc;
 
@@ -8,6 +11,7 @@ use insonify::gpu::{Device, test_device};
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
+use shared_data::shared_data;
 
 /// A scene at a size that a software driver renders in seconds.
 fn small(file: &str) -> Scene {
@@ -160,9 +164,7 @@ fn the_abdomen_repeats_and_both_tracers_agree() {
 /// Anatomy from patients, as it comes: open valves closed by coincident caps, crossing vessels.
 #[test]
 fn both_tracers_agree_on_real_anatomy() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    if !root.join("../shared/data").exists() {
-        println!("skipped: no shared data");
+    if shared_data().is_none() {
         return;
     }
     let device = test_device();

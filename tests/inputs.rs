@@ -1,78 +1,29 @@
 //! Bad input: every mesh at hand and scenes with planted mistakes, through the program itself.
-//!
-//! Each file is checked in a process of its own that may use 1 GB of address space (more than it
-//! can ever hold in memory) and 10 s.
+
+#[path = "common/limited.rs"]
+mod limited;
+#[path = "common/shared_data.rs"]
+mod shared_data;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use assert_cmd::Command;
-
-const SECONDS: u64 = 10;
-const KILOBYTES: u32 = 1 << 20;
-
-fn shared_data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    if !folder.is_dir() {
-        println!("skipped: no shared data");
-        return None;
-    }
-    Some(folder)
-}
+use limited::{Outcome, check, files, limited};
+use shared_data::shared_data;
 
 /// Files that look like meshes, readable or not, in a fixed order.
 fn meshes(folder: &Path) -> Vec<PathBuf> {
-    let mut out = Vec::new();
-    let mut todo = vec![folder.to_owned()];
-    while let Some(folder) = todo.pop() {
-        for entry in std::fs::read_dir(folder).expect("readable folder") {
-            let path = entry.expect("readable entry").path();
-            let extension = path
-                .extension()
-                .and_then(|e| e.to_str())
-                .unwrap_or_default();
-            let kinds = ["obj", "stl", "gltf", "glb", "ply", "off"];
-            if path.is_dir() {
-                todo.push(path);
-            } else if kinds.contains(&extension.to_ascii_lowercase().as_str()) {
-                out.push(path);
-            }
-        }
-    }
-    out.sort();
-    out
-}
-
-struct Outcome {
-    code: Option<i32>,
-    text: String,
+    let kinds = ["obj", "stl", "gltf", "glb", "ply", "off"];
+    files(folder, |path| {
+        let extension = path.extension().and_then(|e| e.to_str());
+        kinds.contains(&extension.unwrap_or_default().to_ascii_lowercase().as_str())
+    })
 }
 
 impl Outcome {
     fn has(&self, kind: &str) -> bool {
         self.text.lines().any(|line| line.starts_with(kind))
-    }
-}
-
-fn check(path: &Path) -> Outcome {
-    limited("exec \"$0\" check \"$1\"", path)
-}
-
-fn limited(script: &str, path: &Path) -> Outcome {
-    let output = Command::new("sh")
-        .arg("-c")
-        .arg(format!("ulimit -v {KILOBYTES}; {script}"))
-        .arg(env!("CARGO_BIN_EXE_insonify"))
-        .arg(path)
-        .timeout(Duration::from_secs(SECONDS))
-        .output()
-        .expect("started");
-    let mut text = String::from_utf8_lossy(&output.stdout).into_owned();
-    text.push_str(&String::from_utf8_lossy(&output.stderr));
-    Outcome {
-        code: output.status.code(),
-        text,
     }
 }
 

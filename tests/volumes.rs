@@ -1,59 +1,22 @@
 //! Volumes of others: values and positions against those that ITK reads from the same files, and
 //! the program on every file at hand, cut and changed too.
 
+#[path = "common/limited.rs"]
+mod limited;
+#[path = "common/shared_data.rs"]
+mod shared_data;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
-use assert_cmd::Command;
 use insonify::volume::{Volume, is_volume};
-
-/// What one file may take. It is address space, more than the program ever holds in memory.
-const KILOBYTES: u32 = 1 << 20;
-const SECONDS: u64 = 10;
+use limited::{Outcome, check, files};
+use shared_data::shared_data;
 
 const SETS: [&str; 3] = ["corpus-nrrd-nifti", "us-plus", "us-itkultrasound"];
 
-fn shared_data() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
-    if !folder.is_dir() {
-        println!("skipped: no shared data");
-        return None;
-    }
-    Some(folder)
-}
-
 fn volumes(folder: &Path) -> Vec<PathBuf> {
-    let (mut out, mut todo) = (Vec::new(), vec![folder.to_owned()]);
-    while let Some(folder) = todo.pop() {
-        for entry in std::fs::read_dir(folder).expect("readable folder") {
-            let path = entry.expect("readable entry").path();
-            if path.is_dir() {
-                todo.push(path);
-            } else if is_volume(&path) {
-                out.push(path);
-            }
-        }
-    }
-    out.sort();
-    out
-}
-
-/// Exit code and what was printed.
-fn check(path: &Path) -> (Option<i32>, String) {
-    let output = Command::new("sh")
-        .arg("-c")
-        .arg(format!("ulimit -v {KILOBYTES}; exec \"$0\" check \"$1\""))
-        .arg(env!("CARGO_BIN_EXE_insonify"))
-        .arg(path)
-        .timeout(Duration::from_secs(SECONDS))
-        .output()
-        .expect("started");
-    let text = [output.stdout, output.stderr].concat();
-    (
-        output.status.code(),
-        String::from_utf8_lossy(&text).into_owned(),
-    )
+    files(folder, is_volume)
 }
 
 /// What ITK reads, by file: `size=(..)`, `comp=1`, `sp=(..)`, `origin=(..)`, `min=`, `max=`, `mean=`.
@@ -164,7 +127,7 @@ fn check_describes_or_refuses_every_file() {
     let mut counts = [0; 2];
     for set in SETS.iter().chain(&["us-dicom-pydicom"]) {
         for path in volumes(&data.join(set)) {
-            let (code, text) = check(&path);
+            let Outcome { code, text } = check(&path);
             match code {
                 Some(0) => assert!(
                     text.contains("values ") && text.contains("0 errors"),
@@ -210,7 +173,7 @@ fn cut_and_changed_files_are_refused_within_bounds() {
             let blown = huge.split(' ').take(axes).collect::<Vec<_>>().join(" ");
             let changed = [&whole[..at + key.len()], blown.as_bytes(), &whole[end..]].concat();
             std::fs::write(&copy, changed).expect("written");
-            let (code, text) = check(&copy);
+            let Outcome { code, text } = check(&copy);
             assert_eq!(code, Some(1), "{}\n{text}", path.display());
         }
     }

@@ -16,25 +16,13 @@ use insonify::reference::intersect::Hit;
 use insonify::scene::{Scene, shapes};
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
-use rays::{Random, Ray, aimed_at_seams, corners, placement, rays, scene};
+use rays::{Random, Ray, aimed_at_seams, corners, mirrored, placement, rays, scene, turned};
 use walk::{clear_hits, walk};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 fn shape(index: usize) -> Scene {
     let near = placement(DVec3::ONE, DVec3::X, 0.0, DVec3::new(0.0, 0.0, 60.0));
-    let turned = placement(
-        DVec3::new(1.0, 0.4, 2.0),
-        DVec3::new(1.0, 2.0, 3.0),
-        1.1,
-        DVec3::new(30.0, -20.0, 90.0),
-    );
-    let mirrored = placement(
-        DVec3::new(-1.5, 1.0, 1.0),
-        DVec3::Y,
-        0.7,
-        DVec3::new(-40.0, 10.0, 50.0),
-    );
     match index {
         0 => scene(vec![(shapes::sphere(20.0, 2), near)]),
         1 => scene(vec![
@@ -42,8 +30,8 @@ fn shape(index: usize) -> Scene {
             (shapes::cuboid([8.0; 3]), near),
         ]),
         2 => scene(vec![
-            (shapes::cylinder(5.0, 60.0, 16), turned),
-            (shapes::sphere(15.0, 1), mirrored),
+            (shapes::cylinder(5.0, 60.0, 16), turned()),
+            (shapes::sphere(15.0, 1), mirrored()),
         ]),
         // Metres and micrometres beside each other, and parts within parts.
         _ => scene(vec![
@@ -60,7 +48,7 @@ fn shape(index: usize) -> Scene {
                     DVec3::new(2.0, 5.0, 62.0),
                 ),
             ),
-            (shapes::cuboid([4.0, 4.0, 40.0]), turned),
+            (shapes::cuboid([4.0, 4.0, 40.0]), turned()),
         ]),
     }
 }

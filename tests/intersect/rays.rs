@@ -109,6 +109,26 @@ pub fn placement(scale: DVec3, axis: DVec3, angle: f64, shift: DVec3) -> DAffine
     )
 }
 
+/// Turned about a slanted axis and stretched, unlike along each of its own.
+pub fn turned() -> DAffine3 {
+    placement(
+        DVec3::new(1.0, 0.4, 2.0),
+        DVec3::new(1.0, 2.0, 3.0),
+        1.1,
+        DVec3::new(30.0, -20.0, 90.0),
+    )
+}
+
+/// Mirrored, stretched and turned.
+pub fn mirrored() -> DAffine3 {
+    placement(
+        DVec3::new(-1.5, 1.0, 1.0),
+        DVec3::Y,
+        0.7,
+        DVec3::new(-40.0, 10.0, 50.0),
+    )
+}
+
 /// The mesh with its placement worked into the vertices. Normals keep the length that the placement
 /// gives them, so that both interpolate alike.
 pub fn baked(mesh: &Mesh, world_from_object: &DAffine3) -> Mesh {

@@ -15,7 +15,7 @@ use rayon::prelude::*;
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use compare::{by_aim, expected, slips, wrong};
 use device::{Rig, Traced};
-use rays::{Ray, aimed_at_seams, baked, placement, rays, scene};
+use rays::{Ray, aimed_at_seams, baked, mirrored, placement, rays, scene, turned};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
@@ -128,21 +128,9 @@ pub fn closest_hits_are_those_of_brute_force_in_double_precision() -> Check {
 
 /// Instances that overlap, turned and mirrored.
 fn parts() -> Scene {
-    let turned = placement(
-        DVec3::new(1.0, 0.4, 2.0),
-        DVec3::new(1.0, 2.0, 3.0),
-        1.1,
-        DVec3::new(30.0, -20.0, 90.0),
-    );
-    let mirrored = placement(
-        DVec3::new(-1.5, 1.0, 1.0),
-        DVec3::Y,
-        0.7,
-        DVec3::new(-40.0, 10.0, 50.0),
-    );
     scene(vec![
-        (shapes::sphere(15.0, 2), mirrored),
-        (shapes::cylinder(5.0, 60.0, 16), turned),
+        (shapes::sphere(15.0, 2), mirrored()),
+        (shapes::cylinder(5.0, 60.0, 16), turned()),
         (shapes::cuboid([30.0, 20.0, 10.0]), DAffine3::IDENTITY),
     ])
 }
