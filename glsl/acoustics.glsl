@@ -56,7 +56,7 @@ bool rough_normal(vec3 d, vec3 n, vec3 n_geometric, float roughness, uint path, 
         return dot(d, m) < 0.0 && dot(d - 2.0 * dot(d, m) * m, n_geometric) > 0.0;
     }
     for (uint attempt = 0u; attempt < 8u; ++attempt) {
-        uvec4 bits = sobol ? path_sobol(path, key, PURPOSE_NORMAL + attempt, seed) : path_random(path, key, PURPOSE_NORMAL + attempt, seed);
+        uvec4 bits = path_draw(path, key, PURPOSE_NORMAL + attempt, seed, sobol);
         m = power_cosine(n, roughness, vec2(unit(bits.x), unit(bits.y)));
         float along = dot(d, m);
         if (along < 0.0 && dot(d - 2.0 * along * m, n_geometric) > 0.0) return true;

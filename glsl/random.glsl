@@ -60,3 +60,8 @@ uvec4 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
     uvec4 bits = path_random(path, bounce, purpose, seed);
     return uvec4(owen(bitfieldReverse(index), key.y), owen(second, key.z), bits.z, bits.w);
 }
+
+// The words of a path as the frame draws them.
+uvec4 path_draw(uint path, uint bounce, uint purpose, uint seed, bool sobol) {
+    return sobol ? path_sobol(path, bounce, purpose, seed) : path_random(path, bounce, purpose, seed);
+}

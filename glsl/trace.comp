@@ -61,8 +61,7 @@ struct Path {
 };
 
 uvec4 draw(uint n, uint key, uint purpose) {
-    if ((frame.flags & FLAG_SOBOL) != 0u) return path_sobol(n, key, purpose, frame.seed);
-    return path_random(n, key, purpose, frame.seed);
+    return path_draw(n, key, purpose, frame.seed, (frame.flags & FLAG_SOBOL) != 0u);
 }
 
 uint row_of(float time) {
