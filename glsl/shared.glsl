@@ -19,6 +19,7 @@ const uint FLAG_COHERENT = 16u;     // surface coherence as in the paper, no spl
 const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the lattice
 const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged over the beam
 const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
+const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
 
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
@@ -41,7 +42,7 @@ struct Frame {
     float image_top;                                                          // mm, top edge in probe z
     float beam_width;                                                         // mm, sigma of the beam weight; 0: none
     float emission_lobe;                                                      // exponent of the cosine; 0: none
-    float unused0;
+    uint ray_mask;                                                            // ray query: bits of the entries that are shown
 };
 
 struct Tissue {
@@ -60,7 +61,10 @@ struct Instance {
     vec4 object_from_world[3];
     vec4 texture_from_world[3];        // rigid: the frame in which the scatterer lattice rests
     uint tissue; int priority; uint surface_outside; uint surface_inside;
-    uint first_triangle; uint triangles; uint bvh_root; uint unused0;
+    uint first_triangle; uint triangles; uint bvh_root;
+    uint slot;                         // the top-level entry that is shown, of those that the instance has
+    vec4 low; vec4 high;               // object-space bounds of what is shown; w unused
+    uint field; uint unused0; uint unused1; uint unused2; // where its displacements begin, in vectors; NONE: none
 };
 
 // Per axial sample k, at depth k * sample_pitch.
@@ -91,5 +95,10 @@ struct Hit { float t; uint instance; uint primitive; float u; float v; };
 struct Counters {
     uint saturated; uint segments_dropped; uint stack_overflow; uint paths_lost;
     uint rays; uint interactions; uint segments; uint candidates;
-    uint deposits; uint node_visits; uint triangle_tests; uint unused0;
+    uint deposits; uint node_visits; uint triangle_tests;   // these two and below only by kernels built with COUNT
+    uint top_visits;                   // node visits of the top level
+    uint instances_reached;            // leaves of the top level that a ray came to
+    uint false_unions;                 // F1: of those, the ray misses the bounds of what is shown
+    uint false_boxes;                  // F2: it meets them, but no triangle
+    uint unused0;
 };

@@ -7,7 +7,7 @@ mod signal;
 use glam::DAffine3;
 use insonify::probe::{Kind, Probe};
 use insonify::scene::settings::ScatterMode;
-use insonify::scene::{Instance, Scene, Surface, Tissue, Wire};
+use insonify::scene::{Instance, Keyframes, Scene, Surface, Tissue, Wire};
 use insonify::sim::calibration::{Calibration, amplitude, lateral_taps};
 use insonify::sim::{layout, tables};
 use signal::{Random, scene, tissue};
@@ -224,6 +224,8 @@ fn sums_cannot_reach_the_accumulators_end() {
     scene.instances.push(Instance {
         name: "plate".into(),
         mesh: 0,
+        keyframes: Keyframes::default(),
+        shown: true,
         tissue: 0,
         priority: 0,
         world_from_object: DAffine3::IDENTITY,

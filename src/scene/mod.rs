@@ -8,6 +8,7 @@ use glam::DAffine3;
 pub mod check;
 pub mod file;
 pub mod issue;
+pub mod keyframes;
 mod load_gltf;
 mod load_obj;
 mod load_stl;
@@ -21,6 +22,7 @@ pub mod topology;
 
 pub use file::SceneError;
 pub use issue::{Issue, Severity, Warning};
+pub use keyframes::{Keyframes, Strategy};
 pub use settings::{Imaging, Simulation};
 pub use tissue::Tissue;
 
@@ -57,8 +59,12 @@ pub struct Surface {
 pub struct Instance {
     /// Name in messages and label lists.
     pub name: String,
-    /// Index into [`Scene::meshes`].
+    /// The shape as it is now: index into [`Scene::meshes`].
     pub mesh: usize,
+    /// The shapes that it takes over time; none for a constant one.
+    pub keyframes: Keyframes,
+    /// Whether it is in the scene now: selectors leave out all subtrees but one.
+    pub shown: bool,
     /// Index into [`Scene::tissues`].
     pub tissue: usize,
     /// Where enclosed volumes overlap the highest priority wins; ties go to the one entered last.

@@ -40,6 +40,8 @@ pub const FLAG_VOXEL: u32 = 32;
 pub const FLAG_FOOTPRINT: u32 = 64;
 /// Paths draw from a Sobol sequence.
 pub const FLAG_SOBOL: u32 = 128;
+/// Ray query: several top-level entries of an instance share a mask bit.
+pub const FLAG_SLOTS: u32 = 256;
 
 macro_rules! shared {
     ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(
@@ -72,7 +74,7 @@ shared! {
         instances: u32, points: u32, face_height: f32, axial_sigma: f32,
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
-        image_top: f32, beam_width: f32, emission_lobe: f32, unused0: f32,
+        image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
     }
     /// Acoustic properties at the centre frequency.
     struct Tissue {
@@ -91,7 +93,9 @@ shared! {
         object_from_world: Rows,
         texture_from_world: Rows,
         tissue: u32, priority: i32, surface_outside: u32, surface_inside: u32,
-        first_triangle: u32, triangles: u32, bvh_root: u32, unused0: u32,
+        first_triangle: u32, triangles: u32, bvh_root: u32, slot: u32,
+        low: [f32; 4], high: [f32; 4],
+        field: u32, unused0: u32, unused1: u32, unused2: u32,
     }
     /// What one axial sample needs to know.
     struct Row {
@@ -112,6 +116,7 @@ shared! {
     struct Counters {
         saturated: u32, segments_dropped: u32, stack_overflow: u32, paths_lost: u32,
         rays: u32, interactions: u32, segments: u32, candidates: u32,
-        deposits: u32, node_visits: u32, triangle_tests: u32, unused0: u32,
+        deposits: u32, node_visits: u32, triangle_tests: u32, top_visits: u32,
+        instances_reached: u32, false_unions: u32, false_boxes: u32, unused0: u32,
     }
 }

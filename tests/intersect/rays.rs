@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::probe::Probe;
-use insonify::scene::{Imaging, Instance, Mesh, Scene, Simulation, Tissue};
+use insonify::scene::{Imaging, Instance, Keyframes, Mesh, Scene, Simulation, Tissue};
 
 /// The same ray for the device and for the reference: single precision throughout.
 #[derive(Clone, Copy, Debug)]
@@ -78,6 +78,8 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
             let instance = Instance {
                 name: format!("{i}"),
                 mesh: i,
+                keyframes: Keyframes::default(),
+                shown: true,
                 tissue: 0,
                 priority: i as i32,
                 world_from_object,

@@ -1,7 +1,7 @@
 //! Frames that repeat. The shipped scenes at their own settings are in `tests/frame.rs`.
 
 use glam::{DAffine3, DVec3};
-use insonify::scene::{Instance, Scene, Surface, shapes};
+use insonify::scene::{Instance, Keyframes, Scene, Surface, shapes};
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 
 use crate::check::{Bench, Check, Outcome, Physics, Picture};
@@ -33,6 +33,8 @@ fn rough_sphere() -> Scene {
     scene.instances.push(Instance {
         name: "sphere".into(),
         mesh: 0,
+        keyframes: Keyframes::default(),
+        shown: true,
         tissue: 1,
         priority: 0,
         world_from_object: DAffine3::from_translation(DVec3::new(1.3, 0.7, 35.0)),

@@ -4,7 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DAffine3, DVec3};
 use insonify::reference::Segment;
-use insonify::scene::{Instance, Mesh, Scene, Tissue};
+use insonify::scene::{Instance, Keyframes, Mesh, Scene, Tissue};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
 use crate::paths::{Range, TRACERS};
@@ -52,6 +52,8 @@ fn cylinder(lines: u32, [from, to]: [f64; 2], around: Tissue, inside: Tissue) ->
     scene.instances.push(Instance {
         name: "cylinder".into(),
         mesh: 0,
+        keyframes: Keyframes::default(),
+        shown: true,
         tissue: 1,
         priority: 0,
         world_from_object: DAffine3::from_translation(DVec3::new(0.0, 0.0, AXIS)),

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
 use insonify::scene::settings::{Imaging, Simulation};
-use insonify::scene::{Instance, Mesh, Scene, Surface, Tissue, Wire, shapes};
+use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.
@@ -75,6 +75,8 @@ pub fn add_body(scene: &mut Scene, mesh: Mesh, tissue: Tissue, at: DAffine3) {
     scene.instances.push(Instance {
         name: mesh.name.clone(),
         mesh: scene.meshes.len(),
+        keyframes: Keyframes::default(),
+        shown: true,
         tissue: scene.tissues.len(),
         priority: scene.instances.len() as i32,
         world_from_object: at,

@@ -10,7 +10,7 @@ use super::schema::{MeshTable, Shape, SurfaceTable, UnitName, WireTable};
 use super::tissues::Tissues;
 use super::within;
 use crate::scene::mesh::{self, Units};
-use crate::scene::{Instance, Issue, Mesh, Surface, Wire, shapes};
+use crate::scene::{Instance, Issue, Keyframes, Mesh, Surface, Wire, shapes};
 
 /// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
 const MIN_SPACING: f64 = 1e-3;
@@ -44,6 +44,8 @@ pub(super) fn meshes(
         instances.push(Instance {
             name: table.name.clone(),
             mesh: source(document, table, &path, &mut shelf, warnings)?,
+            keyframes: Keyframes::default(),
+            shown: true,
             tissue,
             priority: table.priority,
             world_from_object: placement(document, table, &path)?,

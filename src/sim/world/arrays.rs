@@ -121,7 +121,9 @@ pub(super) fn instance_rows(
         first_triangle: places[placed.mesh].first_triangle,
         triangles: places[placed.mesh].triangles,
         bvh_root: roots.map_or(NONE, |roots| roots[placed.mesh]),
-        unused0: 0,
+        slot: 0,
+        field: NONE,
+        ..Instance::default()
     };
     scene.instances.iter().enumerate().map(row).collect()
 }
