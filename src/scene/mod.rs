@@ -5,6 +5,7 @@
 
 use glam::DAffine3;
 
+pub mod animation;
 pub mod check;
 pub mod file;
 pub mod issue;

@@ -1,0 +1,417 @@
+//! Sampled placements: translation, rotation and scale over time, with glTF's interpolations.
+
+use glam::{DAffine3, DQuat, DVec3};
+
+/// Translation, rotation and scale; applied to a point in the order scale, rotation, translation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trs {
+    /// Shift, mm.
+    pub translation: DVec3,
+    /// Unit quaternion.
+    pub rotation: DQuat,
+    /// Factors along the axes.
+    pub scale: DVec3,
+}
+
+impl Default for Trs {
+    fn default() -> Self {
+        Self {
+            translation: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            scale: DVec3::ONE,
+        }
+    }
+}
+
+impl Trs {
+    /// Parent from child.
+    pub fn matrix(&self) -> DAffine3 {
+        DAffine3::from_scale_rotation_translation(self.scale, self.rotation, self.translation)
+    }
+}
+
+/// How a channel goes from one value to the next: the samplers of glTF 2.0.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Curve {
+    /// The earlier value, until the next one's time.
+    Step,
+    /// Along the line; for rotations along the great circle, the short way.
+    #[default]
+    Linear,
+    /// Hermite spline; the values are triples of in-tangent (per second), value, out-tangent.
+    CubicSpline,
+}
+
+/// Why samples are no channel.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum TrackError {
+    /// No time at all.
+    #[error("there are no keyframes")]
+    Empty,
+    /// Values do not go with the times.
+    #[error("{values} values for {times} times")]
+    Count {
+        /// Number of times.
+        times: usize,
+        /// Number of values; a cubic spline has three for each time.
+        values: usize,
+    },
+    /// A time or value is NaN or infinite.
+    #[error("keyframe {0} is not finite")]
+    NotFinite(usize),
+    /// A time is not after the one before.
+    #[error("keyframe {0} is not later than the one before")]
+    Order(usize),
+    /// A rotation without length.
+    #[error("keyframe {0} is a zero quaternion")]
+    ZeroQuaternion(usize),
+    /// A scale that is zero somewhere, so that the placement has no inverse.
+    #[error("the scale is zero at or before keyframe {0}")]
+    ZeroScale(usize),
+}
+
+/// What a channel can hold.
+pub trait Sample: Copy {
+    /// Straight on from `self` to `other`, `t` from 0 to 1.
+    fn between(self, other: Self, t: f64) -> Self;
+    /// Sum of products with the weights of a spline, as a value of this kind.
+    fn weighted(parts: [(Self, f64); 4]) -> Self;
+    /// Whether all components are numbers.
+    fn finite(self) -> bool;
+}
+
+impl Sample for DVec3 {
+    fn between(self, other: Self, t: f64) -> Self {
+        self.lerp(other, t)
+    }
+
+    fn weighted(parts: [(Self, f64); 4]) -> Self {
+        parts.iter().map(|&(value, weight)| value * weight).sum()
+    }
+
+    fn finite(self) -> bool {
+        self.is_finite()
+    }
+}
+
+impl Sample for DQuat {
+    /// Spherical interpolation as glTF 2.0, appendix C.4, has it: the short way round.
+    fn between(self, other: Self, t: f64) -> Self {
+        self.slerp(other, t).normalize()
+    }
+
+    fn weighted(parts: [(Self, f64); 4]) -> Self {
+        let sum = parts
+            .iter()
+            .fold(Self::from_array([0.0; 4]), |sum, &(value, weight)| {
+                sum + value * weight
+            });
+        match sum.length_squared() > 0.0 {
+            true => sum.normalize(),
+            // Tangents may cancel the values exactly; there is no direction then.
+            false => parts[0].0.normalize(),
+        }
+    }
+
+    fn finite(self) -> bool {
+        self.is_finite()
+    }
+}
+
+/// One quantity over time, s. Before the first time it has the first value, after the last time the
+/// last.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Channel<T> {
+    times: Vec<f64>,
+    values: Vec<T>,
+    curve: Curve,
+}
+
+impl<T: Sample> Channel<T> {
+    /// `times` in s, increasing; one value for each, three with [`Curve::CubicSpline`].
+    ///
+    /// # Errors
+    /// Samples that are empty, do not match, are not finite or not in order.
+    pub fn new(times: Vec<f64>, values: Vec<T>, curve: Curve) -> Result<Self, TrackError> {
+        let each = match curve {
+            Curve::CubicSpline => 3,
+            Curve::Step | Curve::Linear => 1,
+        };
+        if times.is_empty() {
+            return Err(TrackError::Empty);
+        }
+        if values.len() != each * times.len() {
+            return Err(TrackError::Count {
+                times: times.len(),
+                values: values.len(),
+            });
+        }
+        for (i, &time) in times.iter().enumerate() {
+            let own = &values[each * i..each * (i + 1)];
+            if !time.is_finite() || own.iter().any(|v| !v.finite()) {
+                return Err(TrackError::NotFinite(i));
+            }
+            if i > 0 && time <= times[i - 1] {
+                return Err(TrackError::Order(i));
+            }
+        }
+        Ok(Self {
+            times,
+            values,
+            curve,
+        })
+    }
+
+    /// Times of the keyframes, s.
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// Values at the times, without tangents.
+    fn keys(&self) -> impl Iterator<Item = T> {
+        (0..self.times.len()).map(|i| self.key(i))
+    }
+
+    fn key(&self, i: usize) -> T {
+        match self.curve {
+            Curve::CubicSpline => self.values[3 * i + 1],
+            Curve::Step | Curve::Linear => self.values[i],
+        }
+    }
+
+    /// The value at `time`, s: glTF 2.0, appendix C.
+    pub fn at(&self, time: f64) -> T {
+        let next = self.times.partition_point(|&t| t <= time);
+        if next == 0 {
+            return self.key(0);
+        }
+        let k = next - 1;
+        if next == self.times.len() {
+            return self.key(k);
+        }
+        let step = self.times[next] - self.times[k];
+        let t = (time - self.times[k]) / step;
+        match self.curve {
+            Curve::Step => self.key(k),
+            Curve::Linear => self.key(k).between(self.key(next), t),
+            Curve::CubicSpline => {
+                let (t2, t3) = (t * t, t * t * t);
+                T::weighted([
+                    (self.key(k), 2.0 * t3 - 3.0 * t2 + 1.0),
+                    (self.values[3 * k + 2], step * (t3 - 2.0 * t2 + t)),
+                    (self.key(next), 3.0 * t2 - 2.0 * t3),
+                    (self.values[3 * next], step * (t3 - t2)),
+                ])
+            }
+        }
+    }
+}
+
+impl Channel<DQuat> {
+    /// A channel of rotations; they need not be of unit length.
+    ///
+    /// # Errors
+    /// As [`Channel::new`], and a zero quaternion.
+    pub fn rotations(
+        times: Vec<f64>,
+        mut values: Vec<DQuat>,
+        curve: Curve,
+    ) -> Result<Self, TrackError> {
+        // A tangent may be zero, and has no unit length.
+        let (each, first) = match curve {
+            Curve::CubicSpline => (3, 1),
+            Curve::Step | Curve::Linear => (1, 0),
+        };
+        for (i, value) in values.iter_mut().skip(first).step_by(each).enumerate() {
+            if value.length_squared() == 0.0 {
+                return Err(TrackError::ZeroQuaternion(i));
+            }
+            if value.is_finite() {
+                *value = value.normalize();
+            }
+        }
+        Self::new(times, values, curve)
+    }
+}
+
+/// Placement of a node over time; what has no channel keeps its rest value.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Track {
+    /// Shift, mm.
+    pub translation: Option<Channel<DVec3>>,
+    /// Rotation.
+    pub rotation: Option<Channel<DQuat>>,
+    /// Factors along the axes.
+    pub scale: Option<Channel<DVec3>>,
+}
+
+impl Track {
+    /// The placement at `time`, s, over what the node has at rest.
+    pub fn at(&self, rest: Trs, time: f64) -> Trs {
+        let translation = self.translation.as_ref().map(|c| c.at(time));
+        let rotation = self.rotation.as_ref().map(|c| c.at(time));
+        let scale = self.scale.as_ref().map(|c| c.at(time));
+        Trs {
+            translation: translation.unwrap_or(rest.translation),
+            rotation: rotation.unwrap_or(rest.rotation),
+            scale: scale.unwrap_or(rest.scale),
+        }
+    }
+
+    /// First and last time of any channel, s; none where there is no channel.
+    pub fn span(&self) -> Option<(f64, f64)> {
+        let all = [
+            self.translation.as_ref().map(Channel::times),
+            self.rotation.as_ref().map(Channel::times),
+            self.scale.as_ref().map(Channel::times),
+        ];
+        let ends = |times: &[f64]| (times[0], times[times.len() - 1]);
+        let of_all = all.into_iter().flatten().map(ends);
+        of_all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    }
+
+    /// Checks that no scale passes zero: such a placement has no inverse, and rays need it.
+    ///
+    /// # Errors
+    /// [`TrackError::ZeroScale`].
+    pub fn invertible(&self) -> Result<(), TrackError> {
+        let Some(scale) = &self.scale else {
+            return Ok(());
+        };
+        let first = scale.key(0).signum();
+        // Between keys of one sign a line keeps it; what tangents do is the author's care.
+        let same = |v: DVec3| v.cmpne(DVec3::ZERO).all() && v.signum() == first;
+        match scale.keys().position(|v| !same(v)) {
+            Some(i) => Err(TrackError::ZeroScale(i)),
+            None => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn turn(degrees: f64) -> DQuat {
+        DQuat::from_rotation_z(degrees.to_radians())
+    }
+
+    fn line(values: &[f64], curve: Curve) -> Channel<DVec3> {
+        let values: Vec<_> = values.iter().map(|&x| DVec3::splat(x)).collect();
+        let each = if curve == Curve::CubicSpline { 3 } else { 1 };
+        let times = (0..values.len() / each).map(|i| 2.0 * i as f64).collect();
+        Channel::new(times, values, curve).expect("sound")
+    }
+
+    #[test]
+    fn steps_hold_lines_join_and_the_ends_stay() {
+        let step = line(&[1.0, 5.0, 3.0], Curve::Step);
+        for (t, x) in [(-9.0, 1.0), (0.0, 1.0), (1.99, 1.0), (2.0, 5.0), (9.0, 3.0)] {
+            assert_eq!(step.at(t).x, x, "{t}");
+        }
+        let linear = line(&[1.0, 5.0, 3.0], Curve::Linear);
+        for (t, x) in [(-9.0, 1.0), (0.5, 2.0), (2.0, 5.0), (3.5, 3.5), (9.0, 3.0)] {
+            assert_eq!(linear.at(t).x, x, "{t}");
+        }
+    }
+
+    #[test]
+    fn a_cubic_spline_with_a_parabolas_tangents_is_the_parabola() {
+        // x = t^2 at 0, 2, 4 s: slopes 0, 4, 8. A cubic Hermite reproduces it exactly.
+        let spline = line(
+            &[0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 8.0, 16.0, 8.0],
+            Curve::CubicSpline,
+        );
+        for i in 0..=40 {
+            let t = f64::from(i) / 10.0;
+            assert!((spline.at(t).x - t * t).abs() < 1e-12, "{t}");
+        }
+        // Tangents per second: taken per step they would miss.
+        assert!((spline.at(1.0).x - 0.0).abs() > 0.5);
+    }
+
+    #[test]
+    fn rotations_take_the_short_way_at_constant_speed() {
+        let far = -turn(90.0);
+        let channel = Channel::rotations(vec![0.0, 1.0], vec![turn(0.0) * 3.0, far], Curve::Linear)
+            .expect("sound");
+        for i in 0..=9 {
+            let t = f64::from(i) / 9.0;
+            let off = channel.at(t).angle_between(turn(90.0 * t));
+            // The angle of nearly equal quaternions is an arc cosine near 1: half the digits.
+            assert!(off < 1e-7, "{t}: {off}");
+        }
+    }
+
+    #[test]
+    fn a_cubic_spline_of_rotations_is_normalised() {
+        let (a, b) = (turn(0.0), turn(80.0));
+        let flat = DQuat::from_array([0.0; 4]);
+        let values = vec![flat, a, flat, flat, b, flat];
+        let channel =
+            Channel::rotations(vec![0.0, 1.0], values, Curve::CubicSpline).expect("sound");
+        let half = channel.at(0.5);
+        assert!((half.length() - 1.0).abs() < 1e-12);
+        // Without tangents the middle is the mean, which by symmetry points half way.
+        assert!(half.angle_between(turn(40.0)) < 1e-7);
+        // At a quarter the weights are 27/32 and 5/32.
+        let sum = a * (27.0 / 32.0) + b * (5.0 / 32.0);
+        assert!(channel.at(0.25).angle_between(sum.normalize()) < 1e-7);
+    }
+
+    #[test]
+    fn a_track_keeps_what_has_no_channel() {
+        let track = Track {
+            rotation: Some(
+                Channel::rotations(vec![1.0, 3.0], vec![turn(0.0), turn(60.0)], Curve::Linear)
+                    .expect("sound"),
+            ),
+            scale: Some(line(&[1.0, 3.0], Curve::Linear)),
+            ..Track::default()
+        };
+        let rest = Trs {
+            translation: DVec3::new(1.0, 2.0, 3.0),
+            ..Trs::default()
+        };
+        let now = track.at(rest, 2.0);
+        assert_eq!(now.translation, rest.translation);
+        assert_eq!(now.scale, DVec3::splat(3.0));
+        assert!(now.rotation.angle_between(turn(30.0)) < 1e-7);
+        assert_eq!(track.span(), Some((0.0, 3.0)));
+        // x scaled by 3, turned by 30 degrees, shifted.
+        let (sin, cos) = 30f64.to_radians().sin_cos();
+        let expected = DVec3::new(1.0 + 3.0 * cos, 2.0 + 3.0 * sin, 3.0);
+        let placed = now.matrix().transform_point3(DVec3::X);
+        assert!((placed - expected).length() < 1e-12);
+    }
+
+    #[test]
+    fn bad_samples_are_named() {
+        let make = |times: &[f64], values: &[f64]| {
+            let values = values.iter().map(|&x| DVec3::splat(x)).collect();
+            Channel::new(times.to_vec(), values, Curve::Linear).map(|_| ())
+        };
+        assert_eq!(make(&[], &[]), Err(TrackError::Empty));
+        let count = TrackError::Count {
+            times: 2,
+            values: 1,
+        };
+        assert_eq!(make(&[0.0, 1.0], &[1.0]), Err(count));
+        assert_eq!(make(&[0.0, 0.0], &[1.0; 2]), Err(TrackError::Order(1)));
+        assert_eq!(make(&[0.0, -1.0], &[1.0; 2]), Err(TrackError::Order(1)));
+        let bad = [1.0, f64::NAN];
+        assert_eq!(make(&[0.0, 1.0], &bad), Err(TrackError::NotFinite(1)));
+        assert_eq!(make(&bad, &[1.0; 2]), Err(TrackError::NotFinite(1)));
+        let zero = vec![DQuat::IDENTITY, DQuat::from_array([0.0; 4])];
+        let found = Channel::rotations(vec![0.0, 1.0], zero, Curve::Step).map(|_| ());
+        assert_eq!(found, Err(TrackError::ZeroQuaternion(1)));
+        for bad in [[1.0, 0.0], [1.0, -1.0]] {
+            let scale = Some(line(&bad, Curve::Linear));
+            let track = Track {
+                scale,
+                ..Track::default()
+            };
+            assert_eq!(track.invertible(), Err(TrackError::ZeroScale(1)));
+        }
+    }
+}
