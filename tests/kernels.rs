@@ -65,5 +65,15 @@ macro_rules! subjects {
 }
 
 subjects!(
-    geometry, rays, origin, trace, scatter, beam, axial, detect, display
+    geometry,
+    rays,
+    interpolate,
+    refit,
+    origin,
+    trace,
+    scatter,
+    beam,
+    axial,
+    detect,
+    display
 );

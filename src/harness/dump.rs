@@ -45,8 +45,10 @@ pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static
             found.push(input.name);
         }
     }
-    // A dump of a frame has those of the one kernel that takes any.
+    // A dump of a frame has those of `trace`, of which it has every binding.
+    let reads = job.inputs.iter().filter(|i| i.role == Role::Read).count();
     if !job.push.is_empty()
+        && found.len() == reads
         && let Some(bytes) = load("push")?
     {
         job.push = bytes;

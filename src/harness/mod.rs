@@ -12,8 +12,10 @@ mod display;
 pub mod dump;
 mod geometry;
 mod inputs;
+mod interpolate;
 mod origin;
 mod rays;
+mod refit;
 mod run;
 mod scatter;
 mod trace;
@@ -210,9 +212,11 @@ pub struct Subject {
 }
 
 /// Every kernel, in the order of a frame after the two that only tests use.
-pub const SUBJECTS: [Subject; 9] = [
+pub const SUBJECTS: [Subject; 11] = [
     geometry::SUBJECT,
     rays::SUBJECT,
+    interpolate::SUBJECT,
+    refit::SUBJECT,
     origin::SUBJECT,
     trace::SUBJECT,
     scatter::SUBJECT,

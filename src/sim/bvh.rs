@@ -4,6 +4,8 @@
 //! boxes. Triangles are never split, so that every triangle lies in exactly one leaf and the leaf
 //! order is a permutation. The node format is described in `glsl/intersect_bvh.glsl`.
 
+mod refit;
+
 use std::time::Duration;
 
 use glam::{DAffine3, DVec3, Vec3A};
@@ -16,6 +18,7 @@ use obvhs::{
 
 use super::layout::NONE;
 use crate::scene::Mesh;
+pub use refit::{Levels, levels};
 
 /// A node as the kernel reads it: 80 bytes.
 pub type Node = [u32; 20];

@@ -120,3 +120,32 @@ shared! {
         instances_reached: u32, false_unions: u32, false_boxes: u32, unused0: u32,
     }
 }
+
+/// Push constants of `interpolate`: how vectors between keyframes are made. All places are counted
+/// in vectors of three floats from the beginning of the buffer.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Interpolation {
+    /// Vectors to make.
+    pub count: u32,
+    /// Where the first is written: apart from every source that is read, or exactly on one.
+    pub target: u32,
+    /// 1: they are brought to length 1, as normals are.
+    pub unit: u32,
+    /// Nothing.
+    pub unused: u32,
+    /// Where the keyframes begin.
+    pub sources: [u32; 4],
+    /// Weight of each; one of weight 0 is not read.
+    pub weights: [f32; 4],
+}
+
+/// Push constants of `refit`: one level of a hierarchy.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+pub struct RefitLevel {
+    /// Where the level's nodes begin in the list of node numbers.
+    pub first: u32,
+    /// How many there are.
+    pub count: u32,
+}
