@@ -9,6 +9,7 @@ pub mod axial;
 pub mod beam;
 pub mod detect;
 pub mod display;
+pub mod field;
 #[cfg(test)]
 mod fixture;
 mod footprint;

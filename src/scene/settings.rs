@@ -47,7 +47,10 @@ pub enum ScatterMode {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TextureSpace {
-    /// To the instance: speckle moves with the anatomy.
+    /// To the tissue: speckle moves with the anatomy and, where keyframes share their topology,
+    /// deforms with it.
+    Tissue,
+    /// To the instance: speckle moves with it as a whole; what changes its shape slides through it.
     Object,
     /// To the world: anatomy slides through the speckle, as in the paper.
     World,
@@ -188,7 +191,7 @@ impl Default for Simulation {
             scatter_mode: ScatterMode::Lattice,
             cell: 0.15,
             elevation_cells: 1.0,
-            texture_space: TextureSpace::Object,
+            texture_space: TextureSpace::Tissue,
             volume_floor: -50.0,
             speckle_gain: 0.0,
             surface_gain: 0.0,

@@ -3,6 +3,7 @@
 pub mod bvh;
 pub mod calibration;
 pub mod dump;
+pub mod fields;
 pub mod layout;
 mod passes;
 pub mod placement;

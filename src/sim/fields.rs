@@ -1,0 +1,191 @@
+//! Where tissue has gone: displacement fields of instances whose keyframes share their topology, so
+//! that speckle follows the deformation.
+//!
+//! A field lives in the instance's texture space, over the shape of keyframe 0: the tissue point P
+//! of the reference shape is at P + v(P) now. It is known on the surfaces alone - a vertex is the same
+//! tissue point in every keyframe - and is made up between them: the affine map that fits best plus
+//! the smoothest remainder, one that minimises the area-weighted misfit on the surfaces and a
+//! membrane's energy, and is harmonic where there is no surface. Homogeneous strain and rotation are
+//! exact; a membrane alone would flatten them next to the surfaces, as nothing holds it outside.
+//!
+//! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::values`] as `fields`
+//! (three floats per vector) and writes [`Fields::offset`] into `field` of every instance's row
+//! whenever keyframes or settings have changed. An instance between keyframes has a field of its own
+//! that is overwritten: before a frame, [`Fields::blend`] says with what.
+
+mod grid;
+mod solve;
+
+use glam::{DAffine3, DVec3};
+use rayon::prelude::*;
+
+use super::layout::NONE;
+use super::placement::rigid;
+use crate::scene::settings::TextureSpace;
+use crate::scene::{Instance, Mesh, Scene, Strategy};
+pub use grid::Grid;
+use solve::{Patch, Solver};
+
+/// Vectors before a field's displacements: origin (mm), nodes per mm in each axis, nodes in each axis.
+pub const HEADER: u32 = 3;
+
+/// Displacement fields of a scene's instances.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Fields {
+    /// Field after field: its header, then a displacement (mm) per node, x running fastest.
+    pub values: Vec<[f32; 3]>,
+    /// Per instance of the scene.
+    slots: Vec<Option<Slots>>,
+}
+
+/// The fields of one instance, one after the other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Slots {
+    first: u32,
+    stride: u32,
+    /// The last one is for what lies between keyframes.
+    blended: Option<u32>,
+}
+
+/// How the field between keyframes is made: `count` vectors from `target` on are the sum of the
+/// weighted ones from `sources` on, all counted in vectors of [`Fields::values`]. Weights sum to 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blend {
+    /// Where each keyframe's displacements begin, and its weight.
+    pub sources: [(u32, f64); 4],
+    /// Where the sum goes.
+    pub target: u32,
+    /// Vectors.
+    pub count: u32,
+}
+
+impl Fields {
+    /// Fields of every instance that has keyframes of shared topology, from the vertices of all
+    /// instances of its group, which must keep their places relative to each other. Others have none.
+    pub fn build(scene: &Scene) -> Self {
+        let made: Vec<Option<Made>> = (0..scene.instances.len())
+            .into_par_iter()
+            .map(|i| make(scene, i))
+            .collect();
+        let mut fields = Self::default();
+        for made in made {
+            let slots = made.map(|made| fields.append(&made));
+            fields.slots.push(slots);
+        }
+        fields
+    }
+
+    fn append(&mut self, made: &Made) -> Slots {
+        let first = self.values.len() as u32;
+        let header = made.grid.header();
+        for displacements in &made.keyframes {
+            self.values.extend(header);
+            self.values.extend_from_slice(displacements);
+        }
+        let stride = HEADER + made.grid.nodes() as u32;
+        let blended = made.blended.then(|| {
+            let at = self.values.len() as u32;
+            self.values.extend(header);
+            self.values.extend_from_slice(&made.keyframes[0]);
+            at
+        });
+        Slots {
+            first,
+            stride,
+            blended,
+        }
+    }
+
+    /// Whether no instance deforms.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Where the field of instance `i` in its present shape begins, in vectors; [`NONE`] for an
+    /// instance without one, or where `simulation.texture_space` lets tissue slide.
+    pub fn offset(&self, scene: &Scene, i: usize) -> u32 {
+        if scene.simulation.texture_space != TextureSpace::Tissue {
+            return NONE;
+        }
+        self.slots[i].map_or(NONE, |slots| {
+            let nearest = scene.instances[i].keyframes.nearest() as u32;
+            slots
+                .blended
+                .unwrap_or(slots.first + nearest * slots.stride)
+        })
+    }
+
+    /// How the field of instance `i` is made before a frame; none where keyframes are shown as they are.
+    pub fn blend(&self, scene: &Scene, i: usize) -> Option<Blend> {
+        let slots = self.slots[i]?;
+        let at = |keyframe: usize| slots.first + keyframe as u32 * slots.stride + HEADER;
+        let blend = scene.instances[i].keyframes.blend;
+        Some(Blend {
+            sources: blend.map(|(keyframe, weight)| (at(keyframe), weight)),
+            target: slots.blended? + HEADER,
+            count: slots.stride - HEADER,
+        })
+    }
+}
+
+/// Fields of one instance.
+struct Made {
+    grid: Grid,
+    keyframes: Vec<Vec<[f32; 3]>>,
+    blended: bool,
+}
+
+/// Meshes of an instance's keyframes, where a vertex is the same tissue point in all of them.
+fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>> {
+    let meshes: Vec<&Mesh> = (instance.keyframes.meshes.iter())
+        .map(|&m| &scene.meshes[m])
+        .collect();
+    let (reference, others) = meshes.split_first()?;
+    let same = |mesh: &&Mesh| {
+        mesh.positions.len() == reference.positions.len() && mesh.triangles == reference.triangles
+    };
+    let moves = |mesh: &&Mesh| mesh.positions != reference.positions;
+    (others.iter().all(same) && others.iter().any(moves)).then_some(meshes)
+}
+
+fn make(scene: &Scene, index: usize) -> Option<Made> {
+    let instance = &scene.instances[index];
+    let own = keyframes(scene, instance)?;
+    let texture_from_world = rigid(&instance.world_from_object).inverse();
+    let patch = |placed: &Instance, meshes| Patch {
+        meshes,
+        texture_from_object: texture_from_world * placed.world_from_object,
+    };
+    let grid = Grid::around(own[0].positions.iter().map(|&p| {
+        let texture: DAffine3 = texture_from_world * instance.world_from_object;
+        texture.transform_point3(DVec3::from(p.map(f64::from)))
+    }));
+    let count = own.len();
+    let group = instance.keyframes.group;
+    let others = scene
+        .instances
+        .iter()
+        .enumerate()
+        .filter(|(other, placed)| {
+            *other != index && group.is_some() && placed.keyframes.group == group
+        });
+    let mut patches: Vec<Patch<'_>> = others
+        .filter_map(|(_, placed)| Some(patch(placed, keyframes(scene, placed)?)))
+        .filter(|patch| patch.meshes.len() == count)
+        .collect();
+    patches.push(patch(instance, own));
+    let solver = Solver::new(&grid, &patches);
+    let keyframes = (0..count)
+        .into_par_iter()
+        .map(|k| solver.displacements(k))
+        .collect();
+    Some(Made {
+        grid,
+        keyframes,
+        blended: instance.keyframes.strategy == Strategy::Interpolate,
+    })
+}
+
+#[cfg(test)]
+#[path = "fields/tests.rs"]
+mod tests;

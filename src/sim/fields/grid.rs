@@ -1,0 +1,80 @@
+//! The regular grid on which a displacement field is stored.
+
+use glam::{DVec3, UVec3};
+
+/// Nodes along the longest axis.
+const LONGEST: f64 = 20.0;
+
+/// Nodes at `origin + spacing * (i, j, k)`, mm.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Grid {
+    /// First node.
+    pub origin: DVec3,
+    /// Distance of neighbours, the same in every axis.
+    pub spacing: f64,
+    /// Nodes per axis, at least two.
+    pub size: UVec3,
+}
+
+impl Grid {
+    /// The grid around `points` with one cell to spare on each side.
+    pub fn around(points: impl Iterator<Item = DVec3>) -> Self {
+        let (low, high) = points.fold((DVec3::MAX, DVec3::MIN), |(low, high), p| {
+            (low.min(p), high.max(p))
+        });
+        let extent = high - low;
+        let spacing = (extent.max_element() / (LONGEST - 3.0)).max(1e-3);
+        // Rounded up: the centre stays where it is.
+        let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
+        Self {
+            origin: (low + high - cells * spacing) / 2.0,
+            spacing,
+            size: cells.as_uvec3() + 1,
+        }
+    }
+
+    /// Number of nodes.
+    pub fn nodes(&self) -> usize {
+        self.size.as_usizevec3().element_product()
+    }
+
+    /// Index of node (i, j, k).
+    pub fn index(&self, node: UVec3) -> usize {
+        let [n, at] = [self.size, node].map(|v| v.as_usizevec3());
+        at.x + n.x * (at.y + n.y * at.z)
+    }
+
+    /// Node of an index.
+    pub fn node(&self, index: usize) -> UVec3 {
+        let i = index as u32;
+        let n = self.size;
+        UVec3::new(i % n.x, i / n.x % n.y, i / (n.x * n.y))
+    }
+
+    /// Place of a node, mm.
+    pub fn place(&self, node: UVec3) -> DVec3 {
+        self.origin + self.spacing * node.as_dvec3()
+    }
+
+    /// The cell that holds `p` and the weights of its eight nodes, node `n` being `n & 1, n >> 1 & 1,
+    /// n >> 2` steps away; none outside.
+    pub fn weights(&self, p: DVec3) -> Option<(UVec3, [f64; 8])> {
+        let at = (p - self.origin) / self.spacing;
+        let last = self.size.as_dvec3() - 1.0;
+        if !(at.cmpge(DVec3::ZERO).all() && at.cmple(last).all()) {
+            return None;
+        }
+        let cell = at.floor().min(last - 1.0);
+        let t = at - cell;
+        let side = |t: f64, far: usize| if far == 1 { t } else { 1.0 - t };
+        let weights =
+            std::array::from_fn(|n| side(t.x, n & 1) * side(t.y, n >> 1 & 1) * side(t.z, n >> 2));
+        Some((cell.as_uvec3(), weights))
+    }
+
+    /// What the kernels read before the displacements.
+    pub fn header(&self) -> [[f32; 3]; 3] {
+        let scale = DVec3::splat(self.spacing.recip());
+        [self.origin, scale, self.size.as_dvec3()].map(|v| v.as_vec3().to_array())
+    }
+}
