@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::{Scene, Warning};
+use super::{Graph, Scene, Warning};
 
 mod anatomy;
 mod document;
@@ -54,6 +54,7 @@ impl Scene {
             background,
             meshes,
             instances,
+            graph: Graph::default(),
             wires,
             probe,
             world_from_probe,

@@ -8,6 +8,7 @@ use glam::DAffine3;
 pub mod animation;
 pub mod check;
 pub mod file;
+pub mod graph;
 pub mod issue;
 pub mod keyframes;
 mod load_gltf;
@@ -22,6 +23,7 @@ pub mod tissue;
 pub mod topology;
 
 pub use file::SceneError;
+pub use graph::Graph;
 pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
 pub use settings::{Imaging, Simulation};
@@ -98,8 +100,10 @@ pub struct Scene {
     pub background: usize,
     /// Triangle meshes.
     pub meshes: Vec<Mesh>,
-    /// Placed meshes.
+    /// Placed meshes, as they are now.
     pub instances: Vec<Instance>,
+    /// How [`Scene::instances`] follow from time; empty where nothing moves.
+    pub graph: Graph,
     /// Point targets.
     pub wires: Vec<Wire>,
     /// Transducer and its geometry.

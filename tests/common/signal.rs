@@ -3,7 +3,7 @@
 use glam::DAffine3;
 use insonify::probe::Probe;
 use insonify::scene::settings::{Imaging, Simulation};
-use insonify::scene::{Scene, Tissue};
+use insonify::scene::{Graph, Scene, Tissue};
 
 /// Fully developed speckle of liver's attenuation at `echogenicity` dB, without texture.
 pub fn tissue(echogenicity: f64) -> Tissue {
@@ -25,6 +25,7 @@ pub fn scene(probe: Probe) -> Scene {
         background: 0,
         meshes: vec![],
         instances: vec![],
+        graph: Graph::default(),
         wires: vec![],
         probe,
         world_from_probe: DAffine3::IDENTITY,

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::probe::Probe;
-use insonify::scene::{Imaging, Instance, Keyframes, Mesh, Scene, Simulation, Tissue};
+use insonify::scene::{Graph, Imaging, Instance, Keyframes, Mesh, Scene, Simulation, Tissue};
 
 /// The same ray for the device and for the reference: single precision throughout.
 #[derive(Clone, Copy, Debug)]
@@ -94,6 +94,7 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
         background: 0,
         meshes,
         instances,
+        graph: Graph::default(),
         wires: Vec::new(),
         probe: Probe::abdominal(),
         world_from_probe: DAffine3::IDENTITY,

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
 use insonify::scene::settings::{Imaging, Simulation};
-use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
+use insonify::scene::{Graph, Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.
@@ -50,6 +50,7 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
         background: 0,
         meshes: vec![],
         instances: vec![],
+        graph: Graph::default(),
         wires: vec![],
         probe: Probe {
             kind: Kind::Linear { width },

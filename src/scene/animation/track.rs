@@ -2,6 +2,8 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 
+use super::EDGE;
+
 /// Translation, rotation and scale; applied to a point in the order scale, rotation, translation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trs {
@@ -181,7 +183,11 @@ impl<T: Sample> Channel<T> {
 
     /// The value at `time`, s: glTF 2.0, appendix C.
     pub fn at(&self, time: f64) -> T {
-        let next = self.times.partition_point(|&t| t <= time);
+        let early = match self.curve {
+            Curve::Step => EDGE,
+            Curve::Linear | Curve::CubicSpline => 0.0,
+        };
+        let next = self.times.partition_point(|&t| t <= time + early);
         if next == 0 {
             return self.key(0);
         }

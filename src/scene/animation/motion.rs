@@ -1,0 +1,210 @@
+//! Placements over time.
+
+use std::f64::consts::TAU;
+
+use glam::{DAffine3, DQuat, DVec3};
+
+use super::clock::Clock;
+use super::fetal::Fetal;
+use super::track::{Track, Trs};
+
+/// A rotation about an axis through a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Turn {
+    /// A point of the axis, mm.
+    pub centre: DVec3,
+    /// Unit vector.
+    pub axis: DVec3,
+    /// Angle by the right-hand rule, rad.
+    pub angle: f64,
+}
+
+impl Default for Turn {
+    /// None.
+    fn default() -> Self {
+        Self {
+            centre: DVec3::ZERO,
+            axis: DVec3::Z,
+            angle: 0.0,
+        }
+    }
+}
+
+impl Turn {
+    /// The rotation by `share` of the angle.
+    pub fn by(&self, share: f64) -> DAffine3 {
+        let rotation = DQuat::from_axis_angle(self.axis, self.angle * share);
+        let shift = self.centre - rotation * self.centre;
+        DAffine3::from_rotation_translation(rotation, shift)
+    }
+}
+
+/// How a transform node moves; lengths and axes are those of the node at rest.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Motion {
+    /// Not at all.
+    #[default]
+    Still,
+    /// To and fro: shift and angle follow the sine of the phase.
+    Sine {
+        /// Full oscillations.
+        clock: Clock,
+        /// Amplitude of the shift, mm.
+        translation: DVec3,
+        /// Amplitude of the rotation.
+        turn: Turn,
+    },
+    /// About an axis at constant speed, and whatever lies off the axis on a circle around it.
+    Orbit {
+        /// The whole angle in one period.
+        clock: Clock,
+        /// What is covered in a period.
+        turn: Turn,
+    },
+    /// As a fetus moves.
+    Fetal(Fetal),
+    /// Along samples.
+    Track {
+        /// Its period is the time from the first sample to the last.
+        clock: Clock,
+        /// Time of the samples at the begin of the period, s.
+        start: f64,
+        /// What has no samples.
+        rest: Trs,
+        /// The samples.
+        track: Box<Track>,
+    },
+}
+
+impl Motion {
+    /// Where the node at rest is moved to at `seconds`.
+    pub fn at(&self, seconds: f64) -> DAffine3 {
+        match self {
+            Self::Still => DAffine3::IDENTITY,
+            Self::Sine {
+                clock,
+                translation,
+                turn,
+            } => {
+                let sine = (TAU * clock.fraction(seconds)).sin();
+                DAffine3::from_translation(*translation * sine) * turn.by(sine)
+            }
+            Self::Orbit { clock, turn } => turn.by(clock.fraction(seconds)),
+            Self::Fetal(fetal) => fetal.at(seconds),
+            Self::Track {
+                clock,
+                start,
+                rest,
+                track,
+            } => {
+                let time = start + clock.period * clock.fraction(seconds);
+                track.at(*rest, time).matrix()
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::clock::Loop;
+    use super::super::track::{Channel, Curve};
+    use super::*;
+
+    fn close(a: DVec3, b: DVec3) {
+        assert!((a - b).length() < 1e-12, "{a} {b}");
+    }
+
+    fn clock(period: f64) -> Clock {
+        Clock {
+            period,
+            ..Clock::default()
+        }
+    }
+
+    #[test]
+    fn sine_is_the_sine() {
+        let motion = Motion::Sine {
+            clock: Clock {
+                phase: 0.125,
+                ..clock(2.0)
+            },
+            translation: DVec3::new(3.0, 0.0, -1.0),
+            turn: Turn {
+                centre: DVec3::new(0.0, 5.0, 0.0),
+                axis: DVec3::X,
+                angle: 0.4,
+            },
+        };
+        for i in 0..50 {
+            let t = f64::from(i) * 0.17;
+            let s = (std::f64::consts::PI * t + std::f64::consts::FRAC_PI_4).sin();
+            // The centre of the rotation only shifts; a point 2 mm beside it goes round.
+            let shift = DVec3::new(3.0 * s, 0.0, -s);
+            let at = motion.at(t);
+            close(
+                at.transform_point3(DVec3::new(1.0, 5.0, 0.0)),
+                DVec3::new(1.0, 5.0, 0.0) + shift,
+            );
+            let (sin, cos) = (0.4 * s).sin_cos();
+            close(
+                at.transform_point3(DVec3::new(0.0, 7.0, 0.0)),
+                DVec3::new(0.0, 5.0 + 2.0 * cos, 2.0 * sin) + shift,
+            );
+        }
+    }
+
+    #[test]
+    fn an_orbit_is_a_circle_and_an_arc_swings_back() {
+        let turn = Turn {
+            centre: DVec3::new(10.0, 0.0, 0.0),
+            axis: DVec3::Z,
+            angle: TAU,
+        };
+        let motion = Motion::Orbit {
+            clock: clock(4.0),
+            turn,
+        };
+        let point = DVec3::new(13.0, 0.0, 1.0);
+        for (t, x, y) in [(0.0, 13.0, 0.0), (1.0, 10.0, 3.0), (6.0, 7.0, 0.0)] {
+            close(motion.at(t).transform_point3(point), DVec3::new(x, y, 1.0));
+        }
+        let arc = Motion::Orbit {
+            clock: Clock {
+                mode: Loop::PingPong,
+                ..clock(4.0)
+            },
+            turn: Turn {
+                angle: TAU / 4.0,
+                ..turn
+            },
+        };
+        for (t, x, y) in [(4.0, 10.0, 3.0), (8.0, 13.0, 0.0)] {
+            close(arc.at(t).transform_point3(point), DVec3::new(x, y, 1.0));
+        }
+        close(
+            arc.at(6.0).transform_point3(point),
+            arc.at(2.0).transform_point3(point),
+        );
+    }
+
+    #[test]
+    fn a_track_runs_from_its_own_first_time() {
+        let values = vec![DVec3::ZERO, DVec3::X * 8.0];
+        let track = Track {
+            translation: Some(Channel::new(vec![3.0, 5.0], values, Curve::Linear).expect("sound")),
+            ..Track::default()
+        };
+        let motion = |mode| Motion::Track {
+            clock: Clock { mode, ..clock(2.0) },
+            start: 3.0,
+            rest: Trs::default(),
+            track: Box::new(track.clone()),
+        };
+        let x = |mode, t: f64| motion(mode).at(t).translation.x;
+        assert_eq!(x(Loop::Repeat, 0.5), 2.0);
+        assert_eq!(x(Loop::Repeat, 2.5), 2.0);
+        assert_eq!(x(Loop::PingPong, 2.5), 6.0);
+        assert_eq!(x(Loop::Once, 2.5), 8.0);
+        assert_eq!(x(Loop::Once, -1.0), 0.0);
+    }
+}
