@@ -11,6 +11,7 @@ fn scene() -> Scene {
         background: 0,
         meshes: vec![],
         instances: vec![],
+        graph: Default::default(),
         wires: vec![],
         probe: Probe::paper_table1(),
         world_from_probe: DAffine3::IDENTITY,
