@@ -1,36 +1,12 @@
 //! The abdomen's parts: names, tissues, priorities, how finely each is meshed.
 
-use fidget::context::Tree;
 use glam::Vec3;
 
 use crate::body;
 use crate::field::{Field, Point};
 use crate::organs;
+use crate::part::{Part, part};
 use crate::vessels::{Growth, Piece, Random, Region, lumen};
-
-/// One mesh of the scene.
-pub struct Part {
-    /// Name of the mesh and of its file.
-    pub name: &'static str,
-    /// Tissue inside.
-    pub tissue: &'static str,
-    /// Coarsest cell that still resolves the part, mm.
-    pub cell: f32,
-    /// How much an error of the surface, mm2, counts when triangles are shared out.
-    pub weight: f64,
-    /// The signed distance field.
-    pub field: Tree,
-}
-
-fn part(name: &'static str, tissue: &'static str, (cell, weight): (f32, f64), field: Tree) -> Part {
-    Part {
-        name,
-        tissue,
-        cell,
-        weight,
-        field,
-    }
-}
 
 /// Smooth layers of the wall; their tightest curve is the probe's imprint.
 const WALL: (f32, f64) = (7.0, 0.4);

@@ -5,13 +5,14 @@ use std::path::Path;
 
 use glam::Vec3;
 
-use crate::abdomen::Part;
 use crate::check::Surface;
+use crate::part::Part;
 use crate::pose::{self, Pose};
 
-/// A mesh as Wavefront OBJ with normals; coordinates to 1 um, normals to 1e-3.
-pub fn obj(name: &str, surface: &Surface) -> String {
-    let mut out = format!("# {name}, mm; x left, y posterior, z superior\n");
+/// A mesh as Wavefront OBJ with normals; coordinates to 1 um, normals to 1e-3. `axes` says where
+/// they point.
+pub fn obj(name: &str, axes: &str, surface: &Surface) -> String {
+    let mut out = format!("# {name}, mm; {axes}\n");
     for p in &surface.positions {
         writeln!(out, "v {:.3} {:.3} {:.3}", p.x, p.y, p.z).expect("strings grow");
     }
@@ -93,6 +94,26 @@ pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> S
     }
     out.truncate(out.trim_end().len());
     out + "\n"
+}
+
+/// The command that makes a scene, for its first lines; `options` begin with a blank.
+pub fn command(scene: &str, budget: usize, options: &str, output: &Path) -> String {
+    format!(
+        "cargo run --features anatomy --bin anatomy -- {scene} --triangles {budget}{options} -o {}",
+        output.display()
+    )
+}
+
+/// A `[[mesh]]` entry; `rest` are its further lines.
+pub fn mesh_entry(name: &str, tissue: &str, priority: usize, rest: &str) -> String {
+    format!("[[mesh]]\nname = \"{name}\"\ntissue = \"{tissue}\"\npriority = {priority}\n{rest}\n")
+}
+
+/// The list of keyframe files of a mesh: `FOLDER/NAME-K.obj`.
+pub fn keyframes(folder: &str, name: &str, count: usize) -> String {
+    let file = |k| format!("    \"{folder}/{name}-{k}.obj\",\n");
+    let files: String = (0..count).map(file).collect();
+    format!("keyframes = [\n{files}]\n")
 }
 
 /// Writes `text` to `path`, making its folder.
