@@ -35,18 +35,16 @@ pub struct Facts {
 }
 
 /// Measures a welded mesh in mm and reports what is wrong with it. `units` is what its file was
-/// read in, for the advice on size. Drops triangles whose corners are not numbers.
-pub(super) fn examine(path: &Path, soup: &mut Soup, units: Units) -> (Facts, Vec<Issue>) {
+/// read in, for the advice on size, and `enlarged` the factor by which its node will enlarge it. Drops triangles whose corners are not numbers.
+pub(super) fn examine(
+    path: &Path,
+    soup: &mut Soup,
+    units: Units,
+    enlarged: f64,
+) -> (Facts, Vec<Issue>) {
     let mut issues = Vec::new();
-    let bad = |p: &[f32; 3]| p.iter().any(|v| !v.is_finite());
-    let not_finite = soup.positions.iter().filter(|p| bad(p)).count();
-    if not_finite > 0 {
-        issues.push(Issue::error(
-            path,
-            not_finite,
-            format!("{not_finite} vertices have coordinates that are not finite numbers"),
-            "export the mesh again",
-        ));
+    if let Some(issue) = not_finite(path, soup) {
+        issues.push(issue);
         let positions = &soup.positions;
         soup.triangles
             .retain(|t| t.iter().all(|&i| !bad(&positions[i as usize])));
@@ -61,7 +59,7 @@ pub(super) fn examine(path: &Path, soup: &mut Soup, units: Units) -> (Facts, Vec
         return (Facts::default(), issues);
     }
     let facts = measure(soup);
-    issues.extend(size(path, &facts, units));
+    issues.extend(size(path, facts.size() * enlarged, units));
     if facts.open_edges > 0 {
         let loops = topology::boundary_loops(soup).len();
         issues.push(Issue::warning(
@@ -86,6 +84,60 @@ pub(super) fn examine(path: &Path, soup: &mut Soup, units: Units) -> (Facts, Vec
         ));
     }
     (facts, issues)
+}
+
+/// Reports what is wrong with a further shape of a surface whose first shape was examined; `outward`:
+/// whether that one is closed and faces outward.
+pub(super) fn examine_shape(
+    path: &Path,
+    soup: &Soup,
+    units: Units,
+    enlarged: f64,
+    outward: bool,
+) -> Vec<Issue> {
+    if let Some(issue) = not_finite(path, soup) {
+        return vec![issue];
+    }
+    let mut issues = Vec::new();
+    issues.extend(size(path, measure(soup).size() * enlarged, units));
+    let flat = soup
+        .triangles
+        .iter()
+        .filter(|t| !topology::has_area(**t, &soup.positions))
+        .count();
+    if flat > 0 {
+        issues.push(Issue::warning(
+            path,
+            flat,
+            format!("{flat} degenerate triangles (no area) in this shape, which others of its shapes have"),
+            "",
+        ));
+    }
+    if outward && topology::volume(soup) <= 0.0 {
+        issues.push(Issue::error(
+            path,
+            1,
+            "is inside out: its volume is negative, that of the first shape is not",
+            "export all shapes of the surface alike, none of them mirrored",
+        ));
+    }
+    issues
+}
+
+fn bad(p: &[f32; 3]) -> bool {
+    p.iter().any(|v| !v.is_finite())
+}
+
+fn not_finite(path: &Path, soup: &Soup) -> Option<Issue> {
+    let count = soup.positions.iter().filter(|p| bad(p)).count();
+    (count > 0).then(|| {
+        Issue::error(
+            path,
+            count,
+            format!("{count} vertices have coordinates that are not finite numbers"),
+            "export the mesh again",
+        )
+    })
 }
 
 fn measure(soup: &Soup) -> Facts {
@@ -124,9 +176,8 @@ impl Facts {
     }
 }
 
-fn size(path: &Path, facts: &Facts, units: Units) -> Option<Issue> {
+fn size(path: &Path, size: f64, units: Units) -> Option<Issue> {
     let (least, most) = SENSIBLE_SIZE;
-    let size = facts.size();
     if (least..=most).contains(&size) {
         return None;
     }
@@ -166,14 +217,14 @@ mod tests {
     }
 
     fn messages(mut soup: Soup) -> Vec<String> {
-        let (_, issues) = examine(Path::new("x"), &mut soup, Units(1.0));
+        let (_, issues) = examine(Path::new("x"), &mut soup, Units(1.0), 1.0);
         issues.iter().map(ToString::to_string).collect()
     }
 
     #[test]
     fn a_sound_mesh_has_no_findings_and_its_volume() {
         let mut soup = scaled(100.0);
-        let (facts, issues) = examine(Path::new("x"), &mut soup, Units(1.0));
+        let (facts, issues) = examine(Path::new("x"), &mut soup, Units(1.0), 1.0);
         assert!(issues.is_empty(), "{issues:?}");
         assert_eq!(facts.volume, Some(1000.0));
         assert_eq!((facts.min, facts.max), ([0.0; 3], [100.0; 3]));

@@ -3,25 +3,54 @@
 use std::path::Path;
 
 use glam::DMat4;
-use gltf::mesh::Mode;
 
 use super::issue::Issue;
-use super::mesh::{self, MAX_ELEMENTS, Parts, Soup};
+use super::mesh::{self, Choice, Parts, Soup};
 
 mod accessor;
+mod animated;
 mod bounds;
+mod budget;
 mod buffers;
+mod choice;
 mod glb;
+mod morph;
 mod reduce;
+mod sampler;
 mod schema;
+mod skin;
+mod surface;
+mod tree;
 mod validate;
 
-use accessor::Reader;
+pub(super) use animated::{AnimatedParts, Part, read_animated};
+use choice::Chosen;
+use surface::{Surface, Surfaces};
 
 /// Most commas of the JSON part: each value of the parsed tree takes some 50 bytes of memory.
 const MAX_VALUES: usize = 4_000_000;
 
-pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Parts, Vec<Issue>> {
+/// A file whose JSON is sound and whose buffers are read.
+struct File<'p> {
+    path: &'p Path,
+    gltf: gltf::Document,
+    buffers: Vec<Option<Vec<u8>>>,
+    /// The file's number of each accessor that was kept.
+    accessors: Vec<usize>,
+    /// The animation that was asked for.
+    animation: Option<Chosen>,
+    /// Primitives that have no stored positions or indices and are left out.
+    without_data: usize,
+    /// Findings so far, none of them an error.
+    issues: Vec<Issue>,
+}
+
+/// Opens a file for its rest pose, or for an animation.
+fn open<'p>(
+    path: &'p Path,
+    bytes: &[u8],
+    animation: Option<Choice<'_>>,
+) -> Result<File<'p>, Vec<Issue>> {
     let one = |issue: Issue| vec![issue];
     let glb::Container {
         json,
@@ -29,11 +58,14 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
         mut issues,
     } = glb::open(path, bytes).map_err(one)?;
     let root = parse(path, json).map_err(one)?;
-    issues.extend(validate::issues(path, validate::validate(&root)));
+    let findings = validate::validate(&root, animation.is_some());
+    issues.extend(validate::issues(path, findings));
     if issues.iter().any(Issue::is_error) {
         return Err(issues);
     }
-    let reduced = reduce::reduce(&root);
+    let chosen = animation.map(|choice| Chosen::of(path, &root, choice));
+    let chosen = chosen.transpose().map_err(one)?;
+    let reduced = reduce::reduce(&root, chosen.as_ref().map(|c| c.number));
     let invalid = |cause: String| {
         let message = format!("is not a valid glTF file: {cause}");
         one(Issue::error(path, 1, message, "export it again"))
@@ -50,43 +82,75 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
         return Err(issues);
     }
     issues.extend(validate::issues(path, bounds::check(&root, &buffers)));
-    let reader = Reader {
+    Ok(File {
         path,
-        buffers: &buffers,
-    };
-    let mut walk = Walk {
-        reader,
-        parts: Vec::new(),
+        gltf,
+        buffers,
+        accessors: reduced.accessors,
+        animation: chosen,
+        without_data: reduced.without_data,
         issues,
-        visited: vec![false; gltf.nodes().len()],
-        elements: 0,
-    };
-    if reduced.without_data > 0 {
-        walk.warn(
-            reduced.without_data,
-            "primitives without stored positions are ignored",
-        );
+    })
+}
+
+impl File<'_> {
+    fn roots(&self) -> Vec<gltf::Node<'_>> {
+        let scene = self.gltf.default_scene();
+        match scene.or_else(|| self.gltf.scenes().next()) {
+            Some(scene) => scene.nodes().collect(),
+            None => roots(&self.gltf),
+        }
     }
-    let scene = gltf.default_scene().or_else(|| gltf.scenes().next());
-    let roots: Vec<_> = match &scene {
-        Some(scene) => scene.nodes().collect(),
-        None => roots(&gltf),
+
+    /// The node called `name`.
+    fn node(&self, name: &str) -> Result<gltf::Node<'_>, Issue> {
+        let found = self.gltf.nodes().find(|n| n.name() == Some(name));
+        found.ok_or_else(|| {
+            let names = self
+                .gltf
+                .nodes()
+                .filter_map(|n| n.name().map(str::to_owned));
+            mesh::no_such_node(self.path, name, &names.collect::<Vec<_>>())
+        })
+    }
+
+    /// What the tree of nodes does not say.
+    fn remarks(&self, visited: &[bool]) -> Vec<Issue> {
+        let unseen = self
+            .gltf
+            .nodes()
+            .filter(|n| n.mesh().is_some() && !visited[n.index()])
+            .count();
+        let remark = |count: usize, message: &str| {
+            let message = format!("{message} ({count})");
+            (count > 0).then(|| Issue::warning(self.path, count, message, ""))
+        };
+        let both = [
+            remark(
+                self.without_data,
+                "primitives without stored positions are ignored",
+            ),
+            remark(
+                unseen,
+                "nodes with meshes outside the default scene are ignored",
+            ),
+        ];
+        both.into_iter().flatten().collect()
+    }
+}
+
+pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Parts, Vec<Issue>> {
+    let one = |issue: Issue| vec![issue];
+    let mut file = open(path, bytes, None)?;
+    let issues = std::mem::take(&mut file.issues);
+    let mut walk = Walk {
+        surfaces: Surfaces::new(&file),
+        parts: Vec::new(),
+        visited: vec![false; file.gltf.nodes().len()],
     };
-    let chosen = match node {
-        Some(name) => Some(
-            gltf.nodes()
-                .find(|n| n.name() == Some(name))
-                .ok_or_else(|| {
-                    let names: Vec<_> = gltf
-                        .nodes()
-                        .filter_map(|n| n.name().map(str::to_owned))
-                        .collect();
-                    one(mesh::no_such_node(path, name, &names))
-                })?,
-        ),
-        None => None,
-    };
-    for root in roots {
+    walk.surfaces.issues = issues;
+    let chosen = node.map(|name| file.node(name)).transpose().map_err(one)?;
+    for root in file.roots() {
         walk.node(
             &root,
             DMat4::IDENTITY,
@@ -98,24 +162,16 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
         && !walk.visited[node.index()]
     {
         walk.node(node, DMat4::IDENTITY, None).map_err(one)?;
-        walk.warn(
+        walk.surfaces.warn(
             1,
             "the node is outside the file's scene: its parents' transforms are not applied",
         );
     }
-    let unseen = gltf
-        .nodes()
-        .filter(|n| n.mesh().is_some() && !walk.visited[n.index()])
-        .count();
-    if unseen > 0 {
-        walk.warn(
-            unseen,
-            "nodes with meshes outside the default scene are ignored",
-        );
-    }
+    let mut issues = walk.surfaces.issues;
+    issues.extend(file.remarks(&walk.visited));
     Ok(Parts {
         parts: walk.parts,
-        issues: walk.issues,
+        issues,
     })
 }
 
@@ -147,20 +203,12 @@ fn roots(gltf: &gltf::Document) -> Vec<gltf::Node<'_>> {
 }
 
 struct Walk<'a> {
-    reader: Reader<'a>,
+    surfaces: Surfaces<'a>,
     parts: Vec<Soup>,
-    issues: Vec<Issue>,
     visited: Vec<bool>,
-    elements: usize,
 }
 
 impl Walk<'_> {
-    fn warn(&mut self, count: usize, message: &str) {
-        let message = format!("{message} ({count})");
-        self.issues
-            .push(Issue::warning(self.reader.path, count, message, ""));
-    }
-
     /// Follows the tree without recursion, because a file may nest nodes as deep as it likes.
     /// With `only`, keeps the meshes of that node and of those under it.
     fn node(
@@ -173,7 +221,7 @@ impl Walk<'_> {
         while let Some((node, parent, kept)) = todo.pop() {
             if std::mem::replace(&mut self.visited[node.index()], true) {
                 return Err(Issue::error(
-                    self.reader.path,
+                    self.surfaces.reader.path,
                     1,
                     format!(
                         "node {} is reached twice: the nodes form a loop or share a child",
@@ -205,98 +253,28 @@ impl Walk<'_> {
         primitive: &gltf::Primitive<'_>,
         matrix: DMat4,
     ) -> Result<(), Issue> {
-        let mode = primitive.mode();
-        if matches!(
-            mode,
-            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
-        ) {
-            self.warn(1, "points or lines are ignored");
+        let Some(Surface {
+            positions,
+            mut triangles,
+        }) = self.surfaces.primitive(name, primitive)?
+        else {
             return Ok(());
-        }
-        let positions = primitive.get(&gltf::Semantic::Positions);
-        let positions = positions.expect("primitives without positions were left out");
-        self.elements += positions.count();
-        self.elements += primitive.indices().map_or(0, |a| a.count() / 3);
-        if self.elements > MAX_ELEMENTS {
-            return Err(Issue::error(
-                self.reader.path,
-                self.elements,
-                "has too many vertices or triangles",
-                "reduce the mesh",
-            ));
-        }
-        let mut transformed = Vec::new();
-        for p in self.reader.positions(&positions).map_err(|e| e.of(name))? {
-            let world = matrix.transform_point3(p.into());
-            transformed.push(world.as_vec3().to_array());
-        }
-        let corners = match primitive.indices() {
-            Some(indices) => self.reader.indices(&indices).map_err(|e| e.of(name))?,
-            None => (0..transformed.len() as u32).collect(),
         };
-        self.in_range(name, &corners, transformed.len())?;
-        let (mut triangles, left_over) = assemble(mode, &corners);
-        if left_over > 0 {
-            self.warn(left_over, "indices that complete no triangle are ignored");
-        }
         // A mirroring transform turns the winding around (glTF 2.0, 3.7.4).
         if matrix.determinant() < 0.0 {
             for t in &mut triangles {
                 t.swap(1, 2);
             }
         }
+        let placed = positions
+            .into_iter()
+            .map(|p| matrix.transform_point3(p.into()).as_vec3().to_array());
         self.parts.push(Soup {
             name: name.to_owned(),
-            positions: transformed,
+            positions: placed.collect(),
             triangles,
         });
         Ok(())
-    }
-
-    fn in_range(&self, name: &str, corners: &[u32], vertices: usize) -> Result<(), Issue> {
-        let outside = corners.iter().filter(|&&i| i as usize >= vertices).count();
-        if outside == 0 {
-            return Ok(());
-        }
-        Err(Issue::error(
-            self.reader.path,
-            outside,
-            format!("{outside} indices are out of range: there are {vertices} vertices"),
-            "export it again",
-        )
-        .of(name))
-    }
-}
-
-/// Triangles of a list, strip or fan, and the indices left over (glTF 2.0, 3.7.2.1).
-fn assemble(mode: Mode, corners: &[u32]) -> (Vec<[u32; 3]>, usize) {
-    match mode {
-        Mode::TriangleStrip => {
-            let strip = corners.windows(3).enumerate();
-            let turned = strip.map(|(i, w)| {
-                if i % 2 == 0 {
-                    [w[0], w[1], w[2]]
-                } else {
-                    [w[0], w[2], w[1]]
-                }
-            });
-            (
-                turned.collect(),
-                if corners.len() < 3 { corners.len() } else { 0 },
-            )
-        }
-        Mode::TriangleFan => {
-            let rim = corners.get(1..).unwrap_or_default().windows(2);
-            let fan = rim.map(|w| [w[0], w[1], corners[0]]);
-            (
-                fan.collect(),
-                if corners.len() < 3 { corners.len() } else { 0 },
-            )
-        }
-        _ => {
-            let (whole, rest) = corners.as_chunks();
-            (whole.to_vec(), rest.len())
-        }
     }
 }
 

@@ -1,10 +1,20 @@
 //! From a mesh file to a [`Mesh`]: read, weld, repair, check, shade.
 
-use std::collections::HashMap;
 use std::path::Path;
 
 use super::issue::Issue;
-use super::{Mesh, check, load_gltf, load_obj, load_stl, normals, topology};
+use super::{Mesh, check, load_gltf, load_obj, load_stl};
+
+mod animated;
+mod keyframes;
+mod recipe;
+
+pub use animated::{Animated, AnimatedMesh, AnimatedNode, Choice, Placement, load_animated};
+pub(super) use keyframes::bounded;
+pub use keyframes::{MAX_SHAPES, load_keyframes};
+pub(super) use recipe::weld;
+
+use recipe::Recipe;
 
 /// Largest file that is read, bytes. Four million triangles of text fit; memory stays under 1 GB.
 pub const MAX_FILE: u64 = 256 << 20;
@@ -60,6 +70,8 @@ pub struct Options {
     pub node: Option<String>,
     /// Whether boundary loops are closed by fans to their centres.
     pub cap_openings: bool,
+    /// Most shapes that are sampled from an animated skin, at least 2; without it 24.
+    pub keyframes: Option<usize>,
 }
 
 /// What was found in a file, mm; the mesh only if no finding is an error.
@@ -97,6 +109,24 @@ pub fn load(path: &Path, options: &Options) -> Result<(Mesh, Vec<Issue>), Vec<Is
 /// Reads a mesh file and reports on it, errors included.
 pub fn inspect(path: &Path, options: &Options) -> Inspected {
     let mut found = Inspected::default();
+    let Some((raw, units)) = read_raw(path, options, &mut found) else {
+        return found;
+    };
+    let (recipe, mut soup, issues) = Recipe::new(path, &raw, &[], options.cap_openings);
+    drop(raw);
+    let (facts, more) = check::examine(path, &mut soup, units, 1.0);
+    found.facts = facts;
+    found.issues.extend(issues);
+    found.issues.extend(more);
+    if !found.issues.iter().any(Issue::is_error) {
+        found.mesh = Some(recipe.mesh(&soup.name, &soup.positions));
+    }
+    found
+}
+
+/// All chosen triangles of a file, mm, as they are stored. None if it could not be read, and why is then
+/// among the issues.
+fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(Soup, Units)> {
     let kind = Kind::of(path);
     let read = read_bounded(path).and_then(|bytes| match kind {
         Some(Kind::Obj) => load_obj::read(path, &bytes),
@@ -113,7 +143,7 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
         Ok(parts) => parts,
         Err(issues) => {
             found.issues = issues;
-            return found;
+            return None;
         }
     };
     found.issues = issues;
@@ -124,7 +154,7 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
             let chosen: Vec<_> = parts.into_iter().filter(|p| p.name == *node).collect();
             if chosen.is_empty() {
                 found.issues.push(no_such_node(path, node, &found.parts));
-                return found;
+                return None;
             }
             chosen
         }
@@ -136,30 +166,7 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
         1.0
     };
     let units = options.units.unwrap_or(Units(default_units));
-    finish(path, parts, units, options.cap_openings, found)
-}
-
-fn finish(
-    path: &Path,
-    parts: Vec<Soup>,
-    units: Units,
-    cap_openings: bool,
-    mut found: Inspected,
-) -> Inspected {
-    let mut soup = weld(&merge(parts, units));
-    let mut issues = topology::clean(path, &mut soup);
-    issues.extend(topology::orient(path, &mut soup));
-    if cap_openings {
-        issues.extend(topology::cap(path, &mut soup));
-    }
-    let (facts, more) = check::examine(path, &mut soup, units);
-    issues.extend(more);
-    found.facts = facts;
-    found.issues.extend(issues);
-    if !found.issues.iter().any(Issue::is_error) {
-        found.mesh = Some(normals::shade(&soup, CREASE));
-    }
-    found
+    Some((merge(parts, units), units))
 }
 
 /// Message for a node that a file does not have.
@@ -236,25 +243,4 @@ fn merge(parts: Vec<Soup>, units: Units) -> Soup {
         all.triangles.extend(shifted);
     }
     all
-}
-
-/// Unites vertices of exactly equal position, so that topology can be seen; drops unused ones.
-pub(super) fn weld(soup: &Soup) -> Soup {
-    let mut seen: HashMap<[u32; 3], u32> = HashMap::new();
-    let mut out = Soup {
-        name: soup.name.clone(),
-        triangles: Vec::with_capacity(soup.triangles.len()),
-        ..Soup::default()
-    };
-    for triangle in &soup.triangles {
-        out.triangles.push(triangle.map(|i| {
-            // Adding zero makes -0 and +0 the same place.
-            let p = soup.positions[i as usize].map(|v| v + 0.0);
-            *seen.entry(p.map(f32::to_bits)).or_insert_with(|| {
-                out.positions.push(p);
-                (out.positions.len() - 1) as u32
-            })
-        }));
-    }
-    out
 }

@@ -6,15 +6,22 @@ use super::Mesh;
 use super::mesh::Soup;
 use super::topology::Edges;
 
-/// Splits vertices where neighbouring triangles meet at more than `crease` degrees.
-///
-/// The weights are the corner angles (Thurmer and Wuthrich 1998), so that a normal does not
-/// depend on how a flat part happens to be triangulated.
+/// A surface whose vertices are split at creases, for any positions of its vertices.
+pub struct Split {
+    /// Indices of split vertices, triangle by triangle as in the surface.
+    pub triangles: Vec<[u32; 3]>,
+    /// The surface's vertex that each split vertex is a copy of.
+    pub source: Vec<u32>,
+}
+
+/// Splits vertices where neighbouring triangles meet at more than `crease` degrees, and shades.
 pub fn shade(soup: &Soup, crease: f32) -> Mesh {
-    let face = |t: usize| {
-        let [a, b, c] = soup.triangles[t].map(|i| Vec3::from(soup.positions[i as usize]));
-        (b - a).cross(c - a).normalize_or_zero()
-    };
+    split(soup, crease).mesh(&soup.name, &soup.positions)
+}
+
+/// Splits vertices where neighbouring triangles meet at more than `crease` degrees.
+pub fn split(soup: &Soup, crease: f32) -> Split {
+    let face = |t: usize| face_normal(soup.triangles[t], &soup.positions);
     let smooth = crease.to_radians().cos();
     let mut fans = Fans::new(soup.triangles.len() * 3);
     for pair in Edges::of(soup).manifold() {
@@ -26,41 +33,67 @@ pub fn shade(soup: &Soup, crease: f32) -> Mesh {
             fans.unite(corner(soup, s, vertex), corner(soup, t, vertex));
         }
     }
-
-    let mut mesh = Mesh {
-        name: soup.name.clone(),
-        ..Mesh::default()
+    let mut out = Split {
+        triangles: Vec::with_capacity(soup.triangles.len()),
+        source: Vec::new(),
     };
     let mut vertex_of_fan = vec![u32::MAX; soup.triangles.len() * 3];
     for (t, triangle) in soup.triangles.iter().enumerate() {
-        let normal = face(t);
-        let points = triangle.map(|i| Vec3::from(soup.positions[i as usize]));
-        mesh.triangles.push([0, 1, 2].map(|k| {
+        out.triangles.push([0, 1, 2].map(|k| {
             let fan = fans.root(t * 3 + k);
             if vertex_of_fan[fan] == u32::MAX {
-                vertex_of_fan[fan] = mesh.positions.len() as u32;
-                mesh.positions.push(points[k].to_array());
-                mesh.normals.push([0.0; 3]);
+                vertex_of_fan[fan] = out.source.len() as u32;
+                out.source.push(triangle[k]);
             }
-            let vertex = vertex_of_fan[fan];
-            let (to_next, to_last) = (
-                points[(k + 1) % 3] - points[k],
-                points[(k + 2) % 3] - points[k],
-            );
-            let sum = &mut mesh.normals[vertex as usize];
-            *sum = (Vec3::from(*sum) + normal * to_next.angle_between(to_last)).to_array();
-            vertex
+            vertex_of_fan[fan]
         }));
     }
-    for (t, triangle) in mesh.triangles.iter().enumerate() {
-        for &i in triangle {
-            let sum = Vec3::from(mesh.normals[i as usize]);
-            // Opposite faces of a folded sheet can cancel; any face normal is then as good.
-            let unit = sum.try_normalize().unwrap_or_else(|| face(t));
-            mesh.normals[i as usize] = unit.to_array();
+    out
+}
+
+impl Split {
+    /// The surface with its vertices at `positions`, and the normals of that shape.
+    ///
+    /// The weights of the faces are the corner angles (Thurmer and Wuthrich 1998), so that a normal
+    /// does not depend on how a flat part happens to be triangulated.
+    pub fn mesh(&self, name: &str, positions: &[[f32; 3]]) -> Mesh {
+        let positions: Vec<_> = self.source.iter().map(|&i| positions[i as usize]).collect();
+        let mut sums = vec![Vec3::ZERO; positions.len()];
+        for triangle in &self.triangles {
+            let normal = face_normal(*triangle, &positions);
+            // A triangle without area has no direction, and its angles are not numbers.
+            if normal == Vec3::ZERO {
+                continue;
+            }
+            let points = triangle.map(|i| Vec3::from(positions[i as usize]));
+            for k in 0..3 {
+                let to_next = points[(k + 1) % 3] - points[k];
+                let to_last = points[(k + 2) % 3] - points[k];
+                sums[triangle[k] as usize] += normal * to_next.angle_between(to_last);
+            }
+        }
+        let mut normals = vec![[0.0; 3]; positions.len()];
+        for triangle in &self.triangles {
+            for &i in triangle {
+                // Opposite faces of a folded sheet can cancel; any face normal is then as good. No ray
+                // asks for the normal of a fan without any area.
+                let face = || face_normal(*triangle, &positions).try_normalize();
+                let unit = sums[i as usize].try_normalize().or_else(face);
+                normals[i as usize] = unit.unwrap_or(Vec3::Z).to_array();
+            }
+        }
+        Mesh {
+            name: name.to_owned(),
+            positions,
+            normals,
+            triangles: self.triangles.clone(),
         }
     }
-    mesh
+}
+
+fn face_normal(triangle: [u32; 3], positions: &[[f32; 3]]) -> Vec3 {
+    let [a, b, c] = triangle.map(|i| Vec3::from(positions[i as usize]));
+    (b - a).cross(c - a).normalize_or_zero()
 }
 
 fn corner(soup: &Soup, triangle: usize, vertex: u32) -> usize {

@@ -209,7 +209,7 @@ mod tests {
             ..Soup::default()
         };
         assert!(
-            topology::clean(Path::new("x"), &mut soup).is_empty(),
+            topology::clean(Path::new("x"), &mut soup, &[]).is_empty(),
             "{}",
             mesh.name
         );

@@ -83,17 +83,14 @@ pub fn volume(soup: &Soup) -> f64 {
     sum / 6.0
 }
 
-/// Removes triangles that no ray can hit and those that would count one crossing twice.
-pub fn clean(path: &Path, soup: &mut Soup) -> Vec<Issue> {
+/// Removes triangles that no ray can hit and those that would count one crossing twice. `others` are
+/// further positions of the same vertices: a triangle stays where it has an area in one of them.
+pub fn clean(path: &Path, soup: &mut Soup, others: &[Vec<[f32; 3]>]) -> Vec<Issue> {
     let mut issues = Vec::new();
     let before = soup.triangles.len();
     let positions = &soup.positions;
-    // Zero area in double precision from the stored single-precision corners; a triangle with a
-    // corner that is not a number is kept, for the check that names it.
-    soup.triangles.retain(|t| {
-        let [a, b, c] = t.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
-        (b - a).cross(c - a).length_squared() != 0.0
-    });
+    soup.triangles
+        .retain(|t| has_area(*t, positions) || others.iter().any(|p| has_area(*t, p)));
     let degenerate = before - soup.triangles.len();
     if degenerate > 0 {
         issues.push(Issue::warning(
@@ -119,6 +116,13 @@ pub fn clean(path: &Path, soup: &mut Soup) -> Vec<Issue> {
         ));
     }
     issues
+}
+
+/// Whether a triangle has an area in double precision from its stored single-precision corners. One with
+/// a corner that is not a number has, for the check that names it.
+pub fn has_area(triangle: [u32; 3], positions: &[[f32; 3]]) -> bool {
+    let [a, b, c] = triangle.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
+    (b - a).cross(c - a).length_squared() != 0.0
 }
 
 /// Directed open edges: from vertex to vertex as their triangle runs.
@@ -153,24 +157,27 @@ pub fn boundary_loops(soup: &Soup) -> Vec<Vec<u32>> {
     loops
 }
 
-/// Closes every boundary loop by a fan of triangles to its centre.
-pub fn cap(path: &Path, soup: &mut Soup) -> Vec<Issue> {
+/// The mean of some vertices.
+pub fn centre(positions: &[[f32; 3]], ring: &[u32]) -> [f32; 3] {
+    let corner = |&i: &u32| DVec3::from(positions[i as usize].map(f64::from));
+    let sum: DVec3 = ring.iter().map(corner).sum();
+    (sum / ring.len() as f64).as_vec3().to_array()
+}
+
+/// Closes every boundary loop by a fan of triangles to its centre. Returns the loops: their centres are
+/// the last vertices, in this order.
+pub fn cap(path: &Path, soup: &mut Soup) -> (Vec<Vec<u32>>, Vec<Issue>) {
     let loops = boundary_loops(soup);
     for ring in &loops {
-        let mut centre = DVec3::ZERO;
-        for &i in ring {
-            centre += DVec3::from(soup.positions[i as usize].map(f64::from));
-        }
-        centre /= ring.len() as f64;
         let hub = soup.positions.len() as u32;
-        soup.positions.push(centre.as_vec3().to_array());
+        soup.positions.push(centre(&soup.positions, ring));
         for (k, &a) in ring.iter().enumerate() {
             let b = ring[(k + 1) % ring.len()];
             soup.triangles.push([b, a, hub]);
         }
     }
     if loops.is_empty() {
-        return Vec::new();
+        return (loops, Vec::new());
     }
     let mut issues = vec![Issue::warning(
         path,
@@ -182,7 +189,7 @@ pub fn cap(path: &Path, soup: &mut Soup) -> Vec<Issue> {
         "",
     )];
     issues.extend(orient(path, soup));
-    issues
+    (loops, issues)
 }
 
 #[cfg(test)]
@@ -220,7 +227,7 @@ pub(super) mod tests {
     #[test]
     fn a_sound_cube_is_left_alone() {
         let mut soup = cube();
-        assert!(clean(Path::new("x"), &mut soup).is_empty());
+        assert!(clean(Path::new("x"), &mut soup, &[]).is_empty());
         assert!(orient(Path::new("x"), &mut soup).is_empty());
         assert!(boundary_loops(&soup).is_empty());
         assert_eq!(volume(&soup), 1.0);
@@ -272,7 +279,7 @@ pub(super) mod tests {
         soup.triangles.extend([[2, 3, 0], [1, 1, 5], [2, 3, 0]]);
         soup.triangles.push([3, 1, 0]);
         // [2, 3, 0] repeats the first triangle from another corner, twice.
-        assert_eq!(kinds(&clean(Path::new("x"), &mut soup)), [1, 3]);
+        assert_eq!(kinds(&clean(Path::new("x"), &mut soup, &[])), [1, 3]);
         assert_eq!(soup.triangles.len(), 12);
     }
 
@@ -281,7 +288,7 @@ pub(super) mod tests {
         let mut soup = cube();
         soup.triangles.drain(2..4);
         assert_eq!(boundary_loops(&soup).len(), 1);
-        assert_eq!(kinds(&cap(Path::new("x"), &mut soup)), [1]);
+        assert_eq!(kinds(&cap(Path::new("x"), &mut soup).1), [1]);
         assert!(boundary_loops(&soup).is_empty());
         assert!((volume(&soup) - 1.0).abs() < 1e-12);
     }

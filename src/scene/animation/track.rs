@@ -82,6 +82,20 @@ pub trait Sample: Copy {
     fn finite(self) -> bool;
 }
 
+impl Sample for f64 {
+    fn between(self, other: Self, t: f64) -> Self {
+        self + (other - self) * t
+    }
+
+    fn weighted(parts: [(Self, f64); 4]) -> Self {
+        parts.iter().map(|&(value, weight)| value * weight).sum()
+    }
+
+    fn finite(self) -> bool {
+        self.is_finite()
+    }
+}
+
 impl Sample for DVec3 {
     fn between(self, other: Self, t: f64) -> Self {
         self.lerp(other, t)
@@ -264,16 +278,20 @@ impl Track {
         }
     }
 
-    /// First and last time of any channel, s; none where there is no channel.
-    pub fn span(&self) -> Option<(f64, f64)> {
+    /// Times of all keyframes, s, channel by channel.
+    pub fn times(&self) -> impl Iterator<Item = f64> {
         let all = [
             self.translation.as_ref().map(Channel::times),
             self.rotation.as_ref().map(Channel::times),
             self.scale.as_ref().map(Channel::times),
         ];
-        let ends = |times: &[f64]| (times[0], times[times.len() - 1]);
-        let of_all = all.into_iter().flatten().map(ends);
-        of_all.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+        all.into_iter().flatten().flatten().copied()
+    }
+
+    /// First and last time of any channel, s; none where there is no channel.
+    pub fn span(&self) -> Option<(f64, f64)> {
+        let ends = self.times().map(|t| (t, t));
+        ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
     }
 
     /// Checks that no scale passes zero: such a placement has no inverse, and rays need it.

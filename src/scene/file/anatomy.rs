@@ -70,6 +70,7 @@ fn source(
                 units,
                 node: table.node.clone(),
                 cap_openings: table.cap_openings,
+                ..mesh::Options::default()
             };
             let full = document
                 .source

@@ -11,6 +11,8 @@ pub(super) struct Reader<'a> {
     pub path: &'a Path,
     /// Bytes by buffer index; those that no geometry needs are absent.
     pub buffers: &'a [Option<Vec<u8>>],
+    /// The file's number of each accessor.
+    pub accessors: &'a [usize],
 }
 
 /// A run of elements inside a buffer.
@@ -30,7 +32,8 @@ impl<'a> Run<'a> {
 
 impl<'a> Reader<'a> {
     fn fault(&self, accessor: &gltf::Accessor<'_>, message: &str) -> Issue {
-        let place = format!("accessor {}", accessor.index());
+        let number = self.accessors.get(accessor.index());
+        let place = format!("/accessors/{}", number.unwrap_or(&accessor.index()));
         Issue::error(self.path, 1, message, "export it again").of(&place)
     }
 
@@ -70,29 +73,25 @@ impl<'a> Reader<'a> {
 
     /// Positions in the file's unit: three floats, or integers where mesh quantisation says so.
     pub fn positions(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<[f64; 3]>, Issue> {
-        if accessor.dimensions() != Dimensions::Vec3 {
-            return Err(self.fault(accessor, "positions must be of type VEC3"));
+        self.vectors(accessor, Dimensions::Vec3, "positions must be of type VEC3")
+    }
+
+    /// Elements of N components, normalised integers as the numbers that they stand for; `otherwise`
+    /// is what is said where the accessor is not of type `kind`.
+    pub fn vectors<const N: usize>(
+        &self,
+        accessor: &gltf::Accessor<'_>,
+        kind: Dimensions,
+        otherwise: &str,
+    ) -> Result<Vec<[f64; N]>, Issue> {
+        if accessor.dimensions() != kind || kind.multiplicity() != N {
+            return Err(self.fault(accessor, otherwise));
         }
-        let (kind, normalized) = (accessor.data_type(), accessor.normalized());
-        let point = |bytes: &[u8]| {
-            let width = bytes.len() / 3;
-            [0, 1, 2].map(|axis| number(kind, normalized, &bytes[axis * width..][..width]))
-        };
-        let mut out = vec![[0.0; 3]; accessor.count()];
-        if let Some(view) = accessor.view() {
-            let run = self.run(
-                accessor,
-                &view,
-                accessor.offset(),
-                accessor.size(),
-                accessor.count(),
-            )?;
-            for (p, bytes) in out.iter_mut().zip(run.elements()) {
-                *p = point(bytes);
-            }
-        }
-        self.replace(accessor, &mut out, point)?;
-        Ok(out)
+        let (data, normalized) = (accessor.data_type(), accessor.normalized());
+        self.elements(accessor, [0.0; N], |bytes| {
+            let width = bytes.len() / N;
+            std::array::from_fn(|k| number(data, normalized, &bytes[k * width..][..width]))
+        })
     }
 
     /// Vertex indices.
@@ -104,7 +103,29 @@ impl<'a> Reader<'a> {
         if accessor.dimensions() != Dimensions::Scalar || !integer {
             return Err(self.fault(accessor, "indices must be unsigned scalars"));
         }
-        let mut out = vec![0; accessor.count()];
+        self.elements(accessor, 0, unsigned)
+    }
+
+    /// Indices of the joints that move each vertex.
+    pub fn joints(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<[u32; 4]>, Issue> {
+        let integer = matches!(accessor.data_type(), DataType::U8 | DataType::U16);
+        if accessor.dimensions() != Dimensions::Vec4 || !integer {
+            return Err(self.fault(accessor, "joints must be four unsigned bytes or shorts"));
+        }
+        self.elements(accessor, [0; 4], |bytes| {
+            let width = bytes.len() / 4;
+            std::array::from_fn(|k| unsigned(&bytes[k * width..][..width]))
+        })
+    }
+
+    /// All elements: the stored ones, or `absent`, and the sparse substitutions.
+    fn elements<T: Clone>(
+        &self,
+        accessor: &gltf::Accessor<'_>,
+        absent: T,
+        decode: impl Fn(&[u8]) -> T,
+    ) -> Result<Vec<T>, Issue> {
+        let mut out = vec![absent; accessor.count()];
         if let Some(view) = accessor.view() {
             let run = self.run(
                 accessor,
@@ -113,11 +134,11 @@ impl<'a> Reader<'a> {
                 accessor.size(),
                 accessor.count(),
             )?;
-            for (i, bytes) in out.iter_mut().zip(run.elements()) {
-                *i = unsigned(bytes);
+            for (slot, bytes) in out.iter_mut().zip(run.elements()) {
+                *slot = decode(bytes);
             }
         }
-        self.replace(accessor, &mut out, unsigned)?;
+        self.replace(accessor, &mut out, decode)?;
         Ok(out)
     }
 

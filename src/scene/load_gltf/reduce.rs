@@ -1,19 +1,25 @@
-//! Keeps of a glTF file what makes triangles: nodes, positions, indices. The typed reader then
-//! cannot stumble over a material, and its own validation concerns the geometry only.
+//! Keeps of a glTF file what makes triangles: nodes, positions, indices; for an animation also what moves
+//! them. The typed reader then cannot stumble over a material, and its own validation concerns the
+//! geometry only.
+
+use std::collections::HashMap;
 
 use serde_json::{Map, Value, json};
 
 /// The geometry of a file, with accessors renumbered.
 pub(super) struct Reduced {
     pub json: Value,
+    /// The file's number of each accessor that is kept.
+    pub accessors: Vec<usize>,
     /// Buffers that the geometry needs.
     pub buffers: Vec<usize>,
     /// Primitives whose positions or indices are not stored anywhere, which are left out.
     pub without_data: usize,
 }
 
-/// `root` has passed validation: references resolve and types are right.
-pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
+/// `root` has passed validation: references resolve and types are right. With the number of an
+/// `animation`, keeps that one, morph targets and skins.
+pub(super) fn reduce(root: &Map<String, Value>, animation: Option<usize>) -> Reduced {
     let mut accessors = Renumbering::default();
     let mut without_data = 0;
     let meshes: Vec<Value> = list(root, "meshes")
@@ -30,8 +36,15 @@ pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
                         return None;
                     }
                     let mut out = pick(primitive, &["mode"]);
-                    let position = accessors.number(position?);
-                    out.insert("attributes".to_owned(), json!({ "POSITION": position }));
+                    let mut attributes = Map::new();
+                    attributes.insert("POSITION".to_owned(), json!(accessors.number(position?)));
+                    if animation.is_some() {
+                        attributes.extend(influences(root, primitive, &mut accessors));
+                        if let Some(targets) = targets(root, primitive, &mut accessors) {
+                            out.insert("targets".to_owned(), targets);
+                        }
+                    }
+                    out.insert("attributes".to_owned(), Value::Object(attributes));
                     if let Some(indices) = primitive.get("indices") {
                         out.insert("indices".to_owned(), json!(accessors.number(indices)));
                     }
@@ -39,11 +52,33 @@ pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
                 })
                 .collect();
             let mut out = pick(mesh, &["name"]);
+            if animation.is_some() {
+                out.extend(pick(mesh, &["weights"]));
+            }
             out.insert("primitives".to_owned(), Value::Array(primitives));
             Value::Object(out)
         })
         .collect();
-    let transform = [
+    let skins: Vec<Value> = match animation {
+        Some(_) => list(root, "skins")
+            .iter()
+            .map(|skin| {
+                let mut out = pick(skin, &["joints"]);
+                if let Some(matrices) = skin.get("inverseBindMatrices") {
+                    let number = accessors.number(matrices);
+                    out.insert("inverseBindMatrices".to_owned(), json!(number));
+                }
+                Value::Object(out)
+            })
+            .collect(),
+        None => Vec::new(),
+    };
+    let animations: Vec<Value> = animation
+        .and_then(|i| list(root, "animations").get(i))
+        .map(|animation| motion(animation, &mut accessors))
+        .into_iter()
+        .collect();
+    let mut transform = vec![
         "name",
         "children",
         "mesh",
@@ -52,6 +87,9 @@ pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
         "rotation",
         "scale",
     ];
+    if animation.is_some() {
+        transform.extend(["skin", "weights"]);
+    }
     let nodes: Vec<Value> = list(root, "nodes")
         .iter()
         .map(|node| Value::Object(pick(node, &transform)))
@@ -74,7 +112,7 @@ pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
         "sparse",
     ];
     let kept: Vec<Value> = accessors
-        .0
+        .kept
         .iter()
         .filter_map(|&i| list(root, "accessors").get(i))
         .map(|accessor| {
@@ -96,6 +134,8 @@ pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
         "meshes": meshes,
         "nodes": nodes,
         "scenes": scenes,
+        "skins": skins,
+        "animations": animations,
     });
     if let Some(scene) = root.get("scene") {
         json["scene"] = scene.clone();
@@ -103,6 +143,7 @@ pub(super) fn reduce(root: &Map<String, Value>) -> Reduced {
     integers(&mut json);
     Reduced {
         json,
+        accessors: accessors.kept,
         buffers,
         without_data,
     }
@@ -115,15 +156,81 @@ fn stored(root: &Map<String, Value>, accessor: &Value) -> bool {
     accessor.is_some_and(|a| a.get("bufferView").is_some() || a.get("sparse").is_some())
 }
 
+/// Joints and their weights of a primitive's vertices.
+fn influences(
+    root: &Map<String, Value>,
+    primitive: &Value,
+    accessors: &mut Renumbering,
+) -> Map<String, Value> {
+    let attributes = primitive.get("attributes").and_then(Value::as_object);
+    let mut out = Map::new();
+    for (name, accessor) in attributes.into_iter().flatten() {
+        let set = name
+            .strip_prefix("JOINTS_")
+            .or(name.strip_prefix("WEIGHTS_"));
+        if set.is_some_and(|s| s.parse::<u8>().is_ok()) && stored(root, accessor) {
+            out.insert(name.clone(), json!(accessors.number(accessor)));
+        }
+    }
+    out
+}
+
+/// Morph targets: displacements, none where they are not stored and hence zero.
+fn targets(
+    root: &Map<String, Value>,
+    primitive: &Value,
+    accessors: &mut Renumbering,
+) -> Option<Value> {
+    let targets = primitive.get("targets")?.as_array()?;
+    let kept = targets.iter().map(|target| {
+        let mut out = Map::new();
+        if let Some(position) = target.get("POSITION").filter(|p| stored(root, p)) {
+            out.insert("POSITION".to_owned(), json!(accessors.number(position)));
+        }
+        Value::Object(out)
+    });
+    Some(Value::Array(kept.collect()))
+}
+
+/// An animation with those of its channels that move nodes or morph targets.
+fn motion(animation: &Value, accessors: &mut Renumbering) -> Value {
+    let channels: Vec<&Value> = list_of(animation, "channels")
+        .iter()
+        .filter(|channel| {
+            let target = channel.get("target");
+            let path = target.and_then(|t| t.get("path")).and_then(Value::as_str);
+            let known = ["translation", "rotation", "scale", "weights"];
+            target.is_some_and(|t| t.get("node").is_some())
+                && path.is_some_and(|p| known.contains(&p))
+        })
+        .collect();
+    let samplers: Vec<Value> = list_of(animation, "samplers")
+        .iter()
+        .map(|sampler| {
+            let mut out = pick(sampler, &["interpolation"]);
+            for key in ["input", "output"] {
+                if let Some(accessor) = sampler.get(key) {
+                    out.insert(key.to_owned(), json!(accessors.number(accessor)));
+                }
+            }
+            Value::Object(out)
+        })
+        .collect();
+    json!({ "channels": channels, "samplers": samplers })
+}
+
 #[derive(Default)]
-struct Renumbering(Vec<usize>);
+struct Renumbering {
+    kept: Vec<usize>,
+    new: HashMap<usize, usize>,
+}
 
 impl Renumbering {
     fn number(&mut self, old: &Value) -> usize {
         let old = old.as_f64().unwrap_or_default() as usize;
-        self.0.iter().position(|&i| i == old).unwrap_or_else(|| {
-            self.0.push(old);
-            self.0.len() - 1
+        *self.new.entry(old).or_insert_with(|| {
+            self.kept.push(old);
+            self.kept.len() - 1
         })
     }
 }

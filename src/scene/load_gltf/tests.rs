@@ -1,3 +1,6 @@
+use gltf::mesh::Mode;
+
+use super::surface::assemble;
 use super::*;
 
 /// A triangle (0,0,0) (1,0,0) (0,1,0) as little-endian floats in a data URI.

@@ -23,6 +23,9 @@ const GEOMETRY: [&str; 7] = [
     "scenes",
 ];
 
+/// Top-level lists that motion depends on besides.
+const MOTION: [&str; 2] = ["animations", "skins"];
+
 /// Findings that are printed one by one; the rest are counted.
 const SHOWN: usize = 8;
 
@@ -40,13 +43,17 @@ pub(super) const EXPORT_AGAIN: &str = "export it again";
 /// All findings on a file.
 pub(super) struct Findings<'a> {
     root: &'a Map<String, Value>,
+    /// Whether animations are read, too.
+    animated: bool,
     list: Vec<Finding>,
 }
 
-/// Checks types, ranges and references of every property, then the rules between them.
-pub(super) fn validate(root: &Map<String, Value>) -> Vec<Finding> {
+/// Checks types, ranges and references of every property, then the rules between them. `animated`:
+/// whether animations and skins are read, so that faults there stop the loading, too.
+pub(super) fn validate(root: &Map<String, Value>, animated: bool) -> Vec<Finding> {
     let mut findings = Findings {
         root,
+        animated,
         list: Vec::new(),
     };
     findings.object(root, ROOT, "");
@@ -84,7 +91,8 @@ impl<'a> Findings<'a> {
     /// A fault that stops loading where the geometry depends on it.
     pub fn fault(&mut self, pointer: &str, message: impl Into<String>) {
         let top = pointer.split('/').nth(1).unwrap_or_default();
-        let severity = match GEOMETRY.contains(&top) || pointer == "/scene" {
+        let moves = self.animated && MOTION.contains(&top);
+        let severity = match GEOMETRY.contains(&top) || moves || pointer == "/scene" {
             true => Severity::Error,
             false => Severity::Warning,
         };

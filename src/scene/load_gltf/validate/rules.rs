@@ -103,7 +103,8 @@ fn extensions(findings: &mut Findings<'_>) {
 fn unread(findings: &mut Findings<'_>) {
     for name in ["animations", "skins", "cameras", "images"] {
         let count = list(findings, name).len();
-        if count > 0 {
+        let read = findings.animated && ["animations", "skins"].contains(&name);
+        if count > 0 && !read {
             findings.note(&format!("/{name}"), format!("{count} {name} are not read"));
         }
     }
@@ -342,7 +343,7 @@ fn meshes(findings: &mut Findings<'_>) {
                     );
                 }
             }
-            if primitive.get("targets").is_some() {
+            if primitive.get("targets").is_some() && !findings.animated {
                 findings.note(&format!("{at}/targets"), "morph targets are not read");
             }
         }
