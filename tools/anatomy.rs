@@ -22,6 +22,10 @@ mod body;
 mod check;
 #[path = "anatomy/decimate.rs"]
 mod decimate;
+#[path = "anatomy/fetus.rs"]
+mod fetus;
+#[path = "anatomy/fetus_scene.rs"]
+mod fetus_scene;
 #[path = "anatomy/field.rs"]
 mod field;
 #[path = "anatomy/heart.rs"]
@@ -48,6 +52,10 @@ mod pose;
 mod valves;
 #[path = "anatomy/vessels.rs"]
 mod vessels;
+#[path = "anatomy/womb.rs"]
+mod womb;
+
+use model::Extent;
 
 /// Makes the anatomy that the scenes show.
 #[derive(Parser)]
@@ -76,6 +84,15 @@ enum Scene {
         #[arg(short, long)]
         output: PathBuf,
     },
+    /// A fetus of eleven weeks that moves in its sac in a uterus.
+    Fetus {
+        /// Triangles in total.
+        #[arg(long, default_value_t = 36_000, value_parser = clap::value_parser!(u64).range(20_000..))]
+        triangles: u64,
+        /// Folder for fetus.toml and fetus/*.obj.
+        #[arg(short, long)]
+        output: PathBuf,
+    },
     /// A limb in eight keyframes that have nothing in common: boxes without overlap.
     Limbs {
         /// Triangles of one keyframe.
@@ -94,6 +111,7 @@ fn main() -> ExitCode {
     let made = match Args::parse().scene {
         Scene::Abdomen { triangles, output } => abdomen(triangles as usize, &output),
         Scene::Heart { triangles, output } => heart_scene::make(triangles as usize, &output),
+        Scene::Fetus { triangles, output } => fetus_scene::make(triangles as usize, &output),
         Scene::Limbs {
             triangles,
             spread,
@@ -111,7 +129,12 @@ fn main() -> ExitCode {
 
 fn abdomen(budget: usize, output: &Path) -> Result<(), String> {
     let parts = abdomen::parts();
-    let surfaces = model::surfaces(&parts, (body::LOW, body::HIGH), budget)?;
+    let extent = Extent {
+        low: body::LOW,
+        high: body::HIGH,
+        step: 4.0,
+    };
+    let surfaces = model::surfaces(&parts, extent, budget)?;
     let total = model::count(&surfaces);
     for (part, surface) in parts.iter().zip(&surfaces) {
         let path = output.join("abdomen").join(format!("{}.obj", part.name));

@@ -12,12 +12,15 @@ use glam::{DVec2, Vec3};
 use crate::field::{
     Point, cone, difference, ellipsoid, half_space, intersection, undulation, union, union_all,
 };
+use crate::model::Extent;
 use crate::part::{Part, part};
 
-/// The box that holds the heart and what is modelled of the chest, mm.
-pub const LOW: Vec3 = Vec3::new(-125.0, -64.0, -6.0);
-/// See [`LOW`].
-pub const HIGH: Vec3 = Vec3::new(105.0, 64.0, 206.0);
+/// The box that holds the heart and what is modelled of the chest.
+pub const EXTENT: Extent = Extent {
+    low: Vec3::new(-125.0, -64.0, -6.0),
+    high: Vec3::new(105.0, 64.0, 206.0),
+    step: 3.0,
+};
 
 /// Level of the left ventricle's widest section.
 pub const EQUATOR: f64 = 83.0;

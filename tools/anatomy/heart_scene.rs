@@ -28,7 +28,7 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
     let count = beating.len();
     let parts: Vec<Part> = beating.into_iter().chain(chest).collect();
     let rest = budget.saturating_sub(leaflets);
-    let surfaces = model::surfaces(&parts, (heart::LOW, heart::HIGH), rest)?;
+    let surfaces = model::surfaces(&parts, heart::EXTENT, rest)?;
     let (resting, still) = surfaces.split_at(count);
 
     let mut volumes = Vec::new();

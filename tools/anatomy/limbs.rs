@@ -118,6 +118,10 @@ background = "amniotic_fluid"
 preset = "abdominal"
 depth = "130 mm"
 
+# Fluid takes next to nothing from the beam, so that nothing is to be made up for.
+[imaging]
+tgc_attenuation = "0.15 dB/cm/MHz"
+
 [[selector]]
 name = "kicks"
 period = "2 s"

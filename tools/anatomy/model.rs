@@ -23,15 +23,22 @@ const ROUNDS: usize = 5;
 /// its shape, and Newton's steps are not to hide it.
 const REACH: f32 = 2.0;
 
-/// Meshes of all parts, `budget` triangles in total to 20 %, inside the box `low..high`, each
-/// closed and outward.
-pub fn surfaces(
-    parts: &[Part],
-    (low, high): (Vec3, Vec3),
-    budget: usize,
-) -> Result<Vec<Surface>, String> {
+/// Where the parts are looked for.
+#[derive(Clone, Copy)]
+pub struct Extent {
+    /// Lower corner, mm.
+    pub low: Vec3,
+    /// Upper corner, mm.
+    pub high: Vec3,
+    /// Pitch of the grid on which a part is found, mm; finer than the smallest part is wide.
+    pub step: f32,
+}
+
+/// Meshes of all parts, `budget` triangles in total to 20 %, inside `extent`, each closed and
+/// outward.
+pub fn surfaces(parts: &[Part], extent: Extent, budget: usize) -> Result<Vec<Surface>, String> {
     let fields: Vec<Field> = parts.iter().map(|p| Field::new(&p.field)).collect();
-    let fine = finely(parts, &fields, (low, high), budget as f64)?;
+    let fine = finely(parts, &fields, extent, budget as f64)?;
     let weights: Vec<f64> = parts.iter().map(|p| p.weight).collect();
     let mut surfaces = decimate::decimate(fine, &weights, budget);
     for ((part, field), surface) in parts.iter().zip(&fields).zip(&mut surfaces) {
@@ -60,13 +67,13 @@ pub fn surfaces(
 fn finely(
     parts: &[Part],
     fields: &[Field],
-    bounds: (Vec3, Vec3),
+    extent: Extent,
     budget: f64,
 ) -> Result<Vec<Surface>, String> {
     let mut before: Option<(f64, f64)> = None;
     let mut scale = 1.0f64;
     for _ in 0..ROUNDS {
-        let built = build(parts, fields, bounds, scale as f32)?;
+        let built = build(parts, fields, extent, scale as f32)?;
         let total = count(&built) as f64;
         println!("cells scaled by {scale:.3}: {total} triangles");
         if total >= LEAST_SPARE * budget {
@@ -88,15 +95,13 @@ pub fn count(surfaces: &[Surface]) -> usize {
 fn build(
     parts: &[Part],
     fields: &[Field],
-    (low, high): (Vec3, Vec3),
+    extent: Extent,
     scale: f32,
 ) -> Result<Vec<Surface>, String> {
     let one = |(part, field): (&Part, &Field)| {
         let cell = part.cell * scale;
-        // A grid that a part as small as a few cells cannot slip through.
-        let step = (2.0 * part.cell).min(4.0);
         field
-            .bounds(low, high, step)
+            .bounds(extent.low, extent.high, extent.step)
             .ok_or(Defect::Empty)
             .and_then(|(low, high)| meshing::mesh(field, low, high, cell))
             .map_err(|defect| format!("{}: {defect} (cells of {cell:.2} mm)", part.name))
