@@ -11,6 +11,10 @@ use insonify::gpu::{
 mod accel;
 #[path = "gpu/commands.rs"]
 mod commands;
+#[path = "gpu/dynamic.rs"]
+mod dynamic;
+#[path = "gpu/sheet.rs"]
+mod sheet;
 
 /// Group size of `add.comp` in these tests; not its default.
 const ADD_GROUP: u32 = 32;

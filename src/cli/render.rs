@@ -103,7 +103,8 @@ pub fn run(args: &Render) -> Result<()> {
     let device = Device::new(&DeviceOptions {
         selector: args.device.clone(),
         validate: args.validate,
-        without_ray_query: args.tracer == TracerChoice::Bvh,
+        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
+        ..DeviceOptions::default()
     })
     .into_diagnostic()?;
     if let Some(quality) = args.quality {

@@ -1,11 +1,13 @@
-//! What bottom and top level share: the structure itself, scratch memory, compacted sizes.
+//! What bottom and top level share: the structure itself, its geometry and sizes, scratch memory,
+//! compacted sizes.
 
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use ash::vk;
 
 use super::commands::Commands;
-use super::device::Device;
+use super::device::{AccelSupport, Device};
 use super::error::{GpuError, during};
 use super::memory::{Buffer, BufferKind};
 
@@ -14,6 +16,8 @@ pub(crate) struct RawAccel {
     pub(crate) handle: vk::AccelerationStructureKHR,
     pub(crate) name: String,
     pub(crate) buffer: Buffer,
+    /// Builds and refits of a structure that changes; a top level must come after the last.
+    builds: AtomicU64,
     device: Arc<Device>,
 }
 
@@ -38,8 +42,18 @@ impl RawAccel {
             handle,
             name: name.into(),
             buffer,
+            builds: AtomicU64::new(0),
             device: device.clone(),
         })
+    }
+
+    /// Counts a build or refit that makes the top levels over this structure stale.
+    pub(crate) fn note_build(&self) {
+        self.builds.fetch_add(1, Ordering::Relaxed);
+    }
+
+    pub(crate) fn builds(&self) -> u64 {
+        self.builds.load(Ordering::Relaxed)
     }
 
     pub(crate) fn address(&self) -> vk::DeviceAddress {
@@ -66,6 +80,45 @@ impl Drop for RawAccel {
             }
         }
     }
+}
+
+/// Opaque triangles of packed single-precision vertices and 32-bit indices at these addresses.
+pub(crate) fn triangles<'a>(
+    vertices: vk::DeviceAddress,
+    vertex_count: u32,
+    indices: vk::DeviceAddress,
+) -> vk::AccelerationStructureGeometryKHR<'a> {
+    let at = |device_address| vk::DeviceOrHostAddressConstKHR { device_address };
+    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
+        .vertex_format(vk::Format::R32G32B32_SFLOAT)
+        .vertex_data(at(vertices))
+        .vertex_stride(12)
+        .max_vertex(vertex_count - 1)
+        .index_type(vk::IndexType::UINT32)
+        .index_data(at(indices));
+    vk::AccelerationStructureGeometryKHR::default()
+        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
+        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
+        .flags(vk::GeometryFlagsKHR::OPAQUE)
+}
+
+/// Memory that a build of one geometry of `count` primitives needs.
+pub(crate) fn build_sizes<'a>(
+    accel: &AccelSupport,
+    info: &vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+    count: u32,
+) -> vk::AccelerationStructureBuildSizesInfoKHR<'a> {
+    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
+    // SAFETY: addresses are ignored in a size query; one geometry, one count.
+    unsafe {
+        accel.functions.get_acceleration_structure_build_sizes(
+            vk::AccelerationStructureBuildTypeKHR::DEVICE,
+            info,
+            &[count],
+            &mut sizes,
+        );
+    }
+    sizes
 }
 
 /// Scratch memory whose address is aligned as the device asks.

@@ -69,6 +69,10 @@ pub(crate) struct Adapter {
     /// 0 where the queue cannot write timestamps.
     pub(crate) timestamp_bits: u32,
     pub(crate) buffer_device_address: bool,
+    /// Ray-tracing pipelines: not used, but structures may only be built where they or ray queries
+    /// are enabled (VUID-vkGetAccelerationStructureBuildSizesKHR-rayTracingPipeline-03617). Drivers
+    /// without ray-tracing cores have them alone.
+    pub(crate) ray_tracing_pipeline: bool,
     pub(crate) robust_buffer_access: bool,
     /// R8 and R16 images can be written by kernels.
     pub(crate) extended_storage_formats: bool,
@@ -169,10 +173,12 @@ fn probe(
     let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
     let mut accel = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut pipeline = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
     let has_accel = at_least_1_2
         && has(khr::acceleration_structure::NAME)
         && has(khr::deferred_host_operations::NAME);
     let has_query = has_accel && has(khr::ray_query::NAME);
+    let has_pipeline = has_accel && has(khr::ray_tracing_pipeline::NAME);
     let mut features = vk::PhysicalDeviceFeatures2::default();
     if at_least_1_2 {
         features = features.push_next(&mut address);
@@ -182,6 +188,9 @@ fn probe(
     }
     if has_query {
         features = features.push_next(&mut query);
+    }
+    if has_pipeline {
+        features = features.push_next(&mut pipeline);
     }
     let mut driver = vk::PhysicalDeviceDriverProperties::default();
     let mut properties2 = vk::PhysicalDeviceProperties2::default();
@@ -201,7 +210,10 @@ fn probe(
     }
     let core = features.features;
     let buffer_device_address = address.buffer_device_address == vk::TRUE;
-    let acceleration_structure = accel.acceleration_structure == vk::TRUE && buffer_device_address;
+    let ray_tracing_pipeline = pipeline.ray_tracing_pipeline == vk::TRUE;
+    let acceleration_structure = accel.acceleration_structure == vk::TRUE
+        && buffer_device_address
+        && (query.ray_query == vk::TRUE || ray_tracing_pipeline);
     let ray_query = query.ray_query == vk::TRUE && acceleration_structure;
 
     // SAFETY: `physical` belongs to this instance.
@@ -246,6 +258,7 @@ fn probe(
         queue_family: family.unwrap_or(0),
         timestamp_bits,
         buffer_device_address,
+        ray_tracing_pipeline,
         robust_buffer_access: core.robust_buffer_access == vk::TRUE,
         extended_storage_formats: core.shader_storage_image_extended_formats == vk::TRUE,
         portability_subset: has(khr::portability_subset::NAME),

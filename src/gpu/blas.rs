@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::accel::{CompactedSizes, RawAccel, Scratch};
+use super::accel::{CompactedSizes, RawAccel, Scratch, build_sizes, triangles};
 use super::barrier::Stage;
+use super::build_times::BuildTimes;
 use super::device::Device;
 use super::error::GpuError;
 use super::memory::{Buffer, BufferKind};
@@ -25,7 +26,7 @@ pub struct BlasInput<'a> {
 }
 
 impl BlasInput<'_> {
-    fn check(&self, device: &Device) -> Result<(), GpuError> {
+    pub(crate) fn check(&self, device: &Device) -> Result<(), GpuError> {
         let problem = if self.triangles.is_empty() {
             "it has no triangles".into()
         } else if self.triangles.len() as u64 > device.require_accel()?.max_primitives {
@@ -103,6 +104,16 @@ impl Blas {
         inputs: &[BlasInput<'_>],
         options: BlasOptions,
     ) -> Result<Vec<Self>, GpuError> {
+        Self::build_timed(device, inputs, options).map(|(built, _)| built)
+    }
+
+    /// As [`Self::build_many`], with what it took.
+    pub(crate) fn build_timed(
+        device: &Arc<Device>,
+        inputs: &[BlasInput<'_>],
+        options: BlasOptions,
+    ) -> Result<(Vec<Self>, BuildTimes), GpuError> {
+        let mut times = BuildTimes::default();
         let mut done = Vec::with_capacity(inputs.len());
         let (mut batch, mut bytes) = (Vec::new(), 0);
         for input in inputs {
@@ -110,7 +121,7 @@ impl Blas {
             let planned = plan(device, *input, options)?;
             let needed = input.input_bytes() + planned.scratch_bytes;
             if !batch.is_empty() && bytes + needed > BATCH_BYTES {
-                done.extend(build_batch(device, &batch, options)?);
+                done.extend(build_batch(device, &batch, options, &mut times)?);
                 batch.clear();
                 bytes = 0;
             }
@@ -118,9 +129,10 @@ impl Blas {
             batch.push(planned);
         }
         if !batch.is_empty() {
-            done.extend(build_batch(device, &batch, options)?);
+            done.extend(build_batch(device, &batch, options, &mut times)?);
         }
-        Ok(done)
+        times.compacted_bytes = done.iter().map(Self::bytes).sum();
+        Ok((done, times))
     }
 
     /// Name of the mesh.
@@ -134,23 +146,10 @@ impl Blas {
     }
 }
 
+/// The geometry of a mesh whose vertices begin at `address`; its triangles follow.
 fn geometry<'a>(input: &BlasInput<'_>, address: u64) -> vk::AccelerationStructureGeometryKHR<'a> {
     let indices = address + size_of_val(input.positions) as u64;
-    let triangles = vk::AccelerationStructureGeometryTrianglesDataKHR::default()
-        .vertex_format(vk::Format::R32G32B32_SFLOAT)
-        .vertex_data(vk::DeviceOrHostAddressConstKHR {
-            device_address: address,
-        })
-        .vertex_stride(12)
-        .max_vertex(input.positions.len() as u32 - 1)
-        .index_type(vk::IndexType::UINT32)
-        .index_data(vk::DeviceOrHostAddressConstKHR {
-            device_address: indices,
-        });
-    vk::AccelerationStructureGeometryKHR::default()
-        .geometry_type(vk::GeometryTypeKHR::TRIANGLES)
-        .geometry(vk::AccelerationStructureGeometryDataKHR { triangles })
-        .flags(vk::GeometryFlagsKHR::OPAQUE)
+    triangles(address, input.positions.len() as u32, indices)
 }
 
 fn build_info<'a>(
@@ -171,16 +170,8 @@ fn plan<'a>(
 ) -> Result<Planned<'a>, GpuError> {
     let accel = device.require_accel()?;
     let geometry = geometry(&input, 0);
-    let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-    // SAFETY: addresses are ignored in a size query; one geometry, one count.
-    unsafe {
-        accel.functions.get_acceleration_structure_build_sizes(
-            vk::AccelerationStructureBuildTypeKHR::DEVICE,
-            &build_info(&geometry, options),
-            &[input.triangles.len() as u32],
-            &mut sizes,
-        );
-    }
+    let info = build_info(&geometry, options);
+    let sizes = build_sizes(accel, &info, input.triangles.len() as u32);
     Ok(Planned {
         input,
         structure_bytes: sizes.acceleration_structure_size,
@@ -194,6 +185,7 @@ fn build_batch(
     device: &Arc<Device>,
     batch: &[Planned<'_>],
     options: BlasOptions,
+    times: &mut BuildTimes,
 ) -> Result<Vec<Blas>, GpuError> {
     let input_bytes = batch.iter().map(|p| p.input.input_bytes()).sum();
     let inputs = device.buffer("BLAS input", input_bytes, BufferKind::BuildInput)?;
@@ -214,7 +206,8 @@ fn build_batch(
         .map(|p| RawAccel::new(device, p.input.name, bottom, p.structure_bytes).map(Arc::new))
         .collect::<Result<Vec<_>, _>>()?;
     let sizes = CompactedSizes::new(device, batch.len() as u32)?;
-    record_builds(
+    times.bytes += structures.iter().map(|s| s.buffer.size()).sum::<u64>();
+    times.build_ms += record_builds(
         device,
         batch,
         options,
@@ -225,12 +218,15 @@ fn build_batch(
     )?;
     drop(inputs);
     if options.compact {
-        compact(device, &structures, &sizes.read()?)
+        let (compacted, ms) = compact(device, &structures, &sizes.read()?)?;
+        times.compact_ms += ms;
+        Ok(compacted)
     } else {
         Ok(structures.into_iter().map(Blas).collect())
     }
 }
 
+/// Builds a batch; returns milliseconds.
 fn record_builds(
     device: &Arc<Device>,
     batch: &[Planned<'_>],
@@ -239,7 +235,7 @@ fn record_builds(
     starts: &[u64],
     structures: &[Arc<RawAccel>],
     sizes: &CompactedSizes,
-) -> Result<(), GpuError> {
+) -> Result<f64, GpuError> {
     let accel = device.require_accel()?;
     let scratch = Scratch::new(device, batch.iter().map(|p| p.scratch_bytes).sum())?;
     let base = inputs.device_address();
@@ -265,7 +261,8 @@ fn record_builds(
         })
         .collect();
     let ranges: Vec<&[_]> = ranges.iter().map(<[_; 1]>::as_slice).collect();
-    device.once(|commands| {
+    let ((), timings) = device.once_timed(|commands| {
+        commands.scope("build");
         // SAFETY: inputs, scratch and structures have the sizes that the device asked for and
         // live until `once` returns, which waits; vertex numbers were checked.
         unsafe {
@@ -275,24 +272,27 @@ fn record_builds(
         }
         if options.compact {
             commands.barrier(Stage::Build, Stage::Build);
+            commands.scope("sizes");
             sizes.record(commands, structures)?;
         }
         Ok(())
-    })
+    })?;
+    Ok(timings.of("build"))
 }
 
-/// Copies each structure into one of the size it needs.
+/// Copies each structure into one of the size it needs; returns milliseconds too.
 fn compact(
     device: &Arc<Device>,
     structures: &[Arc<RawAccel>],
     sizes: &[u64],
-) -> Result<Vec<Blas>, GpuError> {
+) -> Result<(Vec<Blas>, f64), GpuError> {
     let accel = device.require_accel()?;
     let bottom = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
     let compacted = (structures.iter().zip(sizes))
         .map(|(old, &size)| RawAccel::new(device, &old.name, bottom, size))
         .collect::<Result<Vec<_>, _>>()?;
-    device.once(|commands| {
+    let ((), timings) = device.once_timed(|commands| {
+        commands.scope("compact");
         for (old, new) in structures.iter().zip(&compacted) {
             let info = vk::CopyAccelerationStructureInfoKHR::default()
                 .src(old.handle)
@@ -308,8 +308,6 @@ fn compact(
         }
         Ok(())
     })?;
-    Ok(compacted
-        .into_iter()
-        .map(|raw| Blas(Arc::new(raw)))
-        .collect())
+    let compacted = compacted.into_iter().map(|raw| Blas(Arc::new(raw)));
+    Ok((compacted.collect(), timings.of("compact")))
 }

@@ -138,6 +138,18 @@ impl<'a> Commands<'a> {
         by: &str,
     ) {
         self.slot.keep(object.clone());
+        self.note(object, name, stage, write, by);
+    }
+
+    /// While validating, notes that `stage` reads or writes an object that is kept otherwise.
+    pub(crate) fn note<T>(
+        &mut self,
+        object: &Arc<T>,
+        name: &str,
+        stage: Stage,
+        write: bool,
+        by: &str,
+    ) {
         if self.device().is_validating() {
             let id = Arc::as_ptr(object) as usize as u64;
             let by = match self.scope.as_str() {
@@ -232,6 +244,17 @@ impl<'a> Commands<'a> {
             Binding::Tlas(tlas) => {
                 self.uses(tlas.structure(), tlas.name(), compute, false, by);
                 self.keep(tlas.bottom());
+                for blas in tlas.bottom().iter() {
+                    self.note(&blas.0, blas.name(), compute, false, by);
+                }
+                if self.device().is_validating() && tlas.is_stale() {
+                    let message = format!(
+                        "STALE: '{by}' reads '{}', of whose meshes one was built or refitted since: \
+                         build or refit the top level after them",
+                        tlas.name()
+                    );
+                    self.device().validation_log().push(message);
+                }
             }
         }
     }

@@ -24,8 +24,11 @@ pub struct DeviceOptions {
     /// Turns the validation layers on, or fails where they are not installed. The environment
     /// variable `INSONIFY_VALIDATE=1` does the same.
     pub validate: bool,
-    /// Leaves ray queries and acceleration structures off although the device has them.
+    /// Leaves ray queries off although the device has them; acceleration structures can be built
+    /// where it has ray-tracing pipelines.
     pub without_ray_query: bool,
+    /// Leaves acceleration structures, and with them ray queries, off although the device has them.
+    pub without_acceleration_structures: bool,
 }
 
 /// The limits that kernels and buffers are checked against.
@@ -88,10 +91,10 @@ impl Device {
         let from_environment = std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1");
         let instance = Instance::new(options.validate || from_environment)?;
         let mut adapter = adapter::choose(&instance, options.selector.as_deref())?;
-        if options.without_ray_query {
-            adapter.info.ray_query = false;
-            adapter.info.acceleration_structure = false;
-        }
+        let without = options.without_acceleration_structures;
+        adapter.info.ray_query &= !(options.without_ray_query || without);
+        let traces = adapter.info.ray_query || adapter.ray_tracing_pipeline;
+        adapter.info.acceleration_structure &= traces && !without;
         let raw = create_device(&instance, &adapter)?;
         // SAFETY: the family was enabled with one queue.
         let queue = unsafe { raw.get_device_queue(adapter.queue_family, 0) };
@@ -309,6 +312,8 @@ fn create_device(instance: &Instance, adapter: &Adapter) -> Result<ash::Device, 
     let mut accel =
         vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
     let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut pipeline =
+        vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
     if adapter.info.acceleration_structure {
         extensions.push(khr::acceleration_structure::NAME.as_ptr());
         extensions.push(khr::deferred_host_operations::NAME.as_ptr());
@@ -317,6 +322,9 @@ fn create_device(instance: &Instance, adapter: &Adapter) -> Result<ash::Device, 
     if adapter.info.ray_query {
         extensions.push(khr::ray_query::NAME.as_ptr());
         info = info.push_next(&mut query);
+    } else if adapter.info.acceleration_structure {
+        extensions.push(khr::ray_tracing_pipeline::NAME.as_ptr());
+        info = info.push_next(&mut pipeline);
     }
     let info = info.enabled_extension_names(&extensions);
     let _changing = LOADER_LISTS.write();

@@ -46,7 +46,8 @@ impl MemoryUseCounter {
 /// What a buffer is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferKind {
-    /// In device memory, read and written by kernels (as storage or uniform block) and copies.
+    /// In device memory, read and written by kernels (as storage or uniform block) and copies; read
+    /// by builds where the device has acceleration structures.
     Storage,
     /// Vertices, indices and instances of acceleration-structure builds, in device memory.
     BuildInput,
@@ -61,20 +62,24 @@ pub enum BufferKind {
 }
 
 impl BufferKind {
-    fn usage(self) -> vk::BufferUsageFlags {
+    /// `accel`: whether acceleration structures are on, without which their usages are unknown.
+    fn usage(self, accel: bool) -> vk::BufferUsageFlags {
         use vk::BufferUsageFlags as Usage;
+        let build_input =
+            Usage::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR | Usage::SHADER_DEVICE_ADDRESS;
         match self {
             Self::Storage => {
-                Usage::STORAGE_BUFFER
+                let kernels = Usage::STORAGE_BUFFER
                     | Usage::UNIFORM_BUFFER
                     | Usage::TRANSFER_SRC
-                    | Usage::TRANSFER_DST
+                    | Usage::TRANSFER_DST;
+                if accel {
+                    kernels | build_input
+                } else {
+                    kernels
+                }
             }
-            Self::BuildInput => {
-                Usage::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR
-                    | Usage::SHADER_DEVICE_ADDRESS
-                    | Usage::TRANSFER_DST
-            }
+            Self::BuildInput => build_input | Usage::TRANSFER_DST,
             Self::Scratch => Usage::STORAGE_BUFFER | Usage::SHADER_DEVICE_ADDRESS,
             Self::AccelerationStructure => {
                 Usage::ACCELERATION_STRUCTURE_STORAGE_KHR | Usage::SHADER_DEVICE_ADDRESS
@@ -193,7 +198,7 @@ impl Buffer {
         }
         let info = vk::BufferCreateInfo::default()
             .size(size)
-            .usage(kind.usage())
+            .usage(kind.usage(device.supports_acceleration_structure()))
             .sharing_mode(vk::SharingMode::EXCLUSIVE);
         // SAFETY: the size is positive; usages that need an extension were refused above
         // where it is absent.
@@ -288,7 +293,7 @@ impl Buffer {
             .cast()
     }
 
-    /// Address on the device; only for kinds made for acceleration structures.
+    /// Address on the device; only for kinds that builds use, where acceleration structures are on.
     pub(crate) fn device_address(&self) -> vk::DeviceAddress {
         let info = vk::BufferDeviceAddressInfo::default().buffer(self.0.handle);
         // SAFETY: the buffer has the usage flag, and its feature is on wherever acceleration

@@ -27,6 +27,13 @@ impl FrameTimings {
     pub fn total_ms(&self) -> f64 {
         self.passes.iter().map(|(_, ms)| ms).sum()
     }
+
+    /// Milliseconds of the scopes of this name, in all; NaN where none was timed.
+    pub fn of(&self, name: &str) -> f64 {
+        let named = self.passes.iter().filter(|(scope, _)| scope == name);
+        let times = named.map(|&(_, ms)| ms);
+        times.reduce(|a, b| a + b).unwrap_or(f64::NAN)
+    }
 }
 
 /// Records the scopes of one slot. A scope lasts until the next begins or the submission ends, so
@@ -91,7 +98,10 @@ impl Timer {
         self.names.push(name.to_owned());
         let device = &self.device.raw;
         // The word must not be written before the passes before have ended. Nothing waits for it.
-        let earlier = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+        let mut earlier = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+        if self.device.supports_acceleration_structure() {
+            earlier |= vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
+        }
         // SAFETY: `commands` is being recorded outside a render pass; the word lies in the buffer.
         unsafe {
             device.cmd_pipeline_barrier(

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::accel::{RawAccel, Scratch};
+use super::accel::{RawAccel, Scratch, build_sizes};
 use super::barrier::Stage;
 use super::blas::Blas;
 use super::commands::Commands;
@@ -52,6 +52,8 @@ pub struct Tlas {
     capacity: u32,
     /// The meshes that the structure refers to.
     bottom: Arc<Vec<Blas>>,
+    /// Builds of those meshes until then, in all.
+    bottom_builds: u64,
     /// Instances of the last build.
     built: Option<u32>,
 }
@@ -70,16 +72,7 @@ impl Tlas {
         }
         let geometry = geometry(0);
         let info = build_info(&geometry, vk::BuildAccelerationStructureModeKHR::BUILD);
-        let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
-        // SAFETY: addresses are ignored in a size query; one geometry, one count.
-        unsafe {
-            accel.functions.get_acceleration_structure_build_sizes(
-                vk::AccelerationStructureBuildTypeKHR::DEVICE,
-                &info,
-                &[capacity],
-                &mut sizes,
-            );
-        }
+        let sizes = build_sizes(accel, &info, capacity);
         let top = vk::AccelerationStructureTypeKHR::TOP_LEVEL;
         let structure = RawAccel::new(device, name, top, sizes.acceleration_structure_size)?;
         let scratch = sizes.build_scratch_size.max(sizes.update_scratch_size);
@@ -93,6 +86,7 @@ impl Tlas {
             scratch: Scratch::new(device, scratch)?,
             capacity,
             bottom: Arc::default(),
+            bottom_builds: 0,
             built: None,
         })
     }
@@ -107,8 +101,9 @@ impl Tlas {
         self.structure.buffer.size() + self.instances.size() + self.scratch.buffer.size()
     }
 
-    /// Records a build from scratch. A barrier from Build to Compute must come before rays, and
-    /// one from Compute to Build after earlier rays of the same submission.
+    /// Records a build from scratch, after the builds of meshes before it in the submission. A
+    /// barrier from Build to Compute must come before rays, and one from Compute to Build after
+    /// earlier rays of the same submission.
     pub fn build(
         &mut self,
         commands: &mut Commands<'_>,
@@ -146,8 +141,11 @@ impl Tlas {
         let start = address - self.instances.device_address();
         commands.write(&self.instances, start, &bytes)?;
         commands.barrier(Stage::Transfer, Stage::Build);
+        // Meshes may have been built in the same submission.
+        commands.barrier(Stage::Build, Stage::Build);
         // The last submission may still trace the meshes that are replaced here: it keeps them.
         self.bottom = Arc::new(instances.iter().map(|i| i.blas.clone()).collect());
+        self.bottom_builds = self.count_bottom_builds();
         let count = instances.len() as u32;
         self.built = Some(count);
 
@@ -163,6 +161,9 @@ impl Tlas {
         commands.uses(&self.scratch.buffer.0, "scratch", stage, true, "build");
         commands.uses(&self.structure, &name, stage, true, "build");
         commands.keep(&self.bottom);
+        for blas in self.bottom.iter() {
+            commands.note(&blas.0, blas.name(), stage, false, "build");
+        }
         let geometry = geometry(address);
         let mut info = build_info(&geometry, mode)
             .dst_acceleration_structure(self.structure.handle)
@@ -209,6 +210,15 @@ impl Tlas {
 
     pub(crate) fn bottom(&self) -> &Arc<Vec<Blas>> {
         &self.bottom
+    }
+
+    fn count_bottom_builds(&self) -> u64 {
+        self.bottom.iter().map(|blas| blas.0.builds()).sum()
+    }
+
+    /// Whether a mesh was built or refitted after the last build or refit of this.
+    pub(crate) fn is_stale(&self) -> bool {
+        self.bottom_builds != self.count_bottom_builds()
     }
 
     pub(crate) fn is_built(&self) -> bool {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use insonify::gpu::{
     Binding, Blas, BlasInput, BlasOptions, Buffer, BufferKind, Device, DeviceOptions, GpuError,
-    Kernel, Stage, Tlas, TlasInstance, test_device,
+    Kernel, Stage, Tlas, TlasInstance, build_times, refit_times, test_device,
 };
 
 use super::{assert_clean, words};
@@ -25,7 +25,7 @@ fn shifted(z: f32) -> [[f32; 4]; 3] {
 }
 
 /// A device with ray queries, or `None` with a line that says that the test is not run.
-fn ray_query_device() -> Option<Arc<Device>> {
+pub fn ray_query_device() -> Option<Arc<Device>> {
     let device = test_device();
     if !device.supports_ray_query() {
         eprintln!("skipped: '{}' has no ray queries", device.name());
@@ -293,10 +293,10 @@ fn geometry_that_cannot_be_built_is_refused_by_name() {
 
 /// As on a driver without the extensions: everything but rays works, and the error says why.
 #[test]
-fn a_device_without_ray_queries_runs_kernels_and_refuses_rays() {
+fn a_device_without_acceleration_structures_runs_kernels_and_refuses_rays() {
     let options = DeviceOptions {
         validate: true,
-        without_ray_query: true,
+        without_acceleration_structures: true,
         ..Default::default()
     };
     let device = Device::new(&options).unwrap();
@@ -329,5 +329,70 @@ fn a_device_without_ray_queries_runs_kernels_and_refuses_rays() {
         .unwrap();
     assert_eq!(device.read_back_as::<u32>(&b).unwrap(), [5; 8]);
     drop((kernel, a, b));
+    assert_clean(device);
+}
+
+/// As on GPUs for data centres: structures are built and timed, rays are refused.
+#[test]
+fn structures_are_built_and_timed_without_ray_queries() {
+    if ray_query_device().is_none() {
+        return;
+    }
+    let options = DeviceOptions {
+        validate: true,
+        without_ray_query: true,
+        ..Default::default()
+    };
+    let device = Device::new(&options).unwrap();
+    assert!(!device.supports_ray_query() && device.supports_acceleration_structure());
+    let spirv = words(include_bytes!("nearest.spv"));
+    let error = Kernel::new(&device, "nearest", &spirv, &[]).err().unwrap();
+    assert!(error.to_string().contains("needs ray queries"), "{error}");
+
+    let positions: Vec<_> = (0..100_000).flat_map(|i| triangle(i as f32)).collect();
+    let all: Vec<_> = (0..100_000)
+        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
+        .collect();
+    let mesh = |triangles| BlasInput {
+        name: "mesh",
+        positions: &positions,
+        triangles,
+    };
+    let (many, few) = (mesh(&all[..]), mesh(&all[..20]));
+    let loose = BlasOptions {
+        fast_trace: false,
+        compact: false,
+    };
+    let compacted = build_times(&device, &[many, few], BlasOptions::default()).unwrap();
+    let large = build_times(&device, &[many], loose).unwrap();
+    let small = build_times(&device, &[few], loose).unwrap();
+    let changing = refit_times(&device, &[many, few], false).unwrap();
+    println!("{compacted:?}\n{large:?}\n{small:?}\n{changing:?}");
+    assert!(compacted.build_ms > 0.0 && compacted.compact_ms > 0.0);
+    assert!(compacted.compacted_bytes <= compacted.bytes);
+    assert_eq!(
+        (large.compact_ms, large.compacted_bytes),
+        (0.0, large.bytes)
+    );
+    // Five thousand times the triangles: what is timed is the build.
+    assert!(large.build_ms > 3.0 * small.build_ms && large.bytes > 1000 * small.bytes);
+    assert!(changing.build_ms > 0.0 && changing.refit_ms > 0.0 && changing.bytes > large.bytes);
+
+    // Top levels and meshes that change need no ray queries either.
+    let blas = Blas::build_many(&device, &[few], BlasOptions::default()).unwrap();
+    let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
+    let one = TlasInstance {
+        blas: &blas[0],
+        transform: shifted(0.0),
+        custom_index: 0,
+        mask: 1,
+    };
+    device
+        .once(|commands| {
+            commands.scope("top");
+            tlas.build(commands, &[one])
+        })
+        .unwrap();
+    drop((blas, tlas));
     assert_clean(device);
 }
