@@ -17,9 +17,14 @@ layout(std430, binding = 5) readonly buffer SegmentBuffer { Segment segments[]; 
 layout(std430, binding = 6) readonly buffer SegmentCountBuffer { uint segment_count[]; };
 layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 9) readonly buffer FieldBuffer { float fields[]; };
+
+// Whether any instance's tissue deforms; without it the kernel is smaller.
+layout(constant_id = 0) const bool DEFORMING = true;
 
 #include "transform.glsl"
 #include "probe.glsl"
+#include "field.glsl"
 #include "texture.glsl"
 #include "deposit.glsl"
 
@@ -167,6 +172,28 @@ ivec2 lattice_planes(Stretch s) {
     return ivec2(first, int(floor(high / frame.cell)) - first + 1);
 }
 
+// Echo of a scatterer at `rel` from the stretch's origin, if it is within the beam and, along it, `within`.
+bool hear(Stretch s, vec3 rel, uint bits, float factor, vec2 within) {
+    float rho_e = dot(rel, s.e_e);
+    if (abs(rho_e) > frame.elevation_reach) return false;
+    float x = dot(rel, s.d);
+    if (!(x >= within.x && x < within.y)) return false;
+    float rho_l = dot(rel, s.e_l);
+    float time = s.time + x / s.speed;
+    float at = frame.speed * time / frame.sample_pitch;
+    uint row = row_at(at);
+    float sigma_l = rows[row].sigma_lateral;
+    if (abs(rho_l) > frame.lateral_cut * sigma_l) return false;
+    float sigma_e = rows[row].sigma_elevation;
+    float l = rho_l / sigma_l;
+    float e = (layer_y + rho_e) / sigma_e;
+    float amplitude = factor * exp(-0.5 * (l * l + e * e) - s.absorption * x)
+        * thinning(s, x, sigma_l, sigma_e)
+        * (tissues[s.tissue].mean + tissues[s.tissue].sigma * gaussian(bits));
+    deposit(at, time, amplitude, false);
+    return true;
+}
+
 // All scatterers of one lattice plane that the beam reaches.
 uvec2 march_plane(Stretch s, int plane, vec2 within) {
     uint axis = dominant_axis(s.d);
@@ -183,7 +210,6 @@ uvec2 march_plane(Stretch s, int plane, vec2 within) {
     if (x_middle + reach < within.x || x_middle - reach > within.y) return uvec2(0u);
 
     float presence = tissues[s.tissue].presence;
-    float mean = tissues[s.tissue].mean, deviation = tissues[s.tissue].sigma;
     uint seed = tissues[s.tissue].seed;
     float depth = tissues[s.tissue].texture_depth;
     float factor = s.weight;
@@ -219,27 +245,14 @@ uvec2 march_plane(Stretch s, int plane, vec2 within) {
             if (!present(bits, presence)) continue;
             vec3 p = (vec3(cell) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h;
             vec3 rel = p - s.o;
-            float rho_e = dot(rel, s.e_e);
-            if (abs(rho_e) > frame.elevation_reach) continue;
-            float x = dot(rel, s.d);
-            if (!(x >= 0.0 && x < s.extent)) continue;
-            float rho_l = dot(rel, s.e_l);
-            float time = s.time + x / s.speed;
-            float at = frame.speed * time / frame.sample_pitch;
-            uint row = row_at(at);
-            float sigma_l = rows[row].sigma_lateral;
-            if (abs(rho_l) > frame.lateral_cut * sigma_l) continue;
-            float sigma_e = rows[row].sigma_elevation;
-            float l = rho_l / sigma_l;
-            float e = (layer_y + rho_e) / sigma_e;
-            float amplitude = factor * exp(-0.5 * (l * l + e * e) - s.absorption * x)
-                * thinning(s, x, sigma_l, sigma_e) * (mean + deviation * gaussian(bits.w));
-            deposit(at, time, amplitude, false);
+            if (!hear(s, rel, bits.w, factor, vec2(0.0, s.extent))) continue;
             count.y += 1u;
         }
     }
     return count;
 }
+
+#include "pieces.glsl"
 
 // Whole samples inside a stretch: first and number (voxel mode).
 ivec2 voxel_samples(Stretch s) {
@@ -253,6 +266,7 @@ ivec2 voxel_samples(Stretch s) {
 uvec2 march_sample(Stretch s, int k) {
     float x = (float(k) * frame.sample_pitch / frame.speed - s.time) * s.speed;
     vec3 p = s.o + x * s.d;
+    if (deforms(s)) p = reference_point(load_field(field_of(s.instance)), p);
     ivec3 cell = ivec3(floor(p / frame.cell));
     uint seed = tissues[s.tissue].seed;
     uvec4 bits = pcg4d(uvec4(uvec3(cell), seed));
@@ -293,6 +307,12 @@ void march_point(Stretch s, vec4 point) {
     deposit(at, time, s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, sigma_l, sigma_e), true);
 }
 
+// First item of work and number of items: samples, pieces or lattice planes.
+ivec2 work_of(Stretch s, bool voxel) {
+    if (voxel) return voxel_samples(s);
+    return deforms(s) ? field_pieces(s) : lattice_planes(s);
+}
+
 void main() {
     uint line = gl_WorkGroupID.x;
     uint thread = gl_LocalInvocationID.x;
@@ -316,7 +336,7 @@ void main() {
             uint at = line * frame.segment_capacity + gl_WorkGroupID.y + (batch + thread) * chunks;
             Stretch s = texture_stretch(at);
             bool scatters = tissues[s.tissue].presence > 0.0 && is_finite(s);
-            work_end[thread] = !scatters ? 0u : uint(max(voxel ? voxel_samples(s).y : lattice_planes(s).y, 0));
+            work_end[thread] = !scatters ? 0u : uint(max(work_of(s, voxel).y, 0));
         }
         barrier();
         if (thread == 0u) {
@@ -332,12 +352,13 @@ void main() {
             while (item >= work_end[owner]) owner += 1u;
             if (loaded != owner) {
                 s = texture_stretch(line * frame.segment_capacity + gl_WorkGroupID.y + (batch + owner) * chunks);
-                first = voxel ? voxel_samples(s).x : lattice_planes(s).x;
+                first = work_of(s, voxel).x;
                 within = window_extent(s);
                 loaded = owner;
             }
             int index = first + int(item - (owner == 0u ? 0u : work_end[owner - 1u]));
             if (voxel) count += march_sample(s, index);
+            else if (deforms(s)) count += march_piece(s, index);
             else count += march_plane(s, index, within);
         }
         for (uint i = 0u; i < size && frame.points > 0u; ++i) {

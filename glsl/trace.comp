@@ -30,6 +30,7 @@ layout(std430, binding = 10) buffer SurfaceEchoBuffer { int surface_echoes[]; };
 layout(std430, binding = 11) buffer SegmentBuffer { Segment segments[]; };
 layout(std430, binding = 12) buffer SegmentCountBuffer { uint segment_count[]; };
 layout(std430, binding = 13) buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 14) readonly buffer FieldBuffer { float fields[]; };
 
 layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 
@@ -42,6 +43,7 @@ layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 #include "surface.glsl"
 #include "probe.glsl"
 #include "transform.glsl"
+#include "field.glsl"
 #include "acoustics.glsl"
 #include "footprint.glsl"
 #include "media.glsl"
@@ -233,7 +235,7 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     if (s.coherence >= 1.0) return;
     // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
     // tracer would choose the phase.
-    vec3 p = texture_point(instance, path.origin) * 2.0 + 0.381966;
+    vec3 p = tissue_point(instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
     float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;

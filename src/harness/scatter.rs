@@ -49,6 +49,7 @@ fn sizes(job: &Job) -> Vec<usize> {
         4 * lines(&frame),
         8 * samples(&frame),
         size_of::<Counters>(),
+        worlds::field_size(job),
     ]
 }
 
@@ -132,6 +133,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("segment_count", &counts),
         Input::sum("volume_echoes", Element::Integer, 2 * samples(&frame)),
         Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
+        words("fields"),
     ];
     job
 }

@@ -64,11 +64,12 @@ fn sizes(job: &Job) -> Vec<usize> {
         segments * size_of::<layout::Segment>(),
         4 * lines(&frame),
         size_of::<Counters>(),
+        worlds::field_size(job),
     ]);
     sizes
 }
 
-/// Frame, tissues, surfaces and the world's five bindings.
+/// Frame, tissues, surfaces, the world's five bindings, and its fields.
 pub fn scene(case: Case, size: Size) -> Vec<Input> {
     let mut frame = frame(case, size);
     frame.surface_scale = (1 << 20) as f32;
@@ -96,7 +97,10 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
         Input::words("tissues", &tissues),
         Input::floats("surfaces", bytemuck::cast_slice(&worlds::surfaces())),
     ];
-    inputs.extend(worlds::world(case).inputs());
+    let world = worlds::world(case);
+    let fields = world.field_input();
+    inputs.extend(world.inputs());
+    inputs.push(fields);
     inputs
 }
 
@@ -117,6 +121,7 @@ fn job(case: Case, size: Size) -> Job {
     let segments = lines(&frame) * frame.segment_capacity as usize;
     let segments = segments * size_of::<layout::Segment>() / 4;
     job.push = bytemuck::bytes_of(&[0, frame.paths]).to_vec();
+    let fields = job.inputs.pop().expect("the last of the scene");
     job.inputs.extend([
         Input::words("stacks", &origin::pack(&stacks)),
         Input::floats("rows", bytemuck::cast_slice(&rows)),
@@ -124,6 +129,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::output("segments", Element::Word, segments),
         Input::sum("segment_count", Element::Word, lines(&frame)),
         Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
+        fields,
     ]);
     job
 }

@@ -8,6 +8,7 @@ use super::{Case, Input, Job};
 use crate::reference::Owned;
 use crate::scene::{Mesh, shapes};
 use crate::sim::bvh::{MeshBvh, SceneBvh};
+use crate::sim::fields::HEADER;
 use crate::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use crate::sim::placement;
 
@@ -17,6 +18,7 @@ pub struct Builder {
     meshes: Vec<Mesh>,
     placements: Vec<(usize, DAffine3)>,
     instances: Vec<Instance>,
+    fields: Vec<[f32; 3]>,
 }
 
 impl Builder {
@@ -37,8 +39,36 @@ impl Builder {
             priority,
             surface_outside: 0,
             surface_inside: 1,
+            field: NONE,
             ..Instance::default()
         });
+    }
+
+    /// Lets the tissue of the instance placed last be somewhere else than in its reference shape: by
+    /// up to 3 mm, strained by up to a quarter.
+    fn deform(&mut self) {
+        let (origin, spacing, size) = (DVec3::new(-20.0, -16.0, -14.0), 4.0, [11_u8, 9, 8]);
+        let instance = self.instances.last_mut().expect("placed");
+        instance.field = self.fields.len() as u32;
+        let scale = DVec3::splat(f64::recip(spacing));
+        let header = [origin, scale, DVec3::from(size.map(f64::from))];
+        self.fields.extend(header.map(|v| v.as_vec3().to_array()));
+        let along = |n: u8| (0..n).map(f64::from);
+        for k in along(size[2]) {
+            for j in along(size[1]) {
+                for i in along(size[0]) {
+                    let p = origin + spacing * DVec3::new(i, j, k);
+                    let wave = DVec3::new((p.y / 7.0).sin(), (p.z / 9.0).cos(), (p.x / 8.0).sin());
+                    let v = DVec3::new(0.05, -0.08, 0.04) * p + wave;
+                    self.fields.push(v.as_vec3().to_array());
+                }
+            }
+        }
+    }
+
+    /// Displacement fields of the instances.
+    pub fn field_input(&self) -> Input {
+        Input::floats("fields", self.fields.as_flattened())
     }
 
     /// The five bindings instances, vertices, normals, triangles, nodes.
@@ -155,6 +185,7 @@ pub fn world(case: Case) -> Builder {
                 2,
                 1,
             );
+            builder.deform();
             builder.place(shapes::sphere(5.0, 2), pose(2.0, 1.0, 27.0), 0, 2);
             builder.place(
                 shapes::cuboid([9.0, 30.0, 6.0]),
@@ -194,7 +225,20 @@ pub fn owned(job: &Job) -> Owned {
         normals: optional(job, "normals"),
         triangles: optional(job, "triangles"),
         points,
+        fields: optional(job, "fields"),
     }
+}
+
+/// Bytes of the displacement fields that the instances of `job` refer to.
+pub fn field_size(job: &Job) -> usize {
+    let fields: Vec<[f32; 3]> = job.get("fields");
+    let instances: Vec<Instance> = job.get("instances");
+    let used = instances.iter().filter(|i| i.field != NONE).map(|i| {
+        let header = i.field as usize + HEADER as usize;
+        let nodes = fields.get(header - 1).map_or(0.0, |n| n[0] * n[1] * n[2]);
+        header + nodes as usize
+    });
+    12 * used.max().unwrap_or(0)
 }
 
 /// Bytes of the five bindings of [`Builder::inputs`] as they are in `job`: a dump brings its own.

@@ -95,6 +95,25 @@ impl<'a> Field<'a> {
         let longest = |reach: f64, &d: &[f32; 3]| reach.max(widen(d).length());
         self.displacements.iter().fold(0.0, longest)
     }
+
+    /// Bound on the gradient: how much further apart, per mm, two points can be displaced. Along an
+    /// axis the derivative lies between those along the edges of a cell.
+    pub fn steepness(&self) -> f64 {
+        let [nx, ny, _] = self.size;
+        let largest = |step: usize, at: &dyn Fn(usize) -> bool| {
+            let edges = (step..self.displacements.len()).filter(|&i| at(i));
+            let slope = |i: usize| {
+                (widen(self.displacements[i]) - widen(self.displacements[i - step])).length()
+            };
+            edges.map(slope).fold(0.0, f64::max)
+        };
+        let slopes = DVec3::new(
+            largest(1, &|i| i % nx > 0),
+            largest(nx, &|i| i / nx % ny > 0),
+            largest(nx * ny, &|_| true),
+        );
+        (slopes * self.scale).length()
+    }
 }
 
 #[cfg(test)]
@@ -130,6 +149,7 @@ mod tests {
         }
         assert_eq!(field.reach(), 1.25_f64.sqrt());
         assert_eq!(field.spacing(), 2.0);
+        assert_eq!(field.steepness(), 1.25_f64.sqrt() / 2.0);
     }
 
     #[test]

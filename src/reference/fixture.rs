@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 pub use super::Owned as Fixture;
-use crate::sim::layout::{Frame, Instance, Row, Rows, Surface, Tissue};
+use crate::sim::layout::{Frame, Instance, NONE, Row, Rows, Surface, Tissue};
 
 pub fn rows_of(m: &DAffine3) -> Rows {
     std::array::from_fn(|i| {
@@ -97,6 +97,7 @@ impl Fixture {
                 texture_from_world: rows_of(&at.inverse()),
                 tissue,
                 priority,
+                field: NONE,
                 ..Instance::default()
             },
         );

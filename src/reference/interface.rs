@@ -186,7 +186,7 @@ impl Interface {
         );
         let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
         if rest > 0.0 {
-            let p = world.texture(self.instance).transform_point3(path.origin);
+            let p = world.tissue_point(self.instance, path.origin);
             let cell = (p / PHASE_CELL + PHASE_SHIFT).floor().as_i64vec3();
             let key = path.n.wrapping_mul(0x9e37_79b9).wrapping_add(frame.seed);
             let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);

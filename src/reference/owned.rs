@@ -25,6 +25,8 @@ pub struct Owned {
     pub normals: Vec<[f32; 3]>,
     /// Vertex indices; an instance owns a range.
     pub triangles: Vec<[u32; 3]>,
+    /// Displacement fields, in vectors.
+    pub fields: Vec<[f32; 3]>,
 }
 
 impl Owned {
@@ -62,6 +64,7 @@ impl Owned {
                 triangles: &self.triangles,
             },
             points: &self.points,
+            fields: &self.fields,
         }
     }
 

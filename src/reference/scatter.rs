@@ -3,6 +3,7 @@
 use glam::{DAffine3, DVec3, I64Vec3};
 
 use super::accumulator::NEAREST;
+use super::field::Field;
 use super::geometry::{beam_weight, probe, world_line};
 use super::texture::{factor, scatterer};
 use super::world::World;
@@ -31,17 +32,51 @@ struct Tube<'a> {
     layer_offset: f64,
     /// Distance from the geometric scanline, mm: at the start and per mm.
     off: [f64; 2],
+    /// How the tissue is displaced in the tube's space.
+    field: Option<Deformed<'a>>,
+}
+
+/// A field and its bounds.
+#[derive(Clone, Copy)]
+struct Deformed<'a> {
+    field: Field<'a>,
+    /// mm.
+    reach: f64,
+    steepness: f64,
+}
+
+impl Deformed<'_> {
+    /// A middle and a distance of all points of the reference shape from which tissue can be within
+    /// `radius` of `p`, relative to where it is: v differs by no more than `steepness` times the
+    /// distance there, which is no more than radius / (1 - steepness).
+    fn back(&self, p: DVec3, radius: f64) -> (DVec3, f64) {
+        if self.steepness < 1.0 {
+            let spread = self.steepness / (1.0 - self.steepness) * radius;
+            (self.field.reference(p) - p, spread)
+        } else {
+            (DVec3::ZERO, self.reach)
+        }
+    }
 }
 
 /// Echoes of all segments, in units of 1 / volume_scale.
 pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
     let mut out = Accumulator::new(world.frame);
+    let deformed = |instance: u32| {
+        world.field(instance).map(|field| Deformed {
+            field,
+            reach: field.reach(),
+            steepness: field.steepness(),
+        })
+    };
+    let fields: Vec<_> = (0..world.instances.len() as u32).map(deformed).collect();
     for segment in segments {
         let finite = [segment.length, segment.time].iter().all(|x| x.is_finite());
         if !(finite && segment.origin.is_finite() && segment.direction.is_finite()) {
             continue;
         }
-        let tube = Tube::new(world, segment, world.texture(segment.instance));
+        let field = fields.get(segment.instance as usize).copied().flatten();
+        let tube = Tube::new(world, segment, world.texture(segment.instance), field);
         if tube.tissue.presence > 0.0 {
             if world.frame.flags & FLAG_VOXEL == 0 {
                 tube.lattice(&mut out);
@@ -49,13 +84,18 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
                 tube.voxels(&mut out);
             }
         }
-        Tube::new(world, segment, DAffine3::IDENTITY).points(&mut out);
+        Tube::new(world, segment, DAffine3::IDENTITY, None).points(&mut out);
     }
     out
 }
 
 impl<'a> Tube<'a> {
-    fn new(world: &'a World, segment: &'a Segment, space: DAffine3) -> Self {
+    fn new(
+        world: &'a World,
+        segment: &'a Segment,
+        space: DAffine3,
+        field: Option<Deformed<'a>>,
+    ) -> Self {
         let elevation = segment.handedness * segment.direction.cross(segment.lateral);
         let (l, layer) = (
             segment.line % world.frame.scanlines,
@@ -76,6 +116,7 @@ impl<'a> Tube<'a> {
                 (segment.origin - line.origin).dot(line.lateral),
                 segment.direction.dot(line.lateral),
             ],
+            field,
         }
     }
 
@@ -139,7 +180,7 @@ impl<'a> Tube<'a> {
     }
 
     /// Every lattice cell that touches the tube. Pieces own disjoint ranges of x, so that no
-    /// scatterer is met twice.
+    /// scatterer is met twice. Of deformed tissue, every cell from which the field can reach it.
     fn lattice(&self, out: &mut Accumulator) {
         let frame = self.world.frame;
         let h = f64::from(frame.cell);
@@ -147,15 +188,21 @@ impl<'a> Tube<'a> {
         let cut = f64::from(frame.lateral_cut);
         let widest = self.world.rows.iter().map(|r| r.sigma_lateral);
         let half = [cut * f64::from(widest.fold(0.0, f32::max)), reach];
-        let pieces = (self.segment.length / PIECE).ceil() as u32;
+        let length = (self.field).map_or(PIECE, |f| (f.field.spacing() / 4.0).max(4.0 * h));
+        let pieces = (self.segment.length / length).ceil() as u32;
         for piece in 0..pieces {
-            let x0 = f64::from(piece) * PIECE;
-            let x1 = (x0 + PIECE).min(self.segment.length);
+            let x0 = f64::from(piece) * length;
+            let x1 = (x0 + length).min(self.segment.length);
             let (low, high) = self.bounds([x0, x1], half);
+            let middle = self.origin + (x0 + x1) / 2.0 * self.direction;
+            let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
+            let (back, spread) =
+                (self.field).map_or((DVec3::ZERO, 0.0), |f| f.back(middle, radius));
             let (low, high) = (
-                (low / h).floor().as_i64vec3(),
-                (high / h).floor().as_i64vec3(),
+                ((low + back - spread) / h).floor().as_i64vec3(),
+                ((high + back + spread) / h).floor().as_i64vec3(),
             );
+            let of_piece = (self.field).map(|f| factor(self.tissue, f.field.reference(middle)));
             for k in low.z..=high.z {
                 for j in low.y..=high.y {
                     for i in low.x..=high.x {
@@ -163,11 +210,14 @@ impl<'a> Tube<'a> {
                         let Some(s) = scatterer(self.tissue, cell) else {
                             continue;
                         };
-                        let p = (cell.as_dvec3() + s.offset) * h;
+                        let rest = (cell.as_dvec3() + s.offset) * h;
+                        let moved = |f: Deformed| rest + f.field.displacement(rest);
+                        let p = self.field.map_or(rest, moved);
                         let x = (p - self.origin).dot(self.direction);
                         if (x0..x1).contains(&x) {
-                            let amplitude =
-                                s.amplitude * factor(self.tissue, self.on_plane(cell, h));
+                            let texture = of_piece
+                                .unwrap_or_else(|| factor(self.tissue, self.on_plane(cell, h)));
+                            let amplitude = s.amplitude * texture;
                             self.echo(p, amplitude, [cut, reach], |r| r.volume_gain, out);
                         }
                     }
@@ -208,6 +258,7 @@ impl<'a> Tube<'a> {
         for k in (first..i64::from(frame.samples) + 1).take_while(|&k| (k as f64) < end) {
             let x = (k as f64 * pitch / speed - self.segment.time) * f64::from(self.tissue.speed);
             let p = self.origin + x * self.direction;
+            let p = self.field.map_or(p, |f| f.field.reference(p));
             let cell = (p / h).floor().as_i64vec3();
             let Some(s) = scatterer(self.tissue, cell) else {
                 continue;

@@ -2,6 +2,7 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use super::field::Field;
 use super::intersect;
 use super::stack::Stack;
 use crate::sim::layout::{Frame, Instance, NONE, Row, Rows, Surface, Tissue};
@@ -39,6 +40,8 @@ pub struct World<'a> {
     pub geometry: Geometry<'a>,
     /// World position (mm) and amplitude of point targets.
     pub points: &'a [[f32; 4]],
+    /// Displacement fields of deforming instances.
+    pub fields: &'a [[f32; 3]],
 }
 
 /// A ray's crossing of one mesh.
@@ -165,5 +168,21 @@ impl World<'_> {
         } else {
             affine(&self.instances[instance as usize].texture_from_world)
         }
+    }
+
+    /// How the tissue of `instance` is displaced in its texture space; none where it does not deform.
+    pub fn field(&self, instance: u32) -> Option<Field<'_>> {
+        let world = self.frame.flags & crate::sim::layout::FLAG_WORLD_TEXTURE != 0;
+        if instance == NONE || world {
+            return None;
+        }
+        let at = self.instances[instance as usize].field;
+        (at != NONE).then(|| Field::new(self.fields, at))
+    }
+
+    /// The place in the reference shape, in texture space, of the tissue that is at `p` in the world.
+    pub fn tissue_point(&self, instance: u32, p: DVec3) -> DVec3 {
+        let p = self.texture(instance).transform_point3(p);
+        self.field(instance).map_or(p, |field| field.reference(p))
     }
 }

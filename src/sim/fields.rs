@@ -96,6 +96,15 @@ impl Fields {
         }
     }
 
+    /// What the kernels bind: a buffer is never empty.
+    pub fn bytes(&self) -> &[u8] {
+        if self.is_empty() {
+            &[0; 12]
+        } else {
+            bytemuck::cast_slice(&self.values)
+        }
+    }
+
     /// Whether no instance deforms.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()

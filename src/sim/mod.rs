@@ -94,7 +94,7 @@ impl Simulator {
             settings: Settings::of(scene),
             tables,
             passes: Passes {
-                kernels: Kernels::new(device, library, tracer)?,
+                kernels: Kernels::new(device, library, tracer, world.deforms())?,
                 buffers,
                 world,
                 frame,
@@ -161,7 +161,8 @@ impl Simulator {
     /// A kernel that the device refuses; the simulator keeps the ones that it had.
     pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
         self.frames.wait()?;
-        self.passes.kernels = Kernels::new(&self.device, library, self.passes.world.tracer())?;
+        let world = &self.passes.world;
+        self.passes.kernels = Kernels::new(&self.device, library, world.tracer(), world.deforms())?;
         Ok(())
     }
 

@@ -77,6 +77,7 @@ impl Passes {
                 Binding::Buffer(&b.segments),
                 Binding::Buffer(&b.segment_count),
                 Binding::Buffer(&b.counters),
+                Binding::Buffer(w.fields()),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
@@ -110,6 +111,7 @@ impl Passes {
                 Binding::Buffer(&b.segment_count),
                 Binding::Buffer(&b.volume_echoes),
                 Binding::Buffer(&b.counters),
+                Binding::Buffer(w.fields()),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);

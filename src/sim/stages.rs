@@ -147,12 +147,18 @@ impl Kernels {
         device: &Arc<Device>,
         library: &Library,
         tracer: Tracer,
+        deforming: bool,
     ) -> Result<Self, GpuError> {
         let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
         Ok(Self {
             origin: kernel(&format!("origin_{}", tracer.suffix()))?,
             trace: kernel(&format!("trace_{}", tracer.suffix()))?,
-            scatter: kernel("scatter")?,
+            scatter: Kernel::new(
+                device,
+                "scatter",
+                library.words("scatter"),
+                &[(0, u32::from(deforming))],
+            )?,
             beam: kernel("beam")?,
             axial: kernel("axial")?,
             detect: kernel("detect")?,

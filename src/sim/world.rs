@@ -5,6 +5,7 @@ mod arrays;
 use std::sync::Arc;
 
 use super::bvh::{BvhError, SceneBvh};
+use super::fields::Fields;
 use super::layout;
 use super::placement::rows;
 use super::tracer::Tracer;
@@ -49,6 +50,8 @@ pub struct World {
     vertices: Buffer,
     normals: Buffer,
     triangles: Buffer,
+    fields: Fields,
+    field_buffer: Buffer,
     structure: Structure,
 }
 
@@ -66,6 +69,7 @@ impl World {
             vertices,
             normals,
             triangles,
+            fields,
         } = Arrays::new(scene, tracer)?;
         let structure = match bvh {
             Some(bvh) => {
@@ -85,6 +89,8 @@ impl World {
             vertices: upload(device, "vertices", bytemuck::cast_slice(&vertices))?,
             normals: upload(device, "normals", bytemuck::cast_slice(&normals))?,
             triangles: upload(device, "triangles", bytemuck::cast_slice(&triangles))?,
+            field_buffer: upload(device, "fields", fields.bytes())?,
+            fields,
             structure,
             places,
             rows,
@@ -111,7 +117,7 @@ impl World {
             Structure::Bvh { bvh, .. } => Some(&bvh.roots[..]),
             Structure::Query { .. } => None,
         };
-        let rows = instance_rows(scene, &self.places, roots);
+        let rows = instance_rows(scene, &self.places, roots, &self.fields);
         if rows == self.rows {
             return Ok(false);
         }
@@ -157,6 +163,16 @@ impl World {
         &self.triangles
     }
 
+    /// Displacement fields of deforming tissue: three floats per vector.
+    pub fn fields(&self) -> &Buffer {
+        &self.field_buffer
+    }
+
+    /// Whether any instance's tissue deforms.
+    pub fn deforms(&self) -> bool {
+        !self.fields.is_empty()
+    }
+
     /// What a kernel of this world's tracer binds as `nodes` or `tlas`.
     pub fn structure(&self) -> Binding<'_> {
         match &self.structure {
@@ -195,6 +211,7 @@ impl World {
             &self.vertices,
             &self.normals,
             &self.triangles,
+            &self.field_buffer,
         ];
         let structure = match &self.structure {
             Structure::Bvh { nodes, .. } => nodes.size(),

@@ -37,6 +37,7 @@ impl Inputs {
                 priority: placed.priority,
                 surface_outside: 2 * i as u32,
                 surface_inside: 2 * i as u32 + 1,
+                field: layout::NONE,
                 ..layout::Instance::default()
             };
             inputs.place(&mesh.positions, &mesh.normals, &mesh.triangles, instance);

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use crate::scene::{Mesh, Scene};
 use crate::sim::bvh::{BvhError, MeshBvh, SceneBvh};
+use crate::sim::fields::Fields;
 use crate::sim::layout::{Instance, NONE};
 use crate::sim::placement::{rigid, rows};
 use crate::sim::tracer::Tracer;
@@ -31,6 +32,8 @@ pub struct Arrays {
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,
+    /// How tissue deforms.
+    pub fields: Fields,
     pub(super) places: Vec<Place>,
 }
 
@@ -49,6 +52,7 @@ impl Arrays {
             normals: Vec::new(),
             triangles: Vec::new(),
             bvh: None,
+            fields: Fields::build(scene),
             places: Vec::new(),
         };
         if tracer == Tracer::Bvh {
@@ -66,7 +70,7 @@ impl Arrays {
             }
         }
         let roots = arrays.bvh.as_ref().map(|bvh| &bvh.roots[..]);
-        arrays.instances = instance_rows(scene, &arrays.places, roots);
+        arrays.instances = instance_rows(scene, &arrays.places, roots, &arrays.fields);
         Ok(arrays)
     }
 
@@ -109,6 +113,7 @@ pub(super) fn instance_rows(
     scene: &Scene,
     places: &[Place],
     roots: Option<&[u32]>,
+    fields: &Fields,
 ) -> Vec<Instance> {
     let row = |(i, placed): (usize, &crate::scene::Instance)| Instance {
         world_from_object: rows(&placed.world_from_object),
@@ -122,7 +127,7 @@ pub(super) fn instance_rows(
         triangles: places[placed.mesh].triangles,
         bvh_root: roots.map_or(NONE, |roots| roots[placed.mesh]),
         slot: 0,
-        field: NONE,
+        field: fields.offset(scene, i),
         ..Instance::default()
     };
     scene.instances.iter().enumerate().map(row).collect()

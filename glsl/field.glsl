@@ -1,0 +1,80 @@
+// Displacement fields: the tissue point P of the reference shape is at P + v(P) now, both in texture
+// space. The includer declares instances[] and `float fields[]`, three floats per vector, and
+// includes shared.glsl. A field is a header (origin, nodes per mm, nodes per axis) and a displacement
+// per node, x running fastest; between nodes it is trilinear, outside the nearest point's.
+
+struct Field { vec3 origin; vec3 scale; vec3 last; uint values; };
+
+// Where the field of an instance begins; NONE where its tissue does not deform.
+uint field_of(uint instance) {
+    if (instance == NONE || (frame.flags & FLAG_WORLD_TEXTURE) != 0u) return NONE;
+    return instances[instance].field;
+}
+
+vec3 field_vector(uint i) { return vec3(fields[3u * i], fields[3u * i + 1u], fields[3u * i + 2u]); }
+
+Field load_field(uint at) {
+    Field f;
+    f.origin = field_vector(at);
+    f.scale = field_vector(at + 1u);
+    f.last = field_vector(at + 2u) - 1.0;
+    f.values = at + 3u;
+    return f;
+}
+
+// v at p, and its derivatives by x, y, z as columns.
+vec3 displacement(Field f, vec3 p, out mat3 gradient) {
+    vec3 at = (p - f.origin) * f.scale;
+    vec3 on = clamp(at, vec3(0.0), f.last);
+    vec3 cell = min(floor(on), f.last - 1.0);
+    vec3 t = on - cell;
+    uint row = uint(f.last.x) + 1u;
+    uint slice = row * (uint(f.last.y) + 1u);
+    uint node = f.values + uint(cell.x) + row * uint(cell.y) + slice * uint(cell.z);
+    vec3 a = field_vector(node), b = field_vector(node + 1u);
+    vec3 c = field_vector(node + row), d = field_vector(node + row + 1u);
+    vec3 e = field_vector(node + slice), g = field_vector(node + slice + 1u);
+    vec3 h = field_vector(node + slice + row), i = field_vector(node + slice + row + 1u);
+    vec3 near_low = a + t.x * (b - a), near_high = c + t.x * (d - c);
+    vec3 far_low = e + t.x * (g - e), far_high = h + t.x * (i - h);
+    vec3 near = near_low + t.y * (near_high - near_low), far = far_low + t.y * (far_high - far_low);
+    vec3 along_low = (b - a) + t.y * ((d - c) - (b - a));
+    vec3 along_high = (g - e) + t.y * ((i - h) - (g - e));
+    vec3 slope = f.scale * vec3(equal(at, on));
+    gradient[0] = slope.x * (along_low + t.z * (along_high - along_low));
+    gradient[1] = slope.y * (near_high - near_low + t.z * ((far_high - far_low) - (near_high - near_low)));
+    gradient[2] = slope.z * (far - near);
+    return near + t.z * (far - near);
+}
+
+vec3 displaced(Field f, vec3 p) {
+    mat3 gradient;
+    return p + displacement(f, p, gradient);
+}
+
+// The x for which jacobian x = b; b itself where the field folds.
+vec3 undeform(mat3 jacobian, vec3 b) {
+    vec3 across = cross(jacobian[1], jacobian[2]);
+    float volume = dot(jacobian[0], across);
+    if (!(volume > 0.05)) return b;
+    return vec3(dot(b, across), dot(jacobian[0], cross(b, jacobian[2])), dot(jacobian[0], cross(jacobian[1], b))) / volume;
+}
+
+// The reference point whose tissue is at p now: Newton's iteration, exact in one step where the
+// deformation is homogeneous.
+vec3 reference_point(Field f, vec3 p) {
+    vec3 found = p;
+    for (int i = 0; i < 6; ++i) {
+        mat3 gradient;
+        vec3 miss = p - found - displacement(f, found, gradient);
+        found += undeform(mat3(1.0) + gradient, miss);
+    }
+    return found;
+}
+
+// World to the reference shape of the tissue at p.
+vec3 tissue_point(uint instance, vec3 p) {
+    vec3 q = texture_point(instance, p);
+    uint at = field_of(instance);
+    return at == NONE ? q : reference_point(load_field(at), q);
+}
