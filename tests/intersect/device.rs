@@ -51,8 +51,8 @@ pub struct Rig {
     kernel: Kernel,
     pub world: World,
     meshes: Vec<usize>,
-    /// Stands in for one of the world's buffers after an error was planted.
-    pub spoilt: Option<(usize, Buffer)>,
+    /// Stand in for buffers of the world, by binding.
+    pub replaced: Vec<(usize, Buffer)>,
 }
 
 impl Rig {
@@ -73,7 +73,7 @@ impl Rig {
             kernel,
             world,
             meshes: scene.instances.iter().map(|i| i.mesh).collect(),
-            spoilt: None,
+            replaced: Vec::new(),
             device: device.clone(),
         }
     }
@@ -107,7 +107,7 @@ impl Rig {
             .unwrap();
         self.device.upload(&list, bytes).unwrap();
         let mut bindings = self.world.bindings().to_vec();
-        if let Some((slot, buffer)) = &self.spoilt {
+        for (slot, buffer) in &self.replaced {
             bindings[*slot] = Binding::Buffer(buffer);
         }
         bindings.extend([Binding::Buffer(&list), Binding::Buffer(&hits)]);

@@ -6,6 +6,7 @@ mod compare;
 mod device;
 mod placements;
 mod rays;
+mod refit;
 mod suite;
 mod walk;
 

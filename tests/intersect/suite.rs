@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, OnceLock};
 
-use insonify::gpu::{Binding, BufferKind, Device, test_device};
+use insonify::gpu::{Binding, Buffer, BufferKind, Device, test_device};
 use insonify::scene::Scene;
 use insonify::sim::tracer::Tracer;
 
@@ -57,11 +57,15 @@ impl Rig {
     }
 
     fn spoil(&mut self, slot: usize, bytes: &[u8]) {
-        let buffer = self
-            .device
-            .buffer("spoilt", bytes.len() as u64, BufferKind::Storage)
-            .unwrap();
+        let buffer = self.storage("spoilt", bytes);
+        self.replaced.push((slot, buffer));
+    }
+
+    /// A buffer for kernels with this content.
+    pub fn storage(&self, name: &str, bytes: &[u8]) -> Buffer {
+        let size = bytes.len() as u64;
+        let buffer = self.device.buffer(name, size, BufferKind::Storage).unwrap();
         self.device.upload(&buffer, bytes).unwrap();
-        self.spoilt = Some((slot, buffer));
+        buffer
     }
 }
