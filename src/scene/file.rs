@@ -2,15 +2,20 @@
 
 use std::path::Path;
 
-use super::{Graph, Scene, Warning};
+use super::{Scene, Warning};
 
 mod anatomy;
 mod document;
 mod error;
+mod graph;
+mod motion;
 mod parameters;
+mod placing;
 mod probe;
 mod schema;
+mod shelf;
 mod tissues;
+mod trajectory;
 mod units;
 
 pub use error::SceneError;
@@ -19,7 +24,8 @@ use document::{Document, Source};
 
 impl Scene {
     /// Loads a scene file and the meshes that it names. `overrides` are `path = value` pairs put
-    /// in before anything is checked: `probe.depth` = `80 mm`, `mesh.liver.tissue` = `fat`.
+    /// in before anything is checked: `probe.depth` = `80 mm`, `mesh.liver.tissue` = `fat`. The
+    /// scene stands at time 0; [`Scene::set_time`] moves it.
     ///
     /// # Errors
     /// The first mistake, with file, line, column and remedy; a mesh that cannot be used counts.
@@ -35,8 +41,9 @@ impl Scene {
         let mut tissues = tissues::Tissues::new(&document, &file.tissues)?;
         let background =
             tissues.index("background", file.background.as_deref().unwrap_or("water"))?;
-        let (meshes, instances) =
+        let (meshes, mut instances) =
             anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
+        let graph = graph::build(&document, &file, &meshes, &mut instances)?;
         let wires = anatomy::wires(&document, &file.wire)?;
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
         let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
@@ -48,19 +55,20 @@ impl Scene {
                 .to_string_lossy()
                 .into_owned()
         });
-        let scene = Self {
+        let mut scene = Self {
             name,
             tissues: tissues.used(),
             background,
             meshes,
             instances,
-            graph: Graph::default(),
+            graph,
             wires,
             probe,
             world_from_probe,
             simulation,
             imaging,
         };
+        scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
         Ok((scene, warnings))
     }
@@ -98,5 +106,7 @@ fn within(
     Err(document.fail(path, message, remedy))
 }
 
+#[cfg(test)]
+mod graph_tests;
 #[cfg(test)]
 mod tests;

@@ -140,10 +140,8 @@ impl Scene {
     /// own, as strategies that move vertices need it.
     pub fn shares_topology(&self, instance: &Instance) -> bool {
         let mut all = instance.keyframes.meshes.iter().map(|&m| &self.meshes[m]);
-        let Some(first) = all.next() else {
-            return true;
-        };
-        all.all(|m| m.positions.len() == first.positions.len() && m.triangles == first.triangles)
+        let first = all.next();
+        first.is_none_or(|first| all.all(|m| m.shares_topology(first)))
     }
 }
 

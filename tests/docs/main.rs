@@ -19,6 +19,8 @@ fn load(text: &str, set: &[(String, String)]) -> Result<Scene, SceneError> {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("scene.toml");
     std::fs::write(&file, text).expect("written");
+    let way = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n1,5,0,0\n";
+    std::fs::write(folder.path().join("way.csv"), way).expect("written");
     Scene::load(&file, set).map(|(scene, _)| scene)
 }
 
@@ -255,14 +257,24 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
             "simulation.path does not exist",
         ),
         (
-            row("seed"),
-            row("seed").replace("integer", "number"),
-            "simulation.seed: number",
+            row("max_interactions"),
+            row("max_interactions").replace("integer", "number"),
+            "simulation.max_interactions: number",
         ),
         (
-            row("seed"),
-            row("seed").replace('1', "2"),
-            "simulation.seed: 2 is not the default",
+            row("max_interactions"),
+            row("max_interactions").replace("32", "33"),
+            "simulation.max_interactions: 33 is not the default",
+        ),
+        (
+            row("pause"),
+            row("pause").replace("6 s", "7 s"),
+            "transform.motion.pause: 7 s is not the default",
+        ),
+        (
+            row("keyframes"),
+            row("keyframes").replace("list of texts", "text"),
+            "mesh.keyframes: text",
         ),
         (
             row("cell"),
@@ -306,7 +318,7 @@ fn the_reference_states_the_units() {
 #[test]
 fn the_examples_of_the_reference_load() {
     let real = document();
-    assert_eq!(real.matches("```toml").count(), 2);
+    assert_eq!(real.matches("```toml").count(), 3);
     assert_eq!(of_examples(&real), [""; 0]);
     let wrong = real.replace("paths = 16", "pathz = 16");
     assert_eq!(of_examples(&wrong).len(), 1);

@@ -81,9 +81,10 @@ pub fn explore(open: &str, close: &str, path: &str, found: &mut BTreeMap<String,
                 wanted.split(':').next().unwrap_or_default().to_owned()
             };
             let whole = wanted(&replies[0]);
-            let value = match whole.strip_prefix("an array of length ") {
-                Some(count) => format!("{count} x {}", wanted(&replies[1])),
-                None => whole,
+            let value = match (whole.as_str(), whole.strip_prefix("an array of length ")) {
+                ("a sequence", _) => format!("list of x {}", wanted(&replies[1])),
+                (_, Some(count)) => format!("{count} x {}", wanted(&replies[1])),
+                _ => whole,
             };
             found.insert(here, Takes::Value(value));
         }

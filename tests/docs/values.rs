@@ -21,8 +21,35 @@ pub fn place(path: &str) -> (String, String) {
          rotate = {{ axis = [0, 0, 1], angle = 0 }}\n\
          [[wire]]\nfrom = [0, 0, 9]\n[tissues.own]\nbased_on = \"liver\"\n"
     );
+    let motion = match parts.as_slice() {
+        ["transform", "motion", "seed" | "duration" | "pause"] => "kind = \"fetal\"",
+        ["transform", "motion", "file" | "interpolation"] => "kind = \"file\", file = \"way.csv\"",
+        _ => "kind = \"sine\", period = 1",
+    };
+    let amplitude = match motion.contains("file") {
+        true => "",
+        false => ", translate = [0, 0, 0], rotate = { axis = [0, 0, 1], angle = 0 }",
+    };
     match parts[0] {
         "mesh" | "wire" => parts.insert(1, "0"),
+        "group" => {
+            text.push_str("[[group]]\nname = \"node\"\n");
+            parts.insert(1, "0");
+        }
+        "transform" => {
+            write!(
+                text,
+                "[[transform]]\nname = \"node\"\nrotate = {{ axis = [0, 0, 1], angle = 0 }}\n\
+                 motion = {{ {motion}{amplitude} }}\n"
+            )
+            .expect("memory");
+            parts.insert(1, "0");
+        }
+        "selector" => {
+            text = text.replacen("tissue", "parent = \"node\"\ntissue", 1);
+            text.push_str("[[selector]]\nname = \"node\"\nperiod = 1\n");
+            parts.insert(1, "0");
+        }
         "tissues" => parts[1] = "own",
         "probe" if parts[1] == "width" => text.push_str("[probe]\npreset = \"linear\"\n"),
         _ => {}
@@ -37,7 +64,8 @@ pub fn settings(scene: &Scene) -> String {
         scene.probe, scene.world_from_probe, scene.simulation, scene.imaging
     );
     let sizes: Vec<_> = scene.meshes.iter().map(|m| m.triangles.len()).collect();
-    write!(out, "{:?}{:?}{sizes:?}", scene.instances, scene.wires).expect("memory");
+    let (instances, graph) = (&scene.instances, &scene.graph);
+    write!(out, "{instances:?}{graph:?}{:?}{sizes:?}", scene.wires).expect("memory");
     out
 }
 

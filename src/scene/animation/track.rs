@@ -243,11 +243,16 @@ impl Channel<DQuat> {
             Curve::Step | Curve::Linear => (1, 0),
         };
         for (i, value) in values.iter_mut().skip(first).step_by(each).enumerate() {
-            if value.length_squared() == 0.0 {
+            // Neither tiny nor huge components may spoil the length.
+            let largest = value
+                .to_array()
+                .into_iter()
+                .fold(0.0, |m: f64, c| m.max(c.abs()));
+            if largest == 0.0 {
                 return Err(TrackError::ZeroQuaternion(i));
             }
             if value.is_finite() {
-                *value = value.normalize();
+                *value = (*value / largest).normalize();
             }
         }
         Self::new(times, values, curve)
@@ -426,6 +431,11 @@ mod tests {
         let bad = [1.0, f64::NAN];
         assert_eq!(make(&[0.0, 1.0], &bad), Err(TrackError::NotFinite(1)));
         assert_eq!(make(&bad, &[1.0; 2]), Err(TrackError::NotFinite(1)));
+        for size in [1e-200, 1e200] {
+            let tiny = vec![DQuat::from_xyzw(0.0, 0.0, size, size)];
+            let channel = Channel::rotations(vec![0.0], tiny, Curve::Step).expect("sound");
+            assert!(channel.at(0.0).angle_between(turn(90.0)) < 1e-7);
+        }
         let zero = vec![DQuat::IDENTITY, DQuat::from_array([0.0; 4])];
         let found = Channel::rotations(vec![0.0, 1.0], zero, Curve::Step).map(|_| ());
         assert_eq!(found, Err(TrackError::ZeroQuaternion(1)));

@@ -118,3 +118,81 @@ impl Scene {
         pairs
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::Scene;
+
+    /// A scene beside three cubes as files.
+    fn load(text: &str) -> (Scene, Vec<String>) {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        for (name, edge) in [("a", 10), ("b", 20), ("c", 30)] {
+            let cube = "v 0 0 0\nv E 0 0\nv E E 0\nv 0 E 0\nv 0 0 E\nv E 0 E\nv E E E\nv 0 E E\n\
+                f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+            let text = cube.replace('E', &edge.to_string());
+            let file = folder.path().join(format!("{name}.obj"));
+            std::fs::write(file, text).expect("written");
+        }
+        let path = folder.path().join("s.toml");
+        std::fs::write(&path, text).expect("written");
+        let (scene, warnings) = Scene::load(&path, &[]).expect("sound");
+        let said = warnings.iter().map(|w| w.message.clone()).collect();
+        (scene, said)
+    }
+
+    fn mesh(name: &str, more: &str) -> String {
+        format!("[[mesh]]\nname = \"{name}\"\ntissue = \"liver\"\n{more}\n")
+    }
+
+    const BEAT: &str = "[[selector]]\nname = \"beat\"\nperiod = 1\n";
+
+    #[test]
+    fn every_keyframe_counts_whatever_the_time() {
+        // At rest the two differ; in the last keyframe they agree.
+        let text = BEAT.to_owned()
+            + &mesh(
+                "x",
+                "parent = \"beat\"\nkeyframes = [\"a.obj\", \"b.obj\", \"c.obj\"]",
+            )
+            + &mesh("y", "file = \"c.obj\"");
+        let (scene, said) = load(&text);
+        assert_eq!(scene.coincident_triangles(), 12);
+        assert!(said[0].contains("12 triangles of `x` and `y`"), "{said:?}");
+    }
+
+    #[test]
+    fn keyframes_that_are_never_shown_together_do_not_meet() {
+        let pair = |second: &str| {
+            BEAT.to_owned()
+                + &mesh("x", "parent = \"beat\"\nkeyframes = [\"a.obj\", \"b.obj\"]")
+                + &mesh("y", &format!("parent = \"beat\"\nkeyframes = {second}"))
+        };
+        assert_eq!(
+            load(&pair("[\"b.obj\", \"a.obj\"]"))
+                .0
+                .coincident_triangles(),
+            0
+        );
+        assert_eq!(
+            load(&pair("[\"c.obj\", \"b.obj\"]"))
+                .0
+                .coincident_triangles(),
+            12
+        );
+    }
+
+    #[test]
+    fn hidden_alternatives_count_against_all_but_each_other() {
+        let alternatives = BEAT.to_owned()
+            + &mesh("x", "parent = \"beat\"\nfile = \"a.obj\"")
+            + &mesh("y", "parent = \"beat\"\nfile = \"a.obj\"");
+        assert_eq!(load(&alternatives).0.coincident_triangles(), 0);
+        let hidden = alternatives.replace("file = \"a.obj\"", "file = \"b.obj\"");
+        let beside = hidden + &mesh("z", "file = \"b.obj\"");
+        let (scene, said) = load(&beside);
+        assert!(!scene.instances[1].shown);
+        // Each triangle of z has a twin in x and one in y; it counts once.
+        assert_eq!(scene.coincident_triangles(), 12);
+        assert_eq!(said.len(), 1, "{said:?}");
+    }
+}

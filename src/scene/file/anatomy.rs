@@ -1,27 +1,18 @@
-//! Meshes, shapes and wires of a scene file.
-
-use std::path::PathBuf;
-
-use glam::{DAffine3, DQuat, DVec3};
+//! Placed meshes and wires of a scene file.
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::{MeshTable, Shape, SurfaceTable, UnitName, WireTable};
+use super::placing::placement;
+use super::schema::{MeshTable, SurfaceTable, WireTable};
+use super::shelf::Shelf;
 use super::tissues::Tissues;
 use super::within;
-use crate::scene::mesh::{self, Units};
-use crate::scene::{Instance, Issue, Keyframes, Mesh, Surface, Wire, shapes};
+use crate::scene::{Instance, Issue, Keyframes, Mesh, Surface, Wire};
 
 /// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
 const MIN_SPACING: f64 = 1e-3;
 
-/// Meshes read so far: a file that several instances name is read once.
-#[derive(Default)]
-struct Shelf {
-    meshes: Vec<Mesh>,
-    keys: Vec<Option<(PathBuf, mesh::Options)>>,
-}
-
+/// Every mesh where it is placed in its parent, unmoved.
 pub(super) fn meshes(
     document: &Document<'_>,
     tables: &[MeshTable],
@@ -41,209 +32,23 @@ pub(super) fn meshes(
         }
         let tissue = tissues.index(&format!("{path}.tissue"), &table.tissue)?;
         let default = tissues.get(tissue).default_surface();
+        let shapes = shelf.shapes(document, table, &path, warnings)?;
+        let place = (table.translate, table.rotate.as_ref(), table.scale);
         instances.push(Instance {
             name: table.name.clone(),
-            mesh: source(document, table, &path, &mut shelf, warnings)?,
-            keyframes: Keyframes::default(),
+            mesh: shapes.mesh,
+            keyframes: Keyframes {
+                meshes: shapes.keyframes,
+                ..Keyframes::default()
+            },
             shown: true,
             tissue,
             priority: table.priority,
-            world_from_object: placement(document, table, &path)?,
+            world_from_object: placement(document, &path, place)?,
             surface: surfaces(document, table, default, &path)?,
         });
     }
     Ok((shelf.meshes, instances))
-}
-
-fn source(
-    document: &Document<'_>,
-    table: &MeshTable,
-    path: &str,
-    shelf: &mut Shelf,
-    warnings: &mut Vec<Issue>,
-) -> Result<usize, SceneError> {
-    let name = &table.name;
-    let (key, mesh) = match (&table.file, &table.shape) {
-        (Some(file), None) => {
-            let units = table.units.map(length_of);
-            let options = mesh::Options {
-                units,
-                node: table.node.clone(),
-                cap_openings: table.cap_openings,
-                ..mesh::Options::default()
-            };
-            let full = document
-                .source
-                .path
-                .parent()
-                .map_or_else(|| file.into(), |p| p.join(file));
-            let key = (full, options);
-            if let Some(i) = shelf.keys.iter().position(|k| k.as_ref() == Some(&key)) {
-                return Ok(i);
-            }
-            let found = mesh::load(&key.0, &key.1).map_err(|issues| {
-                let errors: Vec<_> = issues.iter().filter(|i| i.is_error()).collect();
-                let causes: Vec<_> = errors
-                    .iter()
-                    .map(|e| format!("{}: {}", e.file.display(), e.message))
-                    .collect();
-                let at = match errors.iter().any(|e| e.message.starts_with("no node")) {
-                    true => "node",
-                    false => "file",
-                };
-                document.fail(
-                    &format!("{path}.{at}"),
-                    format!("mesh `{name}`: {}", causes.join("; ")),
-                    errors.first().map_or(String::new(), |e| e.remedy.clone()),
-                )
-            })?;
-            warnings.extend(found.1.into_iter().map(|w| w.of(name)));
-            (Some(key), found.0)
-        }
-        (None, Some(shape)) => {
-            let extra = [
-                ("units", table.units.is_some()),
-                ("node", table.node.is_some()),
-                ("cap_openings", table.cap_openings),
-            ];
-            if let Some((key, _)) = extra.iter().find(|e| e.1) {
-                return Err(document.fail(
-                    &format!("{path}.{key}"),
-                    format!("mesh `{name}`: `{key}` applies to files, not to shapes"),
-                    "remove it",
-                ));
-            }
-            (None, build(document, shape, &format!("{path}.shape"))?)
-        }
-        (given, _) => {
-            return Err(document.fail(
-                path,
-                match given {
-                    Some(_) => format!("mesh `{name}` has both `file` and `shape`"),
-                    None => format!("mesh `{name}` has neither `file` nor `shape`"),
-                },
-                "give one of them",
-            ));
-        }
-    };
-    shelf.meshes.push(Mesh {
-        name: name.clone(),
-        ..mesh
-    });
-    shelf.keys.push(key);
-    Ok(shelf.meshes.len() - 1)
-}
-
-fn length_of(unit: UnitName) -> Units {
-    let name = match unit {
-        UnitName::Um => "um",
-        UnitName::Mm => "mm",
-        UnitName::Cm => "cm",
-        UnitName::M => "m",
-        UnitName::In => "in",
-    };
-    Units::named(name).expect("every unit of the schema has a length")
-}
-
-fn build(document: &Document<'_>, shape: &Shape, path: &str) -> Result<Mesh, SceneError> {
-    let long = |key: &str, v: f64| {
-        within(document, &format!("{path}.{key}"), v, 1e-3, 1e4, "mm")?;
-        Ok(v)
-    };
-    let count = |key: &str, v: u32, least: u32, most: u32| {
-        let (least, most) = (f64::from(least), f64::from(most));
-        within(
-            document,
-            &format!("{path}.{key}"),
-            f64::from(v),
-            least,
-            most,
-            "",
-        )?;
-        Ok(v)
-    };
-    let fine = shapes::MAX_SUBDIVISIONS;
-    Ok(match shape {
-        Shape::Sphere {
-            radius,
-            subdivisions,
-        } => shapes::sphere(
-            long("sphere.radius", radius.0)?,
-            count("sphere.subdivisions", *subdivisions, 0, fine)?,
-        ),
-        Shape::Ellipsoid {
-            radii,
-            subdivisions,
-        } => {
-            for r in radii {
-                long("ellipsoid.radii", r.0)?;
-            }
-            let n = count("ellipsoid.subdivisions", *subdivisions, 0, fine)?;
-            shapes::ellipsoid(radii.map(|r| r.0), n)
-        }
-        Shape::Cylinder {
-            radius,
-            length,
-            segments,
-        } => shapes::cylinder(
-            long("cylinder.radius", radius.0)?,
-            long("cylinder.length", length.0)?,
-            count("cylinder.segments", *segments, 3, 4096)?,
-        ),
-        Shape::Box { size } => {
-            for s in size {
-                long("box.size", s.0)?;
-            }
-            shapes::cuboid(size.map(|s| s.0))
-        }
-        Shape::Plane { size, thickness } => {
-            for s in size {
-                long("plane.size", s.0)?;
-            }
-            shapes::plane(size.map(|s| s.0), long("plane.thickness", thickness.0)?)
-        }
-    })
-}
-
-/// World from object: scale, then rotate, then translate.
-fn placement(
-    document: &Document<'_>,
-    table: &MeshTable,
-    path: &str,
-) -> Result<DAffine3, SceneError> {
-    let scale = table.scale.unwrap_or(1.0);
-    within(document, &format!("{path}.scale"), scale, 1e-6, 1e6, "")?;
-    let rotation = match &table.rotate {
-        Some(rotation) => {
-            let axis = DVec3::from(rotation.axis).try_normalize().ok_or_else(|| {
-                let remedy = "give a vector such as [0, 0, 1]";
-                document.fail(
-                    &format!("{path}.rotate.axis"),
-                    "this axis has no length",
-                    remedy,
-                )
-            })?;
-            within(
-                document,
-                &format!("{path}.rotate.angle"),
-                rotation.angle.0,
-                -1e3,
-                1e3,
-                "rad",
-            )?;
-            DQuat::from_axis_angle(axis, rotation.angle.0)
-        }
-        None => DQuat::IDENTITY,
-    };
-    let translate = table.translate.map_or([0.0; 3], |t| t.map(|q| q.0));
-    for v in translate {
-        within(document, &format!("{path}.translate"), v, -1e5, 1e5, "mm")?;
-    }
-    Ok(DAffine3::from_scale_rotation_translation(
-        DVec3::splat(scale),
-        rotation,
-        translate.into(),
-    ))
 }
 
 fn surfaces(

@@ -168,6 +168,12 @@ impl Document<'_> {
             .error(self.span(&segments), message.into(), Some(remedy.into()))
     }
 
+    /// Where the value of a dotted path, or its nearest parent, begins: for the order of tables.
+    pub fn place(&self, path: &str) -> usize {
+        let segments: Vec<_> = path.split('.').collect();
+        self.span(&segments).start
+    }
+
     fn span(&self, path: &[&str]) -> Range<usize> {
         (1..=path.len())
             .rev()

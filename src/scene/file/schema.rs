@@ -4,7 +4,11 @@ use std::collections::BTreeMap;
 
 use serde::Deserialize;
 
-use super::units::{Angle, Attenuation, Density, Frequency, Impedance, Length, Level, Speed};
+use super::units::{
+    Angle, Attenuation, Density, Duration, Frequency, Impedance, Length, Level, Rate, Speed,
+};
+use crate::scene::animation::{Interpolation, Loop};
+use crate::scene::keyframes::Strategy;
 use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
 
 /// The whole file.
@@ -19,6 +23,12 @@ pub struct File {
     pub simulation: SimulationTable,
     #[serde(default)]
     pub imaging: ImagingTable,
+    #[serde(default)]
+    pub group: Vec<GroupTable>,
+    #[serde(default)]
+    pub transform: Vec<TransformTable>,
+    #[serde(default)]
+    pub selector: Vec<SelectorTable>,
     #[serde(default)]
     pub mesh: Vec<MeshTable>,
     #[serde(default)]
@@ -125,9 +135,79 @@ pub struct ImagingTable {
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
+pub struct GroupTable {
+    pub name: String,
+    pub parent: Option<String>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TransformTable {
+    pub name: String,
+    pub parent: Option<String>,
+    pub translate: Option<[Length; 3]>,
+    pub rotate: Option<Rotation>,
+    pub scale: Option<f64>,
+    pub motion: Option<MotionTable>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SelectorTable {
+    pub name: String,
+    pub parent: Option<String>,
+    pub period: Option<Duration>,
+    pub phase: Option<f64>,
+    #[serde(rename = "loop")]
+    pub mode: Option<Loop>,
+    pub rate: Option<Rate>,
+    pub strategy: Option<Strategy>,
+    pub interpolation: Option<Interpolation>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MotionTable {
+    pub kind: MotionKind,
+    pub period: Option<Duration>,
+    pub phase: Option<f64>,
+    #[serde(rename = "loop")]
+    pub mode: Option<Loop>,
+    pub rate: Option<Rate>,
+    pub translate: Option<[Length; 3]>,
+    pub rotate: Option<Rotation>,
+    pub centre: Option<[Length; 3]>,
+    pub seed: Option<u32>,
+    pub duration: Option<Duration>,
+    pub pause: Option<Duration>,
+    pub file: Option<String>,
+    pub interpolation: Option<BetweenRows>,
+}
+
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum MotionKind {
+    Sine,
+    Orbit,
+    Fetal,
+    File,
+}
+
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
+#[serde(rename_all = "lowercase")]
+pub enum BetweenRows {
+    #[default]
+    Linear,
+    Step,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct MeshTable {
     pub name: String,
+    pub parent: Option<String>,
     pub file: Option<String>,
+    pub keyframes: Option<Vec<String>>,
     pub node: Option<String>,
     pub shape: Option<Shape>,
     pub units: Option<UnitName>,

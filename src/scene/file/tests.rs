@@ -3,12 +3,12 @@ use std::path::PathBuf;
 use super::*;
 use crate::probe::Kind;
 
-struct Case {
-    folder: tempfile::TempDir,
+pub(super) struct Case {
+    pub folder: tempfile::TempDir,
 }
 
 impl Case {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let folder = tempfile::tempdir().expect("temporary folder");
         let cube = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nv 0 0 10\nv 10 0 10\nv 10 10 10\n\
             v 0 10 10\nf 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
@@ -16,11 +16,15 @@ impl Case {
         Self { folder }
     }
 
-    fn path(&self) -> PathBuf {
+    pub fn path(&self) -> PathBuf {
         self.folder.path().join("s.toml")
     }
 
-    fn load(&self, text: &str, set: &[(&str, &str)]) -> Result<(Scene, Vec<Warning>), SceneError> {
+    pub fn load(
+        &self,
+        text: &str,
+        set: &[(&str, &str)],
+    ) -> Result<(Scene, Vec<Warning>), SceneError> {
         std::fs::write(self.path(), text).expect("written");
         let set: Vec<_> = set
             .iter()
@@ -30,7 +34,7 @@ impl Case {
     }
 
     /// Loads, expecting a mistake at a line and column, with words in message and remedy.
-    fn fails(&self, text: &str, place: (usize, usize), cause: &str, remedy: &str) {
+    pub fn fails(&self, text: &str, place: (usize, usize), cause: &str, remedy: &str) {
         let error = self.load(text, &[]).map(|_| ()).expect_err(cause);
         let help = error.remedy.clone().unwrap_or_default();
         assert_eq!((error.line, error.column), place, "{error}; {help}");

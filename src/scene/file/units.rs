@@ -84,6 +84,16 @@ dimension!(
     [("MRayl", 1.0), ("kg/m2/s", 1e-6), ("Rayl", 1e-6)]
 );
 dimension!(
+    /// s.
+    Duration, InDuration, "a duration", true,
+    [("s", 1.0), ("ms", 1e-3)]
+);
+dimension!(
+    /// Times per second, Hz.
+    Rate, InRate, "a rate", true,
+    [("Hz", 1.0)]
+);
+dimension!(
     /// dB.
     Level, InLevel, "a level", true,
     [("dB", 1.0)]
@@ -212,6 +222,8 @@ mod tests {
         assert_eq!(parse::<InAttenuation>("0.5 dB/(cm MHz)"), Ok(0.5));
         assert_eq!(parse::<InAttenuation>("50 dB/m/MHz"), Ok(0.5));
         assert_eq!(parse::<InImpedance>("1.65 MRayl"), Ok(1.65));
+        assert_eq!(parse::<InDuration>("800 ms"), Ok(0.8));
+        assert_eq!(parse::<InRate>("30 Hz"), Ok(30.0));
         assert_eq!(parse::<InLevel>("-3 dB"), Ok(-3.0));
         assert_eq!(parse::<InLevel>("-inf dB"), Ok(f64::NEG_INFINITY));
     }

@@ -1,0 +1,401 @@
+//! The nodes of a scene file: who is whose child, and what selectors choose from.
+
+use std::collections::HashMap;
+
+use glam::DAffine3;
+
+use super::document::Document;
+use super::error::SceneError;
+use super::schema::{File, SelectorTable};
+use super::{motion, placing};
+use crate::scene::animation::{Motion, Sequence};
+use crate::scene::graph::{Graph, Node, NodeKind};
+use crate::scene::{Instance, Mesh, suggest};
+
+/// Factors and shifts, mm, of a placement with all parents at rest: beyond them single precision
+/// resolves nothing, or the placement has no inverse.
+const SCALES: (f64, f64) = (1e-6, 1e6);
+const FAR: f64 = 1e6;
+
+/// A table that is a node.
+struct Entry<'f> {
+    /// Its path: `selector.0`.
+    path: String,
+    name: &'f str,
+    parent: Option<&'f str>,
+    kind: Kind,
+}
+
+/// Kind, with the number of the table among those of its kind.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Group,
+    Transform(usize),
+    Selector(usize),
+    Mesh(usize),
+}
+
+/// Makes the graph of all nodes; gives `instances`, which are the meshes in their order, the number
+/// and the strategy of their selectors. Empty where no mesh has a parent and no node is written.
+pub(super) fn build(
+    document: &Document<'_>,
+    file: &File,
+    meshes: &[Mesh],
+    instances: &mut [Instance],
+) -> Result<Graph, SceneError> {
+    let entries = entries(document, file)?;
+    let parents = parents(document, &entries)?;
+    let depths = depths(document, &entries, &parents)?;
+    let mut children = vec![Vec::new(); entries.len()];
+    for (e, parent) in parents.iter().enumerate() {
+        if let Some(parent) = parent {
+            children[*parent].push(e);
+        }
+    }
+    let family = Family {
+        document,
+        file,
+        entries: &entries,
+        parents: &parents,
+        children,
+    };
+    let mut choices = Choices::default();
+    for (e, entry) in entries.iter().enumerate() {
+        match entry.kind {
+            Kind::Selector(number) => {
+                let table = &file.selector[number];
+                family.choose(e, table, number, meshes, instances, &mut choices)?;
+            }
+            Kind::Mesh(i) if !instances[i].keyframes.meshes.is_empty() => {
+                family.switched(e)?;
+            }
+            Kind::Group | Kind::Transform(_) | Kind::Mesh(_) => {}
+        }
+    }
+    let mut order: Vec<usize> = (0..entries.len()).collect();
+    // Stable: children of one depth stay in the order of the file.
+    order.sort_by_key(|&e| depths[e]);
+    // A mesh without a parent stays where it is.
+    let alone = |&e: &usize| matches!(entries[e].kind, Kind::Mesh(_)) && parents[e].is_none();
+    order.retain(|e| !alone(e));
+    let mut index = vec![None; entries.len()];
+    let mut graph = Graph::default();
+    let mut rests: Vec<DAffine3> = Vec::new();
+    for &e in &order {
+        let parent = parents[e].map(|p| index[p].expect("parents come first"));
+        let kind = family.kind(e, instances, &mut choices)?;
+        let above = parent.map_or(DAffine3::IDENTITY, |p: usize| rests[p]);
+        let rest = match &kind {
+            NodeKind::Transform { rest, .. } | NodeKind::Mesh { rest, .. } => above * *rest,
+            NodeKind::Group | NodeKind::Selector(_) => above,
+        };
+        family.sensible(e, rest)?;
+        index[e] = Some(graph.nodes.len());
+        rests.push(rest);
+        graph.nodes.push(Node {
+            name: entries[e].name.to_owned(),
+            parent,
+            alternative: choices.alternatives.get(&e).copied(),
+            kind,
+        });
+    }
+    Ok(graph)
+}
+
+/// All nodes in the order in which they stand in the file; their names are unique.
+fn entries<'f>(document: &Document<'_>, file: &'f File) -> Result<Vec<Entry<'f>>, SceneError> {
+    let mut out = Vec::new();
+    let mut add = |kind, path: String, name: &'f String, parent: &'f Option<String>| {
+        out.push(Entry {
+            path,
+            name,
+            parent: parent.as_deref(),
+            kind,
+        });
+    };
+    for (i, t) in file.group.iter().enumerate() {
+        add(Kind::Group, format!("group.{i}"), &t.name, &t.parent);
+    }
+    for (i, t) in file.transform.iter().enumerate() {
+        add(
+            Kind::Transform(i),
+            format!("transform.{i}"),
+            &t.name,
+            &t.parent,
+        );
+    }
+    for (i, t) in file.selector.iter().enumerate() {
+        add(
+            Kind::Selector(i),
+            format!("selector.{i}"),
+            &t.name,
+            &t.parent,
+        );
+    }
+    for (i, t) in file.mesh.iter().enumerate() {
+        add(Kind::Mesh(i), format!("mesh.{i}"), &t.name, &t.parent);
+    }
+    out.sort_by_key(|e| document.place(&e.path));
+    let mut names = HashMap::new();
+    for (e, entry) in out.iter().enumerate() {
+        if let Some(other) = names.insert(entry.name, e) {
+            let other: &Entry = &out[other];
+            let kind = |e: &Entry| e.path.split('.').next().unwrap_or_default().to_owned();
+            return Err(document.fail(
+                &format!("{}.name", entry.path),
+                format!("a {} is already named `{}`", kind(other), entry.name),
+                "give each node its own name",
+            ));
+        }
+    }
+    Ok(out)
+}
+
+/// For each entry the entry that it names as its parent.
+fn parents(
+    document: &Document<'_>,
+    entries: &[Entry<'_>],
+) -> Result<Vec<Option<usize>>, SceneError> {
+    let by_name: HashMap<_, _> = entries.iter().zip(0..).map(|(e, i)| (e.name, i)).collect();
+    let holds = |e: &Entry| !matches!(e.kind, Kind::Mesh(_));
+    let find = |entry: &Entry, parent: &str| {
+        let at = format!("{}.parent", entry.path);
+        match by_name.get(parent) {
+            Some(&p) if holds(&entries[p]) => Ok(p),
+            Some(_) => Err(document.fail(
+                &at,
+                format!("`{parent}` is a mesh, and meshes have no children"),
+                "name a group, a transform or a selector",
+            )),
+            None => {
+                let names = entries.iter().filter(|e| holds(e)).map(|e| e.name);
+                let remedy = suggest::among(parent, names);
+                Err(document.fail(&at, format!("there is no node `{parent}`"), remedy))
+            }
+        }
+    };
+    let one = |entry: &Entry| entry.parent.map(|parent| find(entry, parent)).transpose();
+    entries.iter().map(one).collect()
+}
+
+/// For each entry the number of its ancestors.
+fn depths(
+    document: &Document<'_>,
+    entries: &[Entry<'_>],
+    parents: &[Option<usize>],
+) -> Result<Vec<usize>, SceneError> {
+    let mut depths: Vec<Option<usize>> = vec![None; entries.len()];
+    for start in 0..entries.len() {
+        // Up to an entry whose depth is known, and down again.
+        let mut chain = Vec::new();
+        let mut at = Some(start);
+        while let Some(e) = at.filter(|&e| depths[e].is_none()) {
+            // After as many steps as there are nodes it goes in circles.
+            if chain.len() == entries.len() {
+                let by = parents[e].expect("it was come by");
+                let by = match by == e {
+                    true => String::new(),
+                    false => format!(" by way of `{}`", entries[by].name),
+                };
+                return Err(document.fail(
+                    &format!("{}.parent", entries[e].path),
+                    format!("`{}` is its own ancestor{by}", entries[e].name),
+                    "leave out `parent` of one of them",
+                ));
+            }
+            chain.push(e);
+            at = parents[e];
+        }
+        let mut depth = at.and_then(|e| depths[e]).map_or(0, |d| d + 1);
+        for e in chain.into_iter().rev() {
+            depths[e] = Some(depth);
+            depth += 1;
+        }
+    }
+    Ok(depths
+        .into_iter()
+        .map(|d| d.expect("all visited"))
+        .collect())
+}
+
+/// What selectors choose from.
+#[derive(Default)]
+struct Choices {
+    /// By the selector's entry, its order over time.
+    sequences: HashMap<usize, Sequence>,
+    /// By the child's entry, its number.
+    alternatives: HashMap<usize, usize>,
+}
+
+/// The file's nodes with their relations.
+struct Family<'a> {
+    document: &'a Document<'a>,
+    file: &'a File,
+    entries: &'a [Entry<'a>],
+    parents: &'a [Option<usize>],
+    children: Vec<Vec<usize>>,
+}
+
+impl Family<'_> {
+    /// Fails unless the mesh with keyframes at entry `e` is the child of a selector.
+    fn switched(&self, e: usize) -> Result<(), SceneError> {
+        let kind = self.parents[e].map(|p| self.entries[p].kind);
+        if matches!(kind, Some(Kind::Selector(_))) {
+            return Ok(());
+        }
+        Err(self.document.fail(
+            &format!("{}.keyframes", self.entries[e].path),
+            format!(
+                "nothing switches the keyframes of `{}`",
+                self.entries[e].name
+            ),
+            "add a [[selector]] with a period, and name it as the mesh's `parent`",
+        ))
+    }
+
+    /// Numbers the children of the selector at entry `e`, and tells those with keyframes.
+    fn choose(
+        &self,
+        e: usize,
+        table: &SelectorTable,
+        number: usize,
+        meshes: &[Mesh],
+        instances: &mut [Instance],
+        choices: &mut Choices,
+    ) -> Result<(), SceneError> {
+        let path = &self.entries[e].path;
+        let name = &table.name;
+        let fail = |path: &str, message: String, remedy: &str| {
+            Err(self.document.fail(path, message, remedy))
+        };
+        let strategy = table.strategy.unwrap_or_default();
+        let mut alternatives = 0;
+        let mut count: Option<(usize, &str)> = None;
+        for &child in &self.children[e] {
+            let entry = &self.entries[child];
+            let own = match entry.kind {
+                Kind::Mesh(i) => Some(&mut instances[i]),
+                _ => None,
+            };
+            let Some(instance) = own.filter(|i| !i.keyframes.meshes.is_empty()) else {
+                choices.alternatives.insert(child, alternatives);
+                alternatives += 1;
+                continue;
+            };
+            let keyframes = &mut instance.keyframes;
+            keyframes.group = Some(number);
+            keyframes.strategy = strategy;
+            let at = format!("{}.keyframes", entry.path);
+            let (own, first) = (keyframes.meshes.len(), count.unwrap_or((0, "")));
+            if count.is_some() && own != first.0 {
+                let message = format!(
+                    "`{}` has {own} keyframes, but `{}` under the same selector has {}",
+                    entry.name, first.1, first.0
+                );
+                return fail(&at, message, "all that change together need as many");
+            }
+            count = Some((own, entry.name));
+            let all = || keyframes.meshes.iter().map(|&m| &meshes[m]);
+            let odd = all().position(|m| !m.shares_topology(&meshes[keyframes.meshes[0]]));
+            if let Some(k) = odd.filter(|_| strategy.needs_shared_topology()) {
+                let message = format!(
+                    "`{}` has other triangles in keyframe {k} than in keyframe 0, which strategy \
+                     `{strategy}` cannot follow",
+                    entry.name
+                );
+                let remedy =
+                    "use `selector`, or export all keyframes from one mesh, vertex by vertex";
+                return fail(&at, message, remedy);
+            }
+        }
+        let count = match (count, alternatives) {
+            (None, 0) => {
+                let message = format!("selector `{name}` has nothing to choose from");
+                let remedy = format!("name it as `parent` of what it shows: parent = \"{name}\"");
+                return fail(path, message, &remedy);
+            }
+            (None, _) if strategy.needs_shared_topology() => {
+                return fail(
+                    &format!("{path}.strategy"),
+                    format!("`{strategy}` moves the vertices of keyframes, and `{name}` has none"),
+                    "use `selector`, or a mesh with `keyframes`",
+                );
+            }
+            (None, count) | (Some((count, _)), 0) => count,
+            (Some((count, with)), _) if count != alternatives => {
+                let message = format!(
+                    "selector `{name}` has {alternatives} alternatives, but `{with}` under it has \
+                     {count} keyframes"
+                );
+                return fail(
+                    path,
+                    message,
+                    "they are chosen together and must be as many",
+                );
+            }
+            (Some((count, _)), _) => count,
+        };
+        let period = table.period.ok_or_else(|| {
+            let message = format!("selector `{name}` has no period");
+            let remedy = "add the time in which all its choices are shown: period = \"0.8 s\"";
+            self.document.fail(path, message, remedy)
+        })?;
+        let settings = (table.phase, table.mode, table.rate);
+        let clock = motion::clock(self.document, path, period.0, settings)?;
+        let interpolation = table.interpolation.unwrap_or_default();
+        let sequence = Sequence::even(clock, count, interpolation);
+        choices.sequences.insert(e, sequence);
+        Ok(())
+    }
+
+    /// The node of entry `e`, whose instance, if it has one, is still unmoved.
+    fn kind(
+        &self,
+        e: usize,
+        instances: &[Instance],
+        choices: &mut Choices,
+    ) -> Result<NodeKind, SceneError> {
+        Ok(match self.entries[e].kind {
+            Kind::Group => NodeKind::Group,
+            Kind::Transform(i) => {
+                let table = &self.file.transform[i];
+                let path = &self.entries[e].path;
+                let place = (table.translate, table.rotate.as_ref(), table.scale);
+                let moves = |t| motion::motion(self.document, t, &format!("{path}.motion"));
+                NodeKind::Transform {
+                    rest: placing::placement(self.document, path, place)?,
+                    motion: table.motion.as_ref().map_or(Ok(Motion::Still), moves)?,
+                }
+            }
+            Kind::Selector(_) => {
+                let sequence = choices.sequences.remove(&e);
+                NodeKind::Selector(sequence.expect("every selector has chosen"))
+            }
+            Kind::Mesh(instance) => NodeKind::Mesh {
+                instance,
+                rest: instances[instance].world_from_object,
+            },
+        })
+    }
+
+    /// Fails where a placement with all parents is too large, too small or too far.
+    fn sensible(&self, e: usize, rest: DAffine3) -> Result<(), SceneError> {
+        // Scales are the same along all axes.
+        let scale = rest.matrix3.x_axis.length();
+        let far = rest.translation.abs().max_element();
+        let (cause, limits) = match ((SCALES.0..=SCALES.1).contains(&scale), far <= FAR) {
+            (true, true) => return Ok(()),
+            (false, _) => (
+                format!("is scaled by {scale:.3e}"),
+                format!("between {} and {}", SCALES.0, SCALES.1),
+            ),
+            (true, false) => (format!("is {far:.3e} mm away"), format!("at most {FAR} mm")),
+        };
+        let entry = &self.entries[e];
+        Err(self.document.fail(
+            &entry.path,
+            format!("with its parents, `{}` {cause}", entry.name),
+            format!("it must be {limits}"),
+        ))
+    }
+}
