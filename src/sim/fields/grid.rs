@@ -3,7 +3,7 @@
 use glam::{DVec3, UVec3};
 
 /// Nodes along the longest axis.
-const LONGEST: f64 = 20.0;
+const LONGEST: f64 = 24.0;
 
 /// Nodes at `origin + spacing * (i, j, k)`, mm.
 #[derive(Clone, Debug, PartialEq)]

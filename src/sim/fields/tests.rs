@@ -132,13 +132,14 @@ fn shell_errors(grouped: bool) -> [f64; 2] {
     [worst, (sum / count).sqrt()]
 }
 
-// Cells of 2.1 mm: where the strain jumps by 0.73, at the inner surface, nodes that are right leave
-// jump times spacing over 4 = 0.38 mm in the middle of a cell through which the kink runs. Those
-// are a quarter of the wall, and the root mean square of a hat is 1 / sqrt 3 of its height: 0.11 mm.
+// Cells of 1.7 mm: where the strain jumps by 0.73, at the inner surface, nodes that are right leave
+// jump times spacing over 4 = 0.31 mm in the middle of a cell through which the kink runs. Those are
+// a quarter of the places looked at, and the root mean square of a hat is 1 / sqrt 3 of its height:
+// 0.09 mm.
 #[test]
 fn a_wall_between_two_surfaces_is_harmonic() {
     let [worst, mean] = shell_errors(true);
-    assert!(worst < 0.38 && mean < 0.11, "{worst} {mean}");
+    assert!(worst < 0.31 && mean < 0.09, "{worst} {mean}");
     let [worst, _] = shell_errors(false);
     assert!(
         worst > 0.5,
