@@ -114,10 +114,11 @@ pub(super) fn examine_shape(
         ));
     }
     if outward && topology::volume(soup) <= 0.0 {
-        issues.push(Issue::error(
+        // Not an error: a part that closes to nothing may end a little below.
+        issues.push(Issue::warning(
             path,
             1,
-            "is inside out: its volume is negative, that of the first shape is not",
+            "is inside out: its volume is negative, that of the first shape is not; rays take its inside for the outside",
             "export all shapes of the surface alike, none of them mirrored",
         ));
     }

@@ -8,7 +8,7 @@ use super::keyframes::shapes;
 use super::{Kind, Options, Units, read_bounded};
 use crate::scene::Mesh;
 use crate::scene::animation::{Track, Trs};
-use crate::scene::issue::Issue;
+use crate::scene::issue::{Issue, Severity};
 use crate::scene::load_gltf::{self, AnimatedParts, Part};
 
 /// Times at which a skin is sampled unless [`Options::keyframes`] says otherwise.
@@ -155,7 +155,7 @@ pub fn load_animated(
             _ => (path, name.clone()),
         };
         let (shapes, more) = shapes(&soup, others, place, units, enlarged, options.cap_openings);
-        issues.extend(more);
+        issues.extend(gathered(more));
         meshes.push(AnimatedMesh {
             name,
             node,
@@ -183,4 +183,29 @@ pub fn load_animated(
         meshes,
     };
     Ok((found, issues))
+}
+
+/// The first finding of each kind, with the number of shapes that have it.
+fn gathered(issues: Vec<Issue>) -> Vec<Issue> {
+    let kind = |issue: &Issue| {
+        let message = issue
+            .message
+            .replace(|c: char| c.is_ascii_digit() || c == '.', "");
+        (issue.severity, message)
+    };
+    let mut out: Vec<((Severity, String), Issue, usize)> = Vec::new();
+    for issue in issues {
+        let kind = kind(&issue);
+        match out.iter_mut().find(|known| known.0 == kind) {
+            Some(known) => known.2 += 1,
+            None => out.push((kind, issue, 0)),
+        }
+    }
+    let counted = out.into_iter().map(|(_, mut issue, more)| {
+        if more > 0 {
+            issue.message += &format!(" (and in {more} further shapes)");
+        }
+        issue
+    });
+    counted.collect()
 }

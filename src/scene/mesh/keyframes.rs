@@ -27,8 +27,8 @@ impl Mesh {
 /// is loaded on its own.
 ///
 /// # Errors
-/// Returns every finding, by file, when at least one of them stops loading. Besides those of [`load`]: a
-/// shape that is inside out when the first is not, and more than [`MAX_SHAPES`] elements in all.
+/// Returns every finding, by file, when at least one of them stops loading. Besides those of [`load`]: more
+/// than [`MAX_SHAPES`] vertices and triangles in all.
 pub fn load_keyframes<P: AsRef<Path>>(
     paths: &[P],
     options: &Options,

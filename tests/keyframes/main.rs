@@ -1,0 +1,10 @@
+//! Shapes over time: files that are keyframes, and the animations of glTF files, against an evaluation
+//! of their own in double precision.
+
+mod compare;
+mod document;
+mod gltf;
+mod heart;
+mod pose;
+#[path = "../common/shared_data.rs"]
+mod shared_data;
