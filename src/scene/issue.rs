@@ -71,6 +71,15 @@ impl Issue {
         self
     }
 
+    /// Whether both say the same but for the numbers in it.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let words = |issue: &Self| {
+            let number = |c: char| c.is_ascii_digit() || c == '.';
+            issue.message.replace(number, "")
+        };
+        words(self) == words(other)
+    }
+
     /// Whether loading stops.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error

@@ -175,6 +175,13 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     })
 }
 
+/// Names of a file's animations; none where it cannot be read.
+pub(super) fn animations(path: &Path, bytes: &[u8]) -> Vec<String> {
+    let container = glb::open(path, bytes).ok();
+    let root = container.and_then(|c| parse(path, c.json).ok());
+    root.map_or(Vec::new(), |root| choice::names(&root))
+}
+
 fn parse(path: &Path, json: &[u8]) -> Result<serde_json::Map<String, serde_json::Value>, Issue> {
     let fail = |message: String, remedy: &str| Issue::error(path, 1, message, remedy);
     if json.iter().filter(|&&b| b == b',').count() > MAX_VALUES {

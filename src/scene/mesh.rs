@@ -9,7 +9,9 @@ mod animated;
 mod keyframes;
 mod recipe;
 
-pub use animated::{Animated, AnimatedMesh, AnimatedNode, Choice, Placement, load_animated};
+pub use animated::{
+    Animated, AnimatedMesh, AnimatedNode, Choice, Placement, animations, load_animated,
+};
 pub(super) use keyframes::bounded;
 pub use keyframes::{MAX_SHAPES, load_keyframes};
 pub(super) use recipe::weld;

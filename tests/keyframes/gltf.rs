@@ -62,7 +62,7 @@ const SAMPLES: &[Sample] = &[
 ];
 
 /// Largest distance of a vertex from its place and what rounding allows, mm.
-fn compare(mesh: &AnimatedMesh, node: usize, pose: &Pose<'_>, mm: f64) -> (f64, f64) {
+pub fn compare(mesh: &AnimatedMesh, node: usize, pose: &Pose<'_>, mm: f64) -> (f64, f64) {
     let triangles = pose.triangles(node);
     let place = |time: f64| -> Vec<[f64; 3]> {
         let stored = pose.vertices(node, time);

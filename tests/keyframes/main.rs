@@ -5,6 +5,8 @@ mod compare;
 mod document;
 mod gltf;
 mod heart;
+mod made;
+mod mistakes;
 mod pose;
 #[path = "../common/shared_data.rs"]
 mod shared_data;

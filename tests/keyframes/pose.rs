@@ -37,6 +37,14 @@ pub struct Pose<'d> {
     pub planted: Option<Planted>,
 }
 
+/// Keyframes of a property.
+struct Keys<'d> {
+    sampler: &'d Value,
+    times: Vec<f64>,
+    /// One after the other.
+    values: Vec<f64>,
+}
+
 fn numbers(value: &Value) -> Option<Vec<f64>> {
     value.as_array()?.iter().map(Value::as_f64).collect()
 }
@@ -47,7 +55,7 @@ impl Pose<'_> {
     }
 
     /// Key times and values of a node's property.
-    fn sampler(&self, node: usize, path: &str) -> Option<(&Value, Vec<f64>, Vec<Vec<f64>>)> {
+    fn sampler(&self, node: usize, path: &str) -> Option<Keys<'_>> {
         let animation = &self.document.json["animations"][self.animation];
         let channel = animation["channels"].as_array()?.iter().find(|c| {
             c["target"]["node"].as_u64() == Some(node as u64) && c["target"]["path"] == *path
@@ -55,18 +63,26 @@ impl Pose<'_> {
         let sampler = &animation["samplers"][index_of(&channel["sampler"])];
         let times = self.document.accessor(&sampler["input"]);
         let values = self.document.accessor(&sampler["output"]);
-        Some((sampler, times.into_iter().flatten().collect(), values))
+        Some(Keys {
+            sampler,
+            times: times.into_iter().flatten().collect(),
+            values: values.into_iter().flatten().collect(),
+        })
     }
 
     /// Key times of a property; none where it rests.
     pub fn times(&self, node: usize, path: &str) -> Vec<f64> {
-        self.sampler(node, path).map_or(Vec::new(), |s| s.1)
+        self.sampler(node, path)
+            .map_or(Vec::new(), |keys| keys.times)
     }
 
     fn sample(&self, node: usize, path: &str, time: f64) -> Option<Vec<f64>> {
-        let (sampler, times, values) = self.sampler(node, path)?;
+        let Keys {
+            sampler,
+            times,
+            values: flat,
+        } = self.sampler(node, path)?;
         let time = time - f64::from(u8::from(self.planted(Planted::Late))) * 0.01;
-        let flat: Vec<f64> = values.into_iter().flatten().collect();
         let spline = sampler["interpolation"] == "CUBICSPLINE";
         let width = flat.len() / times.len() / if spline { 3 } else { 1 };
         // Part 0 is the in-tangent, 1 the value, 2 the out-tangent of a spline.

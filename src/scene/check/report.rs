@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::Facts;
-use crate::scene::mesh::{self, Inspected, Options};
+use crate::scene::mesh::{self, Animated, AnimatedNode, Choice, Inspected, Options, Placement};
 use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
 
 /// Distance from a surface at which the tissue around it is looked up, mm: clear of surfaces
@@ -101,11 +101,60 @@ fn mesh_file(path: &Path) -> Report {
             lines.push(format!("  parts: {}", named.join(", ")));
         }
     }
-    Report {
+    let mut report = Report {
         lines,
         issues,
         error: None,
+    };
+    animations(path, &mut report);
+    report
+}
+
+/// Animations that are tried; a file may have any number.
+const ANIMATIONS: usize = 16;
+
+/// Describes the animations of a mesh file. What keeps one from being played does not keep the mesh from
+/// being used: it is a warning.
+fn animations(path: &Path, report: &mut Report) {
+    let names = mesh::animations(path);
+    for (k, name) in names.iter().take(ANIMATIONS).enumerate() {
+        let choice = Choice::Number(k);
+        let issues = match mesh::load_animated(path, &Options::default(), choice) {
+            Ok((animated, issues)) => {
+                report
+                    .lines
+                    .push(format!("  animation {}", play(&animated)));
+                issues
+            }
+            Err(issues) => issues,
+        };
+        for mut issue in issues {
+            // The rest pose has most findings, too.
+            if !report.issues.iter().any(|known| known.is_like(&issue)) {
+                issue.severity = Severity::Warning;
+                issue.message = format!("animation `{name}`: {}", issue.message);
+                report.issues.push(issue);
+            }
+        }
     }
+    if names.len() > ANIMATIONS {
+        let more = names.len() - ANIMATIONS;
+        report
+            .lines
+            .push(format!("  {more} more animations were not tried"));
+    }
+}
+
+fn play(animated: &Animated) -> String {
+    let moving = |n: &&AnimatedNode| matches!(n.placement, Placement::Moving { .. });
+    let (first, last) = animated.span;
+    let shapes: usize = animated.meshes.iter().map(|m| m.times.len()).sum();
+    format!(
+        "`{}`: {first:.3} to {last:.3} s, {} moving nodes, {shapes} shapes of {} meshes",
+        animated.animation,
+        animated.nodes.iter().filter(moving).count(),
+        animated.meshes.len()
+    )
 }
 
 fn describe(facts: &Facts) -> String {

@@ -16,15 +16,20 @@ pub(super) struct Chosen {
     others: Vec<String>,
 }
 
+/// Names of all animations of a file.
+pub(super) fn names(root: &Map<String, Value>) -> Vec<String> {
+    let animations = root.get("animations").and_then(Value::as_array);
+    let names = animations.into_iter().flatten().enumerate().map(|(i, a)| {
+        let name = a.get("name").and_then(Value::as_str);
+        name.map_or_else(|| format!("animation {i}"), str::to_owned)
+    });
+    names.collect()
+}
+
 impl Chosen {
-    /// Finds it by name; those without one are called `animation N`, counted from 0.
+    /// Those without a name are called `animation N`, counted from 0.
     pub fn of(path: &Path, root: &Map<String, Value>, choice: Choice<'_>) -> Result<Self, Issue> {
-        let animations = root.get("animations").and_then(Value::as_array);
-        let names = animations.into_iter().flatten().enumerate().map(|(i, a)| {
-            let name = a.get("name").and_then(Value::as_str);
-            name.map_or_else(|| format!("animation {i}"), str::to_owned)
-        });
-        let mut names: Vec<String> = names.collect();
+        let mut names = names(root);
         if names.is_empty() {
             return Err(Issue::error(
                 path,
@@ -35,6 +40,12 @@ impl Chosen {
         }
         let number = match choice {
             Choice::First => 0,
+            Choice::Number(number) if number < names.len() => number,
+            Choice::Number(number) => {
+                let cause = format!("has no animation {number}");
+                let remedy = format!("count from 0; it has {}", names.len());
+                return Err(Issue::error(path, 1, cause, remedy));
+            }
             Choice::Named(name) => names.iter().position(|n| n == name).ok_or_else(|| {
                 let remedy = suggest::among(name, names.iter().map(String::as_str));
                 Issue::error(path, 1, format!("has no animation `{name}`"), remedy)

@@ -8,7 +8,7 @@ use super::keyframes::shapes;
 use super::{Kind, Options, Units, read_bounded};
 use crate::scene::Mesh;
 use crate::scene::animation::{Track, Trs};
-use crate::scene::issue::{Issue, Severity};
+use crate::scene::issue::Issue;
 use crate::scene::load_gltf::{self, AnimatedParts, Part};
 
 /// Times at which a skin is sampled unless [`Options::keyframes`] says otherwise.
@@ -20,8 +20,10 @@ pub enum Choice<'a> {
     /// The first.
     #[default]
     First,
-    /// That of this name. Those without a name are called `animation N`, counted from 0.
+    /// The first of this name. Those without a name are called `animation N`, counted from 0.
     Named(&'a str),
+    /// That of this number, counted from 0.
+    Number(usize),
 }
 
 /// One animation of a glTF file. Lengths are in mm, times in seconds since the start of the animation.
@@ -100,6 +102,16 @@ pub struct AnimatedMesh {
     pub shapes: Vec<Mesh>,
     /// When the mesh has each of them, s, increasing; empty where it has a single shape at all times.
     pub times: Vec<f64>,
+}
+
+/// Names of the animations of a file, as [`Choice::Named`] takes them; none where it is no glTF file, or
+/// cannot be read.
+pub fn animations(path: &Path) -> Vec<String> {
+    let bytes = match Kind::of(path) {
+        Some(Kind::Gltf) => read_bounded(path).unwrap_or_default(),
+        _ => Vec::new(),
+    };
+    load_gltf::animations(path, &bytes)
 }
 
 /// Reads one animation of a .gltf or .glb file; positions end in mm.
@@ -187,21 +199,17 @@ pub fn load_animated(
 
 /// The first finding of each kind, with the number of shapes that have it.
 fn gathered(issues: Vec<Issue>) -> Vec<Issue> {
-    let kind = |issue: &Issue| {
-        let message = issue
-            .message
-            .replace(|c: char| c.is_ascii_digit() || c == '.', "");
-        (issue.severity, message)
-    };
-    let mut out: Vec<((Severity, String), Issue, usize)> = Vec::new();
+    let mut out: Vec<(Issue, usize)> = Vec::new();
     for issue in issues {
-        let kind = kind(&issue);
-        match out.iter_mut().find(|known| known.0 == kind) {
-            Some(known) => known.2 += 1,
-            None => out.push((kind, issue, 0)),
+        let like = |known: &&mut (Issue, usize)| {
+            known.0.severity == issue.severity && known.0.is_like(&issue)
+        };
+        match out.iter_mut().find(like) {
+            Some(known) => known.1 += 1,
+            None => out.push((issue, 0)),
         }
     }
-    let counted = out.into_iter().map(|(_, mut issue, more)| {
+    let counted = out.into_iter().map(|(mut issue, more)| {
         if more > 0 {
             issue.message += &format!(" (and in {more} further shapes)");
         }

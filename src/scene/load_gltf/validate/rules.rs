@@ -105,7 +105,12 @@ fn unread(findings: &mut Findings<'_>) {
         let count = list(findings, name).len();
         let read = findings.animated && ["animations", "skins"].contains(&name);
         if count > 0 && !read {
-            findings.note(&format!("/{name}"), format!("{count} {name} are not read"));
+            let unless = match name {
+                "animations" | "skins" => " unless an animation is asked for",
+                _ => "",
+            };
+            let message = format!("{count} {name} are not read{unless}");
+            findings.note(&format!("/{name}"), message);
         }
     }
     for (i, material) in list(findings, "materials").iter().enumerate() {
@@ -344,7 +349,10 @@ fn meshes(findings: &mut Findings<'_>) {
                 }
             }
             if primitive.get("targets").is_some() && !findings.animated {
-                findings.note(&format!("{at}/targets"), "morph targets are not read");
+                findings.note(
+                    &format!("{at}/targets"),
+                    "morph targets are not read unless an animation is asked for",
+                );
             }
         }
     }
