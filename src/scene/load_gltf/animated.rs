@@ -213,9 +213,9 @@ impl<'a> Meshes<'a> {
                 }
                 times.extend(self.tree.times(node));
             }
-            times.sort_unstable_by(f64::total_cmp);
-            times.dedup();
         }
+        times.sort_unstable_by(f64::total_cmp);
+        times.dedup();
         thinned(times, self.most)
     }
 

@@ -7,7 +7,7 @@ use crate::scene::issue::Issue;
 /// Most numbers held at a time, 128 MB.
 const HELD: usize = 16_000_000;
 
-/// Most vertices and matrices computed, some seconds.
+/// Most numbers read, and vertices and matrices computed; some seconds.
 const STEPS: usize = 200_000_000;
 
 /// What is left of them.
@@ -26,7 +26,7 @@ impl<'p> Budget<'p> {
         }
     }
 
-    /// Takes room for `count` numbers.
+    /// Takes room for `count` numbers, and the time to read them: they may be read for many nodes.
     pub fn hold(&mut self, count: usize) -> Result<(), Issue> {
         self.held = self.held.checked_sub(count).ok_or_else(|| {
             let cause = format!("its animation has more than {HELD} numbers");
@@ -37,7 +37,7 @@ impl<'p> Budget<'p> {
                 "reduce keyframes or morph targets, or split the file",
             )
         })?;
-        Ok(())
+        self.work(count)
     }
 
     /// What can still be held, for [`Budget::give_back`].
