@@ -57,11 +57,12 @@ pub fn phases() -> [Phase; KEYFRAMES] {
 }
 
 /// Share of the cavity's section that goes at full ejection.
-const KAPPA: f64 = 0.70;
+const KAPPA: f64 = 0.67;
 /// Descent of the base at full ejection, mm.
 const DESCENT: f64 = 14.0;
-/// Slope by which radii outside the left ventricle shrink at full ejection, and over which length.
-const SQUEEZE: (f64, f64) = (0.80, 34.0);
+/// Slope by which radii outside the left ventricle shrink at full ejection, and over which length:
+/// the right ventricle's cavity, but not its wall beyond.
+const SQUEEZE: (f64, f64) = (0.86, 18.5);
 /// Turns of the apex and of the base at full ejection, rad.
 const TWIST: (f64, f64) = (0.14, -0.06);
 /// Widening of the atria at full filling.
@@ -115,16 +116,16 @@ fn contract(p: DVec3, ejected: f64) -> DVec2 {
     let ventricles = 1.0 - smoothstep(100.0, 126.0, p.z);
     let kappa = KAPPA * ejected * ventricles;
     let lambda = 1.0 - ejected * ventricles * DESCENT / (MITRAL - APEX);
-    // The lesser of r^2 and a^2, smooth; the wall loses 5 % of its volume by it, as muscle does
+    // The lesser of r^2 and a^2, smooth; the wall loses 3 % of its volume by it, as muscle does
     // whose blood is pressed out.
     let cavity = radius2(CAVITY, p.z);
-    let m = square / (1.0 + (square / cavity).powi(8)).powf(0.125);
+    let m = square / (1.0 + (square / cavity).powi(16)).powf(1.0 / 16.0);
     let radius = ((square - kappa * m) / lambda).sqrt();
     // Beyond the left ventricle: distance from it, softly zero within.
     let outside = 1.5 * softplus((square.sqrt() - radius2(WALL, p.z).sqrt()) / 1.5);
     let (slope, reach) = SQUEEZE;
     let right = smoothstep(30.0, 62.0, p.z) * ventricles;
-    let shorter = slope * ejected * right * reach * (1.0 - (-outside / reach).exp());
+    let shorter = slope * ejected * right * reach * (outside / reach).tanh();
     across * ((radius - shorter) / square.sqrt())
 }
 

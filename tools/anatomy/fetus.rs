@@ -144,10 +144,10 @@ fn spine(p: &Point) -> Tree {
         let back = back * back.z.signum();
         while ahead < length {
             let at = a + along * ahead;
-            centres.push(ellipsoid(&p.from(at), Vec3::splat(0.6)));
+            centres.push(ellipsoid(&p.from(at), Vec3::splat(0.54)));
             for side in [-1.15, 1.15] {
                 let arch = at + back * 1.1 + Vec3::Y * side;
-                centres.push(ellipsoid(&p.from(arch), Vec3::splat(0.5)));
+                centres.push(ellipsoid(&p.from(arch), Vec3::splat(0.46)));
             }
             ahead += VERTEBRA;
         }
@@ -389,7 +389,7 @@ pub fn parts() -> Vec<(Node, Part)> {
     add(Node::Body, part("ribs", "fetal_bone", (0.25, 0.5), ribs(p)));
     add(
         Node::Body,
-        part("spine", "fetal_bone", (0.25, 1.0), spine(p)),
+        part("spine", "fetal_bone", (0.22, 3.0), spine(p)),
     );
     out.extend(bones);
     out

@@ -156,7 +156,7 @@ fn outer(p: &Point) -> Tree {
     let right = intersection(right, below(p, TRICUSPID + 7.0), 6.0);
     let left = intersection(egg(p, WALL), below(p, MITRAL + 9.0), 6.0);
     let ventricles = union(left, right, 7.0);
-    let atria = union(left_atrium(p) - 2.6, right_atrium(p) - 2.6, 3.0);
+    let atria = union(left_atrium(p) - 2.6, right_atrium(p) - 2.6, 12.0);
     union(ventricles, atria, 7.0) + undulation(p, 0.4, 31.0, 0.2)
 }
 
