@@ -7,13 +7,20 @@
 //   per axis x, y, z: lower planes of the 8 children (8 bytes), upper planes (8 bytes): p + e byte.
 // A child is 0 (none), 001 and 24 + its slot (inner), or the unary count of its primitives and their
 // offset. Primitives are triangles, or in the top level places in a table of instances, which
-// begins at the node nodes[0].y. The top level's root is the node nodes[0].x; NONE: nothing is placed.
+// begins at the node nodes[0].y; of an instance's places rays enter the one that its row's `slot` names.
+// The top level's root is the node nodes[0].x; NONE: nothing is placed.
 
 const uint BVH_STACK = 32u;    // the builder refuses deeper trees
 
 #ifdef COUNT
+// As the counters of shared.glsl; nodes are those of meshes and of the top level.
 uint bvh_node_visits = 0u;
+uint bvh_top_visits = 0u;
 uint bvh_triangle_tests = 0u;
+uint bvh_instances_reached = 0u;
+uint bvh_false_unions = 0u;
+uint bvh_false_boxes = 0u;
+uint bvh_triangle_hits = 0u;   // before the last instance that was entered
 #endif
 
 struct BvhRay {
@@ -61,8 +68,22 @@ uint bvh_children(BvhRay ray, uint meta, uvec3 lo, uvec3 hi, vec3 scale, vec3 ne
 void bvh_triangle(BvhRay ray, uint instance, uint triangle, float t_min, inout Hit hit) {
     TriangleHit h = triangle_hit(ray.sheared, triangle);
     if (min(h.edges.x, min(h.edges.y, h.edges.z)) < 0.0 && max(h.edges.x, max(h.edges.y, h.edges.z)) > 0.0) return;
-    if (h.sum != 0.0 && h.t > t_min && h.t < hit.t) hit = Hit(h.t, instance, triangle, h.u, h.v);
+    if (!(h.sum != 0.0 && h.t > t_min && h.t < hit.t)) return;
+    hit = Hit(h.t, instance, triangle, h.u, h.v);
+#ifdef COUNT
+    bvh_triangle_hits += 1u;
+#endif
 }
+
+#ifdef COUNT
+// Whether a ray in object space meets the bounds of what an instance shows before t_max.
+bool bvh_bounds_met(uint instance, BvhRay ray, float t_min, float t_max) {
+    vec3 a = (instances[instance].low.xyz - ray.origin) * ray.inverse;
+    vec3 b = (instances[instance].high.xyz - ray.origin) * ray.inverse;
+    vec3 enter = min(a, b), leave = max(a, b);
+    return max(max(enter.x, enter.y), max(enter.z, t_min)) <= min(min(leave.x, leave.y), min(leave.z, t_max));
+}
+#endif
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
@@ -94,6 +115,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             uint n = 5u * (inner.x + uint(bitCount(mask & ~(0xffffffffu << slot))));
 #ifdef COUNT
             bvh_node_visits += 1u;
+            if (instance == NONE) bvh_top_visits += 1u;
 #endif
             uvec4 header = nodes[n];
             uvec4 links = nodes[n + 1u];
@@ -129,7 +151,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
                 continue;
             }
             uint entered = nodes[5u * nodes[0].y + primitive / 4u][primitive % 4u];
-            if (entered == skip_instance) continue;
+            if (entered == skip_instance || instances[entered].slot != primitive) continue;
             // What is left of the top level waits below `base`.
             if (primitives.y != 0u && depth < BVH_STACK) {
                 stack[depth] = primitives;
@@ -144,9 +166,20 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             ray = bvh_ray(object_point(instance, origin), object_direction(instance, direction));
             inner = uvec2(instances[instance].bvh_root, 0x80000000u);
             primitives = uvec2(0u);
+#ifdef COUNT
+            bvh_instances_reached += 1u;
+            if (!bvh_bounds_met(instance, ray, t_min, hit.t)) {
+                bvh_false_unions += 1u;
+                bvh_false_boxes -= 1u;   // no triangle will be met either; counted when the mesh is left
+            }
+            bvh_triangle_hits = 0u;
+#endif
         }
         if (inner.y <= 0x00ffffffu) {
             if (depth == base && instance != NONE) {
+#ifdef COUNT
+                if (bvh_triangle_hits == 0u) bvh_false_boxes += 1u;
+#endif
                 instance = NONE;
                 base = 0u;
                 ray = bvh_ray(origin, direction);

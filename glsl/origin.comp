@@ -1,4 +1,4 @@
-// variants: bvh query(RAY_QUERY)
+// variants: bvh query(RAY_QUERY) count(COUNT)
 #version 460
 // Which media enclose the start of each line: signed crossings along its ray to infinity.
 #extension GL_GOOGLE_include_directive : require
@@ -24,6 +24,8 @@ layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
+#define RAY_MASK frame.ray_mask
+#define RAY_SLOTS ((frame.flags & FLAG_SLOTS) != 0u)
 #include "intersect_query.glsl"
 #else
 #include "intersect_bvh.glsl"
@@ -31,6 +33,7 @@ layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
 #include "surface.glsl"
 #include "probe.glsl"
 #include "transform.glsl"
+#include "count.glsl"
 
 const uint MAX_OPEN = 32u;      // instances that may be entered or left on the way
 const uint MAX_CROSSINGS = 64u;
@@ -86,6 +89,7 @@ void main() {
             }
         }
     }
+    report_counts();
     // The outermost first: it is left last.
     uint base = line * (MAX_STACK + 1u);
     uint count = 0u;

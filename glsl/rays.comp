@@ -13,7 +13,7 @@ layout(local_size_x = 64) in;
 struct Ray {
     vec4 origin;      // mm; t_min
     vec4 direction;   // t_max
-    uvec4 skip;       // instance; unused
+    uvec4 skip;       // instance; mask bits that are shown; whether rows choose among their entries; unused
 };
 
 struct RayHit {
@@ -21,6 +21,7 @@ struct RayHit {
     vec4 geometric;   // outward normal; u
     vec4 shading;     // outward normal; v
     uint instance; uint primitive; uint node_visits; uint triangle_tests;
+    uint top_visits; uint instances_reached; uint false_unions; uint false_boxes;
 };
 
 layout(std430, binding = 0) readonly buffer Instances { Instance instances[]; };
@@ -37,6 +38,10 @@ layout(std430, binding = 6) buffer Hits { RayHit hits[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
+uint ray_mask;
+bool ray_slots;
+#define RAY_MASK ray_mask
+#define RAY_SLOTS ray_slots
 #include "intersect_query.glsl"
 #else
 #include "intersect_bvh.glsl"
@@ -48,6 +53,10 @@ void main() {
     if (i >= uint(rays.length())) return;
     vec4 origin = rays[i].origin;
     vec4 direction = rays[i].direction;
+#ifdef RAY_QUERY
+    ray_mask = rays[i].skip.y;
+    ray_slots = rays[i].skip.z != 0u;
+#endif
     Hit hit = closest_hit(origin.xyz, direction.xyz, origin.w, direction.w, rays[i].skip.x);
 
     vec3 position = vec3(0.0), geometric = vec3(0.0), shading = vec3(0.0);
@@ -61,11 +70,19 @@ void main() {
     hits[i].shading = vec4(shading, hit.v);
     hits[i].instance = hit.instance;
     hits[i].primitive = hit.primitive;
-#if defined(COUNT) && !defined(RAY_QUERY)
+#ifdef COUNT
     hits[i].node_visits = bvh_node_visits;
     hits[i].triangle_tests = bvh_triangle_tests;
+    hits[i].top_visits = bvh_top_visits;
+    hits[i].instances_reached = bvh_instances_reached;
+    hits[i].false_unions = bvh_false_unions;
+    hits[i].false_boxes = bvh_false_boxes;
 #else
     hits[i].node_visits = 0u;
     hits[i].triangle_tests = 0u;
+    hits[i].top_visits = 0u;
+    hits[i].instances_reached = 0u;
+    hits[i].false_unions = 0u;
+    hits[i].false_boxes = 0u;
 #endif
 }

@@ -1,4 +1,4 @@
-// variants: bvh query(RAY_QUERY)
+// variants: bvh query(RAY_QUERY) count(COUNT)
 #version 460
 // Paths of one (scanline, elevation layer) through the anatomy: surface echoes are deposited,
 // stretches inside a medium are written out as segments for scatter. docs/kernels.md has the steps.
@@ -36,6 +36,8 @@ layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
+#define RAY_MASK frame.ray_mask
+#define RAY_SLOTS ((frame.flags & FLAG_SLOTS) != 0u)
 #include "intersect_query.glsl"
 #else
 #include "intersect_bvh.glsl"
@@ -48,6 +50,7 @@ layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 #include "footprint.glsl"
 #include "media.glsl"
 #include "deposit.glsl"
+#include "count.glsl"
 
 struct Path {
     vec3 origin; vec3 direction; vec3 lateral;
@@ -263,6 +266,7 @@ void main() {
             if (!resume || guard == guards) {
                 // Inside the loop: naga loses values that a loop carries when they are used after it.
                 atomicAdd(counters.rays, rays);
+                report_counts();
                 if (interactions > 0u) atomicAdd(counters.interactions, interactions);
                 break;
             }

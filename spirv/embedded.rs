@@ -7,6 +7,7 @@
     ("geometry", include_bytes!("geometry.spv")),
     ("interpolate", include_bytes!("interpolate.spv")),
     ("origin_bvh", include_bytes!("origin_bvh.spv")),
+    ("origin_count", include_bytes!("origin_count.spv")),
     ("origin_query", include_bytes!("origin_query.spv")),
     ("rays_bvh", include_bytes!("rays_bvh.spv")),
     ("rays_count", include_bytes!("rays_count.spv")),
@@ -14,5 +15,6 @@
     ("refit", include_bytes!("refit.spv")),
     ("scatter", include_bytes!("scatter.spv")),
     ("trace_bvh", include_bytes!("trace_bvh.spv")),
+    ("trace_count", include_bytes!("trace_count.spv")),
     ("trace_query", include_bytes!("trace_query.spv")),
 ]

@@ -78,6 +78,7 @@ pub fn frame(case: Case, size: Size) -> Frame {
         seed: 0x5eed,
         origin_jitter: 0.05,
         emission_lobe: 3000.0,
+        ray_mask: 0xff,
         beam_width: 4.0,
         cell: 0.3,
         elevation_reach: 0.9,

@@ -11,7 +11,7 @@ use crate::sim::placement;
 
 pub const SUBJECT: Subject = Subject {
     name: "origin",
-    stems: &["origin_bvh", "origin_query"],
+    stems: &["origin_bvh", "origin_count", "origin_query"],
     tolerance: "exact: no line of these worlds starts within 1e-3 mm of a surface or runs along one",
     job,
     sizes: |job| {

@@ -20,7 +20,9 @@ struct Ray {
     direction: [f32; 3],
     t_max: f32,
     skip: u32,
-    unused: [u32; 3],
+    mask: u32,
+    slots: u32,
+    unused: u32,
 }
 
 /// As in `rays.comp`.
@@ -37,6 +39,7 @@ struct Hit {
     primitive: u32,
     node_visits: u32,
     triangle_tests: u32,
+    counts: [u32; 4],
 }
 
 /// Crossings closer together than this, mm, may change places in single precision; so may a
@@ -86,7 +89,9 @@ fn job(case: Case, size: Size) -> Job {
             direction: (target - origin).normalize().as_vec3().to_array(),
             t_max: if choice & 2 == 0 { 1e9 } else { 25.0 },
             skip: if choice & 12 == 0 { 1 } else { NONE },
-            unused: [0; 3],
+            mask: 0xff,
+            slots: 0,
+            unused: 0,
         }
     };
     let mut rays: Vec<Ray> = (0..count).map(&mut ray).collect();

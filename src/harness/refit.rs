@@ -81,8 +81,8 @@ fn job(case: Case, size: Size) -> Job {
         let order = tree.triangle_order.iter();
         triangles.extend(order.map(|&t| mesh.triangles[t as usize].map(|v| base + v)));
     }
-    let scene = SceneBvh::new(&trees, &firsts, trees.len());
-    let moving: Vec<_> = trees.iter().zip(scene.roots.iter().copied()).collect();
+    let (scene, roots) = SceneBvh::of(&trees, &firsts, trees.len());
+    let moving: Vec<_> = trees.iter().zip(roots).collect();
     let levels = levels(&moving[usize::from(moving.len() > 2)..]);
     let mut random = Random(41);
     if case != Case::Modes {

@@ -90,10 +90,12 @@ fn build(device: &Arc<Device>, job: &Job) -> Result<Tlas, GpuError> {
         blas.extend(Blas::build_many(device, &[input], BlasOptions::default())?);
     }
     let mut tlas = Tlas::new(device, "scene", instances.len().max(1) as u32)?;
-    let placed: Vec<_> = instances
-        .iter()
-        .enumerate()
-        .filter(|(_, i)| i.triangles > 0)
+    // An entry lies where its row says: rows are laid out for the compute tracer.
+    let mut order: Vec<_> = instances.iter().enumerate().collect();
+    order.retain(|(_, i)| i.triangles > 0);
+    order.sort_by_key(|(_, i)| i.slot);
+    let placed: Vec<_> = order
+        .into_iter()
         .map(|(index, i)| TlasInstance {
             blas: &blas[meshes[&(i.first_triangle, i.triangles)]],
             transform: i.world_from_object,

@@ -15,7 +15,7 @@ use crate::sim::layout::{
 
 pub const SUBJECT: Subject = Subject {
     name: "trace",
-    stems: &["trace_bvh", "trace_query"],
+    stems: &["trace_bvh", "trace_count", "trace_query"],
     tolerance: "every segment has its twin within 2e-3 mm, 2e-3 us, 2e-4 rad and 1e-3 of its weight: \
                 4e-6 mm at the first surface, times up to ten per curved bounce, three of them; the \
                 echoes' norm within 0.2 %, since most are first bounces, 1e-5 us or 2e-4 rad of the \

@@ -7,7 +7,7 @@ use super::inputs::Random;
 use super::{Case, Input, Job};
 use crate::reference::Owned;
 use crate::scene::{Mesh, shapes};
-use crate::sim::bvh::{MeshBvh, SceneBvh};
+use crate::sim::bvh::{MeshBvh, Placed, SceneBvh};
 use crate::sim::fields::HEADER;
 use crate::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use crate::sim::placement;
@@ -84,12 +84,22 @@ impl Builder {
             let order = tree.triangle_order.iter();
             triangles.extend(order.map(|&t| mesh.triangles[t as usize].map(|v| base + v)));
         }
-        let mut nodes = SceneBvh::new(&trees, &firsts, self.placements.len());
-        nodes.place(&self.placements).expect("a small world");
-        for (instance, &(mesh, _)) in self.instances.iter_mut().zip(&self.placements) {
+        let (mut nodes, roots) = SceneBvh::of(&trees, &firsts, self.placements.len());
+        let places = self.placements.iter().zip(0..);
+        let placed: Vec<Placed> = places
+            .map(|(&(mesh, world_from_object), instance)| Placed {
+                instance,
+                bounds: trees[mesh].bounds,
+                world_from_object,
+            })
+            .collect();
+        nodes.place(&placed, false).expect("a small world");
+        for (i, &(mesh, _)) in self.placements.iter().enumerate() {
+            let instance = &mut self.instances[i];
             instance.first_triangle = firsts[mesh];
             instance.triangles = self.meshes[mesh].triangles.len() as u32;
-            instance.bvh_root = nodes.roots[mesh];
+            instance.bvh_root = roots[mesh];
+            instance.slot = nodes.slots[i];
         }
         vec![
             Input::words("instances", &self.instances),

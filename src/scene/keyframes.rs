@@ -2,7 +2,10 @@
 
 use std::fmt;
 
+use glam::DVec3;
 use serde::Deserialize;
+
+use super::{Mesh, Scene};
 
 /// How the structures that rays walk follow an instance that changes its shape. The same shape gives
 /// the same image by every strategy that can show it; they differ in what is stored and what is built.
@@ -87,5 +90,65 @@ impl Keyframes {
         // The first of equals.
         let found = self.blend.iter().rev().copied().max_by(heaviest);
         found.map_or(0, |(keyframe, _)| keyframe)
+    }
+}
+
+impl Scene {
+    /// The scene as it stands, without keyframes: what every strategy has to look like. Instances keep
+    /// their numbers; what is hidden has no triangles.
+    pub fn still(&self) -> Self {
+        let mut still = self.clone();
+        for instance in &mut still.instances {
+            let keyframes = std::mem::take(&mut instance.keyframes);
+            let between = keyframes.blend.iter().filter(|(_, weight)| *weight != 0.0);
+            if keyframes.strategy == Strategy::Interpolate && between.count() > 1 {
+                instance.mesh = still.meshes.len();
+                still.meshes.push(keyframes.blended(&self.meshes));
+            }
+            if !std::mem::replace(&mut instance.shown, true) {
+                instance.mesh = still.meshes.len();
+                still.meshes.push(Mesh::default());
+            }
+        }
+        still
+    }
+}
+
+impl Keyframes {
+    /// The present shape: vertices and normals weighted as [`Self::blend`] says.
+    ///
+    /// # Panics
+    /// When the keyframes do not share their topology.
+    pub fn blended(&self, meshes: &[Mesh]) -> Mesh {
+        let first = &meshes[self.meshes[0]];
+        let mut out = Mesh {
+            positions: vec![[0.0; 3]; first.positions.len()],
+            normals: vec![[0.0; 3]; first.normals.len()],
+            ..first.clone()
+        };
+        let mut sums = [
+            vec![DVec3::ZERO; first.positions.len()],
+            vec![DVec3::ZERO; first.normals.len()],
+        ];
+        for &(keyframe, weight) in self.blend.iter().filter(|(_, weight)| *weight != 0.0) {
+            let mesh = &meshes[self.meshes[keyframe]];
+            assert!(
+                mesh.shares_topology(first),
+                "`{}` has other triangles",
+                mesh.name
+            );
+            for (sum, values) in sums.iter_mut().zip([&mesh.positions, &mesh.normals]) {
+                for (sum, v) in sum.iter_mut().zip(values) {
+                    *sum += weight * DVec3::from(v.map(f64::from));
+                }
+            }
+        }
+        for (out, sum) in out.positions.iter_mut().zip(&sums[0]) {
+            *out = sum.as_vec3().into();
+        }
+        for (out, sum) in out.normals.iter_mut().zip(&sums[1]) {
+            *out = sum.normalize_or_zero().as_vec3().into();
+        }
+        out
     }
 }

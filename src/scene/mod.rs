@@ -44,6 +44,21 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
 }
 
+impl Mesh {
+    /// Smallest and largest corner of the triangles, mm; zero without any.
+    pub fn bounds(&self) -> [[f32; 3]; 2] {
+        let corners = self.triangles.iter().flatten();
+        let mut positions = corners.map(|&v| self.positions[v as usize]);
+        let Some(first) = positions.next() else {
+            return [[0.0; 3]; 2];
+        };
+        positions.fold([first; 2], |[low, high], p| {
+            let pick = |f: fn(f32, f32) -> f32, a: [f32; 3]| std::array::from_fn(|i| f(a[i], p[i]));
+            [pick(f32::min, low), pick(f32::max, high)]
+        })
+    }
+}
+
 /// How an interface reflects, seen from one side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Surface {

@@ -12,7 +12,8 @@ use glam::{DAffine3, DVec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
-    cwbvh::{CwBvh, builder::build_cwbvh, node::CwBvhNode},
+    bvh2::{Bvh2, builder::build_bvh2},
+    cwbvh::{CwBvh, builder::build_cwbvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
     ploc::{PlocSearchDistance, SortPrecision},
 };
 
@@ -37,6 +38,14 @@ const MESH: BvhBuildParams = BvhBuildParams {
     sort_precision: SortPrecision::U64,
     max_prims_per_leaf: 3,
     collapse_traversal_cost: 1.0,
+};
+
+/// A quick build, for a tree that lives for one keyframe.
+const FAST: BvhBuildParams = BvhBuildParams {
+    ploc_search_distance: PlocSearchDistance::Minimum,
+    search_depth_threshold: 1,
+    reinsertion_batch_ratio: 0.0,
+    ..MESH
 };
 
 /// Why a scene cannot be traced by the compute tracer.
@@ -64,12 +73,21 @@ pub struct MeshBvh {
 impl MeshBvh {
     /// Builds the hierarchy of a mesh with finite coordinates; an empty mesh has an empty one.
     pub fn build(mesh: &Mesh) -> Self {
+        Self::with(mesh, MESH)
+    }
+
+    /// As [`Self::build`], sooner and for slower rays.
+    pub fn build_fast(mesh: &Mesh) -> Self {
+        Self::with(mesh, FAST)
+    }
+
+    fn with(mesh: &Mesh, params: BvhBuildParams) -> Self {
         let boxes: Vec<Aabb> = mesh
             .triangles
             .iter()
             .map(|t| Aabb::from_points(&t.map(|i| Vec3A::from(mesh.positions[i as usize]))))
             .collect();
-        let tree = wide(&boxes, MESH);
+        let tree = wide(&boxes, params);
         Self {
             depth: depth(&tree.nodes),
             nodes: tree.nodes,
@@ -81,6 +99,13 @@ impl MeshBvh {
     /// How many nodes of 80 bytes this mesh takes.
     pub fn node_count(&self) -> usize {
         self.nodes.len()
+    }
+
+    /// The nodes as they stand in a buffer from `root` on; leaf-ordered triangles begin at
+    /// `first_triangle`.
+    pub fn nodes_at(&self, root: u32, first_triangle: u32) -> impl Iterator<Item = Node> + '_ {
+        let moved = move |&node: &CwBvhNode| place(node, root, first_triangle);
+        self.nodes.iter().map(moved)
     }
 }
 
@@ -110,91 +135,146 @@ fn place(mut node: CwBvhNode, first_node: u32, first_primitive: u32) -> Node {
     bytemuck::cast(node)
 }
 
+/// What the top level holds at one place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Index of the instance; it may have several places, of which rays enter only the one that its
+    /// row's `slot` names.
+    pub instance: u32,
+    /// Box around everything that may be found there, object space, mm.
+    pub bounds: [[f32; 3]; 2],
+    /// World from object space, mm.
+    pub world_from_object: DAffine3,
+}
+
 /// All nodes of a scene. First come the header, the top level and its table of instances, so that
-/// moving an instance rewrites only those.
-#[derive(Clone, Debug)]
+/// moving an instance rewrites only those; behind them the meshes' trees.
+#[derive(Clone)]
 pub struct SceneBvh {
     /// The buffer's contents.
     pub nodes: Vec<Node>,
-    /// Per mesh: its root, [`NONE`] for an empty mesh.
-    pub roots: Vec<u32>,
-    bounds: Vec<[[f32; 3]; 2]>,
+    /// Per place of the last [`Self::place`]: what the row of its instance says as `slot` while the
+    /// place is the one that rays enter.
+    pub slots: Vec<u32>,
+    top: Bvh2,
     deepest: usize,
-    instances: usize,
+    capacity: usize,
 }
 
 impl SceneBvh {
-    /// Puts the meshes' trees into one buffer with room for `instances` placements.
-    /// `first_triangles[m]` is where mesh m's leaf-ordered triangles begin.
-    pub fn new(meshes: &[MeshBvh], first_triangles: &[u32], instances: usize) -> Self {
+    /// An empty scene with room for `capacity` places.
+    pub fn new(capacity: usize) -> Self {
         // A tree never has more nodes than primitives.
-        let mut nodes = vec![[0; 20]; 1 + instances + instances.div_ceil(20)];
-        nodes[0][..2].copy_from_slice(&[NONE, 1 + instances as u32]);
-        let mut roots = Vec::with_capacity(meshes.len());
-        for (mesh, &first_triangle) in meshes.iter().zip(first_triangles) {
-            let root = nodes.len() as u32;
-            nodes.extend(
-                mesh.nodes
-                    .iter()
-                    .map(|&node| place(node, root, first_triangle)),
-            );
-            roots.push(if mesh.nodes.is_empty() { NONE } else { root });
-        }
-        let deepest = meshes.iter().map(|m| m.depth).max().unwrap_or(0);
+        let mut nodes = vec![[0; 20]; 1 + capacity + capacity.div_ceil(20)];
+        nodes[0][..2].copy_from_slice(&[NONE, 1 + capacity as u32]);
         Self {
             nodes,
-            roots,
-            bounds: meshes.iter().map(|m| m.bounds).collect(),
-            deepest,
-            instances,
+            slots: Vec::new(),
+            top: Bvh2::default(),
+            deepest: 0,
+            capacity,
         }
     }
 
-    /// Rebuilds the top level over `placements`, (mesh, world from object) per instance, and
-    /// returns the nodes that changed: the buffer's beginning.
+    /// A scene of meshes, whose leaf-ordered triangles begin at `first_triangles`, with room for
+    /// `capacity` places; and the root of each, NONE for an empty mesh.
+    pub fn of(meshes: &[MeshBvh], first_triangles: &[u32], capacity: usize) -> (Self, Vec<u32>) {
+        let mut scene = Self::new(capacity);
+        let trees = meshes.iter().zip(first_triangles);
+        let roots = trees.map(|(tree, &first)| scene.add(tree, first)).collect();
+        (scene, roots)
+    }
+
+    /// Appends a mesh's tree, whose leaf-ordered triangles begin at `first_triangle`; its root, NONE
+    /// for an empty mesh.
+    pub fn add(&mut self, tree: &MeshBvh, first_triangle: u32) -> u32 {
+        let root = self.nodes.len() as u32;
+        self.nodes.extend(tree.nodes_at(root, first_triangle));
+        self.deepen(tree);
+        if tree.nodes.is_empty() { NONE } else { root }
+    }
+
+    /// Appends room for `count` nodes of trees to come; the first of them.
+    pub fn reserve(&mut self, count: usize) -> u32 {
+        let first = self.nodes.len() as u32;
+        self.nodes.resize(self.nodes.len() + count, [0; 20]);
+        first
+    }
+
+    /// Counts with the depth of a tree that is put into reserved room.
+    pub fn deepen(&mut self, tree: &MeshBvh) {
+        self.deepest = self.deepest.max(tree.depth);
+    }
+
+    /// Forgets the meshes' trees, once the device has them; the top level stays.
+    pub fn forget_meshes(&mut self) {
+        self.nodes
+            .truncate(self.table() + self.capacity.div_ceil(20));
+        self.nodes.shrink_to_fit();
+    }
+
+    fn table(&self) -> usize {
+        1 + self.capacity
+    }
+
+    /// Makes the top level over `placed` and returns the nodes that changed: the buffer's beginning.
+    /// With `refit` the tree of the last call is kept where it has as many places, and only its boxes
+    /// follow.
     ///
     /// # Errors
     /// When the kernel's stack could overflow.
-    pub fn place(&mut self, placements: &[(usize, DAffine3)]) -> Result<&[Node], BvhError> {
-        assert_eq!(
-            placements.len(),
-            self.instances,
-            "instances were added or removed after the upload"
-        );
-        let (ids, boxes): (Vec<u32>, Vec<Aabb>) = placements
+    pub fn place(&mut self, placed: &[Placed], refit: bool) -> Result<&[Node], BvhError> {
+        assert!(placed.len() <= self.capacity, "more places than reserved");
+        let boxes: Vec<Aabb> = placed
             .iter()
-            .enumerate()
-            .filter(|(_, (mesh, _))| self.roots[*mesh] != NONE)
-            .map(|(i, (mesh, matrix))| (i as u32, world_box(self.bounds[*mesh], matrix)))
-            .unzip();
-        // Entering an instance costs more than a box: one per leaf.
-        let top = wide(
-            &boxes,
-            BvhBuildParams {
-                max_prims_per_leaf: 1,
-                reinsertion_batch_ratio: 1.0,
-                ..MESH
-            },
-        );
-        let needed = depth(&top.nodes) + ENTRY + self.deepest;
+            .map(|p| world_box(p.bounds, &p.world_from_object))
+            .collect();
+        if refit && self.top.primitives_to_nodes.len() == boxes.len() {
+            for (node, bounds) in self.top.primitives_to_nodes.iter().zip(&boxes) {
+                self.top.nodes[*node as usize].set_aabb(*bounds);
+            }
+            self.top.refit_all();
+        } else {
+            self.top = top_tree(&boxes);
+        }
+        let wide = bvh2_to_cwbvh(&self.top, 1, true, false);
+        let needed = depth(&wide.nodes) + ENTRY + self.deepest;
         if needed > STACK {
             return Err(BvhError::TooDeep(needed));
         }
         self.nodes[0][0] = if boxes.is_empty() { NONE } else { 1 };
-        for (slot, node) in self.nodes[1..].iter_mut().zip(&top.nodes) {
+        for (slot, node) in self.nodes[1..].iter_mut().zip(&wide.nodes) {
             *slot = place(*node, 1, 0);
         }
-        let table = 1 + self.instances;
-        let end = table + self.instances.div_ceil(20);
-        for (slot, &index) in self.nodes[table..end]
+        let table = self.table();
+        let end = table + self.capacity.div_ceil(20);
+        self.slots = vec![NONE; placed.len()];
+        for (slot, (word, &index)) in self.nodes[table..end]
             .as_flattened_mut()
             .iter_mut()
-            .zip(&top.primitive_indices)
+            .zip(&wide.primitive_indices)
+            .enumerate()
         {
-            *slot = ids[index as usize];
+            *word = placed[index as usize].instance;
+            self.slots[index as usize] = slot as u32;
         }
         Ok(&self.nodes[..end])
     }
+}
+
+/// One box per leaf, because entering an instance costs more than a box.
+fn top_tree(boxes: &[Aabb]) -> Bvh2 {
+    if boxes.is_empty() {
+        return Bvh2::default();
+    }
+    let params = BvhBuildParams {
+        max_prims_per_leaf: 1,
+        reinsertion_batch_ratio: 1.0,
+        ..MESH
+    };
+    let mut tree = build_bvh2(boxes, params, &mut Duration::default());
+    tree.update_primitives_to_nodes();
+    tree
 }
 
 /// World box of a placed object box, widened by the rounding of the kernel's single-precision
@@ -285,15 +365,10 @@ mod tests {
         for n in [1, 2, 3, 40] {
             let mesh = sheet(n);
             let tree = MeshBvh::build(&mesh);
-            let scene = SceneBvh::new(std::slice::from_ref(&tree), &[0], 0);
+            let mut scene = SceneBvh::new(0);
+            let root = scene.add(&tree, 0);
             let mut seen = vec![0; mesh.triangles.len()];
-            let bounds = walk(
-                &scene.nodes,
-                scene.roots[0],
-                &mesh,
-                &tree.triangle_order,
-                &mut seen,
-            );
+            let bounds = walk(&scene.nodes, root, &mesh, &tree.triangle_order, &mut seen);
             assert!(seen.iter().all(|&count| count == 1), "{n}: {seen:?}");
             assert_eq!([bounds.min.to_array(), bounds.max.to_array()], tree.bounds);
         }
@@ -303,33 +378,80 @@ mod tests {
     fn trees_of_two_meshes_share_one_buffer() {
         let meshes = [sheet(5), Mesh::default(), sheet(9)];
         let trees = meshes.each_ref().map(MeshBvh::build);
-        let mut scene = SceneBvh::new(&trees, &[0, 50, 50], 4);
-        assert_eq!(scene.roots[1], NONE, "an empty mesh has no root");
+        let mut scene = SceneBvh::new(4);
+        let roots = [0, 1, 2].map(|m| scene.add(&trees[m], [0, 50, 50][m]));
+        assert_eq!(roots[1], NONE, "an empty mesh has no root");
         let order: Vec<u32> = [0, 2]
             .iter()
             .flat_map(|&m| trees[m].triangle_order.clone())
             .collect();
         let mut seen = vec![0; order.len()];
-        walk(&scene.nodes, scene.roots[2], &meshes[2], &order, &mut seen);
+        walk(&scene.nodes, roots[2], &meshes[2], &order, &mut seen);
         assert!(seen[..50].iter().all(|&n| n == 0) && seen[50..].iter().all(|&n| n == 1));
+    }
 
-        let at = |x| DAffine3::from_translation(DVec3::new(x, 0.0, 0.0));
+    fn places(trees: &[(usize, f64)], of: &[MeshBvh]) -> Vec<Placed> {
+        let placed = trees.iter().enumerate().map(|(i, &(tree, x))| Placed {
+            instance: 10 + i as u32,
+            bounds: of[tree].bounds,
+            world_from_object: DAffine3::from_translation(DVec3::new(x, 0.0, 0.0)),
+        });
+        placed.collect()
+    }
+
+    /// Where a point of the middle of each place is found, by a walk over the top level.
+    fn reached(scene: &SceneBvh, p: Vec3A) -> Vec<u32> {
+        let mut todo = vec![scene.nodes[0][0]];
+        let mut found = Vec::new();
+        while let Some(index) = todo.pop() {
+            let node: CwBvhNode = bytemuck::cast(scene.nodes[index as usize]);
+            for child in (0..8).filter(|&child| !node.is_child_empty(child)) {
+                let (bounds, margin) = (node.child_aabb(child), node.compute_extent() * 2.5e-4);
+                if p.cmplt(bounds.min - margin).any() || p.cmpgt(bounds.max + margin).any() {
+                    continue;
+                }
+                if node.is_leaf(child) {
+                    found.push(node.child_primitives(child).0);
+                } else {
+                    todo.push(node.child_node_index(child));
+                }
+            }
+        }
+        found
+    }
+
+    #[test]
+    fn the_top_level_follows_by_rebuild_and_by_refit() {
+        let trees = [sheet(5), sheet(9)].map(|m| MeshBvh::build(&m));
+        let mut scene = SceneBvh::new(4);
+        for tree in &trees {
+            scene.add(tree, 0);
+        }
         let before = scene.nodes.clone();
-        let changed = scene
-            .place(&[(0, at(0.0)), (1, at(50.0)), (2, at(100.0)), (0, at(0.0))])
-            .unwrap()
-            .len();
+        let start = places(&[(0, 0.0), (1, 50.0), (0, 100.0), (1, 150.0)], &trees);
+        let moved = places(&[(0, 10.0), (1, -50.0), (1, 110.0), (0, 60.0)], &trees);
+        let changed = scene.place(&start, false).unwrap().len();
         assert_eq!(scene.nodes[changed..], before[changed..]);
-        let table = scene.nodes[5];
-        let mut placed = [table[0], table[1], table[2]];
-        placed.sort_unstable();
-        assert_eq!(placed, [0, 2, 3], "the empty mesh is not placed");
+        for refit in [false, true] {
+            scene.place(&start, false).unwrap();
+            scene.place(&moved, refit).unwrap();
+            for (placed, &slot) in moved.iter().zip(&scene.slots) {
+                let middle = Vec3A::from(placed.bounds[0]).midpoint(placed.bounds[1].into());
+                let middle = middle + placed.world_from_object.translation.as_vec3a();
+                assert_eq!(reached(&scene, middle), [slot]);
+                let table = scene.nodes[5].iter().chain(&scene.nodes[6]);
+                assert_eq!(table.copied().nth(slot as usize), Some(placed.instance));
+            }
+        }
+        scene.place(&moved[..1], true).unwrap();
+        assert_eq!(scene.slots.len(), 1, "fewer places are a new tree");
     }
 
     #[test]
     fn an_empty_scene_has_no_root() {
-        let mut scene = SceneBvh::new(&[MeshBvh::build(&Mesh::default())], &[0], 1);
-        let nodes = scene.place(&[(0, DAffine3::IDENTITY)]).unwrap();
+        let mut scene = SceneBvh::new(1);
+        assert_eq!(scene.add(&MeshBvh::build(&Mesh::default()), 0), NONE);
+        let nodes = scene.place(&[], false).unwrap();
         assert_eq!(nodes[0][0], NONE);
     }
 
@@ -337,8 +459,11 @@ mod tests {
     fn too_deep_a_tree_is_refused() {
         let mut tree = MeshBvh::build(&sheet(3));
         tree.depth = STACK - 1;
-        let mut scene = SceneBvh::new(&[tree], &[0], 1);
-        let error = scene.place(&[(0, DAffine3::IDENTITY)]).unwrap_err();
+        let mut scene = SceneBvh::new(1);
+        scene.add(&tree, 0);
+        let error = scene
+            .place(&places(&[(0, 0.0)], &[tree]), false)
+            .unwrap_err();
         assert!(matches!(error, BvhError::TooDeep(33)), "{error}");
     }
 

@@ -15,8 +15,9 @@ pub mod tracer;
 pub mod world;
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Stage};
+use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use passes::Passes;
@@ -45,6 +46,9 @@ pub struct Simulator {
     coincident: bool,
     settings: Settings,
     tables: Tables,
+    shapers: Arc<world::Kernels>,
+    counting: bool,
+    update_time: Duration,
 }
 
 /// What the tables on the device were made of.
@@ -82,9 +86,10 @@ impl Simulator {
         scene: &Scene,
         tracer: Tracer,
     ) -> Result<Self, SimError> {
-        let world = World::new(device, scene, tracer)?;
+        let shapers = Arc::new(world::Kernels::new(device, library)?);
+        let world = World::new(device, &shapers, scene, tracer)?;
         let coincident = scene.coincident_triangles() > 0;
-        let (frame, batches) = frame_constants(scene, coincident, 0);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &tables)?;
         let simulator = Self {
@@ -93,8 +98,11 @@ impl Simulator {
             coincident,
             settings: Settings::of(scene),
             tables,
+            shapers,
+            counting: false,
+            update_time: Duration::ZERO,
             passes: Passes {
-                kernels: Kernels::new(device, library, tracer, world.deforms())?,
+                kernels: Kernels::new(device, library, &world, false)?,
                 buffers,
                 world,
                 frame,
@@ -133,14 +141,20 @@ impl Simulator {
             self.upload_tables()?;
             self.settings = settings;
         }
+        if !self.passes.world.serves(scene) {
+            self.frames.wait()?;
+            let tracer = self.passes.world.tracer();
+            self.passes.world = World::new(&self.device, &self.shapers, scene, tracer)?;
+        }
         let passes = &mut self.passes;
-        (passes.frame, passes.batches) = frame_constants(scene, self.coincident, index);
         let mut cmd = self.frames.begin()?;
         cmd.scope("update");
+        let began = Instant::now();
+        passes.world.update(&mut cmd, scene)?;
+        self.update_time = began.elapsed();
+        (passes.frame, passes.batches) =
+            frame_constants(scene, &passes.world, self.coincident, index);
         cmd.write(&passes.buffers.frame, 0, bytemuck::bytes_of(&passes.frame))?;
-        if passes.world.update(&mut cmd, scene)? && passes.world.tracer() == Tracer::RayQuery {
-            cmd.barrier(Stage::Build, Stage::Compute);
-        }
         passes.clear(&mut cmd);
         passes.origin(&mut cmd)?;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
@@ -162,8 +176,34 @@ impl Simulator {
     pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
         self.frames.wait()?;
         let world = &self.passes.world;
-        self.passes.kernels = Kernels::new(&self.device, library, world.tracer(), world.deforms())?;
+        self.passes.kernels = Kernels::new(&self.device, library, world, self.counting)?;
+        self.shapers = Arc::new(world::Kernels::new(&self.device, library)?);
         Ok(())
+    }
+
+    /// Takes the kernels of the compute tracer that count their steps (`node_visits` and below of
+    /// [`Self::counters`]), which slows rays, or those that do not.
+    ///
+    /// # Errors
+    /// A kernel that the device refuses.
+    ///
+    /// # Panics
+    /// With the ray query, whose steps nobody can count.
+    pub fn count(&mut self, library: &Library, counting: bool) -> Result<(), SimError> {
+        assert_eq!(self.passes.world.tracer(), Tracer::Bvh, "what is counted");
+        self.counting = counting;
+        self.reload(library)
+    }
+
+    /// What the processor took to record the last frame's changes of the scene, trees that it built
+    /// for them included.
+    pub fn update_time(&self) -> Duration {
+        self.update_time
+    }
+
+    /// Device memory of geometry and acceleration structures, bytes.
+    pub fn world_bytes(&self) -> u64 {
+        self.passes.world.bytes()
     }
 
     /// Waits for the frames in flight; their timings, oldest first.
@@ -269,10 +309,20 @@ impl Simulator {
 }
 
 /// The frame's constants, with what only the world and the buffers' sizes decide.
-fn frame_constants(scene: &Scene, coincident: bool, index: u32) -> (layout::Frame, Batches) {
+fn frame_constants(
+    scene: &Scene,
+    world: &World,
+    coincident: bool,
+    index: u32,
+) -> (layout::Frame, Batches) {
     let mut frame = tables::frame(scene, index);
     if coincident {
         frame.flags |= layout::FLAG_COINCIDENT;
+    }
+    let (ray_mask, ambiguous) = world.ray_mask();
+    frame.ray_mask = ray_mask;
+    if ambiguous {
+        frame.flags |= layout::FLAG_SLOTS;
     }
     let batches = Batches::new(&frame);
     frame.segment_capacity = batches.capacity;

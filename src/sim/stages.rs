@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::layout;
 use super::shaders::Library;
 use super::tables::Tables;
-use super::tracer::Tracer;
+use super::world::World;
 use crate::gpu::{Buffer, BufferKind, Device, GpuError, Kernel};
 
 /// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
@@ -146,18 +146,22 @@ impl Kernels {
     pub(super) fn new(
         device: &Arc<Device>,
         library: &Library,
-        tracer: Tracer,
-        deforming: bool,
+        world: &World,
+        counting: bool,
     ) -> Result<Self, GpuError> {
         let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
+        let suffix = match counting {
+            true => "count",
+            false => world.tracer().suffix(),
+        };
         Ok(Self {
-            origin: kernel(&format!("origin_{}", tracer.suffix()))?,
-            trace: kernel(&format!("trace_{}", tracer.suffix()))?,
+            origin: kernel(&format!("origin_{suffix}"))?,
+            trace: kernel(&format!("trace_{suffix}"))?,
             scatter: Kernel::new(
                 device,
                 "scatter",
                 library.words("scatter"),
-                &[(0, u32::from(deforming))],
+                &[(0, u32::from(world.deforms()))],
             )?,
             beam: kernel("beam")?,
             axial: kernel("axial")?,

@@ -118,6 +118,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         origin_jitter: simulation.origin_jitter as f32,
         beam_width: finite_or_zero(simulation.beam_width),
         emission_lobe: finite_or_zero(simulation.emission_lobe),
+        ray_mask: 0xff,
         cell: simulation.cell as f32,
         elevation_reach: calibration.elevation_reach() as f32,
         lateral_cut: LATERAL_CUT as f32,

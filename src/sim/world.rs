@@ -1,21 +1,25 @@
 //! The anatomy on the device: geometry, instance rows, and what a tracer walks.
 
 mod arrays;
+mod changing;
+mod entry;
+mod refit;
+mod top;
 
 use std::sync::Arc;
 
-use super::bvh::{BvhError, SceneBvh};
+use super::bvh::BvhError;
 use super::fields::Fields;
 use super::layout;
-use super::placement::rows;
+use super::shaders::Library;
 use super::tracer::Tracer;
-use crate::gpu::{
-    Binding, Blas, BlasInput, BlasOptions, Buffer, BufferKind, Commands, Device, GpuError, Tlas,
-    TlasInstance,
-};
-use crate::scene::Scene;
+use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
+use crate::scene::{Keyframes, Scene, Strategy};
 pub use arrays::Arrays;
-use arrays::{Place, instance_rows, placements};
+use arrays::Place;
+use changing::Changing;
+use entry::Mask;
+use top::Top;
 
 /// Why the anatomy is not on the device.
 #[derive(Debug, thiserror::Error)]
@@ -26,33 +30,66 @@ pub enum WorldError {
     /// The hierarchy does not fit its kernel.
     #[error(transparent)]
     Bvh(#[from] BvhError),
-}
-
-/// What the tracer walks.
-enum Structure {
-    Bvh {
-        bvh: SceneBvh,
-        nodes: Buffer,
-    },
-    /// No structure for a mesh without triangles.
-    Query {
-        meshes: Vec<Option<Blas>>,
-        tlas: Tlas,
-    },
+    /// A node that only the compute tracer has.
+    #[error(
+        "`{0}`: the strategy `union` is a node of the compute tracer: \
+         take --tracer bvh, or the strategy `mask`, which builds nothing either"
+    )]
+    Union(String),
 }
 
 /// The anatomy on the device.
 pub struct World {
     tracer: Tracer,
+    geometry: Geometry,
+    fields: Fields,
     places: Vec<Place>,
+    /// Of instances that change their shape on the device.
+    regions: Vec<Option<Place>>,
+    changing: Changing,
+    top: Top,
     rows: Vec<layout::Instance>,
+    mask: Mask,
+    /// What decides which memory there is.
+    made_for: Vec<Keyframes>,
+}
+
+/// The kernels that make shapes.
+pub struct Kernels {
+    interpolate: Kernel,
+    refit: Kernel,
+}
+
+impl Kernels {
+    /// # Errors
+    /// A kernel that the device refuses.
+    pub fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
+        let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
+        Ok(Self {
+            interpolate: kernel("interpolate")?,
+            refit: kernel("refit")?,
+        })
+    }
+}
+
+/// What all kernels of both tracers bind.
+struct Geometry {
     instances: Buffer,
     vertices: Buffer,
+    vertex_count: u32,
     normals: Buffer,
     triangles: Buffer,
-    fields: Fields,
-    field_buffer: Buffer,
-    structure: Structure,
+    fields: Buffer,
+}
+
+/// The keyframes of each instance, without what changes from frame to frame.
+fn made_for(scene: &Scene) -> Vec<Keyframes> {
+    let lasting = |keyframes: &Keyframes| Keyframes {
+        blend: Default::default(),
+        ..keyframes.clone()
+    };
+    let instances = scene.instances.iter();
+    instances.map(|i| lasting(&i.keyframes)).collect()
 }
 
 impl World {
@@ -61,45 +98,55 @@ impl World {
     ///
     /// # Errors
     /// When the scene exceeds the device's limits or memory, or the tracer cannot serve it.
-    pub fn new(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> Result<Self, WorldError> {
-        let Arrays {
-            places,
-            bvh,
-            instances: rows,
-            vertices,
-            normals,
-            triangles,
-            fields,
-        } = Arrays::new(scene, tracer)?;
-        let structure = match bvh {
-            Some(bvh) => {
-                let nodes = upload(device, "nodes", bytemuck::cast_slice(&bvh.nodes))?;
-                Structure::Bvh { bvh, nodes }
-            }
-            None => {
-                let meshes = build_meshes(device, scene)?;
-                let mut tlas = Tlas::new(device, "anatomy", scene.instances.len().max(1) as u32)?;
-                device.once(|commands| tlas.build(commands, &tlas_instances(scene, &meshes)))?;
-                Structure::Query { meshes, tlas }
-            }
+    pub fn new(
+        device: &Arc<Device>,
+        kernels: &Arc<Kernels>,
+        scene: &Scene,
+        tracer: Tracer,
+    ) -> Result<Self, WorldError> {
+        let union = |i: &&crate::scene::Instance| i.keyframes.strategy == Strategy::Union;
+        if let Some(node) = scene.instances.iter().find(union)
+            && tracer == Tracer::RayQuery
+        {
+            return Err(WorldError::Union(node.name.clone()));
+        }
+        let arrays = Arrays::new(scene, tracer)?;
+        let geometry = Geometry {
+            instances: upload(device, "instances", bytemuck::cast_slice(&arrays.instances))?,
+            vertices: upload(device, "vertices", bytemuck::cast_slice(&arrays.vertices))?,
+            vertex_count: arrays.vertices.len() as u32,
+            normals: upload(device, "normals", bytemuck::cast_slice(&arrays.normals))?,
+            triangles: upload(device, "triangles", bytemuck::cast_slice(&arrays.triangles))?,
+            fields: upload(device, "fields", arrays.fields.bytes())?,
         };
-        Ok(Self {
+        let mut world = Self {
             tracer,
-            instances: upload(device, "instances", bytemuck::cast_slice(&rows))?,
-            vertices: upload(device, "vertices", bytemuck::cast_slice(&vertices))?,
-            normals: upload(device, "normals", bytemuck::cast_slice(&normals))?,
-            triangles: upload(device, "triangles", bytemuck::cast_slice(&triangles))?,
-            field_buffer: upload(device, "fields", fields.bytes())?,
-            fields,
-            structure,
-            places,
-            rows,
-        })
+            changing: Changing::new(device, kernels, scene, tracer, &geometry, &arrays.regions)?,
+            top: Top::new(device, scene, arrays.bvh)?,
+            geometry,
+            fields: arrays.fields,
+            places: arrays.places,
+            regions: arrays.regions,
+            rows: arrays.instances,
+            mask: Mask::default(),
+            made_for: made_for(scene),
+        };
+        let mut failed = None;
+        device.once(|commands| {
+            failed = world.update(commands, scene).err();
+            Ok(())
+        })?;
+        failed.map_or(Ok(world), Err)
     }
 
-    /// Records what changed since the last call: instance rows and the top level, or nothing.
-    /// Meshes and the number of instances must be those of [`Self::new`]. Barriers to and from
-    /// the kernels before and after are the caller's when this returns true.
+    /// Whether [`Self::update`] can show `scene`: its keyframes and strategies are those of [`Self::new`].
+    pub fn serves(&self, scene: &Scene) -> bool {
+        self.made_for == made_for(scene)
+    }
+
+    /// Records what changed since the last call: shapes, instance rows and the top level, or nothing;
+    /// with the barriers between them and to the kernels behind. Returns whether anything did.
+    /// Meshes and the number of instances must be those of [`Self::new`].
     ///
     /// # Errors
     /// When recording fails, or the moved instances need a deeper top level than the kernel walks.
@@ -113,29 +160,32 @@ impl World {
             self.rows.len(),
             "instances were added or removed after the upload"
         );
-        let roots = match &self.structure {
-            Structure::Bvh { bvh, .. } => Some(&bvh.roots[..]),
-            Structure::Query { .. } => None,
-        };
-        let rows = instance_rows(scene, &self.places, roots, &self.fields);
-        if rows == self.rows {
-            return Ok(false);
+        let reshaped = self.changing.record(
+            commands,
+            scene,
+            &self.geometry,
+            &self.fields,
+            &self.places,
+            &mut self.regions,
+            &mut self.top,
+        )?;
+        let entries = entry::entries(scene, &self.places, &self.regions);
+        let placed = self
+            .top
+            .place(commands, scene, entries, self.changing.structures())?;
+        let (places, regions) = (&self.places, &self.regions);
+        let (entries, slots) = (self.top.entries(), self.top.slots());
+        let rows = entry::rows(scene, places, regions, &self.fields, entries, slots);
+        self.mask = entry::mask(scene, self.top.entries());
+        let rewritten = rows != self.rows;
+        if rewritten {
+            commands.write(&self.geometry.instances, 0, bytemuck::cast_slice(&rows))?;
+            self.rows = rows;
         }
-        commands.write(&self.instances, 0, bytemuck::cast_slice(&rows))?;
-        match &mut self.structure {
-            Structure::Bvh { bvh, nodes } => {
-                commands.write(
-                    nodes,
-                    0,
-                    bytemuck::cast_slice(bvh.place(&placements(scene))?),
-                )?;
-            }
-            Structure::Query { meshes, tlas } => {
-                tlas.build(commands, &tlas_instances(scene, meshes))?
-            }
+        if reshaped || placed || rewritten {
+            commands.barrier(Stage::Transfer, Stage::Compute);
         }
-        self.rows = rows;
-        Ok(true)
+        Ok(reshaped || placed || rewritten)
     }
 
     /// How rays find surfaces here.
@@ -145,27 +195,27 @@ impl World {
 
     /// Instance rows, in the order of [`Scene::instances`].
     pub fn instances(&self) -> &Buffer {
-        &self.instances
+        &self.geometry.instances
     }
 
     /// Vertex positions, object space, mm: three floats each.
     pub fn vertices(&self) -> &Buffer {
-        &self.vertices
+        &self.geometry.vertices
     }
 
     /// Shading normals, object space: three floats each.
     pub fn normals(&self) -> &Buffer {
-        &self.normals
+        &self.geometry.normals
     }
 
     /// Three indices into the vertices per triangle.
     pub fn triangles(&self) -> &Buffer {
-        &self.triangles
+        &self.geometry.triangles
     }
 
     /// Displacement fields of deforming tissue: three floats per vector.
     pub fn fields(&self) -> &Buffer {
-        &self.field_buffer
+        &self.geometry.fields
     }
 
     /// Whether any instance's tissue deforms.
@@ -175,21 +225,24 @@ impl World {
 
     /// What a kernel of this world's tracer binds as `nodes` or `tlas`.
     pub fn structure(&self) -> Binding<'_> {
-        match &self.structure {
-            Structure::Bvh { nodes, .. } => Binding::Buffer(nodes),
-            Structure::Query { tlas, .. } => Binding::Tlas(tlas),
-        }
+        self.top.binding()
     }
 
     /// Instances, vertices, normals, triangles, structure: the order in which the kernels bind them.
     pub fn bindings(&self) -> [Binding<'_>; 5] {
         [
-            Binding::Buffer(&self.instances),
-            Binding::Buffer(&self.vertices),
-            Binding::Buffer(&self.normals),
-            Binding::Buffer(&self.triangles),
+            Binding::Buffer(&self.geometry.instances),
+            Binding::Buffer(&self.geometry.vertices),
+            Binding::Buffer(&self.geometry.normals),
+            Binding::Buffer(&self.geometry.triangles),
             self.structure(),
         ]
+    }
+
+    /// Mask bits that a ray query is started with, and whether rows choose among the entries that
+    /// these let pass: a frame's `ray_mask` and FLAG_SLOTS.
+    pub fn ray_mask(&self) -> (u32, bool) {
+        (self.mask.bits, self.mask.ambiguous)
     }
 
     /// The rows as they are on the device.
@@ -197,29 +250,27 @@ impl World {
         &self.rows
     }
 
-    /// Index in [`crate::scene::Mesh::triangles`] of a hit's primitive on mesh `mesh`.
-    pub fn triangle(&self, mesh: usize, primitive: u32) -> usize {
-        let place = &self.places[mesh];
+    /// Index in [`crate::scene::Mesh::triangles`] of a hit's primitive, for what `instance` shows:
+    /// `mesh`.
+    pub fn triangle(&self, instance: usize, mesh: usize, primitive: u32) -> usize {
+        let place = self.regions[instance].as_ref();
+        let place = place.unwrap_or(&self.places[mesh]);
         let index = (primitive - place.first_triangle) as usize;
         place.order.as_ref().map_or(index, |o| o[index] as usize)
     }
 
     /// Device memory of geometry and structure, bytes.
     pub fn bytes(&self) -> u64 {
+        let g = &self.geometry;
         let buffers = [
-            &self.instances,
-            &self.vertices,
-            &self.normals,
-            &self.triangles,
-            &self.field_buffer,
+            &g.instances,
+            &g.vertices,
+            &g.normals,
+            &g.triangles,
+            &g.fields,
         ];
-        let structure = match &self.structure {
-            Structure::Bvh { nodes, .. } => nodes.size(),
-            Structure::Query { meshes, tlas } => {
-                tlas.bytes() + meshes.iter().flatten().map(Blas::bytes).sum::<u64>()
-            }
-        };
-        buffers.iter().map(|b| b.size()).sum::<u64>() + structure
+        let buffers: u64 = buffers.iter().map(|b| b.size()).sum();
+        buffers + self.top.bytes() + self.changing.bytes()
     }
 }
 
@@ -227,37 +278,4 @@ fn upload(device: &Arc<Device>, name: &str, bytes: &[u8]) -> Result<Buffer, GpuE
     let buffer = device.buffer(name, bytes.len() as u64, BufferKind::Storage)?;
     device.upload(&buffer, bytes)?;
     Ok(buffer)
-}
-
-fn build_meshes(device: &Arc<Device>, scene: &Scene) -> Result<Vec<Option<Blas>>, GpuError> {
-    let solid = scene.meshes.iter().filter(|m| !m.triangles.is_empty());
-    let inputs: Vec<BlasInput<'_>> = solid
-        .map(|mesh| BlasInput {
-            name: &mesh.name,
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
-        })
-        .collect();
-    let mut built = Blas::build_many(device, &inputs, BlasOptions::default())?.into_iter();
-    let structure = |mesh: &crate::scene::Mesh| {
-        let solid = !mesh.triangles.is_empty();
-        solid.then(|| built.next()).flatten()
-    };
-    Ok(scene.meshes.iter().map(structure).collect())
-}
-
-fn tlas_instances<'a>(scene: &Scene, meshes: &'a [Option<Blas>]) -> Vec<TlasInstance<'a>> {
-    scene
-        .instances
-        .iter()
-        .enumerate()
-        .filter_map(|(i, placed)| {
-            Some(TlasInstance {
-                blas: meshes[placed.mesh].as_ref()?,
-                transform: rows(&placed.world_from_object),
-                custom_index: i as u32,
-                mask: 0xff,
-            })
-        })
-        .collect()
 }

@@ -9,7 +9,7 @@ use insonify::scene::Scene;
 use insonify::sim::layout::NONE;
 use insonify::sim::shaders::Library;
 use insonify::sim::tracer::Tracer;
-use insonify::sim::world::World;
+use insonify::sim::world::{Kernels, World};
 
 use super::compare::Found;
 use super::rays::Ray;
@@ -30,8 +30,19 @@ struct RawHit {
     shading: [f32; 4],
     instance: u32,
     primitive: u32,
-    node_visits: u32,
-    triangle_tests: u32,
+    counts: Counts,
+}
+
+/// What the compute tracer did for a ray; zero with the ray query. As in `rays.comp`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+pub struct Counts {
+    pub node_visits: u32,
+    pub triangle_tests: u32,
+    pub top_visits: u32,
+    pub instances_reached: u32,
+    pub false_unions: u32,
+    pub false_boxes: u32,
 }
 
 /// What the kernel says of a ray.
@@ -41,8 +52,7 @@ pub struct Traced {
     pub position: DVec3,
     pub geometric: DVec3,
     pub shading: DVec3,
-    pub node_visits: u32,
-    pub triangle_tests: u32,
+    pub counts: Counts,
 }
 
 /// A scene on the device with one tracer.
@@ -50,7 +60,7 @@ pub struct Rig {
     pub device: Arc<Device>,
     kernel: Kernel,
     pub world: World,
-    meshes: Vec<usize>,
+    pub meshes: Vec<usize>,
     /// Stand in for buffers of the world, by binding.
     pub replaced: Vec<(usize, Buffer)>,
 }
@@ -68,7 +78,8 @@ impl Rig {
             Tracer::RayQuery => "rays_query",
         };
         let kernel = Kernel::new(device, stem, Library::embedded().words(stem), &[]).unwrap();
-        let world = World::new(device, scene, tracer).unwrap();
+        let kernels = Arc::new(Kernels::new(device, &Library::embedded()).unwrap());
+        let world = World::new(device, &kernels, scene, tracer).unwrap();
         Self {
             kernel,
             world,
@@ -83,12 +94,13 @@ impl Rig {
         if rays.is_empty() {
             return Vec::new();
         }
+        let (mask, slots) = self.world.ray_mask();
         let raw: Vec<RawRay> = rays
             .iter()
             .map(|r| RawRay {
                 origin: [r.origin[0], r.origin[1], r.origin[2], r.t_min],
                 direction: [r.direction[0], r.direction[1], r.direction[2], r.t_max],
-                skip: [r.skip.unwrap_or(NONE), 0, 0, 0],
+                skip: [r.skip.unwrap_or(NONE), mask, slots.into(), 0],
             })
             .collect();
         let _turn = TURN.lock().unwrap_or_else(|e| e.into_inner());
@@ -127,7 +139,7 @@ impl Rig {
             Found {
                 t: hit.position[3].into(),
                 instance,
-                triangle: self.world.triangle(self.meshes[instance], hit.primitive),
+                triangle: (self.world).triangle(instance, self.meshes[instance], hit.primitive),
             }
         });
         Traced {
@@ -135,8 +147,7 @@ impl Rig {
             position: vector(hit.position),
             geometric: vector(hit.geometric),
             shading: vector(hit.shading),
-            node_visits: hit.node_visits,
-            triangle_tests: hit.triangle_tests,
+            counts: hit.counts,
         }
     }
 

@@ -4,6 +4,7 @@
 
 mod compare;
 mod device;
+mod keyframes;
 mod placements;
 mod rays;
 mod refit;
@@ -285,7 +286,10 @@ fn traversal_steps_stay_small() {
     let mean = |f: fn(&Traced) -> u32| {
         hits.iter().map(|h| f64::from(f(h))).sum::<f64>() / hits.len() as f64
     };
-    let (nodes, triangles) = (mean(|h| h.node_visits), mean(|h| h.triangle_tests));
+    let (nodes, triangles) = (
+        mean(|h| h.counts.node_visits),
+        mean(|h| h.counts.triangle_tests),
+    );
     assert!(
         nodes < 14.0 && triangles < 6.0,
         "{nodes:.2} nodes, {triangles:.2} triangles per ray"

@@ -172,11 +172,14 @@ pub fn aimed_at_seams(i: usize) -> bool {
 /// vertices that triangles share, along axes, and grazing.
 pub fn rays(scene: &Scene, count: usize, seed: u64) -> Vec<Ray> {
     let mut random = Random::new(seed);
+    let triangles = |i: usize| scene.meshes[scene.instances[i].mesh].triangles.len();
+    let seen: Vec<usize> = (0..scene.instances.len())
+        .filter(|&i| triangles(i) > 0)
+        .collect();
     (0..count)
         .map(|i| {
-            let instance = random.below(scene.instances.len());
-            let triangle =
-                random.below(scene.meshes[scene.instances[instance].mesh].triangles.len());
+            let instance = seen[random.below(seen.len())];
+            let triangle = random.below(triangles(instance));
             let [a, b, c] = corners(scene, instance, triangle);
             let target = match i % 4 {
                 0 => a,

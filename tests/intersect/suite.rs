@@ -21,6 +21,7 @@ impl Rig {
 
     /// The scene with its instances moved.
     pub fn update(&mut self, scene: &Scene) -> bool {
+        self.meshes = scene.instances.iter().map(|i| i.mesh).collect();
         let world = &mut self.world;
         self.device
             .once(|commands| Ok(world.update(commands, scene).unwrap()))

@@ -171,8 +171,8 @@ fn steps(bench: &Bench) -> Plot {
             hits.iter().map(|h| f64::from(f(h))).sum::<f64>() / hits.len() as f64
         };
         brute.push([size, size]);
-        nodes.push([size, mean(|h| h.node_visits)]);
-        triangles.push([size, mean(|h| h.triangle_tests)]);
+        nodes.push([size, mean(|h| h.counts.node_visits)]);
+        triangles.push([size, mean(|h| h.counts.triangle_tests)]);
     }
     Plot {
         logarithmic: [true; 2],

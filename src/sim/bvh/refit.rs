@@ -18,7 +18,7 @@ pub struct Levels {
 }
 
 /// The levels of `trees`, each with the number of its root in the scene's buffer
-/// ([`super::SceneBvh::roots`]): trees that are refitted together share their dispatches. Empty
+/// ([`super::SceneBvh::add`]): trees that are refitted together share their dispatches. Empty
 /// trees may be among them, with any root.
 pub fn levels(trees: &[(&MeshBvh, u32)]) -> Levels {
     let mut by_level: Vec<Vec<u32>> = Vec::new();
@@ -141,8 +141,7 @@ mod tests {
             shapes::cylinder(3.0, 20.0, 16),
         ];
         let trees = meshes.each_ref().map(MeshBvh::build);
-        let scene = SceneBvh::new(&trees, &[0, 0, 0], 3);
-        let roots = scene.roots.iter().copied();
+        let (scene, roots) = SceneBvh::of(&trees, &[0, 0, 0], 3);
         let levels = levels(&trees.iter().zip(roots).collect::<Vec<_>>());
         let mut place = vec![None; scene.nodes.len()];
         let mut next = 0;
@@ -203,10 +202,10 @@ mod tests {
     fn a_refitted_hierarchy_holds_its_triangles_and_a_box_too_small_is_noticed() {
         let mesh = shapes::ellipsoid([12.0, 9.0, 17.0], 4);
         let tree = MeshBvh::build(&mesh);
-        let scene = SceneBvh::new(std::slice::from_ref(&tree), &[0], 1);
+        let (scene, roots) = SceneBvh::of(std::slice::from_ref(&tree), &[0], 1);
         let order = tree.triangle_order.iter();
         let triangles: Vec<_> = order.map(|&t| mesh.triangles[t as usize]).collect();
-        let levels = levels(&[(&tree, scene.roots[0])]);
+        let levels = levels(&[(&tree, roots[0])]);
         for vertices in [mesh.positions.clone(), pulsed(&mesh), shuffled(&mesh)] {
             let geometry = Geometry {
                 vertices: &vertices,
@@ -218,17 +217,17 @@ mod tests {
                 let words = nodes.as_flattened_mut();
                 refit(range, words, geometry, &mut boxes, &levels.order);
             }
-            assert_eq!(outside(&nodes, scene.roots[0], geometry), 0);
+            assert_eq!(outside(&nodes, roots[0], geometry), 0);
             // The box of the last node done, the root: one child one quantum too short.
-            let root = &mut nodes[scene.roots[0] as usize];
+            let root = &mut nodes[roots[0] as usize];
             root[10] -= 1;
-            assert!(outside(&nodes, scene.roots[0], geometry) > 0);
+            assert!(outside(&nodes, roots[0], geometry) > 0);
         }
         let still = Geometry {
             vertices: &pulsed(&mesh),
             triangles: &triangles,
         };
-        let stale = outside(&scene.nodes, scene.roots[0], still);
+        let stale = outside(&scene.nodes, roots[0], still);
         assert!(stale > 1000, "without a refit {stale} are outside");
     }
 

@@ -21,8 +21,15 @@ use crate::scene::Scene;
 /// triangles means nothing to the ray query.
 pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
     use Element::{Float, Integer, Word};
-    let arrays = Arrays::new(scene, Tracer::Bvh).map_err(|e| SimError::World(e.into()))?;
+    let arrays = Arrays::new(&scene.still(), Tracer::Bvh).map_err(|e| SimError::World(e.into()))?;
     let nodes = &arrays.bvh.expect("made for the compute tracer").nodes;
+    // The tissue of a still scene rests: where it has gone, the device knows.
+    let mut instances = arrays.instances;
+    for (row, real) in instances.iter_mut().zip(simulator.passes.world.rows()) {
+        row.field = real.field;
+    }
+    let fields = simulator.device.read_back(simulator.passes.world.fields());
+    let fields = fields.map_err(SimError::from)?;
     let frame = *simulator.constants();
     let array = |name, element, values: &[u8], each: usize| {
         let path = dir.join(format!("{name}.npy"));
@@ -68,7 +75,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     array(
         "instances",
         Word,
-        bytemuck::cast_slice(&arrays.instances),
+        bytemuck::cast_slice(&instances),
         words::<layout::Instance>(),
     )?;
     array("vertices", Float, bytemuck::cast_slice(&arrays.vertices), 3)?;
@@ -80,7 +87,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         3,
     )?;
     array("nodes", Word, bytemuck::cast_slice(nodes), 20)?;
-    array("fields", Float, arrays.fields.bytes(), 3)?;
+    array("fields", Float, &fields, 3)?;
 
     let (lines, samples) = (lines(&frame) as usize, frame.samples as usize);
     let samples = frame.scanlines as usize * samples;

@@ -1,29 +1,78 @@
 //! A scene's geometry as the kernels bind it, on the host.
 
-use glam::DAffine3;
 use rayon::prelude::*;
 
-use crate::scene::{Mesh, Scene};
-use crate::sim::bvh::{BvhError, MeshBvh, SceneBvh};
+use super::entry;
+use crate::scene::{Instance, Mesh, Scene, Strategy};
+use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh};
 use crate::sim::fields::Fields;
-use crate::sim::layout::{Instance, NONE};
-use crate::sim::placement::{rigid, rows};
+use crate::sim::layout::{self, NONE};
 use crate::sim::tracer::Tracer;
 
-/// Where a mesh lies in the arrays.
-#[derive(Clone, Debug)]
+/// A box in object space, mm: smallest and largest corner.
+pub(super) type Bounds = [[f32; 3]; 2];
+
+/// Where the geometry of a mesh, or of an instance that changes, lies in the arrays.
+#[derive(Clone, Debug, Default)]
 pub(super) struct Place {
+    pub(super) first_vertex: u32,
     pub(super) first_triangle: u32,
     pub(super) triangles: u32,
+    /// Of the compute tracer's tree; NONE: it has none.
+    pub(super) root: u32,
+    pub(super) bounds: Bounds,
     /// Index in the mesh of each triangle, in the order of the array; none where it is the mesh's.
     pub(super) order: Option<Vec<u32>>,
+    /// Of an instance that changes its shape: how often the device has made it.
+    pub(super) version: u64,
+}
+
+/// What of a mesh has to stay on the device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Need {
+    /// Nothing: it is uploaded when it is shown.
+    Nothing,
+    /// Vertices and normals.
+    Vertices,
+    /// Triangles as well.
+    Geometry,
+    /// And a structure that rays walk.
+    Structure,
+}
+
+/// What each mesh of a scene has to have on the device.
+pub(super) fn needs(scene: &Scene) -> Vec<Need> {
+    let mut needs = vec![Need::Nothing; scene.meshes.len()];
+    for instance in &scene.instances {
+        let keyframes = &instance.keyframes;
+        let need = match keyframes.strategy {
+            _ if keyframes.meshes.is_empty() => Need::Structure,
+            Strategy::Selector | Strategy::Update | Strategy::Mask | Strategy::Union => {
+                Need::Structure
+            }
+            Strategy::Cached => Need::Geometry,
+            Strategy::Refit | Strategy::Interpolate => Need::Vertices,
+            Strategy::Rebuild => Need::Nothing,
+        };
+        for &mesh in keyframes.meshes.iter().chain([&instance.mesh]) {
+            needs[mesh] = needs[mesh].max(need);
+        }
+    }
+    needs
+}
+
+/// Whether the instance's structure changes while the program runs.
+pub(super) fn is_dynamic(instance: &Instance) -> bool {
+    use Strategy::{Cached, Interpolate, Rebuild, Refit};
+    let changing = [Rebuild, Cached, Refit, Interpolate].contains(&instance.keyframes.strategy);
+    changing && !instance.keyframes.meshes.is_empty()
 }
 
 /// Geometry of all meshes, and the instances. For the compute tracer triangles lie in the order of
 /// its leaves, for the ray query in that of the meshes, so that nothing is built to sort them.
 pub struct Arrays {
     /// One row per instance of the scene.
-    pub instances: Vec<Instance>,
+    pub instances: Vec<layout::Instance>,
     /// Vertex positions, object space, mm.
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
@@ -35,10 +84,13 @@ pub struct Arrays {
     /// How tissue deforms.
     pub fields: Fields,
     pub(super) places: Vec<Place>,
+    /// Per instance that changes its shape on the device: room for the largest of its keyframes.
+    pub(super) regions: Vec<Option<Place>>,
 }
 
 impl Arrays {
-    /// What `tracer` needs of `scene`.
+    /// What `tracer` needs of `scene`. Instances that change their shape on the device have room, but
+    /// nothing in it.
     ///
     /// # Errors
     /// When the hierarchy is deeper than the compute tracer walks.
@@ -51,84 +103,109 @@ impl Arrays {
             vertices: Vec::new(),
             normals: Vec::new(),
             triangles: Vec::new(),
-            bvh: None,
+            bvh: (tracer == Tracer::Bvh).then(|| SceneBvh::new(entry::capacity(scene))),
             fields: Fields::build(scene),
             places: Vec::new(),
+            regions: Vec::new(),
         };
-        if tracer == Tracer::Bvh {
-            let trees: Vec<MeshBvh> = scene.meshes.par_iter().map(MeshBvh::build).collect();
-            for (mesh, tree) in scene.meshes.iter().zip(&trees) {
-                arrays.add(mesh, Some(&tree.triangle_order));
-            }
-            let first: Vec<u32> = arrays.places.iter().map(|p| p.first_triangle).collect();
-            let mut bvh = SceneBvh::new(&trees, &first, scene.instances.len());
-            bvh.place(&placements(scene))?;
-            arrays.bvh = Some(bvh);
-        } else {
-            for mesh in &scene.meshes {
-                arrays.add(mesh, None);
-            }
+        let needs = needs(scene);
+        let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
+            .map(|(mesh, need)| {
+                let walked = tracer == Tracer::Bvh && *need == Need::Structure;
+                walked.then(|| MeshBvh::build(mesh))
+            })
+            .collect();
+        for ((mesh, tree), need) in scene.meshes.iter().zip(trees).zip(needs) {
+            let place = arrays.add(mesh, tree, need);
+            arrays.places.push(place);
         }
-        let roots = arrays.bvh.as_ref().map(|bvh| &bvh.roots[..]);
-        arrays.instances = instance_rows(scene, &arrays.places, roots, &arrays.fields);
+        for instance in &scene.instances {
+            let region = is_dynamic(instance).then(|| arrays.reserve(scene, instance));
+            arrays.regions.push(region);
+        }
+        let entries = entry::entries(scene, &arrays.places, &arrays.regions);
+        let slots = match &mut arrays.bvh {
+            Some(bvh) => {
+                bvh.place(&placed(&entries), false)?;
+                bvh.slots.clone()
+            }
+            None => (0..entries.len() as u32).collect(),
+        };
+        let (places, regions, fields) = (&arrays.places, &arrays.regions, &arrays.fields);
+        arrays.instances = entry::rows(scene, places, regions, fields, &entries, &slots);
         Ok(arrays)
     }
 
-    fn add(&mut self, mesh: &Mesh, order: Option<&[u32]>) {
+    fn add(&mut self, mesh: &Mesh, tree: Option<MeshBvh>, need: Need) -> Place {
         assert_eq!(
             mesh.normals.len(),
             mesh.positions.len(),
             "one normal per vertex: `{}`",
             mesh.name
         );
-        let base = self.vertices.len() as u32;
-        self.places.push(Place {
+        let mut place = Place {
+            first_vertex: self.vertices.len() as u32,
             first_triangle: self.triangles.len() as u32,
             triangles: mesh.triangles.len() as u32,
-            order: order.map(<[u32]>::to_vec),
-        });
-        self.vertices.extend_from_slice(&mesh.positions);
-        self.normals.extend_from_slice(&mesh.normals);
-        let moved = |triangle: &[u32; 3]| triangle.map(|v| v + base);
-        match order {
-            Some(order) => {
-                let sorted = order.iter().map(|&i| moved(&mesh.triangles[i as usize]));
-                self.triangles.extend(sorted);
-            }
-            None => self.triangles.extend(mesh.triangles.iter().map(moved)),
+            root: NONE,
+            bounds: mesh.bounds(),
+            order: None,
+            version: 0,
+        };
+        if need >= Need::Vertices {
+            self.vertices.extend_from_slice(&mesh.positions);
+            self.normals.extend_from_slice(&mesh.normals);
         }
+        if need >= Need::Geometry {
+            let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
+            let triangles = ordered(mesh, order, place.first_vertex);
+            self.triangles.extend(triangles);
+        }
+        if let (Some(bvh), Some(tree)) = (&mut self.bvh, tree) {
+            place.root = bvh.add(&tree, place.first_triangle);
+            place.order = Some(tree.triangle_order);
+        }
+        place
+    }
+
+    /// Room for any keyframe of `instance`.
+    fn reserve(&mut self, scene: &Scene, instance: &Instance) -> Place {
+        let meshes = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]);
+        let most = |size: fn(&Mesh) -> usize| meshes.clone().map(size).max().unwrap_or(0);
+        let (vertices, triangles) = (most(|m| m.positions.len()), most(|m| m.triangles.len()));
+        let place = Place {
+            first_vertex: self.vertices.len() as u32,
+            first_triangle: self.triangles.len() as u32,
+            root: self.bvh.as_mut().map_or(NONE, |bvh| bvh.reserve(triangles)),
+            ..Place::default()
+        };
+        let own_vertices = instance.keyframes.strategy != Strategy::Cached;
+        let grown = self.vertices.len() + if own_vertices { vertices } else { 0 };
+        self.vertices.resize(grown, [0.0; 3]);
+        self.normals.resize(grown, [0.0; 3]);
+        self.triangles
+            .resize(self.triangles.len() + triangles, [0; 3]);
+        place
     }
 }
 
-pub(super) fn placements(scene: &Scene) -> Vec<(usize, DAffine3)> {
-    scene
-        .instances
-        .iter()
-        .map(|i| (i.mesh, i.world_from_object))
-        .collect()
+/// The mesh's triangles in `order`, with indices that count from `first_vertex`.
+pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> Vec<[u32; 3]> {
+    let moved = |triangle: &[u32; 3]| triangle.map(|v| v + first_vertex);
+    match order {
+        Some(order) => (order.iter())
+            .map(|&i| moved(&mesh.triangles[i as usize]))
+            .collect(),
+        None => mesh.triangles.iter().map(moved).collect(),
+    }
 }
 
-/// Rows of the scene's instances; `roots` are the meshes' in the compute tracer's hierarchy.
-pub(super) fn instance_rows(
-    scene: &Scene,
-    places: &[Place],
-    roots: Option<&[u32]>,
-    fields: &Fields,
-) -> Vec<Instance> {
-    let row = |(i, placed): (usize, &crate::scene::Instance)| Instance {
-        world_from_object: rows(&placed.world_from_object),
-        object_from_world: rows(&placed.world_from_object.inverse()),
-        texture_from_world: rows(&rigid(&placed.world_from_object).inverse()),
-        tissue: placed.tissue as u32,
-        priority: placed.priority,
-        surface_outside: 2 * i as u32,
-        surface_inside: 2 * i as u32 + 1,
-        first_triangle: places[placed.mesh].first_triangle,
-        triangles: places[placed.mesh].triangles,
-        bvh_root: roots.map_or(NONE, |roots| roots[placed.mesh]),
-        slot: 0,
-        field: fields.offset(scene, i),
-        ..Instance::default()
+/// Entries as the compute tracer's top level takes them.
+pub(super) fn placed(entries: &[entry::Entry]) -> Vec<Placed> {
+    let place = |e: &entry::Entry| Placed {
+        instance: e.instance,
+        bounds: e.bounds,
+        world_from_object: e.world_from_object,
     };
-    scene.instances.iter().enumerate().map(row).collect()
+    entries.iter().map(place).collect()
 }

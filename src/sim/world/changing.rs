@@ -1,0 +1,270 @@
+//! Instances whose shape is made on the device when it is shown: uploaded and built, or moved and
+//! refitted.
+
+use std::sync::Arc;
+
+use super::arrays::{Bounds, Place, ordered};
+use super::refit::Refit;
+use super::top::Top;
+use super::{Geometry, Kernels, WorldError};
+use crate::gpu::{Blas, Commands, Device, DynamicBlas, DynamicSource, GpuError, Stage};
+use crate::scene::{Instance, Scene, Strategy};
+use crate::sim::bvh::MeshBvh;
+use crate::sim::fields::Fields;
+use crate::sim::tracer::Tracer;
+
+/// What is made of an instance: a mesh of the scene, or keyframes with their weights.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Shape {
+    Mesh(usize),
+    Blend([(usize, f64); 4]),
+}
+
+impl Shape {
+    fn of(instance: &Instance) -> Self {
+        match instance.keyframes.strategy {
+            Strategy::Interpolate => Self::Blend(instance.keyframes.blend),
+            _ => Self::Mesh(instance.mesh),
+        }
+    }
+}
+
+/// One instance that changes its shape.
+struct Body {
+    made: Option<Shape>,
+    /// The ray query's structure.
+    blas: Option<DynamicBlas>,
+}
+
+/// All of them.
+pub(super) struct Changing {
+    bodies: Vec<Option<Body>>,
+    structures: Vec<Option<Blas>>,
+    refit: Refit,
+}
+
+impl Changing {
+    /// Structures and kernels for the instances that have a region; `geometry` has the room.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        kernels: &Arc<Kernels>,
+        scene: &Scene,
+        tracer: Tracer,
+        geometry: &Geometry,
+        regions: &[Option<Place>],
+    ) -> Result<Self, GpuError> {
+        let mut bodies = Vec::new();
+        let mut structures = Vec::new();
+        for (instance, region) in scene.instances.iter().zip(regions) {
+            let body = region
+                .as_ref()
+                .map(|_| body(device, scene, tracer, instance, geometry))
+                .transpose()?;
+            let blas = body.as_ref().and_then(|body| body.blas.as_ref());
+            structures.push(blas.map(|blas| blas.blas().clone()));
+            bodies.push(body);
+        }
+        Ok(Self {
+            refit: Refit::new(device, kernels, scene, tracer, regions)?,
+            bodies,
+            structures,
+        })
+    }
+
+    /// The ray query's structures, per instance.
+    pub(super) fn structures(&self) -> &[Option<Blas>] {
+        &self.structures
+    }
+
+    /// Device memory beside the regions, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        let bodies = self.bodies.iter().flatten().filter_map(|b| b.blas.as_ref());
+        bodies.map(DynamicBlas::bytes).sum::<u64>() + self.refit.bytes()
+    }
+
+    /// Records how every shown instance of `scene` that is not what it was gets its shape; `regions`
+    /// then say what they hold. Returns whether anything was recorded.
+    #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
+    pub(super) fn record(
+        &mut self,
+        commands: &mut Commands<'_>,
+        scene: &Scene,
+        geometry: &Geometry,
+        fields: &Fields,
+        places: &[Place],
+        regions: &mut [Option<Place>],
+        top: &mut Top,
+    ) -> Result<bool, WorldError> {
+        let mut due = Vec::new();
+        for (i, instance) in scene.instances.iter().enumerate() {
+            let (Some(body), Some(region)) = (&mut self.bodies[i], &mut regions[i]) else {
+                continue;
+            };
+            let shape = Shape::of(instance);
+            if !instance.shown || body.made == Some(shape) {
+                continue;
+            }
+            body.made = Some(shape);
+            region.version += 1;
+            let strategy = instance.keyframes.strategy;
+            let fresh = match strategy.needs_shared_topology() {
+                true => self
+                    .refit
+                    .shape(commands, scene, i, geometry, region, top)?,
+                false => {
+                    let place = &places[instance.mesh];
+                    upload(commands, scene, instance, place, geometry, region, top)?;
+                    true
+                }
+            };
+            region.bounds = bounds(instance, places);
+            due.push((i, fresh));
+        }
+        if due.is_empty() {
+            return Ok(false);
+        }
+        commands.barrier(Stage::Transfer, Stage::Compute);
+        self.refit.record(
+            commands, scene, places, regions, geometry, fields, &due, top,
+        )?;
+        for (i, fresh) in due {
+            let (Some(body), Some(region)) = (&mut self.bodies[i], &regions[i]) else {
+                continue;
+            };
+            let Some(blas) = &mut body.blas else { continue };
+            // Indices count from the beginning of the buffer.
+            let source = DynamicSource {
+                vertices: &geometry.vertices,
+                first_vertex: 0,
+                vertex_count: geometry.vertex_count,
+                triangles: &geometry.triangles,
+                first_triangle: region.first_triangle,
+                triangle_count: region.triangles,
+            };
+            match fresh {
+                true => blas.build(commands, source)?,
+                false => blas.refit(commands, source)?,
+            }
+        }
+        Ok(true)
+    }
+}
+
+fn body(
+    device: &Arc<Device>,
+    scene: &Scene,
+    tracer: Tracer,
+    instance: &Instance,
+    geometry: &Geometry,
+) -> Result<Body, GpuError> {
+    let meshes = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]);
+    let triangles = meshes.map(|m| m.triangles.len()).max().unwrap_or(0);
+    let query = tracer == Tracer::RayQuery && triangles > 0;
+    // A refitted structure is built once for many frames, the others for one.
+    let fast_trace = instance.keyframes.strategy.needs_shared_topology();
+    let new = || {
+        let count = geometry.vertex_count;
+        DynamicBlas::new(device, &instance.name, triangles as u32, count, fast_trace)
+    };
+    let blas = query.then(new);
+    Ok(Body {
+        made: None,
+        blas: blas.transpose()?,
+    })
+}
+
+/// Box around the present shape. Weighted boxes hold the weighted vertices: interval arithmetic.
+fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
+    let Shape::Blend(blend) = Shape::of(instance) else {
+        return places[instance.mesh].bounds;
+    };
+    let mut sum = [[0.0_f64; 3]; 2];
+    for (keyframe, weight) in blend.into_iter().filter(|(_, weight)| *weight != 0.0) {
+        let [low, high] = places[instance.keyframes.meshes[keyframe]].bounds;
+        for axis in 0..3 {
+            let ends = [low, high].map(|corner| weight * f64::from(corner[axis]));
+            sum[0][axis] += ends[0].min(ends[1]);
+            sum[1][axis] += ends[0].max(ends[1]);
+        }
+    }
+    // The device rounds each vertex in single precision.
+    let margin = |axis: usize| 1e-6 * sum[0][axis].abs().max(sum[1][axis].abs());
+    let grown = |side: usize, sign: f64| {
+        std::array::from_fn(|axis| (sum[side][axis] + sign * margin(axis)) as f32)
+    };
+    [grown(0, -1.0), grown(1, 1.0)]
+}
+
+/// Records what `rebuild` and `cached` send to the device.
+fn upload(
+    commands: &mut Commands<'_>,
+    scene: &Scene,
+    instance: &Instance,
+    place: &Place,
+    geometry: &Geometry,
+    region: &mut Place,
+    top: &mut Top,
+) -> Result<(), GpuError> {
+    let mesh = &scene.meshes[instance.mesh];
+    let cached = instance.keyframes.strategy == Strategy::Cached;
+    region.triangles = mesh.triangles.len() as u32;
+    let tree = top.bvh().map(|_| MeshBvh::build_fast(mesh));
+    if cached && tree.is_none() {
+        region.first_triangle = place.first_triangle;
+        return Ok(());
+    }
+    let first_vertex = match cached {
+        true => place.first_vertex,
+        false => region.first_vertex,
+    };
+    if !cached {
+        let at = 12 * u64::from(first_vertex);
+        commands.write(
+            &geometry.vertices,
+            at,
+            bytemuck::cast_slice(&mesh.positions),
+        )?;
+        commands.write(&geometry.normals, at, bytemuck::cast_slice(&mesh.normals))?;
+    }
+    let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
+    put_triangles(
+        commands,
+        geometry,
+        region,
+        &ordered(mesh, order, first_vertex),
+    )?;
+    if let Some(tree) = tree {
+        put_tree(commands, &tree, region, top)?;
+        region.order = Some(tree.triangle_order);
+    }
+    Ok(())
+}
+
+pub(super) fn put_triangles(
+    commands: &mut Commands<'_>,
+    geometry: &Geometry,
+    region: &Place,
+    triangles: &[[u32; 3]],
+) -> Result<(), GpuError> {
+    let at = 12 * u64::from(region.first_triangle);
+    commands.write(&geometry.triangles, at, bytemuck::cast_slice(triangles))
+}
+
+/// Records a tree into the region's room among the nodes.
+pub(super) fn put_tree(
+    commands: &mut Commands<'_>,
+    tree: &MeshBvh,
+    region: &Place,
+    top: &mut Top,
+) -> Result<(), GpuError> {
+    let Some((bvh, nodes)) = top.bvh() else {
+        return Ok(());
+    };
+    bvh.deepen(tree);
+    let placed: Vec<_> = tree.nodes_at(region.root, region.first_triangle).collect();
+    commands.write(
+        nodes,
+        80 * u64::from(region.root),
+        bytemuck::cast_slice(&placed),
+    )
+}

@@ -1,0 +1,189 @@
+//! What the top level holds, and which of it an instance's row points at.
+
+use glam::DAffine3;
+
+use super::arrays::{Bounds, Place, is_dynamic};
+use crate::scene::{Instance, Scene, Strategy};
+use crate::sim::fields::Fields;
+use crate::sim::layout::{self, NONE};
+use crate::sim::placement::{rigid, rows as matrix_rows};
+
+/// Mask bit of everything that does not go by mask.
+const ALWAYS: u8 = 1;
+/// Bits left for keyframes that do.
+const MASKS: usize = 7;
+
+/// What stands at a place of the top level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Geometry {
+    /// A mesh of the scene.
+    Mesh(usize),
+    /// What the device made last of an instance that changes its shape.
+    Changing {
+        /// How often it was made.
+        version: u64,
+    },
+    /// Whichever keyframe the instance's row names.
+    Union,
+}
+
+/// A place of the top level. Equal entries need no new top level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Entry {
+    pub(super) instance: u32,
+    pub(super) geometry: Geometry,
+    pub(super) bounds: Bounds,
+    pub(super) world_from_object: DAffine3,
+    pub(super) mask: u8,
+}
+
+fn by_mask(number: usize) -> u8 {
+    1 << (1 + number % MASKS)
+}
+
+fn union(a: Bounds, b: Bounds) -> Bounds {
+    let corner = |side: usize, pick: fn(f32, f32) -> f32| {
+        std::array::from_fn(|axis| pick(a[side][axis], b[side][axis]))
+    };
+    [corner(0, f32::min), corner(1, f32::max)]
+}
+
+/// Most entries that the scene can have, whatever it shows.
+pub(super) fn capacity(scene: &Scene) -> usize {
+    let most = |i: &Instance| match i.keyframes.strategy {
+        Strategy::Mask => i.keyframes.meshes.len().max(1),
+        _ => 1,
+    };
+    scene.instances.iter().map(most).sum()
+}
+
+/// Entries of the scene as it stands: what has triangles and is shown, and what is only passed by.
+/// `regions` are those of the instances that change their shape.
+pub(super) fn entries(scene: &Scene, places: &[Place], regions: &[Option<Place>]) -> Vec<Entry> {
+    let mut entries = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let keyframes = &instance.keyframes;
+        let entry = |geometry, bounds, mask| Entry {
+            instance: i as u32,
+            geometry,
+            bounds,
+            world_from_object: instance.world_from_object,
+            mask,
+        };
+        let mesh = |mesh: usize, mask| {
+            let place = &places[mesh];
+            (place.triangles > 0).then(|| entry(Geometry::Mesh(mesh), place.bounds, mask))
+        };
+        match (keyframes.strategy, &regions[i]) {
+            (_, Some(region)) => {
+                if instance.shown && region.triangles > 0 {
+                    let version = region.version;
+                    entries.push(entry(Geometry::Changing { version }, region.bounds, ALWAYS));
+                }
+            }
+            (Strategy::Mask, None) if keyframes.meshes.is_empty() => {
+                entries.extend(mesh(instance.mesh, by_mask(i)));
+            }
+            (Strategy::Mask, None) => {
+                let all = keyframes.meshes.iter().enumerate();
+                let first = all.filter(|(k, m)| !keyframes.meshes[..*k].contains(m));
+                entries.extend(first.filter_map(|(k, &m)| mesh(m, by_mask(k))));
+            }
+            (Strategy::Union, None) => {
+                let one = [instance.mesh];
+                let all = match keyframes.meshes.is_empty() {
+                    true => &one[..],
+                    false => &keyframes.meshes,
+                };
+                let solid = all.iter().map(|&m| &places[m]).filter(|p| p.triangles > 0);
+                let bounds = solid.map(|p| p.bounds).reduce(union);
+                entries.extend(bounds.map(|b| entry(Geometry::Union, b, ALWAYS)));
+            }
+            _ if instance.shown => entries.extend(mesh(instance.mesh, ALWAYS)),
+            _ => {}
+        }
+    }
+    entries
+}
+
+/// Rows of the scene's instances. `slots` says where each entry lies in the top level.
+pub(super) fn rows(
+    scene: &Scene,
+    places: &[Place],
+    regions: &[Option<Place>],
+    fields: &Fields,
+    entries: &[Entry],
+    slots: &[u32],
+) -> Vec<layout::Instance> {
+    let mut rows: Vec<_> = (scene.instances.iter().zip(regions).enumerate())
+        .map(|(i, (placed, region))| {
+            let place = region.as_ref().unwrap_or(&places[placed.mesh]);
+            let corner = |c: [f32; 3]| [c[0], c[1], c[2], 0.0];
+            layout::Instance {
+                world_from_object: matrix_rows(&placed.world_from_object),
+                object_from_world: matrix_rows(&placed.world_from_object.inverse()),
+                texture_from_world: matrix_rows(&rigid(&placed.world_from_object).inverse()),
+                tissue: placed.tissue as u32,
+                priority: placed.priority,
+                surface_outside: 2 * i as u32,
+                surface_inside: 2 * i as u32 + 1,
+                first_triangle: place.first_triangle,
+                triangles: place.triangles,
+                bvh_root: place.root,
+                slot: NONE,
+                low: corner(place.bounds[0]),
+                high: corner(place.bounds[1]),
+                field: fields.offset(scene, i),
+                ..layout::Instance::default()
+            }
+        })
+        .collect();
+    for (entry, &slot) in entries.iter().zip(slots) {
+        let instance = &scene.instances[entry.instance as usize];
+        if instance.shown && shows(instance, entry) {
+            rows[entry.instance as usize].slot = slot;
+        }
+    }
+    rows
+}
+
+/// Whether `entry` is the one of its instance that is seen.
+fn shows(instance: &Instance, entry: &Entry) -> bool {
+    !matches!(entry.geometry, Geometry::Mesh(mesh) if mesh != instance.mesh)
+}
+
+/// What rays of a ray query are told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Mask {
+    /// Bits of the entries that are shown.
+    pub(super) bits: u32,
+    /// Whether some that are not shown share them.
+    pub(super) ambiguous: bool,
+}
+
+/// The mask under which every entry that is shown is met.
+pub(super) fn mask(scene: &Scene, entries: &[Entry]) -> Mask {
+    let seen = |entry: &&Entry| {
+        let instance = &scene.instances[entry.instance as usize];
+        instance.shown && shows(instance, entry)
+    };
+    let bits = entries
+        .iter()
+        .filter(seen)
+        .fold(ALWAYS, |bits, e| bits | e.mask);
+    let hidden = entries.iter().filter(|e| !seen(e));
+    Mask {
+        bits: bits.into(),
+        ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0),
+    }
+}
+
+/// Whether the top level can follow from `old` to `new` by a refit, as the instances that changed ask.
+pub(super) fn may_refit(scene: &Scene, old: &[Entry], new: &[Entry]) -> bool {
+    let wants = |entry: &Entry| {
+        let instance = &scene.instances[entry.instance as usize];
+        instance.keyframes.strategy == Strategy::Update && !is_dynamic(instance)
+    };
+    old.len() == new.len()
+        && (old.iter().zip(new)).all(|(a, b)| a == b || (a.instance == b.instance && wants(b)))
+}

@@ -1,0 +1,281 @@
+//! Shapes of one topology: vertices moved on the device, and the tree's boxes after them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use super::arrays::{Place, ordered};
+use super::changing::{put_tree, put_triangles};
+use super::top::Top;
+use super::{Geometry, Kernels, WorldError};
+use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage};
+use crate::scene::{Instance, Scene, Strategy};
+use crate::sim::bvh::{MeshBvh, levels};
+use crate::sim::fields::Fields;
+use crate::sim::layout::{Interpolation, RefitLevel};
+use crate::sim::tracer::Tracer;
+
+/// A refitted tree whose rays would cost this many times what they cost in a new one is built anew
+/// (choice; a build costs some ten refits).
+const DEGRADED: f64 = 1.5;
+
+/// A tree made for one keyframe, which serves those near it.
+struct Base {
+    tree: MeshBvh,
+    /// Ranges in the list of node numbers.
+    levels: Vec<RefitLevel>,
+}
+
+/// An instance whose keyframes share their triangles.
+struct Body {
+    bases: BTreeMap<usize, Base>,
+    /// Which base serves each keyframe.
+    serving: Vec<usize>,
+    /// The base that the region holds.
+    held: Option<usize>,
+}
+
+/// What the compute tracer's refit works on.
+struct Boxes {
+    boxes: Buffer,
+    order: Buffer,
+}
+
+pub(super) struct Refit {
+    bodies: Vec<Option<Body>>,
+    kernels: Arc<Kernels>,
+    boxes: Option<Boxes>,
+}
+
+impl Refit {
+    /// Trees of all keyframes that need one of their own, and the kernels; nothing in a scene that
+    /// refits nothing.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        kernels: &Arc<Kernels>,
+        scene: &Scene,
+        tracer: Tracer,
+        regions: &[Option<Place>],
+    ) -> Result<Self, GpuError> {
+        let mut order = Vec::new();
+        let mut bodies = Vec::new();
+        let mut last_node = 0;
+        for (instance, region) in scene.instances.iter().zip(regions) {
+            let refits = instance.keyframes.strategy.needs_shared_topology();
+            let region = region.as_ref().filter(|_| refits);
+            bodies.push(region.map(|region| body(scene, instance, region, tracer, &mut order)));
+            last_node = order.iter().copied().fold(last_node, u32::max);
+        }
+        let boxes = match order.is_empty() {
+            true => None,
+            false => {
+                let bytes = 24 * (u64::from(last_node) + 1);
+                Some(Boxes {
+                    boxes: device.buffer("boxes", bytes, BufferKind::Storage)?,
+                    order: super::upload(device, "refit order", bytemuck::cast_slice(&order))?,
+                })
+            }
+        };
+        Ok(Self {
+            bodies,
+            kernels: Arc::clone(kernels),
+            boxes,
+        })
+    }
+
+    /// Device memory, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        self.boxes
+            .as_ref()
+            .map_or(0, |b| b.boxes.size() + b.order.size())
+    }
+
+    /// Records the triangles and the tree of the base that serves instance `index` now, unless the
+    /// region holds them. Returns whether it did not, so that a structure has to be built from new.
+    pub(super) fn shape(
+        &mut self,
+        commands: &mut Commands<'_>,
+        scene: &Scene,
+        index: usize,
+        geometry: &Geometry,
+        region: &mut Place,
+        top: &mut Top,
+    ) -> Result<bool, WorldError> {
+        let instance = &scene.instances[index];
+        let body = self.bodies[index].as_mut().expect("made for this strategy");
+        let serving = body.serving[keyframe(instance)];
+        if body.held == Some(serving) {
+            return Ok(false);
+        }
+        let mesh = &scene.meshes[instance.keyframes.meshes[serving]];
+        let base = &body.bases[&serving];
+        let order = top.bvh().map(|_| &base.tree.triangle_order[..]);
+        region.triangles = mesh.triangles.len() as u32;
+        region.order = order.map(<[u32]>::to_vec);
+        let triangles = ordered(mesh, order, region.first_vertex);
+        put_triangles(commands, geometry, region, &triangles)?;
+        put_tree(commands, &base.tree, region, top)?;
+        body.held = Some(serving);
+        Ok(true)
+    }
+
+    /// Records the vertices of the instances in `due` and, for the compute tracer, the boxes around
+    /// them.
+    #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
+    pub(super) fn record(
+        &self,
+        commands: &mut Commands<'_>,
+        scene: &Scene,
+        places: &[Place],
+        regions: &[Option<Place>],
+        geometry: &Geometry,
+        fields: &Fields,
+        due: &[(usize, bool)],
+        top: &mut Top,
+    ) -> Result<(), GpuError> {
+        // All shapes lie in one buffer: a barrier between two dispatches that write it.
+        let mut ranges: Vec<&[RefitLevel]> = Vec::new();
+        for &(index, _) in due {
+            let (Some(body), Some(region)) = (&self.bodies[index], &regions[index]) else {
+                continue;
+            };
+            let instance = &scene.instances[index];
+            for (values, unit) in [(&geometry.vertices, 0), (&geometry.normals, 1)] {
+                let push = interpolation(scene, instance, places, region, unit);
+                commands.dispatch(
+                    &self.kernels.interpolate,
+                    [push.count, 1, 1],
+                    bytemuck::bytes_of(&push),
+                    &[Binding::Buffer(values)],
+                )?;
+            }
+            if let Some(blend) = fields.blend(scene, index) {
+                let push = Interpolation {
+                    count: blend.count,
+                    target: blend.target,
+                    sources: blend.sources.map(|(at, _)| at),
+                    weights: blend.sources.map(|(_, weight)| weight as f32),
+                    ..Interpolation::default()
+                };
+                commands.dispatch(
+                    &self.kernels.interpolate,
+                    [push.count, 1, 1],
+                    bytemuck::bytes_of(&push),
+                    &[Binding::Buffer(&geometry.fields)],
+                )?;
+            }
+            commands.barrier(Stage::Compute, Stage::Compute);
+            ranges.push(&body.bases[&body.held.expect("shape came first")].levels);
+        }
+        let (Some(refit), Some((_, nodes))) = (&self.boxes, top.bvh()) else {
+            return Ok(());
+        };
+        for level in ranges.into_iter().flatten() {
+            commands.dispatch(
+                &self.kernels.refit,
+                [8 * level.count, 1, 1],
+                bytemuck::bytes_of(level),
+                &[
+                    Binding::Buffer(nodes),
+                    Binding::Buffer(&geometry.vertices),
+                    Binding::Buffer(&geometry.triangles),
+                    Binding::Buffer(&refit.boxes),
+                    Binding::Buffer(&refit.order),
+                ],
+            )?;
+            commands.barrier(Stage::Compute, Stage::Compute);
+        }
+        commands.barrier(Stage::Compute, Stage::Transfer);
+        Ok(())
+    }
+}
+
+/// Number of the keyframe that the instance is, or is nearest to.
+fn keyframe(instance: &Instance) -> usize {
+    let keyframes = &instance.keyframes;
+    let is = |mesh: &usize| *mesh == instance.mesh;
+    match keyframes.strategy {
+        Strategy::Interpolate => keyframes.nearest(),
+        _ => keyframes
+            .meshes
+            .iter()
+            .position(is)
+            .expect("a keyframe is shown"),
+    }
+}
+
+fn interpolation(
+    scene: &Scene,
+    instance: &Instance,
+    places: &[Place],
+    region: &Place,
+    unit: u32,
+) -> Interpolation {
+    let keyframes = &instance.keyframes;
+    let source = |k: usize| places[keyframes.meshes[k]].first_vertex;
+    let mut push = Interpolation {
+        count: scene.meshes[keyframes.meshes[0]].positions.len() as u32,
+        target: region.first_vertex,
+        unit,
+        sources: [source(keyframe(instance)); 4],
+        weights: [1.0, 0.0, 0.0, 0.0],
+        ..Interpolation::default()
+    };
+    if keyframes.strategy == Strategy::Interpolate {
+        push.sources = keyframes.blend.map(|(k, _)| source(k));
+        push.weights = keyframes.blend.map(|(_, weight)| weight as f32);
+    }
+    push
+}
+
+fn body(
+    scene: &Scene,
+    instance: &Instance,
+    region: &Place,
+    tracer: Tracer,
+    order: &mut Vec<u32>,
+) -> Body {
+    let meshes: Vec<_> = instance
+        .keyframes
+        .meshes
+        .iter()
+        .map(|&m| &scene.meshes[m])
+        .collect();
+    let mut bases: BTreeMap<usize, Base> = BTreeMap::new();
+    let mut serving = Vec::new();
+    for (k, mesh) in meshes.iter().enumerate() {
+        let fits = |(&b, base): (&usize, &Base)| {
+            let cost = base.tree.degradation(meshes[b], &mesh.positions);
+            (cost <= DEGRADED).then_some((b, cost))
+        };
+        let best = bases
+            .iter()
+            .filter_map(fits)
+            .min_by(|a, b| a.1.total_cmp(&b.1));
+        serving.push(best.map_or(k, |(b, _)| b));
+        if best.is_none() {
+            bases.insert(k, base(mesh, region, tracer, order));
+        }
+    }
+    Body {
+        bases,
+        serving,
+        held: None,
+    }
+}
+
+fn base(mesh: &crate::scene::Mesh, region: &Place, tracer: Tracer, order: &mut Vec<u32>) -> Base {
+    let tree = MeshBvh::build(mesh);
+    let mut ranges = Vec::new();
+    if tracer == Tracer::Bvh {
+        let all = levels(&[(&tree, region.root)]);
+        ranges = all.ranges;
+        for range in &mut ranges {
+            range.first += order.len() as u32;
+        }
+        order.extend(all.order);
+    }
+    Base {
+        tree,
+        levels: ranges,
+    }
+}

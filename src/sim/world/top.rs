@@ -1,0 +1,165 @@
+//! The top level of either tracer: made over the entries of a scene, anew only when they change.
+
+use std::sync::Arc;
+
+use super::WorldError;
+use super::arrays::{Need, needs, placed};
+use super::entry::{self, Entry, Geometry};
+use crate::gpu::{
+    Binding, Blas, BlasInput, BlasOptions, Buffer, Commands, Device, GpuError, Stage, Tlas,
+    TlasInstance,
+};
+use crate::scene::Scene;
+use crate::sim::bvh::SceneBvh;
+use crate::sim::placement::rows;
+
+/// What the tracer walks.
+enum Structure {
+    Bvh {
+        bvh: SceneBvh,
+        nodes: Buffer,
+    },
+    /// No structure for a mesh that needs none of its own.
+    Query {
+        meshes: Vec<Option<Blas>>,
+        tlas: Tlas,
+    },
+}
+
+/// The top level with everything below it that stays as it is.
+pub(super) struct Top {
+    structure: Structure,
+    entries: Option<Vec<Entry>>,
+    slots: Vec<u32>,
+}
+
+impl Top {
+    /// Uploads the compute tracer's trees, or builds those of the ray query.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        bvh: Option<SceneBvh>,
+    ) -> Result<Self, GpuError> {
+        let structure = match bvh {
+            Some(mut bvh) => {
+                let nodes = super::upload(device, "nodes", bytemuck::cast_slice(&bvh.nodes))?;
+                bvh.forget_meshes();
+                Structure::Bvh { bvh, nodes }
+            }
+            None => {
+                let capacity = entry::capacity(scene).max(1) as u32;
+                Structure::Query {
+                    meshes: build_meshes(device, scene)?,
+                    tlas: Tlas::new(device, "anatomy", capacity)?,
+                }
+            }
+        };
+        Ok(Self {
+            structure,
+            entries: None,
+            slots: Vec::new(),
+        })
+    }
+
+    /// Records the top level over `entries`, if they are not those of the last call. `changing` holds
+    /// the structures of instances that change their shape, for the ray query. Returns whether
+    /// anything was recorded.
+    pub(super) fn place(
+        &mut self,
+        commands: &mut Commands<'_>,
+        scene: &Scene,
+        entries: Vec<Entry>,
+        changing: &[Option<Blas>],
+    ) -> Result<bool, WorldError> {
+        if self.entries.as_ref() == Some(&entries) {
+            return Ok(false);
+        }
+        let old = self.entries.as_deref().unwrap_or_default();
+        let refit = self.entries.is_some() && entry::may_refit(scene, old, &entries);
+        match &mut self.structure {
+            Structure::Bvh { bvh, nodes } => {
+                let changed = bvh.place(&placed(&entries), refit)?;
+                commands.write(nodes, 0, bytemuck::cast_slice(changed))?;
+                self.slots = bvh.slots.clone();
+            }
+            Structure::Query { meshes, tlas } => {
+                let instances: Vec<_> = entries
+                    .iter()
+                    .map(|entry| TlasInstance {
+                        blas: match entry.geometry {
+                            Geometry::Mesh(mesh) => meshes[mesh].as_ref(),
+                            Geometry::Changing { .. } => changing[entry.instance as usize].as_ref(),
+                            Geometry::Union => unreachable!("refused with the ray query"),
+                        }
+                        .expect("entries have triangles, and these a structure"),
+                        transform: rows(&entry.world_from_object),
+                        custom_index: entry.instance,
+                        mask: entry.mask,
+                    })
+                    .collect();
+                match refit {
+                    true => tlas.refit(commands, &instances)?,
+                    false => tlas.build(commands, &instances)?,
+                }
+                commands.barrier(Stage::Build, Stage::Compute);
+                self.slots = (0..entries.len() as u32).collect();
+            }
+        }
+        self.entries = Some(entries);
+        Ok(true)
+    }
+
+    /// Entries of the last [`Self::place`].
+    pub(super) fn entries(&self) -> &[Entry] {
+        self.entries.as_deref().unwrap_or_default()
+    }
+
+    /// Where each entry lies, as rows say it.
+    pub(super) fn slots(&self) -> &[u32] {
+        &self.slots
+    }
+
+    /// The compute tracer's hierarchy and its buffer.
+    pub(super) fn bvh(&mut self) -> Option<(&mut SceneBvh, &Buffer)> {
+        match &mut self.structure {
+            Structure::Bvh { bvh, nodes } => Some((bvh, nodes)),
+            Structure::Query { .. } => None,
+        }
+    }
+
+    pub(super) fn binding(&self) -> Binding<'_> {
+        match &self.structure {
+            Structure::Bvh { nodes, .. } => Binding::Buffer(nodes),
+            Structure::Query { tlas, .. } => Binding::Tlas(tlas),
+        }
+    }
+
+    /// Device memory, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        match &self.structure {
+            Structure::Bvh { nodes, .. } => nodes.size(),
+            Structure::Query { meshes, tlas } => {
+                tlas.bytes() + meshes.iter().flatten().map(Blas::bytes).sum::<u64>()
+            }
+        }
+    }
+}
+
+fn build_meshes(device: &Arc<Device>, scene: &Scene) -> Result<Vec<Option<Blas>>, GpuError> {
+    let all = || scene.meshes.iter().zip(needs(scene));
+    let walked = |(mesh, need): &(&crate::scene::Mesh, Need)| {
+        *need == Need::Structure && !mesh.triangles.is_empty()
+    };
+    let inputs: Vec<BlasInput<'_>> = all()
+        .filter(walked)
+        .map(|(mesh, _)| BlasInput {
+            name: &mesh.name,
+            positions: &mesh.positions,
+            triangles: &mesh.triangles,
+        })
+        .collect();
+    let mut built = Blas::build_many(device, &inputs, BlasOptions::default())?.into_iter();
+    Ok(all()
+        .map(|mesh| walked(&mesh).then(|| built.next()).flatten())
+        .collect())
+}
