@@ -7,6 +7,7 @@ use clap::{Parser, Subcommand};
 mod check;
 mod images;
 mod info;
+mod movie;
 mod render;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.

@@ -338,3 +338,85 @@ fn kernels_from_a_folder_of_sources_make_the_same_picture() {
     let nowhere = render("scenes/phantom.toml", &["--glsl", "nowhere"]);
     assert!(text(&nowhere.stderr).contains("nowhere"));
 }
+
+/// A plate in water that goes from 10 to 20 mm of depth and back within two seconds.
+const MOVING: &str = r#"
+[probe]
+preset = "linear"
+depth = 30
+[imaging]
+image_height = 120
+[[transform]]
+name = "way"
+translate = [0, 0, 15]
+motion = { kind = "sine", period = 2, phase = 0.75, translate = [0, 0, 5] }
+[[mesh]]
+name = "plate"
+parent = "way"
+tissue = "liver"
+shape = { plane = { size = [80, 80], thickness = 40 } }
+"#;
+
+/// Row of the brightest line, as a share of the picture's height.
+fn brightest(image: &image::GrayImage) -> f64 {
+    let sum = |y: u32| -> u64 {
+        (0..image.width())
+            .map(|x| u64::from(image[(x, y)].0[0]))
+            .sum()
+    };
+    let row = (0..image.height()).max_by_key(|&y| sum(y)).expect("rows");
+    f64::from(row) / f64::from(image.height())
+}
+
+#[test]
+fn time_moves_the_scene_and_frames_become_an_animation() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let (scene, gif, png) = (
+        dir.path().join("moving.toml"),
+        dir.path().join("a.gif"),
+        dir.path().join("a.png"),
+    );
+    std::fs::write(&scene, MOVING).expect("written");
+    let more = [
+        "--tracer", "bvh", "--frames", "4", "--fps", "4", "--time", "100 ms",
+    ];
+    let out = render(path(&scene), &[&more[..], &["-o", path(&gif)]].concat());
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    assert_eq!(text(&out.stdout).trim(), path(&gif));
+    let file = std::io::BufReader::new(std::fs::File::open(&gif).expect("a file"));
+    let decoder = image::codecs::gif::GifDecoder::new(file).expect("a GIF");
+    let frames = image::AnimationDecoder::into_frames(decoder);
+    let frames = frames.collect_frames().expect("whole");
+    assert_eq!(frames.len(), 4);
+    let grey: Vec<_> = frames
+        .iter()
+        .map(|f| image::DynamicImage::from(f.buffer().clone()).into_luma8())
+        .collect();
+    // At 0.1 and 0.35 s; the plate's front is at 15 - 5 cos(pi t) of 30 mm, within a row or two of
+    // the 120 rows; the pulse is 0.2 mm long.
+    for (frame, t) in grey.iter().zip([0.1, 0.35]) {
+        let expected = (15.0 - 5.0 * f64::cos(std::f64::consts::PI * t)) / 30.0;
+        let found = brightest(frame);
+        assert!((found - expected).abs() < 0.02, "{t}: {found} {expected}");
+    }
+    assert_eq!(frames[0].delay().numer_denom_ms(), (250, 1));
+
+    let out = render(
+        path(&scene),
+        &["--tracer", "bvh", "--time", "0.35", "-o", path(&png)],
+    );
+    assert!(out.status.success(), "{}", text(&out.stderr));
+    let still = image::open(&png).expect("a PNG").into_luma8();
+    assert!((brightest(&still) - brightest(&grey[1])).abs() < 0.01);
+
+    for (wrong, cause) in [
+        (["--time", "4 mm"], "`s`, `ms`"),
+        (["--fps", "0"], "between"),
+    ] {
+        let out = render(path(&scene), &wrong);
+        assert!(
+            !out.status.success() && text(&out.stderr).contains(cause),
+            "{wrong:?}"
+        );
+    }
+}

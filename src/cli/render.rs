@@ -8,6 +8,7 @@ use miette::{Context, IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::images::Images;
+use super::movie::Movie;
 use insonify::gpu::{AdapterKind, Device, DeviceOptions, FrameTimings};
 use insonify::output;
 use insonify::scene::Scene;
@@ -34,7 +35,7 @@ pub struct Render {
     scene: PathBuf,
     /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here]. With several
     /// frames NAME.png becomes NAME.0000.png, NAME.0001.png, ...; `{}` or `%04d` in the name says
-    /// where the number goes.
+    /// where the number goes. NAME.gif is an animation of all frames, played again and again.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Path and scatterer counts that suit the device [default: the scene's own]. Counts that --set
@@ -44,6 +45,13 @@ pub struct Render {
     /// Frames to simulate; each is written, timings are over all. --dump takes the last.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
+    /// Time of the first frame: seconds, or with a unit, e.g. "400 ms".
+    #[arg(long, default_value = "0", value_parser = seconds, allow_hyphen_values = true)]
+    time: f64,
+    /// Frames per second of the scene's time [default: time stands still, and only noise differs].
+    /// Without it an animated GIF shows 10 frames a second.
+    #[arg(long, value_parser = rate)]
+    fps: Option<f64>,
     /// Seed of every random number; replaces the scene's.
     #[arg(long)]
     seed: Option<u32>,
@@ -88,6 +96,18 @@ fn override_of(text: &str) -> Result<(String, String), String> {
         .ok_or_else(|| format!("'{text}' is not PATH=VALUE"))
 }
 
+fn seconds(text: &str) -> Result<f64, String> {
+    insonify::scene::file::seconds(text)
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match (1e-3..=1e4).contains(&value) {
+        true => Ok(value),
+        false => Err("it must lie between 0.001 and 10000".to_owned()),
+    }
+}
+
 /// Runs the command.
 ///
 /// # Errors
@@ -100,6 +120,7 @@ pub fn run(args: &Render) -> Result<()> {
     if let Some(seed) = args.seed {
         scene.simulation.seed = seed;
     }
+    scene.set_time(args.time);
     let device = Device::new(&DeviceOptions {
         selector: args.device.clone(),
         validate: args.validate,
@@ -121,9 +142,7 @@ pub fn run(args: &Render) -> Result<()> {
         .output
         .clone()
         .unwrap_or_else(|| default_output(&args.scene));
-    let images = Images::new(&output, args.frames);
-    let timings = simulate(&mut simulator, &mut library, &scene, args.frames, &images)?;
-    output::line(&images);
+    let timings = simulate(&mut simulator, &mut library, &mut scene, args, &output)?;
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
     }
@@ -156,6 +175,8 @@ pub fn run(args: &Render) -> Result<()> {
             "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
             "tracer": tracer.to_string(),
             "triangles": scene.triangles(),
+            "time_s": args.time,
+            "fps": args.fps,
             "build_ms": build_ms,
             "stages_ms": stage_statistics(&timings),
             "frame_ms": statistics(&timings.iter().map(FrameTimings::total_ms).collect::<Vec<_>>()),
@@ -235,32 +256,48 @@ fn reload(simulator: &mut Simulator, library: &mut Library) {
 #[cfg(not(feature = "compile"))]
 fn reload(_: &mut Simulator, _: &mut Library) {}
 
-/// All frames, each written as an image; the device's timings of each.
+/// All frames, each written as an image; the device's timings of each. The scene stands at the time
+/// of the last frame afterwards.
 fn simulate(
     simulator: &mut Simulator,
     library: &mut Library,
-    scene: &Scene,
-    frames: u32,
-    images: &Images,
+    scene: &mut Scene,
+    args: &Render,
+    file: &Path,
 ) -> Result<Vec<FrameTimings>> {
+    let mut movie = match Movie::is_meant(file) {
+        true => Some(Movie::new(file, args.fps)?),
+        false => None,
+    };
+    let images = Images::new(file, args.frames);
     // Hidden by indicatif itself when standard error is no terminal; silent under a second.
-    let bar = ProgressBar::new(u64::from(frames)).with_style(
+    let bar = ProgressBar::new(u64::from(args.frames)).with_style(
         ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
             .expect("a valid template"),
     );
     let start = Instant::now();
     let mut timings = Vec::new();
-    for index in 0..frames {
+    for index in 0..args.frames {
         reload(simulator, library);
+        if let Some(fps) = args.fps {
+            scene.set_time(args.time + f64::from(index) / fps);
+        }
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
-        dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?;
+        match &mut movie {
+            Some(movie) => movie.add(width, height, &rgba)?,
+            None => dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?,
+        }
         if start.elapsed().as_secs() >= 1 {
             bar.set_position(u64::from(index) + 1);
         }
     }
     timings.extend(simulator.wait().into_diagnostic()?);
     bar.finish_and_clear();
+    match movie {
+        Some(_) => output::line(file.display()),
+        None => output::line(&images),
+    }
     Ok(timings)
 }
 

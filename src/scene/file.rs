@@ -74,6 +74,21 @@ impl Scene {
     }
 }
 
+/// A time as the command line and scene files write it: seconds, or with a unit. Finite.
+///
+/// # Errors
+/// What is wrong with the text, in words.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    let value = match text.trim().parse::<f64>() {
+        Ok(value) => value,
+        Err(_) => units::parse::<units::InDuration>(text)?,
+    };
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(format!("{value} s is no time")),
+    }
+}
+
 /// Fails at `path` unless `value` lies in the closed range; NaN lies in none.
 fn within(
     document: &Document<'_>,

@@ -79,6 +79,11 @@ impl Sequence {
         }
     }
 
+    /// Periods of the keyframes.
+    pub fn clock(&self) -> &Clock {
+        &self.clock
+    }
+
     /// Number of keyframes.
     pub fn count(&self) -> usize {
         self.count

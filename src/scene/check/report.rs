@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::Facts;
+use super::{Facts, nodes};
 use crate::scene::mesh::{self, Animated, AnimatedNode, Choice, Inspected, Options, Placement};
 use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
 
@@ -191,6 +191,7 @@ fn scene(path: &Path) -> Report {
             scene.wires.len()
         ),
     ];
+    lines.extend(nodes::describe(&scene));
     for instance in &scene.instances {
         let (facts, inside_point) = world_facts(&scene, instance);
         let outside = tissue_around(&scene, instance, inside_point);
@@ -240,7 +241,8 @@ fn tissue_around<'s>(scene: &'s Scene, instance: &Instance, point: DVec3) -> &'s
     let around = scene
         .instances
         .iter()
-        .filter(|other| other.name != instance.name && encloses(scene, other, point))
+        .filter(|other| other.shown && other.name != instance.name)
+        .filter(|other| encloses(scene, other, point))
         .max_by_key(|other| other.priority);
     let tissue = around.map_or(scene.background, |other| other.tissue);
     &scene.tissues[tissue].name

@@ -336,3 +336,14 @@ fn coincident_triangles_are_counted_and_named() {
     // The four sides along x still lie in the same planes but not triangle on triangle.
     assert_eq!((scene.coincident_triangles(), warnings.len()), (0, 0));
 }
+
+#[test]
+fn times_may_have_a_unit() {
+    for (text, value) in [("0.4", 0.4), ("400 ms", 0.4), ("-1s", -1.0)] {
+        assert_eq!(seconds(text), Ok(value));
+    }
+    for (text, cause) in [("4 mm", "`s`, `ms`"), ("soon", "1.5 s"), ("inf", "no time")] {
+        let said = seconds(text).expect_err(text);
+        assert!(said.contains(cause), "{said}");
+    }
+}

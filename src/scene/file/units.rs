@@ -105,7 +105,7 @@ fn allowed<D: Dimension>() -> String {
 }
 
 /// Parses "60 mm"; the message says which units there are.
-fn parse<D: Dimension>(text: &str) -> Result<f64, String> {
+pub(super) fn parse<D: Dimension>(text: &str) -> Result<f64, String> {
     let text = text.trim();
     let end = (0..=text.len())
         .rev()

@@ -1,0 +1,122 @@
+//! Frames as an animated GIF.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use image::codecs::gif::{GifEncoder, Repeat};
+use image::{Delay, Frame, RgbaImage};
+use miette::{Context, IntoDiagnostic, Result};
+
+/// Frames shown per second where time stands still.
+const SHOWN: f64 = 10.0;
+
+/// An animated GIF that is being written: 256 greys, played again and again.
+pub struct Movie {
+    path: PathBuf,
+    encoder: GifEncoder<BufWriter<File>>,
+    /// Frames per second.
+    rate: f64,
+    frames: u32,
+}
+
+impl Movie {
+    /// Whether `path` names one.
+    pub fn is_meant(path: &Path) -> bool {
+        let extension = path.extension().and_then(|e| e.to_str());
+        extension.is_some_and(|e| e.eq_ignore_ascii_case("gif"))
+    }
+
+    /// Begins a file that shows `rate` frames per second.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn new(path: &Path, rate: Option<f64>) -> Result<Self> {
+        let writing = || format!("writing {}", path.display());
+        let file = File::create(path)
+            .into_diagnostic()
+            .wrap_err_with(writing)?;
+        let mut encoder = GifEncoder::new(BufWriter::new(file));
+        encoder
+            .set_repeat(Repeat::Infinite)
+            .into_diagnostic()
+            .wrap_err_with(writing)?;
+        Ok(Self {
+            path: path.to_owned(),
+            encoder,
+            rate: rate.unwrap_or(SHOWN),
+            frames: 0,
+        })
+    }
+
+    /// Adds a frame: the red channel of RGBA bytes, row by row.
+    ///
+    /// # Errors
+    /// What the file system says.
+    pub fn add(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
+        // At most 256 colours, which the format keeps exactly: what is transparent becomes black.
+        let opaque = rgba.chunks_exact(4).flat_map(|p| [p[0], p[0], p[0], 255]);
+        let image = RgbaImage::from_raw(width, height, opaque.collect()).expect("four bytes each");
+        let delay = Delay::from_numer_denom_ms(10 * centiseconds(self.frames, self.rate), 1);
+        self.frames += 1;
+        self.encoder
+            .encode_frame(Frame::from_parts(image, 0, 0, delay))
+            .into_diagnostic()
+            .wrap_err_with(|| format!("writing {}", self.path.display()))
+    }
+}
+
+/// How long a frame is shown, in the hundredths of a second that the format counts in: rounded such
+/// that the error does not add up.
+fn centiseconds(frame: u32, rate: f64) -> u32 {
+    let begin = |frame: f64| (100.0 * frame / rate).round();
+    let shown = begin(f64::from(frame) + 1.0) - begin(f64::from(frame));
+    // Viewers slow down what is shorter than two hundredths.
+    shown.clamp(2.0, 65_535.0) as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::AnimationDecoder;
+    use image::codecs::gif::GifDecoder;
+
+    #[test]
+    fn durations_add_up() {
+        for (rate, frames) in [(10.0, 7), (30.0, 30), (24.0, 100), (15.0, 61), (0.1, 3)] {
+            let total: u32 = (0..frames).map(|i| centiseconds(i, rate)).sum();
+            let exact = 100.0 * f64::from(frames) / rate;
+            assert!(
+                (f64::from(total) - exact).abs() <= 0.5,
+                "{rate}: {total} {exact}"
+            );
+        }
+        assert_eq!(centiseconds(0, 1000.0), 2);
+    }
+
+    #[test]
+    fn every_grey_comes_back_as_it_was() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.gif");
+        let picture = |offset: u8| -> Vec<u8> {
+            let grey = (0..=255u8).map(|g| g.wrapping_add(offset));
+            grey.flat_map(|g| [g, g, g, if g < 9 { 0 } else { 255 }])
+                .collect()
+        };
+        let mut movie = Movie::new(&path, Some(20.0)).expect("made");
+        for offset in [0, 7] {
+            movie.add(16, 16, &picture(offset)).expect("written");
+        }
+        drop(movie);
+        let file = std::io::BufReader::new(File::open(&path).expect("there"));
+        let frames = GifDecoder::new(file).expect("a GIF").into_frames();
+        let frames = frames.collect_frames().expect("whole");
+        assert_eq!(frames.len(), 2);
+        for (frame, offset) in frames.iter().zip([0, 7]) {
+            assert_eq!(frame.delay().numer_denom_ms(), (50, 1));
+            let found: Vec<u8> = frame.buffer().pixels().map(|p| p.0[0]).collect();
+            let expected: Vec<u8> = picture(offset).chunks(4).map(|p| p[0]).collect();
+            assert_eq!(found, expected);
+        }
+    }
+}
