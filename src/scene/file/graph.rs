@@ -206,10 +206,9 @@ fn depths(
             chain.push(e);
             at = parents[e];
         }
-        let mut depth = at.and_then(|e| depths[e]).map_or(0, |d| d + 1);
-        for e in chain.into_iter().rev() {
+        let first = at.and_then(|e| depths[e]).map_or(0, |d| d + 1);
+        for (e, depth) in chain.into_iter().rev().zip(first..) {
             depths[e] = Some(depth);
-            depth += 1;
         }
     }
     Ok(depths

@@ -128,7 +128,8 @@ mod tests {
     /// A permutation of the vertices: neighbours are torn apart.
     fn shuffled(mesh: &Mesh) -> Vec<[f32; 3]> {
         let n = mesh.positions.len();
-        let step = (n / 2..).find(|s| (2..=*s).all(|d| n % d != 0 || s % d != 0));
+        let step =
+            (n / 2..).find(|s| (2..=*s).all(|d| !n.is_multiple_of(d) || !s.is_multiple_of(d)));
         let step = step.expect("a prime is near");
         (0..n).map(|i| mesh.positions[i * step % n]).collect()
     }
