@@ -75,12 +75,11 @@ pub(super) fn entries(scene: &Scene, places: &[Place], regions: &[Option<Place>]
             (place.triangles > 0).then(|| entry(Geometry::Mesh(mesh), place.bounds, mask))
         };
         match (keyframes.strategy, &regions[i]) {
-            (_, Some(region)) => {
-                if instance.shown && region.triangles > 0 {
-                    let version = region.version;
-                    entries.push(entry(Geometry::Changing { version }, region.bounds, ALWAYS));
-                }
+            (_, Some(region)) if instance.shown && region.triangles > 0 => {
+                let version = region.version;
+                entries.push(entry(Geometry::Changing { version }, region.bounds, ALWAYS));
             }
+            (_, Some(_)) => {}
             (Strategy::Mask, None) if keyframes.meshes.is_empty() => {
                 entries.extend(mesh(instance.mesh, by_mask(i)));
             }
