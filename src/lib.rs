@@ -10,6 +10,7 @@ pub mod gpu;
 pub mod harness;
 pub mod npy;
 pub mod output;
+pub mod plot;
 pub mod probe;
 pub mod reference;
 pub mod scene;

@@ -2,11 +2,14 @@
 //! `cargo run --release --bin validate [-- --output DIR] [--only T5,T9]` writes `index.html`.
 
 use std::path::PathBuf;
-use std::process::{Command, ExitCode};
+use std::process::ExitCode;
 
 use clap::Parser;
 use insonify::gpu::{Device, DeviceOptions};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
+
+#[path = "common/commit.rs"]
+mod commit;
 
 // The tests' own modules: what they prove is what the page shows.
 include!("../tests/physics/main.rs");
@@ -55,7 +58,7 @@ fn main() -> Result<ExitCode> {
     let provenance = page::Provenance {
         device: device.name().into(),
         driver: device.driver().into(),
-        commit: commit(),
+        commit: commit::commit(),
     };
     println!("{} ({})", provenance.device, provenance.driver);
     let bench = check::Bench::on(device);
@@ -84,24 +87,4 @@ fn main() -> Result<ExitCode> {
     } else {
         ExitCode::FAILURE
     })
-}
-
-/// The commit that this was built in, as git tells it.
-fn commit() -> String {
-    let git = |arguments: &[&str]| {
-        let output = Command::new("git")
-            .args(["-C", env!("CARGO_MANIFEST_DIR")])
-            .args(arguments)
-            .output();
-        let output = output.ok().filter(|o| o.status.success())?;
-        Some(String::from_utf8_lossy(&output.stdout).trim().to_owned())
-    };
-    match (
-        git(&["rev-parse", "--short=12", "HEAD"]),
-        git(&["status", "--porcelain"]),
-    ) {
-        (Some(commit), Some(changes)) if changes.is_empty() => commit,
-        (Some(commit), _) => format!("{commit}, with changes"),
-        _ => "unknown (no git)".into(),
-    }
 }

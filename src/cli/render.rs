@@ -12,6 +12,7 @@ use super::movie::Movie;
 use insonify::gpu::{AdapterKind, Device, DeviceOptions, FrameTimings};
 use insonify::output;
 use insonify::scene::Scene;
+use insonify::scene::file::override_of;
 use insonify::scene::settings::{Machine, Quality, Simulation};
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
@@ -88,12 +89,6 @@ pub enum QualityChoice {
     Standard,
     /// A proof, on any device: 128 paths, lattice 2/3 as coarse, the whole slice.
     Reference,
-}
-
-fn override_of(text: &str) -> Result<(String, String), String> {
-    text.split_once('=')
-        .map(|(path, value)| (path.trim().to_owned(), value.trim().to_owned()))
-        .ok_or_else(|| format!("'{text}' is not PATH=VALUE"))
 }
 
 fn seconds(text: &str) -> Result<f64, String> {

@@ -22,6 +22,16 @@ pub use error::SceneError;
 
 use document::{Document, Source};
 
+/// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
+///
+/// # Errors
+/// Text without an equals sign.
+pub fn override_of(text: &str) -> Result<(String, String), String> {
+    text.split_once('=')
+        .map(|(path, value)| (path.trim().to_owned(), value.trim().to_owned()))
+        .ok_or_else(|| format!("'{text}' is not PATH=VALUE"))
+}
+
 impl Scene {
     /// Loads a scene file and the meshes that it names. `overrides` are `path = value` pairs put
     /// in before anything is checked: `probe.depth` = `80 mm`, `mesh.liver.tissue` = `fat`. The

@@ -4,6 +4,7 @@
 use std::sync::Arc;
 
 use insonify::gpu;
+pub use insonify::plot::{Curve, Plot};
 
 use crate::render::{Renderer, renderers};
 
@@ -57,71 +58,6 @@ impl std::fmt::Display for Figure {
             f,
             "{what}: {measured}, expected {expected} within {tolerance}"
         )
-    }
-}
-
-/// One line, or one cloud of dots.
-#[derive(Clone, Debug)]
-pub struct Curve {
-    pub label: String,
-    pub points: Vec<[f64; 2]>,
-    /// Drawn as a line: closed forms; else as dots: measurements.
-    pub line: bool,
-}
-
-#[derive(Clone, Debug)]
-pub struct Plot {
-    pub title: String,
-    /// What the axes show, with units.
-    pub axes: [String; 2],
-    /// Decades instead of a linear scale, per axis.
-    pub logarithmic: [bool; 2],
-    pub curves: Vec<Curve>,
-}
-
-impl Curve {
-    /// What was measured.
-    pub fn dots(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
-        Self {
-            label: label.into(),
-            points,
-            line: false,
-        }
-    }
-
-    /// The closed form.
-    pub fn line(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
-        Self {
-            line: true,
-            ..Self::dots(label, points)
-        }
-    }
-}
-
-impl Plot {
-    /// On linear axes.
-    pub fn linear(title: impl Into<String>, axes: [&str; 2], curves: Vec<Curve>) -> Self {
-        Self {
-            title: title.into(),
-            axes: axes.map(String::from),
-            logarithmic: [false; 2],
-            curves,
-        }
-    }
-
-    /// It has names, something to draw, and only points that its axes can show.
-    pub fn is_drawable(&self) -> bool {
-        let shows = |p: &[f64; 2]| {
-            let on = |i: usize| p[i].is_finite() && (!self.logarithmic[i] || p[i] > 0.0);
-            on(0) && on(1)
-        };
-        let named = !self.title.is_empty() && self.axes.iter().all(|a| !a.is_empty());
-        let drawn =
-            |c: &Curve| !c.label.is_empty() && !c.points.is_empty() && c.points.iter().all(shows);
-        named
-            && self.curves.iter().all(drawn)
-            && self.curves.iter().any(|c| c.line)
-            && self.curves.iter().any(|c| !c.line)
     }
 }
 

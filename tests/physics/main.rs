@@ -25,8 +25,6 @@ mod moments;
 mod page;
 mod paths;
 mod pictures;
-#[path = "../../tools/validate/plot.rs"]
-mod plot;
 mod profile;
 mod refraction;
 mod render;

@@ -6,7 +6,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::check::{Check, Examined, Figure, Picture};
-use crate::plot::svg;
+use insonify::plot::{escape, svg};
 
 /// Rows of the validation table.
 pub const ROWS: u32 = 35;
@@ -28,22 +28,6 @@ td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\
 .shown{display:flex;flex-wrap:wrap;gap:1em;align-items:flex-start}figure{margin:0}\
 figcaption{font-size:.9em;color:#444}img{max-width:560px;max-height:480px;border:1px solid #ccc}\
 svg{max-width:100%;height:auto}p{max-width:52em}";
-
-/// Text with the characters that HTML reads as markup replaced.
-pub fn escape(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for c in text.chars() {
-        match c {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '\'' => out.push_str("&#39;"),
-            '"' => out.push_str("&quot;"),
-            c => out.push(c),
-        }
-    }
-    out
-}
 
 /// The page. `rows` are those of every check there is, whether among `examined` or not.
 pub fn page(provenance: &Provenance, rows: &[&str], examined: &[(Check, Examined)]) -> String {

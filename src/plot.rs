@@ -2,8 +2,75 @@
 
 use std::fmt::Write;
 
-use crate::check::{Curve, Plot};
-use crate::page::escape;
+/// One line, or one cloud of dots.
+#[derive(Clone, Debug)]
+pub struct Curve {
+    /// Its name in the legend.
+    pub label: String,
+    /// Places on both axes.
+    pub points: Vec<[f64; 2]>,
+    /// Drawn as a line: closed forms; else as dots: measurements.
+    pub line: bool,
+}
+
+/// Curves over two axes.
+#[derive(Clone, Debug)]
+pub struct Plot {
+    /// What it shows.
+    pub title: String,
+    /// What the axes show, with units.
+    pub axes: [String; 2],
+    /// Decades instead of a linear scale, per axis.
+    pub logarithmic: [bool; 2],
+    /// What is drawn, with a legend in this order.
+    pub curves: Vec<Curve>,
+}
+
+impl Curve {
+    /// What was measured.
+    pub fn dots(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self {
+            label: label.into(),
+            points,
+            line: false,
+        }
+    }
+
+    /// The closed form.
+    pub fn line(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
+        Self {
+            line: true,
+            ..Self::dots(label, points)
+        }
+    }
+}
+
+impl Plot {
+    /// On linear axes.
+    pub fn linear(title: impl Into<String>, axes: [&str; 2], curves: Vec<Curve>) -> Self {
+        Self {
+            title: title.into(),
+            axes: axes.map(String::from),
+            logarithmic: [false; 2],
+            curves,
+        }
+    }
+
+    /// It has names, something to draw, and only points that its axes can show.
+    pub fn is_drawable(&self) -> bool {
+        let shows = |p: &[f64; 2]| {
+            let on = |i: usize| p[i].is_finite() && (!self.logarithmic[i] || p[i] > 0.0);
+            on(0) && on(1)
+        };
+        let named = !self.title.is_empty() && self.axes.iter().all(|a| !a.is_empty());
+        let drawn =
+            |c: &Curve| !c.label.is_empty() && !c.points.is_empty() && c.points.iter().all(shows);
+        named
+            && self.curves.iter().all(drawn)
+            && self.curves.iter().any(|c| c.line)
+            && self.curves.iter().any(|c| !c.line)
+    }
+}
 
 /// Size of a plot and of the frame inside it, px.
 const SIZE: [f64; 2] = [560.0, 340.0];
@@ -93,6 +160,22 @@ fn label(v: f64) -> String {
     } else {
         text.into()
     }
+}
+
+/// Text with the characters that HTML and SVG read as markup replaced.
+pub fn escape(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '\'' => out.push_str("&#39;"),
+            '"' => out.push_str("&quot;"),
+            c => out.push(c),
+        }
+    }
+    out
 }
 
 /// The plot as an `<svg>` element, its legend included.
