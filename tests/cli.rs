@@ -339,7 +339,8 @@ fn kernels_from_a_folder_of_sources_make_the_same_picture() {
     assert!(text(&nowhere.stderr).contains("nowhere"));
 }
 
-/// A plate in water that goes from 10 to 20 mm of depth and back within two seconds.
+/// A plate in water that goes from 10 to 20 mm of depth and back within two seconds, and is hidden in
+/// the second half of every second.
 const MOVING: &str = r#"
 [probe]
 preset = "linear"
@@ -350,11 +351,21 @@ image_height = 120
 name = "way"
 translate = [0, 0, 15]
 motion = { kind = "sine", period = 2, phase = 0.75, translate = [0, 0, 5] }
+[[selector]]
+name = "blink"
+parent = "way"
+period = "1 s"
+[[group]]
+name = "seen 1"
+parent = "blink"
 [[mesh]]
 name = "plate"
-parent = "way"
+parent = "seen 1"
 tissue = "liver"
 shape = { plane = { size = [80, 80], thickness = 40 } }
+[[group]]
+name = "unseen"
+parent = "blink"
 "#;
 
 /// Row of the brightest line, as a share of the picture's height.
@@ -399,6 +410,13 @@ fn time_moves_the_scene_and_frames_become_an_animation() {
         let found = brightest(frame);
         assert!((found - expected).abs() < 0.02, "{t}: {found} {expected}");
     }
+    // In the second half of the second the plate is hidden.
+    let light = |image: &image::GrayImage| image.pixels().filter(|p| p.0[0] > 60).count();
+    let counts: Vec<_> = grey.iter().map(light).collect();
+    assert!(
+        counts[..2].iter().all(|&n| n > 100) && counts[2..] == [0, 0],
+        "{counts:?}"
+    );
     assert_eq!(frames[0].delay().numer_denom_ms(), (250, 1));
 
     let out = render(

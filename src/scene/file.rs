@@ -11,6 +11,7 @@ mod graph;
 mod motion;
 mod parameters;
 mod placing;
+mod playing;
 mod probe;
 mod schema;
 mod shelf;
@@ -51,9 +52,8 @@ impl Scene {
         let mut tissues = tissues::Tissues::new(&document, &file.tissues)?;
         let background =
             tissues.index("background", file.background.as_deref().unwrap_or("water"))?;
-        let (meshes, mut instances) =
-            anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
-        let graph = graph::build(&document, &file, &meshes, &mut instances)?;
+        let mut anatomy = anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
+        let graph = graph::build(&document, &file, &mut anatomy)?;
         let wires = anatomy::wires(&document, &file.wire)?;
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
         let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
@@ -69,8 +69,8 @@ impl Scene {
             name,
             tissues: tissues.used(),
             background,
-            meshes,
-            instances,
+            meshes: anatomy.meshes,
+            instances: anatomy.instances,
             graph,
             wires,
             probe,

@@ -8,5 +8,6 @@ mod heart;
 mod made;
 mod mistakes;
 mod pose;
+mod scene;
 #[path = "../common/shared_data.rs"]
 mod shared_data;

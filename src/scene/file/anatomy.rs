@@ -1,8 +1,13 @@
 //! Placed meshes and wires of a scene file.
 
+use std::ops::Range;
+
+use glam::DAffine3;
+
 use super::document::Document;
 use super::error::SceneError;
 use super::placing::placement;
+use super::playing::{self, Played, Playing};
 use super::schema::{MeshTable, SurfaceTable, WireTable};
 use super::shelf::Shelf;
 use super::tissues::Tissues;
@@ -12,18 +17,38 @@ use crate::scene::{Instance, Issue, Keyframes, Mesh, Surface, Wire};
 /// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
 const MIN_SPACING: f64 = 1e-3;
 
-/// Every mesh where it is placed in its parent, unmoved.
+/// What a mesh table of the file has become.
+pub(super) struct Placed {
+    /// Parent from object, unmoved.
+    pub rest: DAffine3,
+    /// Its instances; several only with an animation.
+    pub instances: Range<usize>,
+    /// The animation that its file brings.
+    pub playing: Option<Playing>,
+}
+
+/// What all mesh tables hold.
+#[derive(Default)]
+pub(super) struct Anatomy {
+    pub meshes: Vec<Mesh>,
+    /// Where they are in their parents, unmoved.
+    pub instances: Vec<Instance>,
+    /// By table.
+    pub placed: Vec<Placed>,
+}
+
+/// Reads every mesh.
 pub(super) fn meshes(
     document: &Document<'_>,
     tables: &[MeshTable],
     tissues: &mut Tissues<'_>,
     warnings: &mut Vec<Issue>,
-) -> Result<(Vec<Mesh>, Vec<Instance>), SceneError> {
+) -> Result<Anatomy, SceneError> {
     let mut shelf = Shelf::default();
-    let mut instances: Vec<Instance> = Vec::new();
+    let mut out = Anatomy::default();
     for (i, table) in tables.iter().enumerate() {
         let path = format!("mesh.{i}");
-        if instances.iter().any(|other| other.name == table.name) {
+        if out.instances.iter().any(|other| other.name == table.name) {
             return Err(document.fail(
                 &format!("{path}.name"),
                 format!("there are two meshes named `{}`", table.name),
@@ -32,23 +57,39 @@ pub(super) fn meshes(
         }
         let tissue = tissues.index(&format!("{path}.tissue"), &table.tissue)?;
         let default = tissues.get(tissue).default_surface();
-        let shapes = shelf.shapes(document, table, &path, warnings)?;
+        let playing = playing::read(document, table, &path, &mut shelf, warnings)?;
+        let shapes = match &playing {
+            Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
+            None => vec![shelf.shapes(document, table, &path, warnings)?],
+        };
         let place = (table.translate, table.rotate.as_ref(), table.scale);
-        instances.push(Instance {
-            name: table.name.clone(),
-            mesh: shapes.mesh,
-            keyframes: Keyframes {
-                meshes: shapes.keyframes,
-                ..Keyframes::default()
-            },
-            shown: true,
-            tissue,
-            priority: table.priority,
-            world_from_object: placement(document, &path, place)?,
-            surface: surfaces(document, table, default, &path)?,
+        let rest = placement(document, &path, place)?;
+        let surface = surfaces(document, table, default, &path)?;
+        let first = out.instances.len();
+        for shapes in shapes {
+            out.instances.push(Instance {
+                name: shapes.name,
+                mesh: shapes.mesh,
+                keyframes: Keyframes {
+                    meshes: shapes.keyframes,
+                    strategy: table.strategy.unwrap_or_default(),
+                    ..Keyframes::default()
+                },
+                shown: true,
+                tissue,
+                priority: table.priority,
+                world_from_object: rest,
+                surface,
+            });
+        }
+        out.placed.push(Placed {
+            rest,
+            instances: first..out.instances.len(),
+            playing,
         });
     }
-    Ok((shelf.meshes, instances))
+    out.meshes = shelf.meshes;
+    Ok(out)
 }
 
 fn surfaces(

@@ -4,13 +4,14 @@ use std::collections::HashMap;
 
 use glam::DAffine3;
 
+use super::anatomy::Anatomy;
 use super::document::Document;
 use super::error::SceneError;
 use super::schema::{File, SelectorTable};
 use super::{motion, placing};
 use crate::scene::animation::{Motion, Sequence};
 use crate::scene::graph::{Graph, Node, NodeKind};
-use crate::scene::{Instance, Mesh, suggest};
+use crate::scene::suggest;
 
 /// Factors and shifts, mm, of a placement with all parents at rest: beyond them single precision
 /// resolves nothing, or the placement has no inverse.
@@ -35,13 +36,12 @@ enum Kind {
     Mesh(usize),
 }
 
-/// Makes the graph of all nodes; gives `instances`, which are the meshes in their order, the number
-/// and the strategy of their selectors. Empty where no mesh has a parent and no node is written.
+/// Makes the graph of all nodes; gives the instances with keyframes the number and the strategy of
+/// their selectors. Empty where no mesh has a parent and no node is written.
 pub(super) fn build(
     document: &Document<'_>,
     file: &File,
-    meshes: &[Mesh],
-    instances: &mut [Instance],
+    anatomy: &mut Anatomy,
 ) -> Result<Graph, SceneError> {
     let entries = entries(document, file)?;
     let parents = parents(document, &entries)?;
@@ -64,40 +64,50 @@ pub(super) fn build(
         match entry.kind {
             Kind::Selector(number) => {
                 let table = &file.selector[number];
-                family.choose(e, table, number, meshes, instances, &mut choices)?;
+                family.choose(e, table, number, anatomy, &mut choices)?;
             }
-            Kind::Mesh(i) if !instances[i].keyframes.meshes.is_empty() => {
-                family.switched(e)?;
-            }
+            Kind::Mesh(i) if switched(anatomy, i).is_some() => family.under_selector(e)?,
             Kind::Group | Kind::Transform(_) | Kind::Mesh(_) => {}
         }
     }
+    group_played(file, anatomy);
     let mut order: Vec<usize> = (0..entries.len()).collect();
     // Stable: children of one depth stay in the order of the file.
     order.sort_by_key(|&e| depths[e]);
-    // A mesh without a parent stays where it is.
-    let alone = |&e: &usize| matches!(entries[e].kind, Kind::Mesh(_)) && parents[e].is_none();
-    order.retain(|e| !alone(e));
+    // A mesh without a parent stays where it is, unless its file moves it.
+    let stays = |&e: &usize| match entries[e].kind {
+        Kind::Mesh(i) => parents[e].is_none() && anatomy.placed[i].playing.is_none(),
+        _ => false,
+    };
+    order.retain(|e| !stays(e));
     let mut index = vec![None; entries.len()];
     let mut graph = Graph::default();
     let mut rests: Vec<DAffine3> = Vec::new();
     for &e in &order {
         let parent = parents[e].map(|p| index[p].expect("parents come first"));
-        let kind = family.kind(e, instances, &mut choices)?;
+        let kind = family.kind(e, anatomy, &mut choices)?;
         let above = parent.map_or(DAffine3::IDENTITY, |p: usize| rests[p]);
         let rest = match &kind {
             NodeKind::Transform { rest, .. } | NodeKind::Mesh { rest, .. } => above * *rest,
             NodeKind::Group | NodeKind::Selector(_) => above,
         };
         family.sensible(e, rest)?;
-        index[e] = Some(graph.nodes.len());
-        rests.push(rest);
+        let node = graph.nodes.len();
+        index[e] = Some(node);
         graph.nodes.push(Node {
             name: entries[e].name.to_owned(),
             parent,
             alternative: choices.alternatives.get(&e).copied(),
             kind,
         });
+        if let Kind::Mesh(i) = entries[e].kind {
+            let placed = &mut anatomy.placed[i];
+            if let Some(playing) = placed.playing.take() {
+                playing.grow(&mut graph, node, placed.instances.start);
+            }
+        }
+        // Nobody of the file is below the nodes that have just grown.
+        rests.resize(graph.nodes.len(), rest);
     }
     Ok(graph)
 }
@@ -217,6 +227,37 @@ fn depths(
         .collect())
 }
 
+/// The instance with keyframes that a selector has to switch; none for a mesh of one shape, and for
+/// one whose own animation does it.
+fn switched(anatomy: &Anatomy, table: usize) -> Option<usize> {
+    let placed = &anatomy.placed[table];
+    let instance = placed.instances.start;
+    let waits =
+        placed.playing.is_none() && !anatomy.instances[instance].keyframes.meshes.is_empty();
+    waits.then_some(instance)
+}
+
+/// Numbers the selectors that animations of mesh files are: one for all meshes of one parent that
+/// change at the same times.
+fn group_played(file: &File, anatomy: &mut Anatomy) {
+    let mut groups: Vec<(Option<&str>, &Sequence)> = Vec::new();
+    for (table, placed) in file.mesh.iter().zip(&anatomy.placed) {
+        let played = placed.playing.iter().flat_map(|p| &p.meshes);
+        for (mesh, instance) in played.zip(placed.instances.clone()) {
+            let Some(sequence) = &mesh.sequence else {
+                continue;
+            };
+            let key = (table.parent.as_deref(), sequence);
+            let group = groups.iter().position(|g| *g == key).unwrap_or_else(|| {
+                groups.push(key);
+                groups.len() - 1
+            });
+            let keyframes = &mut anatomy.instances[instance].keyframes;
+            keyframes.group = Some(file.selector.len() + group);
+        }
+    }
+}
+
 /// What selectors choose from.
 #[derive(Default)]
 struct Choices {
@@ -237,7 +278,7 @@ struct Family<'a> {
 
 impl Family<'_> {
     /// Fails unless the mesh with keyframes at entry `e` is the child of a selector.
-    fn switched(&self, e: usize) -> Result<(), SceneError> {
+    fn under_selector(&self, e: usize) -> Result<(), SceneError> {
         let kind = self.parents[e].map(|p| self.entries[p].kind);
         if matches!(kind, Some(Kind::Selector(_))) {
             return Ok(());
@@ -258,8 +299,7 @@ impl Family<'_> {
         e: usize,
         table: &SelectorTable,
         number: usize,
-        meshes: &[Mesh],
-        instances: &mut [Instance],
+        anatomy: &mut Anatomy,
         choices: &mut Choices,
     ) -> Result<(), SceneError> {
         let path = &self.entries[e].path;
@@ -273,15 +313,15 @@ impl Family<'_> {
         for &child in &self.children[e] {
             let entry = &self.entries[child];
             let own = match entry.kind {
-                Kind::Mesh(i) => Some(&mut instances[i]),
+                Kind::Mesh(i) => switched(anatomy, i),
                 _ => None,
             };
-            let Some(instance) = own.filter(|i| !i.keyframes.meshes.is_empty()) else {
+            let Some(instance) = own else {
                 choices.alternatives.insert(child, alternatives);
                 alternatives += 1;
                 continue;
             };
-            let keyframes = &mut instance.keyframes;
+            let keyframes = &mut anatomy.instances[instance].keyframes;
             keyframes.group = Some(number);
             keyframes.strategy = strategy;
             let at = format!("{}.keyframes", entry.path);
@@ -294,8 +334,8 @@ impl Family<'_> {
                 return fail(&at, message, "all that change together need as many");
             }
             count = Some((own, entry.name));
-            let all = || keyframes.meshes.iter().map(|&m| &meshes[m]);
-            let odd = all().position(|m| !m.shares_topology(&meshes[keyframes.meshes[0]]));
+            let all = || keyframes.meshes.iter().map(|&m| &anatomy.meshes[m]);
+            let odd = all().position(|m| !m.shares_topology(&anatomy.meshes[keyframes.meshes[0]]));
             if let Some(k) = odd.filter(|_| strategy.needs_shared_topology()) {
                 let message = format!(
                     "`{}` has other triangles in keyframe {k} than in keyframe 0, which strategy \
@@ -347,11 +387,11 @@ impl Family<'_> {
         Ok(())
     }
 
-    /// The node of entry `e`, whose instance, if it has one, is still unmoved.
+    /// The node of entry `e`; for a mesh with an animation the one that holds all of it.
     fn kind(
         &self,
         e: usize,
-        instances: &[Instance],
+        anatomy: &Anatomy,
         choices: &mut Choices,
     ) -> Result<NodeKind, SceneError> {
         Ok(match self.entries[e].kind {
@@ -370,10 +410,17 @@ impl Family<'_> {
                 let sequence = choices.sequences.remove(&e);
                 NodeKind::Selector(sequence.expect("every selector has chosen"))
             }
-            Kind::Mesh(instance) => NodeKind::Mesh {
-                instance,
-                rest: instances[instance].world_from_object,
-            },
+            Kind::Mesh(i) => {
+                let placed = &anatomy.placed[i];
+                let (rest, instance) = (placed.rest, placed.instances.start);
+                match placed.playing {
+                    Some(_) => NodeKind::Transform {
+                        rest,
+                        motion: Motion::Still,
+                    },
+                    None => NodeKind::Mesh { instance, rest },
+                }
+            }
         })
     }
 

@@ -361,6 +361,59 @@ fn mistakes_of_selectors_are_placed() {
 }
 
 #[test]
+fn mistakes_of_animations_are_placed() {
+    let case = case();
+    let f = |more: &str, line, column, cause, remedy| {
+        case.fails(&mesh("m", more), (line, column), cause, remedy);
+    };
+    let cube = "file = \"cube.obj\"\n";
+    f(
+        &format!("{cube}animation = true"),
+        5,
+        13,
+        "only .gltf and .glb files have animations",
+        "keyframes",
+    );
+    f(
+        &format!("{cube}animation = false"),
+        5,
+        13,
+        "leave `animation` out",
+        "",
+    );
+    f(
+        "shape = { sphere = { radius = 5 } }\nanimation = \"walk\"",
+        5,
+        13,
+        "only a `file` brings an animation",
+        ".glb",
+    );
+    f(
+        &format!("{cube}strategy = \"refit\""),
+        5,
+        12,
+        "`strategy` of a mesh applies to its `animation`",
+        "[[selector]]",
+    );
+    f(
+        "file = \"gone.glb\"\nanimation = true",
+        4,
+        8,
+        "gone.glb: cannot be read",
+        "path",
+    );
+    let empty = r#"{ "asset": { "version": "2.0" }, "scenes": [{ "nodes": [] }] }"#;
+    write(&case, "empty.gltf", empty);
+    f(
+        "file = \"empty.gltf\"\nanimation = \"walk\"",
+        5,
+        13,
+        "has no animation",
+        "export it with one",
+    );
+}
+
+#[test]
 fn mistakes_of_motions_are_placed() {
     let case = case();
     // The error stands where the text `at` does.

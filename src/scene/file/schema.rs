@@ -1,8 +1,10 @@
 //! The keys of a scene file. What is absent keeps its default.
 
 use std::collections::BTreeMap;
+use std::fmt;
 
 use serde::Deserialize;
+use serde::de::{Deserializer, Error, Visitor};
 
 use super::units::{
     Angle, Attenuation, Density, Duration, Frequency, Impedance, Length, Level, Rate, Speed,
@@ -208,6 +210,13 @@ pub struct MeshTable {
     pub parent: Option<String>,
     pub file: Option<String>,
     pub keyframes: Option<Vec<String>>,
+    pub animation: Option<AnimationName>,
+    pub phase: Option<f64>,
+    #[serde(rename = "loop")]
+    pub mode: Option<Loop>,
+    pub rate: Option<Rate>,
+    pub strategy: Option<Strategy>,
+    pub interpolation: Option<Interpolation>,
     pub node: Option<String>,
     pub shape: Option<Shape>,
     pub units: Option<UnitName>,
@@ -225,6 +234,40 @@ pub struct MeshTable {
     pub inside: SurfaceTable,
     #[serde(default)]
     pub cap_openings: bool,
+}
+
+/// Which animation of a file.
+#[derive(Debug, PartialEq)]
+pub enum AnimationName {
+    First,
+    Named(String),
+}
+
+impl<'de> Deserialize<'de> for AnimationName {
+    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
+        struct AsName;
+
+        impl Visitor<'_> for AsName {
+            type Value = AnimationName;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("text or true: the name of an animation, or the first one")
+            }
+
+            fn visit_bool<E: Error>(self, value: bool) -> Result<Self::Value, E> {
+                match value {
+                    true => Ok(AnimationName::First),
+                    false => Err(E::custom("leave `animation` out for a mesh without one")),
+                }
+            }
+
+            fn visit_str<E: Error>(self, name: &str) -> Result<Self::Value, E> {
+                Ok(AnimationName::Named(name.to_owned()))
+            }
+        }
+
+        deserializer.deserialize_any(AsName)
+    }
 }
 
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]

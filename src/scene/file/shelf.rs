@@ -39,6 +39,8 @@ enum Files {
 
 /// The shapes of one instance.
 pub(super) struct Shapes {
+    /// Name of the instance.
+    pub name: String,
     /// The one at first.
     pub mesh: usize,
     /// All of them; empty where the shape is constant.
@@ -89,17 +91,13 @@ impl Shelf {
                 let shape = shape.as_ref().expect("one of the three is given");
                 let mesh = built(document, table, shape, path)?;
                 return Ok(Shapes {
+                    name: name.clone(),
                     mesh: self.add(name, mesh),
                     keyframes: Vec::new(),
                 });
             }
         };
-        let options = Options {
-            units: table.units.map(length_of),
-            node: table.node.clone(),
-            cap_openings: table.cap_openings,
-            ..Options::default()
-        };
+        let options = Self::options(table);
         let known = self
             .read
             .iter()
@@ -108,7 +106,7 @@ impl Shelf {
             Some(read) => read.meshes.clone(),
             None => {
                 let (found, issues) = load(&files, &options)
-                    .map_err(|issues| unread(document, &issues, name, path, given))?;
+                    .map_err(|issues| Self::unread(document, &issues, name, path, given))?;
                 warnings.extend(issues.into_iter().map(|w| w.of(name)));
                 let found = found.into_iter().map(|mesh| self.add(name, mesh));
                 let meshes: Vec<_> = found.collect();
@@ -121,6 +119,7 @@ impl Shelf {
             }
         };
         Ok(Shapes {
+            name: name.clone(),
             mesh: meshes[0],
             keyframes: match files {
                 Files::One(_) => Vec::new(),
@@ -129,7 +128,42 @@ impl Shelf {
         })
     }
 
-    fn add(&mut self, name: &str, mesh: Mesh) -> usize {
+    /// How the files of `table` are read.
+    pub fn options(table: &MeshTable) -> Options {
+        Options {
+            units: table.units.map(length_of),
+            node: table.node.clone(),
+            cap_openings: table.cap_openings,
+            ..Options::default()
+        }
+    }
+
+    /// The error for mesh files that cannot be used, at the key that names them.
+    pub fn unread(
+        document: &Document<'_>,
+        issues: &[Issue],
+        name: &str,
+        path: &str,
+        given: &str,
+    ) -> SceneError {
+        let errors: Vec<_> = issues.iter().filter(|i| i.is_error()).collect();
+        let causes: Vec<_> = errors
+            .iter()
+            .map(|e| format!("{}: {}", e.file.display(), e.message))
+            .collect();
+        let at = match errors.iter().any(|e| e.message.starts_with("no node")) {
+            true => "node",
+            false => given,
+        };
+        document.fail(
+            &format!("{path}.{at}"),
+            format!("mesh `{name}`: {}", causes.join("; ")),
+            errors.first().map_or(String::new(), |e| e.remedy.clone()),
+        )
+    }
+
+    /// Keeps a mesh; its number.
+    pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
         self.meshes.push(Mesh {
             name: name.to_owned(),
             ..mesh
@@ -146,30 +180,6 @@ fn load(files: &Files, options: &Options) -> Result<(Vec<Mesh>, Vec<Issue>), Vec
         }
         Files::Keyframes(files) => mesh::load_keyframes(files, options),
     }
-}
-
-/// The error for mesh files that cannot be used, at the key that names them.
-fn unread(
-    document: &Document<'_>,
-    issues: &[Issue],
-    name: &str,
-    path: &str,
-    given: &str,
-) -> SceneError {
-    let errors: Vec<_> = issues.iter().filter(|i| i.is_error()).collect();
-    let causes: Vec<_> = errors
-        .iter()
-        .map(|e| format!("{}: {}", e.file.display(), e.message))
-        .collect();
-    let at = match errors.iter().any(|e| e.message.starts_with("no node")) {
-        true => "node",
-        false => given,
-    };
-    document.fail(
-        &format!("{path}.{at}"),
-        format!("mesh `{name}`: {}", causes.join("; ")),
-        errors.first().map_or(String::new(), |e| e.remedy.clone()),
-    )
 }
 
 /// A built-in shape, with none of the keys that files take.
