@@ -9,6 +9,7 @@ mod document;
 mod error;
 mod graph;
 mod motion;
+mod nodes;
 mod parameters;
 mod placing;
 mod playing;
@@ -131,6 +132,8 @@ fn within(
     Err(document.fail(path, message, remedy))
 }
 
+#[cfg(test)]
+mod graph_mistakes;
 #[cfg(test)]
 mod graph_tests;
 #[cfg(test)]

@@ -1,0 +1,144 @@
+//! The nodes of a scene file, and who is whose child.
+
+use std::collections::HashMap;
+
+use super::document::Document;
+use super::error::SceneError;
+use super::schema::File;
+use crate::scene::suggest;
+
+/// A table that is a node.
+pub(super) struct Entry<'f> {
+    /// Its path: `selector.0`.
+    pub path: String,
+    pub name: &'f str,
+    pub parent: Option<&'f str>,
+    pub kind: Kind,
+}
+
+/// Kind, with the number of the table among those of its kind.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Kind {
+    Group,
+    Transform(usize),
+    Selector(usize),
+    Mesh(usize),
+}
+
+/// All nodes in the order in which they stand in the file; their names are unique.
+pub(super) fn entries<'f>(
+    document: &Document<'_>,
+    file: &'f File,
+) -> Result<Vec<Entry<'f>>, SceneError> {
+    let mut out = Vec::new();
+    let mut add = |kind, path: String, name: &'f String, parent: &'f Option<String>| {
+        out.push(Entry {
+            path,
+            name,
+            parent: parent.as_deref(),
+            kind,
+        });
+    };
+    for (i, t) in file.group.iter().enumerate() {
+        add(Kind::Group, format!("group.{i}"), &t.name, &t.parent);
+    }
+    for (i, t) in file.transform.iter().enumerate() {
+        add(
+            Kind::Transform(i),
+            format!("transform.{i}"),
+            &t.name,
+            &t.parent,
+        );
+    }
+    for (i, t) in file.selector.iter().enumerate() {
+        add(
+            Kind::Selector(i),
+            format!("selector.{i}"),
+            &t.name,
+            &t.parent,
+        );
+    }
+    for (i, t) in file.mesh.iter().enumerate() {
+        add(Kind::Mesh(i), format!("mesh.{i}"), &t.name, &t.parent);
+    }
+    out.sort_by_key(|e| document.place(&e.path));
+    let mut names = HashMap::new();
+    for (e, entry) in out.iter().enumerate() {
+        if let Some(other) = names.insert(entry.name, e) {
+            let other: &Entry = &out[other];
+            let kind = |e: &Entry| e.path.split('.').next().unwrap_or_default().to_owned();
+            return Err(document.fail(
+                &format!("{}.name", entry.path),
+                format!("a {} is already named `{}`", kind(other), entry.name),
+                "give each node its own name",
+            ));
+        }
+    }
+    Ok(out)
+}
+
+/// For each entry the entry that it names as its parent.
+pub(super) fn parents(
+    document: &Document<'_>,
+    entries: &[Entry<'_>],
+) -> Result<Vec<Option<usize>>, SceneError> {
+    let by_name: HashMap<_, _> = entries.iter().zip(0..).map(|(e, i)| (e.name, i)).collect();
+    let holds = |e: &Entry| !matches!(e.kind, Kind::Mesh(_));
+    let find = |entry: &Entry, parent: &str| {
+        let at = format!("{}.parent", entry.path);
+        match by_name.get(parent) {
+            Some(&p) if holds(&entries[p]) => Ok(p),
+            Some(_) => Err(document.fail(
+                &at,
+                format!("`{parent}` is a mesh, and meshes have no children"),
+                "name a group, a transform or a selector",
+            )),
+            None => {
+                let names = entries.iter().filter(|e| holds(e)).map(|e| e.name);
+                let remedy = suggest::among(parent, names);
+                Err(document.fail(&at, format!("there is no node `{parent}`"), remedy))
+            }
+        }
+    };
+    let one = |entry: &Entry| entry.parent.map(|parent| find(entry, parent)).transpose();
+    entries.iter().map(one).collect()
+}
+
+/// For each entry the number of its ancestors.
+pub(super) fn depths(
+    document: &Document<'_>,
+    entries: &[Entry<'_>],
+    parents: &[Option<usize>],
+) -> Result<Vec<usize>, SceneError> {
+    let mut depths: Vec<Option<usize>> = vec![None; entries.len()];
+    for start in 0..entries.len() {
+        // Up to an entry whose depth is known, and down again.
+        let mut chain = Vec::new();
+        let mut at = Some(start);
+        while let Some(e) = at.filter(|&e| depths[e].is_none()) {
+            // After as many steps as there are nodes it goes in circles.
+            if chain.len() == entries.len() {
+                let by = parents[e].expect("it was come by");
+                let by = match by == e {
+                    true => String::new(),
+                    false => format!(" by way of `{}`", entries[by].name),
+                };
+                return Err(document.fail(
+                    &format!("{}.parent", entries[e].path),
+                    format!("`{}` is its own ancestor{by}", entries[e].name),
+                    "leave out `parent` of one of them",
+                ));
+            }
+            chain.push(e);
+            at = parents[e];
+        }
+        let first = at.and_then(|e| depths[e]).map_or(0, |d| d + 1);
+        for (e, depth) in chain.into_iter().rev().zip(first..) {
+            depths[e] = Some(depth);
+        }
+    }
+    Ok(depths
+        .into_iter()
+        .map(|d| d.expect("all visited"))
+        .collect())
+}
