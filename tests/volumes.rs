@@ -9,7 +9,7 @@ mod shared_data;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use insonify::volume::{Volume, is_volume};
+use insonify::volume::{Sequence, Volume, is_volume};
 use limited::{Outcome, check, files};
 use shared_data::shared_data;
 
@@ -119,6 +119,60 @@ fn every_encoding_of_the_ball_gives_the_same_voxels() {
     }
     // Its header takes the header of the NIfTI file for voxels.
     assert!(load("_nifti.nhdr") != plain);
+}
+
+/// PLUS's own sequences are read, and written so that they read back equal; poses that it marked
+/// as lost are marked here.
+#[test]
+fn sequences_of_plus_are_written_back_equal() {
+    let Some(data) = shared_data() else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    let copy = folder.path().join("copy.igs.mha");
+    let (mut read, mut refused) = (0, Vec::new());
+    for path in files(&data.join("us-plus/TestImages"), |p| {
+        let name = p.to_string_lossy();
+        name.ends_with(".igs.mha") || name.ends_with(".igs.mhd")
+    }) {
+        let name = path
+            .file_name()
+            .expect("a name")
+            .to_string_lossy()
+            .into_owned();
+        match Sequence::load(&path) {
+            Ok((sequence, _)) => {
+                sequence.write(&copy).expect("written");
+                let (again, _) = Sequence::load(&copy).expect("readable");
+                assert!(again == sequence, "{name}");
+                read += 1;
+            }
+            Err(_) => refused.push(name),
+        }
+    }
+    // Poses alone, and a file whose pixels are missing.
+    assert_eq!(
+        refused,
+        [
+            "EightLandmarkPointsTrackedForPhantomRegistration.igs.mha",
+            "MetaImageSequenceIOTest1.igs.mhd",
+            "ReferenceToRASCalibration.igs.mha",
+        ]
+    );
+    assert!(read >= 18, "{read}");
+    let nwires = data.join("us-plus/TestImages/NwirePhantomFreehand.igs.mha");
+    let (sequence, _) = Sequence::load(&nwires).expect("readable");
+    let poses: Vec<_> = sequence
+        .frames
+        .iter()
+        .flat_map(|f| f.poses.values())
+        .collect();
+    let ok = poses.iter().filter(|p| p.is_ok()).count();
+    assert_eq!((sequence.frames.len(), poses.len(), ok), (97, 291, 194));
+    // Numbers of the header, as they stand there.
+    let first = &sequence.frames[0];
+    assert_eq!(first.timestamp, Some(345.627957));
+    let probe = first.poses["ProbeToTracker"].transform;
+    assert_eq!(probe.matrix3.col(1).x, -0.263308);
+    assert_eq!(probe.translation.x, -190.886);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::Args;
 use insonify::output;
 use insonify::scene::check;
-use insonify::volume::{self, Volume};
+use insonify::volume::{self, Format, Summary, Volume};
 
 /// Arguments of `insonify check`.
 #[derive(Debug, Args)]
@@ -38,6 +38,11 @@ impl Check {
         })?;
         output::line(self.file.display());
         output::line(&volume);
+        if volume.format == Format::MetaImage
+            && let Some(sequence) = Summary::read(&self.file)?
+        {
+            output::line(sequence);
+        }
         for warning in &warnings {
             output::line(warning);
         }

@@ -7,6 +7,7 @@ use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
+use super::sequence::frames;
 use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
 use super::voxels::VoxelType;
 use super::{Format, Warning};
@@ -52,8 +53,17 @@ const KNOWN: [&str; 29] = [
 ];
 
 pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
-    let bytes = source::prefix(path, MAX_HEADER)?;
-    let (fields, data) = fields(path, &bytes)?;
+    let (fields, data) = fields(path)?;
+    let mut out = of_fields(&fields, data)?;
+    let keys = unused_keys(&fields);
+    let keys: Vec<_> = keys.iter().map(|f| f.key.as_str()).collect();
+    out.warnings.extend(unused(path, &keys));
+    out.warnings.extend(stacked(&fields));
+    Ok(out)
+}
+
+/// The header that these fields make; the voxels follow byte `data` if they are in the same file.
+pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeError> {
     if let Some(object) = fields.find(&["ObjectType"])
         && !object.value.eq_ignore_ascii_case("Image")
     {
@@ -91,9 +101,9 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
         None => 1,
     };
     let big_endian = fields.find(&BIG_ENDIAN).is_some_and(truth);
-    let mut out = Header {
+    Ok(Header {
         format: Format::MetaImage,
-        kind: kind(&fields)?,
+        kind: kind(fields)?,
         big_endian,
         channels,
         size: [dims[0], dims[1], dims.get(2).copied().unwrap_or(1)],
@@ -103,18 +113,17 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
             steps: grid::steps(n, &rows, &spacings),
             origin: grid::point(&origin),
             frame: Frame::Lps,
-            unit: unit(&fields)?,
+            unit: unit(fields)?,
         },
         scale: None,
-        payload: payload(&fields, data)?,
-        warnings: unused(path, &unused_keys(&fields)).into_iter().collect(),
-    };
-    out.warnings.extend(stacked(&fields, n));
-    Ok(out)
+        payload: payload(fields, data)?,
+        warnings: Vec::new(),
+    })
 }
 
 /// Fields up to the one that says where the voxels are, and the byte after it.
-fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, u64), VolumeError> {
+pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
+    let bytes = source::prefix(path, MAX_HEADER)?;
     let mut list = Vec::new();
     let mut at = 0;
     for (line, text) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
@@ -237,10 +246,10 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
 
 /// A warning where the third axis is none of space: a plane, or frames of a sequence. Plus calls
 /// the third axis of reconstructed volumes a list as well; only sequences have fields per frame.
-fn stacked(fields: &Fields, n: usize) -> Option<Warning> {
-    let sequence = fields.list.iter().any(|f| f.key.starts_with("Seq_Frame"));
-    let message = match (n, sequence) {
-        (2, _) => "is a plane: one slice of 1 mm",
+fn stacked(fields: &Fields) -> Option<Warning> {
+    let plane = fields.find(&["NDims"]).is_some_and(|f| f.value == "2");
+    let message = match (plane, frames::in_header(fields)) {
+        (true, _) => "is a plane: one slice of 1 mm",
         (_, true) => "is a tracked sequence: its frames are stacked, their poses ignored",
         _ => return None,
     };
@@ -248,18 +257,21 @@ fn stacked(fields: &Fields, n: usize) -> Option<Warning> {
         fields.path,
         1,
         message,
-        "reconstruct a volume from it",
+        "`insonify reconstruct` makes a volume from frames and poses",
     ))
 }
 
-fn unused_keys<'f>(fields: &'f Fields) -> Vec<&'f str> {
+/// Fields whose keys mean nothing to a volume, but those of frames.
+pub(super) fn unused_keys<'f>(fields: &'f Fields) -> Vec<&'f Field> {
     let known = KNOWN
         .iter()
         .chain(&ORIGIN)
         .chain(&DIRECTION)
         .chain(&BIG_ENDIAN);
     let known: Vec<_> = known.collect();
-    let keys = fields.list.iter().map(|f| f.key.as_str());
-    keys.filter(|key| !known.iter().any(|k| k.eq_ignore_ascii_case(key)))
+    let fields = fields.list.iter();
+    fields
+        .filter(|f| !f.key.starts_with(frames::PREFIX))
+        .filter(|f| !known.iter().any(|k| k.eq_ignore_ascii_case(&f.key)))
         .collect()
 }

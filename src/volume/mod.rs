@@ -19,14 +19,18 @@ mod meta;
 mod nifti;
 mod nrrd;
 mod report;
+mod sequence;
 mod source;
 #[cfg(test)]
 mod tests;
 mod voxels;
+mod write;
 
 pub use error::{Place, VolumeError};
 pub use grid::Frame;
+pub use sequence::{Pose, Sequence, Summary, TrackedFrame};
 pub use voxels::{Statistics, VoxelType, Voxels};
+pub use write::write_meta;
 
 /// Format of a volume file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,6 +11,7 @@ use tempfile::TempDir;
 use super::*;
 
 mod planted;
+mod sequences;
 
 const SIZE: [usize; 3] = [4, 3, 2];
 /// An oblique orthonormal frame: a rotation by 0.3 about z after one by 0.5 about x.
@@ -262,7 +263,8 @@ fn bounds_spacing_and_values_are_those_of_whole_voxels() {
 #[test]
 fn extra_keys_channels_and_trailing_bytes_are_warned_of() {
     let folder = Folder::new();
-    let more = format!("Seq_Frame0000_Status = OK\nElementNumberOfChannels = 2\n{LOCAL}");
+    let more =
+        format!("Seq_Frame0000_Status = OK\nStrange = 1\nElementNumberOfChannels = 2\n{LOCAL}");
     let pairs: Vec<u8> = values()
         .iter()
         .flat_map(|v| [*v, 7])

@@ -94,6 +94,22 @@ impl Voxels {
         self.len() == 0
     }
 
+    /// Type of the values as they are here.
+    pub fn kind(&self) -> VoxelType {
+        match self {
+            Self::U8(_) => VoxelType::U8,
+            Self::I8(_) => VoxelType::I8,
+            Self::U16(_) => VoxelType::U16,
+            Self::I16(_) => VoxelType::I16,
+            Self::F32(_) => VoxelType::F32,
+        }
+    }
+
+    /// The values as little-endian bytes.
+    pub(super) fn to_le_bytes(&self) -> Vec<u8> {
+        values!(self, v => v.iter().flat_map(|x| x.to_le_bytes()).collect())
+    }
+
     /// Value of voxel `index`.
     ///
     /// # Panics

@@ -1,0 +1,192 @@
+//! Entries of single frames in the header of a sequence: `Seq_Frame0007_ProbeToTrackerTransform`.
+
+use std::collections::BTreeMap;
+
+use glam::{DAffine3, DMat3, DVec3};
+
+use crate::volume::error::VolumeError;
+use crate::volume::fields::{Field, Fields};
+use crate::volume::write::{Header, number};
+
+/// What entries of frames begin with.
+pub(in crate::volume) const PREFIX: &str = "Seq_Frame";
+const TRANSFORM: &str = "Transform";
+const STATUS: &str = "TransformStatus";
+const IMAGE_STATUS: &str = "ImageStatus";
+const TIMESTAMP: &str = "Timestamp";
+
+/// A transform that was measured, and whether it can be trusted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Pose {
+    /// From the first frame of the name to the second (`ProbeToTracker`), in their units, mm as a
+    /// rule.
+    pub transform: DAffine3,
+    /// `OK`, or why it is none (`INVALID`, `OUT_OF_VIEW`, ...); none where the file does not say,
+    /// which counts as `OK`.
+    pub status: Option<String>,
+}
+
+impl Pose {
+    /// A pose that holds.
+    pub fn ok(transform: DAffine3) -> Self {
+        Self {
+            transform,
+            status: Some("OK".to_owned()),
+        }
+    }
+
+    /// Whether it holds.
+    pub fn is_ok(&self) -> bool {
+        self.status.as_deref().is_none_or(|s| s == "OK")
+    }
+}
+
+/// What belongs to one frame beside its pixels.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct TrackedFrame {
+    /// Seconds since a moment that the sequence shares.
+    pub timestamp: Option<f64>,
+    /// Whether its pixels are an image: `ImageStatus`, where it is stated.
+    pub image: Option<bool>,
+    /// Poses by name without `Transform`, e.g. `ProbeToTracker`.
+    pub poses: BTreeMap<String, Pose>,
+    /// Other entries, in the order of the file.
+    pub fields: Vec<(String, String)>,
+}
+
+impl TrackedFrame {
+    /// Whether its pixels are an image.
+    pub fn has_image(&self) -> bool {
+        self.image != Some(false)
+    }
+
+    pub(super) fn write(&self, index: usize, header: &mut Header) {
+        let mut entry = |name: &str, value: &str| {
+            header.entry(&format!("{PREFIX}{index:04}_{name}"), value);
+        };
+        for (name, pose) in &self.poses {
+            let (m, t) = (pose.transform.matrix3, pose.transform.translation);
+            let rows = [0, 1, 2].map(|row| {
+                let row = m.row(row).extend(t[row]).to_array();
+                row.map(number).join(" ")
+            });
+            entry(
+                &format!("{name}{TRANSFORM}"),
+                &format!("{} 0 0 0 1", rows.join(" ")),
+            );
+            if let Some(status) = &pose.status {
+                entry(&format!("{name}{STATUS}"), status);
+            }
+        }
+        if let Some(timestamp) = self.timestamp {
+            entry(TIMESTAMP, &number(timestamp));
+        }
+        for (name, value) in &self.fields {
+            entry(name, value);
+        }
+        if let Some(image) = self.image {
+            entry(IMAGE_STATUS, if image { "OK" } else { "INVALID" });
+        }
+    }
+}
+
+/// Whether the third axis is declared to be of space.
+pub(in crate::volume) fn third_axis_is_space(fields: &Fields) -> bool {
+    let kinds = fields.find(&["Kinds"]);
+    kinds.is_some_and(|f| f.value.split_whitespace().nth(2) == Some("domain"))
+}
+
+/// Whether a header describes frames.
+pub(in crate::volume) fn in_header(fields: &Fields) -> bool {
+    fields.list.iter().any(|f| f.key.starts_with(PREFIX)) && !third_axis_is_space(fields)
+}
+
+/// Frames that have entries, by number, each below `count`. They are no more than the header has
+/// lines, whatever the file claims to hold.
+pub(super) fn parse(
+    fields: &Fields,
+    count: usize,
+) -> Result<BTreeMap<usize, TrackedFrame>, VolumeError> {
+    let mut out: BTreeMap<usize, (TrackedFrame, BTreeMap<String, String>)> = BTreeMap::new();
+    for field in &fields.list {
+        let Some(rest) = field.key.strip_prefix(PREFIX) else {
+            continue;
+        };
+        let parts = rest
+            .split_once('_')
+            .and_then(|(i, name)| Some((i.parse::<usize>().ok()?, name)));
+        let Some((index, name)) = parts else {
+            return Err(fields.error(
+                field,
+                "names no frame",
+                "write it like Seq_Frame0000_Timestamp",
+            ));
+        };
+        if index >= count {
+            let cause = format!("there are {count} frames, counted from 0");
+            return Err(fields.error(field, &cause, "correct DimSize or the number of the frame"));
+        }
+        let (frame, statuses) = out.entry(index).or_default();
+        if let Some(of) = name.strip_suffix(STATUS) {
+            statuses.insert(of.to_owned(), field.value.clone());
+        } else if let Some(of) = name.strip_suffix(TRANSFORM) {
+            let pose = Pose {
+                transform: transform(fields, field)?,
+                status: None,
+            };
+            frame.poses.insert(of.to_owned(), pose);
+        } else if name == TIMESTAMP {
+            let time: f64 = fields.number(field)?;
+            if !time.is_finite() {
+                return Err(fields.error(field, "is no time", "write seconds"));
+            }
+            frame.timestamp = Some(time);
+        } else if name == IMAGE_STATUS {
+            frame.image = Some(field.value == "OK");
+        } else {
+            frame.fields.push((name.to_owned(), field.value.clone()));
+        }
+    }
+    let attach = |(mut frame, statuses): (TrackedFrame, BTreeMap<String, String>)| {
+        for (name, status) in statuses {
+            match frame.poses.get_mut(&name) {
+                Some(pose) => pose.status = Some(status),
+                None => frame.fields.push((format!("{name}{STATUS}"), status)),
+            }
+        }
+        frame
+    };
+    Ok(out
+        .into_iter()
+        .map(|(i, found)| (i, attach(found)))
+        .collect())
+}
+
+/// Sixteen numbers, row by row, the last row (0, 0, 0, 1).
+fn transform(fields: &Fields, field: &Field) -> Result<DAffine3, VolumeError> {
+    matrix(&field.value).map_err(|cause| {
+        fields.error(
+            field,
+            cause,
+            "write the sixteen numbers of a 4 x 4 matrix, row by row",
+        )
+    })
+}
+
+/// A 4 x 4 matrix in text, row by row, as an affine transform.
+pub(in crate::volume) fn matrix(text: &str) -> Result<DAffine3, &'static str> {
+    let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
+    let numbers = numbers.map_err(|_| "is no list of numbers")?;
+    let Ok(m) = <[f64; 16]>::try_from(numbers) else {
+        return Err("does not have 16 numbers");
+    };
+    if m.iter().any(|v| !v.is_finite()) {
+        return Err("is not finite");
+    }
+    if m[12..] != [0.0, 0.0, 0.0, 1.0] {
+        return Err("is no affine transform: its last row is not 0 0 0 1");
+    }
+    let column = |c: usize| DVec3::new(m[c], m[4 + c], m[8 + c]);
+    let linear = DMat3::from_cols(column(0), column(1), column(2));
+    Ok(DAffine3::from_mat3_translation(linear, column(3)))
+}

@@ -1,0 +1,68 @@
+//! What `insonify check` says of a sequence.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::Path;
+
+use super::frames;
+use crate::volume::error::VolumeError;
+use crate::volume::meta;
+
+/// Frames, poses and times of a sequence.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Summary {
+    /// Frames that the header describes.
+    pub frames: usize,
+    /// How many poses of each name there are, and how many of them hold.
+    pub poses: BTreeMap<String, [usize; 2]>,
+    /// First and last timestamp, seconds.
+    pub times: Option<[f64; 2]>,
+}
+
+impl Summary {
+    /// Reads the header of a file (.mha, .mhd); none where it is no sequence.
+    ///
+    /// # Errors
+    /// Where the header is wrong.
+    pub fn read(path: &Path) -> Result<Option<Self>, VolumeError> {
+        let (fields, data) = meta::fields(path)?;
+        if !frames::in_header(&fields) {
+            return Ok(None);
+        }
+        let header = meta::of_fields(&fields, data)?;
+        let count = match header.size[2] {
+            1 => header.frames,
+            count => count,
+        };
+        let frames = frames::parse(&fields, count)?;
+        let mut poses: BTreeMap<String, [usize; 2]> = BTreeMap::new();
+        for (name, pose) in frames.values().flat_map(|f| &f.poses) {
+            let [all, ok] = poses.entry(name.clone()).or_default();
+            *all += 1;
+            *ok += usize::from(pose.is_ok());
+        }
+        let times = frames.values().filter_map(|f| f.timestamp);
+        let times = times.fold(None, |range: Option<[f64; 2]>, t| {
+            let [low, high] = range.unwrap_or([t, t]);
+            Some([low.min(t), high.max(t)])
+        });
+        Ok(Some(Self {
+            frames: count,
+            poses,
+            times,
+        }))
+    }
+}
+
+impl fmt::Display for Summary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "  tracked sequence of {} frames", self.frames)?;
+        if let Some([first, last]) = self.times {
+            write!(f, ", {first} s to {last} s")?;
+        }
+        for (name, [all, ok]) in &self.poses {
+            write!(f, "\n  pose {name}: {all}, {ok} of them OK")?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,123 @@
+//! Writing MetaImage (.mha): one file, header and zlib data, little endian.
+
+use std::fmt::Write as _;
+use std::fs::File;
+use std::io::Write as _;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::ZlibEncoder;
+use glam::DMat3;
+
+use super::error::VolumeError;
+use super::{Volume, VoxelType, Voxels};
+
+/// A header under construction.
+pub(super) struct Header(String);
+
+/// The shortest text that reads back as the same number.
+pub(super) fn number(value: f64) -> String {
+    // Without an exponent a tiny number would be a line of zeros.
+    if value == 0.0 || (1e-5..1e17).contains(&value.abs()) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
+impl Header {
+    /// The entries that depend on the voxels alone.
+    pub fn new(voxels: &Voxels) -> Self {
+        let kind = match voxels.kind() {
+            VoxelType::U8 => "MET_UCHAR",
+            VoxelType::I8 => "MET_CHAR",
+            VoxelType::U16 => "MET_USHORT",
+            VoxelType::I16 => "MET_SHORT",
+            VoxelType::U32 => "MET_UINT",
+            VoxelType::I32 => "MET_INT",
+            VoxelType::F32 => "MET_FLOAT",
+            VoxelType::F64 => "MET_DOUBLE",
+        };
+        let mut out = Self(String::new());
+        out.entry("ObjectType", "Image");
+        out.entry("NDims", "3");
+        out.entry("BinaryData", "True");
+        out.entry("BinaryDataByteOrderMSB", "False");
+        out.entry("CompressedData", "True");
+        out.entry("ElementType", kind);
+        out
+    }
+
+    /// Adds an entry.
+    ///
+    /// # Panics
+    /// When it would not be read back as one entry.
+    pub fn entry(&mut self, key: &str, value: impl AsRef<str>) {
+        let value = value.as_ref();
+        let sound = !key.contains(['=', '\n']) && !value.contains('\n') && !key.trim().is_empty();
+        assert!(sound, "entry `{key}` = `{value}`");
+        writeln!(self.0, "{key} = {value}").expect("memory");
+    }
+
+    /// Writes the header and the voxels.
+    pub fn finish(mut self, path: &Path, voxels: &Voxels) -> Result<(), VolumeError> {
+        if path
+            .extension()
+            .is_none_or(|e| !e.eq_ignore_ascii_case("mha"))
+        {
+            return Err(VolumeError::file(
+                path,
+                "is not written: only MetaImage in one file is",
+                "end the name in .mha",
+            ));
+        }
+        let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
+        encoder.write_all(&voxels.to_le_bytes()).expect("memory");
+        let data = encoder.finish().expect("memory");
+        self.entry("CompressedDataSize", data.len().to_string());
+        self.entry("ElementDataFile", "LOCAL");
+        let write = || {
+            let mut file = File::create(path)?;
+            file.write_all(self.0.as_bytes())?;
+            file.write_all(&data)
+        };
+        write().map_err(|e| {
+            VolumeError::file(
+                path,
+                format!("cannot be written: {e}"),
+                "check the folder, its permissions and its free space",
+            )
+        })
+    }
+}
+
+/// Writes a volume as MetaImage (.mha). Voxels read back equal, the placement to the rounding of
+/// 64-bit products.
+///
+/// # Errors
+/// When the name is not .mha, or the file cannot be written.
+pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
+    let [x, y, z] = volume.size;
+    assert_eq!(volume.voxels.len(), x * y * z, "voxels");
+    let [i, j, k] = volume.directions();
+    let text = |values: &[f64]| {
+        values
+            .iter()
+            .map(|&v| number(v))
+            .collect::<Vec<_>>()
+            .join(" ")
+    };
+    let mut header = Header::new(&volume.voxels);
+    header.entry("CenterOfRotation", "0 0 0");
+    header.entry("DimSize", format!("{x} {y} {z}"));
+    header.entry("Kinds", "domain domain domain");
+    header.entry("ElementSpacing", text(&volume.spacing().to_array()));
+    header.entry(
+        "Offset",
+        text(&volume.world_from_voxel.translation.to_array()),
+    );
+    // MetaImage lists the direction of one axis after that of the other.
+    let directions = DMat3::from_cols(i, j, k).to_cols_array();
+    header.entry("TransformMatrix", text(&directions));
+    header.finish(path, &volume.voxels)
+}
