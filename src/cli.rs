@@ -8,6 +8,7 @@ mod check;
 mod images;
 mod info;
 mod movie;
+mod reconstruct;
 mod render;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
@@ -24,6 +25,8 @@ enum Command {
     Check(check::Check),
     /// List the Vulkan devices and what each lacks
     Info(info::Info),
+    /// Reconstruct a volume from tracked frames
+    Reconstruct(Box<reconstruct::Reconstruct>),
     /// Render a scene to a B-mode image
     Render(Box<render::Render>),
 }
@@ -33,6 +36,7 @@ pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Check(check) => check.run(),
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
+        Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
     };
     match result {

@@ -18,6 +18,7 @@ mod header;
 mod meta;
 mod nifti;
 mod nrrd;
+mod reconstruct;
 mod report;
 mod sequence;
 mod source;
@@ -28,6 +29,11 @@ mod write;
 
 pub use error::{Place, VolumeError};
 pub use grid::Frame;
+pub use reconstruct::{
+    Compounding, Config, Fan, Filling, Interpolation, Lattice, ReconstructError, Reconstruction,
+    Settings, Transforms, reconstruct,
+};
+pub use sequence::frames::matrix as transform;
 pub use sequence::{Pose, Sequence, Summary, TrackedFrame};
 pub use voxels::{Statistics, VoxelType, Voxels};
 pub use write::write_meta;

@@ -174,7 +174,10 @@ fn transform(fields: &Fields, field: &Field) -> Result<DAffine3, VolumeError> {
 }
 
 /// A 4 x 4 matrix in text, row by row, as an affine transform.
-pub(in crate::volume) fn matrix(text: &str) -> Result<DAffine3, &'static str> {
+///
+/// # Errors
+/// What is wrong with the text, to follow its name.
+pub fn matrix(text: &str) -> Result<DAffine3, &'static str> {
     let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
     let numbers = numbers.map_err(|_| "is no list of numbers")?;
     let Ok(m) = <[f64; 16]>::try_from(numbers) else {

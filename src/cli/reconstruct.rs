@@ -1,0 +1,180 @@
+//! `insonify reconstruct`: a volume from tracked frames.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use glam::{DAffine3, DVec3};
+use insonify::output;
+use insonify::volume::{
+    Compounding, Config, Filling, Interpolation, Sequence, Settings, Transforms, reconstruct,
+    transform, write_meta,
+};
+use miette::{Context, Result};
+
+/// Arguments of `insonify reconstruct`. What is given here goes before the configuration.
+#[derive(Debug, Args)]
+pub struct Reconstruct {
+    /// Tracked frames (.mha, .mhd), as PLUS and 3D Slicer write them.
+    sequence: PathBuf,
+    /// Configuration of PLUS (PlusDeviceSet_*.xml): its CoordinateDefinitions and
+    /// VolumeReconstruction.
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// Calibration from pixels to the probe's tracked frame, mm: 16 numbers, row by row.
+    #[arg(long, value_name = "MATRIX", value_parser = matrix, allow_hyphen_values = true)]
+    image_to_probe: Option<DAffine3>,
+    /// Name of the frame of pixels [default: the configuration's, or Image].
+    #[arg(long, value_name = "NAME")]
+    image: Option<String>,
+    /// Name of the tracked frame that the volume lies in [default: the configuration's, or
+    /// Reference].
+    #[arg(long, value_name = "NAME")]
+    reference: Option<String>,
+    /// Distance of voxels, mm: one number, or one per axis as 0.5,0.5,1 [default: the
+    /// configuration's, or 0.5].
+    #[arg(long, value_parser = spacing)]
+    spacing: Option<DVec3>,
+    /// First voxel and voxels along each axis: x,y,z in mm, then nx,ny,nz [default: what holds all
+    /// frames].
+    #[arg(long, value_name = "X,Y,Z,NX,NY,NZ", value_parser = extent, allow_hyphen_values = true)]
+    extent: Option<(DVec3, [usize; 3])>,
+    /// Rectangle of the frames to use, pixels: x,y,width,height.
+    #[arg(long, value_name = "X,Y,W,H", value_parser = clip)]
+    clip: Option<[i32; 4]>,
+    /// Voxels that a pixel goes to.
+    #[arg(long, value_enum)]
+    interpolation: Option<InterpolationChoice>,
+    /// What a voxel is that several pixels reach.
+    #[arg(long, value_enum)]
+    compounding: Option<CompoundingChoice>,
+    /// Voxels of the longest line that fills a hole; 0 leaves holes.
+    #[arg(long, value_name = "VOXELS", value_parser = clap::value_parser!(u8).range(0..=99))]
+    fill: Option<u8>,
+    /// Volume to write (.mha).
+    #[arg(short, long)]
+    output: PathBuf,
+}
+
+/// `--interpolation`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum InterpolationChoice {
+    /// The voxel it lies in.
+    Nearest,
+    /// The eight around it.
+    Linear,
+}
+
+/// `--compounding`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum CompoundingChoice {
+    /// Their mean.
+    Mean,
+    /// The largest.
+    Maximum,
+    /// The latest.
+    Latest,
+}
+
+fn matrix(text: &str) -> Result<DAffine3, String> {
+    transform(&text.replace([',', ';'], " ")).map_err(str::to_owned)
+}
+
+fn numbers<T: std::str::FromStr>(text: &str) -> Result<Vec<T>, String> {
+    let words = text.split(',').map(|w| w.trim().parse());
+    let numbers: Result<Vec<T>, _> = words.collect();
+    numbers.map_err(|_| format!("'{text}' is no list of such numbers"))
+}
+
+fn spacing(text: &str) -> Result<DVec3, String> {
+    match numbers::<f64>(text)?.as_slice() {
+        [all] => Ok(DVec3::splat(*all)),
+        [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
+        other => Err(format!("{} numbers, not 1 or 3", other.len())),
+    }
+}
+
+fn extent(text: &str) -> Result<(DVec3, [usize; 3]), String> {
+    let wrong = || format!("'{text}' is not X,Y,Z,NX,NY,NZ");
+    let words: Vec<_> = text.split(',').collect();
+    let (Some(first), Some(size)) = (words.get(..3), words.get(3..6)) else {
+        return Err(wrong());
+    };
+    let first = numbers::<f64>(&first.join(","))?;
+    let size = <[usize; 3]>::try_from(numbers::<usize>(&size.join(","))?);
+    match (words.len(), size) {
+        (6, Ok(size)) => Ok((DVec3::from_slice(&first), size)),
+        _ => Err(wrong()),
+    }
+}
+
+fn clip(text: &str) -> Result<[i32; 4], String> {
+    let numbers = numbers::<i32>(text)?;
+    <[i32; 4]>::try_from(numbers).map_err(|_| "four numbers are needed".to_owned())
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// What is wrong with the files or the settings, said once.
+pub fn run(args: &Reconstruct) -> Result<()> {
+    let (sequence, warnings) = Sequence::load(&args.sequence)?;
+    for warning in &warnings {
+        eprintln!("{warning}");
+    }
+    let config = args.config.as_deref().map(Config::load).transpose()?;
+    let mut config = config.unwrap_or_else(|| Config {
+        transforms: Transforms::default(),
+        settings: Settings::new(DVec3::splat(0.5)),
+        image: None,
+        reference: None,
+    });
+    let image = args.image.as_deref().or(config.image.as_deref());
+    let image = image.unwrap_or("Image").to_owned();
+    let reference = args.reference.as_deref().or(config.reference.as_deref());
+    let reference = reference.unwrap_or("Reference").to_owned();
+    if let Some(matrix) = args.image_to_probe {
+        config.transforms = Transforms::default();
+        config.transforms.add(&image, "Probe", matrix);
+    }
+    let settings = &mut config.settings;
+    settings.spacing = args.spacing.unwrap_or(settings.spacing);
+    settings.lattice = args.extent.or(settings.lattice);
+    settings.clip = args.clip.or(settings.clip);
+    if let Some(choice) = args.interpolation {
+        settings.interpolation = match choice {
+            InterpolationChoice::Nearest => Interpolation::Nearest,
+            InterpolationChoice::Linear => Interpolation::Linear,
+        };
+    }
+    if let Some(choice) = args.compounding {
+        settings.compounding = match choice {
+            CompoundingChoice::Mean => Compounding::Mean,
+            CompoundingChoice::Maximum => Compounding::Maximum,
+            CompoundingChoice::Latest => Compounding::Latest,
+        };
+    }
+    if let Some(length) = args.fill {
+        let stick = Filling::Stick {
+            length: usize::from(length),
+            count: 1,
+        };
+        settings.holes = if length > 0 { vec![stick] } else { vec![] };
+    }
+    let about = || format!("reconstructing {}", args.sequence.display());
+    let poses = config.transforms.of_frames(&sequence, &image, &reference);
+    let poses = poses.map_err(miette::Report::from).wrap_err_with(about)?;
+    let made = reconstruct(&sequence, &poses, &config.settings);
+    let made = made.map_err(miette::Report::from).wrap_err_with(about)?;
+    write_meta(&args.output, &made.volume)?;
+    output::line(args.output.display());
+    output::line(&made.volume);
+    let empty = made.volume.voxels.len() - made.reached - made.filled;
+    output::line(format!(
+        "  {} of {} frames; {} voxels reached, {} filled, {empty} empty",
+        made.frames,
+        sequence.frames.len(),
+        made.reached,
+        made.filled
+    ));
+    Ok(())
+}

@@ -1,0 +1,129 @@
+//! From pixels to the frame of reference, through what the file and the calibration know.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use glam::DAffine3;
+
+use super::ReconstructError;
+use crate::volume::{Pose, Sequence};
+
+/// Transforms that hold for every frame of a sequence, such as the calibration from `Image` to
+/// `Probe`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Transforms {
+    fixed: Vec<(String, String, DAffine3)>,
+}
+
+/// A way from a frame to one next to it.
+struct Step<'t> {
+    to: &'t str,
+    transform: DAffine3,
+    ok: bool,
+}
+
+impl Transforms {
+    /// Adds the transform of points in `from` to points in `to`.
+    pub fn add(&mut self, from: &str, to: &str, transform: DAffine3) {
+        self.fixed.push((from.to_owned(), to.to_owned(), transform));
+    }
+
+    /// Transform of points in `image` (pixels) to points in `reference` (mm) for each frame of a
+    /// sequence, along the fewest steps; none where a pose on the way is not OK or cannot be
+    /// turned around.
+    ///
+    /// # Errors
+    /// When no frame of the sequence joins the two at all.
+    pub fn of_frames(
+        &self,
+        sequence: &Sequence,
+        image: &str,
+        reference: &str,
+    ) -> Result<Vec<Option<DAffine3>>, ReconstructError> {
+        let ways = sequence
+            .frames
+            .iter()
+            .map(|f| self.way(&f.poses, image, reference));
+        let ways: Vec<_> = ways.collect();
+        if ways.iter().any(Option::is_some) {
+            return Ok(ways.into_iter().map(Option::flatten).collect());
+        }
+        let mut names: Vec<_> = self
+            .fixed
+            .iter()
+            .map(|(a, b, _)| format!("{a}To{b}"))
+            .collect();
+        names.extend(sequence.frames.iter().flat_map(|f| f.poses.keys().cloned()));
+        names.sort();
+        names.dedup();
+        names.truncate(12);
+        Err(ReconstructError::new(
+            format!(
+                "nothing leads from `{image}` to `{reference}`; there is {}",
+                if names.is_empty() {
+                    "no transform".to_owned()
+                } else {
+                    names.join(", ")
+                }
+            ),
+            "give the calibration (--config or --image-to-probe) and the names of the frames \
+             (--image, --reference)",
+        ))
+    }
+
+    /// None where nothing joins the two, none within where what does is not OK.
+    fn way(
+        &self,
+        poses: &BTreeMap<String, Pose>,
+        image: &str,
+        reference: &str,
+    ) -> Option<Option<DAffine3>> {
+        let mut steps: BTreeMap<&str, Vec<Step>> = BTreeMap::new();
+        let mut join = |from, to, transform: DAffine3, ok: bool| {
+            steps
+                .entry(from)
+                .or_default()
+                .push(Step { to, transform, ok });
+            let inverse = transform.inverse();
+            let (to, ok) = (to, ok && inverse.is_finite());
+            steps.entry(to).or_default().push(Step {
+                to: from,
+                transform: inverse,
+                ok,
+            });
+        };
+        // A pose of the file goes before the calibration of the same name.
+        for (name, pose) in poses {
+            if let Some((from, to)) = names(name) {
+                join(from, to, pose.transform, pose.is_ok());
+            }
+        }
+        for (from, to, transform) in &self.fixed {
+            join(from, to, *transform, true);
+        }
+        let mut found = BTreeMap::from([(image, (DAffine3::IDENTITY, true))]);
+        let mut todo = VecDeque::from([image]);
+        while let Some(at) = todo.pop_front() {
+            let (here, fine) = found[at];
+            if at == reference {
+                return Some(fine.then_some(here));
+            }
+            for step in steps.get(at).into_iter().flatten() {
+                if !found.contains_key(step.to) {
+                    found.insert(step.to, (step.transform * here, fine && step.ok));
+                    todo.push_back(step.to);
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The two frames in `ProbeToTracker`, if they can be told apart.
+pub(super) fn names(name: &str) -> Option<(&str, &str)> {
+    let mut at = name.match_indices("To").filter(|&(i, _)| {
+        let next = name[i + 2..].chars().next();
+        i > 0 && next.is_some_and(|c| !c.is_ascii_lowercase())
+    });
+    let (i, _) = at.next()?;
+    at.next().is_none().then(|| (&name[..i], &name[i + 2..]))
+}
