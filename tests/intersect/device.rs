@@ -60,7 +60,7 @@ pub struct Rig {
     pub device: Arc<Device>,
     kernel: Kernel,
     pub world: World,
-    pub meshes: Vec<usize>,
+    meshes: Vec<usize>,
     /// Stand in for buffers of the world, by binding.
     pub replaced: Vec<(usize, Buffer)>,
 }
@@ -87,6 +87,15 @@ impl Rig {
             replaced: Vec::new(),
             device: device.clone(),
         }
+    }
+
+    /// The scene with its instances moved or reshaped; whether that took anything.
+    pub fn update(&mut self, scene: &Scene) -> bool {
+        self.meshes = scene.instances.iter().map(|i| i.mesh).collect();
+        let world = &mut self.world;
+        self.device
+            .once(|commands| Ok(world.update(commands, scene).unwrap()))
+            .unwrap()
     }
 
     pub fn trace(&self, rays: &[Ray]) -> Vec<Traced> {

@@ -2,6 +2,7 @@
 //!
 //! The device is a software driver where no GPU is at hand; every check runs on both tracers.
 
+mod beating;
 mod compare;
 mod device;
 mod keyframes;

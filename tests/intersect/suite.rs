@@ -19,15 +19,6 @@ impl Rig {
         Self::on(&device(), scene, tracer)
     }
 
-    /// The scene with its instances moved.
-    pub fn update(&mut self, scene: &Scene) -> bool {
-        self.meshes = scene.instances.iter().map(|i| i.mesh).collect();
-        let world = &mut self.world;
-        self.device
-            .once(|commands| Ok(world.update(commands, scene).unwrap()))
-            .unwrap()
-    }
-
     /// No validation message so far.
     pub fn assert_silent(&self) {
         let messages = self.device.validation_messages();

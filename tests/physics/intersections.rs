@@ -1,11 +1,13 @@
 //! Where rays meet triangles, by both tracers. The suite of all kinds of rays is `tests/intersect`.
 
+#[path = "../intersect/beating.rs"]
+pub mod beating;
 #[path = "../intersect/compare.rs"]
-mod compare;
+pub mod compare;
 #[path = "../intersect/device.rs"]
-mod device;
+pub mod device;
 #[path = "../intersect/rays.rs"]
-mod rays;
+pub mod rays;
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Scene, shapes};
@@ -17,7 +19,7 @@ use compare::{by_aim, expected, slips, wrong};
 use device::{Rig, Traced};
 use rays::{Ray, aimed_at_seams, baked, mirrored, placement, rays, scene, turned};
 
-const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
+pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 /// T31.
 pub fn placements_are_transforms_of_the_mesh() -> Check {

@@ -33,6 +33,7 @@ mod reverberation;
 mod roughness;
 mod rows;
 mod scenes;
+mod selectors;
 mod shadow;
 #[path = "../common/signal.rs"]
 mod signal;

@@ -61,6 +61,7 @@ rows! {
     levels::sectors_have_the_area_of_their_geometry,
     conversion::scan_conversion_is_exact_for_every_probe,
     intersections::placements_are_transforms_of_the_mesh,
+    selectors::every_strategy_shows_the_keyframe,
     intersections::closest_hits_are_those_of_brute_force_in_double_precision,
     determinism::a_frame_repeats_bit_for_bit_and_both_tracers_show_it,
     cole::points_and_scatterers_are_those_of_a_convolution_simulator,
