@@ -10,6 +10,8 @@ layout(std430, binding = 1) readonly buffer LogBuffer { float log_image[]; };
 layout(std430, binding = 2) readonly buffer GreyBuffer { uint grey[256]; };
 layout(std430, binding = 3) buffer PixelBuffer { uint pixels[]; };
 
+#include "sector.glsl"
+
 float bilinear(float column, float row) {
     float c = clamp(column, 0.0, float(frame.scanlines - 1u));
     float r = clamp(row, 0.0, float(frame.samples - 1u));
@@ -26,18 +28,10 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     uint j = gl_GlobalInvocationID.y;
     if (i >= frame.image_width || j >= frame.image_height) { return; }
-    float x = frame.image_left + (float(i) + 0.5) * frame.pixel_pitch;
-    float z = frame.image_top + (float(j) + 0.5) * frame.pixel_pitch;
-    float rho = z;
-    float across = x / frame.width;    // -1/2 .. 1/2 over the face
-    if (frame.kind != KIND_LINEAR) {
-        rho = length(vec2(x, z + frame.radius)) - frame.radius;
-        across = atan(x, z + frame.radius) / frame.field_of_view;
-    }
+    vec2 at;
     uint pixel = 0u;
-    if (abs(across) <= 0.5 && rho >= 0.0 && rho < frame.depth) {
-        float column = (across + 0.5) * float(frame.scanlines) - 0.5;
-        float v = bilinear(column, rho / frame.sample_pitch);
+    if (sector(i, j, at)) {
+        float v = bilinear(at.x, at.y);
         uint level = not_a_number(v) ? 0u : uint(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0));
         pixel = 0xff000000u | (grey[level] * 0x010101u);
     }

@@ -152,6 +152,9 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             }
             uint entered = nodes[5u * nodes[0].y + primitive / 4u][primitive % 4u];
             if (entered == skip_instance || instances[entered].slot != primitive) continue;
+#ifdef RAY_MASKS_ONLY
+            if (instances[entered].masks == 0u) continue;
+#endif
             // What is left of the top level waits below `base`.
             if (primitives.y != 0u && depth < BVH_STACK) {
                 stack[depth] = primitives;

@@ -14,6 +14,7 @@ layout(std430, binding = 3) buffer InstanceBuffer { Instance instances[]; };
 layout(std430, binding = 4) buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 5) buffer SegmentBuffer { Segment segments[]; };
 layout(std430, binding = 6) buffer CountersBuffer { Counters counters[]; };
+layout(std430, binding = 7) buffer FusionBuffer { Fusion fusions[]; };
 
 void main() {
     frames[0].kind = 0u;
@@ -23,4 +24,5 @@ void main() {
     rows[0].tgc = 0.0;
     segments[0].line = 0u;
     counters[0].rays = 0u;
+    fusions[0].blur = 0u;
 }

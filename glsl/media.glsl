@@ -17,6 +17,16 @@ uint tissue_of(uint instance) {
     return instance == NONE ? frame.background : instances[instance].tissue;
 }
 
+// Whether echoes from here are wanted: everywhere, or only inside the mask that is cut into an
+// acquired image.
+bool is_heard(Media media) {
+    if ((frame.flags & FLAG_MASKED) == 0u) return true;
+    for (uint i = 0u; i < media.count; ++i) {
+        if (instances[media.ids[i]].masks != 0u) return true;
+    }
+    return false;
+}
+
 // Entering pushes; leaving removes the last occurrence. False when the stack is full.
 bool cross_interface(inout Media media, uint instance, bool entering) {
     if (entering) {

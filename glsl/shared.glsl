@@ -20,6 +20,7 @@ const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the latt
 const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged over the beam
 const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
+const uint FLAG_MASKED = 512u;      // only what a masking instance encloses is heard
 
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
@@ -64,7 +65,9 @@ struct Instance {
     uint first_triangle; uint triangles; uint bvh_root;
     uint slot;                         // the top-level entry that is shown, of those that the instance has
     vec4 low; vec4 high;               // object-space bounds of what is shown; w unused
-    uint field; uint unused0; uint unused1; uint unused2; // where its displacements begin, in vectors; NONE: none
+    uint field;                        // where its displacements begin, in vectors; NONE: none
+    uint masks;                        // 1: it is part of the fusion's mask
+    uint unused0; uint unused1;
 };
 
 // Per axial sample k, at depth k * sample_pitch.
@@ -87,6 +90,15 @@ struct Segment {
     vec4 lateral_weight;   // unit lateral axis e_l carried along the path; weight at the origin
     vec4 spread;           // lateral variance a + 2 b x + c x^2 (mm^2) after rough reflections; path share
     uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
+};
+
+// How an acquired volume is mixed with the simulation.
+struct Fusion {
+    vec4 voxel_from_world[3];                     // texel indices, integers at their centres
+    uint size_x; uint size_y; uint size_z;        // texels
+    uint blur;                                    // pixels of the box by which the mask is blurred, at least 1
+    float slope; float intercept;                 // texel to grey level 0..1
+    uint eased; uint unused0;                     // 1: the blurred mask goes through a smoothstep
 };
 
 struct Hit { float t; uint instance; uint primitive; float u; float v; };

@@ -110,6 +110,7 @@ void emit_segment(Path path, uint line, uint n, uint instance, float extent) {
     bool whole = alike && (frame.sampling == SAMPLING_MAIN_PATH
         || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
     if (whole && n != 0u) return;
+    if (!is_heard(path.media)) return;
     uint tissue = tissue_of(instance);
     if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
     if (path.branch && path.weight * rows[row_of(path.time)].compensation < frame.volume_floor) return;
@@ -293,7 +294,7 @@ void main() {
                 vec3 normal = world_vector(face_normal(probe_point(end)));
                 float cos_face = dot(path.direction, normal);
                 float retro = path.weight * path.share * beam_weight(off_axis(line, end));
-                if (cos_face < 0.0) {
+                if (cos_face < 0.0 && is_heard(path.media)) {
                     uvec4 dither = dither_words(line, n, path.interactions + 32u * path.reflections);
                     deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false, dither);
                 }
@@ -330,8 +331,15 @@ void main() {
         uint after = current_instance(media);
         path.crossings += 1u;
         if (after == before) {
+            if (is_heard(media) != is_heard(path.media)) {
+                // The mask begins or ends within a medium: the stretch is cut there.
+                emit_segment(path, line, n, before, hit.t);
+                advance(path, hit.t, t1, position);
+                path.t_min = max(path.t_min, past - hit.t);
+            } else {
+                path.t_min = past;
+            }
             path.media = media;
-            path.t_min = past;
             continue;
         }
 
@@ -358,7 +366,7 @@ void main() {
         float turn = 2.0 * width / max(cos_i, 1e-3);
         vec3 m;
         bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, (frame.flags & FLAG_SOBOL) != 0u, m);
-        if (rough) echo(path, line, n, key, hit.instance, s, t1, t2, m);
+        if (rough && (is_heard(path.media) || is_heard(media))) echo(path, line, n, key, hit.instance, s, t1, t2, m);
 
         bool can_reflect = rough && path.reflections < frame.max_reflections;
         bool splits = frame.sampling == SAMPLING_MAIN_PATH && !path.branch;

@@ -75,5 +75,9 @@ subjects!(
     beam,
     axial,
     detect,
-    display
+    display,
+    mask,
+    convert,
+    blur,
+    fuse
 );

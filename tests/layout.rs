@@ -2,7 +2,7 @@
 
 use std::mem::size_of;
 
-use insonify::sim::layout::{Counters, Frame, Instance, Row, Segment, Surface, Tissue};
+use insonify::sim::layout::{Counters, Frame, Fusion, Instance, Row, Segment, Surface, Tissue};
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
 use spirq::ty::{StructType, Type};
@@ -21,8 +21,10 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> [Mirror; 7] {
-    mirrors!(Frame, Tissue, Surface, Instance, Row, Segment, Counters)
+fn mirrors() -> [Mirror; 8] {
+    mirrors!(
+        Frame, Tissue, Surface, Instance, Row, Segment, Counters, Fusion
+    )
 }
 
 /// Types of all storage buffers of a module.

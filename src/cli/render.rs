@@ -133,6 +133,10 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
+    if let Some(warning) = simulator.warning() {
+        eprintln!("warning: {warning}");
+    }
+
     let output = args
         .output
         .clone()
@@ -272,10 +276,15 @@ fn simulate(
     );
     let start = Instant::now();
     let mut timings = Vec::new();
+    let mut unseen = scene.masks_off_the_image();
     for index in 0..args.frames {
         reload(simulator, library);
         if let Some(fps) = args.fps {
             scene.set_time(args.time + f64::from(index) / fps);
+        }
+        if index > 0 && !unseen.is_empty() {
+            let still = scene.masks_off_the_image();
+            unseen.retain(|mask| still.contains(mask));
         }
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
@@ -286,6 +295,13 @@ fn simulate(
         if start.elapsed().as_secs() >= 1 {
             bar.set_position(u64::from(index) + 1);
         }
+    }
+    for mask in unseen {
+        eprintln!(
+            "warning: the mask `{}` never meets the image: nothing is simulated in it; move the mesh \
+             or the probe",
+            scene.instances[mask].name
+        );
     }
     timings.extend(simulator.wait().into_diagnostic()?);
     bar.finish_and_clear();

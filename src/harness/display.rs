@@ -21,13 +21,14 @@ pub const SUBJECT: Subject = Subject {
     job,
     sizes: |job| {
         let frame: Frame = job.one("frame");
-        let pixels = frame.image_width as usize * frame.image_height as usize;
-        vec![size_of::<Frame>(), 4 * samples(&frame), 1024, 4 * pixels]
+        vec![
+            size_of::<Frame>(),
+            4 * samples(&frame),
+            1024,
+            4 * pixels(&frame),
+        ]
     },
-    extent: |job| {
-        let frame: Frame = job.one("frame");
-        Extent::Threads([frame.image_width, frame.image_height, 1])
-    },
+    extent: per_pixel,
     check,
     plant: |job, outputs| {
         job.edit(outputs, "pixels", |pixels: &mut [u32]| {
@@ -39,7 +40,19 @@ pub const SUBJECT: Subject = Subject {
     },
 };
 
-fn job(case: Case, size: Size) -> Job {
+/// A thread per pixel.
+pub(super) fn per_pixel(job: &Job) -> Extent {
+    let frame: Frame = job.one("frame");
+    Extent::Threads([frame.image_width, frame.image_height, 1])
+}
+
+/// Pixels of the image.
+pub(super) fn pixels(frame: &Frame) -> usize {
+    frame.image_width as usize * frame.image_height as usize
+}
+
+/// The frame of a case with an image wider and taller than the sector.
+pub(super) fn image(case: Case, size: Size) -> Frame {
     let mut frame = frame(case, size);
     [frame.image_width, frame.image_height] = match (case, size) {
         (Case::Random, Size::Standard) => [1024, 768],
@@ -48,25 +61,29 @@ fn job(case: Case, size: Size) -> Job {
         (Case::Odd, _) => [333, 211],
         _ => [200, 160],
     };
-    // Wider and taller than the sector.
     frame.pixel_pitch = 70.0 / frame.image_width.max(1) as f32;
     frame.image_left = -35.0;
     frame.image_top = -12.0;
     if case == Case::One {
         frame.image_top = -30.0;
     }
-    let mut image = Random(4).floats(samples(&frame), 0.0, 1.0);
+    frame
+}
+
+fn job(case: Case, size: Size) -> Job {
+    let frame = image(case, size);
+    let mut log_image = Random(4).floats(samples(&frame), 0.0, 1.0);
     if case == Case::NotFinite {
-        image[700] = f32::NAN;
-        image[900..905].fill(f32::NAN);
+        log_image[700] = f32::NAN;
+        log_image[900..905].fill(f32::NAN);
     }
     // A negative: no two levels share a grey, and a kernel that skips the map is caught.
     let grey: Vec<u32> = (0..256).map(|v| 255 - v).collect();
-    let pixels = frame.image_width as usize * frame.image_height as usize;
+    let pixels = pixels(&frame);
     Job {
         inputs: vec![
             Input::words("frame", &[frame]),
-            Input::floats("log_image", &image),
+            Input::floats("log_image", &log_image),
             Input::words("grey", &grey),
             Input::output("pixels", Element::Word, pixels),
         ],
@@ -104,7 +121,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
 }
 
 /// Whether the sector's edge runs within [`EDGE`] of pixel `i`.
-fn near_edge(frame: &Frame, i: usize) -> bool {
+pub(super) fn near_edge(frame: &Frame, i: usize) -> bool {
     let pitch = f64::from(frame.pixel_pitch);
     let width = frame.image_width as usize;
     let x = f64::from(frame.image_left) + ((i % width) as f64 + 0.5) * pitch;

@@ -6,13 +6,17 @@
 
 mod axial;
 mod beam;
+mod blur;
 pub mod check;
+mod convert;
 mod detect;
 mod display;
 pub mod dump;
+mod fuse;
 mod geometry;
 mod inputs;
 mod interpolate;
+mod mask;
 mod origin;
 mod rays;
 mod refit;
@@ -145,7 +149,7 @@ const UNWRITTEN: u32 = 0xffa5_a5a5;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
     /// Bindings; where a ray-query variant binds an acceleration structure, the compute variant's
-    /// nodes stand.
+    /// nodes stand, and floats where an image is bound, of the size that `fusion` says.
     pub inputs: Vec<Input>,
     /// Push constants.
     pub push: Vec<u8>,
@@ -212,7 +216,7 @@ pub struct Subject {
 }
 
 /// Every kernel, in the order of a frame after the two that only tests use.
-pub const SUBJECTS: [Subject; 11] = [
+pub const SUBJECTS: [Subject; 15] = [
     geometry::SUBJECT,
     rays::SUBJECT,
     interpolate::SUBJECT,
@@ -224,4 +228,8 @@ pub const SUBJECTS: [Subject; 11] = [
     axial::SUBJECT,
     detect::SUBJECT,
     display::SUBJECT,
+    mask::SUBJECT,
+    convert::SUBJECT,
+    blur::SUBJECT,
+    fuse::SUBJECT,
 ];

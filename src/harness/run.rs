@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::{Extent, Job};
 use crate::gpu::{
-    Binding, BindingKind, Blas, BlasInput, BlasOptions, BufferKind, Device, GpuError, Kernel,
-    Stage, Tlas, TlasInstance,
+    Binding, BindingKind, Blas, BlasInput, BlasOptions, BufferKind, Device, GpuError, Image,
+    ImageDim, ImageFormat, Kernel, Stage, Tlas, TlasInstance,
 };
-use crate::sim::layout::Instance;
+use crate::sim::layout::{Fusion, Instance};
 
 /// What a run left behind.
 pub struct Outcome {
@@ -39,10 +39,15 @@ pub fn run(
         device.upload(&buffer, &input.bytes)?;
         buffers.push(buffer);
     }
+    let image = (kernel.bindings().iter())
+        .find(|b| b.kind == BindingKind::SampledImage)
+        .map(|info| upload_image(device, job, info.binding as usize))
+        .transpose()?;
     // By number: what a kernel declares and does not use is not in its SPIR-V.
     let bindings: Vec<Binding<'_>> = (kernel.bindings().iter())
-        .map(|info| match &scene {
-            Some(tlas) if info.kind == BindingKind::AccelerationStructure => Binding::Tlas(tlas),
+        .map(|info| match (info.kind, &scene, &image) {
+            (BindingKind::AccelerationStructure, Some(tlas), _) => Binding::Tlas(tlas),
+            (BindingKind::SampledImage, _, Some(image)) => Binding::Image(image),
             _ => Binding::Buffer(&buffers[info.binding as usize]),
         })
         .collect();
@@ -66,6 +71,22 @@ pub fn run(
         outputs,
         milliseconds,
     })
+}
+
+/// The floats of binding `at` as an image.
+fn upload_image(device: &Arc<Device>, job: &Job, at: usize) -> Result<Image, GpuError> {
+    let fusion: Fusion = job.one("fusion");
+    let extent = [fusion.size_x, fusion.size_y, fusion.size_z];
+    let input = &job.inputs[at];
+    let image = Image::new(
+        device,
+        input.name,
+        ImageDim::D3,
+        extent,
+        ImageFormat::R32Float,
+    )?;
+    device.upload_image(&image, &input.bytes)?;
+    Ok(image)
 }
 
 /// Acceleration structure of the job's instances, vertices and triangles, in their order.

@@ -9,7 +9,7 @@ use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use crate::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, MAX_STACK, Row,
+    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, MAX_STACK, Row,
     SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, Surface, Tissue,
 };
 
@@ -77,7 +77,7 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
     (frame.sampling, frame.flags, frame.paths) = match case {
         Case::Odd => (
             SAMPLING_PLAIN,
-            FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION,
+            FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED,
             7,
         ),
         Case::Modes => (
@@ -97,7 +97,12 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
         Input::words("tissues", &tissues),
         Input::floats("surfaces", bytemuck::cast_slice(&worlds::surfaces())),
     ];
-    let world = worlds::world(case);
+    let mut world = worlds::world(case);
+    if case == Case::Odd {
+        // An organ that others overlap, and a vessel.
+        world.mask(1);
+        world.mask(4);
+    }
     let fields = world.field_input();
     inputs.extend(world.inputs());
     inputs.push(fields);

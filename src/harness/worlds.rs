@@ -44,6 +44,11 @@ impl Builder {
         });
     }
 
+    /// Makes instance `index` part of the fusion's mask.
+    pub fn mask(&mut self, index: usize) {
+        self.instances[index].masks = 1;
+    }
+
     /// Lets the tissue of the instance placed last be somewhere else than in its reference shape: by
     /// up to 3 mm, strained by up to a quarter.
     fn deform(&mut self) {

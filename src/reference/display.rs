@@ -4,8 +4,8 @@ use super::geometry::probe;
 use crate::probe::Kind;
 use crate::sim::layout::Frame;
 
-/// Level in 0..=1 of each pixel, row by row; none outside the sector. NaN counts as 0.
-pub fn levels(frame: &Frame, log_image: &[f32]) -> Vec<Option<f64>> {
+/// Column and row in the scanlines of each pixel, row by row; none outside the sector.
+pub fn places(frame: &Frame) -> Vec<Option<[f64; 2]>> {
     let (pitch, left, top) = (
         f64::from(frame.pixel_pitch),
         f64::from(frame.image_left),
@@ -16,11 +16,20 @@ pub fn levels(frame: &Frame, log_image: &[f32]) -> Vec<Option<f64>> {
         for i in 0..frame.image_width {
             let x = left + (f64::from(i) + 0.5) * pitch;
             let z = top + (f64::from(j) + 0.5) * pitch;
-            let place = sector(frame, x, z);
-            out.push(place.map(|[column, row]| sample(frame, log_image, column, row)));
+            out.push(sector(frame, x, z));
         }
     }
     out
+}
+
+/// Level in 0..=1 of each pixel, row by row; none outside the sector. NaN counts as 0.
+pub fn levels(frame: &Frame, log_image: &[f32]) -> Vec<Option<f64>> {
+    let level = |[column, row]: [f64; 2]| {
+        let v = sample(frame, log_image, column, row);
+        if v.is_nan() { 0.0 } else { v }
+    };
+    let places = places(frame).into_iter();
+    places.map(|place| place.map(level)).collect()
 }
 
 /// Column and row in the log image of (x, z) mm in probe space; none outside the sector.
@@ -42,8 +51,8 @@ pub fn sector(frame: &Frame, x: f64, z: f64) -> Option<[f64; 2]> {
     inside.then_some([column, depth / f64::from(frame.sample_pitch)])
 }
 
-/// Bilinear, clamped at the edges.
-fn sample(frame: &Frame, log_image: &[f32], column: f64, row: f64) -> f64 {
+/// Bilinear in values per sample of the scanlines, clamped at the edges.
+pub fn sample(frame: &Frame, log_image: &[f32], column: f64, row: f64) -> f64 {
     let clamped = |v: f64, n: u32| v.clamp(0.0, f64::from(n) - 1.0);
     let (column, row) = (
         clamped(column, frame.scanlines),
@@ -59,7 +68,7 @@ fn sample(frame: &Frame, log_image: &[f32], column: f64, row: f64) -> f64 {
             sum += wl * wk * f64::from(level);
         }
     }
-    if sum.is_nan() { 0.0 } else { sum }
+    sum
 }
 
 /// Opaque greys 0xffgggggg through the map of 256 entries; 0 outside the sector.

@@ -1,6 +1,6 @@
 //! Media that enclose a point: nested and overlapping meshes with priorities.
 
-use crate::sim::layout::{Instance, MAX_STACK};
+use crate::sim::layout::{FLAG_MASKED, Frame, Instance, MAX_STACK};
 
 /// Instances entered and not left, in the order of entering.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -21,6 +21,12 @@ impl Stack {
         if let Some(at) = self.0.iter().rposition(|&i| i == instance) {
             self.0.remove(at);
         }
+    }
+
+    /// Whether echoes from here are wanted: everywhere, or in a masked frame inside a masking instance.
+    pub fn is_heard(&self, frame: &Frame, instances: &[Instance]) -> bool {
+        let masks = |&i: &u32| instances[i as usize].masks != 0;
+        frame.flags & FLAG_MASKED == 0 || self.0.iter().any(masks)
     }
 
     /// The instance whose tissue fills the point: the highest priority, of equals the last pushed.

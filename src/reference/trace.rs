@@ -134,7 +134,7 @@ impl Tracer<'_> {
                 if ends {
                     return;
                 }
-                self.advance(&mut path, t);
+                self.interact(&mut path, t);
                 self.face_echo(&path, normal);
                 let back = acoustics::mirror(path.direction, normal);
                 reflect(&mut path, back, normal);
@@ -145,15 +145,24 @@ impl Tracer<'_> {
                 }
                 let Toggled { hit, after, last } = self.toggled(&path.stack, &crossings);
                 if after.current(self.world.instances) == path.stack.current(self.world.instances) {
-                    path.t_min = last + step(path.origin + last * path.direction);
+                    if self.is_heard(&after) == self.is_heard(&path.stack) {
+                        path.t_min = last + step(path.origin + last * path.direction);
+                    } else {
+                        // The mask begins or ends within a medium: the stretch is cut there.
+                        self.emit(&path, hit.t);
+                        self.advance(&mut path, hit.t);
+                        path.t_min += last - hit.t;
+                    }
                     path.stack = after;
                     continue;
                 }
                 self.emit(&path, hit.t);
-                self.advance(&mut path, hit.t);
+                self.interact(&mut path, hit.t);
                 let row = &self.world.rows[self.out.surface.sample(path.time)];
                 let interface = interface::meet(self.world, row, &path, &hit, &after);
-                interface.echo(self.world, &path, &mut self.out.surface);
+                if self.is_heard(&path.stack) || self.is_heard(&after) {
+                    interface.echo(self.world, &path, &mut self.out.surface);
+                }
                 let goes_on = match path.role {
                     Role::Main => {
                         self.branch(&path, &interface);
@@ -197,7 +206,7 @@ impl Tracer<'_> {
     fn face_echo(&mut self, path: &Path, normal: DVec3) {
         let cos = -path.direction.dot(normal);
         let lobe = (2.0 * cos * cos - 1.0).max(0.0);
-        if cos > 0.0 {
+        if cos > 0.0 && self.is_heard(&path.stack) {
             let amplitude = path.share * path.weight * lobe * path.beam_weight(self.world.frame);
             let gain = interface::gain(self.world, path);
             let (l, _) = path.scanline(self.world.frame.scanlines);
@@ -233,8 +242,20 @@ impl Tracer<'_> {
         }
     }
 
+    /// Whether echoes are wanted from where these media are.
+    fn is_heard(&self, stack: &Stack) -> bool {
+        stack.is_heard(self.world.frame, self.world.instances)
+    }
+
     /// Moves the path by `t` to its next interaction.
-    fn advance(&mut self, path: &mut Path, t: f64) {
+    fn interact(&mut self, path: &mut Path, t: f64) {
+        self.advance(path, t);
+        path.interactions += 1;
+        self.out.counters.interactions += 1;
+    }
+
+    /// Moves the path by `t`.
+    fn advance(&self, path: &mut Path, t: f64) {
         let (tissue, _) = self.world.medium(&path.stack);
         let tissue = &self.world.tissues[tissue as usize];
         path.origin += t * path.direction;
@@ -242,9 +263,7 @@ impl Tracer<'_> {
         path.time += t / f64::from(tissue.speed);
         let [a, b, c] = path.spread;
         path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
-        path.interactions += 1;
         path.t_min = step(path.origin);
-        self.out.counters.interactions += 1;
     }
 
     /// The reflected part that main-path sampling splits off, followed to its end.
@@ -339,7 +358,7 @@ impl Tracer<'_> {
         let alike = frame.origin_jitter <= 0.0
             && frame.emission_lobe <= 0.0
             && frame.flags & FLAG_ROUGH_TRANSMISSION == 0;
-        if path.role == Role::Branch && self.is_faint(path) {
+        if !self.is_heard(&path.stack) || path.role == Role::Branch && self.is_faint(path) {
             return;
         }
         let (weight, share) = match path.role {

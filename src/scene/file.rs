@@ -7,6 +7,7 @@ use super::{Scene, Warning};
 mod anatomy;
 mod document;
 mod error;
+mod fusion;
 mod graph;
 mod motion;
 mod nodes;
@@ -59,6 +60,17 @@ impl Scene {
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
         let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
         let imaging = parameters::imaging(&document, file.imaging)?;
+        let volume = match &file.volume {
+            Some(table) => Some(fusion::volume(&document, table, &mut warnings)?),
+            None => None,
+        };
+        let fusion = fusion::fusion(
+            &document,
+            file.fusion.as_ref(),
+            volume.is_some(),
+            &anatomy.meshes,
+            &anatomy.instances,
+        )?;
         warnings.extend(tissues.unused());
         let name = file.name.unwrap_or_else(|| {
             path.file_stem()
@@ -78,6 +90,8 @@ impl Scene {
             world_from_probe,
             simulation,
             imaging,
+            volume,
+            fusion,
         };
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));

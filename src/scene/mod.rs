@@ -8,6 +8,7 @@ use glam::DAffine3;
 pub mod animation;
 pub mod check;
 pub mod file;
+pub mod fusion;
 pub mod graph;
 pub mod issue;
 pub mod keyframes;
@@ -23,6 +24,7 @@ pub mod tissue;
 pub mod topology;
 
 pub use file::SceneError;
+pub use fusion::{Acquired, Fusion};
 pub use graph::Graph;
 pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
@@ -129,6 +131,10 @@ pub struct Scene {
     pub simulation: Simulation,
     /// Image formation.
     pub imaging: Imaging,
+    /// What was acquired elsewhere and may be shown around the masking meshes.
+    pub volume: Option<Acquired>,
+    /// How it is mixed with the simulation; none: everything is simulated.
+    pub fusion: Option<Fusion>,
 }
 
 impl Scene {

@@ -38,7 +38,8 @@ impl DumpError {
 }
 
 /// Writes the last frame of `scene` into `dir`, which is made where it does not exist: the stages
-/// by number and name (`0_echoes.npy` to `5_bmode.png`) with their axes beside them (`.json`), and
+/// by number and name (`0_echoes.npy` to `5_bmode.png`, of a fused frame to `9_simulation.png`) with
+/// their axes beside them (`.json`), and
 /// in [`KERNELS`] the bindings of every kernel by name, as `kernels run NAME --input DIR` reads
 /// them.
 ///

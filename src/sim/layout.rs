@@ -42,6 +42,8 @@ pub const FLAG_FOOTPRINT: u32 = 64;
 pub const FLAG_SOBOL: u32 = 128;
 /// Ray query: several top-level entries of an instance share a mask bit.
 pub const FLAG_SLOTS: u32 = 256;
+/// Only what a masking instance encloses is heard.
+pub const FLAG_MASKED: u32 = 512;
 
 macro_rules! shared {
     ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(
@@ -95,7 +97,7 @@ shared! {
         tissue: u32, priority: i32, surface_outside: u32, surface_inside: u32,
         first_triangle: u32, triangles: u32, bvh_root: u32, slot: u32,
         low: [f32; 4], high: [f32; 4],
-        field: u32, unused0: u32, unused1: u32, unused2: u32,
+        field: u32, masks: u32, unused0: u32, unused1: u32,
     }
     /// What one axial sample needs to know.
     struct Row {
@@ -111,6 +113,12 @@ shared! {
         lateral_weight: [f32; 4],
         spread: [f32; 4],
         tissue: u32, instance: u32, line: u32, handedness: f32,
+    }
+    /// How an acquired volume is mixed with the simulation.
+    struct Fusion {
+        voxel_from_world: Rows,
+        size_x: u32, size_y: u32, size_z: u32, blur: u32,
+        slope: f32, intercept: f32, eased: u32, unused0: u32,
     }
     /// What a frame reports.
     struct Counters {

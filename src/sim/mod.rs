@@ -4,6 +4,7 @@ pub mod bvh;
 pub mod calibration;
 pub mod dump;
 pub mod fields;
+pub mod fusion;
 pub mod layout;
 mod passes;
 pub mod placement;
@@ -20,6 +21,7 @@ use std::time::{Duration, Instant};
 use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
+use fusion::Fused;
 use passes::Passes;
 use shaders::Library;
 use stages::{Batches, Buffers, Kernels};
@@ -48,6 +50,8 @@ pub struct Simulator {
     tables: Tables,
     shapers: Arc<world::Kernels>,
     counting: bool,
+    /// Whether the last frame was mixed with an acquired volume.
+    fused: bool,
     update_time: Duration,
 }
 
@@ -92,6 +96,7 @@ impl Simulator {
         let (frame, batches) = frame_constants(scene, &world, coincident, 0);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &tables)?;
+        let fusion = Fused::new(device, library, scene, &frame, tracer)?;
         let simulator = Self {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
@@ -100,10 +105,12 @@ impl Simulator {
             tables,
             shapers,
             counting: false,
+            fused: false,
             update_time: Duration::ZERO,
             passes: Passes {
                 kernels: Kernels::new(device, library, &world, false)?,
                 buffers,
+                fusion,
                 world,
                 frame,
                 batches,
@@ -125,7 +132,7 @@ impl Simulator {
     }
 
     /// Simulates one frame of `scene` as it stands: pose, placements and settings may differ from
-    /// those before, sizes (lines, samples, meshes, tissues, points, image; paths where each has
+    /// those before, sizes (lines, samples, meshes, tissues, points, image, acquired volume; paths where each has
     /// segments of its own) may not exceed those at creation. A change of settings waits for the
     /// frames in flight. `index` selects the noise.
     /// Returns the timings of the frames that have finished since the last call.
@@ -155,6 +162,9 @@ impl Simulator {
         (passes.frame, passes.batches) =
             frame_constants(scene, &passes.world, self.coincident, index);
         cmd.write(&passes.buffers.frame, 0, bytemuck::bytes_of(&passes.frame))?;
+        if let Some(fusion) = &passes.fusion {
+            fusion.update(&mut cmd, scene)?;
+        }
         passes.clear(&mut cmd);
         passes.origin(&mut cmd)?;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
@@ -165,6 +175,7 @@ impl Simulator {
         passes.axial(&mut cmd)?;
         passes.detect(&mut cmd)?;
         passes.display(&mut cmd)?;
+        self.fused = scene.shows_volume() && passes.fuse(&mut cmd)?;
         cmd.submit()?;
         Ok(self.frames.take_timings())
     }
@@ -177,6 +188,9 @@ impl Simulator {
         self.frames.wait()?;
         let world = &self.passes.world;
         self.passes.kernels = Kernels::new(&self.device, library, world, self.counting)?;
+        if let Some(fusion) = &mut self.passes.fusion {
+            fusion.reload(&self.device, library, world.tracer())?;
+        }
         self.shapers = Arc::new(world::Kernels::new(&self.device, library)?);
         Ok(())
     }
@@ -231,7 +245,10 @@ impl Simulator {
     /// # Errors
     /// What Vulkan says.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
-        let bytes = self.read(|b| &b.pixels)?;
+        self.frames.wait()?;
+        let fused = self.passes.fusion.as_ref().filter(|_| self.fused);
+        let pixels = fused.map_or(&self.passes.buffers.pixels, |f| &f.pixels);
+        let bytes = self.device.read_back(pixels)?;
         let size =
             4 * self.passes.frame.image_width as usize * self.passes.frame.image_height as usize;
         Ok((
@@ -239,6 +256,11 @@ impl Simulator {
             self.passes.frame.image_height,
             bytes[..size].to_vec(),
         ))
+    }
+
+    /// What the user should know of how the scene was uploaded.
+    pub fn warning(&self) -> Option<&str> {
+        self.passes.fusion.as_ref().and_then(Fused::warning)
     }
 
     /// What the last frame counted.

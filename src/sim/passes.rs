@@ -1,6 +1,7 @@
 //! The stages of a frame, each recorded with its bindings and the barrier behind it.
 
 use super::World;
+use super::fusion::{Fused, Simulated};
 use super::layout;
 use super::stages::{Batches, Buffers, Kernels, SCATTER_WINDOW, lines};
 use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
@@ -9,6 +10,8 @@ use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
 pub(super) struct Passes {
     pub(super) kernels: Kernels,
     pub(super) buffers: Buffers,
+    /// Where the scene has an acquired volume.
+    pub(super) fusion: Option<Fused>,
     pub(super) world: World,
     pub(super) frame: layout::Frame,
     pub(super) batches: Batches,
@@ -168,6 +171,22 @@ impl Passes {
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
         Ok(())
+    }
+
+    /// Mixes the image with the acquired volume, if there is one.
+    pub(super) fn fuse(&self, cmd: &mut Commands) -> Result<bool, GpuError> {
+        let Some(fusion) = &self.fusion else {
+            return Ok(false);
+        };
+        let b = &self.buffers;
+        let simulated = Simulated {
+            frame: &self.frame,
+            constants: &b.frame,
+            counters: &b.counters,
+            pixels: &b.pixels,
+        };
+        fusion.record(cmd, &self.world, &simulated)?;
+        Ok(true)
     }
 
     pub(super) fn display(&self, cmd: &mut Commands) -> Result<(), GpuError> {

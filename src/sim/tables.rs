@@ -112,6 +112,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
                 simulation.scatter_mode == ScatterMode::Voxel,
                 layout::FLAG_VOXEL,
             )
+            | flag(scene.is_masked(), layout::FLAG_MASKED)
             | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT)
             | flag(simulation.sequence == Sequence::Sobol, layout::FLAG_SOBOL),
         seed: simulation.seed,

@@ -31,6 +31,8 @@ pub fn scene(probe: Probe) -> Scene {
         world_from_probe: DAffine3::IDENTITY,
         simulation: Simulation::default(),
         imaging: Imaging::default(),
+        volume: None,
+        fusion: None,
     }
 }
 

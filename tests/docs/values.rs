@@ -51,6 +51,10 @@ pub fn place(path: &str) -> (String, String) {
             parts.insert(1, "0");
         }
         "tissues" => parts[1] = "own",
+        "volume" | "fusion" => text.push_str(
+            "[volume]\nfile = \"volume.mha\"\nrotate = { axis = [0, 0, 1], angle = 0 }\n\
+             [fusion]\nmask = [\"one\"]\n",
+        ),
         "probe" if parts[1] == "width" => text.push_str("[probe]\npreset = \"linear\"\n"),
         _ => {}
     }
@@ -66,6 +70,7 @@ pub fn settings(scene: &Scene) -> String {
     let sizes: Vec<_> = scene.meshes.iter().map(|m| m.triangles.len()).collect();
     let (instances, graph) = (&scene.instances, &scene.graph);
     write!(out, "{instances:?}{graph:?}{:?}{sizes:?}", scene.wires).expect("memory");
+    write!(out, "{:?}{:?}", scene.volume, scene.fusion).expect("memory");
     out
 }
 

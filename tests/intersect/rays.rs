@@ -100,6 +100,8 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
         world_from_probe: DAffine3::IDENTITY,
         simulation: Simulation::default(),
         imaging: Imaging::default(),
+        volume: None,
+        fusion: None,
     }
 }
 

@@ -10,6 +10,7 @@ use super::units::{
     Angle, Attenuation, Density, Duration, Frequency, Impedance, Length, Level, Rate, Speed,
 };
 use crate::scene::animation::{Interpolation, Loop};
+use crate::scene::fusion::{Blend, Surroundings};
 use crate::scene::keyframes::Strategy;
 use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
 
@@ -25,6 +26,8 @@ pub struct File {
     pub simulation: SimulationTable,
     #[serde(default)]
     pub imaging: ImagingTable,
+    pub volume: Option<VolumeTable>,
+    pub fusion: Option<FusionTable>,
     #[serde(default)]
     pub group: Vec<GroupTable>,
     #[serde(default)]
@@ -133,6 +136,26 @@ pub struct ImagingTable {
     pub grey_gamma: Option<f64>,
     pub psf_scale: Option<[f64; 3]>,
     pub image_height: Option<u32>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct VolumeTable {
+    pub file: String,
+    pub translate: Option<[Length; 3]>,
+    pub rotate: Option<Rotation>,
+    pub scale: Option<f64>,
+    pub black: Option<f64>,
+    pub white: Option<f64>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FusionTable {
+    pub mask: Vec<String>,
+    pub surroundings: Option<Surroundings>,
+    pub blur: Option<u32>,
+    pub blend: Option<Blend>,
 }
 
 #[derive(Debug, Deserialize)]

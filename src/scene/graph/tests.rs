@@ -39,6 +39,8 @@ fn scene(instances: Vec<Instance>, nodes: Vec<Node>) -> Scene {
         world_from_probe: DAffine3::IDENTITY,
         simulation: Simulation::default(),
         imaging: Imaging::default(),
+        volume: None,
+        fusion: None,
     }
 }
 

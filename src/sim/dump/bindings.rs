@@ -109,7 +109,14 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     array("lateral", Float, &lateral, 2)?;
     array("iq", Float, &read(simulator, |b| &b.iq, 8 * samples)?, 2)?;
     let log_image = read(simulator, |b| &b.log_image, 4 * samples)?;
-    array("log_image", Float, &log_image, 1)
+    array("log_image", Float, &log_image, 1)?;
+    let Some(dumped) = simulator.fusion_dump(scene)? else {
+        return Ok(());
+    };
+    for (name, element, each, bytes) in &dumped {
+        array(name, *element, bytes, *each)?;
+    }
+    Ok(())
 }
 
 /// The first `size` bytes of a buffer: the rest is there for the alignment.

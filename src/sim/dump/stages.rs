@@ -151,5 +151,40 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         "5_bmode",
         "scan-converted B-mode image, pixel centres in probe space",
         &axes,
-    )
+    )?;
+    let Some(steps) = simulator.fusion_steps()? else {
+        return Ok(());
+    };
+    // RGBA of grey levels 0..1, opaque throughout: beside the sector all of them are 0.
+    let grey = |levels: &[f32]| -> Vec<u8> {
+        let byte = |v: &f32| (v * 255.0 + 0.5) as u8;
+        let pixels = levels.iter().map(|v| [byte(v), byte(v), byte(v), 255]);
+        pixels.flatten().collect()
+    };
+    for (name, meaning, rgba) in [
+        (
+            "6_background",
+            "scan-converted acquired volume",
+            grey(&steps.background),
+        ),
+        (
+            "7_mask",
+            "scan-converted mask, white outside the masking meshes",
+            grey(&steps.mask),
+        ),
+        (
+            "8_blurred_mask",
+            "box-blurred mask: the weight of the acquired volume",
+            grey(&steps.blurred),
+        ),
+        (
+            "9_simulation",
+            "the simulation alone; 5_bmode is the fused image",
+            steps.simulated,
+        ),
+    ] {
+        png(&dir.join(format!("{name}.png")), width, height, &rgba)?;
+        sidecar(dir, name, meaning, &axes)?;
+    }
+    Ok(())
 }

@@ -17,6 +17,8 @@ fn scene() -> Scene {
         world_from_probe: DAffine3::IDENTITY,
         simulation: Simulation::default(),
         imaging: Imaging::default(),
+        volume: None,
+        fusion: None,
     }
 }
 

@@ -133,6 +133,7 @@ pub(super) fn rows(
                 low: corner(place.bounds[0]),
                 high: corner(place.bounds[1]),
                 field: fields.offset(scene, i),
+                masks: u32::from(scene.is_mask(i)),
                 ..layout::Instance::default()
             }
         })

@@ -1,0 +1,30 @@
+// The acquired image and the simulated one, mixed by the blurred mask: one thread per pixel.
+#version 460
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+#include "numbers.glsl"
+
+layout(local_size_x = 16, local_size_y = 8) in;
+layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) readonly buffer FusionBuffer { Fusion fusion; };
+layout(std430, binding = 2) readonly buffer SimulatedBuffer { uint simulated[]; };
+layout(std430, binding = 3) readonly buffer BackgroundBuffer { float background[]; };
+layout(std430, binding = 4) readonly buffer SumBuffer { float sums[]; };
+layout(std430, binding = 5) buffer FusedBuffer { uint fused[]; };
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    uint j = gl_GlobalInvocationID.y;
+    if (i >= frame.image_width || j >= frame.image_height) { return; }
+    uint at = j * frame.image_width + i;
+    uint pixel = simulated[at];
+    if ((pixel >> 24u) != 0u) {
+        // Division may round; where the whole box is outside, the weight is 1 to the last bit.
+        float m = sums[2u * at] >= sums[2u * at + 1u] ? 1.0 : sums[2u * at] / sums[2u * at + 1u];
+        if (fusion.eased != 0u) { m = m * m * (3.0 - 2.0 * m); }
+        float v = m * background[at] + (1.0 - m) * (float(pixel & 0xffu) / 255.0);
+        uint level = not_a_number(v) ? 0u : uint(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0));
+        pixel = 0xff000000u | (level * 0x010101u);
+    }
+    fused[at] = pixel;
+}

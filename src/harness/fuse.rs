@@ -1,0 +1,110 @@
+//! `fuse`: the mixed image.
+
+use std::mem::size_of;
+
+use super::display;
+use super::inputs::Random;
+use super::{Case, Check, Element, Input, Job, Size, Subject};
+use crate::reference::fuse;
+use crate::sim::layout::{Frame, Fusion};
+
+/// Distance from the middle between two grey levels at which either will do: single precision of
+/// numbers to 255.
+const ROUNDING: f64 = 1e-4;
+
+pub const SUBJECT: Subject = Subject {
+    name: "fuse",
+    stems: &["fuse"],
+    tolerance: "the twin's grey level; 1e-4 from the middle between two levels (single precision) either",
+    job,
+    sizes: |job| {
+        let pixels = display::pixels(&job.one("frame"));
+        vec![
+            size_of::<Frame>(),
+            size_of::<Fusion>(),
+            4 * pixels,
+            4 * pixels,
+            8 * pixels,
+            4 * pixels,
+        ]
+    },
+    extent: display::per_pixel,
+    check,
+    plant: |job, outputs| {
+        job.edit(outputs, "fused", |fused: &mut [u32]| {
+            let inside = fused
+                .iter_mut()
+                .find(|p| (0xff10_1010..0xffe0_e0e0).contains(*p));
+            *inside.expect("most greys are between") += 0x0001_0101;
+        });
+    },
+};
+
+fn job(case: Case, size: Size) -> Job {
+    let frame = display::image(case, size);
+    let pixels = display::pixels(&frame);
+    let fusion = Fusion {
+        blur: 32,
+        eased: u32::from(matches!(case, Case::Odd | Case::Modes)),
+        ..Fusion::default()
+    };
+    let mut random = Random(8);
+    let simulated: Vec<u32> = (0..pixels)
+        .map(|_| match random.word() % 1024 {
+            grey @ 0..=255 => 0xff00_0000 | (grey * 0x0001_0101),
+            256..=511 => 0,
+            other => 0xff00_0000 | (other % 256 * 0x0001_0101),
+        })
+        .collect();
+    let mut background = random.floats(pixels, 0.0, 1.0);
+    let sums: Vec<[f32; 2]> = (0..pixels)
+        .map(|_| {
+            let weight = random.within(1.0, 1024.0).floor() as f32;
+            match random.word() % 4 {
+                0 => [0.0, weight],
+                1 => [weight, weight],
+                _ => [weight * random.within(0.0, 1.0) as f32, weight],
+            }
+        })
+        .collect();
+    if case == Case::NotFinite {
+        background[pixels / 2] = f32::NAN;
+        background[pixels / 3] = f32::INFINITY;
+    }
+    Job {
+        inputs: vec![
+            Input::words("frame", &[frame]),
+            Input::words("fusion", &[fusion]),
+            Input::words("simulated", &simulated),
+            Input::floats("background", &background),
+            Input::floats("sums", sums.as_flattened()),
+            Input::output("fused", Element::Word, pixels),
+        ],
+        push: Vec::new(),
+    }
+}
+
+fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
+    let fusion: Fusion = job.one("fusion");
+    let simulated: Vec<u32> = job.get("simulated");
+    let background: Vec<f32> = job.get("background");
+    let sums: Vec<[f32; 2]> = job.get("sums");
+    let got: Vec<u32> = job.after(outputs, "fused");
+    let right = |i: usize| {
+        if simulated[i] >> 24 == 0 {
+            return got[i] == 0;
+        }
+        let level = fuse::level(&fusion, simulated[i], background[i], sums[i]).unwrap_or(0.0);
+        let greys = [level - ROUNDING, level + ROUNDING].map(|v| (v.max(0.0) + 0.5).floor() as u32);
+        greys
+            .iter()
+            .any(|g| got[i] == 0xff00_0000 | (g.min(&255) * 0x0001_0101))
+    };
+    let wrong = (0..simulated.len().min(got.len()))
+        .filter(|&i| !right(i))
+        .count();
+    vec![
+        Check::count("pixels", simulated.len(), wrong, 0),
+        Check::equal("image size", &[got.len()], &[simulated.len()]),
+    ]
+}

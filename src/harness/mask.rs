@@ -1,0 +1,145 @@
+//! `mask`: masking instances and acquired volume along the scanlines.
+
+use std::mem::size_of;
+
+use glam::{DAffine3, DVec3};
+
+use super::inputs::{Random, frame, samples};
+use super::worlds;
+use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
+use crate::reference::mask;
+use crate::sim::layout::{Counters, FLAG_COINCIDENT, Frame, Fusion, Instance};
+use crate::sim::placement;
+
+/// Distance from a crossing, mm, within which a sample may be on either side.
+const EDGE: f64 = 1e-3;
+/// Grey levels of white noise may differ by this: places are good to 1e-4 of a texel.
+const LEVEL: f64 = 1e-3;
+
+pub const SUBJECT: Subject = Subject {
+    name: "mask",
+    stems: &["mask_bvh", "mask_query"],
+    tolerance: "the mask is exact but within 1e-3 mm of a crossing; grey levels of white noise within \
+                1e-3 (places good to 1e-4 of a texel), and within 1e-3 texels of the volume's end \
+                either side will do",
+    job,
+    sizes: |job| {
+        let frame: Frame = job.one("frame");
+        let fusion: Fusion = job.one("fusion");
+        let texels = fusion.size_x as usize * fusion.size_y as usize * fusion.size_z as usize;
+        let mut sizes = vec![size_of::<Frame>()];
+        sizes.extend(worlds::sizes(job));
+        sizes.extend([
+            size_of::<Fusion>(),
+            4 * texels,
+            size_of::<Counters>(),
+            8 * samples(&frame),
+        ]);
+        sizes
+    },
+    extent: |job| Extent::Groups([job.one::<Frame>("frame").scanlines, 1, 1]),
+    check,
+    plant: |job, outputs| {
+        job.edit(outputs, "prescan", |prescan: &mut [f32]| {
+            let middle = prescan.len() / 2;
+            let at = (middle..).find(|i| i % 2 == 1 && prescan[*i] > 0.0);
+            prescan[at.expect("the volume is met")] += 0.002;
+        });
+    },
+};
+
+fn job(case: Case, size: Size) -> Job {
+    let mut frame = frame(case, size);
+    if case == Case::NotFinite {
+        frame.world_from_probe[0][1] = f32::NAN;
+    }
+    if case == Case::Modes {
+        frame.flags |= FLAG_COINCIDENT;
+    }
+    let mut world = worlds::world(case).inputs();
+    let instances = world.iter_mut().find(|i| i.name == "instances");
+    let bytes = &mut instances.expect("a world has instances").bytes;
+    let mut rows: Vec<Instance> = bytemuck::pod_collect_to_vec(bytes);
+    // All but one, and not the body around the probe: some scanlines start inside.
+    for (i, row) in rows.iter_mut().enumerate() {
+        row.masks = u32::from(i != 0 || case == Case::One);
+    }
+    *bytes = bytemuck::cast_slice(&rows).to_vec();
+
+    // Oblique and anisotropic, of a size that the sector leaves on all sides.
+    let turn = glam::DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 0.5).normalize(), 0.7);
+    let voxel_from_world = DAffine3::from_translation(DVec3::new(9.0, 6.0, 4.0))
+        * DAffine3::from_scale(DVec3::new(0.6, 0.4, 0.25))
+        * DAffine3::from_quat(turn)
+        * DAffine3::from_translation(DVec3::new(-2.0, 1.0, -30.0));
+    let [size_x, size_y, size_z] = match case {
+        Case::One => [1, 1, 1],
+        Case::Odd => [17, 1, 9],
+        _ => [19, 13, 9],
+    };
+    let fusion = Fusion {
+        voxel_from_world: placement::rows(&voxel_from_world),
+        size_x,
+        size_y,
+        size_z,
+        blur: 32,
+        slope: 1.25,
+        intercept: -0.125,
+        ..Fusion::default()
+    };
+    let texels = (size_x * size_y * size_z) as usize;
+    let mut inputs = vec![Input::words("frame", &[frame])];
+    inputs.extend(world);
+    inputs.push(Input::words("fusion", &[fusion]));
+    let volume = Random(11).floats(texels, 0.0, 1.0);
+    inputs.push(Input::floats("acquired", &volume));
+    let counters = size_of::<Counters>() / 4;
+    inputs.push(Input::sum("counters", Element::Word, counters));
+    let prescan = 2 * samples(&frame);
+    inputs.push(Input::output("prescan", Element::Float, prescan));
+    Job {
+        inputs,
+        push: Vec::new(),
+    }
+}
+
+fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
+    let owned = worlds::owned(job);
+    let (world, frame) = (owned.world(), owned.frame);
+    let fusion: Fusion = job.one("fusion");
+    let texels: Vec<f32> = job.get("acquired");
+    let got: Vec<[f32; 2]> = job.after(outputs, "prescan");
+    let lines = mask::crossings(&world);
+    let places = mask::places(&frame, &fusion);
+    let mut wrong = 0;
+    let mut near = 0;
+    for (i, &[found, _]) in got.iter().enumerate() {
+        let line = &lines[i / frame.samples as usize];
+        let t = mask::distance(&frame, i as u32 % frame.samples);
+        let either = line.along.iter().any(|c| (c.0 - t).abs() < EDGE);
+        near += usize::from(either);
+        let right = f64::from(found) == line.mask(t) || (either && (found == 0.0 || found == 1.0));
+        wrong += usize::from(!right);
+    }
+    let size = DVec3::new(
+        fusion.size_x.into(),
+        fusion.size_y.into(),
+        fusion.size_z.into(),
+    );
+    let at_end = |p: DVec3| {
+        let ends = [p + 0.5, size - 0.5 - p];
+        ends.iter().any(|e| e.abs().min_element() < EDGE)
+    };
+    let shown: Vec<f32> = got.iter().map(|v| v[1]).collect();
+    let expected: Vec<f64> = places
+        .iter()
+        .map(|&p| mask::acquired(&fusion, &texels, p))
+        .collect();
+    let allowed = |i: usize| if at_end(places[i]) { 1.0 } else { LEVEL };
+    vec![
+        Check::count("mask", got.len(), wrong, 0),
+        // As many as lie so close by chance; else the comparison excuses everything.
+        Check::count("samples at a crossing", got.len(), near, got.len() / 50),
+        Check::close("grey level", &shown, &expected, allowed),
+    ]
+}

@@ -1,0 +1,165 @@
+//! An acquired volume, and how it is mixed with what is simulated.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+
+use super::mesh::Soup;
+use super::topology::Edges;
+use super::{Instance, Mesh, Scene};
+use crate::volume::Voxels;
+
+/// A volume of grey values acquired elsewhere, placed in the world.
+#[derive(Clone, Debug)]
+pub struct Acquired {
+    /// Voxels along each axis, all at least 1.
+    pub size: [usize; 3],
+    /// Values, first axis fastest.
+    pub voxels: Arc<Voxels>,
+    /// Voxel indices (integers at voxel centres) to the world, mm.
+    pub world_from_voxel: DAffine3,
+    /// Stored value that is shown black, at grey level 0.
+    pub black: f64,
+    /// Stored value that is shown white, at grey level 1; not equal to `black`.
+    pub white: f64,
+}
+
+/// What is shown around the masking meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Surroundings {
+    /// The acquired volume.
+    Volume,
+    /// Nothing: sound passes and is absorbed there, but does not echo.
+    None,
+    /// The scene's own anatomy with its scatterers: as without fusion.
+    Scatterers,
+}
+
+/// How the two images meet at the border of the mask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Blend {
+    /// Along the ramp that the box blur makes of the mask (the paper).
+    Linear,
+    /// The same ramp through the smoothstep 3 m^2 - 2 m^3.
+    Smooth,
+}
+
+/// On-the-fly fusion of the acquired volume with the simulation.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fusion {
+    /// The masking meshes, of which the union is simulated: indices into [`Scene::instances`].
+    pub masks: Vec<usize>,
+    /// What is shown around them.
+    pub surroundings: Surroundings,
+    /// Edge of the box by which the scan-converted mask is blurred, pixels, at least 1.
+    pub blur: u32,
+    /// How the two images meet.
+    pub blend: Blend,
+}
+
+/// Edges at which a mesh does not close: those with a triangle on one side only, or with more on one
+/// side than on the other. Shading splits vertices at creases without moving them: they are joined.
+pub fn open_edges(mesh: &Mesh) -> usize {
+    let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
+    let mut positions = Vec::new();
+    let mut triangles = Vec::with_capacity(mesh.triangles.len());
+    for triangle in &mesh.triangles {
+        triangles.push(triangle.map(|i| {
+            let p = mesh.positions[i as usize];
+            // Adding 0 makes one zero of the two.
+            *numbers
+                .entry(p.map(|x| (x + 0.0).to_bits()))
+                .or_insert_with(|| {
+                    positions.push(p);
+                    positions.len() as u32 - 1
+                })
+        }));
+    }
+    let soup = Soup {
+        positions,
+        triangles,
+        ..Soup::default()
+    };
+    let open = |group: &&[super::topology::Edge]| {
+        let forward = group.iter().filter(|e| e.forward).count();
+        2 * forward != group.len()
+    };
+    Edges::of(&soup).groups().filter(open).count()
+}
+
+impl Scene {
+    /// Whether frames show the acquired volume.
+    pub fn shows_volume(&self) -> bool {
+        let shown = |f: &Fusion| f.surroundings == Surroundings::Volume;
+        self.volume.is_some() && self.fusion.as_ref().is_some_and(shown)
+    }
+
+    /// Whether only what a masking mesh encloses is heard.
+    pub fn is_masked(&self) -> bool {
+        let fusion = self.fusion.as_ref();
+        fusion.is_some_and(|f| f.surroundings != Surroundings::Scatterers)
+    }
+
+    /// Whether instance `index` is one of the masking meshes.
+    pub fn is_mask(&self, index: usize) -> bool {
+        let fusion = self.fusion.as_ref();
+        fusion.is_some_and(|f| f.masks.contains(&index))
+    }
+
+    /// Masking meshes that no scanline of the image meets as the scene stands: indices into
+    /// [`Scene::instances`].
+    pub fn masks_off_the_image(&self) -> Vec<usize> {
+        let masks = self.fusion.iter().flat_map(|f| &f.masks).copied();
+        let lies_off = |&i: &usize| {
+            let instance = &self.instances[i];
+            !instance.shown || !self.meets_image(instance)
+        };
+        masks.filter(lies_off).collect()
+    }
+
+    /// Whether some scanline in the middle of the slice starts in `instance` or enters it.
+    fn meets_image(&self, instance: &Instance) -> bool {
+        let mesh = &self.meshes[instance.mesh];
+        let probe_from_object = self.world_from_probe.inverse() * instance.world_from_object;
+        let at = |i: u32| {
+            let p = mesh.positions[i as usize].map(f64::from);
+            probe_from_object.transform_point3(p.into())
+        };
+        // Only triangles across the plane of the scanlines can be met.
+        let across: Vec<[DVec3; 3]> = mesh
+            .triangles
+            .iter()
+            .map(|t| t.map(at))
+            .filter(|t| t.iter().any(|p| p.y >= 0.0) && t.iter().any(|p| p.y <= 0.0))
+            .collect();
+        (0..self.probe.scanlines).any(|l| {
+            let (mut origin, direction) = self.probe.ray(l, 0);
+            origin.y = 0.0;
+            let hits = across.iter().filter_map(|t| crossing(t, origin, direction));
+            let (mut ahead, mut beyond) = (0, 0);
+            for t in hits {
+                match t < self.probe.depth {
+                    true => ahead += 1,
+                    false => beyond += 1,
+                }
+            }
+            // A ray that crosses a closed surface an odd number of times started inside.
+            ahead > 0 || beyond % 2 == 1
+        })
+    }
+}
+
+/// Distance ahead at which a ray meets a triangle (Moeller and Trumbore 1997).
+fn crossing([a, b, c]: &[DVec3; 3], origin: DVec3, direction: DVec3) -> Option<f64> {
+    let (u, v, w) = (b - a, c - a, origin - a);
+    let p = direction.cross(v);
+    let determinant = u.dot(p);
+    let q = w.cross(u);
+    let s = w.dot(p) / determinant;
+    let r = direction.dot(q) / determinant;
+    let t = v.dot(q) / determinant;
+    (s >= 0.0 && r >= 0.0 && s + r <= 1.0 && t > 0.0).then_some(t)
+}
