@@ -14,6 +14,7 @@ mod determinism;
 mod energy;
 mod formation;
 mod full_wave;
+mod fusion;
 mod grain;
 mod hilbert;
 mod interfaces;

@@ -68,6 +68,8 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
             noise: f64::NEG_INFINITY,
             ..Imaging::default()
         },
+        volume: None,
+        fusion: None,
     }
 }
 
