@@ -50,6 +50,7 @@ pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static
     if !job.push.is_empty()
         && found.len() == reads
         && let Some(bytes) = load("push")?
+        && bytes.len() == job.push.len()
     {
         job.push = bytes;
         found.push("push");

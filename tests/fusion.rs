@@ -1,0 +1,308 @@
+//! Fusion from the scene file to the frame: what is refused, what is heard, what is dumped.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use insonify::gpu::{Device, Kernel, test_device};
+use insonify::harness::{self, Case, SUBJECTS, Size};
+use insonify::scene::{Scene, SceneError};
+use insonify::sim::dump;
+use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
+
+/// A ball around a depth of 25 mm, and a block of higher priority from its middle to the left: the
+/// ball's surface lies within the block there. No refraction: all sound is equally fast.
+const SCENE: &str = r#"
+background = "around"
+[probe]
+preset = "linear"
+scanlines = 48
+elevation_layers = 1
+samples = 800
+depth = "40 mm"
+speed = "1540 m/s"
+[simulation]
+paths = 1
+max_reflections = 0
+[imaging]
+noise = -inf
+image_height = 200
+[tissues.around]
+based_on = "liver"
+speed = "1540 m/s"
+[tissues.denser]
+based_on = "around"
+density = "1100 kg/m3"
+[tissues.lighter]
+based_on = "around"
+density = "1000 kg/m3"
+[[mesh]]
+name = "ball"
+tissue = "denser"
+shape = { sphere = { radius = 8 } }
+translate = [1.1, 0.3, 22.2]
+[[mesh]]
+name = "block"
+tissue = "lighter"
+priority = 1
+shape = { box = { size = [16, 30, 14] } }
+translate = [-8.3, 0.2, 21.7]
+[[wire]]
+from = [12, 0, 20]
+amplitude = -30
+[[wire]]
+from = [3, 0, 27]
+amplitude = -30
+"#;
+
+const VOLUME: &str = "NDims = 3\nDimSize = 5 4 3\nElementSpacing = 12 9 17\nOffset = -25 -13 1\n\
+    ElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+
+/// A triangle that encloses nothing.
+const OPEN: &str = "v 0 0 0\nv 9 0 0\nv 0 9 0\nf 1 2 3\n";
+
+/// Loads SCENE with `more` behind it, beside a volume and an open mesh.
+fn load(more: &str) -> Result<Scene, SceneError> {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), more);
+    Scene::load(&folder.path().join("scene.toml"), &[]).map(|(scene, _)| scene)
+}
+
+fn write(folder: &Path, more: &str) {
+    let file = |name: &str, bytes: &[u8]| {
+        std::fs::write(folder.join(name), bytes).expect("written");
+    };
+    let voxels: Vec<u8> = (0..60).map(|i| (i * 4) as u8).collect();
+    file("scene.toml", format!("{SCENE}{more}").as_bytes());
+    file("volume.mha", &[VOLUME.as_bytes(), &voxels].concat());
+    file("open.obj", OPEN.as_bytes());
+}
+
+const FUSED: &str = "[volume]\nfile = \"volume.mha\"\n[fusion]\nmask = [\"ball\"]\n";
+
+#[test]
+fn mistakes_name_line_cause_and_remedy() {
+    let line = SCENE.lines().count() + 1;
+    let volume = "[volume]\nfile = \"volume.mha\"\n";
+    let open = "[[mesh]]\nname = \"sheet\"\ntissue = \"around\"\nfile = \"open.obj\"\n";
+    for (more, at, cause, remedy) in [
+        (volume.to_owned(), line, "no [fusion]", "add [fusion]"),
+        (
+            "[fusion]\nmask = [\"ball\"]\n".to_owned(),
+            line,
+            "the scene has none",
+            "add [volume]",
+        ),
+        (
+            format!("{volume}[fusion]\nmask = []\n"),
+            line + 3,
+            "no mesh",
+            "name the closed mesh",
+        ),
+        (
+            format!("{volume}[fusion]\nmask = [\"ball\", \"blok\"]\n"),
+            line + 3,
+            "no mesh `blok`",
+            "`block`",
+        ),
+        (
+            format!("{open}{volume}[fusion]\nmask = [\"sheet\"]\n"),
+            line + 7,
+            "3 of its edges are open",
+            "cap_openings",
+        ),
+        (
+            format!("{FUSED}blur = 0\n"),
+            line + 4,
+            "blur is 0",
+            "between 1 and 512",
+        ),
+        (
+            FUSED.replace("volume.mha", "nothing.mha"),
+            line + 1,
+            "cannot be used",
+            "insonify check",
+        ),
+        (
+            FUSED.replace("[fusion]", "black = 7\nwhite = 7\n[fusion]"),
+            line + 2,
+            "the same stored value",
+            "two different",
+        ),
+        (
+            FUSED.replace("[fusion]", "white = nan\n[fusion]"),
+            line + 2,
+            "white is NaN",
+            "stored values",
+        ),
+    ] {
+        let error = load(&more).map(|_| ()).expect_err(cause);
+        let help = error.remedy.clone().unwrap_or_default();
+        assert_eq!(error.line, at, "{error}");
+        assert!(error.message.contains(cause), "{error}");
+        assert!(help.contains(remedy), "{cause}: {help}");
+    }
+    let closed = format!("{open}{FUSED}").replace("open.obj\"", "open.obj\"\ncap_openings = true");
+    let closed = closed.replace("[\"ball\"]", "[\"sheet\"]");
+    load(&closed).expect("a sheet whose opening is closed by another has an inside");
+}
+
+/// Echoes (surface, volume) and pixels.
+fn shoot(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> ([Vec<i32>; 2], Vec<u8>) {
+    let library = Library::embedded();
+    let mut simulator = Simulator::new(device, &library, scene, tracer).expect("a simulator");
+    simulator.frame(scene, 0).expect("a frame");
+    let pixels = simulator.pixels().expect("pixels").2;
+    (simulator.echoes().expect("echoes"), pixels)
+}
+
+/// Distance to which an echo is heard beside its place, mm: the cells that the beam reaches over, and
+/// a sample to either side.
+const REACH: f64 = 0.4;
+/// Of the loudest echo: a stretch that is cut at the mask's border starts elsewhere, and single precision
+/// rounds its distances and phases (400 cycles of the carrier) anew.
+const ROUNDING: f64 = 1e-3;
+
+/// Echoes of `masked` that lie outside the ball, and samples inside it at which they are not those of
+/// `whole`; also how many of `whole` lie outside.
+fn compare(scene: &Scene, masked: &[Vec<i32>; 2], whole: &[Vec<i32>; 2]) -> [usize; 3] {
+    let ball = scene.instances[0].world_from_object.translation;
+    let (mut stray, mut other, mut silenced) = (0, 0, 0);
+    for (masked, whole) in masked.iter().zip(whole) {
+        let loudest = whole.iter().map(|v| v.abs()).max().unwrap_or(0);
+        let allowed = (ROUNDING * f64::from(loudest)) as i32;
+        for l in 0..scene.probe.scanlines {
+            let (o, d) = scene.probe.ray(l, 0);
+            for k in 0..scene.probe.samples {
+                let p = o + f64::from(k) * scene.probe.sample_pitch() * d;
+                let at = 2 * (l * scene.probe.samples + k) as usize;
+                let depth = p.distance(ball) - 8.0;
+                let (masked, whole) = (&masked[at..at + 2], &whole[at..at + 2]);
+                if depth > REACH {
+                    stray += usize::from(masked != [0, 0]);
+                    silenced += usize::from(whole != [0, 0]);
+                } else if depth < -REACH {
+                    let far = |i: usize| masked[i].abs_diff(whole[i]) > allowed.unsigned_abs();
+                    other += usize::from(far(0) || far(1));
+                }
+            }
+        }
+    }
+    [stray, other, silenced]
+}
+
+#[test]
+fn only_what_the_mask_encloses_is_heard_and_it_is_what_it_was() {
+    let device = test_device();
+    let plain = load("").expect("sound");
+    for tracer in [Tracer::Bvh, Tracer::RayQuery] {
+        let (whole, pixels) = shoot(&device, &plain, tracer);
+        for surroundings in ["volume", "none", "scatterers"] {
+            let more = format!("{FUSED}surroundings = \"{surroundings}\"\n");
+            let scene = load(&more).expect("sound");
+            let (echoes, fused) = shoot(&device, &scene, tracer);
+            if surroundings == "scatterers" {
+                assert!(echoes == whole, "{tracer}: the echoes without fusion");
+                assert!(fused == pixels, "{tracer}: the image without fusion");
+                continue;
+            }
+            let [stray, other, silenced] = compare(&scene, &echoes, &whole);
+            assert_eq!([stray, other], [0; 2], "{tracer} {surroundings}");
+            assert!(silenced > 10_000, "{silenced}");
+            // The same comparison sees a ball that is heard as a whole.
+            assert!(compare(&scene, &whole, &whole)[0] > 10_000);
+            assert!(fused != pixels, "{tracer} {surroundings}");
+        }
+    }
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
+}
+
+#[test]
+fn masks_off_the_image_are_found() {
+    let off = |place: &str| {
+        let text = FUSED.replace("ball", "far")
+            + "[[mesh]]\nname = \"far\"\ntissue = \"denser\"\nshape = { sphere = { radius = 5 } }\n"
+            + place;
+        load(&text).expect("sound").masks_off_the_image().len()
+    };
+    for (place, lost) in [
+        ("translate = [0, 0, 20]\n", 0),
+        // Ends behind the face, around it, and begins before the image does.
+        ("translate = [0, 0, -4.9]\n", 0),
+        ("translate = [0, 0, -5.1]\n", 1),
+        ("translate = [0, 0, 44.9]\n", 0),
+        ("translate = [0, 0, 45.1]\n", 1),
+        ("translate = [0, 5.1, 20]\n", 1),
+        ("translate = [0, 4.9, 20]\n", 0),
+        ("translate = [25, 0, 20]\n", 1),
+        // Around the whole image.
+        ("scale = 100\n", 0),
+    ] {
+        assert_eq!(off(place), lost, "{place}");
+    }
+}
+
+#[test]
+fn render_warns_of_a_mask_off_the_image_and_shows_the_steps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    write(folder.path(), FUSED);
+    let at = |name: &str| folder.path().join(name).display().to_string();
+    let render = |more: &[&str]| {
+        let (scene, image) = (at("scene.toml"), at("image.png"));
+        let fixed = [
+            "render",
+            scene.as_str(),
+            "-o",
+            image.as_str(),
+            "--tracer",
+            "bvh",
+        ];
+        let out = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
+            .args(fixed.iter().chain(more))
+            .output()
+            .expect("the program starts");
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success(), "{said}");
+        said
+    };
+    let said = render(&["--set", "mesh.ball.translate=[90, 0, 0]"]);
+    assert!(said.contains("mask `ball` never meets the image"), "{said}");
+    let said = render(&["--dump", &at("dump")]);
+    assert!(!said.contains("warning"), "{said}");
+    let level = |name: &str, x: u32, y: u32| {
+        let image = image::open(folder.path().join("dump").join(name)).expect(name);
+        image.to_luma8().get_pixel(x, y).0[0]
+    };
+    // In the middle of the ball, and in a corner: 5 pixels per mm.
+    let places = [(95 + 5, 111), (10, 190)];
+    let masks = places.map(|(x, y)| level("7_mask.png", x, y));
+    assert_eq!(masks, [0, 255]);
+    let fused = places.map(|(x, y)| level("5_bmode.png", x, y));
+    assert_eq!(fused[0], level("9_simulation.png", 100, 111));
+    assert_eq!(fused[1], level("6_background.png", 10, 190));
+}
+
+#[test]
+fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
+    let device = test_device();
+    let library = Library::embedded();
+    let scene = load(FUSED).expect("sound");
+    let mut simulator =
+        Simulator::new(&device, &library, &scene, Tracer::Bvh).expect("a simulator");
+    simulator.frame(&scene, 0).expect("a frame");
+    let folder = tempfile::tempdir().expect("a folder");
+    dump::frame(&mut simulator, &scene, folder.path()).expect("dumped");
+    for name in ["mask", "convert", "blur", "fuse"] {
+        let subject = SUBJECTS.iter().find(|s| s.name == name).expect(name);
+        let mut job = (subject.job)(Case::One, Size::Small);
+        let found = harness::dump::read(folder.path(), subject, &mut job).expect(name);
+        assert!(found.len() >= 2, "{name}: {found:?}");
+        let stem = subject.stems[0];
+        let kernel = Kernel::new(&device, stem, library.words(stem), &[]).expect(stem);
+        let extent = (subject.extent)(&job);
+        let outcome = harness::run(&device, &kernel, &job, extent).expect(stem);
+        for check in (subject.check)(&job, &outcome.outputs) {
+            assert!(check.passed(), "{name}: {check}");
+        }
+    }
+}
