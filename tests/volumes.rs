@@ -175,6 +175,61 @@ fn sequences_of_plus_are_written_back_equal() {
     assert_eq!(probe.translation.x, -190.886);
 }
 
+/// Small files that SimpleITK and pydicom wrote, and what they read from them
+/// (tools/oracle/volumes.py): every format, type and way to write, oblique and mirrored directions,
+/// anisotropic spacing.
+#[test]
+fn files_written_by_others_give_their_voxels_and_places() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/volumes");
+    let text = std::fs::read_to_string(folder.join("expected.json")).expect("readable");
+    let all: BTreeMap<String, serde_json::Value> = serde_json::from_str(&text).expect("JSON");
+    for (name, expected) in &all {
+        let numbers = |key: &str| -> Vec<f64> {
+            let list = expected[key].as_array().expect(key);
+            list.iter().map(|v| v.as_f64().expect("a number")).collect()
+        };
+        let (volume, _) = Volume::load(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"));
+        assert_eq!(
+            volume.size.map(|n| n as f64).to_vec(),
+            numbers("size"),
+            "{name}"
+        );
+        let found: Vec<_> = (0..volume.voxels.len())
+            .map(|i| volume.voxels.get(i))
+            .collect();
+        // Of JPEG the standard allows a decoder a grey level; all others are exact.
+        let tolerance = f64::from(u8::from(name.starts_with("jpeg")));
+        // Nine digits name a single-precision number.
+        let values: Vec<_> = numbers("values")
+            .iter()
+            .map(|v| f64::from(*v as f32))
+            .collect();
+        let worst = found.iter().zip(&values).map(|(a, b)| (a - b).abs());
+        let worst = worst.fold(0.0, f64::max);
+        assert!(
+            found.len() == values.len() && worst <= tolerance,
+            "{name}: {worst}"
+        );
+        // NIfTI holds positions in single precision and directions as a quaternion of it.
+        let tolerance = if name.contains(".nii") { 1e-5 } else { 1e-9 };
+        let (spacing, origin, direction) =
+            (numbers("spacing"), numbers("origin"), numbers("direction"));
+        let same = |flip: f64| {
+            (0..3).all(|axis| {
+                let step = volume.world_from_voxel.matrix3.col(axis).to_array();
+                (0..3).all(|row| {
+                    let expected = flip * direction[3 * row + axis] * spacing[axis];
+                    let at = volume.world_from_voxel.translation[row] - origin[row];
+                    (step[row] - expected).abs() < tolerance && at.abs() < tolerance
+                })
+            })
+        };
+        assert!(same(1.0), "{name}: {:?}", volume.world_from_voxel);
+        assert!(!same(-1.0), "the comparison notices a flip");
+    }
+    assert!(all.len() >= 27, "{}", all.len());
+}
+
 #[test]
 fn check_describes_or_refuses_every_file() {
     let Some(data) = shared_data() else { return };

@@ -11,8 +11,8 @@ use insonify::volume::{self, Format, Summary, Volume};
 /// Arguments of `insonify check`.
 #[derive(Debug, Args)]
 pub struct Check {
-    /// A scene (.toml), a mesh (.obj, .gltf, .glb, .stl) or a volume (.mha, .mhd, .nrrd, .nhdr,
-    /// .nii, .nii.gz)
+    /// A scene (.toml), a mesh (.obj, .gltf, .glb, .stl) or a volume or sequence (.mha, .mhd,
+    /// .nrrd, .nhdr, .nii, .nii.gz, .dcm)
     file: PathBuf,
 }
 

@@ -1,4 +1,4 @@
-//! Volumes acquired elsewhere: MetaImage, NRRD and NIfTI-1 files, placed in LPS and mm.
+//! Volumes acquired elsewhere: MetaImage, NRRD, NIfTI-1 and DICOM files, placed in LPS and mm.
 //!
 //! Knows no Vulkan and no ultrasound. Frames and units of the files are turned into LPS and mm in
 //! `grid`, once. Nothing that a header says makes the program allocate or unpack more than the
@@ -11,6 +11,7 @@ use glam::{DAffine3, DVec3};
 /// What is worth knowing about a volume that could be loaded.
 pub use crate::scene::Warning;
 
+mod dicom;
 mod error;
 mod fields;
 mod grid;
@@ -47,6 +48,8 @@ pub enum Format {
     Nrrd,
     /// NIfTI-1 (.nii, .nii.gz).
     Nifti,
+    /// DICOM (.dcm).
+    Dicom,
 }
 
 impl Format {
@@ -56,6 +59,7 @@ impl Format {
             Self::MetaImage => "MetaImage",
             Self::Nrrd => "NRRD",
             Self::Nifti => "NIfTI-1",
+            Self::Dicom => "DICOM",
         }
     }
 }
@@ -82,7 +86,7 @@ pub struct Volume {
 /// Cosine between two axes from which on they are called not perpendicular.
 const SHEAR: f64 = 1e-3;
 
-/// Extensions of volume files, DICOM with them, which is recognised to be refused.
+/// Extensions of volume files.
 const EXTENSIONS: [&str; 8] = [
     ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom",
 ];
@@ -109,16 +113,12 @@ impl Volume {
         } else if is(&[".nii", ".nii.gz"]) {
             nifti::header(path)?.load(path)
         } else if is(&[".dcm", ".dicom"]) {
-            Err(VolumeError::file(
-                path,
-                "DICOM cannot be read by this version",
-                "convert it to .nrrd, .mha or .nii.gz",
-            ))
+            dicom::load(path)
         } else {
             Err(VolumeError::file(
                 path,
                 "is no volume by its extension",
-                "give a .mha, .mhd, .nrrd, .nhdr, .nii or .nii.gz file",
+                "give a .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz or .dcm file",
             ))
         }
     }

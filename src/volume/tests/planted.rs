@@ -167,7 +167,7 @@ fn cut_singular_huge_and_bomb_are_refused() {
 #[test]
 fn dicom_and_strangers_are_refused_plainly() {
     let folder = Folder::new();
-    folder.refused("a.dcm", b"", "DICOM cannot be read");
+    folder.refused("a.dcm", b"", "is no DICOM file");
     folder.refused("a.gz", b"", "no volume by its extension");
     let error = Volume::load(&folder.0.path().join("none.mha")).expect_err("missing");
     assert!(error.to_string().contains("cannot be read"), "{error}");
