@@ -16,7 +16,7 @@ fn blocks_keep_to_the_limit_and_the_budget() {
     assert_eq!(block(&volume([100, 50, 20]), 100, 200_000), [1, 1, 1]);
     assert_eq!(block(&volume([101, 50, 20]), 100, 300_000), [2, 1, 1]);
     assert_eq!(block(&volume([100, 50, 20]), 100, 199_999), [2, 1, 1]);
-    assert_eq!(block(&volume([100, 50, 20]), 100, 50_000), [3, 2, 1]);
+    assert_eq!(block(&volume([100, 50, 20]), 100, 50_000), [2, 2, 1]);
 }
 
 // A linear function: the mean of a block is its value in the middle of the block, which is where the
