@@ -207,12 +207,14 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
     let coding = match encoding.value.to_ascii_lowercase().as_str() {
         "raw" => Coding::Raw,
         "gzip" | "gz" => Coding::Gzip,
+        "bzip2" | "bz2" => Coding::Bzip2,
+        "hex" => Coding::Hex,
         "ascii" | "text" | "txt" => Coding::Text,
         _ => {
             return Err(fields.error(
                 encoding,
                 "this encoding cannot be read",
-                "save it with raw, gzip or ascii",
+                "save it with raw, gzip, bzip2, hex or ascii",
             ));
         }
     };

@@ -4,6 +4,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::path::{Component, Path, PathBuf};
 
+use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
 use super::error::VolumeError;
@@ -30,6 +31,10 @@ pub(super) enum Coding {
     Gzip,
     /// A zlib stream.
     Zlib,
+    /// A bzip2 stream.
+    Bzip2,
+    /// Two hexadecimal digits per byte.
+    Hex,
     /// Numbers in text.
     Text,
 }
@@ -102,6 +107,38 @@ pub(super) fn detached(header: &Path, name: &str) -> Result<PathBuf, String> {
     }
 }
 
+/// Bytes from hexadecimal digits; white space between them means nothing.
+struct Hex<R>(R);
+
+impl<R: BufRead> Hex<R> {
+    fn digit(&mut self) -> io::Result<Option<u8>> {
+        loop {
+            let mut byte = [0];
+            if self.0.read(&mut byte)? == 0 {
+                return Ok(None);
+            }
+            if byte[0].is_ascii_whitespace() {
+                continue;
+            }
+            let digit = char::from(byte[0]).to_digit(16);
+            let wrong = || io::Error::new(ErrorKind::InvalidData, "no hexadecimal digit");
+            return digit.map(|d| Some(d as u8)).ok_or_else(wrong);
+        }
+    }
+}
+
+impl<R: BufRead> Read for Hex<R> {
+    fn read(&mut self, out: &mut [u8]) -> io::Result<usize> {
+        for (count, byte) in out.iter_mut().enumerate() {
+            let Some(high) = self.digit()? else {
+                return Ok(count);
+            };
+            *byte = 16 * high + self.digit()?.ok_or(ErrorKind::UnexpectedEof)?;
+        }
+        Ok(out.len())
+    }
+}
+
 impl Payload {
     /// Opens the stream of voxels and checks that it can hold `total` bytes, or in text as many
     /// numbers. The voxels begin where the stream stands, unless they are its last bytes.
@@ -123,7 +160,10 @@ impl Payload {
             Coding::Raw => held,
             // A digit each, and a separator between them.
             Coding::Text => held.div_ceil(2),
+            Coding::Hex => held / 2,
             Coding::Gzip | Coding::Zlib => held.saturating_mul(MAX_RATIO),
+            // Runs of runs have no bound worth the name; it is unpacked up to what is declared.
+            Coding::Bzip2 => u64::MAX,
         };
         let lead = match self.skip {
             Skip::Bytes(bytes) => bytes,
@@ -143,6 +183,8 @@ impl Payload {
         let mut stream: Box<dyn Read> = match self.coding {
             Coding::Gzip => Box::new(MultiGzDecoder::new(bytes)),
             Coding::Zlib => Box::new(ZlibDecoder::new(bytes)),
+            Coding::Bzip2 => Box::new(MultiBzDecoder::new(bytes)),
+            Coding::Hex => Box::new(Hex(bytes)),
             Coding::Raw | Coding::Text => Box::new(bytes),
         };
         let skipped = io::copy(&mut stream.by_ref().take(lead), &mut io::sink()).map_err(broken)?;

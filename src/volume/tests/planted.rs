@@ -30,7 +30,7 @@ fn planted_mistakes_in_text_headers_name_line_and_cause() {
     }
     let good = String::from_utf8(nrrd("LPS", DVec3::ONE, RAW, b"")).expect("text");
     for (from, to, line, cause) in [
-        ("raw", "bzip2", 10, "`bzip2`"),
+        ("raw", "zip", 10, "`zip`"),
         ("short", "block", 3, "this type"),
         ("LPS", "up-down", 5, "this space"),
         (
@@ -150,6 +150,23 @@ fn cut_singular_huge_and_bomb_are_refused() {
         .expect("zeros");
     assert_eq!(volume.voxels.len(), 24);
     assert!(warnings[0].message.contains("data go on"));
+    // And with bzip2, where 64 MB are 50 bytes: no more than the header declares is unpacked.
+    let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
+    encoder.write_all(&vec![0; 64 << 20]).expect("memory");
+    let bomb = encoder.finish().expect("memory");
+    assert!(bomb.len() < 200, "{}", bomb.len());
+    let small = GZIP.replace("gzip", "bzip2");
+    let (volume, _) = folder
+        .load("b.nrrd", &text("", "", &small, &bomb))
+        .expect("zeros");
+    assert_eq!(volume.voxels.len(), 24);
+    let hex = GZIP.replace("gzip", "hex");
+    folder.refused("h.nrrd", &text("", "", &hex, &[b'0'; 95]), "cut off");
+    folder.refused(
+        "h.nrrd",
+        &text("", "", &hex, &[b'x'; 96]),
+        "no hexadecimal digit",
+    );
 
     let d = direction().to_cols_array().map(|v| v.to_string()).join(" ");
     let good = String::from_utf8(meta(LOCAL, b"")).expect("text");
