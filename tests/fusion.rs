@@ -1,14 +1,20 @@
 //! Fusion from the scene file to the frame: what is refused, what is heard, what is dumped.
 
+#[path = "common/shared_data.rs"]
+mod shared_data;
+
 use std::path::Path;
 use std::sync::Arc;
 
+use glam::{DAffine3, DVec3};
 use insonify::gpu::{Device, Kernel, test_device};
 use insonify::harness::{self, Case, SUBJECTS, Size};
-use insonify::scene::{Scene, SceneError};
+use insonify::scene::{Acquired, Scene, SceneError};
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
+use insonify::volume::Voxels;
+use shared_data::shared_data;
 
 /// A ball around a depth of 25 mm, and a block of higher priority from its middle to the left: the
 /// ball's surface lies within the block there. No refraction: all sound is equally fast.
@@ -305,4 +311,96 @@ fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
             assert!(check.passed(), "{name}: {check}");
         }
     }
+}
+
+/// One voxel more along an axis than the device's images have texels: pairs are averaged, and a linear
+/// function stays where it was.
+#[test]
+fn a_volume_beyond_the_devices_limit_is_averaged_with_a_warning() {
+    let device = test_device();
+    let long = device.limits().max_image_3d as usize + 1;
+    let pitch = 60.0 / long as f64;
+    let mut scene = load(FUSED).expect("sound");
+    let value = |x: f64| 0.5 + x / 100.0;
+    let voxels = (0..4 * long).map(|i| value((i % long) as f64 * pitch - 30.0) as f32);
+    scene.volume = Some(Acquired {
+        size: [long, 2, 2],
+        voxels: Arc::new(Voxels::F32(voxels.collect())),
+        world_from_voxel: DAffine3::from_translation(DVec3::new(-30.0, -30.0, -30.0))
+            * DAffine3::from_scale(DVec3::new(pitch, 60.0, 90.0)),
+        black: 0.0,
+        white: 1.0,
+    });
+    let library = Library::embedded();
+    let mut simulator =
+        Simulator::new(&device, &library, &scene, Tracer::Bvh).expect("a simulator");
+    let warning = simulator.warning().expect("it is told").to_owned();
+    assert!(warning.contains("averaged to"), "{warning}");
+    simulator.frame(&scene, 0).expect("a frame");
+    let steps = simulator.fusion_steps().expect("read").expect("fused");
+    for l in 0..scene.probe.scanlines {
+        let at = 2 * (l * scene.probe.samples + 300) as usize + 1;
+        let expected = value(scene.probe.ray(l, 0).0.x);
+        // Places among thousands of texels are good to 1e-4 of one, 1e-7 of grey; the rest is rounding.
+        let error = f64::from(steps.prescan[at]) - expected;
+        assert!(error.abs() < 2e-6, "line {l}: {error}");
+    }
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
+}
+
+/// The scene with a real volume: both images are there, and meet at the mask.
+#[test]
+fn a_sac_in_a_real_acquired_volume() {
+    if shared_data().is_none() {
+        return;
+    }
+    let device = test_device();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/fusion.toml");
+    let smaller = [
+        ("probe.scanlines", "96"),
+        ("probe.samples", "1024"),
+        ("imaging.image_height", "300"),
+    ]
+    .map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let (scene, warnings) = Scene::load(&path, &smaller).expect("sound");
+    assert!(warnings.is_empty(), "{warnings:?}");
+    assert!(scene.masks_off_the_image().is_empty());
+    let mut images = Vec::new();
+    for tracer in [Tracer::Bvh, Tracer::RayQuery] {
+        let library = Library::embedded();
+        let mut simulator = Simulator::new(&device, &library, &scene, tracer).expect("made");
+        simulator.frame(&scene, 0).expect("a frame");
+        let (_, _, rgba) = simulator.pixels().expect("pixels");
+        let steps = simulator.fusion_steps().expect("read").expect("fused");
+        let mean = |weight: &dyn Fn(f32) -> bool| {
+            let chosen = rgba
+                .chunks_exact(4)
+                .zip(&steps.blurred)
+                .filter(|(_, m)| weight(**m));
+            let (count, sum) =
+                chosen.fold((0.0, 0.0), |(n, s), (p, _)| (n + 1.0, s + f64::from(p[0])));
+            (count, sum / count)
+        };
+        let (inside, simulated) = mean(&|m| m == 0.0);
+        let (outside, acquired) = mean(&|m| m == 1.0);
+        let area = inside / (inside + outside);
+        // An ellipse of 27 by 21 mm in an image of 38 by 46 mm, less half the ramp.
+        assert!(
+            (0.15..0.26).contains(&area),
+            "{tracer}: share simulated {area}"
+        );
+        assert!(
+            simulated > 15.0 && acquired > 15.0,
+            "{tracer}: {simulated} {acquired}"
+        );
+        images.push(rgba);
+    }
+    let differ = images[0]
+        .iter()
+        .zip(&images[1])
+        .filter(|(a, b)| a.abs_diff(**b) > 1);
+    assert!(
+        differ.count() * 1000 < images[0].len(),
+        "the tracers differ"
+    );
 }
