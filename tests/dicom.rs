@@ -211,6 +211,25 @@ fn planted_mistakes_are_refused_with_their_cause() {
 }
 
 #[test]
+fn check_says_type_place_and_range() {
+    let path = shipped()
+        .into_iter()
+        .find(|p| p.ends_with("implicit_i16.dcm"));
+    let Outcome { code, text } = check(&path.expect("it ships"));
+    assert_eq!(code, Some(0), "{text}");
+    for said in [
+        "DICOM, 5 x 4 x 3 voxels, 16-bit signed integer",
+        "spacing 0.2500 x 0.5000 x 0.7500 mm",
+        "first voxel at (3.500, -20.250, 40.125) mm",
+        "values ",
+        "own frame of reference, taken for LPS",
+        "0 errors, 1 warnings",
+    ] {
+        assert!(text.contains(said), "{said}: {text}");
+    }
+}
+
+#[test]
 fn cut_and_changed_files_never_panic() {
     let folder = folder();
     for path in shipped() {

@@ -306,6 +306,33 @@ fn files_written_by_others_give_their_voxels_and_places() {
     assert!(all.len() >= 27, "{}", all.len());
 }
 
+/// A slope of zero means that nothing is scaled.
+#[test]
+fn slopes_of_nifti_are_applied_to_every_type() {
+    let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/volumes");
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["u8_coronal.nii", "i16_oblique.nii", "i32_mirrored.nii"] {
+        let mut file = std::fs::read(shipped.join(name)).expect("readable");
+        let (plain, _) = Volume::load(&shipped.join(name)).expect("sound");
+        for (slope, intercept) in [(0.25f32, -3.5f32), (-2.0, 0.0), (1.0, 7.0), (0.0, 9.0)] {
+            file[112..116].copy_from_slice(&slope.to_le_bytes());
+            file[116..120].copy_from_slice(&intercept.to_le_bytes());
+            let path = folder.path().join(name);
+            std::fs::write(&path, &file).expect("written");
+            let (scaled, _) = Volume::load(&path).expect("sound");
+            for i in 0..plain.voxels.len() {
+                let (value, found) = (plain.voxels.get(i), scaled.voxels.get(i));
+                let expected = if slope == 0.0 {
+                    value
+                } else {
+                    f64::from((f64::from(slope) * value + f64::from(intercept)) as f32)
+                };
+                assert_eq!(found, expected, "{name}");
+            }
+        }
+    }
+}
+
 #[test]
 fn check_describes_or_refuses_every_file() {
     let Some(data) = shared_data() else { return };
