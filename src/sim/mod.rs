@@ -16,15 +16,15 @@ pub mod tracer;
 pub mod world;
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use fusion::Fused;
-use passes::Passes;
+use passes::{Passes, frame_constants};
 use shaders::Library;
-use stages::{Batches, Buffers, Kernels};
+use stages::{Buffers, Kernels};
 use tables::Tables;
 pub use tracer::Tracer;
 use world::World;
@@ -140,31 +140,10 @@ impl Simulator {
     /// # Errors
     /// What Vulkan says; a lost device names the last pass.
     pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
-        let settings = Settings::of(scene);
-        if settings != self.settings {
-            // The tables carry scales and levels that belong to the frame's constants.
-            self.frames.wait()?;
-            self.tables = Tables::new(scene);
-            self.upload_tables()?;
-            self.settings = settings;
-        }
-        if !self.passes.world.serves(scene) {
-            self.frames.wait()?;
-            let tracer = self.passes.world.tracer();
-            self.passes.world = World::new(&self.device, &self.shapers, scene, tracer)?;
-        }
+        self.adopt(scene)?;
         let passes = &mut self.passes;
         let mut cmd = self.frames.begin()?;
-        cmd.scope("update");
-        let began = Instant::now();
-        passes.world.update(&mut cmd, scene)?;
-        self.update_time = began.elapsed();
-        (passes.frame, passes.batches) =
-            frame_constants(scene, &passes.world, self.coincident, index);
-        cmd.write(&passes.buffers.frame, 0, bytemuck::bytes_of(&passes.frame))?;
-        if let Some(fusion) = &passes.fusion {
-            fusion.update(&mut cmd, scene)?;
-        }
+        self.update_time = passes.update(&mut cmd, scene, self.coincident, index)?;
         passes.clear(&mut cmd);
         passes.origin(&mut cmd)?;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
@@ -178,6 +157,24 @@ impl Simulator {
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd)?;
         cmd.submit()?;
         Ok(self.frames.take_timings())
+    }
+
+    /// Takes over settings and strategies that the device does not have yet, after the frames in flight.
+    fn adopt(&mut self, scene: &Scene) -> Result<(), SimError> {
+        let settings = Settings::of(scene);
+        if settings != self.settings {
+            // The tables carry scales and levels that belong to the frame's constants.
+            self.frames.wait()?;
+            self.tables = Tables::new(scene);
+            self.upload_tables()?;
+            self.settings = settings;
+        }
+        if !self.passes.world.serves(scene) {
+            self.frames.wait()?;
+            let tracer = self.passes.world.tracer();
+            self.passes.world = World::new(&self.device, &self.shapers, scene, tracer)?;
+        }
+        Ok(())
     }
 
     /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
@@ -328,25 +325,4 @@ impl Simulator {
         self.frames.wait()?;
         Ok(self.device.read_back(buffer(&self.passes.buffers))?)
     }
-}
-
-/// The frame's constants, with what only the world and the buffers' sizes decide.
-fn frame_constants(
-    scene: &Scene,
-    world: &World,
-    coincident: bool,
-    index: u32,
-) -> (layout::Frame, Batches) {
-    let mut frame = tables::frame(scene, index);
-    if coincident {
-        frame.flags |= layout::FLAG_COINCIDENT;
-    }
-    let (ray_mask, ambiguous) = world.ray_mask();
-    frame.ray_mask = ray_mask;
-    if ambiguous {
-        frame.flags |= layout::FLAG_SLOTS;
-    }
-    let batches = Batches::new(&frame);
-    frame.segment_capacity = batches.capacity;
-    (frame, batches)
 }

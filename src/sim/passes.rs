@@ -1,10 +1,12 @@
 //! The stages of a frame, each recorded with its bindings and the barrier behind it.
 
-use super::World;
+use std::time::{Duration, Instant};
+
 use super::fusion::{Fused, Simulated};
-use super::layout;
 use super::stages::{Batches, Buffers, Kernels, SCATTER_WINDOW, lines};
+use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
+use crate::scene::Scene;
 
 /// What the stages work on.
 pub(super) struct Passes {
@@ -18,6 +20,25 @@ pub(super) struct Passes {
 }
 
 impl Passes {
+    /// Brings the device up to date with `scene`; what the processor took for it.
+    pub(super) fn update(
+        &mut self,
+        cmd: &mut Commands,
+        scene: &Scene,
+        coincident: bool,
+        index: u32,
+    ) -> Result<Duration, SimError> {
+        cmd.scope("update");
+        let began = Instant::now();
+        self.world.update(cmd, scene)?;
+        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index);
+        cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
+        if let Some(fusion) = &self.fusion {
+            fusion.update(cmd, scene)?;
+        }
+        Ok(began.elapsed())
+    }
+
     pub(super) fn clear(&self, cmd: &mut Commands) {
         let b = &self.buffers;
         for buffer in [
@@ -206,4 +227,25 @@ impl Passes {
         cmd.barrier(Stage::Compute, Stage::Transfer);
         Ok(())
     }
+}
+
+/// The frame's constants, with what only the world and the buffers' sizes decide.
+pub(super) fn frame_constants(
+    scene: &Scene,
+    world: &World,
+    coincident: bool,
+    index: u32,
+) -> (layout::Frame, Batches) {
+    let mut frame = tables::frame(scene, index);
+    if coincident {
+        frame.flags |= layout::FLAG_COINCIDENT;
+    }
+    let (ray_mask, ambiguous) = world.ray_mask();
+    frame.ray_mask = ray_mask;
+    if ambiguous {
+        frame.flags |= layout::FLAG_SLOTS;
+    }
+    let batches = Batches::new(&frame);
+    frame.segment_capacity = batches.capacity;
+    (frame, batches)
 }

@@ -1,0 +1,83 @@
+// A path and its steps between interfaces.
+//
+// The includer declares frame and stacks[] and includes random.glsl, probe.glsl, transform.glsl,
+// acoustics.glsl and media.glsl.
+
+struct Path {
+    vec3 origin; vec3 direction; vec3 lateral;
+    float handedness; float t_min;
+    float weight;       // one-way intensity, which is the two-way amplitude
+    float share;        // part of an echo's amplitude that this path carries
+    float probability;  // of the stochastic choices made so far
+    float time;         // one way, us
+    vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
+    uint interactions; uint reflections; uint crossings;
+    bool branch;
+    Media media;
+};
+
+uvec4 draw(uint n, uint key, uint purpose) {
+    return path_draw(n, key, purpose, frame.seed, (frame.flags & FLAG_SOBOL) != 0u);
+}
+
+Path start(uint line, uint n) {
+    vec3 o, d, lateral;
+    probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
+    Path path;
+    path.direction = world_vector(d);
+    path.lateral = world_vector(lateral);
+    uvec4 bits = draw(n, 0u, PURPOSE_JITTER);
+    path.origin = world_point(o) + frame.origin_jitter * gaussian(bits.x) * path.lateral;
+    path.spread = vec3(frame.origin_jitter * frame.origin_jitter, 0.0, 0.0);
+    if (frame.emission_lobe > 0.0) {
+        path.direction = power_cosine(path.direction, frame.emission_lobe, vec2(unit(bits.y), unit(bits.z)));
+        path.lateral = normalize(path.lateral - dot(path.lateral, path.direction) * path.direction);
+        path.spread.z = 1.0 / (frame.emission_lobe + 2.0);
+    }
+    path.handedness = 1.0;
+    path.t_min = 0.0;
+    path.weight = 1.0;
+    path.share = 1.0 / float(frame.paths);
+    path.probability = 1.0;
+    path.time = 0.0;
+    path.interactions = 0u;
+    path.reflections = 0u;
+    path.crossings = 0u;
+    path.branch = false;
+    path.media.count = stacks[line * (MAX_STACK + 1u)];
+    for (uint i = 0u; i < MAX_STACK; ++i) path.media.ids[i] = stacks[line * (MAX_STACK + 1u) + 1u + i];
+    return path;
+}
+
+float clearance(vec3 p) {
+    return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+}
+
+void reflect_path(inout Path path, vec3 m, float roughness, float turn) {
+    path.direction = normalize(path.direction - 2.0 * dot(path.direction, m) * m);
+    path.lateral = path.lateral - 2.0 * dot(path.lateral, m) * m;
+    path.handedness = -path.handedness;
+    path.reflections += 1u;
+    if (roughness < SPECULAR) path.spread.z += 4.0 / (roughness + 2.0);
+    path.spread.z += min(turn * turn, 1.0);
+}
+
+bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
+    vec3 d;
+    if (!refraction(path.direction, n, c1, c2, d) || dot(d, n_geometric) >= 0.0) {
+        if (!refraction(path.direction, n_geometric, c1, c2, d)) return false;
+    }
+    path.lateral = normalize(path.lateral - dot(path.lateral, d) * d);
+    path.direction = d;
+    return true;
+}
+
+// Moves the path along its segment: attenuation, time, widening after rough reflections.
+void advance(inout Path path, float t, Tissue tissue, vec3 position) {
+    path.weight *= exp(-tissue.absorption * t);
+    path.time += t / tissue.speed;
+    path.spread.x += t * (2.0 * path.spread.y + t * path.spread.z);
+    path.spread.y += t * path.spread.z;
+    path.origin = position;
+    path.t_min = clearance(position);
+}
