@@ -5,6 +5,13 @@ bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
 // Stretches through deformed tissue are cut: within a piece the field's gradient hardly changes.
 float piece_length(Field f) { return max(0.25 / f.scale.x, 4.0 * frame.cell); }
 
+// Tissue is squeezed to less than half of its length by no organ; a coarse field may say so where
+// surfaces slide past each other. There the search for scatterers is kept to what a frame affords: those
+// at the beam's edge may be missed.
+const float MOST_SQUEEZED = 2.5;
+
+vec3 bounded(vec3 v) { return v * min(1.0, MOST_SQUEEZED * inversesqrt(max(dot(v, v), 1e-12))); }
+
 // First piece and number of pieces.
 ivec2 field_pieces(Stretch s) {
     vec2 x = window_extent(s);
@@ -29,7 +36,7 @@ uvec2 march_piece(Stretch s, int piece) {
     vec3 back = middle - p - displacement(f, p, jacobian);
     jacobian += mat3(1.0);
     vec3 o = p + undeform(jacobian, back);
-    vec3 d = undeform(jacobian, s.d), el = undeform(jacobian, s.e_l), ee = undeform(jacobian, s.e_e);
+    vec3 d = bounded(undeform(jacobian, s.d)), el = bounded(undeform(jacobian, s.e_l)), ee = bounded(undeform(jacobian, s.e_e));
     float sigma = max(rows[row_at(kappa_at(s, within.x))].sigma_lateral, rows[row_at(kappa_at(s, within.y))].sigma_lateral);
     float lateral_reach = 1.02 * frame.lateral_cut * sigma, elevation_reach = frame.elevation_reach;
 
@@ -41,8 +48,8 @@ uvec2 march_piece(Stretch s, int piece) {
         vec3 there = middle + side.x * s.d + side.y * s.e_l + side.z * s.e_e;
         miss = max(miss, length(displaced(f, o + side.x * d + side.y * el + side.z * ee) - there));
     }
-    miss = 1.5 * miss + 1e-3 * h;
-    float margin = miss * max(length(d), max(length(el), length(ee)));
+    miss = min(1.5 * miss + 1e-3 * h, half_length + elevation_reach);
+    float margin = min(miss * max(length(d), max(length(el), length(ee))), half_length + elevation_reach);
 
     float factor = s.weight;
     if (tissues[s.tissue].texture_depth > 0.0) {
