@@ -4,20 +4,27 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
-use image::codecs::gif::{GifEncoder, Repeat};
-use image::{Delay, Frame, RgbaImage};
+use gif::{Encoder, Frame, Repeat};
 use miette::{Context, IntoDiagnostic, Result};
 
 /// Frames shown per second where time stands still.
 const SHOWN: f64 = 10.0;
 
-/// An animated GIF that is being written: 256 greys, played again and again.
+/// An animated GIF that is being written: 256 greys, played again and again. All frames share one
+/// palette, because some viewers show frames with a palette of their own in black.
 pub struct Movie {
     path: PathBuf,
-    encoder: GifEncoder<BufWriter<File>>,
+    state: State,
     /// Frames per second.
     rate: f64,
     frames: u32,
+}
+
+/// The format wants to know the size of the first frame before anything else.
+enum State {
+    Empty(BufWriter<File>),
+    Begun(Encoder<BufWriter<File>>),
+    Failed,
 }
 
 impl Movie {
@@ -32,37 +39,51 @@ impl Movie {
     /// # Errors
     /// What the file system says.
     pub fn new(path: &Path, rate: Option<f64>) -> Result<Self> {
-        let writing = || format!("writing {}", path.display());
         let file = File::create(path)
             .into_diagnostic()
-            .wrap_err_with(writing)?;
-        let mut encoder = GifEncoder::new(BufWriter::new(file));
-        encoder
-            .set_repeat(Repeat::Infinite)
-            .into_diagnostic()
-            .wrap_err_with(writing)?;
+            .wrap_err_with(|| format!("writing {}", path.display()))?;
         Ok(Self {
             path: path.to_owned(),
-            encoder,
+            state: State::Empty(BufWriter::new(file)),
             rate: rate.unwrap_or(SHOWN),
             frames: 0,
         })
     }
 
-    /// Adds a frame: the red channel of RGBA bytes, row by row.
+    /// Adds a frame: the red channel of RGBA bytes, row by row, of the size of the first one.
     ///
     /// # Errors
-    /// What the file system says.
+    /// What the file system says; an image larger than the format can be.
     pub fn add(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
-        // At most 256 colours, which the format keeps exactly: what is transparent becomes black.
-        let opaque = rgba.chunks_exact(4).flat_map(|p| [p[0], p[0], p[0], 255]);
-        let image = RgbaImage::from_raw(width, height, opaque.collect()).expect("four bytes each");
-        let delay = Delay::from_numer_denom_ms(10 * centiseconds(self.frames, self.rate), 1);
-        self.frames += 1;
-        self.encoder
-            .encode_frame(Frame::from_parts(image, 0, 0, delay))
+        self.write(width, height, rgba)
             .into_diagnostic()
             .wrap_err_with(|| format!("writing {}", self.path.display()))
+    }
+
+    fn write(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<(), gif::EncodingError> {
+        let large = |_| std::io::Error::other("a GIF has at most 65535 pixels a side");
+        let width = u16::try_from(width).map_err(large)?;
+        let height = u16::try_from(height).map_err(large)?;
+        let mut encoder = match std::mem::replace(&mut self.state, State::Failed) {
+            State::Empty(file) => {
+                let greys: Vec<u8> = (0..=255).flat_map(|g| [g; 3]).collect();
+                let mut encoder = Encoder::new(file, width, height, &greys)?;
+                encoder.set_repeat(Repeat::Infinite)?;
+                encoder
+            }
+            State::Begun(encoder) => encoder,
+            State::Failed => return Err(std::io::Error::other("it failed before").into()),
+        };
+        encoder.write_frame(&Frame {
+            width,
+            height,
+            delay: centiseconds(self.frames, self.rate) as u16,
+            buffer: rgba.chunks_exact(4).map(|p| p[0]).collect::<Vec<_>>().into(),
+            ..Frame::default()
+        })?;
+        self.frames += 1;
+        self.state = State::Begun(encoder);
+        Ok(())
     }
 }
 

@@ -169,11 +169,6 @@ lateral = [0.987, 0, 0.16]
 [imaging]
 tgc_sliders = [0, -1, -3, -6, -9, -12, -16, -20]
 
-# Cavities shrink to a third and leaflets turn over: scatterers that follow this are looked for in
-# ten times as many cells and more. So they rest in the meshes; "tissue" lets them follow.
-[simulation]
-texture_space = "object"
-
 # Fat, pleura and loose tissue between the heart and the lungs.
 [tissues.chest]
 based_on = "muscle"
