@@ -78,7 +78,11 @@ impl Movie {
             width,
             height,
             delay: centiseconds(self.frames, self.rate) as u16,
-            buffer: rgba.chunks_exact(4).map(|p| p[0]).collect::<Vec<_>>().into(),
+            buffer: rgba
+                .chunks_exact(4)
+                .map(|p| p[0])
+                .collect::<Vec<_>>()
+                .into(),
             ..Frame::default()
         })?;
         self.frames += 1;

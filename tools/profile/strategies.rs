@@ -17,7 +17,7 @@ use crate::table::{Table, ms, write_json, write_plot};
 pub struct Arguments {
     /// Scene file with a selector over keyframes.
     scene: PathBuf,
-    /// Frames that are measured, spread evenly over one period.
+    /// Frames that are measured, each in the middle of the keyframe after the last one's.
     #[arg(long, default_value_t = 24, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: u32,
     /// Frames before those.
@@ -75,6 +75,8 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
             arguments.scene.display()
         )
     })?;
+    let keyframed = scene.instances.iter().map(|i| i.keyframes.meshes.len());
+    let keyframes = keyframed.max().unwrap_or(0).max(1);
     let mut results = Vec::new();
     for &tracer in &machine.tracers {
         let mut runs = Vec::new();
@@ -87,7 +89,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
             });
         }
         for i in 0..arguments.warm_up + arguments.frames {
-            let seconds = period * f64::from(i) / f64::from(arguments.frames);
+            let seconds = period / keyframes as f64 * (f64::from(i) + 0.5);
             for run in &mut runs {
                 let sample = run.rig.frame_at(seconds)?;
                 if i >= arguments.warm_up {
