@@ -4,6 +4,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
+mod acquire;
 mod check;
 mod images;
 mod info;
@@ -21,6 +22,8 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Acquire tracked frames of a scene along a sweep, and a volume from them
+    Acquire(Box<acquire::Acquire>),
     /// Check a scene, a mesh or a volume and say what it holds; exits 1 on errors
     Check(check::Check),
     /// List the Vulkan devices and what each lacks
@@ -34,6 +37,7 @@ enum Command {
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
 pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
+        Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
         Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),

@@ -6,6 +6,7 @@
 // Of what others may use: tools and tests have no such items.
 #![warn(missing_docs)]
 
+pub mod acquire;
 pub mod gpu;
 pub mod harness;
 pub mod npy;

@@ -1,13 +1,13 @@
 //! `insonify reconstruct`: a volume from tracked frames.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::{DAffine3, DVec3};
 use insonify::output;
 use insonify::volume::{
-    Compounding, Config, Filling, Interpolation, Sequence, Settings, Transforms, reconstruct,
-    transform, write_meta,
+    Compounding, Config, Fan, Filling, Interpolation, Reconstruction, Sequence, Settings,
+    Transforms, reconstruct, transform, write_meta,
 };
 use miette::{Context, Result};
 
@@ -85,7 +85,8 @@ fn numbers<T: std::str::FromStr>(text: &str) -> Result<Vec<T>, String> {
     numbers.map_err(|_| format!("'{text}' is no list of such numbers"))
 }
 
-fn spacing(text: &str) -> Result<DVec3, String> {
+/// `--spacing`: one number for all axes, or one for each, mm.
+pub fn spacing(text: &str) -> Result<DVec3, String> {
     match numbers::<f64>(text)?.as_slice() {
         [all] => Ok(DVec3::splat(*all)),
         [x, y, z] => Ok(DVec3::new(*x, *y, *z)),
@@ -161,20 +162,26 @@ pub fn run(args: &Reconstruct) -> Result<()> {
         settings.holes = if length > 0 { vec![stick] } else { vec![] };
     }
     let about = || format!("reconstructing {}", args.sequence.display());
+    if settings.fan.is_none() {
+        let fan = Fan::of(&sequence).map_err(miette::Report::from);
+        settings.fan = fan.wrap_err_with(about)?;
+    }
     let poses = config.transforms.of_frames(&sequence, &image, &reference);
     let poses = poses.map_err(miette::Report::from).wrap_err_with(about)?;
     let made = reconstruct(&sequence, &poses, &config.settings);
     let made = made.map_err(miette::Report::from).wrap_err_with(about)?;
     write_meta(&args.output, &made.volume)?;
-    output::line(args.output.display());
+    tell(&args.output, &made, sequence.frames.len());
+    Ok(())
+}
+
+/// Says what was made of `frames` frames.
+pub fn tell(path: &Path, made: &Reconstruction, frames: usize) {
+    output::line(path.display());
     output::line(&made.volume);
     let empty = made.volume.voxels.len() - made.reached - made.filled;
     output::line(format!(
-        "  {} of {} frames; {} voxels reached, {} filled, {empty} empty",
-        made.frames,
-        sequence.frames.len(),
-        made.reached,
-        made.filled
+        "  {} of {frames} frames; {} voxels reached, {} filled, {empty} empty",
+        made.frames, made.reached, made.filled
     ));
-    Ok(())
 }

@@ -205,7 +205,7 @@ pub fn run(args: &Render) -> Result<()> {
 }
 
 /// The tracer to use; `auto` says in one line why it falls back.
-fn choose_tracer(choice: TracerChoice, device: &Device) -> Result<Tracer> {
+pub fn choose_tracer(choice: TracerChoice, device: &Device) -> Result<Tracer> {
     let wanted = match choice {
         TracerChoice::Auto => None,
         TracerChoice::RayQuery => Some(Tracer::RayQuery),
@@ -313,7 +313,7 @@ fn simulate(
 }
 
 /// Takes the counts of `quality` for this device, but for those that the user set by hand.
-fn set_quality(
+pub fn set_quality(
     simulation: &mut Simulation,
     quality: QualityChoice,
     device: &Device,

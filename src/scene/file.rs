@@ -22,6 +22,7 @@ mod trajectory;
 mod units;
 
 pub use error::SceneError;
+pub use trajectory::load_trajectory;
 
 use document::{Document, Source};
 
@@ -111,6 +112,33 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     match value.is_finite() {
         true => Ok(value),
         false => Err(format!("{value} s is no time")),
+    }
+}
+
+/// A length as the command line and scene files write it: mm, or with a unit. Finite.
+///
+/// # Errors
+/// What is wrong with the text, in words.
+pub fn millimetres(text: &str) -> Result<f64, String> {
+    let value = match text.trim().parse::<f64>() {
+        Ok(value) => value,
+        Err(_) => units::parse::<units::InLength>(text)?,
+    };
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(format!("{value} mm is no length")),
+    }
+}
+
+/// An angle as the command line and scene files write it, with its unit, in radians. Finite.
+///
+/// # Errors
+/// What is wrong with the text, in words.
+pub fn radians(text: &str) -> Result<f64, String> {
+    let value = units::parse::<units::InAngle>(text)?;
+    match value.is_finite() {
+        true => Ok(value),
+        false => Err(format!("{value} rad is no angle")),
     }
 }
 

@@ -7,7 +7,7 @@ use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
-use super::sequence::frames;
+use super::sequence::{self, frames};
 use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
 use super::voxels::VoxelType;
 use super::{Format, Warning};
@@ -56,7 +56,10 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     let (fields, data) = fields(path)?;
     let mut out = of_fields(&fields, data)?;
     let keys = unused_keys(&fields);
-    let keys: Vec<_> = keys.iter().map(|f| f.key.as_str()).collect();
+    let of_frames = |f: &&&Field| sequence::KEYS.contains(&f.key.as_str());
+    let stacked_frames = frames::in_header(&fields);
+    let keys = keys.iter().filter(|f| !(stacked_frames && of_frames(f)));
+    let keys: Vec<_> = keys.map(|f| f.key.as_str()).collect();
     out.warnings.extend(unused(path, &keys));
     out.warnings.extend(stacked(&fields));
     Ok(out)

@@ -10,12 +10,14 @@ use super::source::MAX_BYTES;
 use super::{Format, Frame, Sequence, Volume, Voxels};
 
 mod config;
+pub(super) mod fan;
 mod grid;
 mod holes;
 mod insert;
 mod poses;
 
 pub use config::Config;
+pub use fan::Fan;
 pub use grid::Lattice;
 pub use poses::Transforms;
 
@@ -57,18 +59,6 @@ pub enum Compounding {
     Maximum,
     /// The one of the latest frame. With `Linear` as for the largest.
     Latest,
-}
-
-/// The part of a frame that holds the image of a curved array, pixels and degrees. The fan opens
-/// towards larger y.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Fan {
-    /// Centre of its arcs.
-    pub origin: [f64; 2],
-    /// Its sides, from y towards x, the smaller first.
-    pub angles: [f64; 2],
-    /// Its smallest and largest distance from the centre.
-    pub radii: [f64; 2],
 }
 
 /// A way to fill a voxel that no pixel reached.

@@ -4,6 +4,7 @@
 use std::path::Path;
 
 use super::error::VolumeError;
+use super::reconstruct::fan;
 use super::{Voxels, Warning, meta};
 
 pub(super) mod frames;
@@ -32,6 +33,12 @@ pub struct Sequence {
 }
 
 const ORIENTATION: &str = "UltrasoundImageOrientation";
+
+/// Keys of a header that mean something where its slices are frames.
+pub(super) const KEYS: [&str; 6] = {
+    let [a, b, c, d] = fan::KEYS;
+    [ORIENTATION, "UltrasoundImageType", a, b, c, d]
+};
 
 impl Sequence {
     /// Reads a sequence (.mha, .mhd). Of several values per pixel the first is read. A frame whose

@@ -24,7 +24,7 @@ pub const SAC: Vec3 = Vec3::new(0.0, 0.0, 70.0);
 const SAC_RADII: Vec3 = Vec3::new(37.0, 26.0, 24.0);
 
 /// Thickness of the decidua around it.
-const DECIDUA: f32 = 4.0;
+pub const DECIDUA: f32 = 4.0;
 
 /// Depth under the skin of the layers' outer faces: fat, rectus muscle, the fat in front of the
 /// peritoneum, the pelvis (lean adult).
@@ -35,7 +35,7 @@ const PRESS: (f32, f32) = (9.0, 1.5);
 
 /// Distance to the skin, negative inside; the probe's curve of radius 50 mm is pressed in and fades
 /// with depth.
-fn skin(p: &Point) -> Tree {
+pub fn skin(p: &Point) -> Tree {
     let gauss = |t: &Tree, sigma: f32| (t.clone() * (1.0 / sigma)).square();
     let pressed = gauss(&p.0, 23.0) + gauss(&p.1, 20.0) + gauss(&p.2, 40.0);
     let dent = (pressed * -0.5).exp() * (PRESS.0 + PRESS.1) - PRESS.0;
@@ -45,13 +45,14 @@ fn skin(p: &Point) -> Tree {
     intersection(front, block, 8.0)
 }
 
-fn sac(p: &Point, wider: f32) -> Tree {
+/// The sac, `wider` mm larger all around.
+pub fn sac(p: &Point, wider: f32) -> Tree {
     let q = p.from(SAC);
     ellipsoid(&q, SAC_RADII + wider) + undulation(p, 0.6, 31.0, 1.4)
 }
 
 /// Body and cervix; the cervix points down and back.
-fn uterus(p: &Point) -> Tree {
+pub fn uterus(p: &Point) -> Tree {
     let body = ellipsoid(&p.from(SAC - Vec3::X), Vec3::new(55.0, 43.0, 40.0));
     let cervix = cone(
         p,
@@ -64,13 +65,18 @@ fn uterus(p: &Point) -> Tree {
 }
 
 /// A half-full bladder between the wall and the lower uterus, shrunk by `wall`.
-fn bladder(p: &Point, wall: f32) -> Tree {
+pub fn bladder(p: &Point, wall: f32) -> Tree {
     let whole = ellipsoid(
         &p.from(Vec3::new(57.0, 0.0, 44.0)),
         Vec3::new(27.0, 30.0, 17.0) - wall,
     );
     let clear = difference(whole, uterus(p) - (1.0 + wall), 5.0);
     intersection(clear, skin(p) + LAYERS[3] + 1.0 + wall, 5.0)
+}
+
+/// The lining around the sac, inside the muscle.
+pub fn decidua(p: &Point) -> Tree {
+    intersection(sac(p, DECIDUA), uterus(p) + 11.0, 3.0)
 }
 
 /// A disc of 15 mm on the back wall of the sac, from which it bulges inwards.
@@ -91,8 +97,6 @@ pub fn outer() -> Vec<Part> {
     let p = &Point::world();
     let wall = (4.0, 0.8);
     let layer = |i: usize| skin(p) + LAYERS[i] + undulation(p, 0.6, 45.0, 1.0 + i as f32);
-    let cavity = uterus(p) + 11.0;
-    let decidua = intersection(sac(p, DECIDUA), cavity, 3.0);
     vec![
         part("skin", "skin", wall, skin(p)),
         part("subcutaneous-fat", "fat", wall, layer(0)),
@@ -102,7 +106,7 @@ pub fn outer() -> Vec<Part> {
         part("bladder-wall", "muscle", (2.5, 0.6), bladder(p, 0.0)),
         part("mother-bladder", "urine", (2.5, 0.6), bladder(p, 2.2)),
         part("uterus", "uterus", (3.0, 0.8), uterus(p)),
-        part("decidua", "decidua", (2.5, 1.0), decidua),
+        part("decidua", "decidua", (2.5, 1.0), decidua(p)),
         part("sac", "amniotic_fluid", (2.5, 1.0), sac(p, 0.0)),
     ]
 }

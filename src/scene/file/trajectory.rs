@@ -47,6 +47,17 @@ pub(super) fn text(path: &Path) -> Result<String, String> {
     std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"))
 }
 
+/// The samples of the trajectory file at `path`, linear between them: TOML by its extension, else CSV,
+/// of the columns `time_s`, `x_mm`, `y_mm`, `z_mm` (mm) and `qw`, `qx`, `qy`, `qz` (a quaternion).
+///
+/// # Errors
+/// A file that cannot be read, or the first mistake with its place in it.
+pub fn load_trajectory(path: &Path) -> Result<Track, SceneError> {
+    let text = text(path)
+        .map_err(|cause| SceneError::file(path, cause, "check the path of the trajectory"))?;
+    parse(path, &text, Curve::Linear)
+}
+
 /// The samples of `text`, TOML by the extension of `path`, else CSV.
 ///
 /// # Errors

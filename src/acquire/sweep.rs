@@ -1,0 +1,82 @@
+//! Ways that a probe takes.
+
+use glam::{DAffine3, DVec3};
+
+use crate::scene::Scene;
+use crate::scene::animation::{Track, Trs};
+
+/// Where the probe is at a moment.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Station {
+    /// Timestamp, s.
+    pub time: f64,
+    /// World from probe space, mm.
+    pub world_from_probe: DAffine3,
+}
+
+/// A sweep about the pose that the scene gives the probe, in the probe's own axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sweep {
+    /// Along the elevation axis, so many mm from the first frame to the last.
+    Linear(f64),
+    /// About the lateral axis through the face's centre (a fan), so many rad from first to last.
+    Tilt(f64),
+    /// About the depth axis, so many rad from first to last.
+    Rotate(f64),
+}
+
+impl Sweep {
+    /// Evenly spaced poses, the scene's own in the middle, `rate` of them a second from time 0 on.
+    pub fn stations(self, scene: &Scene, frames: u32, rate: f64) -> Vec<Station> {
+        let last = f64::from(frames.max(2) - 1);
+        (0..frames)
+            .map(|i| {
+                let part = match frames {
+                    1 => 0.0,
+                    _ => f64::from(i) / last - 0.5,
+                };
+                Station {
+                    time: f64::from(i) / rate,
+                    world_from_probe: scene.world_from_probe * self.at(part),
+                }
+            })
+            .collect()
+    }
+
+    /// The middle pose from the one at `part` of the way, -1/2 to 1/2.
+    fn at(self, part: f64) -> DAffine3 {
+        match self {
+            Self::Linear(length) => DAffine3::from_translation(DVec3::Y * (part * length)),
+            Self::Tilt(angle) => DAffine3::from_rotation_x(part * angle),
+            Self::Rotate(angle) => DAffine3::from_rotation_z(part * angle),
+        }
+    }
+}
+
+/// Poses of the probe in the world from a trajectory: one at each of its times, or `frames` evenly
+/// from its first time to its last. What it leaves out, position or rotation, stays the scene's.
+pub fn stations_of(track: &Track, scene: &Scene, frames: Option<u32>) -> Vec<Station> {
+    let (_, rotation, translation) = scene.world_from_probe.to_scale_rotation_translation();
+    let rest = Trs {
+        translation,
+        rotation,
+        ..Trs::default()
+    };
+    let times: Vec<f64> = match (frames, track.span()) {
+        (Some(frames), Some((first, last))) => {
+            let step = (last - first) / f64::from(frames.max(2) - 1);
+            (0..frames).map(|i| first + f64::from(i) * step).collect()
+        }
+        _ => {
+            let mut times: Vec<f64> = track.times().collect();
+            times.sort_by(f64::total_cmp);
+            times.dedup();
+            times
+        }
+    };
+    let station = |time| Station {
+        time,
+        world_from_probe: track.at(rest, time).matrix(),
+    };
+    times.into_iter().map(station).collect()
+}

@@ -1,0 +1,235 @@
+//! `insonify acquire`: tracked frames of a scene while the probe follows a sweep.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use glam::DVec3;
+use indicatif::{ProgressBar, ProgressStyle};
+use insonify::acquire::{self, Station, Sweep};
+use insonify::gpu::{Device, DeviceOptions};
+use insonify::output;
+use insonify::scene::Scene;
+use insonify::scene::file;
+use insonify::sim::Simulator;
+use insonify::sim::shaders::Library;
+use insonify::volume::{Sequence, Settings, write_meta};
+use miette::{Context, IntoDiagnostic, Result, miette};
+
+use super::reconstruct::{spacing, tell};
+use super::render::{QualityChoice, TracerChoice, choose_tracer, set_quality};
+
+/// Arguments of `insonify acquire`.
+#[derive(Debug, Args)]
+pub struct Acquire {
+    /// Scene file (.toml). Its pose of the probe is the middle of the sweep.
+    scene: PathBuf,
+    /// How the probe goes: linear:LENGTH along its elevation axis, tilt:ANGLE about its lateral axis,
+    /// rotate:ANGLE about its depth axis, from the first frame to the last, e.g. linear:30mm or
+    /// tilt:40deg; or a file (.csv, .toml) of its poses in the world: time_s, x_mm, y_mm, z_mm, qw, qx,
+    /// qy, qz.
+    #[arg(long, value_name = "KIND:EXTENT|FILE", value_parser = way)]
+    sweep: Way,
+    /// Frames to take, evenly spaced [default: 41; of a file one for each of its rows].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    frames: Option<u32>,
+    /// Tracked frames to write (.mha), as PLUS and 3D Slicer read them.
+    #[arg(short, long, required_unless_present = "volume")]
+    output: Option<PathBuf>,
+    /// Volume to reconstruct from them (.mha), along the axes of the probe at its middle frame.
+    #[arg(long, value_name = "FILE")]
+    volume: Option<PathBuf>,
+    /// Distance of the volume's voxels, mm: one number, or lateral,elevation,depth as 0.5,1,0.3.
+    #[arg(long, value_parser = spacing, default_value = "0.5", requires = "volume")]
+    spacing: DVec3,
+    /// Frames per second of the timestamps; a file has times of its own.
+    #[arg(long, value_name = "HZ", default_value_t = 20.0, value_parser = rate)]
+    rate: f64,
+    /// Time of the scene at the first frame: seconds, or with a unit, e.g. "400 ms".
+    #[arg(long, default_value = "0", value_parser = file::seconds, allow_hyphen_values = true)]
+    time: f64,
+    /// Lets the anatomy move on as the timestamps do [default: it stands still].
+    #[arg(long)]
+    moving: bool,
+    /// Path and scatterer counts that suit the device [default: the scene's own].
+    #[arg(long, value_enum)]
+    quality: Option<QualityChoice>,
+    /// Seed of every random number; replaces the scene's.
+    #[arg(long)]
+    seed: Option<u32>,
+    /// Tracer.
+    #[arg(long, value_enum, default_value = "auto")]
+    tracer: TracerChoice,
+    /// Vulkan device: part of its name, or its index in `insonify info`.
+    #[arg(long)]
+    device: Option<String>,
+    /// Overrides an entry of the scene file, e.g. --set probe.depth="80 mm".
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = file::override_of)]
+    overrides: Vec<(String, String)>,
+}
+
+/// `--sweep`.
+#[derive(Clone, Debug)]
+enum Way {
+    /// About the scene's pose.
+    Sweep(Sweep),
+    /// Poses in a file.
+    File(PathBuf),
+}
+
+fn way(text: &str) -> Result<Way, String> {
+    let Some((kind, extent)) = text.split_once(':') else {
+        let path = PathBuf::from(text);
+        let extension = path.extension().and_then(|e| e.to_str());
+        return match extension.map(str::to_ascii_lowercase).as_deref() {
+            Some("csv" | "toml") => Ok(Way::File(path)),
+            _ => {
+                Err("give linear:LENGTH, tilt:ANGLE, rotate:ANGLE, or a .csv or .toml file".into())
+            }
+        };
+    };
+    let bounded = |value: f64, most: f64| match value.abs() <= most {
+        true => Ok(value),
+        false => Err(format!("`{extent}` is too far")),
+    };
+    let turn = || bounded(file::radians(extent)?, std::f64::consts::TAU);
+    Ok(Way::Sweep(match kind {
+        "linear" => Sweep::Linear(bounded(file::millimetres(extent)?, 1e4)?),
+        "tilt" => Sweep::Tilt(turn()?),
+        "rotate" => Sweep::Rotate(turn()?),
+        _ => return Err(format!("`{kind}` is no sweep: linear, tilt and rotate are")),
+    }))
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match (1e-3..=1e4).contains(&value) {
+        true => Ok(value),
+        false => Err("it must lie between 0.001 and 10000".to_owned()),
+    }
+}
+
+/// Refuses names that cannot be written before minutes have gone into what they are for.
+fn writable(path: &Path) -> Result<()> {
+    let extension = path.extension().and_then(|e| e.to_str());
+    if !extension.is_some_and(|e| e.eq_ignore_ascii_case("mha")) {
+        return Err(miette!(
+            help = "end the name in .mha",
+            "{} is not written: only MetaImage in one file is",
+            path.display()
+        ));
+    }
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    match folder.is_none_or(Path::is_dir) {
+        true => Ok(()),
+        false => Err(miette!(
+            help = "make the folder first",
+            "{} is not written: its folder does not exist",
+            path.display()
+        )),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Everything that the user or the device can get wrong, said once.
+pub fn run(args: &Acquire) -> Result<()> {
+    for path in args.output.iter().chain(&args.volume) {
+        writable(path)?;
+    }
+    let (mut scene, warnings) = Scene::load(&args.scene, &args.overrides)?;
+    for warning in &warnings {
+        eprintln!("{warning}");
+    }
+    let stations = stations(args, &scene)?;
+    let sequence = simulate(args, &mut scene, &stations)?;
+    if let Some(path) = &args.output {
+        sequence.write(path)?;
+        output::line(path.display());
+        let [width, height] = sequence.size;
+        let count = sequence.frames.len();
+        output::line(format!(
+            "  {count} tracked frames of {width} x {height} pixels"
+        ));
+    }
+    if let Some(path) = &args.volume {
+        let made = acquire::volume(&sequence, Settings::new(args.spacing));
+        let about = || format!("reconstructing {}", path.display());
+        let made = made.map_err(miette::Report::from).wrap_err_with(about)?;
+        write_meta(path, &made.volume)?;
+        tell(path, &made, sequence.frames.len());
+    }
+    Ok(())
+}
+
+fn stations(args: &Acquire, scene: &Scene) -> Result<Vec<Station>> {
+    match &args.sweep {
+        Way::Sweep(sweep) => Ok(sweep.stations(scene, args.frames.unwrap_or(41), args.rate)),
+        Way::File(path) => {
+            let track = file::load_trajectory(path)?;
+            Ok(acquire::stations_of(&track, scene, args.frames))
+        }
+    }
+}
+
+fn simulate(args: &Acquire, scene: &mut Scene, stations: &[Station]) -> Result<Sequence> {
+    if let Some(seed) = args.seed {
+        scene.simulation.seed = seed;
+    }
+    scene.set_time(args.time);
+    let device = Device::new(&DeviceOptions {
+        selector: args.device.clone(),
+        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
+        ..DeviceOptions::default()
+    })
+    .into_diagnostic()?;
+    if let Some(quality) = args.quality {
+        set_quality(&mut scene.simulation, quality, &device, &args.overrides);
+    }
+    let tracer = choose_tracer(args.tracer, &device)?;
+    let library = Library::embedded();
+    let mut simulator = Simulator::new(&device, &library, scene, tracer).into_diagnostic()?;
+    if let Some(warning) = simulator.warning() {
+        eprintln!("warning: {warning}");
+    }
+    // Hidden by indicatif itself when standard error is no terminal.
+    let bar = ProgressBar::new(stations.len() as u64).with_style(
+        ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
+            .expect("a valid template"),
+    );
+    let moving = args.moving.then_some(args.time);
+    let made = acquire::acquire(&mut simulator, scene, stations, moving, |index| {
+        bar.set_position(index as u64 + 1);
+    });
+    bar.finish_and_clear();
+    made.into_diagnostic()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_have_a_kind_and_an_extent() {
+        let sweep = |text: &str| match way(text) {
+            Ok(Way::Sweep(sweep)) => sweep,
+            other => panic!("{text}: {other:?}"),
+        };
+        assert_eq!(sweep("linear:30"), Sweep::Linear(30.0));
+        assert_eq!(sweep("linear:-3 cm"), Sweep::Linear(-30.0));
+        assert_eq!(sweep("tilt:180deg"), Sweep::Tilt(std::f64::consts::PI));
+        assert_eq!(sweep("rotate:1 rad"), Sweep::Rotate(1.0));
+        assert!(matches!(way("a/way.CSV"), Ok(Way::File(_))));
+        for (text, cause) in [
+            ("linear", "linear:LENGTH"),
+            ("tilt:40", "has no unit"),
+            ("linear:40deg", "does not fit"),
+            ("rotate:400deg", "too far"),
+            ("lineal:3", "no sweep"),
+            ("way.txt", ".csv or .toml"),
+        ] {
+            let told = way(text).expect_err(text);
+            assert!(told.contains(cause), "{text}: {told}");
+        }
+    }
+}
