@@ -6,6 +6,7 @@ use clap::{Parser, Subcommand};
 
 mod acquire;
 mod check;
+mod common;
 mod images;
 mod info;
 mod movie;

@@ -4,9 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use glam::DVec3;
-use indicatif::{ProgressBar, ProgressStyle};
 use insonify::acquire::{self, Station, Sweep};
-use insonify::gpu::{Device, DeviceOptions};
 use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::file;
@@ -15,8 +13,8 @@ use insonify::sim::shaders::Library;
 use insonify::volume::{Sequence, Settings, write_meta};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
+use super::common::{Common, Progress};
 use super::reconstruct::{spacing, tell};
-use super::render::{QualityChoice, TracerChoice, choose_tracer, set_quality};
 
 /// Arguments of `insonify acquire`.
 #[derive(Debug, Args)]
@@ -44,27 +42,11 @@ pub struct Acquire {
     /// Frames per second of the timestamps; a file has times of its own.
     #[arg(long, value_name = "HZ", default_value_t = 20.0, value_parser = rate)]
     rate: f64,
-    /// Time of the scene at the first frame: seconds, or with a unit, e.g. "400 ms".
-    #[arg(long, default_value = "0", value_parser = file::seconds, allow_hyphen_values = true)]
-    time: f64,
     /// Lets the anatomy move on as the timestamps do [default: it stands still].
     #[arg(long)]
     moving: bool,
-    /// Path and scatterer counts that suit the device [default: the scene's own].
-    #[arg(long, value_enum)]
-    quality: Option<QualityChoice>,
-    /// Seed of every random number; replaces the scene's.
-    #[arg(long)]
-    seed: Option<u32>,
-    /// Tracer.
-    #[arg(long, value_enum, default_value = "auto")]
-    tracer: TracerChoice,
-    /// Vulkan device: part of its name, or its index in `insonify info`.
-    #[arg(long)]
-    device: Option<String>,
-    /// Overrides an entry of the scene file, e.g. --set probe.depth="80 mm".
-    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = file::override_of)]
-    overrides: Vec<(String, String)>,
+    #[command(flatten)]
+    common: Common,
 }
 
 /// `--sweep`.
@@ -137,7 +119,7 @@ pub fn run(args: &Acquire) -> Result<()> {
     for path in args.output.iter().chain(&args.volume) {
         writable(path)?;
     }
-    let (mut scene, warnings) = Scene::load(&args.scene, &args.overrides)?;
+    let (mut scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
     for warning in &warnings {
         eprintln!("{warning}");
     }
@@ -173,36 +155,23 @@ fn stations(args: &Acquire, scene: &Scene) -> Result<Vec<Station>> {
 }
 
 fn simulate(args: &Acquire, scene: &mut Scene, stations: &[Station]) -> Result<Sequence> {
-    if let Some(seed) = args.seed {
-        scene.simulation.seed = seed;
-    }
-    scene.set_time(args.time);
-    let device = Device::new(&DeviceOptions {
-        selector: args.device.clone(),
-        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
-        ..DeviceOptions::default()
-    })
-    .into_diagnostic()?;
-    if let Some(quality) = args.quality {
-        set_quality(&mut scene.simulation, quality, &device, &args.overrides);
-    }
-    let tracer = choose_tracer(args.tracer, &device)?;
+    let device = args.common.device()?;
+    let tracer = args.common.tracer(&device)?;
+    args.common.settle(scene, &device);
     let library = Library::embedded();
     let mut simulator = Simulator::new(&device, &library, scene, tracer).into_diagnostic()?;
     if let Some(warning) = simulator.warning() {
         eprintln!("warning: {warning}");
     }
-    // Hidden by indicatif itself when standard error is no terminal.
-    let bar = ProgressBar::new(stations.len() as u64).with_style(
-        ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
-            .expect("a valid template"),
-    );
-    let moving = args.moving.then_some(args.time);
+    let mut progress = Progress::new(stations.len() as u32, "frames");
+    let moving = args.moving.then_some(args.common.time);
     let made = acquire::acquire(&mut simulator, scene, stations, moving, |index| {
-        bar.set_position(index as u64 + 1);
+        progress.done(index as u32 + 1);
     });
-    bar.finish_and_clear();
-    made.into_diagnostic()
+    progress.finish();
+    let made = made.into_diagnostic()?;
+    args.common.validated(&device)?;
+    Ok(made)
 }
 
 #[cfg(test)]

@@ -3,31 +3,18 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
-use miette::{Context, IntoDiagnostic, Result, miette};
+use miette::{Context, IntoDiagnostic, Result};
 use serde_json::{Map, Value, json};
 
+use super::common::{self, Common, Progress};
 use super::images::Images;
 use super::movie::Movie;
-use insonify::gpu::{AdapterKind, Device, DeviceOptions, FrameTimings};
+use insonify::gpu::FrameTimings;
 use insonify::output;
 use insonify::scene::Scene;
-use insonify::scene::file::override_of;
-use insonify::scene::settings::{Machine, Quality, Simulation};
+use insonify::sim::Simulator;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
-
-/// Which tracer follows the rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum TracerChoice {
-    /// Ray query where the device has it, else the compute BVH.
-    Auto,
-    /// The device's ray-tracing hardware, or its emulation.
-    RayQuery,
-    /// Our BVH in a compute kernel; runs everywhere.
-    Bvh,
-}
 
 /// Arguments of `insonify render`.
 #[derive(Debug, clap::Args)]
@@ -39,60 +26,25 @@ pub struct Render {
     /// where the number goes. NAME.gif is an animation of all frames, played again and again.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Path and scatterer counts that suit the device [default: the scene's own]. Counts that --set
-    /// gives stay.
-    #[arg(long, value_enum)]
-    quality: Option<QualityChoice>,
     /// Frames to simulate; each is written, timings are over all. --dump takes the last.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: u32,
-    /// Time of the first frame: seconds, or with a unit, e.g. "400 ms".
-    #[arg(long, default_value = "0", value_parser = seconds, allow_hyphen_values = true)]
-    time: f64,
     /// Frames per second of the scene's time [default: time stands still, and only noise differs].
     /// Without it an animated GIF shows 10 frames a second.
     #[arg(long, value_parser = rate)]
     fps: Option<f64>,
-    /// Seed of every random number; replaces the scene's.
-    #[arg(long)]
-    seed: Option<u32>,
-    /// Tracer.
-    #[arg(long, value_enum, default_value = "auto")]
-    tracer: TracerChoice,
-    /// Vulkan device: part of its name, or its index in `insonify info`.
-    #[arg(long)]
-    device: Option<String>,
-    /// Overrides an entry of the scene file, e.g. --set simulation.paths=32 --set probe.depth="80 mm".
-    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = override_of)]
-    overrides: Vec<(String, String)>,
+    #[command(flatten)]
+    common: Common,
     /// Writes every stage as a numbered array with its axes into this folder.
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
     /// Writes settings, timings, memory and counters as one JSON object.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Runs with Vulkan's validation layers and fails on any message.
-    #[arg(long)]
-    validate: bool,
     /// Compiles the kernels of this folder instead of using the built-in ones.
     #[cfg(feature = "compile")]
     #[arg(long, value_name = "DIR")]
     glsl: Option<PathBuf>,
-}
-
-/// `--quality`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum QualityChoice {
-    /// A first look. Software driver: 2 paths, lattice 4/3 as coarse. GPU: 8 paths.
-    Draft,
-    /// Software driver: 8 paths, one lattice cell per layer. GPU: 32 paths, two cells.
-    Standard,
-    /// A proof, on any device: 128 paths, lattice 2/3 as coarse, the whole slice.
-    Reference,
-}
-
-fn seconds(text: &str) -> Result<f64, String> {
-    insonify::scene::file::seconds(text)
 }
 
 fn rate(text: &str) -> Result<f64, String> {
@@ -108,25 +60,13 @@ fn rate(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &Render) -> Result<()> {
-    let (mut scene, warnings) = Scene::load(&args.scene, &args.overrides)?;
+    let (mut scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
     for warning in &warnings {
         eprintln!("{warning}");
     }
-    if let Some(seed) = args.seed {
-        scene.simulation.seed = seed;
-    }
-    scene.set_time(args.time);
-    let device = Device::new(&DeviceOptions {
-        selector: args.device.clone(),
-        validate: args.validate,
-        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
-        ..DeviceOptions::default()
-    })
-    .into_diagnostic()?;
-    if let Some(quality) = args.quality {
-        set_quality(&mut scene.simulation, quality, &device, &args.overrides);
-    }
-    let tracer = choose_tracer(args.tracer, &device)?;
+    let device = args.common.device()?;
+    let tracer = args.common.tracer(&device)?;
+    args.common.settle(&mut scene, &device);
     let mut library = library(args)?;
 
     let loaded = Instant::now();
@@ -147,23 +87,8 @@ pub fn run(args: &Render) -> Result<()> {
     }
 
     let counters = simulator.counters().into_diagnostic()?;
-    if counters.saturated > 0 {
-        eprintln!(
-            "warning: {} samples saturated; lower surface_gain or speckle_gain",
-            counters.saturated
-        );
-    }
-    if counters.segments_dropped > 0 {
-        eprintln!(
-            "warning: {} path segments did not fit and were dropped; lower simulation.max_interactions",
-            counters.segments_dropped
-        );
-    }
-    if counters.stack_overflow > 0 {
-        eprintln!(
-            "warning: {} crossings of more than 16 nested meshes were ignored",
-            counters.stack_overflow
-        );
+    for lost in common::lost(&counters) {
+        eprintln!("warning: {lost}");
     }
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
@@ -174,7 +99,7 @@ pub fn run(args: &Render) -> Result<()> {
             "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
             "tracer": tracer.to_string(),
             "triangles": scene.triangles(),
-            "time_s": args.time,
+            "time_s": args.common.time,
             "fps": args.fps,
             "build_ms": build_ms,
             "stages_ms": stage_statistics(&timings),
@@ -194,35 +119,7 @@ pub fn run(args: &Render) -> Result<()> {
             .into_diagnostic()
             .wrap_err_with(|| format!("writing {}", file.display()))?;
     }
-    if args.validate && !messages.is_empty() {
-        return Err(miette!(
-            "{} validation messages, the first: {}",
-            messages.len(),
-            messages[0]
-        ));
-    }
-    Ok(())
-}
-
-/// The tracer to use; `auto` says in one line why it falls back.
-pub fn choose_tracer(choice: TracerChoice, device: &Device) -> Result<Tracer> {
-    let wanted = match choice {
-        TracerChoice::Auto => None,
-        TracerChoice::RayQuery => Some(Tracer::RayQuery),
-        TracerChoice::Bvh => Some(Tracer::Bvh),
-    };
-    if wanted == Some(Tracer::RayQuery) && !device.supports_ray_query() {
-        return Err(miette!(
-            help = "use --tracer bvh, which runs everywhere, or another --device",
-            "{} has no ray query",
-            device.name()
-        ));
-    }
-    let (tracer, why) = Tracer::choose(wanted, device);
-    if let Some(why) = why {
-        eprintln!("{why}");
-    }
-    Ok(tracer)
+    args.common.validated(&device)
 }
 
 #[cfg(feature = "compile")]
@@ -269,18 +166,13 @@ fn simulate(
         false => None,
     };
     let images = Images::new(file, args.frames);
-    // Hidden by indicatif itself when standard error is no terminal; silent under a second.
-    let bar = ProgressBar::new(u64::from(args.frames)).with_style(
-        ProgressStyle::with_template("{wide_bar} {pos}/{len} frames, {eta} left")
-            .expect("a valid template"),
-    );
-    let start = Instant::now();
+    let mut progress = Progress::new(args.frames, "frames");
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
     for index in 0..args.frames {
         reload(simulator, library);
         if let Some(fps) = args.fps {
-            scene.set_time(args.time + f64::from(index) / fps);
+            scene.set_time(args.common.time + f64::from(index) / fps);
         }
         if index > 0 && !unseen.is_empty() {
             let still = scene.masks_off_the_image();
@@ -292,53 +184,18 @@ fn simulate(
             Some(movie) => movie.add(width, height, &rgba)?,
             None => dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?,
         }
-        if start.elapsed().as_secs() >= 1 {
-            bar.set_position(u64::from(index) + 1);
-        }
+        progress.done(index + 1);
     }
     for mask in unseen {
-        eprintln!(
-            "warning: the mask `{}` never meets the image: nothing is simulated in it; move the mesh \
-             or the probe",
-            scene.instances[mask].name
-        );
+        eprintln!("warning: {}", common::unseen(scene, mask));
     }
     timings.extend(simulator.wait().into_diagnostic()?);
-    bar.finish_and_clear();
+    progress.finish();
     match movie {
         Some(_) => output::line(file.display()),
         None => output::line(&images),
     }
     Ok(timings)
-}
-
-/// Takes the counts of `quality` for this device, but for those that the user set by hand.
-pub fn set_quality(
-    simulation: &mut Simulation,
-    quality: QualityChoice,
-    device: &Device,
-    overrides: &[(String, String)],
-) {
-    let quality = match quality {
-        QualityChoice::Draft => Quality::Draft,
-        QualityChoice::Standard => Quality::Standard,
-        QualityChoice::Reference => Quality::Reference,
-    };
-    let machine = match device.info().kind {
-        AdapterKind::Cpu => Machine::Software,
-        _ => Machine::Gpu,
-    };
-    let by_hand = simulation.clone();
-    simulation.set_quality(quality, machine);
-    for (key, _) in overrides {
-        match key.as_str() {
-            "simulation.paths" => simulation.paths = by_hand.paths,
-            "simulation.cell" => simulation.cell = by_hand.cell,
-            "simulation.elevation_cells" => simulation.elevation_cells = by_hand.elevation_cells,
-            "simulation.volume_floor" => simulation.volume_floor = by_hand.volume_floor,
-            _ => {}
-        }
-    }
 }
 
 fn default_output(scene: &Path) -> PathBuf {

@@ -1,0 +1,229 @@
+//! What commands that simulate take and do alike.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use indicatif::{ProgressBar, ProgressStyle};
+use miette::{IntoDiagnostic, Result, miette};
+
+use insonify::gpu::{AdapterKind, Device, DeviceOptions};
+use insonify::scene::Scene;
+use insonify::scene::file::override_of;
+use insonify::scene::settings::{Machine, Quality, Simulation};
+use insonify::sim::Tracer;
+use insonify::sim::layout::Counters;
+
+/// Arguments of every command that simulates.
+#[derive(Debug, clap::Args)]
+pub struct Common {
+    /// Path and scatterer counts that suit the device [default: the scene's own]. Counts that --set
+    /// gives stay.
+    #[arg(long, value_enum)]
+    pub quality: Option<QualityChoice>,
+    /// Time of the first frame: seconds, or with a unit, e.g. "400 ms".
+    #[arg(long, default_value = "0", value_parser = seconds, allow_hyphen_values = true)]
+    pub time: f64,
+    /// Seed of every random number; replaces the scene's.
+    #[arg(long)]
+    pub seed: Option<u32>,
+    /// Tracer.
+    #[arg(long, value_enum, default_value = "auto")]
+    pub tracer: TracerChoice,
+    /// Vulkan device: part of its name, or its index in `insonify info`.
+    #[arg(long)]
+    pub device: Option<String>,
+    /// Overrides an entry of the scene file, e.g. --set simulation.paths=32 --set probe.depth="80 mm".
+    #[arg(long = "set", value_name = "PATH=VALUE", value_parser = override_of)]
+    pub overrides: Vec<(String, String)>,
+    /// Runs with Vulkan's validation layers and fails on any message.
+    #[arg(long)]
+    pub validate: bool,
+}
+
+/// Which tracer follows the rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum TracerChoice {
+    /// Ray query where the device has it, else the compute BVH.
+    Auto,
+    /// The device's ray-tracing hardware, or its emulation.
+    RayQuery,
+    /// Our BVH in a compute kernel; runs everywhere.
+    Bvh,
+}
+
+/// `--quality`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum QualityChoice {
+    /// A first look. Software driver: 2 paths, lattice 4/3 as coarse. GPU: 8 paths.
+    Draft,
+    /// Software driver: 8 paths, one lattice cell per layer. GPU: 32 paths, two cells.
+    Standard,
+    /// A proof, on any device: 128 paths, lattice 2/3 as coarse, the whole slice.
+    Reference,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    insonify::scene::file::seconds(text)
+}
+
+impl Common {
+    /// The device that was asked for.
+    ///
+    /// # Errors
+    /// None of that name, or none at all.
+    pub fn device(&self) -> Result<Arc<Device>> {
+        Device::new(&DeviceOptions {
+            selector: self.device.clone(),
+            validate: self.validate,
+            without_acceleration_structures: self.tracer == TracerChoice::Bvh,
+            ..DeviceOptions::default()
+        })
+        .into_diagnostic()
+    }
+
+    /// The tracer to use; `auto` says in one line why it falls back.
+    ///
+    /// # Errors
+    /// The device has no ray query.
+    pub fn tracer(&self, device: &Device) -> Result<Tracer> {
+        let wanted = match self.tracer {
+            TracerChoice::Auto => None,
+            TracerChoice::RayQuery => Some(Tracer::RayQuery),
+            TracerChoice::Bvh => Some(Tracer::Bvh),
+        };
+        if wanted == Some(Tracer::RayQuery) && !device.supports_ray_query() {
+            return Err(miette!(
+                help = "use --tracer bvh, which runs everywhere, or another --device",
+                "{} has no ray query",
+                device.name()
+            ));
+        }
+        let (tracer, why) = Tracer::choose(wanted, device);
+        if let Some(why) = why {
+            eprintln!("{why}");
+        }
+        Ok(tracer)
+    }
+
+    /// Puts seed, time and quality into a scene that was loaded.
+    pub fn settle(&self, scene: &mut Scene, device: &Device) {
+        self.settle_simulation(&mut scene.simulation, device);
+        scene.set_time(self.time);
+    }
+
+    /// Puts seed and quality into the settings of a scene that was loaded.
+    pub fn settle_simulation(&self, simulation: &mut Simulation, device: &Device) {
+        if let Some(seed) = self.seed {
+            simulation.seed = seed;
+        }
+        if let Some(quality) = self.quality {
+            set_quality(simulation, quality, device, &self.overrides);
+        }
+    }
+
+    /// Fails on what the validation layers said, where they were asked for.
+    ///
+    /// # Errors
+    /// The first message.
+    pub fn validated(&self, device: &Device) -> Result<()> {
+        let messages = device.validation_messages();
+        match messages.first() {
+            Some(first) if self.validate => Err(miette!(
+                "{} validation messages, the first: {first}",
+                messages.len()
+            )),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Takes the counts of `quality` for this device, but for those that the user set by hand.
+fn set_quality(
+    simulation: &mut Simulation,
+    quality: QualityChoice,
+    device: &Device,
+    overrides: &[(String, String)],
+) {
+    let quality = match quality {
+        QualityChoice::Draft => Quality::Draft,
+        QualityChoice::Standard => Quality::Standard,
+        QualityChoice::Reference => Quality::Reference,
+    };
+    let machine = match device.info().kind {
+        AdapterKind::Cpu => Machine::Software,
+        _ => Machine::Gpu,
+    };
+    let by_hand = simulation.clone();
+    simulation.set_quality(quality, machine);
+    for (key, _) in overrides {
+        match key.as_str() {
+            "simulation.paths" => simulation.paths = by_hand.paths,
+            "simulation.cell" => simulation.cell = by_hand.cell,
+            "simulation.elevation_cells" => simulation.elevation_cells = by_hand.elevation_cells,
+            "simulation.volume_floor" => simulation.volume_floor = by_hand.volume_floor,
+            _ => {}
+        }
+    }
+}
+
+/// What a frame lost, and what to do about it.
+pub fn lost(counters: &Counters) -> Vec<String> {
+    let mut out = Vec::new();
+    if counters.saturated > 0 {
+        out.push(format!(
+            "{} samples saturated; lower surface_gain or speckle_gain",
+            counters.saturated
+        ));
+    }
+    if counters.segments_dropped > 0 {
+        out.push(format!(
+            "{} path segments did not fit and were dropped; lower simulation.max_interactions",
+            counters.segments_dropped
+        ));
+    }
+    if counters.stack_overflow > 0 {
+        out.push(format!(
+            "{} crossings of more than 16 nested meshes were ignored",
+            counters.stack_overflow
+        ));
+    }
+    out
+}
+
+/// What to say of a masking mesh that lies off the image.
+pub fn unseen(scene: &Scene, mask: usize) -> String {
+    format!(
+        "the mask `{}` never meets the image: nothing is simulated in it; move the mesh or the probe",
+        scene.instances[mask].name
+    )
+}
+
+/// Progress on standard error. Hidden where that is no terminal; silent under a second.
+pub struct Progress {
+    bar: ProgressBar,
+    start: Instant,
+}
+
+impl Progress {
+    /// `count` of what is called `noun`.
+    pub fn new(count: u32, noun: &str) -> Self {
+        let template = format!("{{wide_bar}} {{pos}}/{{len}} {noun}, {{eta}} left");
+        let style = ProgressStyle::with_template(&template).expect("a valid template");
+        Self {
+            bar: ProgressBar::new(u64::from(count)).with_style(style),
+            start: Instant::now(),
+        }
+    }
+
+    /// So many are done.
+    pub fn done(&mut self, count: u32) {
+        if self.start.elapsed().as_secs() >= 1 {
+            self.bar.set_position(u64::from(count));
+        }
+    }
+
+    /// All are done.
+    pub fn finish(self) {
+        self.bar.finish_and_clear();
+    }
+}
