@@ -84,6 +84,11 @@ pub struct Keyframes {
 }
 
 impl Keyframes {
+    /// Whether the same tissue takes the same shapes, by whichever strategy.
+    pub fn deforms_as(&self, other: &Self) -> bool {
+        self.meshes == other.meshes && self.group == other.group
+    }
+
     /// The keyframe nearest to the present shape: the one of largest weight.
     pub fn nearest(&self) -> usize {
         let heaviest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);

@@ -10,8 +10,8 @@
 //!
 //! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::values`] as `fields`
 //! (three floats per vector) and writes [`Fields::offset`] into `field` of every instance's row
-//! whenever keyframes or settings have changed. An instance between keyframes has a field of its own
-//! that is overwritten: before a frame, [`Fields::blend`] says with what.
+//! whenever keyframes or settings have changed. Each instance has one field more, that of the shape
+//! between keyframes, which is overwritten: before a frame, [`Fields::blend`] says with what.
 
 mod grid;
 mod solve;
@@ -43,8 +43,8 @@ pub struct Fields {
 struct Slots {
     first: u32,
     stride: u32,
-    /// The last one is for what lies between keyframes.
-    blended: Option<u32>,
+    /// For what lies between keyframes, whichever strategy shows it: strategies are exchanged live.
+    blended: u32,
 }
 
 /// How the field between keyframes is made: `count` vectors from `target` on are the sum of the
@@ -82,16 +82,12 @@ impl Fields {
             self.values.extend(header);
             self.values.extend_from_slice(displacements);
         }
-        let stride = HEADER + made.grid.nodes() as u32;
-        let blended = made.blended.then(|| {
-            let at = self.values.len() as u32;
-            self.values.extend(header);
-            self.values.extend_from_slice(&made.keyframes[0]);
-            at
-        });
+        let blended = self.values.len() as u32;
+        self.values.extend(header);
+        self.values.extend_from_slice(&made.keyframes[0]);
         Slots {
             first,
-            stride,
+            stride: HEADER + made.grid.nodes() as u32,
             blended,
         }
     }
@@ -116,22 +112,23 @@ impl Fields {
         if scene.simulation.texture_space != TextureSpace::Tissue {
             return NONE;
         }
-        self.slots[i].map_or(NONE, |slots| {
-            let nearest = scene.instances[i].keyframes.nearest() as u32;
-            slots
-                .blended
-                .unwrap_or(slots.first + nearest * slots.stride)
+        let keyframes = &scene.instances[i].keyframes;
+        self.slots[i].map_or(NONE, |slots| match keyframes.strategy {
+            Strategy::Interpolate => slots.blended,
+            _ => slots.first + keyframes.nearest() as u32 * slots.stride,
         })
     }
 
     /// How the field of instance `i` is made before a frame; none where keyframes are shown as they are.
     pub fn blend(&self, scene: &Scene, i: usize) -> Option<Blend> {
-        let slots = self.slots[i]?;
+        let keyframes = &scene.instances[i].keyframes;
+        let slots = self.slots[i].filter(|_| keyframes.strategy == Strategy::Interpolate)?;
         let at = |keyframe: usize| slots.first + keyframe as u32 * slots.stride + HEADER;
-        let blend = scene.instances[i].keyframes.blend;
         Some(Blend {
-            sources: blend.map(|(keyframe, weight)| (at(keyframe), weight)),
-            target: slots.blended? + HEADER,
+            sources: keyframes
+                .blend
+                .map(|(keyframe, weight)| (at(keyframe), weight)),
+            target: slots.blended + HEADER,
             count: slots.stride - HEADER,
         })
     }
@@ -141,7 +138,6 @@ impl Fields {
 struct Made {
     grid: Grid,
     keyframes: Vec<Vec<[f32; 3]>>,
-    blended: bool,
 }
 
 /// Meshes of an instance's keyframes, where a vertex is the same tissue point in all of them.
@@ -150,9 +146,7 @@ fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>>
         .map(|&m| &scene.meshes[m])
         .collect();
     let (reference, others) = meshes.split_first()?;
-    let same = |mesh: &&Mesh| {
-        mesh.positions.len() == reference.positions.len() && mesh.triangles == reference.triangles
-    };
+    let same = |mesh: &&Mesh| mesh.shares_topology(reference);
     let moves = |mesh: &&Mesh| mesh.positions != reference.positions;
     (others.iter().all(same) && others.iter().any(moves)).then_some(meshes)
 }
@@ -188,11 +182,7 @@ fn make(scene: &Scene, index: usize) -> Option<Made> {
         .into_par_iter()
         .map(|k| solver.displacements(k))
         .collect();
-    Some(Made {
-        grid,
-        keyframes,
-        blended: instance.keyframes.strategy == Strategy::Interpolate,
-    })
+    Some(Made { grid, keyframes })
 }
 
 #[cfg(test)]

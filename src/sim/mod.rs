@@ -48,7 +48,6 @@ pub struct Simulator {
     coincident: bool,
     settings: Settings,
     tables: Tables,
-    shapers: Arc<world::Kernels>,
     counting: bool,
     /// Whether the last frame was mixed with an acquired volume.
     fused: bool,
@@ -103,7 +102,6 @@ impl Simulator {
             coincident,
             settings: Settings::of(scene),
             tables,
-            shapers,
             counting: false,
             fused: false,
             update_time: Duration::ZERO,
@@ -171,8 +169,7 @@ impl Simulator {
         }
         if !self.passes.world.serves(scene) {
             self.frames.wait()?;
-            let tracer = self.passes.world.tracer();
-            self.passes.world = World::new(&self.device, &self.shapers, scene, tracer)?;
+            self.passes.world.exchange(&self.device, scene)?;
         }
         Ok(())
     }
@@ -183,12 +180,14 @@ impl Simulator {
     /// A kernel that the device refuses; the simulator keeps the ones that it had.
     pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
         self.frames.wait()?;
+        let shapers = world::Kernels::new(&self.device, library)?;
         let world = &self.passes.world;
-        self.passes.kernels = Kernels::new(&self.device, library, world, self.counting)?;
+        let kernels = Kernels::new(&self.device, library, world, self.counting)?;
         if let Some(fusion) = &mut self.passes.fusion {
             fusion.reload(&self.device, library, world.tracer())?;
         }
-        self.shapers = Arc::new(world::Kernels::new(&self.device, library)?);
+        self.passes.kernels = kernels;
+        self.passes.world.reload(shapers);
         Ok(())
     }
 

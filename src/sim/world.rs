@@ -50,8 +50,9 @@ pub struct World {
     top: Top,
     rows: Vec<layout::Instance>,
     mask: Mask,
-    /// What decides which memory there is.
+    /// What decides which memory there is; present shapes aside.
     made_for: Vec<Keyframes>,
+    kernels: Arc<Kernels>,
 }
 
 /// The kernels that make shapes.
@@ -82,16 +83,6 @@ struct Geometry {
     fields: Buffer,
 }
 
-/// The keyframes of each instance, without what changes from frame to frame.
-fn made_for(scene: &Scene) -> Vec<Keyframes> {
-    let lasting = |keyframes: &Keyframes| Keyframes {
-        blend: Default::default(),
-        ..keyframes.clone()
-    };
-    let instances = scene.instances.iter();
-    instances.map(|i| lasting(&i.keyframes)).collect()
-}
-
 impl World {
     /// Uploads a scene's geometry. Surface `2 i` is instance i's outside, `2 i + 1` its inside;
     /// tissues keep their indices.
@@ -104,13 +95,23 @@ impl World {
         scene: &Scene,
         tracer: Tracer,
     ) -> Result<Self, WorldError> {
+        Self::with_fields(device, kernels, scene, tracer, Fields::build(scene))
+    }
+
+    fn with_fields(
+        device: &Arc<Device>,
+        kernels: &Arc<Kernels>,
+        scene: &Scene,
+        tracer: Tracer,
+        fields: Fields,
+    ) -> Result<Self, WorldError> {
         let union = |i: &&crate::scene::Instance| i.keyframes.strategy == Strategy::Union;
         if let Some(node) = scene.instances.iter().find(union)
             && tracer == Tracer::RayQuery
         {
             return Err(WorldError::Union(node.name.clone()));
         }
-        let arrays = Arrays::new(scene, tracer)?;
+        let arrays = Arrays::new(scene, tracer, fields)?;
         let geometry = Geometry {
             instances: upload(device, "instances", bytemuck::cast_slice(&arrays.instances))?,
             vertices: upload(device, "vertices", bytemuck::cast_slice(&arrays.vertices))?,
@@ -129,7 +130,12 @@ impl World {
             regions: arrays.regions,
             rows: arrays.instances,
             mask: Mask::default(),
-            made_for: made_for(scene),
+            made_for: scene
+                .instances
+                .iter()
+                .map(|i| i.keyframes.clone())
+                .collect(),
+            kernels: Arc::clone(kernels),
         };
         let mut failed = None;
         device.once(|commands| {
@@ -141,7 +147,34 @@ impl World {
 
     /// Whether [`Self::update`] can show `scene`: its keyframes and strategies are those of [`Self::new`].
     pub fn serves(&self, scene: &Scene) -> bool {
-        self.made_for == made_for(scene)
+        self.agrees(scene, |made, now| {
+            made.deforms_as(now) && made.strategy == now.strategy
+        })
+    }
+
+    fn agrees(&self, scene: &Scene, same: impl Fn(&Keyframes, &Keyframes) -> bool) -> bool {
+        let now = scene.instances.iter().map(|i| &i.keyframes);
+        self.made_for.len() == now.len() && self.made_for.iter().zip(now).all(|(a, b)| same(a, b))
+    }
+
+    /// Uploads `scene` anew where [`Self::serves`] says no. How tissue deforms, which takes long to
+    /// find, is kept where only strategies were exchanged.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`]; the world then is what it was.
+    pub fn exchange(&mut self, device: &Arc<Device>, scene: &Scene) -> Result<(), WorldError> {
+        let fields = match self.agrees(scene, Keyframes::deforms_as) {
+            true => self.fields.clone(),
+            false => Fields::build(scene),
+        };
+        *self = Self::with_fields(device, &self.kernels, scene, self.tracer, fields)?;
+        Ok(())
+    }
+
+    /// Takes other kernels from the next update on, after the frames in flight.
+    pub fn reload(&mut self, kernels: Kernels) {
+        self.kernels = Arc::new(kernels);
+        self.changing.reload(&self.kernels);
     }
 
     /// Records what changed since the last call: shapes, instance rows and the top level, or nothing;

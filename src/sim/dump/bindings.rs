@@ -4,6 +4,7 @@ use std::path::Path;
 
 use bytemuck::Pod;
 
+use super::super::fields::Fields;
 use super::super::stages::{Buffers, lines};
 use super::super::world::Arrays;
 use super::super::{SimError, Simulator, Tracer, layout};
@@ -21,7 +22,9 @@ use crate::scene::Scene;
 /// triangles means nothing to the ray query.
 pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
     use Element::{Float, Integer, Word};
-    let arrays = Arrays::new(&scene.still(), Tracer::Bvh).map_err(|e| SimError::World(e.into()))?;
+    let still = scene.still();
+    let arrays = Arrays::new(&still, Tracer::Bvh, Fields::build(&still));
+    let arrays = arrays.map_err(|e| SimError::World(e.into()))?;
     let nodes = &arrays.bvh.expect("made for the compute tracer").nodes;
     // The tissue of a still scene rests: where it has gone, the device knows.
     let mut instances = arrays.instances;

@@ -89,7 +89,7 @@ pub struct Arrays {
 }
 
 impl Arrays {
-    /// What `tracer` needs of `scene`. Instances that change their shape on the device have room, but
+    /// What `tracer` needs of `scene`, whose tissue deforms by `fields`. Instances that change their shape on the device have room, but
     /// nothing in it.
     ///
     /// # Errors
@@ -97,14 +97,14 @@ impl Arrays {
     ///
     /// # Panics
     /// When a mesh has not one normal per vertex.
-    pub fn new(scene: &Scene, tracer: Tracer) -> Result<Self, BvhError> {
+    pub fn new(scene: &Scene, tracer: Tracer, fields: Fields) -> Result<Self, BvhError> {
         let mut arrays = Self {
             instances: Vec::new(),
             vertices: Vec::new(),
             normals: Vec::new(),
             triangles: Vec::new(),
             bvh: (tracer == Tracer::Bvh).then(|| SceneBvh::new(entry::capacity(scene))),
-            fields: Fields::build(scene),
+            fields,
             places: Vec::new(),
             regions: Vec::new(),
         };

@@ -71,6 +71,11 @@ impl Changing {
         })
     }
 
+    /// Takes other kernels.
+    pub(super) fn reload(&mut self, kernels: &Arc<Kernels>) {
+        self.refit.kernels = Arc::clone(kernels);
+    }
+
     /// The ray query's structures, per instance.
     pub(super) fn structures(&self) -> &[Option<Blas>] {
         &self.structures

@@ -42,7 +42,7 @@ struct Boxes {
 
 pub(super) struct Refit {
     bodies: Vec<Option<Body>>,
-    kernels: Arc<Kernels>,
+    pub(super) kernels: Arc<Kernels>,
     boxes: Option<Boxes>,
 }
 
