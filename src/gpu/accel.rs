@@ -136,6 +136,38 @@ impl Scratch {
     }
 }
 
+/// Records a build of `count` primitives, or a refit where `info` says so.
+///
+/// # Safety
+/// The geometry of `info` has that many primitives in memory that can be read; `structure` and
+/// `scratch` are as large as `build_sizes` says for it, and a refitted structure was built with the
+/// same topology; the submission keeps all of them alive.
+pub(crate) unsafe fn record_build(
+    commands: &Commands<'_>,
+    info: vk::AccelerationStructureBuildGeometryInfoKHR<'_>,
+    structure: &RawAccel,
+    scratch: &Scratch,
+    count: u32,
+) -> Result<(), GpuError> {
+    let mut info = info
+        .dst_acceleration_structure(structure.handle)
+        .scratch_data(vk::DeviceOrHostAddressKHR {
+            device_address: scratch.address,
+        });
+    if info.mode == vk::BuildAccelerationStructureModeKHR::UPDATE {
+        info = info.src_acceleration_structure(structure.handle);
+    }
+    let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count);
+    let accel = structure.device.require_accel()?;
+    // SAFETY: the caller's promise.
+    unsafe {
+        accel
+            .functions
+            .cmd_build_acceleration_structures(commands.raw(), &[info], &[&[range]]);
+    }
+    Ok(())
+}
+
 /// Queries for the sizes after compaction.
 pub(crate) struct CompactedSizes {
     pool: vk::QueryPool,

@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 
 use ash::vk;
 
-use super::accel::{RawAccel, Scratch, build_sizes, triangles};
+use super::accel::{RawAccel, Scratch, build_sizes, record_build, triangles};
 use super::barrier::Stage;
 use super::blas::Blas;
 use super::commands::Commands;
@@ -206,28 +206,20 @@ impl DynamicBlas {
         let vertices = source.vertices.device_address() + 12 * u64::from(source.first_vertex);
         let indices = source.triangles.device_address() + 12 * u64::from(source.first_triangle);
         let geometry = triangles(vertices, source.vertex_count, indices);
-        let mut info = build_info(&geometry, self.fast_trace, mode)
-            .dst_acceleration_structure(structure.handle)
-            .scratch_data(vk::DeviceOrHostAddressKHR {
-                device_address: self.scratch.address,
-            });
-        if mode == vk::BuildAccelerationStructureModeKHR::UPDATE {
-            info = info.src_acceleration_structure(structure.handle);
-        }
-        let range = vk::AccelerationStructureBuildRangeInfoKHR::default()
-            .primitive_count(source.triangle_count);
-        let device = commands.device().clone();
-        let accel = device.require_accel()?;
+        let info = build_info(&geometry, self.fast_trace, mode);
         // SAFETY: `check` has compared the mesh with its buffers and with the size for which
         // structure and scratch were made; a refit has the topology of the build (`refit`); the
         // submission keeps all of them alive. Indices beyond the vertices are the caller's breach of
         // contract, which robust buffer access does not cover.
         unsafe {
-            accel
-                .functions
-                .cmd_build_acceleration_structures(commands.raw(), &[info], &[&[range]]);
+            record_build(
+                commands,
+                info,
+                structure,
+                &self.scratch,
+                source.triangle_count,
+            )
         }
-        Ok(())
     }
 }
 

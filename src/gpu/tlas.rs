@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use ash::vk;
 
-use super::accel::{RawAccel, Scratch, build_sizes};
+use super::accel::{RawAccel, Scratch, build_sizes, record_build};
 use super::barrier::Stage;
 use super::blas::Blas;
 use super::commands::Commands;
@@ -165,25 +165,10 @@ impl Tlas {
             commands.note(&blas.0, blas.name(), stage, false, "build");
         }
         let geometry = geometry(address);
-        let mut info = build_info(&geometry, mode)
-            .dst_acceleration_structure(self.structure.handle)
-            .scratch_data(vk::DeviceOrHostAddressKHR {
-                device_address: self.scratch.address,
-            });
-        if mode == vk::BuildAccelerationStructureModeKHR::UPDATE {
-            info = info.src_acceleration_structure(self.structure.handle);
-        }
-        let range = vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count);
-        let device = commands.device().clone();
-        let accel = device.require_accel()?;
+        let info = build_info(&geometry, mode);
         // SAFETY: all memory was sized for `capacity` instances, which `check` compares; the
         // submission keeps the structure, its memory and the meshes alive.
-        unsafe {
-            accel
-                .functions
-                .cmd_build_acceleration_structures(commands.raw(), &[info], &[&[range]]);
-        }
-        Ok(())
+        unsafe { record_build(commands, info, &self.structure, &self.scratch, count) }
     }
 
     fn check(&self, instances: &[TlasInstance<'_>]) -> Result<(), GpuError> {

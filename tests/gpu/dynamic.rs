@@ -1,7 +1,9 @@
 //! Meshes that change within a frame: built anew, refitted, traced, against brute force.
 
+use std::sync::Arc;
+
 use insonify::gpu::{
-    Binding, Buffer, BufferKind, DynamicBlas, DynamicSource, Frames, Kernel, Stage, Tlas,
+    Binding, Buffer, BufferKind, Device, DynamicBlas, DynamicSource, Frames, Kernel, Stage, Tlas,
     TlasInstance,
 };
 use insonify::sim::layout::Interpolation;
@@ -207,6 +209,16 @@ fn frames_in_flight_refit_one_structure() {
     assert_clean(device);
 }
 
+/// Vertices and triangles of a sheet, and how many there are.
+fn small_sheet(device: &Arc<Device>) -> ([Buffer; 2], [u32; 2]) {
+    let (pose, triangles) = (sheet(3, 0.0), grid(3, 0));
+    let buffers = [
+        storage(device, "vertices", bytemuck::cast_slice(&pose)),
+        storage(device, "triangles", bytemuck::cast_slice(&triangles)),
+    ];
+    (buffers, [pose.len() as u32, triangles.len() as u32])
+}
+
 /// What the device does not notice: vertices overwritten while a build may still read them, and
 /// rays through a top level that is older than its mesh.
 #[test]
@@ -214,12 +226,7 @@ fn missing_barriers_and_stale_top_levels_are_reported() {
     let Some(device) = ray_query_device() else {
         return;
     };
-    let (pose, triangles) = (sheet(3, 0.0), grid(3, 0));
-    let sizes = [pose.len() as u32, triangles.len() as u32];
-    let buffers = [
-        storage(&device, "vertices", bytemuck::cast_slice(&pose)),
-        storage(&device, "triangles", bytemuck::cast_slice(&triangles)),
-    ];
+    let (buffers, sizes) = small_sheet(&device);
     let whole = source(buffers.each_ref(), [0, sizes[0]], [0, sizes[1]]);
     let mut mesh = DynamicBlas::new(&device, "sheet", sizes[1], sizes[0], true).unwrap();
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
@@ -264,12 +271,7 @@ fn what_cannot_be_built_or_refitted_is_refused_by_name() {
     let Some(device) = ray_query_device() else {
         return;
     };
-    let (pose, triangles) = (sheet(3, 0.0), grid(3, 0));
-    let sizes = [pose.len() as u32, triangles.len() as u32];
-    let buffers = [
-        storage(&device, "vertices", bytemuck::cast_slice(&pose)),
-        storage(&device, "triangles", bytemuck::cast_slice(&triangles)),
-    ];
+    let (buffers, sizes) = small_sheet(&device);
     let whole = source(buffers.each_ref(), [0, sizes[0]], [0, sizes[1]]);
     assert!(DynamicBlas::new(&device, "none", 0, 3, true).is_err());
     let mut mesh = DynamicBlas::new(&device, "liver", sizes[1], sizes[0], true).unwrap();
@@ -332,7 +334,7 @@ fn what_cannot_be_built_or_refitted_is_refused_by_name() {
         ..whole
     };
     refused(false, moved, "build it anew");
-    let copy = storage(&device, "copy", bytemuck::cast_slice(&triangles));
+    let copy = storage(&device, "copy", bytemuck::cast_slice(&grid(3, 0)));
     refused(
         false,
         DynamicSource {
