@@ -16,4 +16,5 @@ pub mod probe;
 pub mod reference;
 pub mod scene;
 pub mod sim;
+pub mod statistics;
 pub mod volume;

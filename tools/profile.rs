@@ -19,17 +19,18 @@ use insonify::output;
 use insonify::sim::Tracer;
 use insonify::sim::shaders::Library;
 use miette::{IntoDiagnostic, Result, miette};
+use provenance::Provenance;
 
 #[path = "profile/builds.rs"]
 mod builds;
-#[path = "common/commit.rs"]
-mod commit;
 #[path = "profile/crossover.rs"]
 mod crossover;
 #[path = "profile/measure.rs"]
 mod measure;
 #[path = "profile/paper.rs"]
 mod paper;
+#[path = "common/provenance.rs"]
+mod provenance;
 #[path = "profile/strategies.rs"]
 mod strategies;
 #[path = "profile/table.rs"]
@@ -74,7 +75,7 @@ struct Machine {
     library: Library,
     tracers: Vec<Tracer>,
     output: PathBuf,
-    provenance: table::Provenance,
+    provenance: Provenance,
 }
 
 fn main() -> Result<ExitCode> {
@@ -98,11 +99,7 @@ fn main() -> Result<ExitCode> {
         None => vec![Tracer::Bvh],
     };
     let machine = Machine {
-        provenance: table::Provenance {
-            device: device.name().to_owned(),
-            driver: device.driver().to_owned(),
-            commit: commit::commit(),
-        },
+        provenance: Provenance::of(&device),
         device,
         library: Library::embedded(),
         tracers,

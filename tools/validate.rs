@@ -8,8 +8,8 @@ use clap::Parser;
 use insonify::gpu::{Device, DeviceOptions};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-#[path = "common/commit.rs"]
-mod commit;
+#[path = "common/provenance.rs"]
+mod provenance;
 
 // The tests' own modules: what they prove is what the page shows.
 include!("../tests/physics/main.rs");
@@ -55,12 +55,8 @@ fn main() -> Result<ExitCode> {
             device.name()
         ));
     }
-    let provenance = page::Provenance {
-        device: device.name().into(),
-        driver: device.driver().into(),
-        commit: commit::commit(),
-    };
-    println!("{} ({})", provenance.device, provenance.driver);
+    let provenance = provenance::Provenance::of(&device);
+    println!("{provenance}");
     let bench = check::Bench::on(device);
     let mut examined = vec![];
     for check in checks {
@@ -74,7 +70,12 @@ fn main() -> Result<ExitCode> {
         print!("{}", found.complaints(&check));
         examined.push((check, found));
     }
-    let html = page::page(&provenance, &rows, &examined);
+    let origin = [
+        ("Device", provenance.device.as_str()),
+        ("Driver", &provenance.driver),
+        ("Commit", &provenance.commit),
+    ];
+    let html = page::page(&origin, &rows, &examined);
     let path = arguments.output.join("index.html");
     std::fs::create_dir_all(&arguments.output)
         .and_then(|()| std::fs::write(&path, html))

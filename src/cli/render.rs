@@ -15,6 +15,7 @@ use insonify::scene::Scene;
 use insonify::sim::Simulator;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
+use insonify::statistics::Statistics;
 
 /// Arguments of `insonify render`.
 #[derive(Debug, clap::Args)]
@@ -103,7 +104,7 @@ pub fn run(args: &Render) -> Result<()> {
             "fps": args.fps,
             "build_ms": build_ms,
             "stages_ms": stage_statistics(&timings),
-            "frame_ms": statistics(&timings.iter().map(FrameTimings::total_ms).collect::<Vec<_>>()),
+            "frame_ms": Statistics::of(timings.iter().map(FrameTimings::total_ms)),
             "memory": { "host_peak_bytes": host_peak_bytes(), "device_peak_bytes": memory.peak },
             "counters": {
                 "rays": counters.rays, "interactions": counters.interactions, "segments": counters.segments,
@@ -222,14 +223,6 @@ fn settings(scene: &Scene) -> Value {
     })
 }
 
-/// Median and 99th percentile (nearest rank).
-fn statistics(values: &[f64]) -> Value {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    let rank = |q: f64| sorted.get(((sorted.len() as f64 * q).ceil() as usize).saturating_sub(1));
-    json!({ "median": rank(0.5), "p99": rank(0.99) })
-}
-
 /// Per stage, in frame order; a stage that ran more than once per frame counts whole.
 fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
     let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
@@ -248,7 +241,7 @@ fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
     }
     stages
         .into_iter()
-        .map(|(name, ms)| (name, statistics(&ms)))
+        .map(|(name, ms)| (name, json!(Statistics::of(ms))))
         .collect()
 }
 

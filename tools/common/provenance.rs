@@ -1,9 +1,44 @@
-//! What was measured.
+//! What was measured, and on what.
 
+use std::fmt;
 use std::process::Command;
 
+use insonify::gpu::Device;
+use serde::Serialize;
+
+/// Where figures come from.
+#[derive(Serialize)]
+pub struct Provenance {
+    pub device: String,
+    pub driver: String,
+    /// Of this repository, with a mark where the tree differs from it.
+    pub commit: String,
+}
+
+impl Provenance {
+    /// What is measured now, on `device`.
+    pub fn of(device: &Device) -> Self {
+        Self {
+            device: device.name().to_owned(),
+            driver: device.driver().to_owned(),
+            commit: commit(),
+        }
+    }
+}
+
+impl fmt::Display for Provenance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            device,
+            driver,
+            commit,
+        } = self;
+        write!(f, "{device}, {driver}, commit {commit}")
+    }
+}
+
 /// The commit that this was built in, as git tells it.
-pub fn commit() -> String {
+fn commit() -> String {
     let git = |arguments: &[&str]| {
         let output = Command::new("git")
             .args(["-C", env!("CARGO_MANIFEST_DIR")])

@@ -107,21 +107,21 @@ fn strategies(tracer: Tracer) -> Vec<Strategy> {
     Strategy::ALL.into_iter().filter(has).filter(same).collect()
 }
 
-/// Samples per strategy, in turns, over keyframes that follow each other erratically.
+/// A rig with its samples for each strategy, in turns, over keyframes that follow each other erratically.
 fn samples(
     machine: &Machine,
     tracer: Tracer,
     strategies: &[Strategy],
     scene: impl Fn(Strategy) -> Result<Scene>,
     frames: u32,
-) -> Result<Vec<Vec<Sample>>> {
+) -> Result<Vec<(Rig, Vec<Sample>)>> {
     let mut rigs = Vec::new();
     for &strategy in strategies {
-        rigs.push(Rig::new(machine, scene(strategy)?, tracer)?);
+        let rig = Rig::new(machine, scene(strategy)?, tracer)?;
+        rigs.push((rig, Vec::new()));
     }
-    let mut samples = vec![Vec::new(); rigs.len()];
     for i in 0..frames as usize + 2 {
-        for (rig, samples) in rigs.iter_mut().zip(&mut samples) {
+        for (rig, samples) in &mut rigs {
             // Steps of 3 of 7 visit every keyframe, none after its neighbour.
             show(&mut rig.scene, (3 * i + 1) % KEYFRAMES);
             let sample = rig.frame()?;
@@ -130,7 +130,7 @@ fn samples(
             }
         }
     }
-    Ok(samples)
+    Ok(rigs)
 }
 
 pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
@@ -145,7 +145,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         false => Value::Null,
     };
     let all = json!({
-        "machine": machine.provenance.json(),
+        "machine": machine.provenance,
         "frames": arguments.frames,
         "tracers": results,
         "device_builds": builds,
@@ -171,9 +171,9 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
         for (curve, &strategy) in curves.iter_mut().zip(&strategies) {
             // One at a time: eight keyframes of a million triangles by eight strategies do not fit.
             let found = samples(machine, tracer, &[strategy], scene, arguments.frames)?;
-            let structures = Statistics::of(found[0].iter().map(|s| s.structures));
-            let frame = Statistics::of(found[0].iter().map(|s| s.frame));
-            let rig = Rig::new(machine, scene(strategy)?, tracer)?;
+            let (rig, samples) = &found[0];
+            let structures = Statistics::of(samples.iter().map(|s| s.structures));
+            let frame = Statistics::of(samples.iter().map(|s| s.frame));
             let megabytes = rig.simulator.world_bytes() as f64 / 1e6;
             curve
                 .points
@@ -189,8 +189,8 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
             rows.push(json!({
                 "triangles": triangles,
                 "strategy": strategy.to_string(),
-                "structures_ms": structures.json(),
-                "frame_ms": frame.json(),
+                "structures_ms": structures,
+                "frame_ms": frame,
                 "world_mb": megabytes,
             }));
         }
@@ -234,7 +234,7 @@ fn sweep(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Val
             let scene = |s| limb(subdivisions, distance, s);
             let found = samples(machine, tracer, &compared, scene, arguments.frames)?;
             let cost =
-                |i: usize| Statistics::of(found[i].iter().map(|s| s.structures + s.trace)).median;
+                |i: usize| Statistics::of(found[i].1.iter().map(|s| s.structures + s.trace)).median;
             let costs = [cost(0), cost(1), cost(2)];
             for (line, cost) in lines.iter_mut().zip(costs) {
                 line.push([distance, cost]);

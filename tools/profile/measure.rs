@@ -2,8 +2,8 @@
 
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
+pub use insonify::statistics::Statistics;
 use miette::{IntoDiagnostic, Result};
-use serde_json::{Value, json};
 
 use crate::Machine;
 use insonify::sim::Tracer;
@@ -56,37 +56,6 @@ impl Rig {
     pub fn frame_at(&mut self, seconds: f64) -> Result<Sample> {
         self.scene.set_time(seconds);
         self.frame()
-    }
-}
-
-/// Order statistics by nearest rank.
-#[derive(Clone, Copy, Debug)]
-pub struct Statistics {
-    pub median: f64,
-    pub p95: f64,
-    pub p99: f64,
-}
-
-impl Statistics {
-    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
-        let mut sorted: Vec<f64> = values.into_iter().collect();
-        sorted.sort_by(f64::total_cmp);
-        let rank = |q: f64| {
-            let rank = (sorted.len() as f64 * q).ceil() as usize;
-            sorted
-                .get(rank.saturating_sub(1))
-                .copied()
-                .unwrap_or(f64::NAN)
-        };
-        Self {
-            median: rank(0.5),
-            p95: rank(0.95),
-            p99: rank(0.99),
-        }
-    }
-
-    pub fn json(&self) -> Value {
-        json!({ "median": self.median, "p95": self.p95, "p99": self.p99 })
     }
 }
 

@@ -136,7 +136,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
             .wrap_err_with(|| format!("cannot write {}", file.display()))?;
         output::line(file.display());
     }
-    let provenance = machine.provenance.json();
+    let provenance = &machine.provenance;
     write_json(
         &machine.output,
         "paper",

@@ -107,7 +107,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         )?);
     }
     let all = json!({
-        "machine": machine.provenance.json(),
+        "machine": machine.provenance,
         "scene": scene.name,
         "triangles": scene.triangles(),
         "frames": arguments.frames,
@@ -178,9 +178,9 @@ fn report(
         curves.push(Curve::line(run.strategy.to_string(), points.collect()));
         rows.push(json!({
             "strategy": run.strategy.to_string(),
-            "structures_ms": structures.json(),
-            "trace_ms": trace.json(),
-            "frame_ms": frame.json(),
+            "structures_ms": structures,
+            "trace_ms": trace,
+            "frame_ms": frame,
             "world_mb": megabytes,
             "false_unions_per_ray": counts.map(|c| c[0]),
             "false_boxes_per_ray": counts.map(|c| c[1]),

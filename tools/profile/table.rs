@@ -1,35 +1,11 @@
 //! Results as a readable table, CSV, JSON and plots.
 
-use std::fmt;
 use std::path::Path;
 
 use insonify::output;
 use insonify::plot::{Plot, svg};
 use miette::{Context, IntoDiagnostic, Result};
-use serde_json::{Value, json};
-
-/// Where figures come from.
-pub struct Provenance {
-    pub device: String,
-    pub driver: String,
-    pub commit: String,
-}
-
-impl fmt::Display for Provenance {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{}, {}, commit {}",
-            self.device, self.driver, self.commit
-        )
-    }
-}
-
-impl Provenance {
-    pub fn json(&self) -> Value {
-        json!({ "device": self.device, "driver": self.driver, "commit": self.commit })
-    }
-}
+use serde_json::Value;
 
 /// Rows under headings that carry their units.
 pub struct Table {

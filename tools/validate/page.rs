@@ -11,14 +11,6 @@ use insonify::plot::{escape, svg};
 /// Rows of the validation table.
 pub const ROWS: u32 = 35;
 
-/// On what the checks were run.
-pub struct Provenance {
-    pub device: String,
-    pub driver: String,
-    /// Of this repository, with a mark where the tree differs from it.
-    pub commit: String,
-}
-
 const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1a1a1a;background:#fff;\
 max-width:1180px;margin:2em auto;padding:0 1em}h1{font-size:1.7em}h2{font-size:1.2em;margin:2.2em 0 .3em;\
 border-top:1px solid #ccc;padding-top:1em}table{border-collapse:collapse;margin:.8em 0}\
@@ -29,19 +21,19 @@ td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\
 figcaption{font-size:.9em;color:#444}img{max-width:560px;max-height:480px;border:1px solid #ccc}\
 svg{max-width:100%;height:auto}p{max-width:52em}";
 
-/// The page. `rows` are those of every check there is, whether among `examined` or not.
-pub fn page(provenance: &Provenance, rows: &[&str], examined: &[(Check, Examined)]) -> String {
+/// The page. `origin` says by name where the figures come from; `rows` are those of every check there
+/// is, whether among `examined` or not.
+pub fn page(origin: &[(&str, &str)], rows: &[&str], examined: &[(Check, Examined)]) -> String {
     let mut out = String::new();
     let failing = examined.iter().filter(|(_, e)| !e.holds()).count();
     let verdict = match failing {
         0 => format!("All {} checks hold.", examined.len()),
         n => format!("{n} of {} checks do not hold.", examined.len()),
     };
-    let Provenance {
-        device,
-        driver,
-        commit,
-    } = provenance;
+    let origin: String = origin
+        .iter()
+        .map(|(name, text)| format!("<tr><th>{name}</th><td>{}</td></tr>", escape(text)))
+        .collect();
     let _ = write!(
         out,
         "<!doctype html>\n<html lang='en'><head><meta charset='utf-8'><title>insonify: validation</title>\
@@ -51,11 +43,7 @@ pub fn page(provenance: &Provenance, rows: &[&str], examined: &[(Check, Examined
          against a closed form. The same comparisons are the project's tests. Each is also made with an error \
          planted and has to notice it. <b>twins</b> are implementations in double precision on the \
          CPU; <b>bvh</b> and <b>query</b> (<b>ray-query</b>) are the device with the compute tracer and with hardware ray queries.</p>\n\
-         <table><tr><th>Device</th><td>{}</td></tr><tr><th>Driver</th><td>{}</td></tr>\
-         <tr><th>Commit</th><td>{}</td></tr><tr><th>Verdict</th><td class='{}'>{verdict}</td></tr></table>\n",
-        escape(device),
-        escape(driver),
-        escape(commit),
+         <table>{origin}<tr><th>Verdict</th><td class='{}'>{verdict}</td></tr></table>\n",
         if failing == 0 { "yes" } else { "no" },
     );
     missing(&mut out, rows, examined);
@@ -269,11 +257,7 @@ mod tests {
             }),
         ];
         let bench = Bench::new();
-        let provenance = Provenance {
-            device: "a < b".into(),
-            driver: String::new(),
-            commit: String::new(),
-        };
+        let origin = [("Device", "a < b")];
         for c in checks {
             let proven =
                 std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| prove(&c))).is_ok();
@@ -281,7 +265,7 @@ mod tests {
             let found = examine(&c, &bench);
             assert_eq!(proven, name == "right");
             assert_eq!(found.holds(), proven, "{name}");
-            let html = page(&provenance, &["T5"], &[(c, found)]);
+            let html = page(&origin, &["T5"], &[(c, found)]);
             assert_eq!(html.contains("All 1 checks hold."), proven, "{name}");
             assert_eq!(
                 html.contains("1 of 1 checks do not hold."),
@@ -302,13 +286,8 @@ mod tests {
 
     #[test]
     fn rows_without_a_check_are_named() {
-        let provenance = Provenance {
-            device: String::new(),
-            driver: String::new(),
-            commit: String::new(),
-        };
         let rows: Vec<&str> = rows::all().iter().map(|c| c.row).collect();
-        let html = page(&provenance, &rows, &[]);
+        let html = page(&[], &rows, &[]);
         for n in 1..=ROWS {
             let row = format!("T{n}");
             let absent = html
