@@ -1,11 +1,10 @@
 //! An acquired volume, and how it is mixed with what is simulated.
 
-use std::collections::HashMap;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
-use super::mesh::Soup;
+use super::mesh::{Soup, weld};
 use super::topology::Edges;
 use super::{Instance, Mesh, Scene};
 use crate::volume::Voxels;
@@ -63,26 +62,11 @@ pub struct Fusion {
 /// Edges at which a mesh does not close: those with a triangle on one side only, or with more on one
 /// side than on the other. Shading splits vertices at creases without moving them: they are joined.
 pub fn open_edges(mesh: &Mesh) -> usize {
-    let mut numbers: HashMap<[u32; 3], u32> = HashMap::new();
-    let mut positions = Vec::new();
-    let mut triangles = Vec::with_capacity(mesh.triangles.len());
-    for triangle in &mesh.triangles {
-        triangles.push(triangle.map(|i| {
-            let p = mesh.positions[i as usize];
-            // Adding 0 makes one zero of the two.
-            *numbers
-                .entry(p.map(|x| (x + 0.0).to_bits()))
-                .or_insert_with(|| {
-                    positions.push(p);
-                    positions.len() as u32 - 1
-                })
-        }));
-    }
-    let soup = Soup {
-        positions,
-        triangles,
+    let soup = weld(&Soup {
+        positions: mesh.positions.clone(),
+        triangles: mesh.triangles.clone(),
         ..Soup::default()
-    };
+    });
     let open = |group: &&[super::topology::Edge]| {
         let forward = group.iter().filter(|e| e.forward).count();
         2 * forward != group.len()
