@@ -138,6 +138,25 @@ pub struct Scene {
 }
 
 impl Scene {
+    /// `probe` at the origin of an endless `background`, and nothing else.
+    pub fn homogeneous(background: Tissue, probe: Probe) -> Self {
+        Self {
+            name: String::new(),
+            tissues: vec![background],
+            background: 0,
+            meshes: Vec::new(),
+            instances: Vec::new(),
+            graph: Graph::default(),
+            wires: Vec::new(),
+            probe,
+            world_from_probe: DAffine3::IDENTITY,
+            simulation: Simulation::default(),
+            imaging: Imaging::default(),
+            volume: None,
+            fusion: None,
+        }
+    }
+
     /// Triangles of all placed meshes.
     pub fn triangles(&self) -> usize {
         self.instances

@@ -1,9 +1,7 @@
 //! What tests of levels and image formation share: a scene of one tissue, random numbers.
 
-use glam::DAffine3;
 use insonify::probe::Probe;
-use insonify::scene::settings::{Imaging, Simulation};
-use insonify::scene::{Graph, Scene, Tissue};
+use insonify::scene::{Scene, Tissue};
 
 /// Fully developed speckle of liver's attenuation at `echogenicity` dB, without texture.
 pub fn tissue(echogenicity: f64) -> Tissue {
@@ -19,21 +17,7 @@ pub fn tissue(echogenicity: f64) -> Tissue {
 
 /// That tissue everywhere, seen with `probe`.
 pub fn scene(probe: Probe) -> Scene {
-    Scene {
-        name: "test".into(),
-        tissues: vec![tissue(0.0)],
-        background: 0,
-        meshes: vec![],
-        instances: vec![],
-        graph: Graph::default(),
-        wires: vec![],
-        probe,
-        world_from_probe: DAffine3::IDENTITY,
-        simulation: Simulation::default(),
-        imaging: Imaging::default(),
-        volume: None,
-        fusion: None,
-    }
+    Scene::homogeneous(tissue(0.0), probe)
 }
 
 /// SplitMix64: independent of the kernels' generator.

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::probe::Probe;
-use insonify::scene::{Graph, Imaging, Instance, Keyframes, Mesh, Scene, Simulation, Tissue};
+use insonify::scene::{Instance, Keyframes, Mesh, Scene, Tissue};
 
 /// The same ray for the device and for the reference: single precision throughout.
 #[derive(Clone, Copy, Debug)]
@@ -89,19 +89,9 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
         })
         .unzip();
     Scene {
-        name: String::new(),
-        tissues: vec![tissue],
-        background: 0,
         meshes,
         instances,
-        graph: Graph::default(),
-        wires: Vec::new(),
-        probe: Probe::abdominal(),
-        world_from_probe: DAffine3::IDENTITY,
-        simulation: Simulation::default(),
-        imaging: Imaging::default(),
-        volume: None,
-        fusion: None,
+        ..Scene::homogeneous(tissue, Probe::abdominal())
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
 use insonify::scene::settings::{Imaging, Simulation};
-use insonify::scene::{Graph, Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
+use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.
@@ -44,21 +44,13 @@ pub fn mirror() -> Surface {
 /// `lines` parallel scanlines over `width` mm with the focusing of the paper's Table I, a single
 /// layer, no noise, one path and no reflected paths.
 pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
+    let probe = Probe {
+        kind: Kind::Linear { width },
+        scanlines: lines,
+        elevation_layers: 1,
+        ..Probe::paper_table1()
+    };
     Scene {
-        name: "test".into(),
-        tissues: vec![background],
-        background: 0,
-        meshes: vec![],
-        instances: vec![],
-        graph: Graph::default(),
-        wires: vec![],
-        probe: Probe {
-            kind: Kind::Linear { width },
-            scanlines: lines,
-            elevation_layers: 1,
-            ..Probe::paper_table1()
-        },
-        world_from_probe: DAffine3::IDENTITY,
         simulation: Simulation {
             paths: 1,
             max_reflections: 0,
@@ -68,8 +60,7 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
             noise: f64::NEG_INFINITY,
             ..Imaging::default()
         },
-        volume: None,
-        fusion: None,
+        ..Scene::homogeneous(background, probe)
     }
 }
 

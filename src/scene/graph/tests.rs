@@ -3,7 +3,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::*;
 use crate::probe::Probe;
 use crate::scene::animation::{Clock, Interpolation, Turn};
-use crate::scene::{Imaging, Keyframes, Mesh, Simulation, Surface, Tissue};
+use crate::scene::{Keyframes, Mesh, Surface, Tissue};
 
 fn instance(keyframes: &[usize]) -> Instance {
     Instance {
@@ -28,19 +28,13 @@ fn instance(keyframes: &[usize]) -> Instance {
 
 fn scene(instances: Vec<Instance>, nodes: Vec<Node>) -> Scene {
     Scene {
-        name: String::new(),
-        tissues: vec![Tissue::shipped("water").expect("shipped")],
-        background: 0,
         meshes: vec![Mesh::default(); 8],
         instances,
         graph: Graph { nodes },
-        wires: Vec::new(),
-        probe: Probe::abdominal(),
-        world_from_probe: DAffine3::IDENTITY,
-        simulation: Simulation::default(),
-        imaging: Imaging::default(),
-        volume: None,
-        fusion: None,
+        ..Scene::homogeneous(
+            Tissue::shipped("water").expect("shipped"),
+            Probe::abdominal(),
+        )
     }
 }
 

@@ -2,24 +2,11 @@ use glam::{DMat3, DQuat};
 
 use super::*;
 use crate::probe::Probe;
-use crate::scene::{Imaging, Keyframes, Simulation, Tissue, shapes};
+use crate::scene::{Keyframes, Tissue, shapes};
 
 fn scene() -> Scene {
-    Scene {
-        name: "test".into(),
-        tissues: vec![Tissue::shipped("liver").expect("shipped")],
-        background: 0,
-        meshes: vec![],
-        instances: vec![],
-        graph: Default::default(),
-        wires: vec![],
-        probe: Probe::paper_table1(),
-        world_from_probe: DAffine3::IDENTITY,
-        simulation: Simulation::default(),
-        imaging: Imaging::default(),
-        volume: None,
-        fusion: None,
-    }
+    let liver = Tissue::shipped("liver").expect("shipped");
+    Scene::homogeneous(liver, Probe::paper_table1())
 }
 
 /// Adds `mesh` and, as its second keyframe, the same moved by `displaced` in object space.
