@@ -18,6 +18,7 @@ mod probe;
 mod schema;
 mod shelf;
 mod tissues;
+mod tracker;
 mod trajectory;
 mod units;
 
@@ -72,6 +73,7 @@ impl Scene {
             &anatomy.meshes,
             &anatomy.instances,
         )?;
+        let tracker = tracker::build(&document, file.tracker.as_ref())?;
         warnings.extend(tissues.unused());
         let name = file.name.unwrap_or_else(|| {
             path.file_stem()
@@ -93,6 +95,7 @@ impl Scene {
             imaging,
             volume,
             fusion,
+            tracker,
         };
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));

@@ -22,6 +22,7 @@ pub mod shapes;
 pub mod suggest;
 pub mod tissue;
 pub mod topology;
+pub mod tracker;
 
 pub use file::SceneError;
 pub use fusion::{Acquired, Fusion};
@@ -30,6 +31,7 @@ pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
 pub use settings::{Imaging, Simulation};
 pub use tissue::Tissue;
+pub use tracker::Tracker;
 
 use crate::probe::Probe;
 
@@ -135,6 +137,8 @@ pub struct Scene {
     pub volume: Option<Acquired>,
     /// How it is mixed with the simulation; none: everything is simulated.
     pub fusion: Option<Fusion>,
+    /// The tracked tool that may move the probe.
+    pub tracker: Tracker,
 }
 
 impl Scene {
@@ -154,6 +158,7 @@ impl Scene {
             imaging: Imaging::default(),
             volume: None,
             fusion: None,
+            tracker: Tracker::default(),
         }
     }
 

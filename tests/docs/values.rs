@@ -55,6 +55,10 @@ pub fn place(path: &str) -> (String, String) {
             "[volume]\nfile = \"volume.mha\"\nrotate = { axis = [0, 0, 1], angle = 0 }\n\
              [fusion]\nmask = [\"one\"]\n",
         ),
+        "tracker" => text.push_str(
+            "[tracker]\nworld_from_reference = { rotate = { axis = [0, 0, 1], angle = 0 } }\n\
+             tool_from_probe = { rotate = { axis = [0, 0, 1], angle = 0 } }\n",
+        ),
         "probe" if parts[1] == "width" => text.push_str("[probe]\npreset = \"linear\"\n"),
         _ => {}
     }
@@ -70,7 +74,8 @@ pub fn settings(scene: &Scene) -> String {
     let sizes: Vec<_> = scene.meshes.iter().map(|m| m.triangles.len()).collect();
     let (instances, graph) = (&scene.instances, &scene.graph);
     write!(out, "{instances:?}{graph:?}{:?}{sizes:?}", scene.wires).expect("memory");
-    write!(out, "{:?}{:?}", scene.volume, scene.fusion).expect("memory");
+    let (volume, fusion, tracker) = (&scene.volume, &scene.fusion, &scene.tracker);
+    write!(out, "{volume:?}{fusion:?}{tracker:?}").expect("memory");
     out
 }
 

@@ -13,6 +13,7 @@ use crate::scene::animation::{Interpolation, Loop};
 use crate::scene::fusion::{Blend, Surroundings};
 use crate::scene::keyframes::Strategy;
 use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
+use crate::scene::tracker::Axes;
 
 /// The whole file.
 #[derive(Debug, Deserialize)]
@@ -28,6 +29,7 @@ pub struct File {
     pub imaging: ImagingTable,
     pub volume: Option<VolumeTable>,
     pub fusion: Option<FusionTable>,
+    pub tracker: Option<TrackerTable>,
     #[serde(default)]
     pub group: Vec<GroupTable>,
     #[serde(default)]
@@ -156,6 +158,24 @@ pub struct FusionTable {
     pub surroundings: Option<Surroundings>,
     pub blur: Option<u32>,
     pub blend: Option<Blend>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TrackerTable {
+    pub device: Option<String>,
+    pub timeout: Option<Duration>,
+    pub axes: Option<Axes>,
+    pub world_from_reference: Option<RigidTable>,
+    pub tool_from_probe: Option<RigidTable>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RigidTable {
+    pub translate: Option<[Length; 3]>,
+    pub rotate: Option<Rotation>,
+    pub matrix: Option<[f64; 16]>,
 }
 
 #[derive(Debug, Deserialize)]
