@@ -9,6 +9,7 @@
 pub mod acquire;
 pub mod gpu;
 pub mod harness;
+pub mod igtl;
 pub mod npy;
 pub mod output;
 pub mod plot;

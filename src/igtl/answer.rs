@@ -1,0 +1,202 @@
+//! What a message from a client does, and what is answered to queries.
+//!
+//! A query of type GET_X, STT_X or STP_X has an answer whatever X is: an X, or an RTS_X with a
+//! status of 0 (it is so) or 1 (there is none).
+
+use std::time::Duration;
+
+use super::client::{Answer, Client, Wants};
+use super::message::{Content, Extension, Header, Message, Tool};
+use super::picture::Published;
+use super::server::Shared;
+use super::tracking::Tracked;
+use super::wire::Label;
+use super::{IMAGE_DEVICE, POSE_DEVICE};
+
+/// Types that a client may send to some effect.
+const TAKEN: [&str; 12] = [
+    "TRANSFORM",
+    "TDATA",
+    "GET_CAPABIL",
+    "GET_STATUS",
+    "GET_IMAGE",
+    "GET_TRANS",
+    "GET_TDATA",
+    "STT_IMAGE",
+    "STP_IMAGE",
+    "STT_TRANS",
+    "STP_TRANS",
+    "STT_TDATA",
+];
+const OK: u8 = 0;
+const ERROR: u8 = 1;
+/// A tool with six degrees of freedom.
+const SIX: u8 = 2;
+/// A STATUS that says that all is well, and one that says that there is no room.
+const STATUS_OK: u16 = 1;
+const STATUS_BUSY: u16 = 6;
+
+/// Why a message has no effect.
+pub(super) enum Refused {
+    /// It is wrong; the next may be right.
+    Message(String),
+    /// The client is to go.
+    Client(String),
+}
+
+/// Whether a message's body is read here; others are skipped, as the protocol wants it.
+pub(super) fn is_understood(header: &Header) -> bool {
+    let kind = header.kind.text();
+    ["TRANSFORM", "TDATA"].contains(&&*kind) || query(&kind).is_some()
+}
+
+/// Prefix and type of a query.
+fn query(kind: &str) -> Option<(&str, &str)> {
+    let (prefix, of) = kind.split_at_checked(4)?;
+    ["GET_", "STT_", "STP_"]
+        .contains(&prefix)
+        .then_some((prefix, of))
+}
+
+/// Lets a message act.
+///
+/// # Errors
+/// What is wrong with it, or with who sends it.
+pub(super) fn answer(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refused> {
+    let tracking = &shared.tracking;
+    match &message.content {
+        Content::Transform(matrix) => {
+            let taken = tracking.report(message.device, matrix, message);
+            count(shared, taken.map_err(Refused::Message)?);
+            Ok(())
+        }
+        Content::Tracking(tools) => {
+            let mut taken = false;
+            for tool in tools {
+                let own = tracking.report(tool.name, &tool.matrix, message);
+                taken |= own.map_err(Refused::Message)?;
+            }
+            count(shared, taken);
+            Ok(())
+        }
+        _ => reply(client, shared, message),
+    }
+}
+
+fn count(shared: &Shared, taken: bool) {
+    shared.count(|status| match taken {
+        true => status.poses += 1,
+        false => status.ignored += 1,
+    });
+}
+
+fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refused> {
+    let kind = message.content.kind();
+    let kind = kind.text();
+    let Some((prefix, of)) = query(&kind) else {
+        return Ok(());
+    };
+    let published = shared.latest().is_some();
+    let named = |own: &str| published && (message.device.is_empty() || message.device.is(own));
+    let status = |ok: bool| {
+        let status = if ok { OK } else { ERROR };
+        Answer::Message(respond(message, rts(of, status)))
+    };
+    let choose = |change: &dyn Fn(&mut Wants)| {
+        client.choose(change);
+        status(true)
+    };
+    let answer = match (prefix, of) {
+        ("GET_", "CAPABIL") => Answer::Message(respond(message, capability())),
+        ("GET_", "STATUS") => Answer::Message(respond(message, state(shared))),
+        ("GET_", "IMAGE") if named(IMAGE_DEVICE) => Answer::Image,
+        ("GET_", "TRANS" | "TRANSFOR") if named(POSE_DEVICE) => Answer::Transform,
+        ("GET_", "TDATA") if published => Answer::Tracking,
+        ("STT_", "IMAGE") => choose(&|wants| wants.image = true),
+        ("STP_", "IMAGE") => choose(&|wants| wants.image = false),
+        ("STT_", "TRANS" | "TRANSFOR") => choose(&|wants| wants.transform = true),
+        ("STP_", "TRANS" | "TRANSFOR") => choose(&|wants| wants.transform = false),
+        ("STP_", "TDATA") => choose(&|wants| wants.tracking = None),
+        ("STT_", "TDATA") => match &message.content {
+            // There is one frame, whose name is left out.
+            Content::StartTracking {
+                resolution,
+                coordinates,
+            } if coordinates.is_empty() => {
+                let least = Duration::from_millis((*resolution).into());
+                choose(&|wants| wants.tracking = Some(least))
+            }
+            _ => status(false),
+        },
+        _ => status(false),
+    };
+    match client.answer(answer) {
+        true => Ok(()),
+        false => Err(Refused::Client(
+            "it asks and does not read the answers".to_owned(),
+        )),
+    }
+}
+
+/// An answer under the query's name, in its header version and under its number.
+fn respond(query: &Message, content: Content) -> Vec<u8> {
+    let extension = query.extension.as_ref().map(|e| Extension {
+        id: e.id,
+        metadata: Vec::new(),
+    });
+    Message {
+        device: query.device,
+        extension,
+        ..Message::new("", content)
+    }
+    .encode()
+}
+
+fn rts(of: &str, status: u8) -> Content {
+    Content::Other {
+        kind: Label::new(&format!("RTS_{of}")),
+        bytes: vec![status],
+    }
+}
+
+fn capability() -> Content {
+    let mut kinds: Vec<_> = TAKEN.iter().map(|k| Label::new(k)).collect();
+    kinds.push(Label::new("STP_TDATA"));
+    Content::Capability(kinds)
+}
+
+fn status(code: u16, name: &str, text: &str) -> Content {
+    Content::Status {
+        code,
+        subcode: 0,
+        name: Label::new(name),
+        message: [text.as_bytes(), &[0]].concat(),
+    }
+}
+
+/// How things are, for GET_STATUS.
+fn state(shared: &Shared) -> Content {
+    let text = match shared.tracking.now() {
+        Tracked::Never => "no pose has arrived yet",
+        Tracked::Live(_) => "the tracker moves the probe",
+        Tracked::Lost(_) => "the tracker is lost",
+    };
+    status(STATUS_OK, "OK", text)
+}
+
+/// What a client is told for which there is no room.
+pub(super) fn no_room(most: usize) -> Vec<u8> {
+    let text = format!("{most} clients are connected and that is all; close one of them");
+    Message::new("", status(STATUS_BUSY, "Busy", &text)).encode()
+}
+
+/// The probe's pose as a TDATA message.
+pub(super) fn tracking_message(frame: &Published) -> Vec<u8> {
+    let tool = Tool {
+        name: Label::new(POSE_DEVICE),
+        kind: SIX,
+        reserved: 0,
+        matrix: frame.matrix(),
+    };
+    Message::new(POSE_DEVICE, Content::Tracking(vec![tool])).encode()
+}

@@ -1,0 +1,233 @@
+//! A connected client: what waits to be sent to it, and the thread that sends.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Write};
+use std::net::{Shutdown, SocketAddr, TcpStream};
+use std::sync::{Arc, Condvar, Mutex};
+use std::time::{Duration, Instant};
+
+use super::answer::tracking_message;
+use super::lock;
+use super::picture::Published;
+use super::server::Shared;
+
+/// Answers that may wait. Nobody asks for so many before reading one.
+const ANSWERS: usize = 64;
+/// How often a thread that waits for the network looks whether its time is over.
+pub(super) const LOOK: Duration = Duration::from_millis(250);
+
+/// An answer to a query. Images and poses are looked up when they are sent, so that many queries
+/// hold no more memory than one.
+pub(super) enum Answer {
+    Message(Vec<u8>),
+    Image,
+    Transform,
+    Tracking,
+}
+
+/// What a client receives unasked.
+pub(super) struct Wants {
+    pub image: bool,
+    pub transform: bool,
+    /// TDATA messages, no more often than this.
+    pub tracking: Option<Duration>,
+}
+
+struct Outbox {
+    answers: VecDeque<Answer>,
+    /// The newest frame that the client has not been sent.
+    frame: Option<Arc<Published>>,
+    wants: Wants,
+    tracking_sent: Option<Instant>,
+    closed: bool,
+}
+
+pub(super) struct Client {
+    pub stream: TcpStream,
+    pub peer: SocketAddr,
+    outbox: Mutex<Outbox>,
+    changed: Condvar,
+}
+
+/// Why nothing more can be sent.
+enum End {
+    /// The client has left, as it may at any time.
+    Left,
+    Fault(String),
+}
+
+/// Whether the other side has ended the connection, with or without reading what was sent to it.
+pub(super) fn has_left(error: &std::io::Error) -> bool {
+    let kind = error.kind();
+    matches!(
+        kind,
+        ErrorKind::BrokenPipe | ErrorKind::ConnectionReset | ErrorKind::ConnectionAborted
+    )
+}
+
+/// What its thread sends next.
+enum Next {
+    Answer(Answer),
+    Frame(Arc<Published>),
+}
+
+impl Client {
+    pub fn new(stream: TcpStream, peer: SocketAddr, frame: Option<Arc<Published>>) -> Self {
+        Self {
+            stream,
+            peer,
+            outbox: Mutex::new(Outbox {
+                answers: VecDeque::new(),
+                frame,
+                wants: Wants {
+                    image: true,
+                    transform: true,
+                    tracking: None,
+                },
+                tracking_sent: None,
+                closed: false,
+            }),
+            changed: Condvar::new(),
+        }
+    }
+
+    /// Hands over a frame. Whether it takes the place of one that was not sent yet.
+    pub fn offer(&self, frame: Arc<Published>) -> bool {
+        let mut outbox = lock(&self.outbox);
+        // A client that has just come may have been given this very frame already.
+        let late = |old: &Arc<Published>| !Arc::ptr_eq(old, &frame);
+        let late = outbox.frame.as_ref().is_some_and(late);
+        outbox.frame = Some(frame);
+        self.changed.notify_one();
+        late
+    }
+
+    /// Queues an answer. False when too many wait.
+    pub fn answer(&self, answer: Answer) -> bool {
+        let mut outbox = lock(&self.outbox);
+        if outbox.answers.len() >= ANSWERS {
+            return false;
+        }
+        outbox.answers.push_back(answer);
+        self.changed.notify_one();
+        true
+    }
+
+    /// Changes what it receives unasked.
+    pub fn choose(&self, change: impl FnOnce(&mut Wants)) {
+        change(&mut lock(&self.outbox).wants);
+    }
+
+    /// Ends the connection: both threads return soon.
+    pub fn close(&self) {
+        lock(&self.outbox).closed = true;
+        self.changed.notify_one();
+        // It fails where the other side has ended the connection already.
+        let _ = self.stream.shutdown(Shutdown::Both);
+    }
+
+    pub fn is_closed(&self) -> bool {
+        lock(&self.outbox).closed
+    }
+
+    /// Waits for something to send; none when the connection has ended.
+    fn next(&self) -> Option<Next> {
+        let mut outbox = lock(&self.outbox);
+        loop {
+            if outbox.closed {
+                return None;
+            }
+            if let Some(answer) = outbox.answers.pop_front() {
+                return Some(Next::Answer(answer));
+            }
+            if let Some(frame) = outbox.frame.take() {
+                return Some(Next::Frame(frame));
+            }
+            outbox = self
+                .changed
+                .wait(outbox)
+                .unwrap_or_else(std::sync::PoisonError::into_inner);
+        }
+    }
+
+    /// Image and pose now, and whether TDATA are due.
+    fn due(&self) -> (bool, bool, bool) {
+        let outbox = &mut *lock(&self.outbox);
+        let now = Instant::now();
+        let tracking = outbox.wants.tracking.is_some_and(|least| {
+            let sent = outbox.tracking_sent;
+            sent.is_none_or(|sent| now.duration_since(sent) >= least)
+        });
+        if tracking {
+            outbox.tracking_sent = Some(now);
+        }
+        (outbox.wants.image, outbox.wants.transform, tracking)
+    }
+
+    /// Sends until the connection ends.
+    pub fn send_all(&self, shared: &Shared) {
+        while let Some(next) = self.next() {
+            if let Err(end) = self.send(next, shared) {
+                match end {
+                    End::Fault(why) if !self.is_closed() => shared.fault(self, &why),
+                    _ => {}
+                }
+                break;
+            }
+        }
+        self.close();
+    }
+
+    fn send(&self, next: Next, shared: &Shared) -> Result<(), End> {
+        let limit = shared.settings.send_timeout;
+        let put = |bytes: &[u8]| write(&self.stream, bytes, limit);
+        match next {
+            Next::Answer(Answer::Message(bytes)) => put(&bytes),
+            Next::Answer(answer) => {
+                // Asked for only where there is one, and there always is one afterwards.
+                let frame = shared.latest().expect("a frame was published");
+                match answer {
+                    Answer::Image => put(frame.image()),
+                    Answer::Transform => put(frame.transform()),
+                    _ => put(&tracking_message(&frame)),
+                }
+            }
+            Next::Frame(frame) => {
+                let (image, transform, tracking) = self.due();
+                if transform {
+                    put(frame.transform())?;
+                }
+                if tracking {
+                    put(&tracking_message(&frame))?;
+                }
+                if image {
+                    put(frame.image())?;
+                    shared.count(|status| status.images_sent += 1);
+                }
+                Ok(())
+            }
+        }
+    }
+}
+
+/// Writes all of `bytes`, or fails after `limit`, however little and often the other side reads.
+fn write(mut stream: &TcpStream, mut bytes: &[u8], limit: Duration) -> Result<(), End> {
+    let end = Instant::now() + limit;
+    while !bytes.is_empty() {
+        match stream.write(bytes) {
+            Ok(0) => return Err(End::Left),
+            Ok(count) => bytes = &bytes[count..],
+            Err(error) => match error.kind() {
+                ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
+                _ if has_left(&error) => return Err(End::Left),
+                _ => return Err(End::Fault(format!("sending: {error}"))),
+            },
+        }
+        if !bytes.is_empty() && Instant::now() > end {
+            let limit = limit.as_secs_f64();
+            let why = format!("it did not take a message within {limit} s");
+            return Err(End::Fault(why));
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,322 @@
+//! Messages: 58 bytes of header, then (header version 2) an extended header, the content, metadata.
+
+use super::image::Image;
+pub use super::metadata::{Entry, Extension};
+use super::wire::{DecodeError, Label, Reader, Timestamp, checksum, put_floats};
+
+/// Bytes of a header.
+pub const HEADER: usize = 58;
+/// Bytes of a tool in a TDATA message.
+const TOOL: usize = 70;
+
+/// What stands in front of every message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Header {
+    /// 1, or 2 with an extended header (3 is taken for 2: some senders write the protocol's version).
+    pub version: u16,
+    /// Type of the message.
+    pub kind: Label<12>,
+    /// What it is about.
+    pub device: Label<20>,
+    /// When it was made.
+    pub time: Timestamp,
+    /// Bytes that follow.
+    pub body_size: u64,
+    /// Their checksum.
+    pub checksum: u64,
+}
+
+impl Header {
+    /// Reads a header.
+    ///
+    /// # Errors
+    /// An unknown version: what follows cannot be told then.
+    pub fn decode(bytes: &[u8; HEADER]) -> Result<Self, DecodeError> {
+        let mut from = Reader::new(bytes, "a header");
+        let version = from.u16()?;
+        if !(1..=3).contains(&version) {
+            return Err(DecodeError::Version(version));
+        }
+        Ok(Self {
+            version,
+            kind: Label(from.array()?),
+            device: Label(from.array()?),
+            time: Timestamp(from.u64()?),
+            body_size: from.u64()?,
+            checksum: from.u64()?,
+        })
+    }
+
+    fn encode(&self, out: &mut Vec<u8>) {
+        out.extend(self.version.to_be_bytes());
+        out.extend(self.kind.0);
+        out.extend(self.device.0);
+        out.extend(self.time.0.to_be_bytes());
+        out.extend(self.body_size.to_be_bytes());
+        out.extend(self.checksum.to_be_bytes());
+    }
+}
+
+/// A message with what it says.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Message {
+    /// What it is about.
+    pub device: Label<20>,
+    /// When it was made.
+    pub time: Timestamp,
+    /// What header version 2 adds; none: version 1.
+    pub extension: Option<Extension>,
+    /// What it says.
+    pub content: Content,
+}
+
+/// A tool of a TDATA message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tool {
+    /// Name.
+    pub name: Label<20>,
+    /// 1 tracker, 2 with all six degrees of freedom, 3 only its tip, 4 tip and axis.
+    pub kind: u8,
+    /// Not used by the protocol.
+    pub reserved: u8,
+    /// As in [`Content::Transform`].
+    pub matrix: [f32; 12],
+}
+
+/// What messages say.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Content {
+    /// TRANSFORM: the first three rows of a matrix, column after column; the last is the shift, mm.
+    Transform([f32; 12]),
+    /// TDATA: where tools are.
+    Tracking(Vec<Tool>),
+    /// IMAGE.
+    Image(Box<Image>),
+    /// STATUS.
+    Status {
+        /// 1 is OK; the others are in the protocol.
+        code: u16,
+        /// The sender's own.
+        subcode: i64,
+        /// Name of the error.
+        name: Label<20>,
+        /// Text, ended by a zero.
+        message: Vec<u8>,
+    },
+    /// CAPABILITY: types that the sender takes.
+    Capability(Vec<Label<12>>),
+    /// STT_TDATA: the receiver is to send TDATA.
+    StartTracking {
+        /// Least time between two messages, ms.
+        resolution: u32,
+        /// Frame in which it is wanted; empty: the usual one.
+        coordinates: Label<32>,
+    },
+    /// Any other type, and queries without content.
+    Other {
+        /// Its type.
+        kind: Label<12>,
+        /// Its content.
+        bytes: Vec<u8>,
+    },
+}
+
+impl Content {
+    /// Type in the header.
+    pub fn kind(&self) -> Label<12> {
+        Label::new(match self {
+            Self::Transform(_) => "TRANSFORM",
+            Self::Tracking(_) => "TDATA",
+            Self::Image(_) => "IMAGE",
+            Self::Status { .. } => "STATUS",
+            Self::Capability(_) => "CAPABILITY",
+            Self::StartTracking { .. } => "STT_TDATA",
+            Self::Other { kind, .. } => return *kind,
+        })
+    }
+
+    fn encode(&self, out: &mut Vec<u8>) {
+        match self {
+            Self::Transform(matrix) => put_floats(out, matrix),
+            Self::Tracking(tools) => {
+                for tool in tools {
+                    out.extend(tool.name.0);
+                    out.extend([tool.kind, tool.reserved]);
+                    put_floats(out, &tool.matrix);
+                }
+            }
+            Self::Image(image) => image.encode(out),
+            Self::Status {
+                code,
+                subcode,
+                name,
+                message,
+            } => {
+                out.extend(code.to_be_bytes());
+                out.extend(subcode.to_be_bytes());
+                out.extend(name.0);
+                out.extend_from_slice(message);
+            }
+            Self::Capability(kinds) => out.extend(kinds.iter().flat_map(|k| k.0)),
+            Self::StartTracking {
+                resolution,
+                coordinates,
+            } => {
+                out.extend(resolution.to_be_bytes());
+                out.extend(coordinates.0);
+            }
+            Self::Other { bytes, .. } => out.extend_from_slice(bytes),
+        }
+    }
+
+    fn decode(kind: Label<12>, content: &[u8]) -> Result<Self, DecodeError> {
+        let odd = |what| DecodeError::Length {
+            what,
+            bytes: content.len(),
+        };
+        Ok(match &*kind.text() {
+            "TRANSFORM" => {
+                let mut from = Reader::new(content, "a TRANSFORM");
+                let matrix = from.floats()?;
+                from.end()?;
+                Self::Transform(matrix)
+            }
+            "TDATA" => {
+                if !content.len().is_multiple_of(TOOL) {
+                    return Err(odd("a TDATA"));
+                }
+                let tools = content.chunks_exact(TOOL).map(|tool| {
+                    let mut from = Reader::new(tool, "a TDATA");
+                    Ok(Tool {
+                        name: Label(from.array()?),
+                        kind: from.u8()?,
+                        reserved: from.u8()?,
+                        matrix: from.floats()?,
+                    })
+                });
+                Self::Tracking(tools.collect::<Result<_, _>>()?)
+            }
+            "IMAGE" => Self::Image(Box::new(Image::decode(content)?)),
+            "STATUS" => {
+                let mut from = Reader::new(content, "a STATUS");
+                Self::Status {
+                    code: from.u16()?,
+                    subcode: i64::from_be_bytes(from.array()?),
+                    name: Label(from.array()?),
+                    message: from.rest().to_vec(),
+                }
+            }
+            "CAPABILITY" => {
+                let (kinds, rest) = content.as_chunks::<12>();
+                if !rest.is_empty() {
+                    return Err(odd("a CAPABILITY"));
+                }
+                Self::Capability(kinds.iter().map(|k| Label(*k)).collect())
+            }
+            "STT_TDATA" => {
+                let mut from = Reader::new(content, "an STT_TDATA");
+                let (resolution, coordinates) = (from.u32()?, Label(from.array()?));
+                from.end()?;
+                Self::StartTracking {
+                    resolution,
+                    coordinates,
+                }
+            }
+            _ => Self::Other {
+                kind,
+                bytes: content.to_vec(),
+            },
+        })
+    }
+}
+
+impl Message {
+    /// A message of now, in header version 1, which everybody reads.
+    pub fn new(device: &str, content: Content) -> Self {
+        Self {
+            device: Label::new(device),
+            time: Timestamp::now(),
+            extension: None,
+            content,
+        }
+    }
+
+    /// Text of a metadata value.
+    pub fn metadata(&self, key: &str) -> Option<String> {
+        let entries = &self.extension.as_ref()?.metadata;
+        let entry = entries.iter().find(|e| e.key == key.as_bytes())?;
+        Some(String::from_utf8_lossy(&entry.value).into_owned())
+    }
+
+    /// The bytes to send.
+    ///
+    /// # Panics
+    /// With metadata beyond what the protocol can say: 65,535 entries or bytes of a key, 4 GB.
+    pub fn encode(&self) -> Vec<u8> {
+        let mut out = vec![0; HEADER];
+        let [front, back] = match &self.extension {
+            Some(extension) => extension.encode(),
+            None => Default::default(),
+        };
+        out.extend(front);
+        self.content.encode(&mut out);
+        out.extend(back);
+        let header = Header {
+            version: if self.extension.is_some() { 2 } else { 1 },
+            kind: self.content.kind(),
+            device: self.device,
+            time: self.time,
+            body_size: (out.len() - HEADER) as u64,
+            checksum: checksum(&out[HEADER..]),
+        };
+        let mut front = Vec::with_capacity(HEADER);
+        header.encode(&mut front);
+        out[..HEADER].copy_from_slice(&front);
+        out
+    }
+
+    /// Reads a message.
+    ///
+    /// # Errors
+    /// A body that is not the one of the header, or not of its type.
+    pub fn decode(header: &Header, body: &[u8]) -> Result<Self, DecodeError> {
+        if body.len() as u64 != header.body_size {
+            return Err(DecodeError::Length {
+                what: "a body",
+                bytes: body.len(),
+            });
+        }
+        let computed = checksum(body);
+        if computed != header.checksum {
+            return Err(DecodeError::Checksum {
+                stated: header.checksum,
+                computed,
+            });
+        }
+        let (extension, content) = match header.version {
+            1 => (None, body),
+            _ => {
+                let (extension, content) = Extension::decode(body)?;
+                (Some(extension), content)
+            }
+        };
+        Ok(Self {
+            device: header.device,
+            time: header.time,
+            extension,
+            content: Content::decode(header.kind, content)?,
+        })
+    }
+
+    /// Reads a message and nothing behind it.
+    ///
+    /// # Errors
+    /// As [`Self::decode`], and bytes that are missing or left over.
+    pub fn from_bytes(bytes: &[u8]) -> Result<Self, DecodeError> {
+        let (header, body) = bytes.split_first_chunk().ok_or(DecodeError::Length {
+            what: "a header",
+            bytes: bytes.len(),
+        })?;
+        Self::decode(&Header::decode(header)?, body)
+    }
+}

@@ -1,0 +1,180 @@
+//! Reading a client's messages: bounded in bytes and in time.
+
+use std::io::{ErrorKind, Read};
+use std::net::TcpStream;
+use std::time::{Duration, Instant};
+
+use super::answer;
+use super::client::{Client, has_left};
+use super::message::{HEADER, Header, Message};
+use super::server::{Settings, Shared};
+
+/// Bytes that a message of a type which is understood here may have: a thousand tools.
+const UNDERSTOOD: u64 = 70_000;
+/// Bytes a second that a long message which is skipped has to arrive with.
+const PACE: f64 = 1e6;
+/// Faulty messages in a row after which the connection is ended.
+const FAULTS: u32 = 16;
+
+/// What is wrong.
+enum Fault {
+    /// One message; the next one can be found.
+    Message(String),
+    /// The connection cannot go on.
+    Connection(String),
+}
+
+/// Reads and answers until the connection ends.
+pub(super) fn receive_all(client: &Client, shared: &Shared) {
+    let mut faults = 0;
+    loop {
+        let fault = match receive(client, shared) {
+            Ok(true) => {
+                faults = 0;
+                continue;
+            }
+            Ok(false) => break,
+            Err(fault) => fault,
+        };
+        if client.is_closed() {
+            break;
+        }
+        match fault {
+            Fault::Message(why) => {
+                shared.fault(client, &why);
+                faults += 1;
+                if faults == FAULTS {
+                    shared.fault(client, &format!("{FAULTS} faulty messages in a row"));
+                    break;
+                }
+            }
+            Fault::Connection(why) => {
+                shared.fault(client, &why);
+                break;
+            }
+        }
+    }
+    client.close();
+}
+
+/// The next message. False where the connection has ended between two messages.
+fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
+    let mut source = Source::new(&client.stream, &shared.settings);
+    let mut header = [0; HEADER];
+    if !source.first(&mut header[..1])? {
+        return Ok(false);
+    }
+    source.fill(&mut header[1..])?;
+    let header = Header::decode(&header).map_err(|why| Fault::Connection(why.to_string()))?;
+    if !answer::is_understood(&header) {
+        if header.body_size > shared.settings.skipped_bytes {
+            return Err(too_long(&header));
+        }
+        source.skip(header.body_size)?;
+        shared.count(|status| status.ignored += 1);
+        return Ok(true);
+    }
+    if header.body_size > UNDERSTOOD {
+        return Err(too_long(&header));
+    }
+    let mut body = vec![0; header.body_size as usize];
+    source.fill(&mut body)?;
+    let message = Message::decode(&header, &body)
+        .map_err(|why| Fault::Message(format!("a message of type {}: {why}", header.kind)))?;
+    shared.count(|status| status.messages += 1);
+    answer::answer(client, shared, &message).map_err(|refused| match refused {
+        answer::Refused::Message(why) => Fault::Message(why),
+        answer::Refused::Client(why) => Fault::Connection(why),
+    })?;
+    Ok(true)
+}
+
+fn too_long(header: &Header) -> Fault {
+    let (kind, bytes) = (header.kind, header.body_size);
+    Fault::Connection(format!("a message of type {kind} with {bytes} bytes"))
+}
+
+/// A stream whose reads return every now and then, and one message's time.
+struct Source<'s> {
+    stream: &'s TcpStream,
+    limit: Duration,
+    /// When the message has to be here.
+    end: Instant,
+}
+
+impl<'s> Source<'s> {
+    fn new(stream: &'s TcpStream, settings: &Settings) -> Self {
+        Self {
+            stream,
+            limit: settings.message_timeout,
+            end: Instant::now(),
+        }
+    }
+
+    /// Waits for the first byte for as long as it takes; the message's time begins with it. False
+    /// where the connection has ended.
+    fn first(&mut self, byte: &mut [u8]) -> Result<bool, Fault> {
+        loop {
+            match self.stream.read(byte) {
+                Ok(0) => return Ok(false),
+                Ok(_) => {
+                    self.end = Instant::now() + self.limit;
+                    return Ok(true);
+                }
+                Err(error) if waits(&error) => {}
+                Err(error) if has_left(&error) => return Ok(false),
+                Err(error) => return Err(Fault::Connection(format!("receiving: {error}"))),
+            }
+        }
+    }
+
+    fn fill(&mut self, mut bytes: &mut [u8]) -> Result<(), Fault> {
+        while !bytes.is_empty() {
+            let count = self.some(bytes)?;
+            bytes = &mut bytes[count..];
+        }
+        Ok(())
+    }
+
+    /// Reads on without keeping anything.
+    fn skip(&mut self, mut count: u64) -> Result<(), Fault> {
+        self.end += Duration::from_secs_f64(count as f64 / PACE);
+        let mut scratch = [0; 16 << 10];
+        while count > 0 {
+            let part = count.min(scratch.len() as u64) as usize;
+            count -= self.some(&mut scratch[..part])? as u64;
+        }
+        Ok(())
+    }
+
+    /// At least one byte.
+    fn some(&mut self, bytes: &mut [u8]) -> Result<usize, Fault> {
+        loop {
+            match self.stream.read(bytes) {
+                Ok(0) => {
+                    let why = "it ended the connection within a message";
+                    return Err(Fault::Connection(why.to_owned()));
+                }
+                Ok(count) if Instant::now() <= self.end => return Ok(count),
+                Ok(_) => {}
+                Err(error) if waits(&error) => {}
+                Err(error) => return Err(Fault::Connection(format!("receiving: {error}"))),
+            }
+            if Instant::now() > self.end {
+                let limit = self.limit.as_secs_f64();
+                return Err(Fault::Connection(format!(
+                    "a message did not arrive within {limit} s"
+                )));
+            }
+        }
+    }
+}
+
+/// Whether there is just nothing to read yet.
+fn waits(error: &std::io::Error) -> bool {
+    let kind = error.kind();
+    matches!(
+        kind,
+        ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut
+    )
+}

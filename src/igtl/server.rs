@@ -1,0 +1,314 @@
+//! The server: one thread that lets clients in, two for each of them.
+
+use std::collections::VecDeque;
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use glam::DAffine3;
+
+use super::client::{Client, LOOK};
+use super::picture::{Picture, Published};
+use super::tracking::{Tracked, Tracking};
+use super::{answer, lock, receive};
+use crate::scene::tracker::Tracker;
+
+/// How often the listener looks for clients.
+const LISTEN: Duration = Duration::from_millis(10);
+/// Refused clients whose last bytes are read before they are dropped, and for how long: a
+/// connection that is closed over unread bytes is reset, and the refusal would never arrive.
+const LINGERING: usize = 16;
+const LINGER: Duration = Duration::from_millis(300);
+
+/// What cannot be served.
+#[derive(Debug, thiserror::Error)]
+pub enum IgtlError {
+    /// The address cannot be listened at.
+    #[error("listening at {address} for OpenIGTLink: {cause}")]
+    Bind {
+        /// The address.
+        address: SocketAddr,
+        /// What the system says.
+        cause: std::io::Error,
+    },
+}
+
+/// How clients are treated.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Which tool moves the probe, and how.
+    pub tracker: Tracker,
+    /// Clients at a time; more are told so and disconnected.
+    pub clients: usize,
+    /// Time between the first and the last byte of a message from a client; messages that are
+    /// skipped have a second more for each megabyte.
+    pub message_timeout: Duration,
+    /// Time within which a client has to take a message.
+    pub send_timeout: Duration,
+    /// Longest body that is skipped, bytes.
+    pub skipped_bytes: u64,
+}
+
+impl Settings {
+    /// The usual limits.
+    pub fn new(tracker: Tracker) -> Self {
+        Self {
+            tracker,
+            clients: 8,
+            message_timeout: Duration::from_secs(5),
+            send_timeout: Duration::from_secs(20),
+            skipped_bytes: 1 << 30,
+        }
+    }
+}
+
+/// What has happened so far.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Status {
+    /// Clients that take room now.
+    pub clients: usize,
+    /// Clients that were let in.
+    pub accepted: u64,
+    /// Clients for which there was no room.
+    pub refused: u64,
+    /// Messages that were understood.
+    pub messages: u64,
+    /// Poses of the tool that moves the probe, those counted that the tracker did not see.
+    pub poses: u64,
+    /// Messages of other tools and of types that are skipped.
+    pub ignored: u64,
+    /// Images that clients took.
+    pub images_sent: u64,
+    /// Images that clients were not sent because they were still taking an older one.
+    pub images_dropped: u64,
+    /// Faulty messages and connections.
+    pub errors: u64,
+    /// The last of them: who, and what.
+    pub last_error: Option<String>,
+}
+
+/// What all threads share.
+pub(super) struct Shared {
+    pub settings: Settings,
+    pub tracking: Tracking,
+    latest: Mutex<Option<Arc<Published>>>,
+    clients: Mutex<Vec<Arc<Client>>>,
+    status: Mutex<Status>,
+    stopping: AtomicBool,
+}
+
+impl Shared {
+    /// The frame that was published last.
+    pub fn latest(&self) -> Option<Arc<Published>> {
+        lock(&self.latest).clone()
+    }
+
+    /// Changes the counts.
+    pub fn count(&self, change: impl FnOnce(&mut Status)) {
+        change(&mut lock(&self.status));
+    }
+
+    /// Takes note of what a client did wrong.
+    pub fn fault(&self, client: &Client, why: &str) {
+        self.error(format!("{}: {why}", client.peer));
+    }
+
+    fn error(&self, why: String) {
+        self.count(|status| {
+            status.errors += 1;
+            status.last_error = Some(why);
+        });
+    }
+}
+
+/// Listens for OpenIGTLink clients until it is dropped, which ends their connections.
+pub struct Server {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    listener: Option<JoinHandle<()>>,
+}
+
+impl Server {
+    /// Listens at `address`; port 0 takes any that is free.
+    ///
+    /// # Errors
+    /// An address that is taken or not this machine's.
+    pub fn bind(address: SocketAddr, settings: Settings) -> Result<Self, IgtlError> {
+        let fail = |cause| IgtlError::Bind { address, cause };
+        let listener = TcpListener::bind(address).map_err(fail)?;
+        // A listener that waited could not be stopped.
+        listener.set_nonblocking(true).map_err(fail)?;
+        let bound = listener.local_addr().map_err(fail)?;
+        let shared = Arc::new(Shared {
+            tracking: Tracking::new(settings.tracker.clone()),
+            settings,
+            latest: Mutex::new(None),
+            clients: Mutex::new(Vec::new()),
+            status: Mutex::new(Status::default()),
+            stopping: AtomicBool::new(false),
+        });
+        let thread = {
+            let shared = Arc::clone(&shared);
+            let builder = thread::Builder::new().name("igtl listener".to_owned());
+            builder
+                .spawn(move || Doorman::new(shared).run(&listener))
+                .map_err(fail)?
+        };
+        Ok(Self {
+            shared,
+            address: bound,
+            listener: Some(thread),
+        })
+    }
+
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// What is known of the tracker. Does not wait for the network.
+    pub fn pose(&self) -> Tracked {
+        self.shared.tracking.now()
+    }
+
+    /// Offers a picture and the pose at which it was taken to every client: those that are still
+    /// taking an older one get the newest when they are done. Does not wait for the network.
+    pub fn publish(&self, picture: Picture, world_from_probe: &DAffine3) {
+        let axes = self.shared.tracking.tracker().axes;
+        let frame = Arc::new(Published::new(picture, axes.to_ras() * *world_from_probe));
+        *lock(&self.shared.latest) = Some(Arc::clone(&frame));
+        let clients = lock(&self.shared.clients).clone();
+        let late = clients.iter().filter(|c| c.offer(Arc::clone(&frame)));
+        let late = late.count() as u64;
+        self.shared.count(|status| status.images_dropped += late);
+    }
+
+    /// What has happened so far.
+    pub fn status(&self) -> Status {
+        lock(&self.shared.status).clone()
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.shared.stopping.store(true, Ordering::Relaxed);
+        if let Some(listener) = self.listener.take() {
+            // It has panicked only where a bug has been reported already.
+            let _ = listener.join();
+        }
+    }
+}
+
+/// Lets clients in and sees them out.
+struct Doorman {
+    shared: Arc<Shared>,
+    threads: Vec<(Arc<Client>, [JoinHandle<()>; 2])>,
+    refused: VecDeque<(TcpStream, Instant)>,
+}
+
+impl Doorman {
+    fn new(shared: Arc<Shared>) -> Self {
+        Self {
+            shared,
+            threads: Vec::new(),
+            refused: VecDeque::new(),
+        }
+    }
+
+    fn run(mut self, listener: &TcpListener) {
+        while !self.shared.stopping.load(Ordering::Relaxed) {
+            match listener.accept() {
+                Ok((stream, peer)) => {
+                    self.see_out();
+                    if let Err(error) = self.let_in(stream, peer) {
+                        self.shared.error(format!("{peer}: letting it in: {error}"));
+                    }
+                }
+                Err(error) => {
+                    if error.kind() != ErrorKind::WouldBlock {
+                        self.shared.error(format!("accepting a client: {error}"));
+                    }
+                    self.see_out();
+                    thread::sleep(LISTEN);
+                }
+            }
+        }
+        for (client, threads) in self.threads {
+            client.close();
+            for thread in threads {
+                let _ = thread.join();
+            }
+        }
+    }
+
+    /// Forgets the clients that have gone.
+    fn see_out(&mut self) {
+        let ended = |threads: &[JoinHandle<()>; 2]| threads.iter().all(JoinHandle::is_finished);
+        self.threads.retain(|(_, threads)| !ended(threads));
+        lock(&self.shared.clients).retain(|client| !client.is_closed());
+        let mut scratch = [0; 4096];
+        self.refused.retain_mut(|(stream, since)| {
+            let open = match stream.read(&mut scratch) {
+                Ok(count) => count > 0,
+                Err(error) => error.kind() == ErrorKind::WouldBlock,
+            };
+            open && since.elapsed() < LINGER
+        });
+        let seated = self.threads.len();
+        self.shared.count(|status| status.clients = seated);
+    }
+
+    fn let_in(&mut self, stream: TcpStream, peer: SocketAddr) -> std::io::Result<()> {
+        let most = self.shared.settings.clients;
+        // Threads, not connections: one that is ending still takes room.
+        if self.threads.len() >= most {
+            self.shared.count(|status| status.refused += 1);
+            return self.refuse(stream, most);
+        }
+        stream.set_nonblocking(false)?;
+        stream.set_nodelay(true)?;
+        stream.set_read_timeout(Some(LOOK))?;
+        stream.set_write_timeout(Some(LOOK))?;
+        // Both under one lock: a frame that is published now reaches it one way or the other.
+        let client = {
+            let mut clients = lock(&self.shared.clients);
+            let client = Arc::new(Client::new(stream, peer, self.shared.latest()));
+            clients.push(Arc::clone(&client));
+            client
+        };
+        let start = |name: &str, work: fn(&Client, &Shared)| {
+            let (client, shared) = (Arc::clone(&client), Arc::clone(&self.shared));
+            let builder = thread::Builder::new().name(format!("igtl {name}"));
+            builder.spawn(move || work(&client, &shared))
+        };
+        let threads = start("sender", Client::send_all)
+            .and_then(|sender| Ok([sender, start("receiver", receive::receive_all)?]));
+        match threads {
+            Ok(threads) => self.threads.push((client, threads)),
+            // A sender without its receiver ends with the connection.
+            Err(error) => {
+                client.close();
+                return Err(error);
+            }
+        }
+        let seated = self.threads.len();
+        self.shared.count(|status| {
+            status.accepted += 1;
+            status.clients = seated;
+        });
+        Ok(())
+    }
+
+    /// Says that there is no room, which a new connection has room for in its buffers.
+    fn refuse(&mut self, mut stream: TcpStream, most: usize) -> std::io::Result<()> {
+        stream.set_nonblocking(true)?;
+        stream.write_all(&answer::no_room(most))?;
+        stream.shutdown(Shutdown::Write)?;
+        self.refused.truncate(LINGERING - 1);
+        self.refused.push_front((stream, Instant::now()));
+        Ok(())
+    }
+}

@@ -1,0 +1,131 @@
+//! The pose that the tracker last reported.
+
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use glam::DAffine3;
+
+use super::message::Message;
+use super::wire::Label;
+use super::{POSE_DEVICE, lock};
+use crate::scene::tracker::{Tracker, rigid};
+
+/// A pose of the probe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Calibrated: world from probe space, rigid, mm.
+    pub world_from_probe: DAffine3,
+    /// When it arrived here.
+    pub arrived: Instant,
+    /// Counts the poses from 1.
+    pub number: u64,
+    /// The transform or the tool.
+    pub device: Label<20>,
+}
+
+/// What is known of the tracker.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Tracked {
+    /// No pose has arrived yet.
+    Never,
+    /// The latest pose is no older than the tracker's timeout.
+    Live(Pose),
+    /// It is older, or the tracker says that it does not see the tool. The last pose: nothing has
+    /// been seen since its arrival.
+    Lost(Pose),
+}
+
+impl Tracked {
+    /// The last pose, live or not.
+    pub fn pose(&self) -> Option<&Pose> {
+        match self {
+            Self::Never => None,
+            Self::Live(pose) | Self::Lost(pose) => Some(pose),
+        }
+    }
+}
+
+/// The latest pose with what turns messages into it.
+pub(super) struct Tracking {
+    tracker: Tracker,
+    last: Mutex<Option<Last>>,
+}
+
+struct Last {
+    pose: Pose,
+    /// The tracker has said since that it does not see the tool.
+    missing: bool,
+}
+
+impl Tracking {
+    pub fn new(tracker: Tracker) -> Self {
+        Self {
+            tracker,
+            last: Mutex::new(None),
+        }
+    }
+
+    pub fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    pub fn now(&self) -> Tracked {
+        match &*lock(&self.last) {
+            None => Tracked::Never,
+            Some(last) => {
+                let timeout = Duration::from_secs_f64(self.tracker.timeout);
+                match last.missing || last.pose.arrived.elapsed() > timeout {
+                    true => Tracked::Lost(last.pose),
+                    false => Tracked::Live(last.pose),
+                }
+            }
+        }
+    }
+
+    /// Whether this tool moves the probe. Without a choice all do, but for what was sent from here:
+    /// some programs send back what they receive.
+    fn is_meant(&self, device: &Label<20>) -> bool {
+        match &self.tracker.device {
+            Some(wanted) => device.is(wanted),
+            None => !device.is(POSE_DEVICE),
+        }
+    }
+
+    /// Takes a tool's matrix, columns first. Whether it is the tool that moves the probe.
+    ///
+    /// # Errors
+    /// What is wrong with the matrix.
+    pub fn report(
+        &self,
+        device: Label<20>,
+        matrix: &[f32; 12],
+        message: &Message,
+    ) -> Result<bool, String> {
+        if !self.is_meant(&device) {
+            return Ok(false);
+        }
+        // PLUS sends what it does not see with the last matrix and a status that is not OK.
+        let status = message.metadata("TransformStatus");
+        if status.is_some_and(|status| status != "OK") {
+            if let Some(last) = &mut *lock(&self.last) {
+                last.missing |= last.pose.device == device;
+            }
+            return Ok(true);
+        }
+        let reported = DAffine3::from_cols_array(&matrix.map(f64::from));
+        let reported =
+            rigid(reported).map_err(|why| format!("{device} is no pose of a probe: {why}"))?;
+        let mut last = lock(&self.last);
+        let number = last.as_ref().map_or(0, |last| last.pose.number) + 1;
+        *last = Some(Last {
+            pose: Pose {
+                world_from_probe: self.tracker.world_from_probe(reported),
+                arrived: Instant::now(),
+                number,
+                device,
+            },
+            missing: false,
+        });
+        Ok(true)
+    }
+}

@@ -1,0 +1,12 @@
+//! OpenIGTLink: the codec against messages of others, the server against good and bad clients, and
+//! the program. All traffic stays on this machine.
+
+mod client;
+mod codec;
+mod hostile;
+mod queries;
+mod session;
+#[path = "../common/shared_data.rs"]
+mod shared_data;
+mod table;
+mod vectors;
