@@ -12,6 +12,7 @@ mod info;
 mod movie;
 mod reconstruct;
 mod render;
+mod serve;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
 #[derive(Debug, Parser)]
@@ -33,6 +34,8 @@ enum Command {
     Reconstruct(Box<reconstruct::Reconstruct>),
     /// Render a scene to a B-mode image
     Render(Box<render::Render>),
+    /// Simulate without a window: a tracker moves the probe, viewers receive the images
+    Serve(Box<serve::Serve>),
 }
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
@@ -43,6 +46,7 @@ pub fn run() -> ExitCode {
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
         Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
+        Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
     };
     match result {
         Ok(code) => code,

@@ -4,6 +4,7 @@
 mod client;
 mod codec;
 mod hostile;
+mod program;
 mod queries;
 mod session;
 #[path = "../common/shared_data.rs"]

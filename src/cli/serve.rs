@@ -1,0 +1,189 @@
+//! `insonify serve`: the simulator without a window. A tracker moves the probe over OpenIGTLink,
+//! and whoever is connected receives the images.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr};
+use std::path::PathBuf;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use glam::DAffine3;
+use miette::{IntoDiagnostic, Report, Result, miette};
+
+use super::common::Common;
+use insonify::igtl::{self, IgtlError, Picture, Server, Status, Tracked};
+use insonify::output;
+use insonify::scene::Scene;
+use insonify::sim::Simulator;
+use insonify::sim::shaders::Library;
+
+/// How long to rest where nothing has changed: a tracker sends 30 to 100 poses a second.
+const REST: Duration = Duration::from_millis(3);
+/// How often clients and errors are told.
+const TOLD: Duration = Duration::from_secs(1);
+
+/// Arguments of `insonify serve`.
+#[derive(Debug, clap::Args)]
+pub struct Serve {
+    /// Scene file (.toml). Its [tracker] says which tool moves the probe.
+    scene: PathBuf,
+    /// Port for OpenIGTLink; 0 takes any that is free, and says which.
+    #[arg(long, value_name = "PORT", default_value_t = igtl::PORT)]
+    igtl_port: u16,
+    /// Address of this machine to listen at; 0.0.0.0 lets other machines in.
+    #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
+    igtl_bind: IpAddr,
+    /// Ends after as many images [default: goes on until it is stopped, as by Ctrl-C]. An image is
+    /// made only when the probe or the anatomy has moved.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..))]
+    frames: Option<u32>,
+    /// Images per second at most.
+    #[arg(long, default_value_t = 30.0, value_parser = rate)]
+    fps: f64,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    match (0.1..=1000.0).contains(&value) {
+        true => Ok(value),
+        false => Err("it must lie between 0.1 and 1000".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Everything that the user or the device can get wrong, said once.
+pub fn run(args: &Serve) -> Result<()> {
+    let common = &args.common;
+    let (mut scene, warnings) = Scene::load(&args.scene, &common.overrides)?;
+    for warning in &warnings {
+        eprintln!("{warning}");
+    }
+    let device = common.device()?;
+    common.settle(&mut scene, &device);
+    let tracer = common.tracer(&device)?;
+    let library = Library::embedded();
+    let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
+    if let Some(warning) = simulator.warning() {
+        eprintln!("warning: {warning}");
+    }
+
+    let address = SocketAddr::new(args.igtl_bind, args.igtl_port);
+    let settings = igtl::Settings::new(scene.tracker.clone());
+    let server = Server::bind(address, settings).map_err(advise)?;
+    if !args.igtl_bind.is_loopback() {
+        eprintln!(
+            "warning: whoever reaches this machine can move the probe and see the images; OpenIGTLink \
+             knows no passwords"
+        );
+    }
+    output::line(format!("listening at {} (OpenIGTLink)", server.address()));
+    simulate(&mut simulator, &mut scene, &server, args)?;
+    common.validated(&device)
+}
+
+fn advise(error: IgtlError) -> Report {
+    let IgtlError::Bind { cause, .. } = &error;
+    let help = match cause.kind() {
+        std::io::ErrorKind::AddrInUse => {
+            "another program listens there, such as a PlusServer or this program: choose another \
+             --igtl-port"
+        }
+        std::io::ErrorKind::AddrNotAvailable => {
+            "give --igtl-bind an address of this machine, such as 127.0.0.1 or 0.0.0.0"
+        }
+        _ => "choose another --igtl-port or --igtl-bind",
+    };
+    miette!(help = help, "{error}")
+}
+
+/// Makes an image whenever probe or anatomy have moved, and offers it to the clients.
+fn simulate(
+    simulator: &mut Simulator,
+    scene: &mut Scene,
+    server: &Server,
+    args: &Serve,
+) -> Result<()> {
+    let began = Instant::now();
+    let pause = Duration::from_secs_f64(1.0 / args.fps);
+    let mut told = Told::default();
+    let mut shown = None;
+    let mut frames = 0;
+    let mut due = began;
+    loop {
+        told.tell(server);
+        scene.set_time(args.common.time + began.elapsed().as_secs_f64());
+        if let Some(pose) = server.pose().pose() {
+            scene.world_from_probe = pose.world_from_probe;
+        }
+        let now = Some(state(scene));
+        if now == shown || Instant::now() < due {
+            thread::sleep(REST);
+            continue;
+        }
+        due = Instant::now() + pause;
+        shown = now;
+        simulator.frame(scene, frames).into_diagnostic()?;
+        let (_, _, rgba) = simulator.pixels().into_diagnostic()?;
+        let picture = Picture::new(simulator.constants(), &rgba);
+        server.publish(picture, &scene.world_from_probe);
+        frames += 1;
+        if Some(frames) == args.frames {
+            return Ok(());
+        }
+    }
+}
+
+/// Placement, visibility and shape of an instance.
+type Placed = (DAffine3, bool, usize, [(usize, f64); 4]);
+
+/// What of a scene changes with time and tracker.
+fn state(scene: &Scene) -> (DAffine3, Vec<Placed>) {
+    let placed = scene.instances.iter();
+    let placed = placed.map(|i| (i.world_from_object, i.shown, i.mesh, i.keyframes.blend));
+    (scene.world_from_probe, placed.collect())
+}
+
+/// What the user has been told already.
+#[derive(Default)]
+struct Told {
+    tracker: String,
+    status: Status,
+    at: Option<Instant>,
+}
+
+impl Told {
+    /// Says what is new of the tracker at once, of clients and errors once a second.
+    fn tell(&mut self, server: &Server) {
+        let tracker = match server.pose() {
+            Tracked::Never => String::new(),
+            Tracked::Live(pose) => format!("tracker: {} moves the probe", pose.device),
+            Tracked::Lost(pose) => format!("tracker: {} is lost; the probe stays", pose.device),
+        };
+        if tracker != self.tracker {
+            eprintln!("{tracker}");
+            self.tracker = tracker;
+        }
+        if self.at.is_some_and(|at| at.elapsed() < TOLD) {
+            return;
+        }
+        self.at = Some(Instant::now());
+        let status = server.status();
+        if status.clients != self.status.clients {
+            eprintln!("clients: {}", status.clients);
+        }
+        if status.refused != self.status.refused {
+            eprintln!(
+                "clients refused, because there is no room: {}",
+                status.refused
+            );
+        }
+        if status.errors != self.status.errors {
+            let last = status.last_error.as_deref().unwrap_or_default();
+            eprintln!("errors: {}, the last: {last}", status.errors);
+        }
+        self.status = status;
+    }
+}

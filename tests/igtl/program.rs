@@ -1,0 +1,162 @@
+//! `insonify serve` with a client of its own.
+
+use std::io::{BufRead, BufReader};
+use std::net::SocketAddr;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::{Duration, Instant};
+
+use insonify::igtl::image::Image;
+use insonify::igtl::message::Content;
+
+use crate::client::{Client, shift};
+
+/// A small frame of a scene that stands still.
+const SMALL: [&str; 12] = [
+    "--quality",
+    "draft",
+    "--set",
+    "probe.scanlines=48",
+    "--set",
+    "probe.samples=512",
+    "--set",
+    "probe.elevation_layers=1",
+    "--set",
+    "imaging.image_height=160",
+    "--set",
+    "tracker.timeout=3600",
+];
+
+fn command(scene: &str, more: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
+    command.args(["serve", scene]).args(SMALL).args(more);
+    command
+}
+
+/// The program, which ends with the test.
+struct Program {
+    child: Child,
+    address: SocketAddr,
+}
+
+impl Program {
+    fn start(scene: &str, more: &[&str]) -> Self {
+        let mut child = command(scene, &[more, &["--igtl-port", "0"]].concat())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program starts");
+        let mut line = String::new();
+        let stdout = child.stdout.take().expect("piped");
+        BufReader::new(stdout).read_line(&mut line).expect("text");
+        let address = line.split_whitespace().find_map(|word| word.parse().ok());
+        let address = address.unwrap_or_else(|| panic!("no address in '{line}'"));
+        Self { child, address }
+    }
+
+    fn wait(&mut self) -> Option<i32> {
+        let end = Instant::now() + Duration::from_secs(60);
+        loop {
+            if let Some(status) = self.child.try_wait().expect("a child") {
+                return status.code();
+            }
+            assert!(Instant::now() < end, "it goes on");
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+}
+
+impl Drop for Program {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn run(scene: &str, more: &[&str]) -> Output {
+    command(scene, more).output().expect("the program starts")
+}
+
+/// The first image that is taken where the probe was put.
+fn image_at(client: &mut Client, matrix: [f32; 12]) -> Image {
+    client.transform("Probe", matrix);
+    loop {
+        let message = client.receive_kind("TRANSFORM");
+        let Content::Image(image) = client.receive_kind("IMAGE").content else {
+            panic!("no image")
+        };
+        if message.content == Content::Transform(matrix) {
+            return *image;
+        }
+    }
+}
+
+#[test]
+fn a_client_moves_the_probe_and_sees_what_it_sees() {
+    let program = Program::start("scenes/phantom.toml", &[]);
+    assert!(program.address.ip().is_loopback());
+    let mut client = Client::at(program.address);
+    let home = image_at(&mut client, shift(0.0, 0.0, 0.0));
+    let away = image_at(&mut client, shift(12.0, 0.0, 4.0));
+    let back = image_at(&mut client, shift(0.0, 0.0, 0.0));
+    assert_eq!((home.size[1], home.size[2], home.components), (160, 1, 1));
+    let moved = away.patient_from_pixel().translation - home.patient_from_pixel().translation;
+    assert!(
+        (moved - glam::DVec3::new(12.0, 0.0, 4.0)).length() < 1e-4,
+        "{moved}"
+    );
+    let difference = |a: &Image, b: &Image| {
+        let pairs = a.values.iter().zip(&b.values);
+        pairs.map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / a.values.len() as f64
+    };
+    // Between frames only electronic noise differs.
+    let (moved, noise) = (difference(&home, &away), difference(&home, &back));
+    assert!(moved > 2.0 && moved > 4.0 * noise, "{moved} {noise}");
+    // The scene stands still: nothing more comes until the probe moves.
+    let silent = Duration::from_millis(400);
+    client.stream.set_read_timeout(Some(silent)).expect("set");
+    let read = std::io::Read::read(&mut client.stream, &mut [0]);
+    assert!(read.is_err(), "{read:?}");
+}
+
+#[test]
+fn a_scene_that_moves_is_sent_by_itself_and_the_program_ends_when_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("scene.toml");
+    std::fs::write(
+        &scene,
+        "[[transform]]\nname = \"to and fro\"\n\
+         motion = { kind = \"sine\", period = \"1 s\", translate = [5, 0, 0] }\n\
+         [[mesh]]\nname = \"ball\"\nparent = \"to and fro\"\ntissue = \"liver\"\n\
+         shape = { sphere = { radius = 8, subdivisions = 2 } }\ntranslate = [0, 0, 30]\n",
+    )
+    .expect("written");
+    let mut program = Program::start(
+        scene.to_str().expect("plain"),
+        &["--frames", "8", "--validate"],
+    );
+    let mut client = Client::at(program.address);
+    client.receive_kind("IMAGE");
+    assert_eq!(program.wait(), Some(0));
+}
+
+#[test]
+fn an_address_that_cannot_be_had_is_told_with_what_to_do() {
+    let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
+    let port = taken.local_addr().expect("bound").port().to_string();
+    for (more, words) in [
+        (
+            &["--igtl-port", &*port][..],
+            ["another program", "--igtl-port"],
+        ),
+        (
+            &["--igtl-bind", "192.0.2.1"],
+            ["192.0.2.1", "of this machine"],
+        ),
+    ] {
+        let out = run("scenes/phantom.toml", more);
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        // The message may be broken into lines.
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert_eq!(out.status.code(), Some(1), "{said}");
+        assert!(words.iter().all(|w| said.contains(w)), "{said}");
+    }
+}
