@@ -13,6 +13,7 @@ mod movie;
 mod reconstruct;
 mod render;
 mod serve;
+mod sweep;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
 #[derive(Debug, Parser)]
@@ -36,6 +37,8 @@ enum Command {
     Render(Box<render::Render>),
     /// Simulate without a window: a tracker moves the probe, viewers receive the images
     Serve(Box<serve::Serve>),
+    /// Render a scene many times, one parameter at a time, onto one labelled sheet
+    Sweep(Box<sweep::Sweep>),
 }
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
@@ -47,6 +50,7 @@ pub fn run() -> ExitCode {
         Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
+        Command::Sweep(sweep) => sweep::run(&sweep).map(|()| ExitCode::SUCCESS),
     };
     match result {
         Ok(code) => code,

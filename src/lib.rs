@@ -16,6 +16,7 @@ pub mod plot;
 pub mod probe;
 pub mod reference;
 pub mod scene;
+pub mod sheet;
 pub mod sim;
 pub mod statistics;
 pub mod volume;

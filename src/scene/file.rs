@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::sweep::Variant;
 use super::{Scene, Warning};
 
 mod anatomy;
@@ -17,6 +18,7 @@ mod playing;
 mod probe;
 mod schema;
 mod shelf;
+mod sweep;
 mod tissues;
 mod tracker;
 mod trajectory;
@@ -48,6 +50,27 @@ impl Scene {
         path: &Path,
         overrides: &[(String, String)],
     ) -> Result<(Self, Vec<Warning>), SceneError> {
+        Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
+    }
+
+    /// As [`Scene::load`], with the variants of the scene that its table `[sweep]` describes: in the
+    /// order of [`Parameter::ALL`](super::sweep::Parameter::ALL), of a parameter in the table's.
+    ///
+    /// # Errors
+    /// As there.
+    pub fn load_sweep(
+        path: &Path,
+        overrides: &[(String, String)],
+    ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
+        Self::load_with(path, overrides, true)
+    }
+
+    /// `suggested`: with the variants of parameters of which the file says nothing.
+    fn load_with(
+        path: &Path,
+        overrides: &[(String, String)],
+        suggested: bool,
+    ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
         let source = Source::read(path, overrides)?;
         let document = source.document()?;
         let file = document.parse()?;
@@ -99,7 +122,8 @@ impl Scene {
         };
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
-        Ok((scene, warnings))
+        let variants = sweep::variants(&document, &file.sweep, &scene, suggested)?;
+        Ok((scene, variants, warnings))
     }
 }
 
@@ -181,5 +205,7 @@ fn within(
 mod graph_mistakes;
 #[cfg(test)]
 mod graph_tests;
+#[cfg(test)]
+mod sweep_tests;
 #[cfg(test)]
 mod tests;

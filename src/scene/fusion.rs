@@ -36,6 +36,20 @@ pub enum Surroundings {
     Scatterers,
 }
 
+impl Surroundings {
+    /// All of them, in the order of the paper's figure 14.
+    pub const ALL: [Self; 3] = [Self::Volume, Self::None, Self::Scatterers];
+
+    /// What scene files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Volume => "volume",
+            Self::None => "none",
+            Self::Scatterers => "scatterers",
+        }
+    }
+}
+
 /// How the two images meet at the border of the mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -44,6 +58,19 @@ pub enum Blend {
     Linear,
     /// The same ramp through the smoothstep 3 m^2 - 2 m^3.
     Smooth,
+}
+
+impl Blend {
+    /// All of them.
+    pub const ALL: &[Self] = &[Self::Linear, Self::Smooth];
+
+    /// What scene files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Linear => "linear",
+            Self::Smooth => "smooth",
+        }
+    }
 }
 
 /// On-the-fly fusion of the acquired volume with the simulation.

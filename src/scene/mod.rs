@@ -20,6 +20,7 @@ pub mod normals;
 pub mod settings;
 pub mod shapes;
 pub mod suggest;
+pub mod sweep;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;

@@ -103,6 +103,13 @@ pub struct Simulation {
     pub speckle_gain: f64,
     /// Level of all surface echoes, dB.
     pub surface_gain: f64,
+    /// Factor on the scatterers per volume of every tissue, more than 0. What exceeds 1 is in
+    /// [`Self::cell`] already; below 1 the scatterers are thinned out ([`Self::thinning`]).
+    pub density_scale: f64,
+    /// Factor on the roughness exponent of every surface, more than 0.
+    pub roughness_scale: f64,
+    /// Factor on the thickness of every surface.
+    pub thickness_scale: f64,
     /// Seed of every random number.
     pub seed: u32,
 }
@@ -152,6 +159,11 @@ pub enum Machine {
 }
 
 impl Simulation {
+    /// Share of its scatterers that a tissue keeps, 0..=1.
+    pub fn thinning(&self) -> f64 {
+        self.density_scale.min(1.0)
+    }
+
     /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
     pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
         let (paths, cell, elevation_cells, volume_floor) = match (quality, machine) {
@@ -195,6 +207,9 @@ impl Default for Simulation {
             volume_floor: -50.0,
             speckle_gain: 0.0,
             surface_gain: 0.0,
+            density_scale: 1.0,
+            roughness_scale: 1.0,
+            thickness_scale: 1.0,
             seed: 1,
         }
     }

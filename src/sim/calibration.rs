@@ -265,7 +265,8 @@ impl<'a> Calibration<'a> {
             ScatterMode::Lattice => sinc(2.0 * probe.frequency * simulation.cell / tissue.speed),
             ScatterMode::Voxel => sinc(2.0 * probe.frequency * probe.sample_pitch() / probe.speed),
         };
-        let (rho, m) = (tissue.density_of_scatterers, tissue.mean_over_sigma);
+        let rho = tissue.density_of_scatterers * simulation.thinning();
+        let m = tissue.mean_over_sigma;
         let variance = rho * (1.0 + m * m) - (rho * m * phi).powi(2);
         let power = amplitude(tissue.echogenicity).powi(2);
         if variance <= 0.0 || power == 0.0 {

@@ -9,7 +9,7 @@ use super::layout::{self, Rows};
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
 use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
-use crate::scene::{Scene, Wire};
+use crate::scene::{Scene, Surface, Wire};
 
 /// The kernel ends a path by setting its weight to 0, which has to be below every limit.
 const LEAST_WEIGHT: f32 = 1e-30;
@@ -220,7 +220,7 @@ pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
                 presence: if silent {
                     0.0
                 } else {
-                    tissue.density_of_scatterers as f32
+                    (tissue.density_of_scatterers * scene.simulation.thinning()) as f32
                 },
                 mean: mean as f32,
                 sigma: sigma as f32,
@@ -241,17 +241,18 @@ pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
 
 /// Surfaces 2i (outside) and 2i + 1 (inside) of instance i.
 pub fn surfaces(scene: &Scene) -> Vec<layout::Surface> {
-    let phase = scene.probe.phase_per_mm();
+    let (phase, simulation) = (scene.probe.phase_per_mm(), &scene.simulation);
+    let thickness = |surface: &Surface| surface.thickness * simulation.thickness_scale;
     scene
         .instances
         .iter()
         .flat_map(|instance| instance.surface)
         .map(|surface| layout::Surface {
-            roughness: surface.roughness.min(MIRROR) as f32,
-            thickness: surface.thickness as f32,
+            roughness: (surface.roughness * simulation.roughness_scale).min(MIRROR) as f32,
+            thickness: thickness(&surface) as f32,
             specularity: surface.specularity as f32,
             gain: amplitude(surface.gain) as f32,
-            coherence: half_normal_coherence(phase, surface.thickness) as f32,
+            coherence: half_normal_coherence(phase, thickness(&surface)) as f32,
             ..layout::Surface::default()
         })
         .collect()

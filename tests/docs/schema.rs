@@ -102,8 +102,9 @@ pub fn type_name(wanted: &str) -> String {
         "a speed of sound" => "speed",
         quantity => quantity.trim_start_matches("an ").trim_start_matches("a "),
     };
-    match count {
-        "" => name.to_owned(),
-        _ => format!("{count} {name}s"),
+    match (count, name.strip_suffix('y')) {
+        ("", _) => name.to_owned(),
+        (_, Some(stem)) => format!("{count} {stem}ies"),
+        (_, None) => format!("{count} {name}s"),
     }
 }

@@ -124,6 +124,7 @@ pub fn of_values(path: &str, kind: &str, default: &str, stated: &str) -> Vec<Str
         let count = kind.split(' ').next().and_then(|n| n.parse().ok());
         let value = match count {
             Some(count) => format!("{:?}", vec![beyond; count]),
+            None if kind.starts_with("list of") => format!("[{value}]"),
             None => value,
         };
         let said = load(&text, &[(at, value)])

@@ -22,7 +22,8 @@ pub(super) struct Source {
     overrides: Vec<Override>,
 }
 
-/// One `path = value` of the command line. Its spans count from `start`, past the file's text.
+/// One `path = value` of the command line, or of a sweep. Its spans count from `start`, past the file's text.
+#[derive(Clone)]
 struct Override {
     path: String,
     shown: String,
@@ -48,8 +49,19 @@ impl Source {
         }
         let text =
             std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
-        let mut start = text.len() + 1;
-        let mut all = Vec::new();
+        let source = Self {
+            path: path.to_owned(),
+            text,
+            overrides: Vec::new(),
+        };
+        Ok(source.with(overrides))
+    }
+
+    /// The same with more overrides.
+    pub fn with(&self, overrides: &[(String, String)]) -> Self {
+        let mut all = self.overrides.clone();
+        let last = all.last().map(|o| o.start + o.shown.len());
+        let mut start = last.unwrap_or(self.text.len()) + 1;
         for (path, value) in overrides {
             // Whatever is not TOML is taken for a string: shells eat the quotes of "80 mm".
             let written = match DeValue::parse(value) {
@@ -67,11 +79,11 @@ impl Source {
             });
             start = end + 1;
         }
-        Ok(Self {
-            path: path.to_owned(),
-            text,
+        Self {
+            path: self.path.clone(),
+            text: self.text.clone(),
             overrides: all,
-        })
+        }
     }
 
     /// Parses the text and puts the overrides in.

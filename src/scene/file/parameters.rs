@@ -18,6 +18,8 @@ pub(super) use overlay;
 const INF: f64 = f64::INFINITY;
 /// Levels may be switched off (minus infinity) but not boundless.
 const LEVEL: (f64, f64) = (-INF, 200.0);
+/// A hundred times as many scatterers take a hundred times as long.
+const DENSITY: (f64, f64) = (0.001, 100.0);
 
 pub(super) fn simulation(
     document: &Document<'_>,
@@ -32,7 +34,7 @@ pub(super) fn simulation(
     overlay!(table => out:
         paths, sampling, sequence, max_interactions, max_reflections, min_weight, coherence,
         rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, elevation_cells,
-        texture_space, seed;
+        texture_space, density_scale, roughness_scale, thickness_scale, seed;
         origin_jitter, beam_width, cell, volume_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
         ("paths", f64::from(out.paths), (1.0, 65_535.0), ""),
@@ -57,6 +59,9 @@ pub(super) fn simulation(
         ("volume_floor", out.volume_floor, LEVEL, "dB"),
         ("speckle_gain", out.speckle_gain, LEVEL, "dB"),
         ("surface_gain", out.surface_gain, LEVEL, "dB"),
+        ("density_scale", out.density_scale, DENSITY, ""),
+        ("roughness_scale", out.roughness_scale, (1e-6, 1e6), ""),
+        ("thickness_scale", out.thickness_scale, (0.0, 100.0), ""),
     ] {
         within(
             document,
@@ -67,6 +72,8 @@ pub(super) fn simulation(
             unit,
         )?;
     }
+    // A cell holds one scatterer at most: more of them need more cells.
+    out.cell /= out.density_scale.max(1.0).cbrt();
     Ok(out)
 }
 

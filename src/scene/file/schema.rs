@@ -31,6 +31,8 @@ pub struct File {
     pub fusion: Option<FusionTable>,
     pub tracker: Option<TrackerTable>,
     #[serde(default)]
+    pub sweep: SweepTable,
+    #[serde(default)]
     pub group: Vec<GroupTable>,
     #[serde(default)]
     pub transform: Vec<TransformTable>,
@@ -123,6 +125,9 @@ pub struct SimulationTable {
     pub volume_floor: Option<Level>,
     pub speckle_gain: Option<Level>,
     pub surface_gain: Option<Level>,
+    pub density_scale: Option<f64>,
+    pub roughness_scale: Option<f64>,
+    pub thickness_scale: Option<f64>,
     pub seed: Option<u32>,
 }
 
@@ -158,6 +163,22 @@ pub struct FusionTable {
     pub surroundings: Option<Surroundings>,
     pub blur: Option<u32>,
     pub blend: Option<Blend>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SweepTable {
+    pub frequency: Option<Vec<Frequency>>,
+    pub gain: Option<Vec<Level>>,
+    pub tgc_attenuation: Option<Vec<Attenuation>>,
+    pub dynamic_range: Option<Vec<Level>>,
+    pub speckle_gain: Option<Vec<Level>>,
+    pub density_scale: Option<Vec<f64>>,
+    pub psf_lateral: Option<Vec<f64>>,
+    pub psf_axial: Option<Vec<f64>>,
+    pub surface_gain: Option<Vec<Level>>,
+    pub roughness_scale: Option<Vec<f64>>,
+    pub thickness_scale: Option<Vec<f64>>,
 }
 
 #[derive(Debug, Deserialize)]

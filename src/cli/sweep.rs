@@ -1,0 +1,229 @@
+//! `insonify sweep`: many images of one scene on one sheet.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use insonify::output;
+use insonify::scene::Scene;
+use insonify::sheet::{Sheet, Tile};
+use insonify::sim::Simulator;
+use insonify::sim::shaders::Library;
+use miette::{Context, IntoDiagnostic, Result, miette};
+
+use super::common::{self, Common};
+use order::order;
+use pictures::{Picture, Studio};
+use record::Record;
+
+mod order;
+mod pictures;
+mod record;
+
+/// Arguments of `insonify sweep`.
+#[derive(Debug, Args)]
+pub struct Sweep {
+    /// Scene file (.toml); its table [sweep] says which parameters take which values.
+    scene: PathBuf,
+    /// The sheet, NAME.png, with its table beside it, NAME.csv; or a folder for both and every single
+    /// image [default: the scene's name and what is shown, here].
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// What the images show.
+    #[arg(long, value_enum, default_value = "parameters")]
+    show: Show,
+    /// For blind rating: images in an order that this seed draws, numbered and without labels. Only the
+    /// table says which is which.
+    #[arg(long, value_name = "SEED")]
+    shuffle: Option<u32>,
+    /// Images side by side [default: what suits them].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100))]
+    columns: Option<u32>,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// What the images of a sheet show.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Show {
+    /// The scene, then one parameter at a time below and above its value.
+    Parameters,
+    /// How the fused image comes about: acquired volume, simulation, mask, both without and with blur.
+    Steps,
+    /// What is shown around the mask: the acquired volume, nothing, or the scene's own scatterers.
+    Surroundings,
+    /// The ways in which simulation and acquired volume meet.
+    Blends,
+}
+
+impl fmt::Display for Show {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Parameters => "parameters",
+            Self::Steps => "steps",
+            Self::Surroundings => "surroundings",
+            Self::Blends => "blends",
+        })
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Everything that the user or the device can get wrong, said once.
+pub fn run(args: &Sweep) -> Result<()> {
+    let common = &args.common;
+    let (mut scene, variants, warnings) = Scene::load_sweep(&args.scene, &common.overrides)?;
+    for warning in &warnings {
+        eprintln!("{warning}");
+    }
+    if args.show != Show::Parameters && scene.volume.is_none() {
+        return Err(miette!(
+            help = "add [volume] and [fusion] to it, or leave out --show",
+            "{} shows no acquired volume: there are no {} to compare",
+            args.scene.display(),
+            args.show
+        ));
+    }
+    let files = Files::new(args)?;
+    let device = common.device()?;
+    let tracer = common.tracer(&device)?;
+    common.settle(&mut scene, &device);
+    for mask in scene.masks_off_the_image() {
+        eprintln!("warning: {}", common::unseen(&scene, mask));
+    }
+    let simulator =
+        Simulator::new(&device, &Library::embedded(), &scene, tracer).into_diagnostic()?;
+    if let Some(warning) = simulator.warning() {
+        eprintln!("warning: {warning}");
+    }
+    let mut studio = Studio::new(simulator);
+    let pictures = match args.show {
+        Show::Parameters => {
+            let settle = |scene: &mut Scene| {
+                common.settle_simulation(&mut scene.simulation, &device);
+            };
+            studio.parameters(&scene, &variants, settle)?
+        }
+        Show::Steps => studio.steps(&scene)?,
+        Show::Surroundings => studio.surroundings(&scene)?,
+        Show::Blends => studio.blends(&scene)?,
+    };
+    write(args, &scene, &pictures, &files)?;
+    common.validated(&device)
+}
+
+/// Where the results go.
+struct Files {
+    sheet: PathBuf,
+    table: PathBuf,
+    /// For the single images.
+    folder: Option<PathBuf>,
+}
+
+impl Files {
+    fn new(args: &Sweep) -> Result<Self> {
+        let stem = args.scene.file_stem().unwrap_or_default().to_string_lossy();
+        let named = || PathBuf::from(format!("{stem}-{}.png", args.show));
+        let output = args.output.clone().unwrap_or_else(named);
+        let png = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("png");
+        if output.extension().is_some_and(png) {
+            return Ok(Self {
+                table: output.with_extension("csv"),
+                sheet: output,
+                folder: None,
+            });
+        }
+        std::fs::create_dir_all(&output)
+            .into_diagnostic()
+            .wrap_err_with(|| format!("making the folder {}", output.display()))?;
+        Ok(Self {
+            sheet: output.join("sheet.png"),
+            table: output.join("sheet.csv"),
+            folder: Some(output),
+        })
+    }
+}
+
+/// Writes sheet, table and single images.
+fn write(args: &Sweep, scene: &Scene, pictures: &[Picture], files: &Files) -> Result<()> {
+    let order = order(pictures.len(), args.shuffle);
+    let blind = args.shuffle.is_some();
+    let shown: Vec<&Picture> = order.iter().map(|&i| &pictures[i]).collect();
+    let mut tiles: Vec<Tile<'_>> = (1..)
+        .zip(&shown)
+        .map(|(number, picture)| Tile::Image {
+            caption: match blind {
+                true => format!("{number}"),
+                false => format!("{number}  {}", picture.caption),
+            },
+            image: &picture.image,
+        })
+        .collect();
+    // Beside the first image, so that what lies below and above stands side by side.
+    let panel = (args.show == Show::Parameters && !blind).then(|| pictures::own_values(scene));
+    let shift = usize::from(panel.is_some());
+    tiles.splice(1..1, panel.map(Tile::Text));
+    let page = Sheet {
+        title: title(args, scene),
+        columns: args.columns.map_or_else(|| columns(args), |n| n as usize),
+        tiles,
+    }
+    .draw();
+    let records: Vec<Record> = (1..)
+        .zip(&shown)
+        .map(|(number, picture)| {
+            let tile = match number {
+                1 => 0,
+                n => n - 1 + shift,
+            };
+            let file = files
+                .folder
+                .as_ref()
+                .map(|_| single(number, picture, blind));
+            Record::new(number, picture, page.places[tile], file)
+        })
+        .collect();
+    if let Some(folder) = &files.folder {
+        for (record, picture) in records.iter().zip(&shown) {
+            save(&picture.image, &folder.join(&record.file))?;
+        }
+    }
+    save(&page.image, &files.sheet)?;
+    record::write(&files.table, &records)?;
+    output::line(files.sheet.display());
+    output::line(files.table.display());
+    Ok(())
+}
+
+fn save(image: &image::GrayImage, path: &Path) -> Result<()> {
+    image
+        .save(path)
+        .into_diagnostic()
+        .wrap_err_with(|| format!("writing {}", path.display()))
+}
+
+/// Name of a single image. In blind rating it says nothing of what it shows.
+fn single(number: usize, picture: &Picture, blind: bool) -> String {
+    match blind {
+        true => format!("{number:02}.png"),
+        false => format!("{number:02}-{}.png", picture.stem),
+    }
+}
+
+/// Below, above, below, above: both values of two parameters in a row.
+fn columns(args: &Sweep) -> usize {
+    match args.show {
+        Show::Parameters => 4,
+        Show::Steps | Show::Surroundings | Show::Blends => 3,
+    }
+}
+
+fn title(args: &Sweep, scene: &Scene) -> String {
+    let name = &scene.name;
+    match (args.shuffle, args.show) {
+        (Some(_), _) => name.clone(),
+        (None, Show::Parameters) => format!("{name}: one parameter at a time"),
+        (None, show) => format!("{name}: {show}"),
+    }
+}

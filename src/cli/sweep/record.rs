@@ -1,0 +1,86 @@
+//! The table of a sheet: which image is which, and how bright it is.
+
+use std::path::Path;
+
+use miette::{Context, IntoDiagnostic, Result};
+use serde::Serialize;
+
+use super::pictures::Picture;
+
+/// One row. Columns are named as the fields.
+#[derive(Debug, Serialize)]
+pub struct Record {
+    /// Number on the sheet, from 1.
+    pub image: usize,
+    /// What was changed; `none` in the image of the scene as it is.
+    pub parameter: &'static str,
+    /// Its value here.
+    pub value: String,
+    /// Its value in the scene.
+    pub own: String,
+    /// Unit of both; empty for factors and names.
+    pub unit: &'static str,
+    /// What `--set` makes of it, blanks between: `insonify render SCENE --set ...` is the same image.
+    pub set: String,
+    /// The single image, beside the table; empty where none was written.
+    pub file: String,
+    /// Left upper corner of the image on the sheet, px.
+    pub x: u32,
+    /// Left upper corner of the image on the sheet, px.
+    pub y: u32,
+    /// Size, px.
+    pub width: u32,
+    /// Size, px.
+    pub height: u32,
+    /// Mean grey level of the sector, 0 to 255.
+    pub mean_grey: f64,
+    /// Standard deviation of the sector's grey levels.
+    pub sd_grey: f64,
+    /// Share of the sector that is black (0), percent.
+    pub black_percent: f64,
+    /// Share of the sector that is white (255), percent.
+    pub white_percent: f64,
+}
+
+impl Record {
+    /// Of one picture.
+    pub fn new(image: usize, picture: &Picture, place: [u32; 2], file: Option<String>) -> Self {
+        let grey = &picture.grey;
+        let entries = picture.settings.iter();
+        let set: Vec<String> = entries
+            .map(|(path, value)| format!("{path}={value}"))
+            .collect();
+        let three = |x: f64| (x * 1000.0).round() / 1000.0;
+        Self {
+            image,
+            parameter: picture.parameter,
+            value: picture.value.clone(),
+            own: picture.own.clone(),
+            unit: picture.unit,
+            set: set.join(" "),
+            file: file.unwrap_or_default(),
+            x: place[0],
+            y: place[1],
+            width: picture.image.width(),
+            height: picture.image.height(),
+            mean_grey: three(grey.mean),
+            sd_grey: three(grey.deviation),
+            black_percent: three(100.0 * grey.black),
+            white_percent: three(100.0 * grey.white),
+        }
+    }
+}
+
+/// Writes the table as CSV with a header.
+pub fn write(path: &Path, records: &[Record]) -> Result<()> {
+    let whole = || -> Result<(), csv::Error> {
+        let mut writer = csv::Writer::from_path(path)?;
+        for record in records {
+            writer.serialize(record)?;
+        }
+        Ok(writer.flush()?)
+    };
+    whole()
+        .into_diagnostic()
+        .wrap_err_with(|| format!("writing {}", path.display()))
+}

@@ -1,0 +1,457 @@
+//! Sheets as a user makes them: what is on them, in which order, and whether it is what `render` makes.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+use std::sync::OnceLock;
+
+use image::{GrayImage, imageops};
+use serde::Deserialize;
+
+/// Speckle of one tissue down to a plate at 30 mm in which nothing scatters.
+const SCENE: &str = r#"
+name = "A plate in speckle"
+background = "own"
+[probe]
+preset = "linear"
+width = "12 mm"
+scanlines = 64
+elevation_layers = 3
+samples = 800
+frequency = "5 MHz"
+depth = "40 mm"
+[simulation]
+paths = 4
+[imaging]
+gain = "10 dB"
+noise = -inf
+image_height = 800
+[tissues.own]
+based_on = "liver"
+texture_depth = 0.0
+[tissues.plate]
+based_on = "own"
+echogenicity = "-inf dB"
+density = "1200 kg/m3"
+[[mesh]]
+name = "plate"
+tissue = "plate"
+shape = { box = { size = [60, 60, 12] } }
+translate = [0, 0, 36]
+"#;
+
+const FUSED: &str = r#"
+[volume]
+file = "volume.mha"
+translate = [-25, -13, 1]
+[fusion]
+mask = ["plate"]
+blend = "smooth"
+"#;
+
+const VOLUME: &str = "NDims = 3\nDimSize = 5 4 3\nElementSpacing = 12 9 17\n\
+    ElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
+
+/// Pixels per mm.
+const PER_MM: f64 = 20.0;
+
+#[derive(Debug, Deserialize, PartialEq)]
+struct Row {
+    image: usize,
+    parameter: String,
+    value: String,
+    own: String,
+    unit: String,
+    set: String,
+    file: String,
+    x: u32,
+    y: u32,
+    width: u32,
+    height: u32,
+    mean_grey: f64,
+    sd_grey: f64,
+    black_percent: f64,
+    white_percent: f64,
+}
+
+/// A folder with the scene, and what is put into it.
+struct Folder(tempfile::TempDir);
+
+impl Folder {
+    fn new(scene: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::write(folder.path().join("scene.toml"), scene).expect("written");
+        let voxels: Vec<u8> = (0..60).map(|i| (i * 4) as u8).collect();
+        let volume = [VOLUME.as_bytes(), &voxels].concat();
+        std::fs::write(folder.path().join("volume.mha"), volume).expect("written");
+        Self(folder)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn run(&self, command: &str, args: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_insonify"))
+            .current_dir(self.0.path())
+            .args([command, "scene.toml", "--tracer", "bvh"])
+            .args(args)
+            .output()
+            .expect("the program starts")
+    }
+
+    fn sweep(&self, args: &[&str]) {
+        let out = self.run("sweep", &[&["--validate"], args].concat());
+        let said = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(out.status.success() && said.is_empty(), "{said}");
+    }
+
+    fn rows(&self, name: &str) -> Vec<Row> {
+        let mut reader = csv::Reader::from_path(self.path(name)).expect("a table");
+        let rows: Result<_, _> = reader.deserialize().collect();
+        rows.expect("sound rows")
+    }
+
+    fn image(&self, name: &str) -> GrayImage {
+        image::open(self.path(name)).expect("a PNG").into_luma8()
+    }
+
+    fn bytes(&self, name: &str) -> Vec<u8> {
+        std::fs::read(self.path(name)).expect("a file")
+    }
+
+    /// What `render` makes of the scene with the entries of a row.
+    fn render(&self, set: &str) -> GrayImage {
+        let entries = set.split_whitespace().flat_map(|entry| ["--set", entry]);
+        let args: Vec<_> = ["-o", "single.png"].into_iter().chain(entries).collect();
+        let out = self.run("render", &args);
+        assert!(out.status.success(), "{set}");
+        self.image("single.png")
+    }
+}
+
+/// The sheet of the scene's parameters with its single images; made once.
+fn swept() -> &'static Folder {
+    static MADE: OnceLock<Folder> = OnceLock::new();
+    MADE.get_or_init(|| {
+        let folder = Folder::new(SCENE);
+        folder.sweep(&["-o", "all"]);
+        folder
+    })
+}
+
+const PARAMETERS: [&str; 11] = [
+    "frequency",
+    "gain",
+    "tgc_attenuation",
+    "dynamic_range",
+    "speckle_gain",
+    "density_scale",
+    "psf_lateral",
+    "psf_axial",
+    "surface_gain",
+    "roughness_scale",
+    "thickness_scale",
+];
+
+/// The part of a sheet at which a row says that its image is.
+fn cell(sheet: &GrayImage, row: &Row) -> GrayImage {
+    imageops::crop_imm(sheet, row.x, row.y, row.width, row.height).to_image()
+}
+
+#[test]
+fn a_sheet_holds_the_scene_and_each_parameter_below_and_above() {
+    let folder = swept();
+    let rows = folder.rows("all/sheet.csv");
+    let sheet = folder.image("all/sheet.png");
+    let numbers: Vec<_> = rows.iter().map(|r| r.image).collect();
+    assert_eq!(numbers, (1..=23).collect::<Vec<_>>());
+    let found: Vec<_> = rows.iter().map(|r| r.parameter.as_str()).collect();
+    let pairs = PARAMETERS.iter().flat_map(|p| [*p, *p]);
+    assert_eq!(found, ["none"].into_iter().chain(pairs).collect::<Vec<_>>());
+    for pair in rows[1..].chunks(2) {
+        let number = |text: &str| text.parse::<f64>().expect("a number");
+        let [below, above] = [0, 1].map(|i| number(&pair[i].value));
+        let own = number(&pair[0].own);
+        assert!(below < own && own < above, "{pair:?}");
+        // The two of a parameter stand side by side.
+        assert!(pair[0].y == pair[1].y && pair[0].x < pair[1].x, "{pair:?}");
+    }
+    for row in &rows {
+        let single = folder.image(&format!("all/{}", row.file));
+        assert_eq!(single.dimensions(), (240, 800));
+        assert!(cell(&sheet, row) == single, "{row:?}");
+        let mean = single.pixels().map(|p| f64::from(p.0[0])).sum::<f64>() / (240.0 * 800.0);
+        assert!((mean - row.mean_grey).abs() < 1e-3, "{row:?}: {mean}");
+    }
+    // The comparison sees a pixel's shift.
+    let shifted = Row {
+        x: rows[3].x + 1,
+        ..folder.rows("all/sheet.csv").swap_remove(3)
+    };
+    assert!(cell(&sheet, &shifted) != cell(&sheet, &rows[3]));
+}
+
+#[test]
+fn single_images_are_what_render_makes_of_the_entry_that_is_named() {
+    let folder = swept();
+    let rows = folder.rows("all/sheet.csv");
+    let scene = folder.render("");
+    assert!(scene == folder.image(&format!("all/{}", rows[0].file)));
+    // One of each kind of setting: probe, image, lattice, scatterers, beam, surfaces.
+    for row in [1, 3, 8, 11, 12, 13, 16, 17, 19, 22].map(|i| &rows[i]) {
+        let image = folder.render(&row.set);
+        assert!(
+            image == folder.image(&format!("all/{}", row.file)),
+            "{row:?}"
+        );
+        assert!(image != scene, "{row:?} changes the image");
+    }
+}
+
+/// Grey levels between two depths in mm, row by row.
+fn between(image: &GrayImage, from: f64, to: f64) -> Vec<Vec<f64>> {
+    let row = |z: f64| (z * PER_MM) as u32;
+    let line = |y: u32| (0..image.width()).map(move |x| f64::from(image[(x, y)].0[0]));
+    (row(from)..row(to)).map(|y| line(y).collect()).collect()
+}
+
+fn mean(levels: &[Vec<f64>]) -> f64 {
+    let all = levels.iter().flatten();
+    all.clone().sum::<f64>() / all.count() as f64
+}
+
+/// Lag in pixels at which the autocovariance along the rows has fallen to a half.
+fn half_width(levels: &[Vec<f64>]) -> f64 {
+    let mean = mean(levels);
+    let at = |lag: usize| {
+        let pairs = levels.iter().flat_map(|row| row.iter().zip(&row[lag..]));
+        let sum: f64 = pairs.clone().map(|(a, b)| (a - mean) * (b - mean)).sum();
+        sum / pairs.count() as f64
+    };
+    let half = at(0) / 2.0;
+    let after = (1..60).find(|&lag| at(lag) < half).expect("it falls");
+    let (a, b) = (at(after - 1), at(after));
+    (after - 1) as f64 + (a - half) / (a - b)
+}
+
+fn transposed(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let column = |x: usize| levels.iter().map(|row| row[x]).collect();
+    (0..levels[0].len()).map(column).collect()
+}
+
+/// Mean over the columns of the brightest level about the plate's surface.
+fn plate(image: &GrayImage) -> f64 {
+    let columns = transposed(&between(image, 29.0, 31.0));
+    let peaks = columns
+        .iter()
+        .map(|c| c.iter().fold(0.0, |a: f64, b| a.max(*b)));
+    peaks.sum::<f64>() / columns.len() as f64
+}
+
+/// Figures of a parameter below, at and above its own value.
+fn figures(parameter: &str, figure: impl Fn(&GrayImage) -> f64) -> [f64; 3] {
+    let folder = swept();
+    let rows = folder.rows("all/sheet.csv");
+    let of = |row: &Row| figure(&folder.image(&format!("all/{}", row.file)));
+    let mut both = rows.iter().filter(|r| r.parameter == parameter).map(of);
+    let (below, above) = (both.next().expect(parameter), both.next().expect(parameter));
+    [below, of(&rows[0]), above]
+}
+
+/// Each is more than `factor` times the one before.
+fn rises([a, b, c]: [f64; 3], factor: f64) -> bool {
+    b > factor * a && c > factor * b
+}
+
+/// Speckle itself moves a mean over this region by 1 % (some four thousand speckles) and a width by
+/// 3 %; the settings move them by 15 % (frequency) to 90 % (the point-spread function's widths).
+#[test]
+fn each_parameter_changes_its_image_the_way_it_should() {
+    let speckle = |image: &GrayImage| between(image, 8.0, 26.0);
+    let bright = |image: &GrayImage| mean(&speckle(image));
+    let lateral = |image: &GrayImage| half_width(&speckle(image));
+    let axial = |image: &GrayImage| half_width(&transposed(&speckle(image)));
+    let reversed = |[a, b, c]: [f64; 3]| [c, b, a];
+
+    let frequency = figures("frequency", axial);
+    assert!(rises(reversed(frequency), 1.1), "{frequency:?}");
+    assert!(!rises(frequency, 1.1), "the comparison knows the direction");
+    for parameter in ["gain", "dynamic_range", "speckle_gain"] {
+        let found = figures(parameter, bright);
+        assert!(rises(found, 1.1), "{parameter}: {found:?}");
+    }
+    let slope = figures("tgc_attenuation", |image| {
+        mean(&between(image, 22.0, 28.0)) - mean(&between(image, 2.0, 8.0))
+    });
+    assert!(
+        slope[1] > slope[0] + 4.0 && slope[2] > slope[1] + 4.0,
+        "{slope:?}"
+    );
+    let [thin, own, dense] = figures("density_scale", |image| {
+        let levels = speckle(image);
+        let mean = mean(&levels);
+        let squares = levels.iter().flatten().map(|v| (v - mean).powi(2));
+        let count = (levels.len() * levels[0].len()) as f64;
+        (squares.sum::<f64>() / count).sqrt() / mean
+    });
+    assert!(thin > 1.2 * own, "few scatterers make holes: {thin} {own}");
+    // Some eight in a resolution cell are nearly as many as one can see.
+    assert!(
+        (0.8 * own..own).contains(&dense),
+        "many are many: {dense} {own}"
+    );
+    let found = figures("psf_lateral", lateral);
+    assert!(rises(found, 1.2), "{found:?}");
+    let found = figures("psf_axial", axial);
+    assert!(rises(found, 1.2), "{found:?}");
+    let found = figures("surface_gain", plate);
+    assert!(rises(found, 1.1), "{found:?}");
+    // A rougher surface returns less straight back; a smoother one than this is a mirror already.
+    let [rough, own, smooth] = figures("roughness_scale", plate);
+    assert!(
+        rough < 0.95 * own && (smooth / own - 1.0).abs() < 0.05,
+        "{rough} {own} {smooth}"
+    );
+    let behind = figures("thickness_scale", |image| mean(&between(image, 30.6, 32.0)));
+    assert!(behind[2] > 2.0 * behind[1] + 5.0, "{behind:?}");
+    let [sharp, own, _] = figures("thickness_scale", plate);
+    assert!(
+        sharp > 1.02 * own,
+        "a plane without thickness is a mirror: {sharp} {own}"
+    );
+}
+
+#[test]
+fn a_seed_shuffles_and_says_nothing_on_the_sheet() {
+    let folder = Folder::new(SCENE);
+    let plain = swept();
+    let values = "sweep.tgc_attenuation=[0.1, 0.9]";
+    let small = ["--set", "imaging.image_height=200", "--set", values];
+    let blind = |seed: &str, to: &str| {
+        folder.sweep(&[&["--shuffle", seed, "-o", to], &small[..]].concat());
+    };
+    blind("7", "first");
+    blind("7", "again");
+    blind("8", "other");
+    folder.sweep(&[&["-o", "plain"], &small[..]].concat());
+    for name in ["sheet.png", "sheet.csv"] {
+        let of = |to: &str| folder.bytes(&format!("{to}/{name}"));
+        assert!(of("first") == of("again"), "{name}");
+        assert!(of("first") != of("other"), "{name}");
+    }
+    let rows = folder.rows("first/sheet.csv");
+    let images = |rows: &[Row]| {
+        let mut all: Vec<_> = rows.iter().map(|r| r.set.clone()).collect();
+        all.sort();
+        all
+    };
+    let plain_rows = folder.rows("plain/sheet.csv");
+    assert_eq!(images(&rows), images(&plain_rows));
+    for (number, row) in (1..).zip(&rows) {
+        assert_eq!(
+            (row.image, row.file.as_str()),
+            (number, &*format!("{number:02}.png"))
+        );
+        let same = plain_rows.iter().find(|r| r.set == row.set).expect("there");
+        let [shuffled, unshuffled] = [("first", row), ("plain", same)]
+            .map(|(to, row)| folder.bytes(&format!("{to}/{}", row.file)));
+        assert!(shuffled == unshuffled, "{row:?}");
+    }
+    // Captions are numbers only: less ink below the images than with labels, and no panel.
+    let ink = |folder: &Folder, to: &str| {
+        let sheet = folder.image(&format!("{to}/sheet.png"));
+        let rows = folder.rows(&format!("{to}/sheet.csv"));
+        let caption = |row: &Row| {
+            let y = row.y + row.height + 2;
+            let strip = imageops::crop_imm(&sheet, row.x, y, row.width, 12).to_image();
+            strip.pixels().filter(|p| p.0[0] < 128).count()
+        };
+        rows.iter().map(caption).max().expect("rows")
+    };
+    assert!(2 * ink(&folder, "first") < ink(plain, "all"));
+    // In rows of four without a gap, where a labelled sheet has its panel second.
+    assert_eq!(rows[1].y, rows[0].y);
+    let step = rows[1].x - rows[0].x;
+    assert_eq!(
+        [rows[2].x - rows[1].x, plain_rows[1].x - plain_rows[0].x],
+        [step, 2 * step]
+    );
+}
+
+#[test]
+fn steps_surroundings_and_blends_are_what_render_makes() {
+    let folder = Folder::new(&format!("{SCENE}{FUSED}"));
+    for (show, parameter, values) in [
+        (
+            "steps",
+            "step",
+            &[
+                "volume",
+                "simulation",
+                "mask",
+                "composed",
+                "blurred-mask",
+                "fused",
+            ][..],
+        ),
+        (
+            "surroundings",
+            "surroundings",
+            &["volume", "none", "scatterers"],
+        ),
+        ("blends", "blend", &["linear", "smooth"]),
+    ] {
+        folder.sweep(&["--show", show, "-o", show]);
+        let rows = folder.rows(&format!("{show}/sheet.csv"));
+        let sheet = folder.image(&format!("{show}/sheet.png"));
+        assert!(rows.len() >= values.len());
+        for (row, value) in rows.iter().zip(values) {
+            assert_eq!(
+                (row.parameter.as_str(), row.value.as_str()),
+                (parameter, *value)
+            );
+            let single = folder.image(&format!("{show}/{}", row.file));
+            assert!(cell(&sheet, row) == single, "{row:?}");
+            if !row.set.is_empty() || *value == "fused" {
+                assert!(folder.render(&row.set) == single, "{row:?}");
+            }
+        }
+    }
+    let step = |name: &str| folder.image(&format!("steps/{name}.png"));
+    let out = folder.run("render", &["-o", "x.png", "--dump", "dump"]);
+    assert!(out.status.success());
+    for (name, dumped) in [
+        ("01-volume", "6_background"),
+        ("02-simulation", "9_simulation"),
+        ("03-mask", "7_mask"),
+        ("05-blurred-mask", "8_blurred_mask"),
+    ] {
+        assert!(
+            step(name) == folder.image(&format!("dump/{dumped}.png")),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn mistakes_are_explained() {
+    let folder = Folder::new(&format!("{SCENE}[sweep]\ngain = [3, 999]\n"));
+    let line = format!("scene.toml:{}:", SCENE.lines().count() + 2);
+    let told = |args: &[&str]| {
+        let out = folder.run("sweep", args);
+        assert!(!out.status.success(), "{args:?}");
+        String::from_utf8_lossy(&out.stderr).into_owned()
+    };
+    let said = told(&[]);
+    for part in [line.as_str(), "gain", "999 dB", "between -200 and 200 dB"] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let said = told(&["--set", "sweep.gain=[3]", "--show", "steps"]);
+    assert!(
+        said.contains("no acquired volume") && said.contains("[volume]"),
+        "{said}"
+    );
+    let said = told(&["--set", "sweep.gain=[3]", "-o", "no/where/sheet.png"]);
+    assert!(said.contains("no/where"), "{said}");
+    assert!(!Path::new("no").exists());
+}
