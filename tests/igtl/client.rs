@@ -12,13 +12,18 @@ use insonify::sim::layout;
 /// Nothing here takes longer on an idle machine by far.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Short limits, so that a test can wait for them.
+/// Short limits, so that a test can wait for them; but a pose never grows old, however busy the
+/// machine is.
 pub fn settings() -> Settings {
+    let tracker = Tracker {
+        timeout: 3600.0,
+        ..Tracker::default()
+    };
     Settings {
         clients: 4,
         message_timeout: Duration::from_millis(400),
         send_timeout: Duration::from_millis(800),
-        ..Settings::new(Tracker::default())
+        ..Settings::new(tracker)
     }
 }
 

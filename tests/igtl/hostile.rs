@@ -15,10 +15,12 @@ fn assert_serves(server: &Server) {
     let before = server.pose().pose().map_or(0, |pose| pose.number);
     let mut client = Client::connect(server);
     client.transform("Probe", shift(1.0, 2.0, 3.0));
-    until(
-        "the pose arrives",
-        || matches!(server.pose(), Tracked::Live(pose) if pose.number > before),
-    );
+    until("the pose arrives", || {
+        server
+            .pose()
+            .pose()
+            .is_some_and(|pose| pose.number > before)
+    });
     server.publish(grey(8, 8), &DAffine3::IDENTITY);
     client.receive_kind("IMAGE");
 }

@@ -131,7 +131,7 @@ fn a_scene_that_moves_is_sent_by_itself_and_the_program_ends_when_told() {
     .expect("written");
     let mut program = Program::start(
         scene.to_str().expect("plain"),
-        &["--frames", "8", "--validate"],
+        &["--frames", "30", "--fps", "10", "--validate"],
     );
     let mut client = Client::at(program.address);
     client.receive_kind("IMAGE");

@@ -12,11 +12,10 @@ use insonify::scene::tracker::Axes;
 
 use crate::client::{Client, grey, picture, serve, settings, shift, until};
 
-fn live(server: &Server) -> DVec3 {
-    match server.pose() {
-        Tracked::Live(pose) => pose.world_from_probe.translation,
-        other => panic!("{other:?}"),
-    }
+/// Where the probe was last.
+fn place(server: &Server) -> DVec3 {
+    let pose = *server.pose().pose().expect("a pose");
+    pose.world_from_probe.translation
 }
 
 /// A world that is the tracker's, one tool, and a timeout to wait for.
@@ -24,7 +23,7 @@ fn plain() -> Settings {
     Settings {
         tracker: Tracker {
             device: Some("ProbeToReference".to_owned()),
-            timeout: 0.3,
+            timeout: 1.0,
             axes: Axes::Ras,
             world_from_reference: DAffine3::IDENTITY,
             ..Tracker::default()
@@ -45,16 +44,16 @@ fn the_tool_moves_the_probe_until_it_is_lost() {
     let sent = Instant::now();
     tracker.transform("ProbeToReference", shift(1.0, 2.0, 3.0));
     until("a pose", || server.pose() != Tracked::Never);
-    assert_eq!(live(&server), DVec3::new(1.0, 2.0, 3.0));
+    assert_eq!(place(&server), DVec3::new(1.0, 2.0, 3.0));
     let pose = *server.pose().pose().expect("a pose");
     assert!(pose.arrived >= sent && pose.number == 1 && pose.device.is("ProbeToReference"));
 
     until("it is lost", || matches!(server.pose(), Tracked::Lost(_)));
-    assert!(pose.arrived.elapsed() >= Duration::from_millis(300));
+    assert!(pose.arrived.elapsed() >= Duration::from_secs(1));
     assert_eq!(server.pose(), Tracked::Lost(pose), "the last pose is kept");
     tracker.transform("ProbeToReference", shift(4.0, 5.0, 6.0));
     until("it is back", || matches!(server.pose(), Tracked::Live(_)));
-    assert_eq!(live(&server), DVec3::new(4.0, 5.0, 6.0));
+    assert_eq!(place(&server), DVec3::new(4.0, 5.0, 6.0));
     assert_eq!(server.status().errors, 0);
 }
 
@@ -121,7 +120,7 @@ fn tdata_name_the_tool() {
     ];
     client.send(&Message::new("Tracker", Content::Tracking(tools)));
     until("a pose", || server.pose() != Tracked::Never);
-    assert_eq!(live(&server).x, 2.0);
+    assert_eq!(place(&server).x, 2.0);
 }
 
 #[test]
@@ -157,7 +156,7 @@ fn a_tool_that_plus_does_not_see_is_lost_at_once() {
     assert_eq!(last.translation.x, 1.0, "what it saw last");
     send("OK", 2.0);
     until("it is back", || matches!(server.pose(), Tracked::Live(_)));
-    assert_eq!(live(&server).x, 2.0);
+    assert_eq!(place(&server).x, 2.0);
 }
 
 #[test]
@@ -254,7 +253,10 @@ fn colours_are_sent_as_such_and_what_is_transparent_is_black() {
 
 #[test]
 fn a_client_that_does_not_read_delays_nobody() {
-    let server = serve(settings());
+    let server = serve(Settings {
+        send_timeout: Duration::from_secs(3),
+        ..settings()
+    });
     let idle = Client::connect(&server);
     let mut reader = Client::connect(&server);
     until("both are in", || server.status().clients == 2);
@@ -267,9 +269,8 @@ fn a_client_that_does_not_read_delays_nobody() {
         longest = longest.max(began.elapsed());
         reader.receive_kind("IMAGE");
     }
-    // A blocked publish would take as long as the idle client: for ever. A busy machine may well
-    // take a tenth of a second to come back to this thread.
-    assert!(longest < Duration::from_millis(400), "{longest:?}");
+    // One that waited for the idle client would take its 3 s.
+    assert!(longest < Duration::from_millis(1500), "{longest:?}");
     let status = server.status();
     assert!(status.images_dropped > 0, "{status:?}");
     until("it is sent away", || server.status().clients == 1);
