@@ -66,6 +66,8 @@ pub(crate) struct Adapter {
     pub(crate) info: DeviceInfo,
     pub(crate) properties: vk::PhysicalDeviceProperties,
     pub(crate) queue_family: u32,
+    /// Queues of that family.
+    pub(crate) queue_count: u32,
     /// 0 where the queue cannot write timestamps.
     pub(crate) timestamp_bits: u32,
     pub(crate) buffer_device_address: bool,
@@ -76,13 +78,15 @@ pub(crate) struct Adapter {
     pub(crate) robust_buffer_access: bool,
     /// R8 and R16 images can be written by kernels.
     pub(crate) extended_storage_formats: bool,
+    /// Pictures can be shown in a window.
+    pub(crate) swapchain: bool,
     /// VK_KHR_portability_subset must be enabled where it is offered.
     pub(crate) portability_subset: bool,
 }
 
 /// Every Vulkan device of the machine, usable or not, in the loader's order.
 pub fn list_devices() -> Result<Vec<DeviceInfo>, GpuError> {
-    let instance = Instance::new(false)?;
+    let instance = Instance::new(false, false)?;
     Ok(adapters(&instance)?.into_iter().map(|a| a.info).collect())
 }
 
@@ -256,11 +260,13 @@ fn probe(
         },
         properties,
         queue_family: family.unwrap_or(0),
+        queue_count: family.map_or(0, |f| families[f as usize].queue_count),
         timestamp_bits,
         buffer_device_address,
         ray_tracing_pipeline,
         robust_buffer_access: core.robust_buffer_access == vk::TRUE,
         extended_storage_formats: core.shader_storage_image_extended_formats == vk::TRUE,
+        swapchain: has(khr::swapchain::NAME),
         portability_subset: has(khr::portability_subset::NAME),
     })
 }

@@ -12,6 +12,8 @@ use super::frames::Slot;
 use super::image::{Image, Sampler, whole};
 use super::kernel::Kernel;
 use super::memory::Buffer;
+use super::pieces::Groups;
+use super::queues::Lane;
 use super::reflect::BindingInfo;
 use super::timer::FrameTimings;
 use super::tlas::Tlas;
@@ -62,9 +64,14 @@ impl<'a> Commands<'a> {
             frame,
             scope: String::new(),
         };
-        let work = [Stage::Compute, Stage::Transfer, Stage::Build];
-        commands.barrier_between(&work, &work);
+        commands.follow();
         Ok(commands)
+    }
+
+    /// Waits for everything submitted before.
+    fn follow(&self) {
+        let work = [Stage::Compute, Stage::Transfer, Stage::Build];
+        self.barrier_between(&work, &work);
     }
 
     /// The device that is recorded for.
@@ -213,22 +220,52 @@ impl<'a> Commands<'a> {
         for (info, binding) in kernel.bindings().iter().zip(bindings) {
             self.use_binding(kernel, info, binding);
         }
+        // Commands without a scope are uploads and the like.
+        let pieces = self.slot.pieces.as_ref().filter(|_| !self.scope.is_empty());
+        let Some(pieces) = pieces else {
+            self.bind_and_dispatch(kernel, push, &sets, [[0; 3], groups]);
+            return Ok(());
+        };
+        let (boxes, each_ms) = pieces.cut(&self.scope, groups, kernel.counts_groups());
+        for piece in boxes {
+            let full = self.slot.pieces.as_mut().is_some_and(|p| p.add(each_ms));
+            if full {
+                self.slot.cut()?;
+                self.follow();
+            }
+            self.bind_and_dispatch(kernel, push, &sets, piece);
+        }
+        Ok(())
+    }
+
+    fn bind_and_dispatch(
+        &self,
+        kernel: &Kernel,
+        push: &[u8],
+        sets: &[vk::DescriptorSet],
+        [base, groups]: Groups,
+    ) {
         let (raw, commands) = (&self.slot.device.raw, self.slot.commands);
         // SAFETY: pipeline, layout and sets belong together by reflection; sizes and group counts
-        // were checked; all objects are kept until the submission has finished.
+        // were checked; all objects are kept until the submission has finished. Only on a shared
+        // queue, for which pipelines allow it, does a dispatch not begin at group 0.
         unsafe {
             let point = vk::PipelineBindPoint::COMPUTE;
             raw.cmd_bind_pipeline(commands, point, kernel.0.pipeline);
             if !sets.is_empty() {
-                raw.cmd_bind_descriptor_sets(commands, point, kernel.0.layout, 0, &sets, &[]);
+                raw.cmd_bind_descriptor_sets(commands, point, kernel.0.layout, 0, sets, &[]);
             }
             if !push.is_empty() {
                 let stage = vk::ShaderStageFlags::COMPUTE;
                 raw.cmd_push_constants(commands, kernel.0.layout, stage, 0, push);
             }
-            raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
+            if base == [0; 3] {
+                raw.cmd_dispatch(commands, groups[0], groups[1], groups[2]);
+            } else {
+                let ([x, y, z], [nx, ny, nz]) = (base, groups);
+                raw.cmd_dispatch_base(commands, x, y, z, nx, ny, nz);
+            }
         }
-        Ok(())
     }
 
     fn use_binding(&mut self, kernel: &Kernel, info: &BindingInfo, binding: &Binding<'_>) {
@@ -288,6 +325,15 @@ impl<'a> Commands<'a> {
         self.slot.submit(self.frame)
     }
 
+    /// As [`Self::submit`], after `wait` at its stages; signals `done`.
+    pub(crate) fn submit_between(
+        self,
+        wait: &[(vk::Semaphore, vk::PipelineStageFlags)],
+        done: &[vk::Semaphore],
+    ) -> Result<(), GpuError> {
+        self.slot.submit_between(self.frame, wait, done)
+    }
+
     /// Hands the commands to the device and waits until they have finished.
     pub fn submit_and_wait(self) -> Result<FrameTimings, GpuError> {
         self.slot.submit(self.frame)?;
@@ -310,7 +356,7 @@ impl Device {
         self: &Arc<Self>,
         record: impl FnOnce(&mut Commands<'_>) -> Result<T, GpuError>,
     ) -> Result<(T, FrameTimings), GpuError> {
-        let mut slot = Slot::new(self, "once")?;
+        let mut slot = Slot::new(self, "once", Lane::Work)?;
         let mut commands = Commands::begin(&mut slot, 0)?;
         let result = record(&mut commands)?;
         let timings = commands.submit_and_wait()?;

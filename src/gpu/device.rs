@@ -1,7 +1,7 @@
 //! The logical device: features, queue, allocator, object names.
 
 use std::ffi::CString;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -10,6 +10,7 @@ use super::adapter::{self, Adapter, DeviceInfo};
 use super::error::{GpuError, during};
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::memory::{MemoryUse, MemoryUseCounter};
+use super::queues::Queues;
 
 /// Blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
@@ -24,6 +25,9 @@ pub struct DeviceOptions {
     /// Turns the validation layers on, or fails where they are not installed. The environment
     /// variable `INSONIFY_VALIDATE=1` does the same.
     pub validate: bool,
+    /// Enables what a window needs ([`super::Painter`]), and a second queue for it where there is
+    /// one.
+    pub window: bool,
     /// Leaves ray queries off although the device has them; acceleration structures can be built
     /// where it has ray-tracing pipelines.
     pub without_ray_query: bool,
@@ -79,25 +83,34 @@ pub struct Device {
     info: DeviceInfo,
     limits: Limits,
     debug: Option<ext::debug_utils::Device>,
-    queue: Mutex<vk::Queue>,
+    pub(crate) queues: Queues,
     /// `None` only while the device is dropped.
     allocator: Mutex<Option<Allocator>>,
     pub(crate) instance: Instance,
 }
 
 impl Device {
-    /// Opens the chosen device with one compute queue.
+    /// Opens the chosen device with one compute queue, and one for a window if that is wanted.
     pub fn new(options: &DeviceOptions) -> Result<Arc<Self>, GpuError> {
         let from_environment = std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1");
-        let instance = Instance::new(options.validate || from_environment)?;
+        let instance = Instance::new(options.validate || from_environment, options.window)?;
         let mut adapter = adapter::choose(&instance, options.selector.as_deref())?;
         let without = options.without_acceleration_structures;
         adapter.info.ray_query &= !(options.without_ray_query || without);
         let traces = adapter.info.ray_query || adapter.ray_tracing_pipeline;
         adapter.info.acceleration_structure &= traces && !without;
-        let raw = create_device(&instance, &adapter)?;
-        // SAFETY: the family was enabled with one queue.
-        let queue = unsafe { raw.get_device_queue(adapter.queue_family, 0) };
+        if options.window && !adapter.swapchain {
+            return Err(GpuError::Unsupported {
+                device: adapter.info.name,
+                feature: "way to show pictures in a window (VK_KHR_swapchain)".into(),
+            });
+        }
+        let queue_count = match options.window {
+            true => adapter.queue_count.min(2),
+            false => 1,
+        };
+        let raw = create_device(&instance, &adapter, queue_count, options.window)?;
+        let queues = Queues::new(&raw, adapter.queue_family, queue_count, options.window);
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: raw.clone(),
@@ -153,7 +166,7 @@ impl Device {
             },
             debug: (instance.debug_utils)
                 .then(|| ext::debug_utils::Device::new(&instance.raw, &raw)),
-            queue: Mutex::new(queue),
+            queues,
             allocator: Mutex::new(Some(allocator)),
             info: adapter.info,
             raw,
@@ -225,10 +238,6 @@ impl Device {
         })
     }
 
-    pub(crate) fn queue(&self) -> MutexGuard<'_, vk::Queue> {
-        self.queue.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Runs `work` with the allocator.
     pub(crate) fn with_allocator<T>(&self, work: impl FnOnce(&mut Allocator) -> T) -> T {
         let mut allocator = self
@@ -288,14 +297,22 @@ impl Drop for Device {
     }
 }
 
-fn create_device(instance: &Instance, adapter: &Adapter) -> Result<ash::Device, GpuError> {
-    let priorities = [1.0];
+fn create_device(
+    instance: &Instance,
+    adapter: &Adapter,
+    queue_count: u32,
+    window: bool,
+) -> Result<ash::Device, GpuError> {
+    let priorities = [1.0; 2];
     let queues = [vk::DeviceQueueCreateInfo::default()
         .queue_family_index(adapter.queue_family)
-        .queue_priorities(&priorities)];
+        .queue_priorities(&priorities[..queue_count as usize])];
     let mut extensions = Vec::new();
     if adapter.portability_subset {
         extensions.push(khr::portability_subset::NAME.as_ptr());
+    }
+    if window {
+        extensions.push(khr::swapchain::NAME.as_ptr());
     }
     let features = vk::PhysicalDeviceFeatures {
         // Out-of-bounds accesses then have a defined result instead of a random crash; it costs

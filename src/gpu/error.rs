@@ -143,6 +143,16 @@ pub enum GpuError {
         /// What is wrong.
         problem: String,
     },
+    /// A device that cannot show pictures in the window.
+    #[error(
+        "'{device}' cannot be used with this window: {reason}; take another one with --device (insonify info lists them), or `insonify render`, which needs no window"
+    )]
+    Window {
+        /// Name of the device.
+        device: String,
+        /// What is missing.
+        reason: String,
+    },
     /// Something this device does not offer.
     #[error("'{device}' has no {feature}")]
     Unsupported {

@@ -11,6 +11,8 @@ use super::descriptors::DescriptorPools;
 use super::device::Device;
 use super::error::{GpuError, during};
 use super::memory::{Buffer, BufferKind};
+use super::pieces::Pieces;
+use super::queues::Lane;
 use super::timer::{FrameTimings, Timer};
 
 /// Frames that may be under way at a time. What the CPU writes per frame through
@@ -27,6 +29,15 @@ pub(crate) struct Slot {
     pub(crate) descriptors: DescriptorPools,
     pub(crate) timer: Timer,
     pub(crate) hazards: HazardCheck,
+    /// Where the queue is shared.
+    pub(crate) pieces: Option<Pieces>,
+    lane: Lane,
+    /// All command buffers; one more is made as soon as there are as many pieces.
+    buffers: Vec<vk::CommandBuffer>,
+    /// One for each piece but the last.
+    piece_fences: Vec<vk::Fence>,
+    /// Pieces of this submission that the queue has.
+    handed: usize,
     pool: vk::CommandPool,
     fence: vk::Fence,
     /// What the submission uses, kept until it has finished.
@@ -39,7 +50,7 @@ pub(crate) struct Slot {
 }
 
 impl Slot {
-    pub(crate) fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Arc<Device>, name: &str, lane: Lane) -> Result<Self, GpuError> {
         let timer = Timer::new(device, name)?;
         let mut slot = Self {
             device: device.clone(),
@@ -47,6 +58,11 @@ impl Slot {
             descriptors: DescriptorPools::new(device),
             timer,
             hazards: HazardCheck::default(),
+            pieces: (lane == Lane::Work && device.queues.are_shared()).then(Pieces::default),
+            lane,
+            buffers: Vec::new(),
+            piece_fences: Vec::new(),
+            handed: 0,
             pool: vk::CommandPool::null(),
             fence: vk::Fence::null(),
             kept: Vec::new(),
@@ -61,13 +77,7 @@ impl Slot {
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the family is the device's own; `Drop` destroys the pool.
         slot.pool = unsafe { device.raw.create_command_pool(&info, None) }.map_err(what())?;
-        let info = vk::CommandBufferAllocateInfo::default()
-            .command_pool(slot.pool)
-            .level(vk::CommandBufferLevel::PRIMARY)
-            .command_buffer_count(1);
-        // SAFETY: the pool was just made and frees the buffer with itself.
-        let buffers = unsafe { device.raw.allocate_command_buffers(&info) }.map_err(what())?;
-        slot.commands = buffers[0];
+        slot.commands = slot.buffer(0).map_err(what())?;
         // SAFETY: no precondition; `Drop` destroys the fence.
         slot.fence =
             unsafe { device.raw.create_fence(&Default::default(), None) }.map_err(what())?;
@@ -75,31 +85,113 @@ impl Slot {
         Ok(slot)
     }
 
+    /// Command buffer `index`; the first of all, or next to one that there is.
+    fn buffer(&mut self, index: usize) -> Result<vk::CommandBuffer, vk::Result> {
+        if index == self.buffers.len() {
+            let info = vk::CommandBufferAllocateInfo::default()
+                .command_pool(self.pool)
+                .level(vk::CommandBufferLevel::PRIMARY)
+                .command_buffer_count(1);
+            // SAFETY: the pool is alive and frees the buffer with itself.
+            let made = unsafe { self.device.raw.allocate_command_buffers(&info) }?;
+            self.buffers.extend(made);
+        }
+        Ok(self.buffers[index])
+    }
+
     /// Starts recording; the slot's last submission must have been waited for.
     pub(crate) fn begin(&mut self) -> Result<(), GpuError> {
         debug_assert!(!self.pending);
+        self.wait_for_pieces();
         self.kept.clear();
         self.staging_used = 0;
         self.hazards = HazardCheck::default();
         self.descriptors.reset()?;
-        let raw = &self.device.raw;
-        let info = vk::CommandBufferBeginInfo::default()
-            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
-        // SAFETY: the device has finished with the command buffer.
-        unsafe {
-            raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty())
-                .and_then(|()| raw.begin_command_buffer(self.commands, &info))
+        if let Some(pieces) = &mut self.pieces {
+            pieces.begin();
         }
-        .map_err(during("starting a command buffer"))?;
+        self.commands = self.buffers[0];
+        let raw = &self.device.raw;
+        // SAFETY: the device has finished with the command buffers.
+        unsafe { raw.reset_command_pool(self.pool, vk::CommandPoolResetFlags::empty()) }
+            .and_then(|()| self.open())
+            .map_err(during("starting a command buffer"))?;
         self.timer.begin(self.commands);
         Ok(())
     }
 
+    fn open(&self) -> Result<(), vk::Result> {
+        let info = vk::CommandBufferBeginInfo::default()
+            .flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the command buffer was reset or is new.
+        unsafe { self.device.raw.begin_command_buffer(self.commands, &info) }
+    }
+
+    /// Hands over what is recorded so far and goes on recording, once no more than this piece and
+    /// the one before are under way.
+    pub(crate) fn cut(&mut self) -> Result<(), GpuError> {
+        self.hand_over()
+            .map_err(|code| self.failure(code, "submitting a piece of a frame"))
+    }
+
+    fn hand_over(&mut self) -> Result<(), vk::Result> {
+        let (raw, at) = (&self.device.raw, self.handed);
+        if at == self.piece_fences.len() {
+            // SAFETY: no precondition; `Drop` destroys the fence.
+            let fence = unsafe { raw.create_fence(&Default::default(), None) }?;
+            self.piece_fences.push(fence);
+        }
+        let (fence, buffers) = (self.piece_fences[at], [self.commands]);
+        let submit = vk::SubmitInfo::default().command_buffers(&buffers);
+        // SAFETY: the buffer was begun and has not been submitted; the fence is not in use. The
+        // guard keeps other threads off the queue.
+        unsafe {
+            raw.end_command_buffer(self.commands)?;
+            raw.reset_fences(&[fence])?;
+            let queue = self.device.queues.lock(self.lane);
+            raw.queue_submit(*queue, &[submit], fence)?;
+        }
+        self.handed += 1;
+        if let Some(before) = at.checked_sub(1) {
+            let before = [self.piece_fences[before]];
+            // SAFETY: the fence belongs to a piece that was handed over.
+            unsafe { raw.wait_for_fences(&before, true, u64::MAX) }?;
+        }
+        self.commands = self.buffer(at + 1)?;
+        self.open()
+    }
+
+    /// Waits for pieces whose last one was perhaps never handed over. A lost device returns at
+    /// once, and the next call on it says so.
+    fn wait_for_pieces(&mut self) {
+        let handed = &self.piece_fences[..std::mem::take(&mut self.handed)];
+        if !handed.is_empty() {
+            // SAFETY: the fences belong to pieces that were handed over.
+            let _ = unsafe { self.device.raw.wait_for_fences(handed, true, u64::MAX) };
+        }
+    }
+
     /// Hands the recorded commands to the queue.
     pub(crate) fn submit(&mut self, frame: u64) -> Result<(), GpuError> {
+        self.submit_between(frame, &[], &[])
+    }
+
+    /// As [`Self::submit`], after `wait` have been signalled for the stages named with them; signals
+    /// `done`.
+    pub(crate) fn submit_between(
+        &mut self,
+        frame: u64,
+        wait: &[(vk::Semaphore, vk::PipelineStageFlags)],
+        done: &[vk::Semaphore],
+    ) -> Result<(), GpuError> {
         self.timer.end(self.commands);
         let buffers = [self.commands];
-        let submit = vk::SubmitInfo::default().command_buffers(&buffers);
+        let (waited, stages): (Vec<_>, Vec<_>) = wait.iter().copied().unzip();
+        let submit = vk::SubmitInfo::default()
+            .wait_semaphores(&waited)
+            .wait_dst_stage_mask(&stages)
+            .command_buffers(&buffers)
+            .signal_semaphores(done);
         let raw = &self.device.raw;
         // SAFETY: the buffer was begun and has not been submitted; the fence is not in use. The
         // guard keeps other threads off the queue.
@@ -107,7 +199,7 @@ impl Slot {
             raw.end_command_buffer(self.commands)
                 .and_then(|()| raw.reset_fences(&[self.fence]))
                 .and_then(|()| {
-                    let queue = self.device.queue();
+                    let queue = self.device.queues.lock(self.lane);
                     raw.queue_submit(*queue, &[submit], self.fence)
                 })
         };
@@ -130,11 +222,16 @@ impl Slot {
         }
         .map_err(|code| self.failure(code, "waiting for a submission"))?;
         self.pending = false;
+        self.wait_for_pieces();
         self.kept.clear();
-        Ok(Some(FrameTimings {
+        let timings = FrameTimings {
             frame: self.frame,
             passes: self.timer.collect()?,
-        }))
+        };
+        if let Some(pieces) = &mut self.pieces {
+            pieces.learn(&timings);
+        }
+        Ok(Some(timings))
     }
 
     /// An error that names the last pass where the device is lost.
@@ -182,12 +279,16 @@ impl Slot {
 
 impl Drop for Slot {
     fn drop(&mut self) {
+        self.wait_for_pieces();
         let raw = &self.device.raw;
         // SAFETY: the submission is waited for (a lost device returns at once); null handles are
-        // ignored, and freeing the pool frees its command buffer.
+        // ignored, and freeing the pool frees its command buffers.
         unsafe {
             if self.pending {
                 let _ = raw.wait_for_fences(&[self.fence], true, u64::MAX);
+            }
+            for &fence in &self.piece_fences {
+                raw.destroy_fence(fence, None);
             }
             raw.destroy_fence(self.fence, None);
             raw.destroy_command_pool(self.pool, None);
@@ -207,8 +308,8 @@ impl Frames {
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
         Ok(Self {
             slots: [
-                Slot::new(device, &format!("{name} 0"))?,
-                Slot::new(device, &format!("{name} 1"))?,
+                Slot::new(device, &format!("{name} 0"), Lane::Work)?,
+                Slot::new(device, &format!("{name} 1"), Lane::Work)?,
             ],
             next: 0,
             finished: Vec::new(),
@@ -252,13 +353,13 @@ mod tests {
     use ash::vk;
 
     use super::super::{Commands, GpuError, test_device};
-    use super::Slot;
+    use super::{Lane, Slot};
 
     /// No driver at hand can be made to lose its device, so the code is planted.
     #[test]
     fn a_lost_device_names_the_last_pass_that_began() {
         let device = test_device();
-        let mut slot = Slot::new(&device, "test").unwrap();
+        let mut slot = Slot::new(&device, "test", Lane::Work).unwrap();
         let mut commands = Commands::begin(&mut slot, 0).unwrap();
         commands.scope("trace");
         commands.scope("scatter");

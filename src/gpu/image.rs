@@ -142,6 +142,11 @@ impl Image {
         Ok(image)
     }
 
+    /// Whether there is no other clone, not even of a submission that was not waited for.
+    pub fn is_unshared(&self) -> bool {
+        Arc::strong_count(&self.0) == 1
+    }
+
     /// Name given at creation.
     pub fn name(&self) -> &str {
         &self.0.name

@@ -9,6 +9,16 @@ use super::error::{GpuError, during};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
+/// What a window of each system needs; those that the loader offers are enabled.
+const SURFACES: [&CStr; 6] = [
+    khr::surface::NAME,
+    khr::xlib_surface::NAME,
+    khr::xcb_surface::NAME,
+    khr::wayland_surface::NAME,
+    khr::win32_surface::NAME,
+    ext::metal_surface::NAME,
+];
+
 /// Messages kept at most; a mistake in a loop would otherwise fill the memory.
 const MAX_MESSAGES: usize = 1000;
 
@@ -61,13 +71,14 @@ pub(crate) struct Instance {
     pub(crate) log: ValidationLog,
     messenger: Option<Messenger>,
     /// Holds the loader's library open; dropped last.
-    _entry: ash::Entry,
+    pub(crate) entry: ash::Entry,
 }
 
 impl Instance {
     /// Opens the loader and makes an instance; with `validate` also the validation layer with
-    /// synchronization validation, which must then be installed.
-    pub(crate) fn new(validate: bool) -> Result<Self, GpuError> {
+    /// synchronization validation, which must then be installed; with `window` also what windows
+    /// need, as far as it is there.
+    pub(crate) fn new(validate: bool, window: bool) -> Result<Self, GpuError> {
         let loader = |reason: String| GpuError::Loader { reason };
         // SAFETY: the loader is the system's Vulkan library; its initialisers have no precondition.
         let entry = unsafe { ash::Entry::load() }.map_err(|e| loader(e.to_string()))?;
@@ -97,6 +108,8 @@ impl Instance {
         if portability {
             extensions.push(khr::portability_enumeration::NAME.as_ptr());
         }
+        let surfaces = SURFACES.iter().filter(|name| window && has(name));
+        extensions.extend(surfaces.map(|name| name.as_ptr()));
         // Layers since 1.3.268 take settings; older ones know only the feature.
         let settable = validate && has(ext::layer_settings::NAME);
         if settable {
@@ -140,7 +153,7 @@ impl Instance {
             validating: validate,
             log: ValidationLog::default(),
             messenger: None,
-            _entry: entry,
+            entry,
         };
         if validate {
             instance.messenger = Some(instance.listen()?);
@@ -149,7 +162,7 @@ impl Instance {
     }
 
     fn listen(&self) -> Result<Messenger, GpuError> {
-        let functions = ext::debug_utils::Instance::new(&self._entry, &self.raw);
+        let functions = ext::debug_utils::Instance::new(&self.entry, &self.raw);
         let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
             .message_severity(
                 vk::DebugUtilsMessageSeverityFlagsEXT::WARNING

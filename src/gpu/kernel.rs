@@ -74,6 +74,13 @@ impl Kernel {
     }
 }
 
+impl Kernel {
+    /// Whether it asks how many groups there are: a dispatch of part of them would tell it less.
+    pub(crate) fn counts_groups(&self) -> bool {
+        self.0.reflection.counts_groups
+    }
+}
+
 fn check_limits(device: &Device, reflection: &Reflection) -> Result<(), String> {
     let limits = device.limits();
     let size = reflection.local_size;
@@ -175,7 +182,12 @@ impl RawKernel {
             .module(module)
             .name(&entry)
             .specialization_info(&constants);
+        let flags = match self.device.queues.are_shared() {
+            true => vk::PipelineCreateFlags::DISPATCH_BASE,
+            false => vk::PipelineCreateFlags::empty(),
+        };
         let info = vk::ComputePipelineCreateInfo::default()
+            .flags(flags)
             .stage(stage)
             .layout(self.layout);
         // SAFETY: module, layout and constants are alive during the call; the layout was

@@ -82,6 +82,8 @@ pub(crate) struct Reflection {
     pub(crate) bindings: Vec<BindingInfo>,
     pub(crate) push_constant_bytes: u32,
     pub(crate) local_size: [u32; 3],
+    /// gl_NumWorkGroups is read.
+    pub(crate) counts_groups: bool,
 }
 
 /// Reads a compute module with one entry point; `specialization` gives (id, value as bits).
@@ -136,6 +138,7 @@ pub(crate) fn reflect(words: &[u32], specialization: &[(u32, u32)]) -> Result<Re
         bindings,
         push_constant_bytes,
         local_size: constants.local_size.ok_or("it states no work-group size")?,
+        counts_groups: constants.counts_groups,
     })
 }
 
@@ -204,6 +207,7 @@ fn block_name(ty: &Type) -> Option<String> {
 struct Constants {
     ids: Vec<u32>,
     local_size: Option<[u32; 3]>,
+    counts_groups: bool,
 }
 
 impl Constants {
@@ -219,6 +223,7 @@ impl Constants {
         const MODE_LOCAL_SIZE_ID: u32 = 38;
         const DECORATION_SPEC_ID: u32 = 1;
         const DECORATION_BUILT_IN: u32 = 11;
+        const BUILT_IN_NUM_WORKGROUPS: u32 = 24;
         const BUILT_IN_WORKGROUP_SIZE: u32 = 25;
 
         let mut constants = Self::default();
@@ -242,6 +247,9 @@ impl Constants {
                 (OP_DECORATE, &[_, id, DECORATION_SPEC_ID, spec]) => {
                     constants.ids.push(spec);
                     spec_id_of.insert(id, spec);
+                }
+                (OP_DECORATE, &[_, _, DECORATION_BUILT_IN, BUILT_IN_NUM_WORKGROUPS]) => {
+                    constants.counts_groups = true;
                 }
                 (OP_DECORATE, &[_, id, DECORATION_BUILT_IN, BUILT_IN_WORKGROUP_SIZE]) => {
                     size_object = Some(id);

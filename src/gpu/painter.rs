@@ -1,0 +1,385 @@
+//! Draws a window: images of the device, and an egui interface over them.
+//!
+//! Images are blitted, so that their grey levels reach the screen as they are; egui's own renderer
+//! would take them through its colour space.
+
+use std::sync::Arc;
+
+use ash::vk;
+use winit::window::Window;
+
+use super::barrier::Stage;
+use super::commands::Commands;
+use super::device::Device;
+use super::error::{GpuError, during};
+use super::frames::{FRAMES_IN_FLIGHT, Slot};
+use super::image::{Image, whole};
+use super::memory::{Buffer, BufferKind};
+use super::overlay::Overlay;
+use super::queues::Lane;
+use super::surface::Surface;
+use super::swapchain::{Acquired, Swapchain};
+
+/// An image and where it is shown.
+pub struct Placed<'a> {
+    /// What is shown.
+    pub image: &'a Image,
+    /// Where, in pixels of the window: left, top, right, bottom. What lies outside is cut off.
+    pub to: [f32; 4],
+}
+
+/// One interface frame.
+pub struct Interface<'a> {
+    /// Pixels per point of the primitives.
+    pub pixels_per_point: f32,
+    /// Shapes in the order of drawing.
+    pub primitives: &'a [egui::ClippedPrimitive],
+    /// Textures that have changed.
+    pub textures: egui::TexturesDelta,
+}
+
+/// The pixels of a window.
+pub struct Shot {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// RGBA, row by row, opaque.
+    pub rgba: Vec<u8>,
+}
+
+/// What painting brought.
+pub enum Painted {
+    /// The picture is on its way to the screen; with its pixels where they were asked for.
+    Shown(Option<Shot>),
+    /// Nothing was drawn: the window has no area, or the window system no room for a picture.
+    Skipped,
+}
+
+/// Draws one window.
+pub struct Painter {
+    overlay: Overlay,
+    swapchain: Option<Swapchain>,
+    slots: [Slot; FRAMES_IN_FLIGHT],
+    /// One per slot: signalled when the picture that it draws on is free.
+    free: [vk::Semaphore; FRAMES_IN_FLIGHT],
+    pass: vk::RenderPass,
+    next: u64,
+    surface: Surface,
+    device: Arc<Device>,
+}
+
+impl Painter {
+    /// For a window and a device that was opened with [`super::DeviceOptions::window`].
+    ///
+    /// # Errors
+    /// A device that cannot show pictures in this window, with the remedy.
+    pub fn new(device: &Arc<Device>, window: Arc<Window>) -> Result<Self, GpuError> {
+        let surface = Surface::new(device, window)?;
+        let pass = render_pass(device, surface.format.format)?;
+        let slot = |name| Slot::new(device, name, Lane::Window);
+        let mut made = Self {
+            overlay: Overlay::new(device, pass)?,
+            swapchain: None,
+            slots: [slot("window 0")?, slot("window 1")?],
+            free: [vk::Semaphore::null(); FRAMES_IN_FLIGHT],
+            pass,
+            next: 0,
+            surface,
+            device: device.clone(),
+        };
+        for semaphore in &mut made.free {
+            // SAFETY: no precondition; `Drop` destroys it.
+            *semaphore = unsafe { device.raw.create_semaphore(&Default::default(), None) }
+                .map_err(during("making the window's semaphores"))?;
+        }
+        Ok(made)
+    }
+
+    /// Draws `images` on black and the interface over them, `size` pixels large, and shows it.
+    /// Waits until the frame before the last is on the screen. With `shot` it waits for this one,
+    /// too, and returns its pixels.
+    ///
+    /// # Errors
+    /// A lost device, no memory, a window system that lets no one read its pictures.
+    pub fn paint(
+        &mut self,
+        size: [u32; 2],
+        images: &[Placed<'_>],
+        interface: Interface<'_>,
+        shot: bool,
+    ) -> Result<Painted, GpuError> {
+        let slot = self.next as usize % FRAMES_IN_FLIGHT;
+        self.slots[slot].wait()?;
+        self.overlay.update(interface.textures)?;
+        let Some(index) = self.acquire(size, slot)? else {
+            return Ok(Painted::Skipped);
+        };
+        let chain = self.swapchain.as_mut().expect("a picture was acquired");
+        if shot && !chain.readable {
+            return Err(GpuError::Window {
+                device: self.device.name().into(),
+                reason: "its pictures cannot be read back".into(),
+            });
+        }
+        let (extent, picture) = (chain.extent, &chain.pictures[index]);
+        let image = picture.image;
+        let mut commands = Commands::begin(&mut self.slots[slot], self.next)?;
+        commands.scope("window");
+        commands.move_window(image, UNDEFINED, COPY_TO);
+        commands.clear(image);
+        for placed in images {
+            commands.blit(placed, image, extent);
+        }
+        commands.move_window(image, COPY_TO, DRAWN);
+        let (primitives, scale) = (interface.primitives, interface.pixels_per_point);
+        let target = (self.pass, picture.framebuffer, extent);
+        self.overlay.draw(&commands, target, primitives, scale)?;
+        let read = match shot {
+            true => {
+                let bytes = 4 * u64::from(extent.width) * u64::from(extent.height);
+                let buffer = (self.device).buffer("window", bytes, BufferKind::Readback)?;
+                commands.move_window(image, DRAWN, COPY_FROM);
+                commands.read_window(image, extent, &buffer);
+                commands.move_window(image, COPY_FROM, SHOWN);
+                Some(buffer)
+            }
+            false => {
+                commands.move_window(image, DRAWN, SHOWN);
+                None
+            }
+        };
+        let free = [(self.free[slot], vk::PipelineStageFlags::TRANSFER)];
+        commands.submit_between(&free, &[picture.drawn])?;
+        chain.present(index)?;
+        self.next += 1;
+        let Some(buffer) = read else {
+            return Ok(Painted::Shown(None));
+        };
+        self.slots[slot].wait()?;
+        Ok(Painted::Shown(Some(self.shot(&buffer, extent))))
+    }
+
+    /// The next picture, of a new swapchain where the window has changed; none where there is none.
+    fn acquire(&mut self, size: [u32; 2], slot: usize) -> Result<Option<usize>, GpuError> {
+        // A window that is being dragged may change again before the picture is there.
+        for _ in 0..3 {
+            if self.swapchain.as_ref().is_none_or(|s| s.is_stale(size)) {
+                self.wait()?;
+                let old = self.swapchain.take();
+                let (device, surface) = (&self.device, &self.surface);
+                self.swapchain = Swapchain::new(device, surface, size, self.pass, old.as_ref())?;
+            }
+            let Some(chain) = &mut self.swapchain else {
+                return Ok(None);
+            };
+            match chain.acquire(self.free[slot])? {
+                Acquired::Picture(index) => return Ok(Some(index)),
+                Acquired::NotNow => return Ok(None),
+                Acquired::OutOfDate => chain.forget(),
+            }
+        }
+        Ok(None)
+    }
+
+    fn shot(&self, buffer: &Buffer, extent: vk::Extent2D) -> Shot {
+        let mut rgba = vec![0; buffer.size() as usize];
+        // SAFETY: the copy was waited for, after a barrier to the host.
+        unsafe { buffer.read_mapped(&mut rgba) };
+        let swapped = self.surface.format.format == vk::Format::B8G8R8A8_UNORM;
+        for texel in rgba.chunks_exact_mut(4) {
+            if swapped {
+                texel.swap(0, 2);
+            }
+            texel[3] = 255;
+        }
+        Shot {
+            size: [extent.width, extent.height],
+            rgba,
+        }
+    }
+
+    /// Waits until nothing of the window is under way any more.
+    fn wait(&mut self) -> Result<(), GpuError> {
+        for slot in &mut self.slots {
+            slot.wait()?;
+        }
+        let queue = self.device.queues.lock(Lane::Window);
+        // SAFETY: the guard keeps other threads off the queue. Presentations have no fence.
+        unsafe { self.device.raw.queue_wait_idle(*queue) }
+            .map_err(super::swapchain::lost_or("waiting for the window"))
+    }
+}
+
+impl Drop for Painter {
+    fn drop(&mut self) {
+        // A lost device has nothing under way.
+        let _ = self.wait();
+        self.swapchain = None;
+        let raw = &self.device.raw;
+        // SAFETY: the device is done with them; null handles are ignored. The overlay's pipeline
+        // does not need the pass any more.
+        unsafe {
+            for &semaphore in &self.free {
+                raw.destroy_semaphore(semaphore, None);
+            }
+            raw.destroy_render_pass(self.pass, None);
+        }
+    }
+}
+
+/// Layout, stages and accesses of a picture between two uses.
+type Use = (vk::ImageLayout, vk::PipelineStageFlags, vk::AccessFlags);
+
+/// As the window system hands it over: the semaphore is waited for before TRANSFER.
+const UNDEFINED: Use = (
+    vk::ImageLayout::UNDEFINED,
+    vk::PipelineStageFlags::TRANSFER,
+    vk::AccessFlags::empty(),
+);
+const COPY_TO: Use = (
+    vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+    vk::PipelineStageFlags::TRANSFER,
+    vk::AccessFlags::TRANSFER_WRITE,
+);
+const DRAWN: Use = (
+    vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+    vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
+    vk::AccessFlags::from_raw(
+        vk::AccessFlags::COLOR_ATTACHMENT_READ.as_raw()
+            | vk::AccessFlags::COLOR_ATTACHMENT_WRITE.as_raw(),
+    ),
+);
+const COPY_FROM: Use = (
+    vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+    vk::PipelineStageFlags::TRANSFER,
+    vk::AccessFlags::TRANSFER_READ,
+);
+const SHOWN: Use = (
+    vk::ImageLayout::PRESENT_SRC_KHR,
+    vk::PipelineStageFlags::BOTTOM_OF_PIPE,
+    vk::AccessFlags::empty(),
+);
+
+/// One colour attachment that keeps what was blitted, in [`DRAWN`] before and after.
+fn render_pass(device: &Device, format: vk::Format) -> Result<vk::RenderPass, GpuError> {
+    let attachments = [vk::AttachmentDescription::default()
+        .format(format)
+        .samples(vk::SampleCountFlags::TYPE_1)
+        .load_op(vk::AttachmentLoadOp::LOAD)
+        .store_op(vk::AttachmentStoreOp::STORE)
+        .initial_layout(DRAWN.0)
+        .final_layout(DRAWN.0)];
+    let colours = [vk::AttachmentReference::default().layout(DRAWN.0)];
+    let subpasses = [vk::SubpassDescription::default()
+        .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
+        .color_attachments(&colours)];
+    let info = vk::RenderPassCreateInfo::default()
+        .attachments(&attachments)
+        .subpasses(&subpasses);
+    // SAFETY: the structure is complete; the painter destroys the pass.
+    unsafe { device.raw.create_render_pass(&info, None) }
+        .map_err(during("making the window's render pass"))
+}
+
+impl Commands<'_> {
+    fn move_window(&self, image: vk::Image, from: Use, to: Use) {
+        let barrier = [vk::ImageMemoryBarrier::default()
+            .image(image)
+            .old_layout(from.0)
+            .new_layout(to.0)
+            .src_access_mask(from.2)
+            .dst_access_mask(to.2)
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .subresource_range(whole())];
+        let (raw, none) = (&self.device().raw, vk::DependencyFlags::empty());
+        // SAFETY: the picture is acquired; layouts follow each other as the painter records them.
+        unsafe { raw.cmd_pipeline_barrier(self.raw(), from.1, to.1, none, &[], &[], &barrier) };
+    }
+
+    fn clear(&self, image: vk::Image) {
+        let black = vk::ClearColorValue {
+            float32: [0.0, 0.0, 0.0, 1.0],
+        };
+        // SAFETY: the picture is acquired and in the layout of copies.
+        unsafe {
+            let raw = &self.device().raw;
+            raw.cmd_clear_color_image(self.raw(), image, COPY_TO.0, &black, &[whole()]);
+        }
+        // What is cleared is written again by blits.
+        self.move_window(image, COPY_TO, COPY_TO);
+    }
+
+    /// Scales an image, linearly, onto the part of its place that lies in the window.
+    fn blit(&mut self, placed: &Placed<'_>, window: vk::Image, extent: vk::Extent2D) {
+        let [width, height, _] = placed.image.extent();
+        let axis = |low: f32, high: f32, limit: u32, texels: u32| {
+            let clipped = [low, high].map(|x| x.clamp(0.0, limit as f32).round());
+            let from = clipped.map(|x| ((x - low) / (high - low) * texels as f32).round());
+            (
+                clipped.map(|x| x as i32),
+                from.map(|x| x.clamp(0.0, texels as f32) as i32),
+            )
+        };
+        let [left, top, right, bottom] = placed.to;
+        let (x, from_x) = axis(left, right, extent.width, width);
+        let (y, from_y) = axis(top, bottom, extent.height, height);
+        let empty = |[a, b]: [i32; 2]| b <= a;
+        if [x, y, from_x, from_y].into_iter().any(empty) {
+            return;
+        }
+        let corners = |x: [i32; 2], y: [i32; 2]| {
+            let corner = |i: usize| vk::Offset3D {
+                x: x[i],
+                y: y[i],
+                z: i as i32,
+            };
+            [corner(0), corner(1)]
+        };
+        let layers = vk::ImageSubresourceLayers {
+            aspect_mask: vk::ImageAspectFlags::COLOR,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        };
+        let region = [vk::ImageBlit {
+            src_subresource: layers,
+            src_offsets: corners(from_x, from_y),
+            dst_subresource: layers,
+            dst_offsets: corners(x, y),
+        }];
+        let image = placed.image;
+        self.uses(&image.0, image.name(), Stage::Transfer, false, "blit");
+        // SAFETY: both regions lie inside their images; the source is in GENERAL and kept, the
+        // picture in the layout of copies. Vulkan demands linear blits of eight-bit colours.
+        unsafe {
+            self.device().raw.cmd_blit_image(
+                self.raw(),
+                image.0.handle,
+                vk::ImageLayout::GENERAL,
+                window,
+                COPY_TO.0,
+                &region,
+                vk::Filter::LINEAR,
+            );
+        }
+        self.move_window(window, COPY_TO, COPY_TO);
+    }
+
+    fn read_window(&mut self, image: vk::Image, extent: vk::Extent2D, to: &Buffer) {
+        self.uses(&to.0, to.name(), Stage::Transfer, true, "read the window");
+        let region = [vk::BufferImageCopy::default()
+            .image_subresource(vk::ImageSubresourceLayers {
+                aspect_mask: vk::ImageAspectFlags::COLOR,
+                mip_level: 0,
+                base_array_layer: 0,
+                layer_count: 1,
+            })
+            .image_extent(extent.into())];
+        // SAFETY: the buffer has room for the picture, which is in the layout of copies.
+        unsafe {
+            let raw = &self.device().raw;
+            raw.cmd_copy_image_to_buffer(self.raw(), image, COPY_FROM.0, to.0.handle, &region);
+        }
+        self.barrier(Stage::Transfer, Stage::Host);
+    }
+}
