@@ -8,6 +8,7 @@ pub mod fusion;
 pub mod layout;
 mod passes;
 pub mod placement;
+mod resize;
 pub mod shaders;
 pub mod special;
 mod stages;
@@ -18,11 +19,12 @@ pub mod world;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError};
+use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use fusion::Fused;
 use passes::{Passes, frame_constants};
+pub use resize::image_size;
 use shaders::Library;
 use stages::{Buffers, Kernels};
 use tables::Tables;
@@ -51,6 +53,8 @@ pub struct Simulator {
     counting: bool,
     /// Whether the last frame was mixed with an acquired volume.
     fused: bool,
+    /// Where the next frames are copied.
+    shown_on: Option<Image>,
     update_time: Duration,
 }
 
@@ -104,6 +108,7 @@ impl Simulator {
             tables,
             counting: false,
             fused: false,
+            shown_on: None,
             update_time: Duration::ZERO,
             passes: Passes {
                 kernels: Kernels::new(device, library, &world, false)?,
@@ -153,6 +158,9 @@ impl Simulator {
         passes.detect(&mut cmd)?;
         passes.display(&mut cmd)?;
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd)?;
+        if let Some(image) = &self.shown_on {
+            cmd.copy_to_image(passes.pixels(self.fused), image)?;
+        }
         cmd.submit()?;
         Ok(self.frames.take_timings())
     }
@@ -242,8 +250,7 @@ impl Simulator {
     /// What Vulkan says.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
         self.frames.wait()?;
-        let fused = self.passes.fusion.as_ref().filter(|_| self.fused);
-        let pixels = fused.map_or(&self.passes.buffers.pixels, |f| &f.pixels);
+        let pixels = self.passes.pixels(self.fused);
         let bytes = self.device.read_back(pixels)?;
         let size =
             4 * self.passes.frame.image_width as usize * self.passes.frame.image_height as usize;

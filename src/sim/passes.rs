@@ -194,6 +194,12 @@ impl Passes {
         Ok(())
     }
 
+    /// The finished image.
+    pub(super) fn pixels(&self, fused: bool) -> &Buffer {
+        let fused = self.fusion.as_ref().filter(|_| fused);
+        fused.map_or(&self.buffers.pixels, |f| &f.pixels)
+    }
+
     /// Mixes the image with the acquired volume, if there is one.
     pub(super) fn fuse(&self, cmd: &mut Commands) -> Result<bool, GpuError> {
         let Some(fusion) = &self.fusion else {
