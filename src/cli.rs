@@ -14,6 +14,7 @@ mod reconstruct;
 mod render;
 mod serve;
 mod sweep;
+mod view;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
 #[derive(Debug, Parser)]
@@ -39,6 +40,8 @@ enum Command {
     Serve(Box<serve::Serve>),
     /// Render a scene many times, one parameter at a time, onto one labelled sheet
     Sweep(Box<sweep::Sweep>),
+    /// Open a window: the live image, the probe under the keyboard, every setting
+    View(Box<view::View>),
 }
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
@@ -51,6 +54,7 @@ pub fn run() -> ExitCode {
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
         Command::Sweep(sweep) => sweep::run(&sweep).map(|()| ExitCode::SUCCESS),
+        Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
     };
     match result {
         Ok(code) => code,

@@ -1,7 +1,7 @@
 //! insonify: real-time ultrasound by Monte-Carlo path tracing on Vulkan.
 //!
 //! `scene` and `probe` say what is imaged and with what; `gpu` knows Vulkan and no ultrasound;
-//! `sim` is the frame; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
+//! `sim` is the frame, `view` the window; `reference` is the f64 twin of every kernel. Units: mm, microseconds, MHz.
 
 // Of what others may use: tools and tests have no such items.
 #![warn(missing_docs)]
@@ -19,4 +19,5 @@ pub mod scene;
 pub mod sheet;
 pub mod sim;
 pub mod statistics;
+pub mod view;
 pub mod volume;

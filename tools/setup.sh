@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Installs what insonify needs and this machine lacks, and says what it installs. Idempotent, asks
-# nothing. `setup.sh run` is enough to render; without an argument it adds what the tests need
-# (validation layers, spirv-val) and what compiling kernels needs.
+# nothing. `setup.sh run` is enough to render and, where there is a display, for the window; without
+# an argument it adds what the tests need (validation layers, spirv-val, a virtual display) and what
+# compiling kernels needs.
 set -eu
 mode=${1:-test}
 
@@ -12,7 +13,8 @@ manual() {
   say "install by hand, then run this again:"
   say "  a C compiler and linker (cc), the Vulkan loader (libvulkan.so.1),"
   say "  a Vulkan driver (your GPU's, or Mesa's lavapipe, 25 or newer for ray query)"
-  [ "$mode" = run ] || say "  the Khronos validation layers, SPIRV-Tools (spirv-val), cmake, a C++ compiler, Python 3"
+  say "  for the window: libX11, libX11-xcb, libXcursor, libXi, libXrandr, libxkbcommon, libxkbcommon-x11"
+  [ "$mode" = run ] || say "  the Khronos validation layers, SPIRV-Tools (spirv-val), Xvfb, cmake, a C++ compiler, Python 3"
   exit 1
 }
 
@@ -28,7 +30,15 @@ has_driver() {
 want=()
 command -v cc >/dev/null || want+=(gcc libc6-dev)
 has_library libvulkan.so.1 || want+=(libvulkan1)
+# The window's libraries are opened at run time; every desktop has them, a bare server has not.
+if [ "$mode" != run ] || [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
+  for pair in libX11.so.6:libx11-6 libX11-xcb.so.1:libx11-xcb1 libXcursor.so.1:libxcursor1 libXi.so.6:libxi6 \
+    libXrandr.so.2:libxrandr2 libxkbcommon.so.0:libxkbcommon0 libxkbcommon-x11.so.0:libxkbcommon-x11-0; do
+    has_library "${pair%%:*}" || want+=("${pair#*:}")
+  done
+fi
 if [ "$mode" != run ]; then
+  command -v Xvfb >/dev/null || want+=(xvfb)
   ls /usr/share/vulkan/explicit_layer.d/*validation*.json /etc/vulkan/explicit_layer.d/*validation*.json >/dev/null 2>&1 || want+=(vulkan-validationlayers)
   command -v spirv-val >/dev/null || want+=(spirv-tools)
   command -v cmake >/dev/null || want+=(cmake)

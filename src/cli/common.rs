@@ -14,7 +14,7 @@ use insonify::sim::Tracer;
 use insonify::sim::layout::Counters;
 
 /// Arguments of every command that simulates.
-#[derive(Debug, clap::Args)]
+#[derive(Clone, Debug, clap::Args)]
 pub struct Common {
     /// Path and scatterer counts that suit the device [default: the scene's own]. Counts that --set
     /// gives stay.
@@ -73,12 +73,19 @@ impl Common {
     /// None of that name, or none at all.
     pub fn device(&self) -> Result<Arc<Device>> {
         Device::new(&DeviceOptions {
-            selector: self.device.clone(),
-            validate: self.validate,
             without_acceleration_structures: self.tracer == TracerChoice::Bvh,
-            ..DeviceOptions::default()
+            ..self.device_options()
         })
         .into_diagnostic()
+    }
+
+    /// The device that was asked for, for both tracers.
+    pub fn device_options(&self) -> DeviceOptions {
+        DeviceOptions {
+            selector: self.device.clone(),
+            validate: self.validate,
+            ..DeviceOptions::default()
+        }
     }
 
     /// The tracer to use; `auto` says in one line why it falls back.

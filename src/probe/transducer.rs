@@ -59,7 +59,19 @@ pub struct Probe {
     pub slice_thickness: f64,
 }
 
+/// A name and the probe that it stands for.
+pub type Preset = (&'static str, fn() -> Probe);
+
 impl Probe {
+    /// The presets of scene files by name.
+    pub const PRESETS: [Preset; 5] = [
+        ("paper-table1", Self::paper_table1),
+        ("abdominal", Self::abdominal),
+        ("cardiac", Self::cardiac),
+        ("linear", Self::linear),
+        ("phased", Self::phased),
+    ];
+
     /// Axial sample pitch dz = D/K, mm.
     pub fn sample_pitch(&self) -> f64 {
         self.depth / f64::from(self.samples)

@@ -12,16 +12,6 @@ use super::within;
 use crate::probe::{Kind, Probe};
 use crate::scene::suggest;
 
-type Preset = (&'static str, fn() -> Probe);
-
-const PRESETS: [Preset; 5] = [
-    ("paper-table1", Probe::paper_table1),
-    ("abdominal", Probe::abdominal),
-    ("cardiac", Probe::cardiac),
-    ("linear", Probe::linear),
-    ("phased", Probe::phased),
-];
-
 /// Lateral and depth axes nearer to parallel than this (sine) define no image plane.
 const PARALLEL: f64 = 1e-3;
 
@@ -30,8 +20,9 @@ pub(super) fn build(
     table: &ProbeTable,
 ) -> Result<(Probe, DAffine3), SceneError> {
     let preset = table.preset.as_deref().unwrap_or("paper-table1");
-    let make = PRESETS.iter().find(|p| p.0 == preset).ok_or_else(|| {
-        let remedy = suggest::among(preset, PRESETS.iter().map(|p| p.0));
+    let presets = &Probe::PRESETS;
+    let make = presets.iter().find(|p| p.0 == preset).ok_or_else(|| {
+        let remedy = suggest::among(preset, presets.iter().map(|p| p.0));
         document.fail("probe.preset", format!("unknown preset `{preset}`"), remedy)
     })?;
     let mut out = make.1();

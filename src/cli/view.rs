@@ -1,0 +1,58 @@
+//! `insonify view`: a scene in a window.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use miette::{IntoDiagnostic, Result};
+
+use super::common::{Common, QualityChoice};
+use insonify::gpu::AdapterKind;
+use insonify::scene::Scene;
+use insonify::sim::shaders::Library;
+use insonify::view::{self, Options};
+
+/// Arguments of `insonify view`.
+#[derive(Debug, clap::Args)]
+pub struct View {
+    /// Scene file (.toml).
+    #[arg(default_value = "scenes/abdomen.toml")]
+    scene: PathBuf,
+    #[command(flatten)]
+    common: Common,
+    /// Writes the window's picture (PNG) once it shows an image, and ends.
+    #[arg(long, value_name = "FILE")]
+    screenshot: Option<PathBuf>,
+    /// Writes the timings of the last frames as one JSON object at the end.
+    #[arg(long, value_name = "FILE")]
+    json: Option<PathBuf>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Everything that the user or the device can get wrong, said once.
+pub fn run(args: &View) -> Result<()> {
+    let (scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
+    for warning in &warnings {
+        eprintln!("{warning}");
+    }
+    let common = args.common.clone();
+    let options = Options {
+        // Both tracers: the console exchanges them.
+        device: common.device_options(),
+        library: Arc::new(Library::embedded()),
+        seconds: common.time,
+        screenshot: args.screenshot.clone(),
+        json: args.json.clone(),
+        prepare: Box::new(move |device, simulation| {
+            let mut common = common.clone();
+            // The probe is to be moved, not waited for.
+            if device.info().kind == AdapterKind::Cpu {
+                common.quality.get_or_insert(QualityChoice::Draft);
+            }
+            common.settle_simulation(simulation, device);
+            Ok(common.tracer(device)?)
+        }),
+    };
+    view::run(scene, options).into_diagnostic()
+}

@@ -1,0 +1,98 @@
+//! The window: the live image, a console for everything that the model exposes, timings.
+//!
+//! The simulation runs on a thread of its own ([`engine`]); the window shows its last finished
+//! picture and never waits for it. What is shown and set is a plain [`Model`].
+
+mod app;
+mod bmode;
+mod catalogue;
+mod console;
+pub mod engine;
+mod keys;
+mod layout;
+pub mod model;
+mod ring;
+mod session;
+mod state;
+mod statistics;
+mod style;
+mod timing;
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use winit::event_loop::EventLoop;
+
+pub use model::Model;
+
+use crate::gpu::{Device, DeviceOptions, GpuError};
+use crate::scene::{Scene, Simulation};
+use crate::sim::shaders::Library;
+use crate::sim::{SimError, Tracer};
+
+/// What a window is opened with.
+pub struct Options {
+    /// Which device; that it serves a window is set by [`run`].
+    pub device: DeviceOptions,
+    /// The kernels.
+    pub library: Arc<Library>,
+    /// Time of the scene at the start, s.
+    pub seconds: f64,
+    /// Writes the window's picture into this file (PNG) once it shows an image, and ends.
+    pub screenshot: Option<PathBuf>,
+    /// Writes the timings into this file at the end.
+    pub json: Option<PathBuf>,
+    /// Suits path and scatterer counts to the device, and chooses a tracer that it has.
+    pub prepare: Prepare,
+}
+
+/// See [`Options::prepare`].
+pub type Prepare = Box<dyn Fn(&Device, &mut Simulation) -> Result<Tracer, Refusal>>;
+
+/// Why a device does not suit.
+pub type Refusal = Box<dyn std::error::Error + Send + Sync>;
+
+/// Why there is no window, or no more.
+#[derive(Debug, thiserror::Error)]
+pub enum ViewError {
+    /// There is no display, or it cannot be reached.
+    #[error("no window can be opened: {0}; `insonify render` needs no display")]
+    Display(String),
+    /// The device.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The device does not suit.
+    #[error("{0}")]
+    Refused(Refusal),
+    /// The simulation, before its first image.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+    /// A file that was asked for.
+    #[error("writing {}: {reason}", file.display())]
+    Unwritten {
+        /// The file.
+        file: PathBuf,
+        /// What the system says.
+        reason: String,
+    },
+    /// The validation layers had something to say, and were asked for.
+    #[error("{count} validation messages, the first: {first}")]
+    Validation {
+        /// How many.
+        count: usize,
+        /// The first.
+        first: String,
+    },
+}
+
+/// Opens a window on `scene` and stays until it is closed.
+///
+/// # Errors
+/// No display, no device that can show pictures, a device that is lost again and again.
+pub fn run(scene: Scene, options: Options) -> Result<(), ViewError> {
+    let display = |error: winit::error::EventLoopError| ViewError::Display(error.to_string());
+    let events = EventLoop::with_user_event().build().map_err(display)?;
+    let mut app = app::App::new(scene, options, events.create_proxy());
+    events.run_app(&mut app).map_err(display)?;
+    app.finish()
+}

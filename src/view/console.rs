@@ -1,0 +1,86 @@
+//! The console: controls for everything that the model exposes, with the units, ranges and meanings
+//! of the scene file's keys.
+
+mod anatomy;
+mod animation;
+mod controls;
+mod image;
+mod probe;
+mod simulation;
+
+use std::time::Instant;
+
+use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
+
+use super::model::Model;
+use super::state::State;
+
+/// Width of the console, points.
+pub(super) const WIDTH: f32 = 336.0;
+
+/// Draws the console into a side panel.
+pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
+    actions(ui, model, now);
+    ui.separator();
+    let before = model.settings.clone();
+    ScrollArea::vertical()
+        .auto_shrink([false; 2])
+        .show(ui, |ui| {
+            section(ui, "Probe", true, |ui| probe::show(ui, &mut model.settings));
+            section(ui, "Image", true, |ui| image::show(ui, &mut model.settings));
+            let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
+            section(ui, "Animation", false, &mut animate);
+            let (settings, loaded) = (&mut model.settings, &model.loaded);
+            section(ui, "Simulation", false, |ui| {
+                simulation::show(ui, settings, state)
+            });
+            if let Some(fusion) = &mut settings.fusion {
+                section(ui, "Fusion", false, |ui| simulation::fusion(ui, fusion));
+            }
+            section(ui, "Tissues", false, |ui| {
+                anatomy::tissues(ui, settings, loaded, &mut state.tissue);
+            });
+            let meshes = &model.meshes;
+            section(ui, "Surfaces", false, |ui| {
+                anatomy::surfaces(ui, settings, loaded, meshes, &mut state.mesh);
+            });
+        });
+    model.note(&before, now);
+}
+
+fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
+    CollapsingHeader::new(RichText::new(name).strong())
+        .default_open(open)
+        .show(ui, add);
+}
+
+fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
+    ui.horizontal(|ui| {
+        let word = if model.frozen { "Live" } else { "Freeze" };
+        let tip = "Stop or start the image and the scene's time (Space)";
+        if ui.button(word).on_hover_text(tip).clicked() {
+            model.freeze(!model.frozen, now);
+        }
+        let [back, forward] = model.undoable();
+        let undo = ui.add_enabled(back, egui::Button::new("Undo"));
+        if undo
+            .on_hover_text("Take back the last change of a setting (Ctrl+Z)")
+            .clicked()
+        {
+            model.undo(now);
+        }
+        let redo = ui.add_enabled(forward, egui::Button::new("Redo"));
+        if redo.on_hover_text("Make it again (Ctrl+Y)").clicked() {
+            model.redo(now);
+        }
+        let tip = "Settings as in the scene file; the probe stays where it is";
+        if ui.button("Reset").on_hover_text(tip).clicked() {
+            let before = std::mem::replace(&mut model.settings, model.loaded.clone());
+            model.note(&before, now);
+        }
+        let tip = "Put the probe where the scene file has it (Home)";
+        if ui.button("Home").on_hover_text(tip).clicked() {
+            model.place_probe(model.home, now);
+        }
+    });
+}

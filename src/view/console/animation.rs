@@ -1,0 +1,71 @@
+//! The scene's time.
+
+use std::time::Instant;
+
+use egui::{DragValue, Slider, Ui};
+
+use super::controls::words;
+use crate::scene::Strategy;
+use crate::sim::Tracer;
+use crate::view::catalogue;
+use crate::view::model::Model;
+
+pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
+    if !model.animated {
+        ui.label("Nothing in this scene moves.");
+        return;
+    }
+    ui.horizontal(|ui| {
+        let word = if model.clock.is_playing() {
+            "Pause"
+        } else {
+            "Play"
+        };
+        if ui
+            .button(word)
+            .on_hover_text("Let the scene's time pass (P)")
+            .clicked()
+        {
+            model.clock.play(!model.clock.is_playing(), now);
+            model.touch(now);
+        }
+        let mut seconds = model.clock.at(now);
+        let time = DragValue::new(&mut seconds)
+            .speed(0.02)
+            .fixed_decimals(2)
+            .suffix(" s");
+        if ui
+            .add(time)
+            .on_hover_text("The scene's time: drag or type")
+            .changed()
+        {
+            model.clock.seek(seconds, now);
+            model.touch(now);
+        }
+    });
+    let mut speed = model.clock.speed();
+    let slider = Slider::new(&mut speed, 0.05..=4.0)
+        .logarithmic(true)
+        .max_decimals(2)
+        .text("speed");
+    let tip = "Seconds of the scene per second";
+    if ui.add(slider).on_hover_text(tip).changed() {
+        model.clock.set_speed(speed, now);
+        model.touch(now);
+    }
+    let entry = catalogue::entry("selector.strategy");
+    let tracer = model.settings.tracer;
+    for (index, strategy) in model.settings.strategies.iter_mut().enumerate() {
+        if let Some(strategy) = strategy {
+            ui.horizontal(|ui| {
+                let mesh = &model.meshes[index];
+                let possible = |s: &Strategy| match s {
+                    Strategy::Union => tracer == Tracer::Bvh,
+                    s => mesh.shares_topology || !s.needs_shared_topology(),
+                };
+                words(ui, &format!("strategy {index}"), strategy, entry, possible);
+                ui.label(&mesh.name);
+            });
+        }
+    }
+}

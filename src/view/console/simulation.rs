@@ -1,0 +1,180 @@
+//! Path tracing, scatterers, and fusion with an acquired volume.
+
+use egui::{ComboBox, Ui};
+
+use super::controls::{choice, count, grid, number, number_or, switch};
+use crate::scene::Fusion;
+use crate::scene::settings::Quality;
+use crate::sim::Tracer;
+use crate::view::model::Settings;
+use crate::view::state::State;
+
+pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State) {
+    ui.horizontal(|ui| {
+        ui.label("Quality")
+            .on_hover_text("Path and scatterer counts that suit the device");
+        for (name, quality) in [
+            ("draft", Quality::Draft),
+            ("standard", Quality::Standard),
+            ("reference", Quality::Reference),
+        ] {
+            if ui.button(name).clicked() {
+                settings.simulation.cell = state.lattice / settings.probe.frequency;
+                settings.simulation.set_quality(quality, state.machine);
+            }
+        }
+    });
+    grid(ui, "simulation", |ui| {
+        ui.label("Tracer")
+            .on_hover_text("How rays find surfaces; the pictures agree");
+        ComboBox::from_id_salt("tracer")
+            .selected_text(settings.tracer.to_string())
+            .show_ui(ui, |ui| {
+                for tracer in [Tracer::RayQuery, Tracer::Bvh] {
+                    let possible = tracer == Tracer::Bvh || state.ray_query;
+                    ui.add_enabled_ui(possible, |ui| {
+                        ui.selectable_value(&mut settings.tracer, tracer, tracer.to_string());
+                    });
+                }
+            });
+        ui.end_row();
+        let s = &mut settings.simulation;
+        count(ui, "simulation.paths", "Paths", &mut s.paths, 1..=128);
+        number(
+            ui,
+            "simulation.speckle_gain",
+            "Speckle",
+            &mut s.speckle_gain,
+            -30.0..=30.0,
+        );
+        number(
+            ui,
+            "simulation.surface_gain",
+            "Surfaces",
+            &mut s.surface_gain,
+            -30.0..=30.0,
+        );
+        number(ui, "simulation.cell", "Cell", &mut s.cell, 0.05..=1.0);
+        let cells = &mut s.elevation_cells;
+        number(
+            ui,
+            "simulation.elevation_cells",
+            "Cells across",
+            cells,
+            0.0..=16.0,
+        );
+        choice(
+            ui,
+            "simulation.scatter_mode",
+            "Scatterers",
+            &mut s.scatter_mode,
+        );
+        choice(
+            ui,
+            "simulation.texture_space",
+            "Texture in",
+            &mut s.texture_space,
+        );
+    });
+    let s = &mut settings.simulation;
+    ui.collapsing("Paths", |ui| {
+        grid(ui, "paths", |ui| {
+            choice(ui, "simulation.sampling", "Sampling", &mut s.sampling);
+            choice(ui, "simulation.sequence", "Sequence", &mut s.sequence);
+            choice(ui, "simulation.coherence", "Coherence", &mut s.coherence);
+            let most = &mut s.max_interactions;
+            count(
+                ui,
+                "simulation.max_interactions",
+                "Interactions",
+                most,
+                1..=64,
+            );
+            let most = &mut s.max_reflections;
+            count(
+                ui,
+                "simulation.max_reflections",
+                "Reflections",
+                most,
+                0..=16,
+            );
+            number(
+                ui,
+                "simulation.min_weight",
+                "Least weight",
+                &mut s.min_weight,
+                1e-9..=1e-2,
+            );
+            let floor = &mut s.volume_floor;
+            let none = (f64::NEG_INFINITY, "none");
+            number_or(
+                ui,
+                "simulation.volume_floor",
+                "Speckle floor",
+                floor,
+                -100.0..=0.0,
+                none,
+            );
+            let rough = &mut s.rough_transmission;
+            switch(
+                ui,
+                "simulation.rough_transmission",
+                "Rough refraction",
+                rough,
+            );
+            switch(
+                ui,
+                "simulation.face_reflection",
+                "Face reflects",
+                &mut s.face_reflection,
+            );
+            switch(
+                ui,
+                "simulation.beam_footprint",
+                "Footprint",
+                &mut s.beam_footprint,
+            );
+            let jitter = &mut s.origin_jitter;
+            number(
+                ui,
+                "simulation.origin_jitter",
+                "Origin jitter",
+                jitter,
+                0.0..=2.0,
+            );
+            let off = (f64::INFINITY, "off");
+            let lobe = &mut s.emission_lobe;
+            number_or(
+                ui,
+                "simulation.emission_lobe",
+                "Emission lobe",
+                lobe,
+                1.0..=10_000.0,
+                off,
+            );
+            let width = &mut s.beam_width;
+            number_or(
+                ui,
+                "simulation.beam_width",
+                "Beam width",
+                width,
+                0.1..=10.0,
+                off,
+            );
+            count(ui, "simulation.seed", "Seed", &mut s.seed, 0..=1000);
+        });
+    });
+}
+
+pub(super) fn fusion(ui: &mut Ui, fusion: &mut Fusion) {
+    grid(ui, "fusion", |ui| {
+        choice(
+            ui,
+            "fusion.surroundings",
+            "Around the mask",
+            &mut fusion.surroundings,
+        );
+        count(ui, "fusion.blur", "Blur", &mut fusion.blur, 1..=128);
+        choice(ui, "fusion.blend", "Blend", &mut fusion.blend);
+    });
+}

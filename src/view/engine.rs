@@ -1,0 +1,260 @@
+//! The simulation on its own thread: it takes the newest order and hands over finished pictures.
+
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
+
+use glam::DAffine3;
+
+use super::model::Order;
+use super::ring::Ring;
+use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
+use crate::probe::Probe;
+use crate::scene::Scene;
+use crate::sim::shaders::Library;
+use crate::sim::{SimError, Simulator, image_size};
+
+/// Where the image lies in the probe's space.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sector {
+    /// Lateral place of the image's left edge, mm.
+    pub left: f64,
+    /// Depth of its upper edge, mm.
+    pub top: f64,
+    /// Edge of a pixel, mm.
+    pub pitch: f64,
+}
+
+/// A finished picture of the simulation.
+#[derive(Clone)]
+pub struct Frame {
+    /// The B-mode image; nobody writes it while there are clones.
+    pub image: Image,
+    /// Where it lies.
+    pub sector: Sector,
+    /// The probe that it was made with.
+    pub probe: Probe,
+    /// World from probe.
+    pub pose: DAffine3,
+    /// Time of the scene, s.
+    pub seconds: f64,
+    /// [`Order::revision`] of what it shows.
+    pub revision: u64,
+    /// When what it shows was decided: the input that moved the probe, or, while time passes, the
+    /// moment at which the clock was read.
+    pub at: Instant,
+    /// Time on the device by stage.
+    pub timings: FrameTimings,
+    /// From reading the order to the finished picture, ms.
+    pub wall_ms: f64,
+    /// What the processor took to bring acceleration structures up to date, ms.
+    pub update_ms: f64,
+    /// Memory of the device.
+    pub memory: MemoryUse,
+    /// Of that, geometry and acceleration structures, bytes.
+    pub world_bytes: u64,
+}
+
+/// What the simulation has to say.
+pub enum News {
+    /// A picture.
+    Frame(Box<Frame>),
+    /// An order could not be carried out; the next one may.
+    Refused(String),
+    /// Nothing more will come.
+    Failed(SimError),
+}
+
+struct State {
+    /// The newest order that was not taken yet.
+    order: Option<Order>,
+    frozen: bool,
+    stop: bool,
+    news: Vec<News>,
+}
+
+struct Shared {
+    state: Mutex<State>,
+    changed: Condvar,
+}
+
+impl Shared {
+    /// The lists stay whole after a panic of the other thread, so poisoning is ignored.
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The simulation's thread; it ends when this is dropped, after the frame under way.
+pub struct Engine {
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Engine {
+    /// Uploads `scene` and carries out `order`. `wake` is called, from the thread, for each news.
+    pub fn start(
+        device: &Arc<Device>,
+        library: Arc<Library>,
+        scene: Scene,
+        order: Order,
+        wake: impl Fn() + Send + 'static,
+    ) -> Self {
+        let shared = Arc::new(Shared {
+            state: Mutex::new(State {
+                order: Some(order),
+                frozen: false,
+                stop: false,
+                news: Vec::new(),
+            }),
+            changed: Condvar::new(),
+        });
+        let worker = Worker {
+            shared: shared.clone(),
+            ring: Ring::new(device),
+            device: device.clone(),
+            library,
+            scene,
+            wake: Box::new(wake),
+        };
+        let thread = std::thread::Builder::new()
+            .name("simulation".into())
+            .spawn(move || worker.run())
+            .expect("a thread can be started");
+        Self {
+            shared,
+            thread: Some(thread),
+        }
+    }
+
+    /// Replaces the order that was not taken yet. While `frozen` nothing is carried out.
+    pub fn order(&self, order: Order, frozen: bool) {
+        let mut state = self.shared.lock();
+        state.order = Some(order);
+        state.frozen = frozen;
+        drop(state);
+        self.shared.changed.notify_all();
+    }
+
+    /// What has come since the last call, oldest first.
+    pub fn news(&self) -> Vec<News> {
+        std::mem::take(&mut self.shared.lock().news)
+    }
+}
+
+impl Drop for Engine {
+    fn drop(&mut self) {
+        self.shared.lock().stop = true;
+        self.shared.changed.notify_all();
+        if let Some(thread) = self.thread.take() {
+            // A panic of the thread has been printed by itself.
+            let _ = thread.join();
+        }
+    }
+}
+
+struct Worker {
+    shared: Arc<Shared>,
+    ring: Ring,
+    device: Arc<Device>,
+    library: Arc<Library>,
+    scene: Scene,
+    wake: Box<dyn Fn() + Send>,
+}
+
+impl Worker {
+    fn run(mut self) {
+        let mut simulator = None;
+        let mut last: Option<Order> = None;
+        for index in 0.. {
+            let Some(order) = self.next(last.as_ref()) else {
+                return;
+            };
+            match self.carry_out(&mut simulator, &order, index) {
+                Ok(frame) => self.tell(News::Frame(Box::new(frame))),
+                // Everything on the device is gone with it.
+                Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
+                    return self.tell(News::Failed(error));
+                }
+                Err(error) if simulator.is_none() => return self.tell(News::Failed(error)),
+                Err(error) => self.tell(News::Refused(error.to_string())),
+            }
+            last = Some(order);
+        }
+    }
+
+    fn tell(&self, news: News) {
+        self.shared.lock().news.push(news);
+        (self.wake)();
+    }
+
+    /// The newest order once there is one, or the last one again while its clock runs; nothing at
+    /// the end.
+    fn next(&self, last: Option<&Order>) -> Option<Order> {
+        let mut state = self.shared.lock();
+        loop {
+            if state.stop {
+                return None;
+            }
+            if !state.frozen {
+                if let Some(order) = state.order.take() {
+                    return Some(order);
+                }
+                if let Some(last) = last.filter(|last| last.clock.runs()) {
+                    let at = Instant::now();
+                    return Some(Order { at, ..last.clone() });
+                }
+            }
+            let changed = self.shared.changed.wait(state);
+            state = changed.unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+
+    fn carry_out(
+        &mut self,
+        simulator: &mut Option<(Simulator, crate::sim::Tracer)>,
+        order: &Order,
+        index: u32,
+    ) -> Result<Frame, SimError> {
+        let began = Instant::now();
+        let seconds = order.clock.at(began);
+        order.settings.apply(&mut self.scene);
+        self.scene.world_from_probe = order.pose;
+        self.scene.set_time(seconds);
+        let (scene, library, tracer) = (&self.scene, &self.library, order.settings.tracer);
+        if simulator.as_ref().is_none_or(|(_, made)| *made != tracer) {
+            // The old one first, so that there is room for the new one.
+            *simulator = None;
+            *simulator = Some((
+                Simulator::new(&self.device, library, scene, tracer)?,
+                tracer,
+            ));
+        }
+        let (simulator, _) = simulator.as_mut().expect("just made");
+        simulator.fit(library, scene)?;
+        let image = self.ring.free(image_size(scene))?;
+        simulator.show_on(Some(image.clone()));
+        simulator.frame(scene, index)?;
+        let timings = simulator.wait()?.pop().unwrap_or_default();
+        simulator.show_on(None);
+        let constants = simulator.constants();
+        Ok(Frame {
+            sector: Sector {
+                left: f64::from(constants.image_left),
+                top: f64::from(constants.image_top),
+                pitch: f64::from(constants.pixel_pitch),
+            },
+            image,
+            probe: scene.probe.clone(),
+            pose: order.pose,
+            seconds,
+            revision: order.revision,
+            at: order.at,
+            timings,
+            wall_ms: began.elapsed().as_secs_f64() * 1e3,
+            update_ms: simulator.update_time().as_secs_f64() * 1e3,
+            memory: self.device.memory(),
+            world_bytes: simulator.world_bytes(),
+        })
+    }
+}

@@ -1,0 +1,254 @@
+//! What the keyboard does.
+
+use std::time::Instant;
+
+use egui::{Event, Key, Modifiers};
+
+use super::catalogue;
+use super::model::{Axis, Model, STEP};
+use super::state::State;
+
+/// What a key does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Action {
+    Move(Axis, f64),
+    Gain(f64),
+    Depth(f64),
+    Freeze,
+    Play,
+    Home,
+    Undo,
+    Redo,
+    Console,
+    Timing,
+    Help,
+    Close,
+    Quit,
+}
+
+/// A key, whether it is held with Ctrl, and what it does.
+type Binding = (Key, bool, Action);
+
+/// Every key with its line in the list of keys; lines without a text belong to the one before.
+const BINDINGS: [(&str, &[Binding], &str); 15] = [
+    (
+        "Left Right",
+        &[
+            (Key::ArrowLeft, false, Action::Move(Axis::Lateral, -1.0)),
+            (Key::ArrowRight, false, Action::Move(Axis::Lateral, 1.0)),
+        ],
+        "slide along the image (2 mm)",
+    ),
+    (
+        "Up Down",
+        &[
+            (Key::ArrowUp, false, Action::Move(Axis::Elevation, 1.0)),
+            (Key::ArrowDown, false, Action::Move(Axis::Elevation, -1.0)),
+        ],
+        "slide across the image (2 mm)",
+    ),
+    (
+        "Page Up Page Down",
+        &[
+            (Key::PageUp, false, Action::Move(Axis::Depth, -1.0)),
+            (Key::PageDown, false, Action::Move(Axis::Depth, 1.0)),
+        ],
+        "lift and press (2 mm)",
+    ),
+    (
+        "A D",
+        &[
+            (Key::A, false, Action::Move(Axis::Rock, -1.0)),
+            (Key::D, false, Action::Move(Axis::Rock, 1.0)),
+        ],
+        "rock in the image plane (2 deg)",
+    ),
+    (
+        "W S",
+        &[
+            (Key::W, false, Action::Move(Axis::Tilt, 1.0)),
+            (Key::S, false, Action::Move(Axis::Tilt, -1.0)),
+        ],
+        "tilt (fan) the image plane (2 deg)",
+    ),
+    (
+        "Q E",
+        &[
+            (Key::Q, false, Action::Move(Axis::Rotate, -1.0)),
+            (Key::E, false, Action::Move(Axis::Rotate, 1.0)),
+        ],
+        "rotate about the depth axis (2 deg)",
+    ),
+    (
+        "Home",
+        &[(Key::Home, false, Action::Home)],
+        "probe back to the scene file's pose",
+    ),
+    (
+        "Space",
+        &[(Key::Space, false, Action::Freeze)],
+        "freeze and go live",
+    ),
+    (
+        "P",
+        &[(Key::P, false, Action::Play)],
+        "play and pause the animation",
+    ),
+    (
+        "+ -",
+        &[
+            (Key::Plus, false, Action::Gain(1.0)),
+            (Key::Equals, false, Action::Gain(1.0)),
+            (Key::Minus, false, Action::Gain(-1.0)),
+        ],
+        "gain (1 dB)",
+    ),
+    (
+        "[ ]",
+        &[
+            (Key::OpenBracket, false, Action::Depth(-10.0)),
+            (Key::CloseBracket, false, Action::Depth(10.0)),
+        ],
+        "depth (10 mm)",
+    ),
+    (
+        "Ctrl+Z Ctrl+Y",
+        &[(Key::Z, true, Action::Undo), (Key::Y, true, Action::Redo)],
+        "undo and redo settings",
+    ),
+    (
+        "C T",
+        &[
+            (Key::C, false, Action::Console),
+            (Key::T, false, Action::Timing),
+        ],
+        "console, timings",
+    ),
+    (
+        "? Esc",
+        &[
+            (Key::Questionmark, false, Action::Help),
+            (Key::F1, false, Action::Help),
+            (Key::Escape, false, Action::Close),
+        ],
+        "this list; close it",
+    ),
+    ("Ctrl+Q", &[(Key::Q, true, Action::Quit)], "quit"),
+];
+
+/// Keys and what they do, for the list on the screen.
+pub(super) fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
+    BINDINGS.iter().map(|(keys, _, text)| (*keys, *text))
+}
+
+/// Carries out the keys that were pressed, unless a field is being typed into.
+pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, now: Instant) {
+    if ctx.egui_wants_keyboard_input() {
+        return;
+    }
+    let pressed = ctx.input(|input| {
+        let presses = input.events.iter().filter_map(|event| match event {
+            Event::Key {
+                key,
+                pressed: true,
+                modifiers,
+                ..
+            } => Some((*key, *modifiers)),
+            _ => None,
+        });
+        presses.collect::<Vec<_>>()
+    });
+    for (key, modifiers) in pressed {
+        if let Some(action) = action(key, modifiers) {
+            carry_out(action, modifiers, model, state, now);
+        }
+    }
+}
+
+fn action(key: Key, modifiers: Modifiers) -> Option<Action> {
+    let bindings = BINDINGS.iter().flat_map(|(_, bindings, _)| *bindings);
+    let mut found = bindings.filter(|b| b.0 == key && b.1 == modifiers.command);
+    found.next().map(|b| b.2)
+}
+
+fn carry_out(
+    action: Action,
+    modifiers: Modifiers,
+    model: &mut Model,
+    state: &mut State,
+    now: Instant,
+) {
+    let clamped = |key: &str, value: f64| {
+        let [least, most] = catalogue::entry(key).range;
+        value.clamp(least, most)
+    };
+    let before = model.settings.clone();
+    match action {
+        Action::Move(axis, steps) => {
+            let step = if axis.shifts() { STEP[0] } else { STEP[1] };
+            let fine = if modifiers.shift { 0.25 } else { 1.0 };
+            model.move_probe(axis, steps * step * fine, now);
+        }
+        Action::Gain(by) => {
+            let gain = &mut model.settings.imaging.gain;
+            *gain = clamped("imaging.gain", *gain + by);
+        }
+        Action::Depth(by) => {
+            let depth = &mut model.settings.probe.depth;
+            // Ten millimetres above nothing are a lower limit of their own.
+            *depth = clamped("probe.depth", (*depth + by).max(10.0));
+        }
+        Action::Freeze => model.freeze(!model.frozen, now),
+        Action::Play if model.animated => {
+            model.clock.play(!model.clock.is_playing(), now);
+            model.touch(now);
+        }
+        Action::Play => {}
+        Action::Home => model.place_probe(model.home, now),
+        Action::Undo => return model.undo(now),
+        Action::Redo => return model.redo(now),
+        Action::Console => state.console = !state.console,
+        Action::Timing => state.timing = !state.timing,
+        Action::Help => state.help = !state.help,
+        Action::Close => state.help = false,
+        Action::Quit => state.quit = true,
+    }
+    model.note(&before, now);
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Key, Modifiers};
+
+    use super::{Action, BINDINGS, action};
+    use crate::view::model::Axis;
+
+    #[test]
+    fn no_key_does_two_things_and_every_movement_has_two() {
+        let all: Vec<_> = BINDINGS.iter().flat_map(|(_, b, _)| *b).collect();
+        for (i, a) in all.iter().enumerate() {
+            assert!(!all[..i].iter().any(|b| (a.0, a.1) == (b.0, b.1)), "{a:?}");
+        }
+        for axis in Axis::ALL {
+            let steps: f64 = (all.iter())
+                .filter_map(|b| match b.2 {
+                    Action::Move(a, steps) if a == axis => Some(steps),
+                    _ => None,
+                })
+                .sum();
+            let count = all
+                .iter()
+                .filter(|b| matches!(b.2, Action::Move(a, _) if a == axis));
+            assert_eq!((count.count(), steps), (2, 0.0), "{axis:?}");
+        }
+    }
+
+    #[test]
+    fn control_tells_quitting_from_rotating() {
+        assert_eq!(action(Key::Q, Modifiers::COMMAND), Some(Action::Quit));
+        let rotate = Some(Action::Move(Axis::Rotate, -1.0));
+        assert_eq!(action(Key::Q, Modifiers::NONE), rotate);
+        assert_eq!(action(Key::Q, Modifiers::SHIFT), rotate, "a finer step");
+        assert_eq!(action(Key::Z, Modifiers::NONE), None);
+    }
+}

@@ -1,0 +1,101 @@
+//! What is where in the window.
+
+use std::time::Instant;
+
+use egui::{Align2, CentralPanel, Frame as Space, Panel, RichText, Ui};
+
+use super::bmode::{self, Place};
+use super::console;
+use super::engine::Frame;
+use super::model::Model;
+use super::state::State;
+use super::statistics::Times;
+use super::{keys, style, timing};
+
+/// Draws the interface; returns where the picture belongs.
+pub(super) fn show(
+    ui: &mut Ui,
+    model: &mut Model,
+    state: &mut State,
+    statistics: &Times,
+    frame: Option<&Frame>,
+    now: Instant,
+) -> Option<Place> {
+    if state.console {
+        Panel::right("console")
+            .resizable(false)
+            .exact_size(console::WIDTH)
+            .show(ui, |ui| console::show(ui, model, state, now));
+    }
+    if state.timing {
+        Panel::bottom("timing")
+            .resizable(false)
+            .exact_size(timing::HEIGHT)
+            .show(ui, |ui| timing::show(ui, statistics, frame, state));
+    }
+    // Transparent: the picture is below the interface.
+    let centre = CentralPanel::default().frame(Space::NONE);
+    let place = centre.show(ui, |ui| {
+        let place = bmode::show(ui, frame, model);
+        toggles(ui, state);
+        place
+    });
+    if let Some(problem) = &state.problem {
+        let mut open = true;
+        egui::Window::new("A problem")
+            .anchor(Align2::CENTER_TOP, [0.0, 64.0])
+            .resizable(false)
+            .collapsible(false)
+            .open(&mut open)
+            .show(ui.ctx(), |ui| {
+                ui.set_max_width(460.0);
+                ui.label(RichText::new(problem).color(style::WARN));
+            });
+        if !open {
+            state.problem = None;
+        }
+    }
+    if state.help {
+        help(ui.ctx(), &mut state.help);
+    }
+    place.inner
+}
+
+/// Buttons at the lower edge that open the panels.
+fn toggles(ui: &mut Ui, state: &mut State) {
+    let area = ui.max_rect();
+    let at = egui::pos2(area.left() + 10.0, area.bottom() - 30.0);
+    let room = egui::Rect::from_min_size(at, egui::vec2(300.0, 24.0));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(room), |ui| {
+        ui.horizontal(|ui| {
+            for (open, name, tip) in [
+                (&mut state.console, "Console", "Settings (C)"),
+                (&mut state.timing, "Timings", "Where the time goes (T)"),
+                (&mut state.help, "Keys", "What the keyboard does (?)"),
+            ] {
+                ui.toggle_value(open, name).on_hover_text(tip);
+            }
+        });
+    });
+}
+
+fn help(ctx: &egui::Context, open: &mut bool) {
+    egui::Window::new("Keys")
+        .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
+        .resizable(false)
+        .collapsible(false)
+        .open(open)
+        .show(ctx, |ui| {
+            egui::Grid::new("keys")
+                .num_columns(2)
+                .spacing([16.0, 4.0])
+                .show(ui, |ui| {
+                    for (key, text) in keys::list() {
+                        ui.monospace(key);
+                        ui.label(text);
+                        ui.end_row();
+                    }
+                });
+            ui.small("With Shift the probe moves a quarter of a step.");
+        });
+}

@@ -1,0 +1,180 @@
+//! What the window shows and lets one change, without the window: settings, pose of the probe, clock.
+
+mod clock;
+mod history;
+mod pose;
+mod settings;
+
+use std::time::Instant;
+
+use glam::DAffine3;
+
+pub use clock::Clock;
+use history::History;
+pub use pose::{Axis, STEP, moved};
+pub use settings::Settings;
+
+use crate::scene::graph::NodeKind;
+use crate::scene::{Scene, animation};
+use crate::sim::Tracer;
+
+/// The state of a session.
+pub struct Model {
+    /// The scene's title.
+    pub title: String,
+    /// What the console sets.
+    pub settings: Settings,
+    /// World from probe.
+    pub pose: DAffine3,
+    /// Time of the scene.
+    pub clock: Clock,
+    /// The image stands still, and so does the clock.
+    pub frozen: bool,
+    /// Whether anything in the scene follows time.
+    pub animated: bool,
+    /// The placed meshes, as [`Settings::surfaces`].
+    pub meshes: Vec<Placed>,
+    /// The settings of the scene file.
+    pub loaded: Settings,
+    /// The pose of the scene file.
+    pub home: DAffine3,
+    history: History,
+    revision: u64,
+    changed: Instant,
+}
+
+/// What the console needs to know of a placed mesh.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// Name in the scene file.
+    pub name: String,
+    /// What it encloses: index into [`Settings::tissues`].
+    pub tissue: usize,
+    /// All its keyframes have the same triangles.
+    pub shares_topology: bool,
+}
+
+/// What one picture of the simulation is made from.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// The console's settings.
+    pub settings: Settings,
+    /// World from probe.
+    pub pose: DAffine3,
+    /// Time of the scene.
+    pub clock: Clock,
+    /// Grows with every change.
+    pub revision: u64,
+    /// When the change was made: an input event's arrival.
+    pub at: Instant,
+}
+
+impl Model {
+    /// The state of a scene as loaded, standing at `seconds`; it plays if it can.
+    pub fn new(scene: &Scene, tracer: Tracer, seconds: f64, now: Instant) -> Self {
+        let settings = Settings::of(scene, tracer);
+        let animated = is_animated(scene);
+        Self {
+            title: scene.name.clone(),
+            loaded: settings.clone(),
+            settings,
+            pose: scene.world_from_probe,
+            clock: Clock::new(seconds, animated, now),
+            frozen: false,
+            animated,
+            meshes: (scene.instances.iter())
+                .map(|i| Placed {
+                    name: i.name.clone(),
+                    tissue: i.tissue,
+                    shares_topology: scene.shares_topology(i),
+                })
+                .collect(),
+            home: scene.world_from_probe,
+            history: History::default(),
+            revision: 0,
+            changed: now,
+        }
+    }
+
+    /// Moves the probe along or about one of its axes, by mm or radians.
+    pub fn move_probe(&mut self, axis: Axis, amount: f64, now: Instant) {
+        self.place_probe(moved(&self.pose, axis, amount), now);
+    }
+
+    /// Puts the probe somewhere.
+    pub fn place_probe(&mut self, pose: DAffine3, now: Instant) {
+        if pose != self.pose {
+            self.pose = pose;
+            self.touch(now);
+        }
+    }
+
+    /// Stops or starts the image; the clock goes on from where it stopped.
+    pub fn freeze(&mut self, frozen: bool, now: Instant) {
+        self.frozen = frozen;
+        self.clock.hold(frozen, now);
+        self.touch(now);
+    }
+
+    /// Notes that the settings were `before` until now.
+    pub fn note(&mut self, before: &Settings, now: Instant) {
+        if *before != self.settings {
+            self.history.push(before.clone(), now);
+            self.touch(now);
+        }
+    }
+
+    /// Notes that the clock was set.
+    pub fn touch(&mut self, now: Instant) {
+        self.revision += 1;
+        self.changed = now;
+    }
+
+    /// Goes back by one change of the settings, if there is one.
+    pub fn undo(&mut self, now: Instant) {
+        if let Some(settings) = self.history.undo(self.settings.clone()) {
+            self.settings = settings;
+            self.touch(now);
+        }
+    }
+
+    /// Goes forward again.
+    pub fn redo(&mut self, now: Instant) {
+        if let Some(settings) = self.history.redo(self.settings.clone()) {
+            self.settings = settings;
+            self.touch(now);
+        }
+    }
+
+    /// Whether there is something to undo, and to redo.
+    pub fn undoable(&self) -> [bool; 2] {
+        self.history.depth().map(|n| n > 0)
+    }
+
+    /// Grows with every change.
+    pub fn revision(&self) -> u64 {
+        self.revision
+    }
+
+    /// What the simulation needs to know.
+    pub fn order(&self) -> Order {
+        Order {
+            settings: self.settings.clone(),
+            pose: self.pose,
+            clock: self.clock,
+            revision: self.revision,
+            at: self.changed,
+        }
+    }
+}
+
+fn is_animated(scene: &Scene) -> bool {
+    scene.graph.nodes.iter().any(|node| match &node.kind {
+        NodeKind::Transform { motion, .. } => *motion != animation::Motion::Still,
+        NodeKind::Selector(_) => true,
+        NodeKind::Group | NodeKind::Mesh { .. } => false,
+    })
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,61 @@
+//! What the console sets: everything of a scene but its geometry.
+
+use crate::probe::Probe;
+use crate::scene::{Fusion, Imaging, Scene, Simulation, Strategy, Surface, Tissue};
+use crate::sim::Tracer;
+
+/// Settings of a scene that change while it is imaged.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Transducer and its geometry.
+    pub probe: Probe,
+    /// Path tracing and scatterers.
+    pub simulation: Simulation,
+    /// Image formation.
+    pub imaging: Imaging,
+    /// The acoustic table.
+    pub tissues: Vec<Tissue>,
+    /// Echo properties of each placed mesh, from outside and from inside.
+    pub surfaces: Vec<[Surface; 2]>,
+    /// How the device follows each mesh that changes its shape; none for those that do not.
+    pub strategies: Vec<Option<Strategy>>,
+    /// How an acquired volume is shown around what is simulated.
+    pub fusion: Option<Fusion>,
+    /// How rays find surfaces.
+    pub tracer: Tracer,
+}
+
+impl Settings {
+    /// The settings of a scene.
+    pub fn of(scene: &Scene, tracer: Tracer) -> Self {
+        let strategy = |i: &crate::scene::Instance| {
+            (!i.keyframes.meshes.is_empty()).then_some(i.keyframes.strategy)
+        };
+        Self {
+            probe: scene.probe.clone(),
+            simulation: scene.simulation.clone(),
+            imaging: scene.imaging.clone(),
+            tissues: scene.tissues.clone(),
+            surfaces: scene.instances.iter().map(|i| i.surface).collect(),
+            strategies: scene.instances.iter().map(strategy).collect(),
+            fusion: scene.fusion.clone(),
+            tracer,
+        }
+    }
+
+    /// Puts them into the scene that they were taken from.
+    pub fn apply(&self, scene: &mut Scene) {
+        scene.probe.clone_from(&self.probe);
+        scene.simulation.clone_from(&self.simulation);
+        scene.imaging.clone_from(&self.imaging);
+        scene.tissues.clone_from(&self.tissues);
+        scene.fusion.clone_from(&self.fusion);
+        let instances = scene.instances.iter_mut();
+        for ((instance, surface), strategy) in instances.zip(&self.surfaces).zip(&self.strategies) {
+            instance.surface = *surface;
+            if let Some(strategy) = strategy {
+                instance.keyframes.strategy = *strategy;
+            }
+        }
+    }
+}

@@ -1,0 +1,177 @@
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use glam::{DAffine3, DVec3};
+
+use super::{Axis, Clock, Model, Settings, moved};
+use crate::scene::Scene;
+use crate::sim::Tracer;
+
+fn scene() -> Scene {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("scene.toml");
+    let text = r#"
+        background = "liver"
+        [probe]
+        preset = "linear"
+        [probe.pose]
+        position = [10, 20, 30]
+        direction = [0, 1, 0]
+        [[transform]]
+        name = "breathing"
+        motion = { kind = "sine", period = "4 s", translate = ["8 mm", 0, 0] }
+        [[mesh]]
+        name = "cyst"
+        parent = "breathing"
+        shape = { sphere = { radius = "5 mm" } }
+        tissue = "cyst_fluid"
+    "#;
+    std::fs::write(&file, text).unwrap();
+    Scene::load(Path::new(&file), &[]).unwrap().0
+}
+
+fn model(now: Instant) -> Model {
+    Model::new(&scene(), Tracer::Bvh, 0.0, now)
+}
+
+fn close(a: DVec3, b: DVec3) {
+    assert!(a.distance(b) < 1e-12, "{a} {b}");
+}
+
+#[test]
+fn the_probe_moves_in_its_own_axes() {
+    let now = Instant::now();
+    let mut model = model(now);
+    let home = model.pose;
+    model.move_probe(Axis::Depth, 3.0, now);
+    close(model.pose.translation, DVec3::new(10.0, 23.0, 30.0));
+    model.move_probe(Axis::Lateral, 2.0, now);
+    close(model.pose.translation, DVec3::new(12.0, 23.0, 30.0));
+    for (axis, fixed) in [
+        (Axis::Rotate, DVec3::Z),
+        (Axis::Rock, DVec3::Y),
+        (Axis::Tilt, DVec3::X),
+    ] {
+        let turned = moved(&home, axis, 0.3);
+        close(turned.translation, home.translation);
+        close(
+            turned.transform_vector3(fixed),
+            home.transform_vector3(fixed),
+        );
+        let other = fixed.any_orthonormal_vector();
+        let (a, b) = (
+            turned.transform_vector3(other),
+            home.transform_vector3(other),
+        );
+        assert!((a.angle_between(b) - 0.3).abs() < 1e-12, "{axis:?}");
+    }
+    for axis in Axis::ALL {
+        let back = moved(&moved(&home, axis, 0.7), axis, -0.7);
+        assert!(back.abs_diff_eq(home, 1e-12), "{axis:?}");
+    }
+}
+
+#[test]
+fn many_steps_stay_rigid() {
+    let mut pose = DAffine3::IDENTITY;
+    for step in 0..10_000 {
+        pose = moved(&pose, Axis::ALL[step % 6], 0.1);
+    }
+    let m = pose.matrix3;
+    let error = m * m.transpose() - glam::DMat3::IDENTITY;
+    assert!(error.to_cols_array().iter().all(|e| e.abs() < 1e-12));
+}
+
+#[test]
+fn time_passes_while_it_plays_and_is_neither_held_nor_frozen() {
+    let now = Instant::now();
+    let later = |s: f64| now + Duration::from_secs_f64(s);
+    let mut clock = Clock::new(1.0, true, now);
+    assert_eq!(clock.at(later(2.0)), 3.0);
+    clock.set_speed(0.5, later(2.0));
+    assert_eq!(clock.at(later(4.0)), 4.0);
+    clock.play(false, later(4.0));
+    assert_eq!(clock.at(later(9.0)), 4.0);
+    clock.play(true, later(10.0));
+    clock.hold(true, later(12.0));
+    assert_eq!(clock.at(later(20.0)), 5.0);
+    clock.hold(false, later(20.0));
+    assert_eq!(clock.at(later(22.0)), 6.0);
+    clock.seek(0.25, later(22.0));
+    assert_eq!(clock.at(later(22.0)), 0.25);
+
+    let mut model = model(now);
+    assert!(model.animated && model.clock.runs());
+    model.freeze(true, later(1.0));
+    assert!(!model.clock.runs() && model.clock.is_playing());
+    model.freeze(false, later(5.0));
+    assert_eq!(model.clock.at(later(6.0)), 2.0);
+}
+
+#[test]
+fn settings_go_into_the_scene_and_come_back() {
+    let mut scene = scene();
+    let mut settings = Settings::of(&scene, Tracer::Bvh);
+    settings.imaging.gain = 3.0;
+    settings.probe.depth = 77.0;
+    settings.tissues[1].speed = 1.6;
+    settings.surfaces[0][1].gain = -6.0;
+    settings.simulation.paths = 5;
+    assert_ne!(settings, Settings::of(&scene, Tracer::Bvh));
+    settings.apply(&mut scene);
+    assert_eq!(settings, Settings::of(&scene, Tracer::Bvh));
+}
+
+#[test]
+fn a_gesture_is_undone_at_once_and_can_be_done_again() {
+    let now = Instant::now();
+    let later = |ms| now + Duration::from_millis(ms);
+    let mut model = model(now);
+    let first = model.settings.clone();
+    for (ms, gain) in [(0, 20.0), (50, 21.0), (100, 22.0), (5000, 30.0)] {
+        let before = model.settings.clone();
+        model.settings.imaging.gain = gain;
+        model.note(&before, later(ms));
+    }
+    assert_eq!(model.undoable(), [true, false]);
+    model.undo(later(6000));
+    assert_eq!(model.settings.imaging.gain, 22.0);
+    model.undo(later(6000));
+    assert_eq!(model.settings, first);
+    model.undo(later(6000));
+    assert_eq!(model.settings, first, "there is nothing before");
+    model.redo(later(6000));
+    model.redo(later(6000));
+    assert_eq!(model.settings.imaging.gain, 30.0);
+    model.undo(later(7000));
+    let before = model.settings.clone();
+    model.settings.imaging.gain = 1.0;
+    model.note(&before, later(8000));
+    assert_eq!(model.undoable(), [true, false], "what was undone is gone");
+}
+
+#[test]
+fn every_change_is_a_new_revision_and_nothing_else_is() {
+    let now = Instant::now();
+    let mut model = model(now);
+    let mut last = model.revision();
+    let mut changed = |model: &Model| {
+        let is_new = model.revision() != last;
+        last = model.revision();
+        is_new
+    };
+    model.place_probe(model.pose, now);
+    let same = model.settings.clone();
+    model.note(&same, now);
+    model.undo(now);
+    assert!(!changed(&model));
+    model.move_probe(Axis::Rock, 0.1, now);
+    assert!(changed(&model));
+    model.freeze(true, now);
+    assert!(changed(&model));
+    let before = model.settings.clone();
+    model.settings.imaging.gain += 1.0;
+    model.note(&before, now);
+    assert!(changed(&model));
+    assert_eq!(model.order().revision, model.revision());
+}

@@ -1,0 +1,58 @@
+//! A window with its device: all that is made anew when the device is lost.
+
+use std::sync::Arc;
+
+use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
+use winit::window::Window;
+
+use super::engine::Engine;
+use super::model::Order;
+use super::{Options, ViewError};
+use crate::gpu::{Device, DeviceOptions, Painter};
+use crate::scene::Scene;
+
+/// News of the simulation.
+pub(super) struct Wake;
+
+/// Window, device, simulation. Fields drop in order: the simulation ends first.
+pub(super) struct Session {
+    pub(super) engine: Engine,
+    pub(super) painter: Painter,
+}
+
+/// A window of the default size.
+pub(super) fn window(events: &ActiveEventLoop, title: &str) -> Result<Arc<Window>, ViewError> {
+    let attributes = Window::default_attributes()
+        .with_title(format!("{title} - insonify"))
+        .with_inner_size(winit::dpi::LogicalSize::new(1280, 720))
+        .with_min_inner_size(winit::dpi::LogicalSize::new(640, 400));
+    let window = events.create_window(attributes);
+    window
+        .map(Arc::new)
+        .map_err(|e| ViewError::Display(e.to_string()))
+}
+
+/// The device that was asked for, for a window.
+pub(super) fn device(options: &Options) -> Result<Arc<Device>, ViewError> {
+    Ok(Device::new(&DeviceOptions {
+        window: true,
+        ..options.device.clone()
+    })?)
+}
+
+impl Session {
+    pub(super) fn new(
+        device: Arc<Device>,
+        window: &Arc<Window>,
+        options: &Options,
+        scene: Scene,
+        order: Order,
+        proxy: EventLoopProxy<Wake>,
+    ) -> Result<Self, ViewError> {
+        let painter = Painter::new(&device, window.clone())?;
+        // An event loop that is gone needs no news.
+        let wake = move || drop(proxy.send_event(Wake));
+        let engine = Engine::start(&device, options.library.clone(), scene, order, wake);
+        Ok(Self { engine, painter })
+    }
+}

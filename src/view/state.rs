@@ -1,0 +1,29 @@
+//! What of the window is open and chosen; not saved.
+
+use crate::scene::settings::Machine;
+
+/// State of the window itself.
+pub(super) struct State {
+    /// The console is open.
+    pub(super) console: bool,
+    /// The timing panel is open.
+    pub(super) timing: bool,
+    /// The list of keys is open.
+    pub(super) help: bool,
+    /// Tissue under inspection: index into the scene's.
+    pub(super) tissue: usize,
+    /// Mesh under inspection: index into the scene's instances.
+    pub(super) mesh: usize,
+    /// What the simulation runs on.
+    pub(super) machine: Machine,
+    /// Edge of the scene file's lattice cell times its frequency, mm MHz: what qualities start from.
+    pub(super) lattice: f64,
+    /// The device has ray queries.
+    pub(super) ray_query: bool,
+    /// Name and driver of the device.
+    pub(super) device: String,
+    /// What went wrong last, until it goes right again.
+    pub(super) problem: Option<String>,
+    /// The window is to be closed.
+    pub(super) quit: bool,
+}

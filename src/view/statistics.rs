@@ -1,0 +1,129 @@
+//! Times of the last pictures: medians, 99th percentiles.
+
+use std::collections::VecDeque;
+
+use serde_json::{Map, Value, json};
+
+use crate::statistics::Statistics;
+
+/// Pictures that are remembered.
+pub(super) const REMEMBERED: usize = 240;
+
+/// Times of one picture, ms.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sample {
+    /// Time on the device by stage.
+    pub(super) stages: Vec<(String, f64)>,
+    /// From order to finished picture.
+    pub(super) wall: f64,
+    /// What the processor took for acceleration structures.
+    pub(super) update: f64,
+    /// From input to the screen.
+    pub(super) latency: f64,
+}
+
+/// The last pictures.
+#[derive(Default)]
+pub(super) struct Times {
+    samples: VecDeque<Sample>,
+    /// How long the window's own frames took, from the start of drawing to the screen.
+    interface: VecDeque<f64>,
+}
+
+impl Times {
+    pub(super) fn add(&mut self, sample: Sample) {
+        push(&mut self.samples, sample);
+    }
+
+    /// Notes a frame of the window, ms.
+    pub(super) fn add_interface(&mut self, ms: f64) {
+        push(&mut self.interface, ms);
+    }
+
+    /// Times of the window's own frames, ms.
+    pub(super) fn interface(&self) -> Vec<f64> {
+        self.interface.iter().copied().collect()
+    }
+
+    /// Everything as median and 99th percentile, ms.
+    pub(super) fn report(&self) -> Value {
+        let both = |values: &[f64]| {
+            let found = Statistics::of(values.iter().copied());
+            json!({ "median": found.median, "p99": found.p99 })
+        };
+        let stages = self.stages();
+        let stages = stages
+            .iter()
+            .map(|name| (name.clone(), both(&self.stage(name))));
+        json!({
+            "frames": self.samples.len(),
+            "stages_ms": stages.collect::<Map<_, _>>(),
+            "device_ms": both(&self.of(Sample::device)),
+            "frame_ms": both(&self.of(|s| s.wall)),
+            "structures_ms": both(&self.of(|s| s.update)),
+            "latency_ms": both(&self.of(|s| s.latency)),
+            "interface_ms": both(&self.interface()),
+        })
+    }
+
+    /// One value of each picture, oldest first.
+    pub(super) fn of(&self, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
+        self.samples.iter().map(value).collect()
+    }
+
+    /// Stages of the last picture, in order, each once.
+    pub(super) fn stages(&self) -> Vec<String> {
+        let mut names = Vec::new();
+        for (name, _) in self.samples.back().iter().flat_map(|s| &s.stages) {
+            if !names.contains(name) {
+                names.push(name.clone());
+            }
+        }
+        names
+    }
+
+    /// The whole time that each picture spent in a stage.
+    pub(super) fn stage(&self, name: &str) -> Vec<f64> {
+        self.of(|sample| {
+            let named = sample.stages.iter().filter(|(stage, _)| stage == name);
+            named.map(|(_, ms)| ms).sum()
+        })
+    }
+}
+
+impl Sample {
+    /// All stages.
+    pub(super) fn device(&self) -> f64 {
+        self.stages.iter().map(|(_, ms)| ms).sum()
+    }
+}
+
+fn push<T>(list: &mut VecDeque<T>, value: T) {
+    if list.len() == REMEMBERED {
+        list.pop_front();
+    }
+    list.push_back(value);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{REMEMBERED, Sample, Times};
+
+    #[test]
+    fn a_stage_that_runs_twice_counts_whole_and_old_pictures_go() {
+        let mut statistics = Times::default();
+        let stages = [("trace", 1.0), ("scatter", 2.0), ("trace", 3.0)];
+        let stages = stages.map(|(name, ms)| (name.to_owned(), ms)).to_vec();
+        for wall in 0..REMEMBERED + 5 {
+            statistics.add(Sample {
+                stages: stages.clone(),
+                wall: wall as f64,
+                ..Sample::default()
+            });
+        }
+        assert_eq!(statistics.stages(), ["trace", "scatter"]);
+        assert_eq!(statistics.stage("trace")[0], 4.0);
+        let walls = statistics.of(|s| s.wall);
+        assert_eq!((walls.len(), walls[0]), (REMEMBERED, 5.0));
+    }
+}

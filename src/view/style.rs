@@ -1,0 +1,36 @@
+//! Colours and sizes: dark, as the room in which one scans.
+
+use egui::{Color32, CornerRadius, Visuals};
+
+/// Behind graphs.
+pub(super) const BACK: Color32 = Color32::from_rgb(14, 16, 18);
+/// Panels.
+const PANEL: Color32 = Color32::from_rgb(27, 30, 34);
+/// Marks and bars.
+pub(super) const ACCENT: Color32 = Color32::from_rgb(92, 176, 196);
+/// Text on the image.
+pub(super) const TEXT: Color32 = Color32::from_rgb(208, 212, 216);
+/// Less important text.
+pub(super) const FAINT: Color32 = Color32::from_rgb(140, 146, 152);
+/// What went wrong.
+pub(super) const WARN: Color32 = Color32::from_rgb(232, 170, 84);
+
+/// Sets up the interface's look.
+pub(super) fn apply(ctx: &egui::Context) {
+    ctx.set_theme(egui::Theme::Dark);
+    let mut visuals = Visuals::dark();
+    visuals.panel_fill = PANEL;
+    visuals.window_fill = PANEL;
+    visuals.extreme_bg_color = BACK;
+    visuals.override_text_color = Some(TEXT);
+    visuals.selection.bg_fill = Color32::from_rgb(36, 92, 108);
+    visuals.slider_trailing_fill = true;
+    visuals.menu_corner_radius = CornerRadius::same(4);
+    ctx.set_visuals_of(egui::Theme::Dark, visuals);
+    ctx.all_styles_mut(|style| {
+        // Each step of a fade would redraw a window in which nothing has changed.
+        style.animation_time = 0.0;
+        style.spacing.slider_width = 110.0;
+        style.spacing.combo_width = 110.0;
+    });
+}

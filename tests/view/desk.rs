@@ -1,0 +1,315 @@
+//! A virtual display with the program on it.
+
+use std::io::{BufRead, BufReader, IoSlice};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use x11rb::connection::{Connection, RequestConnection as _};
+use x11rb::protocol::xproto::{self, ConnectionExt as _, ImageFormat, InputFocus};
+use x11rb::rust_connection::RustConnection;
+
+/// Longest wait for anything: a debug build on a busy machine takes its time to upload a scene.
+const PATIENCE: Duration = Duration::from_secs(90);
+
+/// Keys that the tests press.
+#[derive(Clone, Copy)]
+pub enum Key {
+    Right,
+    Home,
+    Space,
+    Escape,
+    /// `F1`, which is also `?`.
+    Help,
+    Letter(char),
+    Control,
+}
+
+impl Key {
+    fn symbol(self) -> u32 {
+        match self {
+            Self::Right => 0xff53,
+            Self::Home => 0xff50,
+            Self::Space => 0x20,
+            Self::Escape => 0xff1b,
+            Self::Help => 0xffbe,
+            Self::Letter(letter) => u32::from(letter),
+            Self::Control => 0xffe3,
+        }
+    }
+}
+
+/// An X server without a screen.
+pub struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    /// Starts one; where there is none to start nothing, and it is said.
+    pub fn open() -> Option<Self> {
+        let started = Command::new("Xvfb")
+            .args([
+                "-displayfd",
+                "1",
+                "-screen",
+                "0",
+                "1366x768x24",
+                "-nolisten",
+                "tcp",
+            ])
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn();
+        let mut server = match started {
+            Ok(server) => server,
+            Err(error) => {
+                println!("skipped: no X server (Xvfb: {error})");
+                return None;
+            }
+        };
+        let mut number = String::new();
+        let out = server.stdout.take().expect("piped");
+        BufReader::new(out)
+            .read_line(&mut number)
+            .expect("a number");
+        assert!(!number.trim().is_empty(), "Xvfb ended at once");
+        let name = format!(":{}", number.trim());
+        Some(Self { server, name })
+    }
+
+    /// The program on this display.
+    pub fn program(&self, scene: &Path, arguments: &[&str]) -> Command {
+        let mut command = program(scene, arguments);
+        command.env("DISPLAY", &self.name);
+        command
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// `insonify view`.
+pub fn program(scene: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
+    command.arg("view").arg(scene).args(arguments);
+    command
+        .env_remove("WAYLAND_DISPLAY")
+        .env_remove("WAYLAND_SOCKET");
+    command
+}
+
+/// The program in its window.
+pub struct Desk {
+    program: Child,
+    x: RustConnection,
+    root: xproto::Window,
+    window: xproto::Window,
+    _display: Display,
+    _folder: tempfile::TempDir,
+}
+
+impl Desk {
+    /// Opens a scene's window at the upper left corner; nothing where there is no X server.
+    pub fn open(scene: &str, arguments: &[&str]) -> Option<Self> {
+        let display = Display::open()?;
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join("scene.toml");
+        std::fs::write(&file, scene).expect("written");
+        let (x, screen) = x11rb::connect(Some(&display.name)).expect("the X server answers");
+        let root = x.setup().roots[screen].root;
+        let program = display.program(&file, arguments).spawn().expect("started");
+        let mut desk = Self {
+            program,
+            x,
+            root,
+            window: 0,
+            _display: display,
+            _folder: folder,
+        };
+        desk.wait_for("a window", Desk::find);
+        desk.focus();
+        Some(desk)
+    }
+
+    /// The program's window, once it is shown.
+    fn find(&mut self) -> bool {
+        let tree = self.x.query_tree(self.root).unwrap().reply().unwrap();
+        let shown = tree.children.into_iter().find(|&child| {
+            let attributes = self.x.get_window_attributes(child).unwrap().reply();
+            let geometry = self.x.get_geometry(child).unwrap().reply();
+            attributes.is_ok_and(|a| a.map_state == xproto::MapState::VIEWABLE)
+                && geometry.is_ok_and(|g| g.width > 300)
+        });
+        self.window = shown.unwrap_or_default();
+        shown.is_some()
+    }
+
+    /// Without a window manager nobody else gives the window the keyboard and a place.
+    fn focus(&self) {
+        let place = xproto::ConfigureWindowAux::new().x(0).y(0);
+        self.x.configure_window(self.window, &place).unwrap();
+        let now = x11rb::CURRENT_TIME;
+        self.x
+            .set_input_focus(InputFocus::PARENT, self.window, now)
+            .unwrap();
+        self.x.flush().unwrap();
+        std::thread::sleep(Duration::from_millis(100));
+    }
+
+    /// Colours in a part of the display: left, top, width, height.
+    pub fn grab(&self, [x, y, width, height]: [u16; 4]) -> Vec<u8> {
+        let (format, all) = (ImageFormat::Z_PIXMAP, u32::MAX);
+        let (left, top) = (x as i16, y as i16);
+        let cookie = self
+            .x
+            .get_image(format, self.root, left, top, width, height, all);
+        let data = cookie.unwrap().reply().expect("a part of the display").data;
+        // Blue, green, red and one unused.
+        data.chunks_exact(4)
+            .flat_map(|p| [p[2], p[1], p[0]])
+            .collect()
+    }
+
+    /// Waits until a part has not changed for half a second.
+    pub fn settle(&mut self, part: [u16; 4]) -> Vec<u8> {
+        let (mut last, mut since) = (self.grab(part), Instant::now());
+        self.wait_for("the window to come to rest", |desk| {
+            let now = desk.grab(part);
+            if now != last {
+                (last, since) = (now, Instant::now());
+            }
+            since.elapsed() > Duration::from_millis(500)
+        });
+        self.grab(part)
+    }
+
+    /// Waits until something is so.
+    pub fn wait_for(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
+        let began = Instant::now();
+        while !is_so(self) {
+            if let Some(status) = self.program.try_wait().expect("a child") {
+                panic!("the program ended ({status}) before {what}");
+            }
+            assert!(began.elapsed() < PATIENCE, "waited in vain for {what}");
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+
+    fn code(&self, key: Key) -> u8 {
+        let setup = self.x.setup();
+        let (first, count) = (setup.min_keycode, setup.max_keycode - setup.min_keycode + 1);
+        let map = self
+            .x
+            .get_keyboard_mapping(first, count)
+            .unwrap()
+            .reply()
+            .unwrap();
+        let each = usize::from(map.keysyms_per_keycode);
+        let found = map.keysyms.chunks(each).position(|k| k[0] == key.symbol());
+        first + found.expect("the keyboard has the key") as u8
+    }
+
+    /// XTestFakeInput (The X11 Test Extension, version 2.2). Written out, since the feature of x11rb
+    /// that has it would build the whole window system a second time for the tests.
+    fn fake(&self, kind: u8, detail: u8, (x, y): (i16, i16)) {
+        let extension = self.x.extension_information("XTEST").unwrap();
+        let mut request = vec![extension.expect("Xvfb has XTEST").major_opcode, 2, 9, 0];
+        request.extend([kind, detail, 0, 0]);
+        request.extend(x11rb::CURRENT_TIME.to_ne_bytes());
+        request.extend(self.root.to_ne_bytes());
+        request.extend([0; 8]);
+        request.extend(x.to_ne_bytes());
+        request.extend(y.to_ne_bytes());
+        request.extend([0; 8]);
+        let sent = self
+            .x
+            .send_request_without_reply(&[IoSlice::new(&request)], vec![]);
+        sent.unwrap();
+        self.x.flush().unwrap();
+        // As fast as a hand; the server delivers each on its own.
+        std::thread::sleep(Duration::from_millis(15));
+    }
+
+    /// Presses and releases a key.
+    pub fn press(&self, key: Key) {
+        let code = self.code(key);
+        self.fake(xproto::KEY_PRESS_EVENT, code, (0, 0));
+        self.fake(xproto::KEY_RELEASE_EVENT, code, (0, 0));
+    }
+
+    /// Clicks at a place of the display.
+    pub fn click(&self, (x, y): (u16, u16)) {
+        self.fake(xproto::MOTION_NOTIFY_EVENT, 0, (x as i16, y as i16));
+        std::thread::sleep(Duration::from_millis(100));
+        self.fake(xproto::BUTTON_PRESS_EVENT, 1, (0, 0));
+        self.fake(xproto::BUTTON_RELEASE_EVENT, 1, (0, 0));
+    }
+
+    /// Gives the window another size.
+    pub fn resize(&self, width: u16, height: u16) {
+        let size = xproto::ConfigureWindowAux::new()
+            .width(u32::from(width))
+            .height(u32::from(height));
+        self.x.configure_window(self.window, &size).unwrap();
+        self.x.flush().unwrap();
+    }
+
+    /// Takes the window off the screen, as minimising does.
+    pub fn hide(&self) {
+        self.x.unmap_window(self.window).unwrap();
+        self.x.flush().unwrap();
+    }
+
+    /// Puts it back.
+    pub fn show(&self) {
+        self.x.map_window(self.window).unwrap();
+        self.x.flush().unwrap();
+        std::thread::sleep(Duration::from_millis(200));
+        self.focus();
+    }
+
+    /// Processor time that the program has used so far, to a hundredth of a second.
+    pub fn processor_time(&self) -> Duration {
+        let path = format!("/proc/{}/stat", self.program.id());
+        let text = std::fs::read_to_string(path).expect("the program runs");
+        // Fields are counted behind the name, which is in brackets and may hold anything.
+        let rest = text.rsplit(')').next().expect("a name");
+        let fields: Vec<u64> = rest
+            .split_whitespace()
+            .map(|f| f.parse().unwrap_or(0))
+            .collect();
+        let ticks = fields[11] + fields[12];
+        Duration::from_millis(10 * ticks)
+    }
+
+    /// Ctrl+Q; the program has to end by itself, without an error.
+    pub fn quit(mut self) {
+        let control = self.code(Key::Control);
+        self.fake(xproto::KEY_PRESS_EVENT, control, (0, 0));
+        self.press(Key::Letter('q'));
+        self.fake(xproto::KEY_RELEASE_EVENT, control, (0, 0));
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.program.try_wait().expect("a child") {
+                assert!(status.success(), "{status}");
+                return;
+            }
+            assert!(began.elapsed() < PATIENCE, "the program does not end");
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+}
+
+impl Drop for Desk {
+    fn drop(&mut self) {
+        // It has ended, or a test has failed.
+        let _ = self.program.kill();
+        let _ = self.program.wait();
+    }
+}
