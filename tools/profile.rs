@@ -1,4 +1,5 @@
-//! What animation costs: acceleration structures made anew against those that are switched.
+//! What animation costs, acceleration structures made anew against those that are switched; and what
+//! fusion with an acquired volume saves.
 //!
 //! ```text
 //! cargo run --release --bin profile -- strategies scenes/heart.toml
@@ -25,6 +26,8 @@ use provenance::Provenance;
 mod builds;
 #[path = "profile/crossover.rs"]
 mod crossover;
+#[path = "profile/fusion.rs"]
+mod fusion;
 #[path = "profile/measure.rs"]
 mod measure;
 #[path = "profile/paper.rs"]
@@ -36,7 +39,7 @@ mod strategies;
 #[path = "profile/table.rs"]
 mod table;
 
-/// Measures what animation costs on this machine.
+/// Measures what animation and fusion cost on this machine.
 #[derive(Parser)]
 #[command(name = "profile")]
 struct Arguments {
@@ -65,7 +68,7 @@ enum Command {
     Strategies(strategies::Arguments),
     /// Where rebuilding beats selecting: over the distance between keyframes and their triangles.
     Crossover(crossover::Arguments),
-    /// Tables II and III of Starkov et al. 2019, beside the paper's numbers.
+    /// Tables I to III of Starkov et al. 2019, beside the paper's numbers.
     Paper(paper::Arguments),
 }
 

@@ -1,5 +1,6 @@
 //! One frame at a time, and what many of them come to.
 
+use insonify::gpu::FrameTimings;
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
 pub use insonify::statistics::Statistics;
@@ -37,14 +38,19 @@ impl Rig {
         })
     }
 
-    /// Images the scene as it stands, alone on the device.
-    pub fn frame(&mut self) -> Result<Sample> {
+    /// Images the scene as it stands, alone on the device: its passes, and what the processor did, ms.
+    pub fn timings(&mut self) -> Result<(FrameTimings, f64)> {
         self.index += 1;
         let (simulator, scene) = (&mut self.simulator, &self.scene);
         simulator.frame(scene, self.index).into_diagnostic()?;
         let host = simulator.update_time().as_secs_f64() * 1e3;
-        let timings = simulator.wait().into_diagnostic()?;
-        let last = timings.last().expect("a frame was waited for");
+        let mut timings = simulator.wait().into_diagnostic()?;
+        Ok((timings.pop().expect("a frame was waited for"), host))
+    }
+
+    /// Images the scene as it stands.
+    pub fn frame(&mut self) -> Result<Sample> {
+        let (last, host) = self.timings()?;
         Ok(Sample {
             structures: host + last.of("update"),
             trace: last.of("origin") + last.of("trace"),

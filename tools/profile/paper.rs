@@ -10,12 +10,18 @@ use miette::{Context, IntoDiagnostic, Result};
 use serde_json::{Value, json};
 
 use crate::Machine;
+use crate::fusion;
 use crate::measure::{Rig, Statistics, mean};
 use crate::strategies::{by, period};
 use crate::table::{Table, ms, write_json};
 
 #[derive(clap::Args)]
 pub struct Arguments {
+    #[command(flatten)]
+    fusion: fusion::Options,
+    /// One of the tables alone.
+    #[arg(long, value_enum)]
+    only: Option<Which>,
     /// Scene of Table II, with transform nodes [default: the shipped scenes/fetus.toml].
     #[arg(long)]
     fetus: Option<PathBuf>,
@@ -31,10 +37,10 @@ pub struct Arguments {
     /// How often each pose and keyframe is measured.
     #[arg(long, default_value_t = 3)]
     rounds: u32,
-    /// Overrides an entry of both scene files, e.g. --set probe.preset=paper-table1.
+    /// Overrides an entry of all scene files, e.g. --set probe.scanlines=64.
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = insonify::scene::file::override_of)]
     overrides: Vec<(String, String)>,
-    /// Writes the medians: {"tables": {"II": {"static_ms", "transform_ms"}, "III": {...}}}.
+    /// Writes the medians: {"tables": {"I": {"simulated_ms", "fused_ms"}, "II": {...}, "III": {...}}}.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
@@ -50,18 +56,33 @@ fn strategy(text: &str) -> Result<Strategy, String> {
     })
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Which {
+    /// Fusion.
+    #[value(name = "i")]
+    One,
+    /// Transform nodes.
+    #[value(name = "ii")]
+    Two,
+    /// Selector nodes.
+    #[value(name = "iii")]
+    Three,
+}
+
 /// Two ways to image the same things, ms per frame.
 struct Pair {
-    still: f64,
-    animated: f64,
+    first: f64,
+    second: f64,
     triangles: usize,
 }
 
-impl Pair {
-    /// How much more the animation costs, percent.
-    fn excess(&self) -> f64 {
-        100.0 * (self.animated / self.still - 1.0)
-    }
+/// Two ways, what they are called in JSON, and what the paper says: thousand triangles and ms.
+struct Entry {
+    number: &'static str,
+    what: &'static str,
+    keys: [&'static str; 2],
+    pair: Pair,
+    paper: [f64; 3],
 }
 
 pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
@@ -74,57 +95,64 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         let file = given.clone().unwrap_or_else(|| shipped(name));
         Scene::load(&file, &arguments.overrides).map(|(scene, _)| scene)
     };
-    let (fetus, heart) = (
-        load(&arguments.fetus, "fetus.toml")?,
-        load(&arguments.heart, "heart.toml")?,
-    );
+    let wanted = |table: Which| arguments.only.is_none_or(|only| only == table);
+    let scenes = match wanted(Which::One) {
+        true => Some(fusion::Scenes::load(
+            &arguments.fusion,
+            &arguments.overrides,
+        )?),
+        false => None,
+    };
+    let fetus = match wanted(Which::Two) {
+        true => Some(load(&arguments.fetus, "fetus.toml")?),
+        false => None,
+    };
+    let heart = match wanted(Which::Three) {
+        true => Some(load(&arguments.heart, "heart.toml")?),
+        false => None,
+    };
     let mut all = Vec::new();
     for &tracer in &machine.tracers {
-        let two = transform(machine, &fetus, tracer, arguments)?;
-        let three = selector(machine, &heart, tracer, arguments)?;
-        let mut table = Table::new(
-            format!(
-                "{tracer}: ms per frame, {} rounds, interleaved",
-                arguments.rounds
-            ),
-            &[
-                "table",
-                "",
-                "triangles",
-                "static ms",
-                "animated ms",
-                "difference",
-                "paper: triangles",
-                "static ms",
-                "animated ms",
-                "difference",
-            ],
-        );
-        let mut row = |name: &str, what: &str, pair: &Pair, paper: [f64; 3]| {
-            table.add(vec![
-                name.into(),
-                what.into(),
-                pair.triangles.to_string(),
-                ms(pair.still),
-                ms(pair.animated),
-                format!("{:+.1} %", pair.excess()),
-                format!("{}", paper[0]),
-                ms(paper[1]),
-                ms(paper[2]),
-                format!("{:+.1} %", 100.0 * (paper[2] / paper[1] - 1.0)),
-            ]);
-        };
-        // Tables II (without the paper's fusion) and III.
-        row("II", "transform nodes", &two, [934e3, 85.6, 87.7]);
-        row("III", "selector node", &three, [7.3e3, 65.0, 64.1]);
-        table.print();
-        table.csv(&machine.output, &format!("paper-{tracer}"))?;
+        let mut entries = Vec::new();
+        let mut details = Value::Null;
+        if let Some(scenes) = &scenes {
+            let one = fusion::run(machine, scenes, tracer, arguments.fusion.frames)?;
+            details = one.details;
+            entries.push(Entry {
+                number: "I",
+                what: "simulated / fused",
+                keys: ["simulated_ms", "fused_ms"],
+                pair: Pair {
+                    first: one.simulated,
+                    second: one.fused,
+                    triangles: one.triangles,
+                },
+                paper: [929.0, fusion::PAPER[0], fusion::PAPER[1]],
+            });
+        }
+        // The paper's with fusion, here without.
+        if let Some(fetus) = &fetus {
+            entries.push(Entry {
+                number: "II",
+                what: "static / transform nodes",
+                keys: ["static_ms", "transform_ms"],
+                pair: transform(machine, fetus, tracer, arguments)?,
+                paper: [934.0, 85.6, 87.7],
+            });
+        }
+        if let Some(heart) = &heart {
+            entries.push(Entry {
+                number: "III",
+                what: "static / selector node",
+                keys: ["static_ms", "selector_ms"],
+                pair: selector(machine, heart, tracer, arguments)?,
+                paper: [7.3, 65.0, 64.1],
+            });
+        }
+        report(machine, tracer, &entries)?;
+        let tables: serde_json::Map<String, Value> = entries.iter().map(json_of).collect();
         all.push(json!({
-            "tracer": tracer.to_string(),
-            "tables": {
-                "II": { "static_ms": two.still, "transform_ms": two.animated },
-                "III": { "static_ms": three.still, "selector_ms": three.animated },
-            },
+            "tracer": tracer.to_string(), "tables": tables, "fusion": details,
         }));
     }
     if let Some(file) = &arguments.json {
@@ -142,6 +170,48 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         "paper",
         &json!({ "machine": provenance, "runs": all }),
     )
+}
+
+fn json_of(entry: &Entry) -> (String, Value) {
+    let [first, second] = entry.keys;
+    let values = json!({ first: entry.pair.first, second: entry.pair.second });
+    (entry.number.to_owned(), values)
+}
+
+fn report(machine: &Machine, tracer: Tracer, entries: &[Entry]) -> Result<()> {
+    let mut table = Table::new(
+        format!("{tracer}: median ms per frame, the two ways in turns"),
+        &[
+            "table",
+            "ways",
+            "thousand triangles",
+            "first ms",
+            "second ms",
+            "difference",
+            "paper: triangles",
+            "first ms",
+            "second ms",
+            "difference",
+        ],
+    );
+    let change = |a: f64, b: f64| format!("{:+.1} %", 100.0 * (b / a - 1.0));
+    for entry in entries {
+        let (pair, paper) = (&entry.pair, entry.paper);
+        table.add(vec![
+            entry.number.into(),
+            entry.what.into(),
+            format!("{:.1}", pair.triangles as f64 / 1e3),
+            ms(pair.first),
+            ms(pair.second),
+            change(pair.first, pair.second),
+            format!("{}", paper[0]),
+            ms(paper[1]),
+            ms(paper[2]),
+            change(paper[1], paper[2]),
+        ]);
+    }
+    table.print();
+    table.csv(&machine.output, &format!("paper-{tracer}"))
 }
 
 /// Table II: every pose imaged when it has just been taken, and again while nothing moves.
@@ -172,8 +242,8 @@ fn transform(
         }
     }
     Ok(Pair {
-        still: Statistics::of(still).median,
-        animated: Statistics::of(animated).median,
+        first: Statistics::of(still).median,
+        second: Statistics::of(animated).median,
         triangles: scene.triangles(),
     })
 }
@@ -221,8 +291,8 @@ fn selector(
         )
     };
     Ok(Pair {
-        still: part(0),
-        animated: part(1),
+        first: part(0),
+        second: part(1),
         triangles: scene.triangles(),
     })
 }

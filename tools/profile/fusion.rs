@@ -1,0 +1,250 @@
+//! Table I of the paper: the whole scene simulated, against its fusion with an acquired volume, of
+//! which only what the mask encloses is simulated.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use glam::{DAffine3, DVec3};
+use insonify::output;
+use insonify::probe::Probe;
+use insonify::scene::fusion::{Blend, Fusion, Surroundings};
+use insonify::scene::{Acquired, Scene};
+use insonify::sim::{Tracer, layout::Counters};
+use insonify::volume::Voxels;
+use miette::{IntoDiagnostic, Result, miette};
+use serde_json::{Value, json};
+
+use crate::Machine;
+use crate::measure::{Rig, Statistics};
+use crate::table::{Table, ms};
+
+#[derive(clap::Args)]
+pub struct Options {
+    /// Scene of Table I, imaged by the paper's probe [default: the shipped scenes/fetus.toml]. Where it
+    /// has no [fusion], a volume is made up around the mesh that --mask names. The paper's had 929
+    /// thousand triangles: `anatomy -- fetus --triangles 930000 -o DIR` makes as many.
+    #[arg(long, value_name = "SCENE")]
+    fusion: Option<PathBuf>,
+    /// Mesh that masks the volume, where the scene of Table I does not say.
+    #[arg(long, default_value = "sac")]
+    mask: String,
+    /// Frames of Table I, simulated and fused.
+    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub frames: u32,
+}
+
+/// The paper's imaging parameters; only it says nothing of the probe's place.
+const PROBE: [(&str, &str); 6] = [
+    ("probe.preset", "paper-table1"),
+    ("probe.frequency", "7 MHz"),
+    ("probe.depth", "100 mm"),
+    ("probe.scanlines", "192"),
+    ("probe.elevation_layers", "7"),
+    ("probe.samples", "2048"),
+];
+/// The passes of a frame, in its order.
+const STAGES: [&str; 12] = [
+    "update", "origin", "trace", "scatter", "beam", "axial", "detect", "display", "mask",
+    "convert", "blur", "fuse",
+];
+/// Voxels along each axis of a volume that is made up.
+const VOXELS: [usize; 3] = [256, 64, 256];
+
+/// The same scene in two ways.
+pub struct Scenes {
+    simulated: Scene,
+    fused: Scene,
+}
+
+impl Scenes {
+    pub fn load(arguments: &Options, overrides: &[(String, String)]) -> Result<Self> {
+        let shipped = || Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/fetus.toml");
+        let file = arguments.fusion.clone().unwrap_or_else(shipped);
+        let probe = PROBE.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let all = [&probe[..], overrides].concat();
+        let (mut fused, _) = Scene::load(&file, &all)?;
+        if fused.fusion.is_none() || fused.volume.is_none() {
+            let mask = fused
+                .instances
+                .iter()
+                .position(|i| i.name == arguments.mask);
+            let mask = mask.ok_or_else(|| {
+                miette!(
+                    help = "name one of its closed meshes with --mask",
+                    "{} has no [fusion] and no mesh `{}`",
+                    file.display(),
+                    arguments.mask
+                )
+            })?;
+            fused.volume = Some(made_up(&fused.probe, &fused.world_from_probe));
+            fused.fusion = Some(Fusion {
+                masks: vec![mask],
+                surroundings: Surroundings::Volume,
+                blur: 32,
+                blend: Blend::Linear,
+            });
+        }
+        let mut simulated = fused.clone();
+        simulated.volume = None;
+        simulated.fusion = None;
+        Ok(Self { simulated, fused })
+    }
+}
+
+/// Noise in a box around the image: what it shows is of no matter to what it costs.
+fn made_up(probe: &Probe, world_from_probe: &DAffine3) -> Acquired {
+    let size = DVec3::new(
+        2.0 * probe.depth,
+        2.0 * probe.slice_thickness,
+        1.2 * probe.depth,
+    );
+    let spacing = size / DVec3::from(VOXELS.map(|n| n as f64));
+    let corner = DVec3::new(-size.x / 2.0, -size.y / 2.0, -0.1 * probe.depth);
+    // Knuth's multiplicative hash.
+    let noise = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
+    Acquired {
+        size: VOXELS,
+        voxels: Arc::new(Voxels::U8(
+            (0..VOXELS.iter().product::<usize>() as u32)
+                .map(noise)
+                .collect(),
+        )),
+        world_from_voxel: *world_from_probe
+            * DAffine3::from_translation(corner)
+            * DAffine3::from_scale(spacing),
+        black: 0.0,
+        white: 255.0,
+    }
+}
+
+/// One way to make the image.
+struct Way {
+    rig: Rig,
+    stages: Vec<Vec<f64>>,
+    frames: Vec<f64>,
+}
+
+impl Way {
+    fn new(machine: &Machine, scene: &Scene, tracer: Tracer) -> Result<Self> {
+        let mut rig = Rig::new(machine, scene.clone(), tracer)?;
+        rig.frame()?;
+        Ok(Self {
+            rig,
+            stages: vec![Vec::new(); STAGES.len()],
+            frames: Vec::new(),
+        })
+    }
+
+    fn measure(&mut self) -> Result<()> {
+        let (timings, host) = self.rig.timings()?;
+        for (name, times) in STAGES.iter().zip(&mut self.stages) {
+            let own = if *name == "update" { host } else { 0.0 };
+            // A pass that is not in this frame takes no time.
+            let pass = timings.of(name);
+            times.push(own + if pass.is_nan() { 0.0 } else { pass });
+        }
+        self.frames.push(host + timings.total_ms());
+        Ok(())
+    }
+
+    fn medians(&self) -> Vec<f64> {
+        let median = |times: &Vec<f64>| Statistics::of(times.iter().copied()).median;
+        self.stages.iter().map(median).collect()
+    }
+
+    fn frame(&self) -> f64 {
+        Statistics::of(self.frames.iter().copied()).median
+    }
+
+    fn counters(&mut self) -> Result<Counters> {
+        self.rig.simulator.counters().into_diagnostic()
+    }
+}
+
+/// Milliseconds per frame.
+pub struct Measured {
+    pub simulated: f64,
+    pub fused: f64,
+    pub triangles: usize,
+    pub details: Value,
+}
+
+/// Measures both in turns and prints what each stage costs.
+pub fn run(machine: &Machine, scenes: &Scenes, tracer: Tracer, frames: u32) -> Result<Measured> {
+    let mut ways = [
+        Way::new(machine, &scenes.simulated, tracer)?,
+        Way::new(machine, &scenes.fused, tracer)?,
+    ];
+    for round in 0..frames {
+        // Now the one first, now the other.
+        let first = usize::from(round % 2 == 1);
+        ways[first].measure()?;
+        ways[1 - first].measure()?;
+    }
+    let stages = [ways[0].medians(), ways[1].medians()];
+    let frame = [ways[0].frame(), ways[1].frame()];
+    let counters = [ways[0].counters()?, ways[1].counters()?];
+    let mut table = Table::new(
+        format!("Table I by stage, {tracer}: median ms of {frames} frames, interleaved"),
+        &["stage", "simulated", "fused", "saved", "of the frame"],
+    );
+    let mut row = |name: &str, [simulated, fused]: [f64; 2]| {
+        table.add(vec![
+            name.into(),
+            ms(simulated),
+            ms(fused),
+            ms(simulated - fused),
+            format!("{:+.1} %", 100.0 * (simulated - fused) / frame[0]),
+        ]);
+    };
+    for (i, name) in STAGES.iter().enumerate() {
+        row(name, [stages[0][i], stages[1][i]]);
+    }
+    row("frame", frame);
+    table.print();
+    table.csv(&machine.output, &format!("fusion-{tracer}"))?;
+    explain(&counters, frame);
+    let by_stage = |i: usize| -> Value {
+        let pairs = STAGES.iter().zip(&stages[i]);
+        pairs
+            .map(|(name, ms)| ((*name).to_owned(), json!(ms)))
+            .collect()
+    };
+    let count = |c: &Counters| {
+        json!({
+            "rays": c.rays, "interactions": c.interactions, "segments": c.segments,
+            "candidates": c.candidates, "deposits": c.deposits,
+        })
+    };
+    Ok(Measured {
+        simulated: frame[0],
+        fused: frame[1],
+        triangles: scenes.fused.triangles(),
+        details: json!({
+            "frames": frames,
+            "simulated": by_stage(0), "fused": by_stage(1),
+            "simulated_counts": count(&counters[0]), "fused_counts": count(&counters[1]),
+        }),
+    })
+}
+
+/// Where the saving comes from, in what is not done.
+fn explain(counters: &[Counters; 2], [simulated, fused]: [f64; 2]) {
+    let of = |count: fn(&Counters) -> u32| {
+        let [all, kept] = [&counters[0], &counters[1]].map(|c| f64::from(count(c)));
+        let share = 100.0 * (1.0 - kept / all.max(1.0));
+        format!("{all:.3e} to {kept:.3e} ({share:.0} % fewer)")
+    };
+    output::line(format_args!(
+        "\nFusion saves {:.1} % of the frame; the paper saved {:.1} %. Work not done: rays {}, \
+         segments {}, scatterer cells {}. Added: mask, convert, blur, fuse.",
+        100.0 * (1.0 - fused / simulated),
+        100.0 * (1.0 - PAPER[1] / PAPER[0]),
+        of(|c| c.rays),
+        of(|c| c.segments),
+        of(|c| c.candidates),
+    ));
+}
+
+/// The paper's milliseconds, simulated and fused.
+pub const PAPER: [f64; 2] = [95.3, 85.4];
