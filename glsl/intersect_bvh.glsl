@@ -12,6 +12,11 @@
 
 const uint BVH_STACK = 32u;    // the builder refuses deeper trees
 
+// Which other instances are transparent.
+#ifndef RAY_SKIPS
+#define RAY_SKIPS(i) false
+#endif
+
 #ifdef COUNT
 // As the counters of shared.glsl; nodes are those of meshes and of the top level.
 uint bvh_node_visits = 0u;
@@ -152,9 +157,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             }
             uint entered = nodes[5u * nodes[0].y + primitive / 4u][primitive % 4u];
             if (entered == skip_instance || instances[entered].slot != primitive) continue;
-#ifdef RAY_MASKS_ONLY
-            if (instances[entered].masks == 0u) continue;
-#endif
+            if (RAY_SKIPS(entered)) continue;
             // What is left of the top level waits below `base`.
             if (primitives.y != 0u && depth < BVH_STACK) {
                 stack[depth] = primitives;

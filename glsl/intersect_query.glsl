@@ -3,8 +3,13 @@
 // The includer enables GL_EXT_ray_query, includes triangle.glsl, and declares `tlas`, whose
 // instances carry our instance as custom index and whose meshes hold the triangles in the same order
 // as triangles[]. It defines RAY_MASK, the mask bits of the entries that are shown, and RAY_SLOTS,
-// whether entries that are not shown share them; then an instance's row says which one is. With
-// RAY_MASKS_ONLY everything but masking instances is transparent.
+// whether entries that are not shown share them; then an instance's row says which one is. It may
+// define RAY_SKIPS(i), whether instance i is transparent, and RAY_SELECTS, whether any may be.
+
+#ifndef RAY_SKIPS
+#define RAY_SKIPS(i) false
+#define RAY_SELECTS false
+#endif
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
@@ -17,20 +22,14 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
     if (!finite || !(size > 1e-18) || !(t_min >= 0.0) || !(t_max >= t_min)) return hit;
 
     rayQueryEXT query;
-#ifdef RAY_MASKS_ONLY
-    bool all_pass = false;
-#else
-    bool all_pass = skip_instance == NONE && !RAY_SLOTS;
-#endif
+    bool all_pass = skip_instance == NONE && !RAY_SLOTS && !(RAY_SELECTS);
     uint opacity = all_pass ? gl_RayFlagsOpaqueEXT : gl_RayFlagsNoOpaqueEXT;
     rayQueryInitializeEXT(query, tlas, opacity, RAY_MASK, origin, t_min, direction, t_max);
     while (rayQueryProceedEXT(query)) {
         if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionTriangleEXT) continue;
         uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false));
         uint slot = uint(rayQueryGetIntersectionInstanceIdEXT(query, false));
-#ifdef RAY_MASKS_ONLY
-        if (instances[instance].masks == 0u) continue;
-#endif
+        if (RAY_SKIPS(instance)) continue;
         if (instance != skip_instance && instances[instance].slot == slot) rayQueryConfirmIntersectionEXT(query);
     }
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {

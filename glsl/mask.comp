@@ -26,7 +26,8 @@ layout(binding = 7) uniform texture3D volume;
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) buffer PrescanBuffer { float prescan[]; };
 
-#define RAY_MASKS_ONLY
+#define RAY_SKIPS(i) (instances[i].masks == 0u)
+#define RAY_SELECTS true
 #include "triangle.glsl"
 #ifdef RAY_QUERY
 #define RAY_MASK frame.ray_mask

@@ -44,3 +44,10 @@ bool cross_interface(inout Media media, uint instance, bool entering) {
     media.count -= 1u;
     return true;
 }
+
+// Around the masks sound goes straight on. Of the weight, what is left behind a surface there: all
+// but what a fluid interface reflects at normal incidence.
+float passed(float impedance1, float impedance2) {
+    float r = (impedance2 - impedance1) / (impedance2 + impedance1);
+    return 1.0 - r * r;
+}

@@ -1,6 +1,8 @@
 // variants: bvh query(RAY_QUERY) count(COUNT)
 #version 460
-// Which media enclose the start of each line: signed crossings along its ray to infinity.
+// Which media enclose the start of each line: signed crossings along its ray to infinity. Where only
+// what a mask encloses is heard, the way to it is the same for all paths of a line, which then begin
+// at its last surface.
 #extension GL_GOOGLE_include_directive : require
 #ifdef RAY_QUERY
 #extension GL_EXT_ray_query : require
@@ -21,8 +23,26 @@ layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
 layout(std430, binding = 6) buffer StackBuffer { uint stacks[]; };
 layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 8) readonly buffer TissueBuffer { Tissue tissues[]; };
 
 #include "triangle.glsl"
+
+const uint ALL = 0u;
+const uint AROUND = 1u;         // what may enclose the line's start: its box does
+const uint MASKS = 2u;
+uint wanted = ALL;              // what rays meet
+vec3 line_start;
+
+bool skips(uint instance) {
+    if (wanted == MASKS) return instances[instance].masks == 0u;
+    if (wanted == ALL) return false;
+    vec3 low = instances[instance].low.xyz, high = instances[instance].high.xyz;
+    vec3 margin = 1e-5 * max(abs(low), abs(high));
+    vec3 p = object_point(instance, line_start);
+    return any(lessThan(p, low - margin)) || any(greaterThan(p, high + margin));
+}
+#define RAY_SKIPS(i) skips(i)
+#define RAY_SELECTS (wanted != ALL)
 #ifdef RAY_QUERY
 #define RAY_MASK frame.ray_mask
 #define RAY_SLOTS ((frame.flags & FLAG_SLOTS) != 0u)
@@ -33,11 +53,11 @@ layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
 #include "surface.glsl"
 #include "probe.glsl"
 #include "transform.glsl"
+#include "media.glsl"
 #include "count.glsl"
 
 const uint MAX_OPEN = 32u;      // instances that may be entered or left on the way
 const uint MAX_CROSSINGS = 64u;
-
 // Net exits per instance; an instance whose entries and exits balance frees its slot.
 uint open_count = 0u;
 uint open_ids[MAX_OPEN];
@@ -66,6 +86,64 @@ void note_crossing(uint instance, bool entering, uint order) {
     }
 }
 
+// The other surface at a hit, where surfaces coincide; how far past them both the ray is.
+Hit coincident_hit(vec3 o, vec3 d, Hit hit, inout float past) {
+    Hit twin = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+    vec3 p = o + hit.t * d;
+    float clearance = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+    past = hit.t + clearance;
+    if ((frame.flags & FLAG_COINCIDENT) != 0u) {
+        twin = closest_hit(o, d, max(hit.t - clearance, 0.0), past, hit.instance);
+        if (twin.instance != NONE) past = max(past, twin.t + clearance);
+    }
+    return twin;
+}
+
+bool enters(vec3 d, Hit hit) { return dot(d, surface_geometric_normal(hit)) < 0.0; }
+
+void toggle(inout Media media, vec3 d, Hit hit) {
+    if (!cross_interface(media, hit.instance, enters(d, hit))) atomicAdd(counters.stack_overflow, 1u);
+}
+
+// Goes straight on as long as nothing is heard: to the last surface before, with the media there.
+void follow_way(vec3 o, vec3 d, inout Media media, inout float travelled, inout float weight, inout uint interactions) {
+    wanted = ALL;
+    float t_min = 0.0;
+    for (uint order = 1u; order <= MAX_CROSSINGS; ++order) {
+        Hit hit = closest_hit(o, d, t_min, frame.depth, NONE);
+        if (hit.instance == NONE) break;
+        float past;
+        Hit twin = coincident_hit(o, d, hit, past);
+        // As in trace, the lower instance first.
+        bool turned = twin.instance < hit.instance;
+        Media next = media;
+        if (turned) toggle(next, d, twin);
+        toggle(next, d, hit);
+        if (twin.instance != NONE && !turned) toggle(next, d, twin);
+        if (is_heard(next)) break;
+        uint before = current_instance(media), after = current_instance(next);
+        uint t1 = tissue_of(before), t2 = tissue_of(after);
+        float t = twin.instance == NONE ? hit.t : max(hit.t, twin.t);
+        weight *= exp(-tissues[t1].absorption * (t - travelled));
+        if (before != after) {
+            weight *= passed(tissues[t1].impedance, tissues[t2].impedance);
+            interactions += 1u;
+        }
+        travelled = t;
+        media = next;
+        t_min = past;
+    }
+}
+
+void write_start(uint line, Media media, float travelled, float weight, uint interactions) {
+    uint base = line * START_WORDS;
+    stacks[base] = media.count;
+    for (uint i = 0u; i < MAX_STACK; ++i) stacks[base + 1u + i] = i < media.count ? media.ids[i] : NONE;
+    stacks[base + MAX_STACK + 1u] = floatBitsToUint(travelled);
+    stacks[base + MAX_STACK + 2u] = floatBitsToUint(weight);
+    stacks[base + MAX_STACK + 3u] = interactions;
+}
+
 void main() {
     uint line = gl_GlobalInvocationID.x;
     if (line >= frame.scanlines * frame.layers) return;
@@ -73,26 +151,33 @@ void main() {
     probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
     o = world_point(o);
     d = world_vector(d);
+    line_start = o;
+    Media media;
+    media.count = 0u;
+    // A path that is aimed elsewhere has a way of its own.
+    bool masked = (frame.flags & FLAG_MASKED) != 0u && frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+    float mask_t = 0.0;
+    if (masked) {
+        wanted = MASKS;
+        Hit mask = closest_hit(o, d, 0.0, 1e9, NONE);
+        if (mask.instance == NONE) {
+            // Outside of all masks, and none is ahead.
+            report_counts();
+            write_start(line, media, 0.0, 0.0, 0u);
+            return;
+        }
+        mask_t = mask.t;
+    }
+    wanted = AROUND;
     float t_min = 0.0;
     for (uint order = 1u; order <= MAX_CROSSINGS; ++order) {
         Hit hit = closest_hit(o, d, t_min, 1e9, NONE);
         if (hit.instance == NONE) break;
-        vec3 p = o + hit.t * d;
-        float clearance = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
-        note_crossing(hit.instance, dot(d, surface_geometric_normal(hit)) < 0.0, 2u * order);
-        t_min = hit.t + clearance;
-        if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-            Hit twin = closest_hit(o, d, max(hit.t - clearance, 0.0), hit.t + clearance, hit.instance);
-            if (twin.instance != NONE) {
-                note_crossing(twin.instance, dot(d, surface_geometric_normal(twin)) < 0.0, 2u * order + 1u);
-                t_min = max(t_min, twin.t + clearance);
-            }
-        }
+        Hit twin = coincident_hit(o, d, hit, t_min);
+        note_crossing(hit.instance, enters(d, hit), 2u * order);
+        if (twin.instance != NONE) note_crossing(twin.instance, enters(d, twin), 2u * order + 1u);
     }
-    report_counts();
     // The outermost first: it is left last.
-    uint base = line * (MAX_STACK + 1u);
-    uint count = 0u;
     uint last = NONE;
     for (uint i = 0u; i < open_count; ++i) {
         uint best = MAX_OPEN;
@@ -100,11 +185,17 @@ void main() {
             if (open_net[j] > 0 && open_order[j] < last && (best == MAX_OPEN || open_order[j] > open_order[best])) best = j;
         }
         if (best == MAX_OPEN) break;
-        if (count == MAX_STACK) { atomicAdd(counters.stack_overflow, 1u); break; }
-        stacks[base + 1u + count] = open_ids[best];
-        count += 1u;
+        if (media.count == MAX_STACK) { atomicAdd(counters.stack_overflow, 1u); break; }
+        media.ids[media.count] = open_ids[best];
+        media.count += 1u;
         last = open_order[best];
     }
-    stacks[base] = count;
-    for (uint i = count; i < MAX_STACK; ++i) stacks[base + 1u + i] = NONE;
+    float travelled = 0.0, weight = 1.0;
+    uint interactions = 0u;
+    if (masked && !is_heard(media)) {
+        if (mask_t >= frame.depth) weight = 0.0;
+        else follow_way(o, d, media, travelled, weight, interactions);
+    }
+    report_counts();
+    write_start(line, media, travelled, weight, interactions);
 }

@@ -20,6 +20,10 @@ uvec4 draw(uint n, uint key, uint purpose) {
     return path_draw(n, key, purpose, frame.seed, (frame.flags & FLAG_SOBOL) != 0u);
 }
 
+float clearance(vec3 p) {
+    return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+}
+
 Path start(uint line, uint n) {
     vec3 o, d, lateral;
     probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
@@ -36,21 +40,24 @@ Path start(uint line, uint n) {
     }
     path.handedness = 1.0;
     path.t_min = 0.0;
-    path.weight = 1.0;
     path.share = 1.0 / float(frame.paths);
     path.probability = 1.0;
     path.time = 0.0;
-    path.interactions = 0u;
     path.reflections = 0u;
     path.crossings = 0u;
     path.branch = false;
-    path.media.count = stacks[line * (MAX_STACK + 1u)];
-    for (uint i = 0u; i < MAX_STACK; ++i) path.media.ids[i] = stacks[line * (MAX_STACK + 1u) + 1u + i];
+    uint at = line * START_WORDS;
+    path.media.count = stacks[at];
+    for (uint i = 0u; i < MAX_STACK; ++i) path.media.ids[i] = stacks[at + 1u + i];
+    float travelled = uintBitsToFloat(stacks[at + MAX_STACK + 1u]);
+    if (travelled > 0.0) {
+        path.origin += travelled * path.direction;
+        path.time = travelled / frame.speed;
+        path.t_min = clearance(path.origin);
+    }
+    path.weight = uintBitsToFloat(stacks[at + MAX_STACK + 2u]);
+    path.interactions = stacks[at + MAX_STACK + 3u];
     return path;
-}
-
-float clearance(vec3 p) {
-    return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
 }
 
 void reflect_path(inout Path path, vec3 m, float roughness, float turn) {

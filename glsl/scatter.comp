@@ -323,13 +323,16 @@ void main() {
     layer_y = elevation(layer);
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
 
+    uint chunks = gl_NumWorkGroups.y;
+    uint mine = gl_WorkGroupID.y < available ? (available - gl_WorkGroupID.y + chunks - 1u) / chunks : 0u;
+    // Where nothing is heard there is nothing to gather.
+    if (mine == 0u) return;
+
     for (uint i = thread; i < 2u * WINDOW; i += THREADS) echoes[i] = 0;
     if (thread == 0u) { shared_candidates = 0u; shared_deposits = 0u; }
     barrier();
 
     uvec2 count = uvec2(0u);
-    uint chunks = gl_NumWorkGroups.y;
-    uint mine = gl_WorkGroupID.y < available ? (available - gl_WorkGroupID.y + chunks - 1u) / chunks : 0u;
     for (uint batch = 0u; batch < mine; batch += BATCH) {
         uint size = min(BATCH, mine - batch);
         if (thread < size) {

@@ -6,6 +6,9 @@
 
 const uint NONE = 0xffffffffu;
 const uint MAX_STACK = 16u;         // media that may enclose one point
+// What origin leaves of a line: number of media, media; distance (mm) and weight at which its paths
+// begin, as bits of floats, and the interactions up to there.
+const uint START_WORDS = MAX_STACK + 4u;
 
 const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;

@@ -34,6 +34,11 @@ layout(std430, binding = 14) readonly buffer FieldBuffer { float fields[]; };
 
 layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 
+// Whether everything but masks is transparent to rays.
+bool masks_only = false;
+#define RAY_SKIPS(i) (masks_only && instances[i].masks == 0u)
+#define RAY_SELECTS masks_only
+
 #include "triangle.glsl"
 #ifdef RAY_QUERY
 #define RAY_MASK frame.ray_mask
@@ -179,6 +184,9 @@ void main() {
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     uint rays = 0u, interactions = 0u;
+    // Whether a mask is known to lie ahead of a path that is outside of all. Where all paths of a
+    // line begin alike, origin has looked.
+    bool aimed = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
 
     // A main path spawns at most one branch per interaction, and a branch spawns none.
     uint guards = limit * (frame.max_interactions + 2u);
@@ -194,29 +202,48 @@ void main() {
                 break;
             }
             resume = false;
+            aimed = false;
             path = main_path;
             continue;
         }
         uint before = current_instance(path.media);
         Tissue t1 = load_tissue(tissue_of(before));
-        float t_end = (time_end - path.time) * t1.speed;
+        bool heard = is_heard(path.media);
+        // An acquired image is laid out at the probe's speed: so is the way to the mask.
+        Tissue way = t1;
+        if (!heard) way.speed = frame.speed;
+        float t_end = (time_end - path.time) * way.speed;
         float face = path.reflections > 0u ? face_distance(probe_point(path.origin), probe_vector(path.direction)) : -1.0;
         bool at_face = face > path.t_min && face < t_end;
         if (at_face) t_end = face;
+        bool bounces = at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections;
+        if (!heard && !aimed && !bounces) {
+            // Nothing more is heard of what flies past all masks.
+            masks_only = true;
+            Hit mask = closest_hit(path.origin, path.direction, path.t_min, t_end, NONE);
+            masks_only = false;
+            rays += 1u;
+            if (mask.instance == NONE) {
+                path.weight = 0.0;
+                continue;
+            }
+        }
+        aimed = !heard;
         Hit hit = closest_hit(path.origin, path.direction, path.t_min, t_end, NONE);
         rays += 1u;
 
         if (hit.instance == NONE) {
             emit_segment(path, line, n, before, t_end);
             vec3 end = path.origin + t_end * path.direction;
-            if (at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections) {
-                advance(path, t_end, t1, end);
+            if (bounces) {
+                aimed = false;
+                advance(path, t_end, way, end);
                 path.interactions += 1u;
                 interactions += 1u;
                 vec3 normal = world_vector(face_normal(probe_point(end)));
                 float cos_face = dot(path.direction, normal);
                 float retro = path.weight * path.share * beam_weight(off_axis(line, end));
-                if (cos_face < 0.0 && is_heard(path.media)) {
+                if (cos_face < 0.0 && heard) {
                     uvec4 dither = dither_words(line, n, path.interactions + 32u * path.reflections);
                     deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false, dither);
                 }
@@ -252,12 +279,19 @@ void main() {
         }
         uint after = current_instance(media);
         path.crossings += 1u;
-        if (after == before) {
-            if (is_heard(media) != is_heard(path.media)) {
-                // The mask begins or ends within a medium: the stretch is cut there.
+        bool heard_after = is_heard(media);
+        bool outside = !heard && !heard_after;
+        if (after == before || outside) {
+            if (heard_after != heard || after != before) {
+                // The mask begins or ends within a medium: the stretch is cut there. Outside another
+                // medium begins, and sound goes straight on.
                 emit_segment(path, line, n, before, hit.t);
-                advance(path, hit.t, t1, position);
+                advance(path, hit.t, way, position);
                 path.t_min = max(path.t_min, past - hit.t);
+                if (after != before) {
+                    path.weight *= passed(t1.impedance, tissues[tissue_of(after)].impedance);
+                    path.interactions += 1u;
+                }
             } else {
                 path.t_min = past;
             }
@@ -266,7 +300,8 @@ void main() {
         }
 
         emit_segment(path, line, n, before, hit.t);
-        advance(path, hit.t, t1, position);
+        advance(path, hit.t, way, position);
+        aimed = false;
         path.interactions += 1u;
         interactions += 1u;
         uint key = path.interactions + 32u * path.reflections;
@@ -288,7 +323,7 @@ void main() {
         float turn = 2.0 * width / max(cos_i, 1e-3);
         vec3 m;
         bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, (frame.flags & FLAG_SOBOL) != 0u, m);
-        if (rough && (is_heard(path.media) || is_heard(media))) echo(path, line, n, key, hit.instance, s, t1, t2, m);
+        if (rough) echo(path, line, n, key, hit.instance, s, t1, t2, m);
 
         bool can_reflect = rough && path.reflections < frame.max_reflections;
         bool splits = frame.sampling == SAMPLING_MAIN_PATH && !path.branch;

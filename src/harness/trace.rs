@@ -9,8 +9,8 @@ use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use crate::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, MAX_STACK, Row,
-    SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, Surface, Tissue,
+    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, Row,
+    SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, START_WORDS, Surface, Tissue,
 };
 
 pub const SUBJECT: Subject = Subject {
@@ -58,7 +58,7 @@ fn sizes(job: &Job) -> Vec<usize> {
     sizes.extend(worlds::sizes(job));
     let segments = lines(&frame) * frame.segment_capacity as usize;
     sizes.extend([
-        4 * (MAX_STACK + 1) * lines(&frame),
+        4 * START_WORDS * lines(&frame),
         frame.samples as usize * size_of::<Row>(),
         8 * samples(&frame),
         segments * size_of::<layout::Segment>(),
@@ -144,9 +144,9 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let world = owned.world();
     let frame = world.frame;
     let stacks: Vec<_> = job
-        .get::<[u32; MAX_STACK + 1]>("stacks")
+        .get::<[u32; START_WORDS]>("stacks")
         .iter()
-        .map(|s| crate::reference::stack::Stack(s[1..=s[0] as usize].to_vec()))
+        .map(origin::unpack)
         .collect();
     let twin = trace::trace(&world, &stacks);
 

@@ -105,6 +105,8 @@ impl Builder {
             instance.triangles = self.meshes[mesh].triangles.len() as u32;
             instance.bvh_root = roots[mesh];
             instance.slot = nodes.slots[i];
+            let [low, high] = trees[mesh].bounds.map(|[x, y, z]| [x, y, z, 0.0]);
+            (instance.low, instance.high) = (low, high);
         }
         vec![
             Input::words("instances", &self.instances),

@@ -31,6 +31,7 @@ pub mod segment;
 pub mod stack;
 pub mod texture;
 pub mod trace;
+pub mod way;
 pub mod world;
 
 pub use accumulator::Accumulator;

@@ -1,17 +1,18 @@
-//! Twin of `origin`: which media enclose the start of each line.
+//! Twin of `origin`: which media enclose the start of each line, and where its paths begin.
 
 use super::geometry::world_line;
 use super::stack::Stack;
+use super::way::Start;
 use super::world::{Crossing, World};
-use crate::sim::layout::MAX_STACK;
+use crate::sim::layout::{MAX_STACK, START_WORDS};
 
 /// Most crossings followed.
 const CROSSINGS: usize = 64;
 
-/// One stack per line e * scanlines + l, and the number of lines with more than eight media.
-pub fn origin(world: &World) -> (Vec<Stack>, u32) {
+/// One start per line e * scanlines + l, and how often there were more media than a stack holds.
+pub fn origin(world: &World) -> (Vec<Start>, u32) {
     let mut overflow = 0;
-    let mut stacks = Vec::new();
+    let mut starts = Vec::new();
     for e in 0..world.frame.layers {
         for l in 0..world.frame.scanlines {
             let line = world_line(world.frame, l, e);
@@ -20,10 +21,12 @@ pub fn origin(world: &World) -> (Vec<Stack>, u32) {
             let mut media = enclosing(&crossings);
             overflow += u32::from(media.len() > MAX_STACK);
             media.truncate(MAX_STACK);
-            stacks.push(Stack(media));
+            let (start, full) = world.start(Stack(media), &crossings);
+            overflow += full;
+            starts.push(start);
         }
     }
-    (stacks, overflow)
+    (starts, overflow)
 }
 
 /// Instances left more often than entered, the one whose last exit is farthest first.
@@ -39,14 +42,29 @@ fn enclosing(crossings: &[Crossing]) -> Vec<u32> {
     instances
 }
 
-/// The layout of the device's buffer: per line the count, then eight instances.
-pub fn pack(stacks: &[Stack]) -> Vec<u32> {
-    let mut packed = vec![0; stacks.len() * (MAX_STACK + 1)];
-    for (slot, stack) in packed.chunks_mut(MAX_STACK + 1).zip(stacks) {
-        slot[0] = stack.0.len() as u32;
-        slot[1..=stack.0.len()].copy_from_slice(&stack.0);
+/// The layout of the device's buffer.
+pub fn pack(starts: &[Start]) -> Vec<u32> {
+    let mut packed = vec![0; starts.len() * START_WORDS];
+    for (slot, start) in packed.chunks_mut(START_WORDS).zip(starts) {
+        let media = &start.media.0;
+        slot[0] = media.len() as u32;
+        slot[1..=media.len()].copy_from_slice(media);
+        slot[MAX_STACK + 1] = (start.travelled as f32).to_bits();
+        slot[MAX_STACK + 2] = (start.weight as f32).to_bits();
+        slot[MAX_STACK + 3] = start.interactions;
     }
     packed
+}
+
+/// What one line's words in the device's buffer say.
+pub fn unpack(words: &[u32; START_WORDS]) -> Start {
+    let count = (words[0] as usize).min(MAX_STACK);
+    Start {
+        media: Stack(words[1..=count].to_vec()),
+        travelled: f32::from_bits(words[MAX_STACK + 1]).into(),
+        weight: f32::from_bits(words[MAX_STACK + 2]).into(),
+        interactions: words[MAX_STACK + 3],
+    }
 }
 
 #[cfg(test)]
@@ -72,10 +90,14 @@ mod tests {
         fixture.sphere(DVec3::new(0.0, 0.0, -50.0), 8.0, 24, 0, 0);
         fixture.sphere(DVec3::new(30.0, 0.0, 0.0), 8.0, 24, 0, 0);
         let (stacks, overflow) = origin(&fixture.world());
-        assert_eq!((&stacks[0].0[..], overflow), (&[1, 2, 0][..], 0));
+        assert_eq!((&stacks[0].media.0[..], overflow), (&[1, 2, 0][..], 0));
         let mut packed = vec![3, 1, 2, 0];
         packed.resize(MAX_STACK + 1, 0);
+        packed.extend([0.0_f32, 1.0].map(f32::to_bits));
+        packed.push(0);
         assert_eq!(pack(&stacks), packed);
+        let back: [u32; START_WORDS] = packed.try_into().expect("one line's");
+        assert_eq!(unpack(&back), stacks[0]);
     }
 
     #[test]
@@ -84,7 +106,7 @@ mod tests {
         let radii: Vec<f64> = (1..=most + 2).map(|i| 2.0 * f64::from(i)).collect();
         let (stacks, overflow) = origin(&spheres(&radii).world());
         let outermost: Vec<u32> = (2..most + 2).rev().collect();
-        assert_eq!((&stacks[0].0, overflow), (&outermost, 1));
+        assert_eq!((&stacks[0].media.0, overflow), (&outermost, 1));
     }
 
     #[test]
@@ -93,7 +115,7 @@ mod tests {
         fixture.block([0.0, -9.0, -9.0], [9.0, 9.0, 9.0], 0, 0);
         (fixture.frame.scanlines, fixture.frame.layers) = (4, 2);
         let (stacks, _) = origin(&fixture.world());
-        let counts: Vec<usize> = stacks.iter().map(|s| s.0.len()).collect();
+        let counts: Vec<usize> = stacks.iter().map(|s| s.media.0.len()).collect();
         assert_eq!(counts, [0, 0, 1, 1, 0, 0, 1, 1]);
     }
 
@@ -105,6 +127,6 @@ mod tests {
         fixture.sphere(DVec3::ZERO, 5.0, 12, 0, 0);
         fixture.instances[0].object_from_world = super::super::fixture::rows_of(&turn);
         let (stacks, _) = origin(&fixture.world());
-        assert_eq!(stacks[0].0, [0]);
+        assert_eq!(stacks[0].media.0, [0]);
     }
 }

@@ -7,15 +7,13 @@ use super::interface::{self, Interface};
 use super::path::{Path, Role, reflect, step, widen};
 use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
 use super::stack::Stack;
-use super::world::{Crossing, World, affine};
+use super::way::{Start, Toggled};
+use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use crate::sim::layout::{
-    Counters, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, SAMPLING_MAIN_PATH,
+    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, SAMPLING_MAIN_PATH,
     SAMPLING_SHARED_PRIMARY,
 };
-
-/// Crossings farther apart than this, mm, are not the same surface.
-const COINCIDENT: f64 = 1e-3;
 
 /// What `trace` leaves behind.
 #[derive(Clone, Debug)]
@@ -28,24 +26,14 @@ pub struct Traced {
     pub counters: Counters,
 }
 
-/// One meeting with a surface, or with two that coincide.
-struct Toggled {
-    /// Whose echo it is.
-    hit: Crossing,
-    /// Media behind.
-    after: Stack,
-    /// Distance of the last crossing that counted.
-    last: f64,
-}
-
 struct Tracer<'a> {
     world: &'a World<'a>,
     probe_from_world: DAffine3,
     out: Traced,
 }
 
-/// Follows all paths of all lines; `stacks` are the media at each line's start.
-pub fn trace(world: &World, stacks: &[Stack]) -> Traced {
+/// Follows all paths of all lines from where they begin.
+pub fn trace(world: &World, starts: &[Start]) -> Traced {
     let frame = world.frame;
     let lines = frame.layers * frame.scanlines;
     let mut tracer = Tracer {
@@ -59,7 +47,7 @@ pub fn trace(world: &World, stacks: &[Stack]) -> Traced {
     };
     for line in 0..lines {
         for n in 0..frame.paths {
-            let path = tracer.start(line, n, stacks[line as usize].clone());
+            let path = tracer.start(line, n, &starts[line as usize]);
             tracer.follow(path);
         }
     }
@@ -74,7 +62,7 @@ pub fn trace(world: &World, stacks: &[Stack]) -> Traced {
 }
 
 impl Tracer<'_> {
-    fn start(&self, line: u32, n: u32, stack: Stack) -> Path {
+    fn start(&self, line: u32, n: u32, begin: &Start) -> Path {
         let frame = self.world.frame;
         let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
         let words = draw(frame, n, 0, PURPOSE_JITTER);
@@ -88,6 +76,12 @@ impl Tracer<'_> {
             lateral = (lateral - lateral.dot(direction) * direction).normalize();
             fan = 1.0 / (lobe + 2.0);
         }
+        let mut origin = start.origin + jitter * gaussian(words[0]) * start.lateral;
+        let mut t_min = 0.0;
+        if begin.travelled > 0.0 {
+            origin += begin.travelled * direction;
+            t_min = step(origin);
+        }
         Path {
             role: if frame.sampling == SAMPLING_MAIN_PATH {
                 Role::Main
@@ -96,19 +90,19 @@ impl Tracer<'_> {
             },
             n,
             line,
-            weight: 1.0,
+            weight: begin.weight,
             share: 1.0 / f64::from(frame.paths),
             probability: 1.0,
-            time: 0.0,
-            origin: start.origin + jitter * gaussian(words[0]) * start.lateral,
+            time: begin.travelled / f64::from(frame.speed),
+            origin,
             direction,
             lateral,
             handedness: 1.0,
-            interactions: 0,
+            interactions: begin.interactions,
             reflections: 0,
             spread: [jitter * jitter, 0.0, fan],
-            stack,
-            t_min: 0.0,
+            stack: begin.media.clone(),
+            t_min,
         }
     }
 
@@ -120,13 +114,17 @@ impl Tracer<'_> {
     fn follow(&mut self, mut path: Path) {
         let frame = self.world.frame;
         for _ in 0..64 + frame.max_interactions {
-            let (tissue, _) = self.world.medium(&path.stack);
-            let speed = f64::from(self.world.tissues[tissue as usize].speed);
-            let t_end = (self.end() - path.time) * speed;
+            if self.ended(&path) {
+                return;
+            }
+            let t_end = (self.end() - path.time) * self.speed(&path.stack);
             let range = [path.t_min, t_end];
             let crossings = self.world.crossings(path.origin, path.direction, range);
             self.out.counters.rays += 1;
             let nearest = crossings.first().map_or(t_end, |c| c.t);
+            if self.flies_past(&path, t_end, self.world.meets_mask(&crossings)) {
+                return;
+            }
             if let Some((t, normal)) = self.face(&path, nearest) {
                 self.emit(&path, t);
                 let ends = frame.flags & FLAG_FACE_REFLECTION == 0
@@ -143,15 +141,26 @@ impl Tracer<'_> {
                     self.emit(&path, t_end);
                     return;
                 }
-                let Toggled { hit, after, last } = self.toggled(&path.stack, &crossings);
-                if after.current(self.world.instances) == path.stack.current(self.world.instances) {
-                    if self.is_heard(&after) == self.is_heard(&path.stack) {
+                let toggled = self.world.toggled(&path.stack, &crossings);
+                self.out.counters.stack_overflow += toggled.overflow;
+                let Toggled {
+                    hit, after, last, ..
+                } = toggled;
+                let heard = [&path.stack, &after].map(|s| self.world.is_heard(s));
+                let same = self.world.medium(&path.stack) == self.world.medium(&after);
+                if same || heard == [false; 2] {
+                    if same && heard[0] == heard[1] {
                         path.t_min = last + step(path.origin + last * path.direction);
                     } else {
-                        // The mask begins or ends within a medium: the stretch is cut there.
+                        // The mask begins or ends within a medium: the stretch is cut there. Outside
+                        // another medium begins, and sound goes straight on.
                         self.emit(&path, hit.t);
                         self.advance(&mut path, hit.t);
                         path.t_min += last - hit.t;
+                        if !same {
+                            path.weight *= self.world.passed(&path.stack, &after);
+                            path.interactions += 1;
+                        }
                     }
                     path.stack = after;
                     continue;
@@ -160,9 +169,7 @@ impl Tracer<'_> {
                 self.interact(&mut path, hit.t);
                 let row = &self.world.rows[self.out.surface.sample(path.time)];
                 let interface = interface::meet(self.world, row, &path, &hit, &after);
-                if self.is_heard(&path.stack) || self.is_heard(&after) {
-                    interface.echo(self.world, &path, &mut self.out.surface);
-                }
+                interface.echo(self.world, &path, &mut self.out.surface);
                 let goes_on = match path.role {
                     Role::Main => {
                         self.branch(&path, &interface);
@@ -175,10 +182,25 @@ impl Tracer<'_> {
                     return;
                 }
             }
-            if self.ended(&path) {
-                return;
-            }
         }
+    }
+
+    /// Whether nothing more is heard of the path: it is outside of all masks, and none is ahead, nor
+    /// the face that would send it back.
+    fn flies_past(&self, path: &Path, t_end: f64, mask_ahead: bool) -> bool {
+        let frame = self.world.frame;
+        let bounces = frame.flags & FLAG_FACE_REFLECTION != 0
+            && path.reflections < frame.max_reflections
+            && self.face(path, t_end).is_some();
+        !self.world.is_heard(&path.stack) && !mask_ahead && !bounces
+    }
+
+    /// Speed at which a path goes on: that of its medium, and of the acquired image around the masks.
+    fn speed(&self, media: &Stack) -> f64 {
+        let (tissue, _) = self.world.medium(media);
+        let heard = self.world.is_heard(media);
+        let speed = self.world.tissues[tissue as usize].speed;
+        f64::from(if heard { speed } else { self.world.frame.speed })
     }
 
     fn ended(&self, path: &Path) -> bool {
@@ -206,7 +228,7 @@ impl Tracer<'_> {
     fn face_echo(&mut self, path: &Path, normal: DVec3) {
         let cos = -path.direction.dot(normal);
         let lobe = (2.0 * cos * cos - 1.0).max(0.0);
-        if cos > 0.0 && self.is_heard(&path.stack) {
+        if cos > 0.0 && self.world.is_heard(&path.stack) {
             let amplitude = path.share * path.weight * lobe * path.beam_weight(self.world.frame);
             let gain = interface::gain(self.world, path);
             let (l, _) = path.scanline(self.world.frame.scanlines);
@@ -214,37 +236,6 @@ impl Tracer<'_> {
             let surface = &mut self.out.surface;
             surface.deposit(l, path.time, amplitude, 0.0, gain, dither);
         }
-    }
-
-    /// What the first of `crossings` does to the media.
-    fn toggled(&mut self, stack: &Stack, crossings: &[Crossing]) -> Toggled {
-        let nearest = crossings[0];
-        let mut here = vec![nearest];
-        if self.world.frame.flags & FLAG_COINCIDENT != 0 {
-            let other = crossings[1..]
-                .iter()
-                .find(|c| c.instance != nearest.instance && c.t - nearest.t <= COINCIDENT);
-            here.extend(other);
-            here.sort_by_key(|c| c.instance);
-        }
-        let mut after = stack.clone();
-        for c in &here {
-            if !c.entry {
-                after.leave(c.instance);
-            } else if !after.enter(c.instance) {
-                self.out.counters.stack_overflow += 1;
-            }
-        }
-        Toggled {
-            hit: here[0],
-            after,
-            last: here.iter().map(|c| c.t).fold(nearest.t, f64::max),
-        }
-    }
-
-    /// Whether echoes are wanted from where these media are.
-    fn is_heard(&self, stack: &Stack) -> bool {
-        stack.is_heard(self.world.frame, self.world.instances)
     }
 
     /// Moves the path by `t` to its next interaction.
@@ -256,11 +247,9 @@ impl Tracer<'_> {
 
     /// Moves the path by `t`.
     fn advance(&self, path: &mut Path, t: f64) {
-        let (tissue, _) = self.world.medium(&path.stack);
-        let tissue = &self.world.tissues[tissue as usize];
         path.origin += t * path.direction;
-        path.weight *= (-f64::from(tissue.absorption) * t).exp();
-        path.time += t / f64::from(tissue.speed);
+        path.weight *= self.world.unabsorbed(&path.stack, t);
+        path.time += t / self.speed(&path.stack);
         let [a, b, c] = path.spread;
         path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
         path.t_min = step(path.origin);
@@ -358,7 +347,7 @@ impl Tracer<'_> {
         let alike = frame.origin_jitter <= 0.0
             && frame.emission_lobe <= 0.0
             && frame.flags & FLAG_ROUGH_TRANSMISSION == 0;
-        if !self.is_heard(&path.stack) || path.role == Role::Branch && self.is_faint(path) {
+        if !self.world.is_heard(&path.stack) || path.role == Role::Branch && self.is_faint(path) {
             return;
         }
         let (weight, share) = match path.role {

@@ -3,7 +3,7 @@ use glam::DAffine3;
 use super::super::fixture::{Fixture, tissue};
 use super::super::origin::origin;
 use super::*;
-use crate::sim::layout::{FLAG_COHERENT, NONE, Tissue};
+use crate::sim::layout::{FLAG_COHERENT, FLAG_COINCIDENT, NONE, Tissue};
 
 const FAR: f64 = 500.0;
 

@@ -9,6 +9,9 @@ pub type Rows = [[f32; 4]; 3];
 pub const NONE: u32 = u32::MAX;
 /// Media that may enclose one point.
 pub const MAX_STACK: usize = 16;
+/// Words that `origin` leaves of a line: number of media and media; distance and weight at which its
+/// paths begin, and the interactions up to there.
+pub const START_WORDS: usize = MAX_STACK + 4;
 
 /// The transmitted path always continues, reflected branches are spawned.
 pub const SAMPLING_MAIN_PATH: u32 = 0;

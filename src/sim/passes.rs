@@ -67,6 +67,7 @@ impl Passes {
                 w.structure(),
                 Binding::Buffer(&b.stacks),
                 Binding::Buffer(&b.counters),
+                Binding::Buffer(&b.tissues),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);

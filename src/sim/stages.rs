@@ -117,7 +117,7 @@ impl Buffers {
             )?,
             points: new("points", tables.points.len() as u64, 16)?,
             grey: new("grey map", 256, 4)?,
-            stacks: new("media stacks", lines * (layout::MAX_STACK as u64 + 1), 4)?,
+            stacks: new("media stacks", lines * layout::START_WORDS as u64, 4)?,
             segments: new("segments", segments, size_of::<layout::Segment>())?,
             segment_count: new("segment count", lines, 4)?,
             surface_echoes: new("surface echoes", samples, 8)?,

@@ -101,7 +101,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     clear_unused(&mut segments, bytemuck::cast_slice(&counts), capacity);
     array("segment_count", Word, &counts, 1)?;
     array("segments", Word, &segments, words::<layout::Segment>())?;
-    let each = layout::MAX_STACK + 1;
+    let each = layout::START_WORDS;
     let stacks = read(simulator, |b| &b.stacks, 4 * lines * each)?;
     array("stacks", Word, &stacks, each)?;
     let surface = read(simulator, |b| &b.surface_echoes, 8 * samples)?;
