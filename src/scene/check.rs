@@ -7,6 +7,7 @@ use super::mesh::{Soup, Units};
 use super::topology::{self, Edges};
 
 mod coincident;
+mod fusion;
 mod nodes;
 mod report;
 

@@ -1,6 +1,6 @@
 //! Scene files: TOML with units, checked, every error with its place and a remedy.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::sweep::Variant;
 use super::{Scene, Warning};
@@ -125,6 +125,14 @@ impl Scene {
         let variants = sweep::variants(&document, &file.sweep, &scene, suggested)?;
         Ok((scene, variants, warnings))
     }
+}
+
+/// The volume that the scene file at `path` names, as it is written there; none where it names none
+/// or cannot be read.
+pub fn volume_of(path: &Path) -> Option<PathBuf> {
+    let source = Source::read(path, &[]).ok()?;
+    let file = source.document().ok()?.parse().ok()?;
+    file.volume.map(|table| PathBuf::from(table.file))
 }
 
 /// A time as the command line and scene files write it: seconds, or with a unit. Finite.

@@ -9,6 +9,9 @@ use super::topology::Edges;
 use super::{Instance, Mesh, Scene};
 use crate::volume::Voxels;
 
+/// Most bytes of the volume on the device. What is larger is averaged: a frame reads less than a slice.
+pub const TEXTURE_BUDGET: u64 = 512 << 20;
+
 /// A volume of grey values acquired elsewhere, placed in the world.
 #[derive(Clone, Debug)]
 pub struct Acquired {
@@ -22,6 +25,13 @@ pub struct Acquired {
     pub black: f64,
     /// Stored value that is shown white, at grey level 1; not equal to `black`.
     pub white: f64,
+}
+
+impl Acquired {
+    /// Bytes of the volume on the device, where it is not larger than that holds.
+    pub fn texture_bytes(&self) -> u64 {
+        self.voxels.len() as u64 * self.voxels.kind().bytes() as u64
+    }
 }
 
 /// What is shown around the masking meshes.

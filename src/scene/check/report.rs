@@ -5,7 +5,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Facts, nodes};
+use super::{Facts, fusion, nodes};
 use crate::scene::mesh::{self, Animated, AnimatedNode, Choice, Inspected, Options, Placement};
 use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
 
@@ -173,7 +173,7 @@ fn describe(facts: &Facts) -> String {
 }
 
 fn scene(path: &Path) -> Report {
-    let (scene, issues) = match Scene::load(path, &[]) {
+    let (scene, mut issues) = match Scene::load(path, &[]) {
         Ok(loaded) => loaded,
         Err(error) => {
             return Report {
@@ -201,6 +201,10 @@ fn scene(path: &Path) -> Report {
             scene.tissues[instance.tissue].name, instance.priority
         ));
     }
+    let facts = |mask: usize| world_facts(&scene, &scene.instances[mask]).0;
+    let (fused, idle) = fusion::describe(path, &scene, facts);
+    lines.extend(fused);
+    issues.extend(idle);
     lines.push(format!(
         "coincident triangles: {}",
         scene.coincident_triangles()

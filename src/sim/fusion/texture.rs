@@ -6,10 +6,8 @@ use glam::{DAffine3, DVec3};
 
 use crate::gpu::{Device, GpuError, Image, ImageDim, ImageFormat};
 use crate::scene::Acquired;
+use crate::scene::fusion::TEXTURE_BUDGET as BUDGET;
 use crate::volume::Voxels;
-
-/// Most texels of the texture, bytes. What is larger is resampled: a frame reads less than a slice.
-const BUDGET: u64 = 512 << 20;
 
 /// The texture, and what its texels mean.
 pub(in crate::sim) struct Texture {

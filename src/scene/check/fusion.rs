@@ -1,0 +1,157 @@
+//! The acquired volume of a scene and its masks as text.
+
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::Facts;
+use crate::scene::fusion::{Acquired, Surroundings, TEXTURE_BUDGET};
+use crate::scene::{Issue, Scene, file};
+use crate::volume::Volume;
+
+/// What the scene file at `path` shows around what is simulated, line by line, and masks that do
+/// nothing. `facts` measures an instance by its number.
+pub fn describe(
+    path: &Path,
+    scene: &Scene,
+    facts: impl Fn(usize) -> Facts,
+) -> (Vec<String>, Vec<Issue>) {
+    let (mut lines, mut issues) = (Vec::new(), Vec::new());
+    if let (Some(acquired), Some(named)) = (&scene.volume, file::volume_of(path)) {
+        lines.push(format!("volume {}", named.display()));
+        let folder = path.parent().unwrap_or(Path::new(""));
+        lines.extend(stored(folder.join(named)));
+        lines.extend(placed(acquired));
+    }
+    let Some(fusion) = &scene.fusion else {
+        return (lines, issues);
+    };
+    let around = match fusion.surroundings {
+        Surroundings::Volume => "the volume",
+        Surroundings::None => "nothing",
+        Surroundings::Scatterers => "the scene's own scatterers",
+    };
+    // Its name in scene files.
+    let blend = format!("{:?}", fusion.blend).to_lowercase();
+    lines.push(format!(
+        "fusion: around the masks {around}; over {} pixels, blend {blend}",
+        fusion.blur
+    ));
+    let off = scene.masks_off_the_image();
+    for &mask in &fusion.masks {
+        let name = &scene.instances[mask].name;
+        let volume = facts(mask)
+            .volume
+            .map_or("open".to_owned(), |ml| format!("{ml:.3} ml"));
+        let seen = if off.contains(&mask) {
+            "off the image"
+        } else {
+            "on the image"
+        };
+        lines.push(format!("  mask {name}: {volume}, {seen}"));
+        if off.contains(&mask) {
+            issues.push(Issue::warning(
+                path,
+                1,
+                format!("the mask `{name}` does not meet the image: nothing is simulated in it"),
+                "move the mesh or the probe",
+            ));
+        }
+    }
+    (lines, issues)
+}
+
+/// What the file holds, as `insonify check` says of it alone.
+fn stored(file: PathBuf) -> Vec<String> {
+    match Volume::load(&file) {
+        Ok((volume, _)) => volume.to_string().lines().map(str::to_owned).collect(),
+        // The scene was loaded with it; it can only have been changed since.
+        Err(error) => vec![format!("  {error}")],
+    }
+}
+
+/// Where it lies in the world, what is black and white, what the device holds of it.
+fn placed(acquired: &Acquired) -> Vec<String> {
+    let vector = |v: DVec3| {
+        // Turns -0 into 0.
+        let v = v + DVec3::ZERO;
+        format!("({:.3}, {:.3}, {:.3})", v.x, v.y, v.z)
+    };
+    let m = acquired.world_from_voxel;
+    let size = DVec3::from(acquired.size.map(|n| n as f64));
+    let corners = (0..8u32).map(|i| {
+        let upper = DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1)));
+        m.transform_point3(upper * size - DVec3::splat(0.5))
+    });
+    let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| {
+        (l.min(c), h.max(c))
+    });
+    let axes = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis];
+    let [i, j, k] = axes.map(|axis| vector(axis.normalize()));
+    let bytes = acquired.texture_bytes();
+    let averaged = match bytes > TEXTURE_BUDGET {
+        true => format!(", averaged to fit {} MiB", TEXTURE_BUDGET >> 20),
+        false => String::new(),
+    };
+    vec![
+        format!(
+            "  in the world: axes {i}, {j}, {k}, box {} to {} mm",
+            vector(low),
+            vector(high)
+        ),
+        format!(
+            "  shown from {} (black) to {} (white)",
+            acquired.black, acquired.white
+        ),
+        format!("  {:.1} MB on the device{averaged}", bytes as f64 / 1e6),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::check::report;
+
+    #[test]
+    fn a_scene_report_tells_of_volume_and_masks() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let write = |name: &str, bytes: &[u8]| {
+            std::fs::write(folder.path().join(name), bytes).expect("written");
+        };
+        let header = "NDims = 3\nDimSize = 5 4 3\nElementSpacing = 2 1 4\nOffset = 1 2 3\n\
+            ElementType = MET_SHORT\nElementDataFile = LOCAL\n";
+        let values: Vec<u8> = (0..60i16).flat_map(|i| (i - 7).to_le_bytes()).collect();
+        write("volume.mha", &[header.as_bytes(), &values].concat());
+        let scene = |x: i32| {
+            let text = format!(
+                "[volume]\nfile = \"volume.mha\"\ntranslate = [10, 0, 0]\n[fusion]\nmask = [\"ball\"]\n\
+                 blend = \"smooth\"\nblur = 9\n[[mesh]]\nname = \"ball\"\ntissue = \"liver\"\n\
+                 shape = {{ sphere = {{ radius = 5, subdivisions = 3 }} }}\ntranslate = [{x}, 0, 30]\n"
+            );
+            write("scene.toml", text.as_bytes());
+            report(&folder.path().join("scene.toml"))
+        };
+        let text = scene(0).to_string();
+        for line in [
+            "volume volume.mha",
+            "  MetaImage, 5 x 4 x 3 voxels, 16-bit signed integer",
+            "  spacing 2.0000 x 1.0000 x 4.0000 mm",
+            "  orientation in the file: LPS",
+            "  values -7 to 52, mean 22.500",
+            "  in the world: axes (1.000, 0.000, 0.000), (0.000, 1.000, 0.000), (0.000, 0.000, 1.000), \
+             box (10.000, 1.500, 1.000) to (20.000, 5.500, 13.000) mm",
+            "  shown from -7 (black) to 52 (white)",
+            "  0.0 MB on the device",
+            "fusion: around the masks the volume; over 9 pixels, blend smooth",
+            "  mask ball: 0.519 ml, on the image",
+        ] {
+            assert!(text.lines().any(|l| l == line), "{line}\nin\n{text}");
+        }
+        assert!(text.ends_with("0 errors, 0 warnings"), "{text}");
+        let text = scene(200).to_string();
+        assert!(
+            text.contains("mask ball: 0.519 ml, off the image"),
+            "{text}"
+        );
+        assert!(text.ends_with("0 errors, 1 warnings"), "{text}");
+    }
+}
