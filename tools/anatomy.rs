@@ -3,7 +3,8 @@
 //! ```text
 //! cargo run --features anatomy --bin anatomy -- abdomen --triangles 25000 -o scenes
 //! ```
-//! writes `scenes/abdomen.toml` and `scenes/abdomen/*.obj`; `heart`, `fetus` and `limbs` are animated.
+//! writes `scenes/abdomen.toml` and `scenes/abdomen/*.obj`; `heart`, `fetus` and `limbs` are animated, `pregnancy` is a
+//! volume for fusion.
 //! The same fields are meshed at every budget: finely enough for the thinnest vessel, then thinned
 //! where the surface is flat, all parts together, until the budget is met.
 
@@ -46,8 +47,12 @@ mod output;
 mod overlap;
 #[path = "anatomy/part.rs"]
 mod part;
+#[path = "anatomy/pelvis.rs"]
+mod pelvis;
 #[path = "anatomy/pose.rs"]
 mod pose;
+#[path = "anatomy/pregnancy.rs"]
+mod pregnancy;
 #[path = "anatomy/valves.rs"]
 mod valves;
 #[path = "anatomy/vessels.rs"]
@@ -93,6 +98,18 @@ enum Scene {
         #[arg(short, long)]
         output: PathBuf,
     },
+    /// The fetus in a pelvis that the simulator itself has acquired: a volume for fusion.
+    Pregnancy {
+        /// Triangles of the pelvis.
+        #[arg(long, default_value_t = 60_000, value_parser = clap::value_parser!(u64).range(20_000..))]
+        triangles: u64,
+        /// Folder for pregnancy.toml and pregnancy/pelvis.mha; it holds fetus/*.obj already.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Keeps the pelvis as a scene of its own in this folder: pelvis.toml and pelvis/*.obj.
+        #[arg(long, value_name = "DIR")]
+        keep: Option<PathBuf>,
+    },
     /// A limb in eight keyframes that have nothing in common: boxes without overlap.
     Limbs {
         /// Triangles of one keyframe.
@@ -112,6 +129,11 @@ fn main() -> ExitCode {
         Scene::Abdomen { triangles, output } => abdomen(triangles as usize, &output),
         Scene::Heart { triangles, output } => heart_scene::make(triangles as usize, &output),
         Scene::Fetus { triangles, output } => fetus_scene::make(triangles as usize, &output),
+        Scene::Pregnancy {
+            triangles,
+            output,
+            keep,
+        } => pregnancy::make(triangles as usize, &output, keep.as_deref()),
         Scene::Limbs {
             triangles,
             spread,

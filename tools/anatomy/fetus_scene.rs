@@ -20,7 +20,8 @@ const TILT: f32 = 9.0;
 
 /// What the axes are, for the files.
 const FETAL_AXES: &str = "x to the crown, y to the left, z to the back";
-const WORLD_AXES: &str = "x towards the mother's feet, y to her right, z to her back";
+/// See [`FETAL_AXES`].
+pub const WORLD_AXES: &str = "x towards the mother's feet, y to her right, z to her back";
 
 /// Makes `fetus.toml` and its meshes in `output`: `budget` triangles in total.
 pub fn make(budget: usize, output: &Path) -> Result<(), String> {
@@ -49,35 +50,48 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
         "# A moving fetus of eleven weeks, {total} triangles, made by\n#   {command}\n# {}\n{HEAD}\n",
         fetus::biometry()
     );
-    out += &transforms();
-    out +=
-        "# In rising priority: where two overlap, the later one wins. So joints need no seams.\n";
-    let entry = |name: &str, tissue: &str, priority: usize, parent: &str| {
-        let chorion = match name {
-            "sac" => "surface_gain = \"6 dB\" # chorion: a membrane of its own\n",
-            _ => "",
-        };
-        let rest = format!("{parent}file = \"fetus/{name}.obj\"\n{chorion}");
-        output::mesh_entry(name, tissue, priority, &rest)
-    };
-    let (inner, outer) = mother.split_last().expect("the mother has parts");
-    for (i, part) in outer.iter().enumerate() {
-        out += &entry(part.name, part.tissue, i, "");
-    }
-    let first = outer.len();
-    for (i, (part, node)) in parts.iter().zip(&nodes).enumerate() {
-        let parent = format!("parent = \"{}\"\n", name(*node));
-        out += &entry(part.name, part.tissue, first + i, &parent);
-        if part.name == "cord-vessels" {
-            // Over the cord's end and under all else.
-            out += &entry(inner.name, inner.tissue, first + i, "");
-        }
-    }
+    out += PELVIC;
+    out += DECIDUAL;
+    out += FETAL;
+    out.push('\n');
+    out += &contents(|name| Some(if name == "sac" { CHORION } else { "" }.to_owned()));
     out.truncate(out.trim_end().len());
     let path = output.join("fetus.toml");
     output::write(&path, &(out + "\n"))?;
     println!("{total} triangles: {}", path.display());
     Ok(())
+}
+
+/// What the entry of the sac adds.
+pub const CHORION: &str = "surface_gain = \"6 dB\" # chorion: a membrane of its own\n";
+
+/// The nodes and meshes of a scene: the fetus, and of its surroundings those for which `around` has
+/// the last lines of their entry.
+pub fn contents(around: impl Fn(&str) -> Option<String>) -> String {
+    let mut out = transforms();
+    out +=
+        "# In rising priority: where two overlap, the later one wins. So joints need no seams.\n";
+    let entry = |name: &str, tissue: &str, priority: usize, [parent, last]: [&str; 2]| {
+        let rest = format!("{parent}file = \"fetus/{name}.obj\"\n{last}");
+        output::mesh_entry(name, tissue, priority, &rest)
+    };
+    let inner = womb::inner();
+    let outer = womb::outer();
+    let outer = outer.iter().filter_map(|p| Some((p, around(p.name)?)));
+    let mut first = 0;
+    for (part, last) in outer {
+        out += &entry(part.name, part.tissue, first, ["", &last]);
+        first += 1;
+    }
+    for (i, (node, part)) in fetus::parts().iter().enumerate() {
+        let parent = format!("parent = \"{}\"\n", name(*node));
+        out += &entry(part.name, part.tissue, first + i, [&parent, ""]);
+        if part.name == "cord-vessels" {
+            // Over the cord's end and under all else.
+            out += &entry(inner.name, inner.tissue, first + i, ["", ""]);
+        }
+    }
+    out
 }
 
 /// Where a node's joint is in the fetus' frame, mm.
@@ -156,7 +170,7 @@ fn transforms() -> String {
     out
 }
 
-/// What precedes the nodes.
+/// What precedes the tissues.
 const HEAD: &str = r#"# World frame, mm: that of the probe, x towards the mother's feet, y to her right, z to her back;
 # in the fetus' own frame x points to its crown, y to its left, z to its back. Outside the skin is
 # coupling gel. Sizes: Robinson and Fleming, Br J Obstet Gynaecol 1975;82:702-710.
@@ -174,8 +188,10 @@ slice_thickness = "8 mm"
 # Fluid attenuates less than the tissue that the curve assumes: the far sliders go down.
 [imaging]
 tgc_sliders = [0, 0, 0, -2, -4, -7, -10, -12]
+"#;
 
-# Bowel, omentum and ligaments around the uterus.
+/// What lies around the uterus.
+pub const PELVIC: &str = r#"# Bowel, omentum and ligaments around the uterus.
 [tissues.pelvis]
 based_on = "fat"
 speed = "1500 m/s"
@@ -183,13 +199,19 @@ density = "980 kg/m3"
 texture_depth = 0.5
 source = "chosen by this project, no source found"
 
-# The lining of the uterus is bright in pregnancy.
+"#;
+
+/// The lining of the uterus.
+pub const DECIDUAL: &str = r#"# The lining of the uterus is bright in pregnancy.
 [tissues.decidua]
 based_on = "placenta"
 echogenicity = "+5 dB"
 source = "chosen by this project, no source found"
 
-# Intramembranous bone has just begun to form: spicules in a membrane, which sound still passes.
+"#;
+
+/// Tissues of the fetus that the shipped table lacks.
+pub const FETAL: &str = r#"# Intramembranous bone has just begun to form: spicules in a membrane, which sound still passes.
 [tissues.membranous_bone]
 based_on = "fetal_bone"
 speed = "1700 m/s"
