@@ -3,7 +3,10 @@
 use std::path::Path;
 
 use glam::DVec3;
+use insonify::gpu::test_device;
 use insonify::scene::Scene;
+use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
 
 fn shipped(name: &str) -> Scene {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml"));
@@ -105,4 +108,89 @@ fn the_phantom_is_one_gel_with_contrast_in_it() {
     for tissue in &scene.tissues {
         assert!((tissue.impedance() / impedance - 1.0).abs() < 1e-12);
     }
+}
+
+#[test]
+fn the_pregnancy_has_its_fetus_in_a_small_volume_of_the_pelvis() {
+    let scene = shipped("pregnancy");
+    for (point, expected) in [
+        ([0.0, 0.0, 20.0], "mother"),
+        ([0.0, 0.0, 44.0], "decidua"),
+        ([0.0, 0.0, 50.0], "amniotic_fluid"),
+        ([2.0, 0.0, 69.0], "fetal_soft_tissue"),
+        ([9.0, 0.0, 66.0], "fetal_brain"),
+    ] {
+        assert_eq!(tissue(&scene, point), expected, "at {point:?}");
+    }
+    assert!(scene.shows_volume() && scene.masks_off_the_image().is_empty());
+    let acquired = scene.volume.as_ref().expect("a volume");
+    // What the default view shows lies in it, and so do views 15 mm beside it.
+    let voxel_from_probe = acquired.world_from_voxel.inverse() * scene.world_from_probe;
+    let last = DVec3::from(acquired.size.map(|n| n as f64 - 1.0));
+    for (l, y) in [0, 96, 191]
+        .iter()
+        .flat_map(|l| [-15.0, 0.0, 15.0].map(|y| (*l, y)))
+    {
+        let (mut origin, direction) = scene.probe.ray(l, 0);
+        origin.y = y;
+        for depth in [1.0, 117.0] {
+            let voxel = voxel_from_probe.transform_point3(origin + depth * direction);
+            assert!(
+                voxel.cmpge(DVec3::ZERO).all() && voxel.cmple(last).all(),
+                "line {l}, y {y}, depth {depth}: {voxel}"
+            );
+        }
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/pregnancy/pelvis.mha");
+    let bytes = std::fs::metadata(&file).expect("the volume").len();
+    assert!(bytes < 3_200_000, "{bytes} bytes in the repository");
+}
+
+/// In front of the sac nothing of the fetus shades the decidua: there the volume, swept over a pelvis
+/// with all its layers, and the simulation, through one medium that stands for them, show the same
+/// tissue.
+#[test]
+fn the_pregnancys_simulation_is_as_bright_as_its_volume() {
+    let mut scene = shipped("pregnancy");
+    scene.probe.scanlines = 96;
+    scene.probe.elevation_layers = 3;
+    let device = test_device();
+    let simulator = Simulator::new(&device, &Library::embedded(), &scene, Tracer::Bvh);
+    let mut simulator = simulator.expect("a simulator");
+    // Mean grey in three parts of the ring between the sac and the muscle, from left to right.
+    let mut differences = |scene: &Scene| {
+        simulator.frame(scene, 0).expect("a frame");
+        let steps = simulator.fusion_steps().expect("steps").expect("fused");
+        let frame = *simulator.constants();
+        let pitch = f64::from(frame.pixel_pitch);
+        [-130f64, -90.0, -50.0].map(|middle| {
+            let (mut sums, mut count) = ([0.0, 0.0], 0.0);
+            for pixel in 0..steps.background.len() {
+                let [i, j] = [
+                    pixel as u32 % frame.image_width,
+                    pixel as u32 / frame.image_width,
+                ];
+                let x = f64::from(frame.image_left) + (f64::from(i) + 0.5) * pitch;
+                let z = f64::from(frame.image_top) + (f64::from(j) + 0.5) * pitch;
+                // Half-axes in the middle of the ring.
+                let (x, z) = (x / 39.0, (z - 70.0) / 26.0);
+                let turn = z.atan2(x).to_degrees() - middle;
+                if (x.hypot(z) - 1.0).abs() < 0.03 && turn.abs() < 20.0 {
+                    sums[0] += 255.0 * f64::from(steps.background[pixel]);
+                    sums[1] += f64::from(steps.simulated[4 * pixel]);
+                    count += 1.0;
+                }
+            }
+            (sums[1] - sums[0]) / count
+        })
+    };
+    // 12 grey levels are 2.8 of the 60 dB: what a reader of two grey wedges side by side overlooks.
+    let alike = |d: [f64; 3]| d.iter().all(|d| d.abs() < 12.0);
+    let found = differences(&scene);
+    println!("simulation above volume by {found:.1?} grey levels");
+    assert!(alike(found), "{found:?}");
+    // Planted: 6 dB.
+    scene.imaging.gain += 6.0;
+    let planted = differences(&scene);
+    assert!(!alike(planted), "{planted:?}");
 }
