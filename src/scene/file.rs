@@ -16,6 +16,7 @@ mod parameters;
 mod placing;
 mod playing;
 mod probe;
+mod save;
 mod schema;
 mod shelf;
 mod sweep;
@@ -25,6 +26,7 @@ mod trajectory;
 mod units;
 
 pub use error::SceneError;
+pub use save::save;
 pub use trajectory::load_trajectory;
 
 use document::{Document, Source};

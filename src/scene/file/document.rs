@@ -86,6 +86,20 @@ impl Source {
         }
     }
 
+    /// A text that is to become the file `path`; no overrides.
+    pub fn of(path: &Path, text: String) -> Self {
+        Self {
+            path: path.to_owned(),
+            text,
+            overrides: Vec::new(),
+        }
+    }
+
+    /// The file's text, without the overrides.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
     /// Parses the text and puts the overrides in.
     pub fn document(&self) -> Result<Document<'_>, SceneError> {
         let root = self.table(&self.text)?;

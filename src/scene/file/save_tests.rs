@@ -1,0 +1,154 @@
+use super::*;
+use crate::scene::Scene;
+use crate::scene::file::tests::Case;
+
+const COMMENTED: &str = r#"# A liver.
+name = "test"   # title
+
+[imaging]
+# Found by trying.
+gain = "14 dB" # loud
+psf_scale = [
+    2, # axial
+    1.5,
+    1,
+]
+
+[[mesh]] # first
+name = "a"
+tissue = "liver"
+file = "cube.obj"
+
+# The second.
+[[mesh]]
+name = "b"
+tissue = "fat"
+keyframes = ["cube.obj"]
+parent = "beat"
+
+[[selector]]
+name = "beat"
+period = 1
+"#;
+
+fn settings(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
+    let owned = |&(path, value): &(&str, &str)| (path.to_owned(), value.to_owned());
+    pairs.iter().map(owned).collect()
+}
+
+#[test]
+fn only_what_is_set_changes() {
+    let case = Case::new();
+    std::fs::write(case.path(), COMMENTED).expect("written");
+    let set = settings(&[
+        ("imaging.gain", "9.5 dB"),
+        ("imaging.psf_scale", "[1.25, 0.75, 1]"),
+        ("imaging.dynamic_range", "\"55 dB\""),
+        ("mesh.b.priority", "3"),
+        ("probe.pose.position", "[1, 2, 3]"),
+    ]);
+    save(&case.path(), &case.path(), &set).expect("saved");
+    let text = std::fs::read_to_string(case.path()).expect("there");
+    let expected = COMMENTED
+        .replace("\"14 dB\"", "\"9.5 dB\"")
+        .replace("2, # axial", "1.25, # axial")
+        .replace(
+            "1.5,\n    1,\n]\n",
+            "0.75,\n    1,\n]\ndynamic_range = \"55 dB\"\n",
+        )
+        .replace("parent = \"beat\"\n", "parent = \"beat\"\npriority = 3\n")
+        + "\n[probe.pose]\nposition = [1, 2, 3]\n";
+    assert_eq!(text, expected);
+    let (saved, _) = Scene::load(&case.path(), &[]).expect("sound");
+    std::fs::write(case.path(), COMMENTED).expect("written");
+    let (overridden, _) = Scene::load(&case.path(), &set).expect("sound");
+    assert_eq!(
+        saved.imaging, overridden.imaging,
+        "as the command line sets it"
+    );
+    assert_eq!(saved.world_from_probe, overridden.world_from_probe);
+}
+
+#[test]
+fn tables_in_any_spelling_are_found() {
+    let case = Case::new();
+    for (text, expected) in [
+        ("imaging = { gain = 3 }\n", "imaging = { gain = 5 }\n"),
+        ("imaging.gain = 3 # dotted\n", "imaging.gain = 5 # dotted\n"),
+        ("", "[imaging]\ngain = 5\n"),
+    ] {
+        std::fs::write(case.path(), text).expect("written");
+        save(
+            &case.path(),
+            &case.path(),
+            &settings(&[("imaging.gain", "5")]),
+        )
+        .expect("saved");
+        let saved = std::fs::read_to_string(case.path()).expect("there");
+        assert_eq!(saved.trim_start(), expected, "{text}");
+    }
+}
+
+#[test]
+fn elsewhere_files_are_named_from_there() {
+    let case = Case::new();
+    std::fs::write(case.path(), COMMENTED).expect("written");
+    let folder = case.folder.path().join("more/deep");
+    std::fs::create_dir_all(&folder).expect("made");
+    let to = folder.join("new.toml");
+    save(&case.path(), &to, &[]).expect("saved");
+    let text = std::fs::read_to_string(&to).expect("there");
+    let expected = COMMENTED.replace("cube.obj", "../../cube.obj");
+    assert_eq!(text, expected);
+    Scene::load(&to, &[]).expect("its files are found");
+    // And back again, past another name of the same folder.
+    save(&to, &case.folder.path().join("more/../back.toml"), &[]).expect("saved");
+    let text = std::fs::read_to_string(case.folder.path().join("back.toml")).expect("there");
+    assert_eq!(text, COMMENTED);
+}
+
+#[test]
+fn a_failure_leaves_the_file_alone() {
+    let case = Case::new();
+    std::fs::write(case.path(), COMMENTED).expect("written");
+    let nowhere = case.folder.path().join("gone/new.toml");
+    for (to, set, cause) in [
+        (case.path(), ("mesh.c.priority", "1"), "no mesh `c`"),
+        (case.path(), ("imaging.gain.x", "1"), "no such part"),
+        (case.path(), ("imaging.gian", "1"), "gian"),
+        (
+            case.path(),
+            ("imaging.gain", "\"5 mm\""),
+            "`mm` does not fit",
+        ),
+        (case.path(), ("imaging.gain", "loud"), "loud"),
+        (nowhere, ("imaging.gain", "1"), "folder cannot be used"),
+    ] {
+        let error = save(&case.path(), &to, &settings(&[set])).expect_err(cause);
+        assert!(error.message.contains(cause), "{error}");
+        let text = std::fs::read_to_string(case.path()).expect("there");
+        assert_eq!(text, COMMENTED, "{cause}");
+    }
+    let left = std::fs::read_dir(case.folder.path())
+        .expect("a folder")
+        .count();
+    assert_eq!(left, 2, "the scene and its mesh, nothing beside");
+}
+
+#[cfg(unix)]
+#[test]
+fn links_and_permissions_stay() {
+    use std::os::unix::fs::PermissionsExt;
+    let case = Case::new();
+    std::fs::write(case.path(), COMMENTED).expect("written");
+    let mode = std::fs::Permissions::from_mode(0o640);
+    std::fs::set_permissions(case.path(), mode).expect("set");
+    let link = case.folder.path().join("link.toml");
+    std::os::unix::fs::symlink(case.path(), &link).expect("made");
+    save(&link, &link, &settings(&[("imaging.gain", "5")])).expect("saved");
+    assert!(link.is_symlink());
+    let info = std::fs::metadata(case.path()).expect("there");
+    assert_eq!(info.permissions().mode() & 0o777, 0o640);
+    let text = std::fs::read_to_string(case.path()).expect("there");
+    assert!(text.contains("gain = 5 # loud"), "{text}");
+}
