@@ -9,6 +9,7 @@ mod check;
 mod common;
 mod images;
 mod info;
+mod matching;
 mod movie;
 mod reconstruct;
 mod render;
@@ -32,6 +33,8 @@ enum Command {
     Check(check::Check),
     /// List the Vulkan devices and what each lacks
     Info(info::Info),
+    /// Fit gain, TGC, dynamic range and speckle size to the acquired volume around the mask
+    Match(Box<matching::Match>),
     /// Reconstruct a volume from tracked frames
     Reconstruct(Box<reconstruct::Reconstruct>),
     /// Render a scene to a B-mode image
@@ -50,6 +53,7 @@ pub fn run() -> ExitCode {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
+        Command::Match(args) => matching::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),

@@ -6,6 +6,7 @@ pub mod dump;
 pub mod fields;
 pub mod fusion;
 pub mod layout;
+pub mod matching;
 mod passes;
 pub mod placement;
 mod resize;

@@ -1,0 +1,175 @@
+//! `insonify match`: image formation fitted to the acquired volume around the mask.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use insonify::output;
+use insonify::scene::file::save;
+use insonify::scene::{Imaging, Scene};
+use insonify::sim::Simulator;
+use insonify::sim::matching::{self, Adjusted, MatchError, Matching, Options};
+use insonify::sim::shaders::Library;
+use miette::{IntoDiagnostic, Result, miette};
+
+use super::common::Common;
+
+mod table;
+
+/// Arguments of `insonify match`. What --set and --seed change holds while fitting; what is not fitted of
+/// it is not written.
+#[derive(Debug, Args)]
+pub struct Match {
+    /// Scene file (.toml) with [volume] and [fusion]; its [imaging] is fitted.
+    scene: PathBuf,
+    /// Scene file to write [default: SCENE itself].
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Says what would be set and writes nothing.
+    #[arg(long, conflicts_with = "output")]
+    dry_run: bool,
+    /// Width of the bands inside and outside the mask's border that are compared, mm.
+    #[arg(long, default_value_t = 4.0, value_parser = band)]
+    band: f64,
+    /// What is fitted.
+    #[arg(
+        long,
+        value_enum,
+        value_delimiter = ',',
+        default_value = "gain,tgc,range,size"
+    )]
+    fit: Vec<Fitted>,
+    /// Realisations of the speckle that are simulated per round: more are surer.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
+    frames: u32,
+    #[command(flatten)]
+    common: Common,
+}
+
+/// `--fit`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Fitted {
+    /// Gain.
+    Gain,
+    /// The sliders of the time-gain compensation.
+    Tgc,
+    /// Dynamic range.
+    Range,
+    /// Axial and lateral scale of the point-spread function.
+    Size,
+}
+
+fn band(text: &str) -> Result<f64, String> {
+    let number = text.trim().trim_end_matches("mm").trim_end();
+    match number.parse() {
+        Ok(width) if (0.5..=100.0).contains(&width) => Ok(width),
+        Ok(_) => Err("it must lie between 0.5 and 100 mm".to_owned()),
+        Err(_) => Err("a width in mm is needed".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Everything that the user or the device can get wrong, said once; the scene file is then untouched.
+pub fn run(args: &Match) -> Result<()> {
+    let (mut scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
+    for warning in &warnings {
+        eprintln!("{warning}");
+    }
+    let device = args.common.device()?;
+    let tracer = args.common.tracer(&device)?;
+    args.common.settle(&mut scene, &device);
+    let library = Library::embedded();
+    let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
+    if let Some(warning) = simulator.warning() {
+        eprintln!("warning: {warning}");
+    }
+    let fits = |what| args.fit.contains(&what);
+    let options = Options {
+        band: args.band,
+        frames: args.frames,
+        adjusted: Adjusted {
+            gain: fits(Fitted::Gain),
+            tgc: fits(Fitted::Tgc),
+            range: fits(Fitted::Range),
+            size: fits(Fitted::Size),
+        },
+    };
+    let told = |round: usize, imaging: &Imaging| {
+        let [axial, lateral, _] = imaging.psf_scale;
+        eprintln!(
+            "round {round}: gain {:.1} dB, dynamic range {:.1} dB, psf_scale {axial} {lateral}",
+            imaging.gain, imaging.dynamic_range
+        );
+    };
+    let made = matching::fit(&mut simulator, &mut scene, &options, told);
+    let made = made.map_err(|error| match error {
+        MatchError::Nothing { cause, remedy } => miette!(
+            help = remedy,
+            "{} cannot be matched: {cause}",
+            args.scene.display()
+        ),
+        MatchError::Sim(error) => miette!(error),
+    })?;
+    args.common.validated(&device)?;
+    table::print(&scene.probe, &made);
+    for note in &made.notes {
+        eprintln!("warning: {note}");
+    }
+    if !made.settled {
+        eprintln!(
+            "warning: not settled after {} rounds; match again, or fit less with --fit",
+            made.rounds
+        );
+    }
+    write(args, &made)
+}
+
+/// Writes what has changed, unless nothing has and no other file is wanted.
+fn write(args: &Match, made: &Matching) -> Result<()> {
+    let settings = settings(made, &args.common.overrides);
+    for (path, value) in &settings {
+        output::line(format!("{path} = {value}"));
+    }
+    if settings.is_empty() {
+        output::line("matched already: nothing to set");
+    }
+    if args.dry_run || (settings.is_empty() && args.output.is_none()) {
+        return Ok(());
+    }
+    let output = args.output.as_ref().unwrap_or(&args.scene);
+    save(&args.scene, output, &settings)?;
+    output::line(output.display());
+    Ok(())
+}
+
+/// Entries of the scene file that have changed, as `--set` takes them; those that were overridden count,
+/// since the file may say something else.
+fn settings(made: &Matching, overrides: &[(String, String)]) -> Vec<(String, String)> {
+    let (before, after) = (&made.before.imaging, &made.after.imaging);
+    let mut out = Vec::new();
+    let mut set = |key: &str, differs: bool, value: String| {
+        let path = format!("imaging.{key}");
+        if differs || overrides.iter().any(|(set, _)| set.starts_with(&path)) {
+            out.push((path, value));
+        }
+    };
+    let level = |decibel: f64| format!("\"{decibel} dB\"");
+    set("gain", before.gain != after.gain, level(after.gain));
+    set(
+        "dynamic_range",
+        before.dynamic_range != after.dynamic_range,
+        level(after.dynamic_range),
+    );
+    set(
+        "tgc_sliders",
+        before.tgc_sliders != after.tgc_sliders,
+        format!("{:?}", after.tgc_sliders),
+    );
+    set(
+        "psf_scale",
+        before.psf_scale != after.psf_scale,
+        format!("{:?}", after.psf_scale),
+    );
+    out
+}
