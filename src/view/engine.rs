@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use glam::DAffine3;
 
-use super::model::Order;
+use super::model::{Order, Settings};
 use super::ring::Ring;
 use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
 use crate::probe::Probe;
@@ -115,6 +115,7 @@ impl Engine {
             device: device.clone(),
             library,
             scene,
+            fitted: None,
             wake: Box::new(wake),
         };
         let thread = std::thread::Builder::new()
@@ -159,6 +160,8 @@ struct Worker {
     device: Arc<Device>,
     library: Arc<Library>,
     scene: Scene,
+    /// Settings that the simulator's buffers are known to hold.
+    fitted: Option<Settings>,
     wake: Box<dyn Fn() + Send>,
 }
 
@@ -231,7 +234,10 @@ impl Worker {
             ));
         }
         let (simulator, _) = simulator.as_mut().expect("just made");
-        simulator.fit(library, scene)?;
+        if self.fitted.as_ref() != Some(&order.settings) {
+            simulator.fit(library, scene)?;
+            self.fitted = Some(order.settings.clone());
+        }
         let image = self.ring.free(image_size(scene))?;
         simulator.show_on(Some(image.clone()));
         simulator.frame(scene, index)?;

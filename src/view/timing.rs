@@ -9,7 +9,7 @@ use super::style;
 use crate::statistics::Statistics;
 
 /// Height of the panel, points.
-pub(super) const HEIGHT: f32 = 190.0;
+pub(super) const HEIGHT: f32 = 212.0;
 
 /// Median, 99th percentile.
 fn pair(values: &[f64]) -> [String; 2] {
@@ -43,7 +43,7 @@ fn stages(ui: &mut Ui, statistics: &Times) {
     let names = statistics.stages();
     // Two columns of stages: a fused frame has more than the panel is high.
     ui.horizontal_top(|ui| {
-        for (column, names) in names.chunks(7).enumerate() {
+        for (column, names) in names.chunks(8).enumerate() {
             egui::Grid::new(("stages", column))
                 .num_columns(3)
                 .show(ui, |ui| {
