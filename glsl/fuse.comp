@@ -11,6 +11,8 @@ layout(std430, binding = 2) readonly buffer SimulatedBuffer { uint simulated[]; 
 layout(std430, binding = 3) readonly buffer BackgroundBuffer { float background[]; };
 layout(std430, binding = 4) readonly buffer SumBuffer { float sums[]; };
 layout(std430, binding = 5) buffer FusedBuffer { uint fused[]; };
+// What blending by bands adds to the acquired image; read by that only.
+layout(std430, binding = 6) readonly buffer ChangeBuffer { float change[]; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -19,10 +21,15 @@ void main() {
     uint at = j * frame.image_width + i;
     uint pixel = simulated[at];
     if ((pixel >> 24u) != 0u) {
-        // Division may round; where the whole box is outside, the weight is 1 to the last bit.
-        float m = sums[2u * at] >= sums[2u * at + 1u] ? 1.0 : sums[2u * at] / sums[2u * at + 1u];
-        if (fusion.eased != 0u) { m = m * m * (3.0 - 2.0 * m); }
-        float v = m * background[at] + (1.0 - m) * (float(pixel & 0xffu) / 255.0);
+        float v;
+        if (fusion.blend == BLEND_MULTIBAND) {
+            v = background[at] + change[at];
+        } else {
+            // Division may round; where the whole box is outside, the weight is 1 to the last bit.
+            float m = sums[2u * at] >= sums[2u * at + 1u] ? 1.0 : sums[2u * at] / sums[2u * at + 1u];
+            if (fusion.blend == BLEND_SMOOTH) { m = m * m * (3.0 - 2.0 * m); }
+            v = m * background[at] + (1.0 - m) * (float(pixel & 0xffu) / 255.0);
+        }
         uint level = not_a_number(v) ? 0u : uint(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0));
         pixel = 0xff000000u | (level * 0x010101u);
     }

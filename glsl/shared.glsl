@@ -9,6 +9,8 @@ const uint MAX_STACK = 16u;         // media that may enclose one point
 // What origin leaves of a line: number of media, media; distance (mm) and weight at which its paths
 // begin, as bits of floats, and the interactions up to there.
 const uint START_WORDS = MAX_STACK + 4u;
+const uint MAX_PIECES = 64u;        // of the level of what is transmitted along a line
+const float FAR_PIECE = 1e30;       // begins behind every sample: there are no more
 
 const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;
@@ -24,6 +26,10 @@ const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged 
 const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
 const uint FLAG_MASKED = 512u;      // only what a masking instance encloses is heard
+
+const uint BLEND_LINEAR = 0u;
+const uint BLEND_SMOOTH = 1u;
+const uint BLEND_MULTIBAND = 2u;
 
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
@@ -101,7 +107,7 @@ struct Fusion {
     uint size_x; uint size_y; uint size_z;        // texels
     uint blur;                                    // pixels of the box by which the mask is blurred, at least 1
     float slope; float intercept;                 // texel to grey level 0..1
-    uint eased; uint unused0;                     // 1: the blurred mask goes through a smoothstep
+    uint blend; uint unused0;                     // BLEND_*
 };
 
 struct Hit { float t; uint instance; uint primitive; float u; float v; };

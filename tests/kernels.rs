@@ -77,7 +77,12 @@ subjects!(
     detect,
     display,
     mask,
+    shadow,
+    darken,
     convert,
     blur,
+    difference,
+    reduce,
+    collapse,
     fuse
 );

@@ -6,7 +6,7 @@ use super::display;
 use super::inputs::Random;
 use super::{Case, Check, Element, Input, Job, Size, Subject};
 use crate::reference::fuse;
-use crate::sim::layout::{Frame, Fusion};
+use crate::sim::layout::{BLEND_LINEAR, BLEND_MULTIBAND, BLEND_SMOOTH, Frame, Fusion};
 
 /// Distance from the middle between two grey levels at which either will do: single precision of
 /// numbers to 255.
@@ -19,6 +19,7 @@ pub const SUBJECT: Subject = Subject {
     job,
     sizes: |job| {
         let pixels = display::pixels(&job.one("frame"));
+        let banded = job.one::<Fusion>("fusion").blend == BLEND_MULTIBAND;
         vec![
             size_of::<Frame>(),
             size_of::<Fusion>(),
@@ -26,6 +27,7 @@ pub const SUBJECT: Subject = Subject {
             4 * pixels,
             8 * pixels,
             4 * pixels,
+            4 * pixels * usize::from(banded),
         ]
     },
     extent: display::per_pixel,
@@ -45,7 +47,11 @@ fn job(case: Case, size: Size) -> Job {
     let pixels = display::pixels(&frame);
     let fusion = Fusion {
         blur: 32,
-        eased: u32::from(matches!(case, Case::Odd | Case::Modes)),
+        blend: match case {
+            Case::Odd => BLEND_SMOOTH,
+            Case::Modes => BLEND_MULTIBAND,
+            _ => BLEND_LINEAR,
+        },
         ..Fusion::default()
     };
     let mut random = Random(8);
@@ -67,6 +73,7 @@ fn job(case: Case, size: Size) -> Job {
             }
         })
         .collect();
+    let change = random.floats(pixels, -0.6, 0.6);
     if case == Case::NotFinite {
         background[pixels / 2] = f32::NAN;
         background[pixels / 3] = f32::INFINITY;
@@ -79,6 +86,7 @@ fn job(case: Case, size: Size) -> Job {
             Input::floats("background", &background),
             Input::floats("sums", sums.as_flattened()),
             Input::output("fused", Element::Word, pixels),
+            Input::floats("change", &change),
         ],
         push: Vec::new(),
     }
@@ -89,12 +97,16 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let simulated: Vec<u32> = job.get("simulated");
     let background: Vec<f32> = job.get("background");
     let sums: Vec<[f32; 2]> = job.get("sums");
+    let change: Vec<f32> = job.get("change");
     let got: Vec<u32> = job.after(outputs, "fused");
     let right = |i: usize| {
         if simulated[i] >> 24 == 0 {
             return got[i] == 0;
         }
-        let level = fuse::level(&fusion, simulated[i], background[i], sums[i]).unwrap_or(0.0);
+        // A frame that is not blended by bands has dumped none.
+        let added = change.get(i).copied().unwrap_or(0.0);
+        let level = fuse::level(&fusion, simulated[i], background[i], sums[i], added);
+        let level = level.unwrap_or(0.0);
         let greys = [level - ROUNDING, level + ROUNDING].map(|v| (v.max(0.0) + 0.5).floor() as u32);
         greys
             .iter()

@@ -8,8 +8,11 @@ mod axial;
 mod beam;
 mod blur;
 pub mod check;
+mod collapse;
 mod convert;
+mod darken;
 mod detect;
+mod difference;
 mod display;
 pub mod dump;
 mod fuse;
@@ -19,9 +22,11 @@ mod interpolate;
 mod mask;
 mod origin;
 mod rays;
+mod reduce;
 mod refit;
 mod run;
 mod scatter;
+mod shadow;
 mod trace;
 mod worlds;
 
@@ -216,7 +221,7 @@ pub struct Subject {
 }
 
 /// Every kernel, in the order of a frame after the two that only tests use.
-pub const SUBJECTS: [Subject; 15] = [
+pub const SUBJECTS: [Subject; 20] = [
     geometry::SUBJECT,
     rays::SUBJECT,
     interpolate::SUBJECT,
@@ -229,7 +234,12 @@ pub const SUBJECTS: [Subject; 15] = [
     detect::SUBJECT,
     display::SUBJECT,
     mask::SUBJECT,
+    shadow::SUBJECT,
+    darken::SUBJECT,
     convert::SUBJECT,
     blur::SUBJECT,
+    difference::SUBJECT,
+    reduce::SUBJECT,
+    collapse::SUBJECT,
     fuse::SUBJECT,
 ];

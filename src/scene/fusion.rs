@@ -68,17 +68,21 @@ pub enum Blend {
     Linear,
     /// The same ramp through the smoothstep 3 m^2 - 2 m^3.
     Smooth,
+    /// By bands of an image pyramid, each over as many pixels as its structures are wide (Burt and
+    /// Adelson, ACM Transactions on Graphics 2(4), 1983).
+    Multiband,
 }
 
 impl Blend {
     /// All of them.
-    pub const ALL: &[Self] = &[Self::Linear, Self::Smooth];
+    pub const ALL: &[Self] = &[Self::Linear, Self::Smooth, Self::Multiband];
 
     /// What scene files call it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
             Self::Smooth => "smooth",
+            Self::Multiband => "multiband",
         }
     }
 }
@@ -94,6 +98,19 @@ pub struct Fusion {
     pub blur: u32,
     /// How the two images meet.
     pub blend: Blend,
+    /// Whether the anatomy inside the mask throws its shadow into the acquired volume.
+    pub background_shadows: bool,
+}
+
+impl Fusion {
+    /// Levels of the pyramid above the finest, for [`Blend::Multiband`]: the fewest with which the
+    /// coarsest band fades at least as widely as the box. A level l adds 4^l to the variance of the
+    /// ramp, on the way down and on the way up: 2 (4^levels - 1) / 3 against (blur^2 - 1) / 12.
+    pub fn levels(&self) -> u32 {
+        let box_variance = (f64::from(self.blur).powi(2) - 1.0) / 12.0;
+        let levels = (1.0 + 1.5 * box_variance).log(4.0);
+        (levels - 1e-9).ceil().max(0.0) as u32
+    }
 }
 
 /// Edges at which a mesh does not close: those with a triangle on one side only, or with more on one

@@ -1,5 +1,5 @@
-//! Fusion of the simulated image with an acquired volume: mask and volume along the scanlines, their
-//! scan conversion, the blurred mask, the mixed image.
+//! Fusion of the simulated image with an acquired volume: mask and volume along the scanlines, shadows
+//! in it, their scan conversion, the blurred mask or the pyramid, the mixed image.
 
 use std::sync::Arc;
 
@@ -8,19 +8,29 @@ use super::placement;
 use super::shaders::Library;
 use super::tracer::Tracer;
 use super::world::World;
-use super::{SimError, Simulator};
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
-use crate::npy::Element;
 use crate::scene::fusion::Blend;
 use crate::scene::{Acquired, Fusion, Scene};
+use bands::{Bands, Images};
+use shadows::Shadows;
 use texture::Texture;
 
+pub use steps::Steps;
+
+mod bands;
+mod shadows;
+mod steps;
 mod texture;
 
 /// Everything of which a frame without fusion has no need.
 pub(super) struct Fused {
+    device: Arc<Device>,
     texture: Texture,
     kernels: Kernels,
+    shadows: Shadows,
+    bands: Bands,
+    /// Whether the last frame was blended by bands.
+    banded: bool,
     /// The frame's [`layout::Fusion`].
     constants: Buffer,
     /// Mask and grey level of every sample of the scanlines.
@@ -61,6 +71,9 @@ impl Kernels {
 pub(super) struct Simulated<'a> {
     pub(super) frame: &'a layout::Frame,
     pub(super) constants: &'a Buffer,
+    pub(super) tissues: &'a Buffer,
+    pub(super) rows: &'a Buffer,
+    pub(super) stacks: &'a Buffer,
     pub(super) counters: &'a Buffer,
     pub(super) pixels: &'a Buffer,
 }
@@ -81,8 +94,12 @@ impl Fused {
         let pixels = u64::from(frame.image_width) * u64::from(frame.image_height);
         let new = |name: &str, size: u64| device.buffer(name, size.max(16), BufferKind::Storage);
         Ok(Some(Self {
+            device: Arc::clone(device),
             texture: Texture::new(device, acquired)?,
             kernels: Kernels::new(device, library, tracer)?,
+            shadows: Shadows::new(device, library, frame, tracer)?,
+            bands: Bands::new(device, library, pixels)?,
+            banded: false,
             constants: new("fusion", size_of::<layout::Fusion>() as u64)?,
             prescan: new("prescan", 8 * samples)?,
             mask: new("converted mask", 8 * pixels)?,
@@ -101,7 +118,8 @@ impl Fused {
         tracer: Tracer,
     ) -> Result<(), GpuError> {
         self.kernels = Kernels::new(device, library, tracer)?;
-        Ok(())
+        self.shadows.reload(device, library, tracer)?;
+        self.bands.reload(device, library)
     }
 
     /// What the user should know of the volume.
@@ -121,16 +139,28 @@ impl Fused {
             blur: fusion.blur,
             slope: (self.texture.scale / range) as f32,
             intercept: ((self.texture.offset - acquired.black) / range) as f32,
-            eased: u32::from(fusion.blend == Blend::Smooth),
+            blend: match fusion.blend {
+                Blend::Linear => layout::BLEND_LINEAR,
+                Blend::Smooth => layout::BLEND_SMOOTH,
+                Blend::Multiband => layout::BLEND_MULTIBAND,
+            },
             unused0: 0,
         }
     }
 
-    /// Sets the frame's constants; before the barrier that clears wait for.
-    pub(super) fn update(&self, cmd: &mut Commands<'_>, scene: &Scene) -> Result<(), GpuError> {
+    /// Sets the frame's constants, and makes room for what it needs; before the barrier that clears
+    /// wait for.
+    pub(super) fn update(&mut self, cmd: &mut Commands<'_>, scene: &Scene) -> Result<(), GpuError> {
         if let (Some(acquired), Some(fusion)) = (&scene.volume, &scene.fusion) {
             let constants = self.constants(acquired, fusion);
             cmd.write(&self.constants, 0, bytemuck::bytes_of(&constants))?;
+            if fusion.background_shadows {
+                self.shadows.fit(&self.device)?;
+            }
+            self.banded = fusion.blend == Blend::Multiband;
+            if self.banded {
+                self.bands.fit(&self.device, fusion.levels())?;
+            }
         }
         Ok(())
     }
@@ -140,10 +170,12 @@ impl Fused {
         &self,
         cmd: &mut Commands<'_>,
         world: &World,
+        fusion: &Fusion,
         simulated: &Simulated<'_>,
     ) -> Result<(), GpuError> {
         let (frame, buffer) = (simulated.frame, Binding::Buffer);
-        let per_pixel = [frame.image_width, frame.image_height, 1];
+        let size = [frame.image_width, frame.image_height];
+        let per_pixel = [size[0], size[1], 1];
         cmd.barrier(Stage::Compute, Stage::Compute);
         cmd.scope("mask");
         cmd.dispatch_groups(
@@ -163,6 +195,10 @@ impl Fused {
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
+        let prescan = match fusion.background_shadows {
+            true => (self.shadows).record(cmd, world, simulated, &self.prescan)?,
+            false => &self.prescan,
+        };
         cmd.scope("convert");
         cmd.dispatch(
             &self.kernels.convert,
@@ -170,29 +206,25 @@ impl Fused {
             &[],
             &[
                 buffer(simulated.constants),
-                buffer(&self.prescan),
+                buffer(prescan),
                 buffer(&self.mask),
                 buffer(&self.background),
             ],
         )?;
-        for (down, source, sums) in [
-            (0u32, &self.mask, &self.across),
-            (1, &self.across, &self.sums),
-        ] {
-            cmd.barrier(Stage::Compute, Stage::Compute);
-            cmd.scope("blur");
-            cmd.dispatch(
-                &self.kernels.blur,
-                per_pixel,
-                bytemuck::bytes_of(&down),
-                &[
-                    buffer(simulated.constants),
-                    buffer(&self.constants),
-                    buffer(source),
-                    buffer(sums),
-                ],
-            )?;
-        }
+        let change = if fusion.blend == Blend::Multiband {
+            let images = Images {
+                constants: simulated.constants,
+                simulated: simulated.pixels,
+                background: &self.background,
+                mask: &self.mask,
+            };
+            self.bands.record(cmd, &images, size, fusion.levels())?;
+            self.bands.change()
+        } else {
+            self.blur(cmd, simulated.constants, per_pixel)?;
+            // The kernel does not read it.
+            &self.background
+        };
         cmd.barrier(Stage::Compute, Stage::Compute);
         cmd.scope("fuse");
         cmd.dispatch(
@@ -206,97 +238,39 @@ impl Fused {
                 buffer(&self.background),
                 buffer(&self.sums),
                 buffer(&self.pixels),
+                buffer(change),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Transfer);
         Ok(())
     }
-}
 
-/// The steps of the last fused frame, row by row where they are images.
-pub struct Steps {
-    /// Mask (1 outside) and grey level 0..1 of the volume: pairs, [L][K].
-    pub prescan: Vec<f32>,
-    /// Grey level 0..1 of the volume per pixel; 0 outside the sector.
-    pub background: Vec<f32>,
-    /// Scan-converted mask per pixel; 0 outside the sector.
-    pub mask: Vec<f32>,
-    /// Blurred mask per pixel, before the blend's curve.
-    pub blurred: Vec<f32>,
-    /// The simulation alone, RGBA bytes.
-    pub simulated: Vec<u8>,
-}
-
-/// A binding of one of the kernels: name, type, words per entry, content.
-type Dumped = (&'static str, Element, usize, Vec<u8>);
-
-impl Simulator {
-    /// What the kernels of the fusion had bound in the last frame, of `scene`, if it showed an
-    /// acquired volume.
-    pub(super) fn fusion_dump(&mut self, scene: &Scene) -> Result<Option<Vec<Dumped>>, SimError> {
-        let passes = &self.passes;
-        let (Some(fused), Some(acquired), Some(fusion)) =
-            (&passes.fusion, &scene.volume, &scene.fusion)
-        else {
-            return Ok(None);
-        };
-        if !self.fused {
-            return Ok(None);
+    /// Sums mask and weight over the box.
+    fn blur(
+        &self,
+        cmd: &mut Commands<'_>,
+        frame: &Buffer,
+        per_pixel: [u32; 3],
+    ) -> Result<(), GpuError> {
+        let buffer = Binding::Buffer;
+        for (down, source, sums) in [
+            (0u32, &self.mask, &self.across),
+            (1, &self.across, &self.sums),
+        ] {
+            cmd.barrier(Stage::Compute, Stage::Compute);
+            cmd.scope("blur");
+            cmd.dispatch(
+                &self.kernels.blur,
+                per_pixel,
+                bytemuck::bytes_of(&down),
+                &[
+                    buffer(frame),
+                    buffer(&self.constants),
+                    buffer(source),
+                    buffer(sums),
+                ],
+            )?;
         }
-        self.frames.wait()?;
-        let constants = fused.constants(acquired, fusion);
-        let frame = &passes.frame;
-        let samples = frame.scanlines as usize * frame.samples as usize;
-        let pixels = frame.image_width as usize * frame.image_height as usize;
-        let read = |buffer: &Buffer, size: usize| -> Result<Vec<u8>, SimError> {
-            Ok(self.device.read_back(buffer)?[..size].to_vec())
-        };
-        use Element::{Float, Word};
-        Ok(Some(vec![
-            ("fusion", Word, 1, bytemuck::bytes_of(&constants).to_vec()),
-            ("acquired", Float, 1, fused.texture.read(&self.device)?),
-            ("prescan", Float, 2, read(&fused.prescan, 8 * samples)?),
-            ("mask", Float, 2, read(&fused.mask, 8 * pixels)?),
-            ("sums", Float, 2, read(&fused.sums, 8 * pixels)?),
-            ("background", Float, 1, read(&fused.background, 4 * pixels)?),
-            (
-                "simulated",
-                Word,
-                1,
-                read(&passes.buffers.pixels, 4 * pixels)?,
-            ),
-        ]))
-    }
-
-    /// The steps of the last frame, if it showed an acquired volume.
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn fusion_steps(&mut self) -> Result<Option<Steps>, SimError> {
-        if !self.fused {
-            return Ok(None);
-        }
-        self.frames.wait()?;
-        let passes = &self.passes;
-        let fused = passes.fusion.as_ref().expect("the frame was fused");
-        let frame = &passes.frame;
-        let samples = frame.scanlines as usize * frame.samples as usize;
-        let pixels = frame.image_width as usize * frame.image_height as usize;
-        let floats = |buffer: &Buffer, count: usize| -> Result<Vec<f32>, SimError> {
-            let bytes = self.device.read_back(buffer)?;
-            Ok(bytemuck::pod_collect_to_vec(&bytes[..4 * count]))
-        };
-        let mask = floats(&fused.mask, 2 * pixels)?;
-        let sums = floats(&fused.sums, 2 * pixels)?;
-        let (masks, _) = mask.as_chunks::<2>();
-        let (sums, _) = sums.as_chunks::<2>();
-        let mean = |s: &[f32; 2]| if s[1] > 0.0 { s[0] / s[1] } else { 0.0 };
-        Ok(Some(Steps {
-            prescan: floats(&fused.prescan, 2 * samples)?,
-            background: floats(&fused.background, pixels)?,
-            mask: masks.iter().map(|m| m[0]).collect(),
-            blurred: sums.iter().map(mean).collect(),
-            simulated: self.device.read_back(&passes.buffers.pixels)?[..4 * pixels].to_vec(),
-        }))
+        Ok(())
     }
 }

@@ -13,6 +13,18 @@ pub const MAX_STACK: usize = 16;
 /// paths begin, and the interactions up to there.
 pub const START_WORDS: usize = MAX_STACK + 4;
 
+/// Pieces of the level of what is transmitted along a line.
+pub const MAX_PIECES: usize = 64;
+/// Where a piece begins that is none: behind every sample.
+pub const FAR_PIECE: f32 = 1e30;
+
+/// The blurred mask weighs the acquired image.
+pub const BLEND_LINEAR: u32 = 0;
+/// Its smoothstep does.
+pub const BLEND_SMOOTH: u32 = 1;
+/// A pyramid of the mask weighs those of the images.
+pub const BLEND_MULTIBAND: u32 = 2;
+
 /// The transmitted path always continues, reflected branches are spawned.
 pub const SAMPLING_MAIN_PATH: u32 = 0;
 /// Independent paths.
@@ -121,7 +133,7 @@ shared! {
     struct Fusion {
         voxel_from_world: Rows,
         size_x: u32, size_y: u32, size_z: u32, blur: u32,
-        slope: f32, intercept: f32, eased: u32, unused0: u32,
+        slope: f32, intercept: f32, blend: u32, unused0: u32,
     }
     /// What a frame reports.
     struct Counters {

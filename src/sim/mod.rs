@@ -158,7 +158,7 @@ impl Simulator {
         passes.axial(&mut cmd)?;
         passes.detect(&mut cmd)?;
         passes.display(&mut cmd)?;
-        self.fused = scene.shows_volume() && passes.fuse(&mut cmd)?;
+        self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
             cmd.copy_to_image(passes.pixels(self.fused), image)?;
         }

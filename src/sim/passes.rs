@@ -33,7 +33,7 @@ impl Passes {
         self.world.update(cmd, scene)?;
         (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index);
         cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
-        if let Some(fusion) = &self.fusion {
+        if let Some(fusion) = &mut self.fusion {
             fusion.update(cmd, scene)?;
         }
         Ok(began.elapsed())
@@ -202,18 +202,21 @@ impl Passes {
     }
 
     /// Mixes the image with the acquired volume, if there is one.
-    pub(super) fn fuse(&self, cmd: &mut Commands) -> Result<bool, GpuError> {
-        let Some(fusion) = &self.fusion else {
+    pub(super) fn fuse(&self, cmd: &mut Commands, scene: &Scene) -> Result<bool, GpuError> {
+        let (Some(fused), Some(fusion)) = (&self.fusion, &scene.fusion) else {
             return Ok(false);
         };
         let b = &self.buffers;
         let simulated = Simulated {
             frame: &self.frame,
             constants: &b.frame,
+            tissues: &b.tissues,
+            rows: &b.rows,
+            stacks: &b.stacks,
             counters: &b.counters,
             pixels: &b.pixels,
         };
-        fusion.record(cmd, &self.world, &simulated)?;
+        fused.record(cmd, &self.world, fusion, &simulated)?;
         Ok(true)
     }
 

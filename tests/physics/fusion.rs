@@ -22,10 +22,15 @@ struct Fused {
     width: u32,
 }
 
+fn simulator(bench: &Bench, scene: &Scene, tracer: Tracer) -> Simulator {
+    Simulator::new(&bench.device, &Library::embedded(), scene, tracer).expect("a simulator")
+}
+
 fn fused(bench: &Bench, scene: &Scene, tracer: Tracer) -> Fused {
-    let library = Library::embedded();
-    let mut simulator =
-        Simulator::new(&bench.device, &library, scene, tracer).expect("a simulator");
+    shoot(&mut simulator(bench, scene, tracer), scene)
+}
+
+fn shoot(simulator: &mut Simulator, scene: &Scene) -> Fused {
     simulator.frame(scene, 0).expect("a frame");
     let (width, _, rgba) = simulator.pixels().expect("pixels");
     let steps = simulator.fusion_steps().expect("read back");
@@ -66,6 +71,7 @@ fn mask(scene: &mut Scene, count: usize, blend: Blend) {
         surroundings: Surroundings::Volume,
         blur: 32,
         blend,
+        background_shadows: false,
     });
 }
 
@@ -210,8 +216,8 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                 foreign += u32::from(level != (acquired * 255.0 + 0.5).floor() as u8);
             } else {
                 let m = match blend {
-                    Blend::Linear => m,
                     Blend::Smooth => m * m * (3.0 - 2.0 * m),
+                    _ => m,
                 };
                 let v = m * acquired * 255.0 + (1.0 - m) * f64::from(simulated);
                 // Half a level by rounding, and single precision.
@@ -257,6 +263,155 @@ fn picture(title: String, got: &Fused) -> Picture {
         width: got.width,
         grey: got.levels.iter().map(|l| l.unwrap_or(255)).collect(),
     }
+}
+
+/// T29.
+pub fn bands_fade_over_their_own_widths_and_need_nothing_where_images_agree() -> Check {
+    Check {
+        row: "T29",
+        name: "bands_fade_over_their_own_widths_and_need_nothing_where_images_agree",
+        claim: "Blended by bands (Burt and Adelson 1983), constant images meet along a ramp whose \
+            variance is that of the mask's own rise plus 2 (4^n - 1) / 3 pixels^2, n the levels above \
+            the finest, the fewest for which that is at least the box's (b^2 - 1) / 12; a mask of \
+            everything shows the simulation and a mask of nothing the volume, to the last bit; and \
+            a volume that equals the simulation changes nothing.",
+        planted: "A pyramid of one level less.",
+        run: bands,
+    }
+}
+
+fn bands(bench: &Bench, physics: Physics) -> Outcome {
+    let mut out = Outcome::default();
+    let everywhere = [-40.0, 400.0];
+    // Black on the left, white on the right.
+    let right = 121_u32;
+    let mut scene = boxed([-40.0, f64::from(right)], everywhere, Blend::Multiband);
+    for tissue in &mut scene.tissues {
+        *tissue = silent(1.54, 1.63, 0.0);
+    }
+    scene.volume = Some(constant(1.0));
+    let mut simulator = simulator(bench, &scene, Tracer::Bvh);
+    for blur in [1, 8, 32] {
+        scene.fusion.as_mut().expect("made").blur = blur;
+        let got = shoot(&mut simulator, &scene);
+        let row = (HEIGHT / 2 * got.width) as usize;
+        let shown = |i: u32| f64::from(got.levels[row + i as usize].expect("inside")) / 255.0;
+        let mask = |i: u32| f64::from(got.steps.mask[row + i as usize]);
+        let moments = |values: &dyn Fn(u32) -> f64| {
+            let rise = |i: u32| (f64::from(i) - 0.5, values(i) - values(i - 1));
+            let mean: f64 = (1..got.width).map(rise).map(|(x, r)| x * r).sum();
+            let variance = (1..got.width).map(rise);
+            (
+                mean,
+                variance.map(|(x, r)| (x - mean).powi(2) * r).sum::<f64>(),
+            )
+        };
+        let ((mean, variance), (middle, own)) = (moments(&shown), moments(&mask));
+        let levels = match blur {
+            1 => 0,
+            8 => 2,
+            _ => 4,
+        };
+        let levels = match physics {
+            Physics::Planted => levels - 1,
+            Physics::Right => levels,
+        };
+        let expected = own + 2.0 * (4f64.powi(levels) - 1.0) / 3.0;
+        // Rounding to 256 levels, uniform and independent over the ramp's width: three deviations.
+        let lost = 3.0 * 0.29 / 255.0;
+        let half = 2.0 * expected.sqrt() + 1.0;
+        out.compare(
+            format!("box of {blur}: middle of the ramp, pixels"),
+            mean,
+            middle,
+            lost * (2.0 * half).sqrt(),
+        );
+        out.compare(
+            format!("box of {blur}: variance of the ramp, pixels^2"),
+            variance,
+            expected,
+            lost * 2.0 * (2.0 / 3.0 * half.powi(3)).sqrt(),
+        );
+        let around = right - 60..right + 60;
+        let bell =
+            |i: u32| (-(f64::from(i) - 0.5 - middle).powi(2) / (2.0 * expected.max(0.01))).exp();
+        let whole: f64 = (1..got.width).map(bell).sum();
+        let normal = |i: u32| (1..=i).map(bell).sum::<f64>() / whole;
+        out.plots.push(Plot::linear(
+            format!("Black beside white, bands of a box of {blur} pixels"),
+            ["pixel", "grey level"],
+            vec![
+                Curve::dots(
+                    "shown",
+                    around.clone().map(|i| [f64::from(i), shown(i)]).collect(),
+                ),
+                Curve::line(
+                    "normal of that variance",
+                    around.map(|i| [f64::from(i), normal(i)]).collect(),
+                ),
+            ],
+        ));
+    }
+    if physics == Physics::Planted {
+        return out;
+    }
+    let mut alone = |what: &str, x: [f64; 2], of_volume: bool, steep: bool| {
+        let mut scene = boxed(x, everywhere, Blend::Multiband);
+        if !steep {
+            // As simulated with everything masked: its own pixels, one voxel each.
+            let first = fused(bench, &scene, Tracer::Bvh);
+            scene.volume = Some(pixels_as_volume(&first));
+        }
+        let got = fused(bench, &scene, Tracer::Bvh);
+        let expected = |at: usize| match of_volume {
+            true => (got.steps.background[at] * 255.0 + 0.5).floor() as u8,
+            false => got.steps.simulated[4 * at],
+        };
+        let wrong = (0..got.levels.len()).filter(|&at| got.levels[at] != Some(expected(at)));
+        out.compare(
+            format!("{what}: pixels that are not it"),
+            wrong.count() as f64,
+            0.0,
+            0.0,
+        );
+        if !steep {
+            let off = (0..got.levels.len()).filter(|&at| {
+                let own = f32::from(got.steps.simulated[4 * at]) / 255.0;
+                (own - got.steps.background[at]).abs() > 1e-4
+            });
+            let off = off.count() as f64;
+            out.compare(
+                "pixels at which the volume is not the simulation",
+                off,
+                0.0,
+                0.0,
+            );
+        }
+    };
+    alone("mask of everything", everywhere, false, true);
+    alone("mask of nothing", [600.0, 700.0], true, true);
+    alone("volume of the simulation", everywhere, false, false);
+    out
+}
+
+/// A volume of one grey level around everything.
+fn constant(level: f64) -> Acquired {
+    let around = DAffine3::from_translation(DVec3::splat(-300.0))
+        * DAffine3::from_scale(DVec3::splat(600.0));
+    volume([2, 2, 2], around, |_| level)
+}
+
+/// The simulated image as a volume of one voxel per pixel, as thick as three pixels are wide.
+fn pixels_as_volume(got: &Fused) -> Acquired {
+    let (width, height) = (got.width as usize, HEIGHT as usize);
+    let first = DVec3::new(-0.5 * f64::from(LINES) + 0.5, -1.0, 0.5) * PITCH;
+    let place = DAffine3::from_translation(first) * DAffine3::from_scale(DVec3::splat(PITCH));
+    let level = |p: DVec3| {
+        let pixel = (p - first) / PITCH;
+        let at = pixel.z.round() as usize * width + pixel.x.round() as usize;
+        f64::from(got.steps.simulated[4 * at]) / 255.0
+    };
+    volume([width, 3, height], place, level)
 }
 
 /// T30.

@@ -15,6 +15,7 @@ mod energy;
 mod formation;
 mod full_wave;
 mod fusion;
+mod fusion_shadows;
 mod grain;
 mod hilbert;
 mod interfaces;

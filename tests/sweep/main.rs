@@ -285,7 +285,7 @@ fn steps_surroundings_and_blends_are_what_render_makes() {
             "surroundings",
             &["volume", "none", "scatterers"],
         ),
-        ("blends", "blend", &["linear", "smooth"]),
+        ("blends", "blend", &["linear", "smooth", "multiband"]),
     ] {
         folder.sweep(&["--show", show, "-o", show]);
         let rows = folder.rows(&format!("{show}/sheet.csv"));

@@ -82,6 +82,7 @@ impl Scenes {
                 surroundings: Surroundings::Volume,
                 blur: 32,
                 blend: Blend::Linear,
+                background_shadows: false,
             });
         }
         let mut simulated = fused.clone();

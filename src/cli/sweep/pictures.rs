@@ -154,6 +154,10 @@ impl Studio {
             .expect("a volume is shown by a fusion");
         fusion.surroundings = Surroundings::Volume;
         let (blend, blur) = (fusion.blend.name(), fusion.blur);
+        let blurred = match fusion.blend {
+            Blend::Multiband => "mask, of which each band blurs its own".to_owned(),
+            _ => format!("mask blurred over {blur} px"),
+        };
         let frame = self.shoot(&scene, "the steps")?;
         let steps = self.simulator.fusion_steps().into_diagnostic()?;
         let steps = steps.expect("the frame was fused");
@@ -189,11 +193,7 @@ impl Studio {
                 settings: sharp_border.to_vec(),
                 ..step("composed", plain("composed, border sharp"), sharp.whole())
             },
-            step(
-                "blurred-mask",
-                format!("mask blurred over {blur} px"),
-                levels(&steps.blurred),
-            ),
+            step("blurred-mask", blurred, levels(&steps.blurred)),
             step("fused", format!("fused, {blend}"), frame.whole()),
         ])
     }

@@ -124,6 +124,7 @@ pub(super) fn fusion(
         surroundings,
         blur,
         blend: table.blend.unwrap_or(Blend::Linear),
+        background_shadows: table.background_shadows.unwrap_or(false),
     }))
 }
 

@@ -163,6 +163,7 @@ pub struct FusionTable {
     pub surroundings: Option<Surroundings>,
     pub blur: Option<u32>,
     pub blend: Option<Blend>,
+    pub background_shadows: Option<bool>,
 }
 
 #[derive(Debug, Default, Deserialize)]
