@@ -8,12 +8,11 @@ use insonify::acquire::{self, Station, Sweep};
 use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::file;
-use insonify::sim::Simulator;
 use insonify::sim::shaders::Library;
 use insonify::volume::{Sequence, Settings, write_meta};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
-use super::common::{Common, Progress};
+use super::common::{self, Common, Progress};
 use super::reconstruct::{spacing, tell};
 
 /// Arguments of `insonify acquire`.
@@ -119,10 +118,7 @@ pub fn run(args: &Acquire) -> Result<()> {
     for path in args.output.iter().chain(&args.volume) {
         writable(path)?;
     }
-    let (mut scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
-    for warning in &warnings {
-        eprintln!("{warning}");
-    }
+    let mut scene = args.common.scene(&args.scene)?;
     let stations = stations(args, &scene)?;
     let sequence = simulate(args, &mut scene, &stations)?;
     if let Some(path) = &args.output {
@@ -159,10 +155,7 @@ fn simulate(args: &Acquire, scene: &mut Scene, stations: &[Station]) -> Result<S
     let tracer = args.common.tracer(&device)?;
     args.common.settle(scene, &device);
     let library = Library::embedded();
-    let mut simulator = Simulator::new(&device, &library, scene, tracer).into_diagnostic()?;
-    if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
-    }
+    let mut simulator = common::simulator(&device, &library, scene, tracer)?;
     let mut progress = Progress::new(stations.len() as u32, "frames");
     let moving = args.moving.then_some(args.common.time);
     let made = acquire::acquire(&mut simulator, scene, stations, moving, |index| {

@@ -1,5 +1,6 @@
 //! What commands that simulate take and do alike.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,8 +11,9 @@ use insonify::gpu::{AdapterKind, Device, DeviceOptions};
 use insonify::scene::Scene;
 use insonify::scene::file::override_of;
 use insonify::scene::settings::{Machine, Quality, Simulation};
-use insonify::sim::Tracer;
 use insonify::sim::layout::Counters;
+use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
 
 /// Arguments of every command that simulates.
 #[derive(Clone, Debug, clap::Args)]
@@ -112,6 +114,18 @@ impl Common {
         Ok(tracer)
     }
 
+    /// Loads a scene with the overrides, and says on standard error what it warns of.
+    ///
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn scene(&self, path: &Path) -> Result<Scene> {
+        let (scene, warnings) = Scene::load(path, &self.overrides)?;
+        for warning in &warnings {
+            eprintln!("{warning}");
+        }
+        Ok(scene)
+    }
+
     /// Puts seed, time and quality into a scene that was loaded.
     pub fn settle(&self, scene: &mut Scene, device: &Device) {
         self.settle_simulation(&mut scene.simulation, device);
@@ -142,6 +156,23 @@ impl Common {
             _ => Ok(()),
         }
     }
+}
+
+/// Uploads a scene, and says on standard error what of it the device does not take as it is.
+///
+/// # Errors
+/// What the device refuses.
+pub fn simulator(
+    device: &Arc<Device>,
+    library: &Library,
+    scene: &Scene,
+    tracer: Tracer,
+) -> Result<Simulator> {
+    let simulator = Simulator::new(device, library, scene, tracer).into_diagnostic()?;
+    if let Some(warning) = simulator.warning() {
+        eprintln!("warning: {warning}");
+    }
+    Ok(simulator)
 }
 
 /// Takes the counts of `quality` for this device, but for those that the user set by hand.

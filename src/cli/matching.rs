@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
 use insonify::output;
+use insonify::scene::Imaging;
 use insonify::scene::file::save;
-use insonify::scene::{Imaging, Scene};
-use insonify::sim::Simulator;
 use insonify::sim::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::sim::shaders::Library;
-use miette::{IntoDiagnostic, Result, miette};
+use miette::{Result, miette};
 
-use super::common::Common;
+use super::common::{self, Common};
 
 mod table;
 
@@ -72,18 +71,12 @@ fn band(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Everything that the user or the device can get wrong, said once; the scene file is then untouched.
 pub fn run(args: &Match) -> Result<()> {
-    let (mut scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
-    for warning in &warnings {
-        eprintln!("{warning}");
-    }
+    let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device)?;
     args.common.settle(&mut scene, &device);
     let library = Library::embedded();
-    let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
-    if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
-    }
+    let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let fits = |what| args.fit.contains(&what);
     let options = Options {
         band: args.band,

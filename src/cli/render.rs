@@ -61,22 +61,15 @@ fn rate(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &Render) -> Result<()> {
-    let (mut scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
-    for warning in &warnings {
-        eprintln!("{warning}");
-    }
+    let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device)?;
     args.common.settle(&mut scene, &device);
     let mut library = library(args)?;
 
     let loaded = Instant::now();
-    let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
+    let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
-
-    if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
-    }
 
     let output = args
         .output

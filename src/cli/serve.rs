@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 use miette::{IntoDiagnostic, Report, Result, miette};
 
-use super::common::Common;
+use super::common::{self, Common};
 use insonify::igtl::{self, IgtlError, Picture, Server, Status, Tracked};
 use insonify::output;
 use insonify::scene::Scene;
@@ -57,19 +57,12 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &Serve) -> Result<()> {
     let common = &args.common;
-    let (mut scene, warnings) = Scene::load(&args.scene, &common.overrides)?;
-    for warning in &warnings {
-        eprintln!("{warning}");
-    }
+    let mut scene = common.scene(&args.scene)?;
     let device = common.device()?;
     common.settle(&mut scene, &device);
     let tracer = common.tracer(&device)?;
     let library = Library::embedded();
-    let mut simulator = Simulator::new(&device, &library, &scene, tracer).into_diagnostic()?;
-    if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
-    }
-
+    let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let address = SocketAddr::new(args.igtl_bind, args.igtl_port);
     let settings = igtl::Settings::new(scene.tracker.clone());
     let server = Server::bind(address, settings).map_err(advise)?;

@@ -7,7 +7,6 @@ use clap::{Args, ValueEnum};
 use insonify::output;
 use insonify::scene::Scene;
 use insonify::sheet::{Sheet, Tile};
-use insonify::sim::Simulator;
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 
@@ -92,11 +91,7 @@ pub fn run(args: &Sweep) -> Result<()> {
     for mask in scene.masks_off_the_image() {
         eprintln!("warning: {}", common::unseen(&scene, mask));
     }
-    let simulator =
-        Simulator::new(&device, &Library::embedded(), &scene, tracer).into_diagnostic()?;
-    if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
-    }
+    let simulator = common::simulator(&device, &Library::embedded(), &scene, tracer)?;
     let mut studio = Studio::new(simulator);
     let pictures = match args.show {
         Show::Parameters => {

@@ -7,7 +7,6 @@ use miette::{IntoDiagnostic, Result};
 
 use super::common::{Common, QualityChoice};
 use insonify::gpu::AdapterKind;
-use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::view::{self, Options};
 
@@ -32,10 +31,7 @@ pub struct View {
 /// # Errors
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &View) -> Result<()> {
-    let (scene, warnings) = Scene::load(&args.scene, &args.common.overrides)?;
-    for warning in &warnings {
-        eprintln!("{warning}");
-    }
+    let scene = args.common.scene(&args.scene)?;
     let common = args.common.clone();
     let options = Options {
         // Both tracers: the console exchanges them.
