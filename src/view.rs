@@ -11,6 +11,7 @@ pub mod engine;
 mod keys;
 mod layout;
 pub mod model;
+mod open;
 mod ring;
 mod session;
 mod state;
