@@ -1,5 +1,6 @@
 //! What the window shows and lets one change, without the window: settings, pose of the probe, clock.
 
+mod camera;
 mod clock;
 mod history;
 mod pose;
@@ -9,6 +10,7 @@ use std::time::Instant;
 
 use glam::DAffine3;
 
+pub use camera::{Camera, Ray};
 pub use clock::Clock;
 use history::History;
 pub use pose::{Axis, STEP, moved};
