@@ -10,6 +10,7 @@ mod console;
 pub mod engine;
 mod keys;
 mod layout;
+mod mmode;
 pub mod model;
 mod open;
 mod ring;

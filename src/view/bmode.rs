@@ -42,6 +42,12 @@ impl Place {
         let from_corner = vec2(lateral as f32 - self.left, depth as f32 - self.top);
         self.rect.min + from_corner * self.scale
     }
+
+    /// The point of the image plane at a place on the screen: lateral and depth, mm.
+    pub(super) fn mm(&self, point: Pos2) -> [f64; 2] {
+        let from_corner = (point - self.rect.min) / self.scale;
+        [from_corner.x + self.left, from_corner.y + self.top].map(f64::from)
+    }
 }
 
 /// Draws everything around the picture, into what is left of the window.

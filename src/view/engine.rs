@@ -25,11 +25,39 @@ pub struct Sector {
     pub pitch: f64,
 }
 
+/// Pixels of an image, read back from the device.
+#[derive(Clone, Debug)]
+pub struct Pixels {
+    /// Width and height.
+    pub size: [u32; 2],
+    /// RGBA, row by row; transparent outside the sector.
+    pub rgba: Vec<u8>,
+}
+
+impl Pixels {
+    /// Grey level at a place in pixels from the upper left corner, linear between the centres of four;
+    /// 0 outside.
+    pub fn level(&self, x: f64, y: f64) -> u8 {
+        let [width, height] = self.size.map(i64::from);
+        let (left, top) = ((x - 0.5).floor(), (y - 0.5).floor());
+        let (right, below) = (x - 0.5 - left, y - 0.5 - top);
+        let at = |i: i64, j: i64| match (0..width).contains(&i) && (0..height).contains(&j) {
+            true => f64::from(self.rgba[4 * (j * width + i) as usize]),
+            false => 0.0,
+        };
+        let (i, j) = (left as i64, top as i64);
+        let row = |j| at(i, j) * (1.0 - right) + at(i + 1, j) * right;
+        (row(j) * (1.0 - below) + row(j + 1) * below).round() as u8
+    }
+}
+
 /// A finished picture of the simulation.
 #[derive(Clone)]
 pub struct Frame {
     /// The B-mode image; nobody writes it while there are clones.
     pub image: Image,
+    /// Its pixels, where [`Order::reads_back`].
+    pub pixels: Option<Arc<Pixels>>,
     /// Where it lies.
     pub sector: Sector,
     /// The probe that it was made with.
@@ -243,8 +271,17 @@ impl Worker {
         simulator.frame(scene, index)?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         simulator.show_on(None);
+        let pixels = match order.reads_back {
+            true => {
+                let (width, height, rgba) = simulator.pixels()?;
+                let size = [width, height];
+                Some(Arc::new(Pixels { size, rgba }))
+            }
+            false => None,
+        };
         let constants = simulator.constants();
         Ok(Frame {
+            pixels,
             sector: Sector {
                 left: f64::from(constants.image_left),
                 top: f64::from(constants.image_top),

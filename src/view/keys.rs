@@ -4,9 +4,9 @@ use std::time::Instant;
 
 use egui::{Event, Key, Modifiers};
 
-use super::catalogue;
 use super::model::{Axis, Model, STEP};
 use super::state::State;
+use super::{catalogue, mmode};
 
 /// What a key does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +21,7 @@ enum Action {
     Redo,
     Console,
     Timing,
+    Mmode,
     Help,
     Close,
     Quit,
@@ -117,12 +118,13 @@ const BINDINGS: [(&str, &[Binding], &str); 15] = [
         "undo and redo settings",
     ),
     (
-        "C T",
+        "C T M",
         &[
             (Key::C, false, Action::Console),
             (Key::T, false, Action::Timing),
+            (Key::M, false, Action::Mmode),
         ],
-        "console, timings",
+        "console, timings, M-mode",
     ),
     (
         "? Esc",
@@ -209,6 +211,7 @@ fn carry_out(
         Action::Redo => return model.redo(now),
         Action::Console => state.console = !state.console,
         Action::Timing => state.timing = !state.timing,
+        Action::Mmode => mmode::toggle(model, now),
         Action::Help => state.help = !state.help,
         Action::Close => state.help = false,
         Action::Quit => state.quit = true,

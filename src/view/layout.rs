@@ -8,9 +8,10 @@ use super::bmode::{self, Place};
 use super::console;
 use super::engine::Frame;
 use super::model::Model;
+use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{keys, style, timing};
+use super::{keys, mmode, style, timing};
 
 /// Draws the interface; returns where the picture belongs.
 pub(super) fn show(
@@ -21,6 +22,7 @@ pub(super) fn show(
     frame: Option<&Frame>,
     now: Instant,
 ) -> Option<Place> {
+    let line = model.mmode.as_ref().map(Strip::line);
     if state.console {
         Panel::right("console")
             .resizable(false)
@@ -33,13 +35,25 @@ pub(super) fn show(
             .exact_size(timing::HEIGHT)
             .show(ui, |ui| timing::show(ui, statistics, frame, state));
     }
+    if model.mmode.is_some() {
+        Panel::bottom("mmode")
+            .resizable(false)
+            .exact_size(mmode::HEIGHT)
+            .show(ui, |ui| mmode::show(ui, model, &mut state.mmode));
+    }
     // Transparent: the picture is below the interface.
     let centre = CentralPanel::default().frame(Space::NONE);
     let place = centre.show(ui, |ui| {
         let place = bmode::show(ui, frame, model);
-        toggles(ui, state);
+        if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
+            mmode::aim(ui, place, frame, strip, model.frozen);
+        }
+        toggles(ui, model, state, now);
         place
     });
+    if model.mmode.as_ref().map(Strip::line) != line {
+        model.touch(now);
+    }
     if let Some(problem) = &state.problem {
         let mut open = true;
         egui::Window::new("A problem")
@@ -62,7 +76,7 @@ pub(super) fn show(
 }
 
 /// Buttons at the lower edge that open the panels.
-fn toggles(ui: &mut Ui, state: &mut State) {
+fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     let area = ui.max_rect();
     let at = egui::pos2(area.left() + 10.0, area.bottom() - 30.0);
     let room = egui::Rect::from_min_size(at, egui::vec2(300.0, 24.0));
@@ -74,6 +88,11 @@ fn toggles(ui: &mut Ui, state: &mut State) {
                 (&mut state.help, "Keys", "What the keyboard does (?)"),
             ] {
                 ui.toggle_value(open, name).on_hover_text(tip);
+            }
+            let tip = "One scanline against time (M)";
+            let strip = ui.selectable_label(model.mmode.is_some(), "M-mode");
+            if strip.on_hover_text(tip).clicked() {
+                mmode::toggle(model, now);
             }
         });
     });

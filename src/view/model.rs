@@ -3,6 +3,7 @@
 mod camera;
 mod clock;
 mod history;
+pub mod mmode;
 mod pose;
 mod settings;
 
@@ -13,9 +14,11 @@ use glam::DAffine3;
 pub use camera::{Camera, Ray};
 pub use clock::Clock;
 use history::History;
+use mmode::Strip;
 pub use pose::{Axis, STEP, moved};
 pub use settings::Settings;
 
+use super::engine::Frame;
 use crate::scene::graph::NodeKind;
 use crate::scene::{Scene, animation};
 use crate::sim::Tracer;
@@ -34,6 +37,8 @@ pub struct Model {
     pub frozen: bool,
     /// Whether anything in the scene follows time.
     pub animated: bool,
+    /// The strip of one scanline, while it is drawn.
+    pub mmode: Option<Strip>,
     /// The placed meshes, as [`Settings::surfaces`].
     pub meshes: Vec<Placed>,
     /// The settings of the scene file.
@@ -42,6 +47,7 @@ pub struct Model {
     pub home: DAffine3,
     history: History,
     revision: u64,
+    opened: Instant,
     changed: Instant,
 }
 
@@ -65,6 +71,8 @@ pub struct Order {
     pub pose: DAffine3,
     /// Time of the scene.
     pub clock: Clock,
+    /// The picture's pixels are wanted outside the device, too.
+    pub reads_back: bool,
     /// Grows with every change.
     pub revision: u64,
     /// When the change was made: an input event's arrival.
@@ -84,6 +92,7 @@ impl Model {
             clock: Clock::new(seconds, animated, now),
             frozen: false,
             animated,
+            mmode: None,
             meshes: (scene.instances.iter())
                 .map(|i| Placed {
                     name: i.name.clone(),
@@ -94,6 +103,7 @@ impl Model {
             home: scene.world_from_probe,
             history: History::default(),
             revision: 0,
+            opened: now,
             changed: now,
         }
     }
@@ -158,12 +168,25 @@ impl Model {
         self.revision
     }
 
+    /// Adds a picture to the strip of the M-mode. Where nothing in the scene moves the strip's time is
+    /// that of the pictures: what moves then is the probe.
+    pub fn film(&mut self, frame: &Frame) {
+        if let (Some(strip), Some(pixels)) = (&mut self.mmode, &frame.pixels) {
+            let seconds = match self.animated {
+                true => frame.seconds,
+                false => frame.at.duration_since(self.opened).as_secs_f64(),
+            };
+            strip.add(seconds, &frame.probe, frame.sector, pixels);
+        }
+    }
+
     /// What the simulation needs to know.
     pub fn order(&self) -> Order {
         Order {
             settings: self.settings.clone(),
             pose: self.pose,
             clock: self.clock,
+            reads_back: self.mmode.is_some(),
             revision: self.revision,
             at: self.changed,
         }

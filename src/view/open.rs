@@ -88,6 +88,7 @@ impl Open {
             console: true,
             timing: false,
             help: false,
+            mmode: Default::default(),
             tissue: 0,
             mesh: 0,
             machine,
@@ -136,6 +137,8 @@ impl Open {
         drop(frame);
         drop(session);
         let device = session::device(&plan.options)?;
+        // Its texture is gone with the device.
+        state.mmode = Default::default();
         state.problem = Some(format!("{error}. It was opened again."));
         let input = interface(&window, input.egui_ctx().pixels_per_point(), &device);
         let log = device.validation_log();
@@ -162,6 +165,7 @@ impl Open {
         for news in self.session.engine.news() {
             match news {
                 News::Frame(frame) => {
+                    self.model.film(&frame);
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;

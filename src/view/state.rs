@@ -1,5 +1,6 @@
 //! What of the window is open and chosen; not saved.
 
+use super::mmode;
 use crate::scene::settings::Machine;
 
 /// State of the window itself.
@@ -10,6 +11,8 @@ pub(super) struct State {
     pub(super) timing: bool,
     /// The list of keys is open.
     pub(super) help: bool,
+    /// The M-mode strip.
+    pub(super) mmode: mmode::Panel,
     /// Tissue under inspection: index into the scene's.
     pub(super) tissue: usize,
     /// Mesh under inspection: index into the scene's instances.

@@ -2,6 +2,7 @@
 //! watched by its pixels.
 
 mod desk;
+mod mmode;
 
 use std::time::Duration;
 

@@ -1,0 +1,312 @@
+//! M-mode: what lies along one scanline, against time.
+//!
+//! Levels are those of the B-mode image, sampled along the line: what is fused or blended is in it as
+//! it is on the screen.
+
+use std::collections::VecDeque;
+
+use crate::probe::Probe;
+use crate::view::engine::{Pixels, Sector};
+
+/// Depths of a column, from the face to the image's depth.
+pub const ROWS: usize = 256;
+
+/// Columns that are kept: at 60 images per second those of more than a minute.
+const KEPT: usize = 4096;
+
+/// One scanline at one moment.
+struct Column {
+    seconds: f64,
+    levels: Vec<u8>,
+}
+
+/// The strip of one scanline.
+#[derive(Default)]
+pub struct Strip {
+    line: u32,
+    probe: Option<Probe>,
+    columns: VecDeque<Column>,
+}
+
+impl Strip {
+    /// An empty strip of a scanline.
+    pub fn new(line: u32) -> Self {
+        Self {
+            line,
+            ..Self::default()
+        }
+    }
+
+    /// The scanline.
+    pub fn line(&self) -> u32 {
+        self.line
+    }
+
+    /// Takes another scanline; what was drawn of the one before is gone.
+    pub fn aim(&mut self, line: u32) {
+        if line != self.line {
+            self.line = line;
+            self.columns.clear();
+        }
+    }
+
+    /// Adds what an image shows along the line at `seconds`. A strip of another probe, or of a time
+    /// that was left by going back, is gone; the same moment again replaces its column.
+    pub fn add(&mut self, seconds: f64, probe: &Probe, sector: Sector, pixels: &Pixels) {
+        if self.probe.as_ref() != Some(probe) {
+            self.columns.clear();
+            self.probe = Some(probe.clone());
+            self.line = self.line.min(probe.scanlines - 1);
+        }
+        match self.columns.back() {
+            Some(last) if last.seconds > seconds => self.columns.clear(),
+            Some(last) if last.seconds == seconds => {
+                self.columns.pop_back();
+            }
+            _ => {}
+        }
+        if self.columns.len() == KEPT {
+            self.columns.pop_front();
+        }
+        let (start, direction) = probe.ray(self.line, probe.elevation_layers / 2);
+        let levels = (0..ROWS).map(|row| {
+            let at = start + direction * (probe.depth * (row as f64 + 0.5) / ROWS as f64);
+            let x = (at.x - sector.left) / sector.pitch;
+            let y = (at.z - sector.top) / sector.pitch;
+            pixels.level(x, y)
+        });
+        self.columns.push_back(Column {
+            seconds,
+            levels: levels.collect(),
+        });
+    }
+
+    /// Time of the newest column, s.
+    pub fn newest(&self) -> Option<f64> {
+        self.columns.back().map(|c| c.seconds)
+    }
+
+    /// Columns of the `window` seconds before `end`.
+    pub fn columns_in(&self, end: f64, window: f64) -> usize {
+        let within = |c: &&Column| c.seconds > end - window;
+        self.columns.iter().rev().take_while(within).count()
+    }
+
+    /// Depth of the strip, mm; nothing before the first image.
+    pub fn depth(&self) -> Option<f64> {
+        self.probe.as_ref().map(|p| p.depth)
+    }
+
+    /// Grey levels of the `window` seconds before `end`, row by row, `width` by [`ROWS`]. Each column
+    /// lasts until the next; black before the first and after the newest.
+    pub fn raster(&self, end: f64, window: f64, width: usize) -> Vec<u8> {
+        let mut out = vec![0; width * ROWS];
+        let mut next = 0;
+        for x in 0..width {
+            let moment = end - window * (1.0 - (x as f64 + 1.0) / width as f64);
+            while self.columns.get(next).is_some_and(|c| c.seconds <= moment) {
+                next += 1;
+            }
+            let shown = next.checked_sub(1).map(|at| &self.columns[at]);
+            for (row, level) in shown.iter().flat_map(|c| c.levels.iter().enumerate()) {
+                out[row * width + x] = *level;
+            }
+        }
+        out
+    }
+}
+
+/// From one point of a strip to another: seconds and mm of depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Where it begins.
+    pub from: [f64; 2],
+    /// Where it ends.
+    pub to: [f64; 2],
+}
+
+impl Span {
+    /// Time between, s, 0 or more.
+    pub fn seconds(&self) -> f64 {
+        (self.to[0] - self.from[0]).abs()
+    }
+
+    /// Depth between, mm, 0 or more.
+    pub fn millimetres(&self) -> f64 {
+        (self.to[1] - self.from[1]).abs()
+    }
+
+    /// How often a minute what lasts as long happens; nothing where no time lies between.
+    pub fn per_minute(&self) -> Option<f64> {
+        (self.seconds() > 0.0).then(|| 60.0 / self.seconds())
+    }
+
+    /// Speed of what moves from one to the other, mm/s, positive away from the probe; nothing where no
+    /// time lies between.
+    pub fn speed(&self) -> Option<f64> {
+        let [seconds, depth] = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
+        (seconds != 0.0).then(|| depth / seconds)
+    }
+}
+
+/// The scanline of `probe` that passes nearest to a point of the image plane, mm.
+pub fn nearest_line(probe: &Probe, lateral: f64, depth: f64) -> u32 {
+    let point = glam::DVec3::new(lateral, 0.0, depth);
+    let layer = probe.elevation_layers / 2;
+    let away = |l: u32| {
+        let (start, direction) = probe.ray(l, layer);
+        let from = (point - start).with_y(0.0);
+        (from - direction * from.dot(direction).max(0.0)).length_squared()
+    };
+    (0..probe.scanlines)
+        .min_by(|a, b| away(*a).total_cmp(&away(*b)))
+        .expect("a probe has scanlines")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{ROWS, Span, Strip, nearest_line};
+    use crate::probe::{Kind, Probe};
+    use crate::view::engine::{Pixels, Sector};
+
+    const SECTOR: Sector = Sector {
+        left: -20.0,
+        top: 0.0,
+        pitch: 0.5,
+    };
+
+    fn probe() -> Probe {
+        Probe {
+            kind: Kind::Linear { width: 40.0 },
+            scanlines: 40,
+            depth: 50.0,
+            ..Probe::PRESETS[0].1()
+        }
+    }
+
+    /// 80 by 100 pixels, black but for the row at a depth of `mm`.
+    fn bright_at(mm: f64) -> Pixels {
+        let row = (mm / 0.5) as usize;
+        let mut rgba = vec![0; 80 * 100 * 4];
+        rgba[row * 320..(row + 1) * 320].fill(255);
+        Pixels {
+            size: [80, 100],
+            rgba,
+        }
+    }
+
+    /// Depth of the brightest row of a strip at a moment, mm.
+    fn depth_at(raster: &[u8], x: usize, width: usize) -> f64 {
+        let brightest = (0..ROWS).max_by_key(|row| raster[row * width + x]).unwrap();
+        (brightest as f64 + 0.5) / ROWS as f64 * 50.0
+    }
+
+    #[test]
+    fn a_reflector_that_moves_draws_its_way() {
+        let mut strip = Strip::new(20);
+        let way = |t: f64| 25.0 + 10.0 * (std::f64::consts::TAU * t).sin();
+        for i in 0..=200 {
+            let t = f64::from(i) * 0.01;
+            strip.add(t, &probe(), SECTOR, &bright_at(way(t)));
+        }
+        let raster = strip.raster(2.0, 2.0, 400);
+        for x in (10..400).step_by(10) {
+            // A column lasts until the next: up to a hundredth of a second, 0.63 mm; a pixel has 0.5,
+            // a row 0.2 mm.
+            let t = (x as f64 + 1.0) / 200.0;
+            let off = (depth_at(&raster, x, 400) - way(t)).abs();
+            assert!(off < 0.63 + 0.5, "{t}: {off}");
+        }
+        // A strip twice as slow is noticed.
+        let wrong = strip.raster(2.0, 1.0, 400);
+        assert!(
+            (0..400)
+                .any(|x| (depth_at(&wrong, x, 400) - way((x as f64 + 1.0) / 200.0)).abs() > 5.0)
+        );
+    }
+
+    #[test]
+    fn only_what_was_seen_is_drawn() {
+        let mut strip = Strip::new(3);
+        assert!(strip.raster(1.0, 1.0, 10).iter().all(|&l| l == 0));
+        strip.add(0.55, &probe(), SECTOR, &bright_at(25.0));
+        let raster = strip.raster(1.0, 1.0, 10);
+        let seen: Vec<bool> = (0..10)
+            .map(|x| (0..ROWS).any(|row| raster[row * 10 + x] > 0))
+            .collect();
+        assert_eq!(
+            seen,
+            [
+                false, false, false, false, false, true, true, true, true, true
+            ]
+        );
+        // Back in time, another line, another probe: a new strip.
+        strip.add(0.1, &probe(), SECTOR, &bright_at(25.0));
+        assert_eq!((strip.columns.len(), strip.newest()), (1, Some(0.1)));
+        strip.add(0.1, &probe(), SECTOR, &bright_at(30.0));
+        assert_eq!(strip.columns.len(), 1, "the same moment");
+        strip.add(0.15, &probe(), SECTOR, &bright_at(30.0));
+        assert_eq!([0.04, 0.1].map(|s| strip.columns_in(0.15, s)), [1, 2]);
+        strip.aim(4);
+        assert_eq!(strip.newest(), None);
+        strip.add(0.2, &probe(), SECTOR, &bright_at(25.0));
+        strip.add(
+            0.3,
+            &Probe {
+                depth: 60.0,
+                ..probe()
+            },
+            SECTOR,
+            &bright_at(25.0),
+        );
+        assert_eq!((strip.columns.len(), strip.depth()), (1, Some(60.0)));
+        let few = Probe {
+            scanlines: 2,
+            ..probe()
+        };
+        strip.add(0.4, &few, SECTOR, &bright_at(25.0));
+        assert_eq!(strip.line(), 1);
+    }
+
+    #[test]
+    fn memory_is_bounded() {
+        let mut strip = Strip::new(0);
+        for i in 0..super::KEPT + 10 {
+            strip.add(i as f64, &probe(), SECTOR, &bright_at(25.0));
+        }
+        assert_eq!(strip.columns.len(), super::KEPT);
+    }
+
+    #[test]
+    fn spans_are_measured() {
+        let span = Span {
+            from: [1.0, 30.0],
+            to: [1.8, 14.0],
+        };
+        assert!((span.seconds() - 0.8).abs() < 1e-12);
+        assert_eq!(span.millimetres(), 16.0);
+        assert!((span.per_minute().unwrap() - 75.0).abs() < 1e-9);
+        assert!((span.speed().unwrap() + 20.0).abs() < 1e-9);
+        let still = Span {
+            to: span.from,
+            ..span
+        };
+        assert_eq!((still.per_minute(), still.speed()), (None, None));
+    }
+
+    #[test]
+    fn the_line_below_a_point_is_found() {
+        let linear = probe();
+        assert_eq!(nearest_line(&linear, -19.6, 10.0), 0);
+        assert_eq!(nearest_line(&linear, 0.4, 10.0), 20);
+        assert_eq!(nearest_line(&linear, 400.0, 10.0), 39);
+        for (_, make) in Probe::PRESETS {
+            let probe = make();
+            for line in [0, probe.scanlines / 3, probe.scanlines - 1] {
+                let (start, direction) = probe.ray(line, probe.elevation_layers / 2);
+                let at = start + direction * 0.6 * probe.depth;
+                assert_eq!(nearest_line(&probe, at.x, at.z), line);
+            }
+        }
+    }
+}
