@@ -110,16 +110,19 @@ impl Fused {
         }))
     }
 
-    /// Makes the pipelines again.
+    /// Makes the pipelines again, all or none.
     pub(super) fn reload(
         &mut self,
         device: &Arc<Device>,
         library: &Library,
         tracer: Tracer,
     ) -> Result<(), GpuError> {
-        self.kernels = Kernels::new(device, library, tracer)?;
-        self.shadows.reload(device, library, tracer)?;
-        self.bands.reload(device, library)
+        let kernels = Kernels::new(device, library, tracer)?;
+        let shadows = shadows::Kernels::new(device, library, tracer)?;
+        self.bands.kernels = bands::Kernels::new(device, library)?;
+        self.shadows.kernels = shadows;
+        self.kernels = kernels;
+        Ok(())
     }
 
     /// What the user should know of the volume.

@@ -7,14 +7,14 @@ use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel
 
 /// The kernels, and the pyramid once it is wanted.
 pub(super) struct Bands {
-    kernels: Kernels,
+    pub(super) kernels: Kernels,
     /// Pixels of the largest image.
     pixels: u64,
     /// The finest first.
     levels: Vec<Level>,
 }
 
-struct Kernels {
+pub(super) struct Kernels {
     difference: Kernel,
     reduce: Kernel,
     collapse: Kernel,
@@ -36,7 +36,7 @@ pub(super) struct Images<'a> {
 }
 
 impl Kernels {
-    fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
+    pub(super) fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
         let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
         Ok(Self {
             difference: kernel("difference")?,
@@ -58,16 +58,6 @@ impl Bands {
             pixels,
             levels: Vec::new(),
         })
-    }
-
-    /// Makes the pipelines again.
-    pub(super) fn reload(
-        &mut self,
-        device: &Arc<Device>,
-        library: &Library,
-    ) -> Result<(), GpuError> {
-        self.kernels = Kernels::new(device, library)?;
-        Ok(())
     }
 
     /// Makes room for `levels` levels above the finest.

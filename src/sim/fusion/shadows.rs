@@ -12,13 +12,13 @@ use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel
 
 /// The kernels, and their buffers once there are to be shadows.
 pub(super) struct Shadows {
-    kernels: Kernels,
+    pub(super) kernels: Kernels,
     /// Lines and samples of the largest frame.
     size: [u64; 2],
     buffers: Option<Buffers>,
 }
 
-struct Kernels {
+pub(super) struct Kernels {
     shadow: Kernel,
     darken: Kernel,
 }
@@ -32,7 +32,11 @@ pub(super) struct Buffers {
 }
 
 impl Kernels {
-    fn new(device: &Arc<Device>, library: &Library, tracer: Tracer) -> Result<Self, GpuError> {
+    pub(super) fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        tracer: Tracer,
+    ) -> Result<Self, GpuError> {
         let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
         Ok(Self {
             shadow: kernel(&format!("shadow_{}", tracer.suffix()))?,
@@ -55,17 +59,6 @@ impl Shadows {
             size: [lines(frame).into(), samples],
             buffers: None,
         })
-    }
-
-    /// Makes the pipelines again.
-    pub(super) fn reload(
-        &mut self,
-        device: &Arc<Device>,
-        library: &Library,
-        tracer: Tracer,
-    ) -> Result<(), GpuError> {
-        self.kernels = Kernels::new(device, library, tracer)?;
-        Ok(())
     }
 
     /// Makes the buffers where they are missing.
