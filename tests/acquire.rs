@@ -1,8 +1,9 @@
 //! Tracked sweeps of known geometry: where points end up in the volume, what of the speckle is kept,
 //! poses read back, and the command.
 
-use std::path::Path;
-use std::process::Command;
+#[path = "common/program.rs"]
+mod program;
+
 use std::sync::LazyLock;
 
 use glam::{DAffine3, DVec3};
@@ -13,6 +14,7 @@ use insonify::scene::file::load_trajectory;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::volume::{Fan, Sequence, Settings, Transforms, Volume, reconstruct};
+use program::insonify;
 
 /// Points in the world, mm: apart from each other in every direction, none in the middle.
 const POINTS: [[f64; 3]; 4] = [
@@ -305,18 +307,6 @@ fn a_file_of_poses_is_followed() {
     assert!(off.to_cols_array().iter().all(|v| v.abs() < 1e-12), "{off}");
     let error = load_trajectory(&folder.path().join("none.csv")).expect_err("no file");
     assert!(error.to_string().contains("none.csv"), "{error}");
-}
-
-fn insonify(folder: &Path, args: &[&str]) -> (bool, String) {
-    let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
-    let out = command.current_dir(folder).args(args).output();
-    let out = out.expect("the program starts");
-    let text = [out.stdout, out.stderr].concat();
-    let text = String::from_utf8_lossy(&text)
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ");
-    (out.status.success(), text.replace("│ ", ""))
 }
 
 #[test]

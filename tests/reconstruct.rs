@@ -1,15 +1,18 @@
 //! Volumes from tracked frames, against what the frames were cut from, and the command. Against a
 //! volume of PLUS: tests/plus.rs.
 
+#[path = "common/program.rs"]
+mod program;
+
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::Command;
 
 use glam::{DAffine3, DMat3, DVec3};
 use insonify::volume::{
     Compounding, Filling, Interpolation, Pose, Sequence, Settings, TrackedFrame, Transforms,
     Volume, Voxels, reconstruct,
 };
+use program::insonify;
 
 /// A field linear in space.
 fn field(at: DVec3) -> f64 {
@@ -197,20 +200,6 @@ fn holes_are_filled_along_sticks_and_from_the_nearest() {
     assert_eq!(column(nearest(0.4)), ([0.0, 0.0, 0.0, 90.0], 0));
 }
 
-fn insonify(args: &[&str]) -> (bool, String) {
-    let out = Command::new(env!("CARGO_BIN_EXE_insonify"))
-        .args(args)
-        .output();
-    let out = out.expect("the program starts");
-    let text = [out.stdout, out.stderr].concat();
-    // Errors are wrapped to the terminal's width.
-    let text = String::from_utf8_lossy(&text)
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ");
-    (out.status.success(), text.replace("│ ", ""))
-}
-
 #[test]
 fn the_command_writes_a_volume_or_says_why_not() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -228,7 +217,10 @@ fn the_command_writes_a_volume_or_says_why_not() {
     };
     config("Interpolation=\"LINEAR\" CompoundingMode=\"LATEST\" FillHoles=\"OFF\"");
     let (source, xml, out) = (at("a.igs.mha"), at("a.xml"), at("a.mha"));
-    let (fine, text) = insonify(&["reconstruct", &source, "--config", &xml, "-o", &out]);
+    let (fine, text) = insonify(
+        folder.path(),
+        &["reconstruct", &source, "--config", &xml, "-o", &out],
+    );
     assert!(
         fine && text.contains("5 of 5 frames; 585 voxels reached, 0 filled, 0 empty"),
         "{text}"
@@ -245,10 +237,12 @@ fn the_command_writes_a_volume_or_says_why_not() {
         "--fill",
         "0",
     ];
-    let (fine, text) =
-        insonify(&[&["reconstruct", &source, "-o", &out], &given[..], &extent].concat());
+    let (fine, text) = insonify(
+        folder.path(),
+        &[&["reconstruct", &source, "-o", &out], &given[..], &extent].concat(),
+    );
     assert!(fine && text.contains("3 x 4 x 2 voxels"), "{text}");
-    let (fine, text) = insonify(&["check", &source]);
+    let (fine, text) = insonify(folder.path(), &["check", &source]);
     assert!(
         fine && text.contains("pose ProbeToReference: 5, 5 of them OK"),
         "{text}"
@@ -272,7 +266,10 @@ fn the_command_writes_a_volume_or_says_why_not() {
         ),
     ] {
         config(attributes);
-        let (fine, text) = insonify(&["reconstruct", &source, "--config", &xml, "-o", &out]);
+        let (fine, text) = insonify(
+            folder.path(),
+            &["reconstruct", &source, "--config", &xml, "-o", &out],
+        );
         assert!(
             !fine && text.contains(cause) && text.contains("help:"),
             "{cause}: {text}"
@@ -297,7 +294,10 @@ fn the_command_writes_a_volume_or_says_why_not() {
             "to `Tracker`",
         ),
     ] {
-        let (fine, text) = insonify(&[&["reconstruct", &source, "-o", &out], more].concat());
+        let (fine, text) = insonify(
+            folder.path(),
+            &[&["reconstruct", &source, "-o", &out], more].concat(),
+        );
         assert!(!fine && text.contains(cause), "{cause}: {text}");
     }
 }
