@@ -1,17 +1,21 @@
 //! What the window shows and lets one change, without the window: settings, pose of the probe, clock.
 
+pub mod calipers;
 mod camera;
+pub mod cine;
 mod clock;
 mod history;
 pub mod mmode;
 mod pose;
 mod settings;
+pub mod sheet;
 
 use std::time::Instant;
 
 use glam::DAffine3;
 
 pub use camera::{Camera, Ray};
+pub use cine::Cine;
 pub use clock::Clock;
 use history::History;
 use mmode::Strip;

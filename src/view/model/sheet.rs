@@ -1,0 +1,436 @@
+//! Measurements and texts on the image, and how the pointer makes, moves and removes them.
+
+use glam::{DAffine3, DVec2};
+
+use super::calipers::{Caliper, Kind};
+
+/// What the pointer does on the image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tool {
+    /// Measures.
+    Measure(Kind),
+    /// Places a text.
+    Note,
+}
+
+/// A text on the image.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Note {
+    /// What it says.
+    pub text: String,
+    /// Its left edge at half its height, mm lateral and mm deep.
+    pub at: DVec2,
+    /// What it points at, mm.
+    pub arrow: Option<DVec2>,
+}
+
+/// The moment that an image shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// World from probe.
+    pub pose: DAffine3,
+    /// Time of the scene, s.
+    pub seconds: f64,
+}
+
+/// Something on the image.
+#[derive(Clone, Debug, PartialEq)]
+pub enum What {
+    /// A measurement.
+    Caliper(Caliper),
+    /// A text.
+    Note(Note),
+}
+
+/// Something on the image, and on which image it was put.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mark {
+    /// What it is called: `A` to `Z`.
+    pub letter: char,
+    /// What it is.
+    pub what: What,
+    /// On which image.
+    pub of: Moment,
+}
+
+impl Mark {
+    /// What can be taken with the pointer, mm.
+    pub fn points(&self) -> Vec<DVec2> {
+        match &self.what {
+            What::Caliper(caliper) => caliper.points.clone(),
+            What::Note(note) => [note.at].into_iter().chain(note.arrow).collect(),
+        }
+    }
+
+    fn drag(&mut self, point: usize, to: DVec2) {
+        match &mut self.what {
+            What::Caliper(caliper) => caliper.drag(point, to),
+            What::Note(note) if point == 0 => note.at = to,
+            What::Note(note) => note.arrow = Some(to),
+        }
+    }
+}
+
+/// A point of a mark: both indices.
+pub type Handle = (usize, usize);
+
+/// What is being drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Draft {
+    /// With which tool.
+    pub tool: Tool,
+    /// Points so far, mm.
+    pub points: Vec<DVec2>,
+    of: Moment,
+}
+
+/// All marks, and what the pointer holds.
+#[derive(Default)]
+pub struct Sheet {
+    marks: Vec<Mark>,
+    tool: Option<Tool>,
+    draft: Option<Draft>,
+    /// Where the pointer was last, mm.
+    pointer: DVec2,
+    selected: Option<Handle>,
+    /// The selected point follows the pointer.
+    held: bool,
+    editing: Option<usize>,
+}
+
+impl Sheet {
+    /// All marks, in the order in which they were made.
+    pub fn marks(&self) -> &[Mark] {
+        &self.marks
+    }
+
+    /// What the pointer does.
+    pub fn tool(&self) -> Option<Tool> {
+        self.tool
+    }
+
+    /// Takes a tool, or none. What was being drawn is dropped.
+    pub fn take(&mut self, tool: Option<Tool>) {
+        self.tool = tool;
+        self.draft = None;
+        self.stop_editing();
+    }
+
+    /// What is being drawn, where it would be finished now where the pointer is.
+    pub fn draft(&self) -> Option<Draft> {
+        let mut draft = self.draft.clone()?;
+        draft.points.push(self.pointer);
+        Some(draft)
+    }
+
+    /// The point that keys move.
+    pub fn selected(&self) -> Option<Handle> {
+        self.selected
+    }
+
+    /// The note whose text is being typed.
+    pub fn editing(&self) -> Option<usize> {
+        self.editing
+    }
+
+    /// Selects a mark by its last point.
+    pub fn select(&mut self, mark: usize) {
+        if let Some(found) = self.marks.get(mark) {
+            self.selected = Some((mark, found.points().len() - 1));
+        }
+    }
+
+    /// The button went down at a place, mm; what lies within `reach` mm of it is meant.
+    pub fn press(&mut self, at: DVec2, reach: f64, of: Moment) {
+        self.stop_editing();
+        self.pointer = at;
+        if self.draft.is_some() {
+            return self.add(at);
+        }
+        self.selected = self.near(at, reach);
+        self.held = self.selected.is_some();
+        if let (None, Some(tool)) = (self.selected, self.tool) {
+            let points = vec![at];
+            self.draft = Some(Draft { tool, points, of });
+        }
+    }
+
+    /// The pointer is elsewhere now, mm.
+    pub fn motion(&mut self, at: DVec2) {
+        self.pointer = at;
+        if let (true, Some((mark, point))) = (self.held, self.selected) {
+            self.marks[mark].drag(point, at);
+        }
+    }
+
+    /// The button went up: a point where it went down and another one here, if it was moved further
+    /// than `reach` mm.
+    pub fn release(&mut self, at: DVec2, reach: f64) {
+        self.motion(at);
+        self.held = false;
+        let Some(draft) = &self.draft else { return };
+        let last = *draft.points.last().expect("the first point made it");
+        if draft.tool == Tool::Note || last.distance(at) > reach {
+            self.add(at);
+        }
+    }
+
+    fn add(&mut self, at: DVec2) {
+        let Some(draft) = &mut self.draft else { return };
+        draft.points.push(at);
+        let what = match draft.tool {
+            Tool::Measure(kind) if draft.points.len() < kind.points() => return,
+            Tool::Measure(kind) => What::Caliper(Caliper::new(kind, draft.points.clone())),
+            Tool::Note => {
+                let tip = draft.points[0];
+                self.editing = Some(self.marks.len());
+                // A click places the text itself, a drag leads it away from what it points at.
+                let arrow = (tip != at).then_some(tip);
+                let text = String::new();
+                What::Note(Note { text, at, arrow })
+            }
+        };
+        let (of, letter) = (draft.of, self.letter());
+        self.draft = None;
+        self.marks.push(Mark { letter, what, of });
+        self.select(self.marks.len() - 1);
+    }
+
+    /// The first letter that no mark has.
+    fn letter(&self) -> char {
+        let mut letters = 'A'..='Z';
+        let free = letters.find(|letter| self.marks.iter().all(|m| m.letter != *letter));
+        free.unwrap_or('Z')
+    }
+
+    /// The point nearest to a place, no further than `reach` mm.
+    pub fn near(&self, at: DVec2, reach: f64) -> Option<Handle> {
+        let points = self.marks.iter().enumerate().flat_map(|(index, mark)| {
+            let points = mark.points().into_iter().enumerate();
+            points.map(move |(point, place)| ((index, point), place.distance(at)))
+        });
+        let within = points.filter(|(_, distance)| *distance <= reach);
+        let nearest = within.min_by(|a, b| a.1.total_cmp(&b.1));
+        nearest.map(|(handle, _)| handle)
+    }
+
+    /// Moves the selected point; whether there is one.
+    pub fn nudge(&mut self, by: DVec2) -> bool {
+        let Some((mark, point)) = self.selected else {
+            return false;
+        };
+        let to = self.marks[mark].points()[point] + by;
+        self.marks[mark].drag(point, to);
+        true
+    }
+
+    /// Drops what is being drawn, else the selection, else the tool; whether there was any.
+    pub fn cancel(&mut self) -> bool {
+        if self.editing.is_some() {
+            self.stop_editing();
+        } else if self.draft.is_some() {
+            self.draft = None;
+        } else if self.selected.is_some() {
+            self.selected = None;
+        } else {
+            return self.tool.take().is_some();
+        }
+        true
+    }
+
+    /// Removes the mark whose point is selected; whether there is one.
+    pub fn delete(&mut self) -> bool {
+        let Some((mark, _)) = self.selected.take() else {
+            return false;
+        };
+        self.remove(mark);
+        true
+    }
+
+    /// Removes a mark.
+    pub fn remove(&mut self, mark: usize) {
+        (self.selected, self.editing, self.held) = (None, None, false);
+        self.marks.remove(mark);
+    }
+
+    /// Removes all.
+    pub fn clear(&mut self) {
+        let tool = self.tool;
+        *self = Self {
+            tool,
+            ..Self::default()
+        };
+    }
+
+    /// Names a measurement, or sets the text of a note.
+    pub fn set_text(&mut self, mark: usize, text: String) {
+        match &mut self.marks[mark].what {
+            What::Caliper(caliper) => caliper.label = text,
+            What::Note(note) => note.text = text,
+        }
+    }
+
+    /// Types the text of a note.
+    pub fn edit(&mut self, mark: usize) {
+        self.stop_editing();
+        self.select(mark);
+        self.editing = Some(mark);
+    }
+
+    /// Keeps what was typed; a note without a text is removed.
+    pub fn stop_editing(&mut self) {
+        let Some(mark) = self.editing.take() else {
+            return;
+        };
+        if let What::Note(note) = &self.marks[mark].what
+            && note.text.trim().is_empty()
+        {
+            self.remove(mark);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DVec2, dvec2};
+
+    use super::super::calipers::{Kind, Reading};
+    use super::{Moment, Sheet, Tool, What};
+
+    const REACH: f64 = 1.0;
+    const NOW: Moment = Moment {
+        pose: DAffine3::IDENTITY,
+        seconds: 0.5,
+    };
+
+    fn click(sheet: &mut Sheet, x: f64, z: f64) {
+        sheet.press(dvec2(x, z), REACH, NOW);
+        sheet.release(dvec2(x, z), REACH);
+    }
+
+    fn drag(sheet: &mut Sheet, from: [f64; 2], to: [f64; 2]) {
+        sheet.press(from.into(), REACH, NOW);
+        sheet.motion((DVec2::from(from) + DVec2::from(to)) / 2.0);
+        sheet.release(to.into(), REACH);
+    }
+
+    fn distance(sheet: &Sheet, mark: usize) -> f64 {
+        match &sheet.marks()[mark].what {
+            What::Caliper(caliper) => match caliper.reading() {
+                Reading::Distance(mm) => mm,
+                other => panic!("{other:?}"),
+            },
+            What::Note(note) => panic!("{note:?}"),
+        }
+    }
+
+    #[test]
+    fn two_clicks_or_a_drag_are_a_distance() {
+        let mut sheet = Sheet::default();
+        click(&mut sheet, 0.0, 0.0);
+        assert!(sheet.marks().is_empty(), "no tool");
+        sheet.take(Some(Tool::Measure(Kind::Distance)));
+        click(&mut sheet, 0.0, 10.0);
+        sheet.motion(dvec2(0.0, 33.0));
+        assert_eq!(
+            sheet.draft().unwrap().points,
+            [dvec2(0.0, 10.0), dvec2(0.0, 33.0)]
+        );
+        click(&mut sheet, 0.0, 40.0);
+        drag(&mut sheet, [10.0, 20.0], [13.0, 24.0]);
+        assert_eq!([distance(&sheet, 0), distance(&sheet, 1)], [30.0, 5.0]);
+        let letters: String = sheet.marks().iter().map(|m| m.letter).collect();
+        assert_eq!(letters, "AB");
+        assert_eq!(sheet.marks()[0].of, NOW);
+    }
+
+    #[test]
+    fn an_ellipse_takes_a_drag_and_a_click_and_an_angle_three_clicks() {
+        let mut sheet = Sheet::default();
+        sheet.take(Some(Tool::Measure(Kind::Ellipse)));
+        drag(&mut sheet, [0.0, 20.0], [10.0, 20.0]);
+        assert!(sheet.marks().is_empty());
+        click(&mut sheet, 5.0, 23.0);
+        sheet.take(Some(Tool::Measure(Kind::Angle)));
+        for (x, z) in [(30.0, 10.0), (20.0, 10.0), (20.0, 50.0)] {
+            click(&mut sheet, x, z);
+        }
+        let readings: Vec<_> = (sheet.marks().iter())
+            .map(|m| match &m.what {
+                What::Caliper(caliper) => caliper.reading(),
+                What::Note(note) => panic!("{note:?}"),
+            })
+            .collect();
+        assert!(matches!(
+            readings[0],
+            Reading::Ellipse {
+                axes: [10.0, 6.0],
+                ..
+            }
+        ));
+        assert!(matches!(readings[1], Reading::Angle(a) if (a - 90.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn ends_are_taken_moved_and_deleted() {
+        let mut sheet = Sheet::default();
+        sheet.take(Some(Tool::Measure(Kind::Distance)));
+        drag(&mut sheet, [0.0, 10.0], [20.0, 10.0]);
+        drag(&mut sheet, [0.0, 30.0], [20.0, 30.0]);
+        // Near an end it is taken, though a tool is in the hand.
+        drag(&mut sheet, [20.3, 10.4], [25.0, 10.0]);
+        assert_eq!((sheet.marks().len(), distance(&sheet, 0)), (2, 25.0));
+        assert_eq!(sheet.selected(), Some((0, 1)));
+        assert!(sheet.nudge(dvec2(-0.5, 0.0)));
+        assert_eq!(distance(&sheet, 0), 24.5);
+        assert!(sheet.delete() && !sheet.delete());
+        assert_eq!((sheet.marks().len(), distance(&sheet, 0)), (1, 20.0));
+        drag(&mut sheet, [50.0, 10.0], [60.0, 10.0]);
+        assert_eq!(sheet.marks()[1].letter, 'A', "the first that is free");
+        sheet.clear();
+        assert!(sheet.marks().is_empty() && sheet.selected().is_none() && !sheet.nudge(DVec2::X));
+    }
+
+    #[test]
+    fn escape_takes_back_one_thing_after_the_other() {
+        let mut sheet = Sheet::default();
+        sheet.take(Some(Tool::Measure(Kind::Distance)));
+        drag(&mut sheet, [0.0, 10.0], [20.0, 10.0]);
+        click(&mut sheet, 40.0, 40.0);
+        assert!(sheet.draft().is_some() && sheet.cancel() && sheet.draft().is_none());
+        sheet.select(0);
+        assert!(sheet.cancel() && sheet.selected().is_none());
+        assert!(sheet.cancel() && sheet.tool().is_none());
+        assert!(!sheet.cancel());
+        assert_eq!(sheet.marks().len(), 1);
+    }
+
+    #[test]
+    fn a_text_is_placed_by_a_click_and_points_after_a_drag() {
+        let mut sheet = Sheet::default();
+        sheet.take(Some(Tool::Note));
+        click(&mut sheet, 5.0, 10.0);
+        assert_eq!(sheet.editing(), Some(0));
+        sheet.set_text(0, "liver".into());
+        drag(&mut sheet, [20.0, 20.0], [30.0, 25.0]);
+        let note = |sheet: &Sheet, i: usize| match &sheet.marks()[i].what {
+            What::Note(note) => note.clone(),
+            What::Caliper(caliper) => panic!("{caliper:?}"),
+        };
+        assert_eq!(
+            (note(&sheet, 0).text.as_str(), note(&sheet, 0).arrow),
+            ("liver", None)
+        );
+        assert_eq!(note(&sheet, 1).arrow, Some(dvec2(20.0, 20.0)));
+        assert_eq!(note(&sheet, 1).at, dvec2(30.0, 25.0));
+        // Nothing was typed, so there is nothing to keep.
+        sheet.stop_editing();
+        assert_eq!((sheet.marks().len(), sheet.editing()), (1, None));
+        drag(&mut sheet, [5.0, 10.0], [7.0, 11.0]);
+        assert_eq!(note(&sheet, 0).at, dvec2(7.0, 11.0));
+        sheet.edit(0);
+        sheet.set_text(0, String::new());
+        sheet.take(None);
+        assert!(sheet.marks().is_empty());
+    }
+}
