@@ -5,7 +5,9 @@
 
 mod app;
 mod bmode;
+mod calipers;
 mod catalogue;
+mod cine;
 mod console;
 pub mod engine;
 mod keys;
@@ -19,6 +21,7 @@ mod state;
 mod statistics;
 mod style;
 mod timing;
+mod tools;
 
 use std::path::PathBuf;
 use std::sync::Arc;

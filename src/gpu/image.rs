@@ -147,6 +147,14 @@ impl Image {
         Arc::strong_count(&self.0) == 1
     }
 
+    /// All its texels without padding, after everything submitted so far.
+    ///
+    /// # Errors
+    /// No memory; a lost device.
+    pub fn read_back(&self) -> Result<Vec<u8>, GpuError> {
+        self.0.device.read_back_image(self)
+    }
+
     /// Name given at creation.
     pub fn name(&self) -> &str {
         &self.0.name

@@ -1,8 +1,9 @@
 //! The B-mode image on the screen, with what a scanner writes around it.
 
 use egui::{Align2, Color32, FontId, Mesh, Pos2, Rect, Shape, Stroke, Ui, pos2, vec2};
+use glam::{DVec2, dvec2};
 
-use super::engine::Frame;
+use super::engine::{Frame, Sector};
 use super::model::Model;
 use super::style;
 use crate::probe::Kind;
@@ -10,43 +11,69 @@ use crate::probe::Kind;
 /// Room around the image, points: left (grey bar), top (texts), right (ruler), bottom.
 const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
 
-/// Where a picture is on the screen.
+/// Where a picture is on the screen: whole pixels, since it is copied to whole pixels. What is drawn
+/// and clicked then lies where the picture has it.
 pub(super) struct Place {
     /// The whole image, points.
     pub(super) rect: Rect,
-    /// Points per mm.
-    scale: f32,
-    left: f32,
-    top: f32,
+    /// Points per mm, across and down: equal but for what rounding to pixels makes of them.
+    scale: [f64; 2],
+    left: f64,
+    top: f64,
 }
 
 impl Place {
     /// As large as fits into `area`.
-    fn new(area: Rect, frame: &Frame) -> Self {
+    fn new(area: Rect, frame: &Frame, pixels_per_point: f32) -> Self {
+        let [width, height, _] = frame.image.extent();
+        Self::of(area, [width, height], &frame.sector, pixels_per_point)
+    }
+
+    fn of(area: Rect, texels: [u32; 2], sector: &Sector, pixels_per_point: f32) -> Self {
         let [left, top, right, bottom] = MARGINS;
         let room = Rect::from_min_max(area.min + vec2(left, top), area.max - vec2(right, bottom));
-        let [width, height, _] = frame.image.extent();
-        let texels = vec2(width as f32, height as f32);
-        let scale = (room.size() / texels).min_elem().max(0.01);
-        let x = room.center().x - texels.x * scale / 2.0;
+        let size = vec2(texels[0] as f32, texels[1] as f32);
+        let scale = (room.size() / size).min_elem().max(0.01);
+        let x = room.center().x - size.x * scale / 2.0;
+        let free = Rect::from_min_size(pos2(x, room.top()), size * scale);
+        let pixel = |points: f32| (points * pixels_per_point).round() / pixels_per_point;
+        let rect = Rect {
+            min: pos2(pixel(free.min.x), pixel(free.min.y)),
+            max: pos2(pixel(free.max.x), pixel(free.max.y)),
+        };
+        let per_mm = |points: f32, texels: u32| {
+            f64::from(points).max(0.01) / (f64::from(texels) * sector.pitch)
+        };
         Self {
-            rect: Rect::from_min_size(pos2(x, room.top()), texels * scale),
-            scale: scale / frame.sector.pitch as f32,
-            left: frame.sector.left as f32,
-            top: frame.sector.top as f32,
+            rect,
+            scale: [
+                per_mm(rect.width(), texels[0]),
+                per_mm(rect.height(), texels[1]),
+            ],
+            left: sector.left,
+            top: sector.top,
         }
     }
 
-    /// A point of the image plane, mm lateral and mm deep.
+    /// A point of the image plane, mm lateral and mm deep, on the screen.
     pub(super) fn at(&self, lateral: f64, depth: f64) -> Pos2 {
-        let from_corner = vec2(lateral as f32 - self.left, depth as f32 - self.top);
-        self.rect.min + from_corner * self.scale
+        let x = (lateral - self.left) * self.scale[0];
+        let y = (depth - self.top) * self.scale[1];
+        self.rect.min + vec2(x as f32, y as f32)
     }
 
-    /// The point of the image plane at a place on the screen: lateral and depth, mm.
-    pub(super) fn mm(&self, point: Pos2) -> [f64; 2] {
-        let from_corner = (point - self.rect.min) / self.scale;
-        [from_corner.x + self.left, from_corner.y + self.top].map(f64::from)
+    /// A point of the screen in the image plane, mm lateral and mm deep.
+    pub(super) fn mm(&self, at: Pos2) -> DVec2 {
+        let from_corner = at - self.rect.min;
+        dvec2(
+            self.left + f64::from(from_corner.x) / self.scale[0],
+            self.top + f64::from(from_corner.y) / self.scale[1],
+        )
+    }
+
+    /// Length of a point of the screen, mm.
+    pub(super) fn mm_per_point(&self) -> f64 {
+        1.0 / self.scale[1]
     }
 }
 
@@ -66,16 +93,16 @@ pub(super) fn show(ui: &mut Ui, frame: Option<&Frame>, model: &Model) -> Option<
         );
         return None;
     };
-    let place = Place::new(area, frame);
+    let place = Place::new(area, frame, ui.pixels_per_point());
     texts(&painter, area, frame, model);
     ruler(&painter, &place, frame);
-    grey_bar(&painter, area, &place, model);
+    grey_bar(&painter, area, &place, frame);
     orientation(&painter, &place, frame);
     Some(place)
 }
 
 fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
-    let (probe, imaging) = (&frame.probe, &model.settings.imaging);
+    let (probe, imaging) = (&frame.probe, &frame.settings.imaging);
     let kind = match probe.kind {
         Kind::Convex { .. } => "convex",
         Kind::Linear { .. } => "linear",
@@ -133,7 +160,7 @@ fn label_step(points_per_mm: f32) -> f64 {
 
 fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
     let x = place.rect.right() + 12.0;
-    let (depth, step) = (frame.probe.depth, label_step(place.scale));
+    let (depth, step) = (frame.probe.depth, label_step(place.scale[1] as f32));
     let font = FontId::proportional(11.0);
     let line = Stroke::new(1.0, style::FAINT);
     let at = |mm: f64| pos2(x, place.at(0.0, mm).y);
@@ -161,8 +188,8 @@ fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
 }
 
 /// White on top, the floor of the dynamic range at the bottom, by the grey map.
-fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, model: &Model) {
-    let imaging = &model.settings.imaging;
+fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
+    let imaging = &frame.settings.imaging;
     let height = (place.rect.height() * 0.4).clamp(60.0, 240.0);
     let bar = Rect::from_min_size(
         pos2(area.left() + 14.0, place.rect.top() + 16.0),
@@ -214,7 +241,10 @@ fn orientation(painter: &egui::Painter, place: &Place, frame: &Frame) {
 
 #[cfg(test)]
 mod tests {
-    use super::label_step;
+    use egui::{Rect, pos2, vec2};
+    use glam::dvec2;
+
+    use super::{Place, Sector, label_step};
 
     #[test]
     fn labels_never_touch() {
@@ -229,5 +259,39 @@ mod tests {
             (label_step(8.0), label_step(4.0), label_step(1.0)),
             (5.0, 10.0, 50.0)
         );
+    }
+
+    #[test]
+    fn the_screen_and_the_image_plane_are_each_others_inverse() {
+        let sector = Sector {
+            left: -41.0,
+            top: -3.5,
+            pitch: 0.2,
+        };
+        for (ppp, size) in [
+            (1.0_f32, [1030.0, 690.0]),
+            (1.25, [811.0, 433.0]),
+            (2.0, [515.0, 633.0]),
+        ] {
+            let area = Rect::from_min_size(pos2(3.0, 7.0), vec2(size[0], size[1]));
+            let place = Place::of(area, [410, 700], &sector, ppp);
+            assert!(area.contains_rect(place.rect), "{ppp}");
+            for edge in [
+                place.rect.min.x,
+                place.rect.min.y,
+                place.rect.max.x,
+                place.rect.max.y,
+            ] {
+                let pixel = edge * ppp;
+                assert!((pixel - pixel.round()).abs() < 1e-3, "{ppp}: {pixel}");
+            }
+            // The corners of the image are those of its pixels: 410 x 700 of 0.2 mm.
+            let [min, max] = [place.rect.min, place.rect.max].map(|corner| place.mm(corner));
+            assert!(
+                min.distance(dvec2(-41.0, -3.5)) < 1e-6 && max.distance(dvec2(41.0, 136.5)) < 1e-3
+            );
+            let there = place.mm(place.at(12.5, 88.0));
+            assert!(there.distance(dvec2(12.5, 88.0)) < 1e-4, "{ppp}: {there}");
+        }
     }
 }

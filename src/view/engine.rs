@@ -62,6 +62,8 @@ pub struct Frame {
     pub sector: Sector,
     /// The probe that it was made with.
     pub probe: Probe,
+    /// The settings that it was made with.
+    pub settings: Arc<Settings>,
     /// World from probe.
     pub pose: DAffine3,
     /// Time of the scene, s.
@@ -73,6 +75,8 @@ pub struct Frame {
     pub at: Instant,
     /// Time on the device by stage.
     pub timings: FrameTimings,
+    /// When it was finished.
+    pub finished: Instant,
     /// From reading the order to the finished picture, ms.
     pub wall_ms: f64,
     /// What the processor took to bring acceleration structures up to date, ms.
@@ -189,7 +193,7 @@ struct Worker {
     library: Arc<Library>,
     scene: Scene,
     /// Settings that the simulator's buffers are known to hold.
-    fitted: Option<Settings>,
+    fitted: Option<Arc<Settings>>,
     wake: Box<dyn Fn() + Send>,
 }
 
@@ -262,10 +266,14 @@ impl Worker {
             ));
         }
         let (simulator, _) = simulator.as_mut().expect("just made");
-        if self.fitted.as_ref() != Some(&order.settings) {
-            simulator.fit(library, scene)?;
-            self.fitted = Some(order.settings.clone());
-        }
+        let settings = match &self.fitted {
+            Some(fitted) if **fitted == order.settings => fitted.clone(),
+            _ => {
+                simulator.fit(library, scene)?;
+                let settings = Arc::new(order.settings.clone());
+                self.fitted.insert(settings).clone()
+            }
+        };
         let image = self.ring.free(image_size(scene))?;
         simulator.show_on(Some(image.clone()));
         simulator.frame(scene, index)?;
@@ -289,11 +297,13 @@ impl Worker {
             },
             image,
             probe: scene.probe.clone(),
+            settings,
             pose: order.pose,
             seconds,
             revision: order.revision,
             at: order.at,
             timings,
+            finished: Instant::now(),
             wall_ms: began.elapsed().as_secs_f64() * 1e3,
             update_ms: simulator.update_time().as_secs_f64() * 1e3,
             memory: self.device.memory(),

@@ -4,6 +4,8 @@ use std::time::Instant;
 
 use egui::{Event, Key, Modifiers};
 
+use super::model::calipers::Kind;
+use super::model::sheet::Tool;
 use super::model::{Axis, Model, STEP};
 use super::state::State;
 use super::{catalogue, mmode};
@@ -15,6 +17,10 @@ enum Action {
     Gain(f64),
     Depth(f64),
     Freeze,
+    Frame(isize),
+    Loop,
+    Take(Tool),
+    Delete,
     Play,
     Home,
     Undo,
@@ -31,7 +37,7 @@ enum Action {
 type Binding = (Key, bool, Action);
 
 /// Every key with its line in the list of keys; lines without a text belong to the one before.
-const BINDINGS: [(&str, &[Binding], &str); 15] = [
+const BINDINGS: [(&str, &[Binding], &str); 19] = [
     (
         "Left Right",
         &[
@@ -89,6 +95,37 @@ const BINDINGS: [(&str, &[Binding], &str); 15] = [
         "Space",
         &[(Key::Space, false, Action::Freeze)],
         "freeze and go live",
+    ),
+    (
+        ", .",
+        &[
+            (Key::Comma, false, Action::Frame(-1)),
+            (Key::Period, false, Action::Frame(1)),
+        ],
+        "frozen: one image back and on",
+    ),
+    (
+        "Enter",
+        &[(Key::Enter, false, Action::Loop)],
+        "frozen: play and stop the loop",
+    ),
+    (
+        "L O K N",
+        &[
+            (Key::L, false, Action::Take(Tool::Measure(Kind::Distance))),
+            (Key::O, false, Action::Take(Tool::Measure(Kind::Ellipse))),
+            (Key::K, false, Action::Take(Tool::Measure(Kind::Angle))),
+            (Key::N, false, Action::Take(Tool::Note)),
+        ],
+        "measure a distance, an ellipse, an angle; place a text",
+    ),
+    (
+        "Del",
+        &[
+            (Key::Delete, false, Action::Delete),
+            (Key::Backspace, false, Action::Delete),
+        ],
+        "remove what is selected; arrows move its point by a pixel",
     ),
     (
         "P",
@@ -186,6 +223,7 @@ fn carry_out(
     };
     let before = model.settings.clone();
     match action {
+        Action::Move(axis, steps) if state.tools.nudge(axis, steps, modifiers.shift) => {}
         Action::Move(axis, steps) => {
             let step = if axis.shifts() { STEP[0] } else { STEP[1] };
             let fine = if modifiers.shift { 0.25 } else { 1.0 };
@@ -201,6 +239,14 @@ fn carry_out(
             *depth = clamped("probe.depth", (*depth + by).max(10.0));
         }
         Action::Freeze => model.freeze(!model.frozen, now),
+        Action::Frame(by) if model.frozen => state.tools.cine.step(by),
+        Action::Loop if model.frozen => {
+            let cine = &mut state.tools.cine;
+            cine.play(!cine.is_playing(), now);
+        }
+        Action::Frame(_) | Action::Loop => {}
+        Action::Take(tool) => state.tools.sheet.toggle(tool),
+        Action::Delete => drop(state.tools.sheet.delete()),
         Action::Play if model.animated => {
             model.clock.play(!model.clock.is_playing(), now);
             model.touch(now);
@@ -213,7 +259,8 @@ fn carry_out(
         Action::Timing => state.timing = !state.timing,
         Action::Mmode => mmode::toggle(model, now),
         Action::Help => state.help = !state.help,
-        Action::Close => state.help = false,
+        Action::Close if state.help => state.help = false,
+        Action::Close => drop(state.tools.sheet.cancel()),
         Action::Quit => state.quit = true,
     }
     model.note(&before, now);

@@ -11,7 +11,7 @@ use super::model::Model;
 use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{keys, mmode, style, timing};
+use super::{calipers, cine, keys, mmode, style, timing};
 
 /// Draws the interface; returns where the picture belongs.
 pub(super) fn show(
@@ -29,6 +29,16 @@ pub(super) fn show(
             .exact_size(console::WIDTH)
             .show(ui, |ui| console::show(ui, model, state, now));
     }
+    Panel::bottom("bar")
+        .resizable(false)
+        .exact_size(cine::HEIGHT)
+        .show(ui, |ui| {
+            ui.horizontal_centered(|ui| {
+                toggles(ui, model, state, now);
+                ui.separator();
+                cine::show(ui, model, &mut state.tools.cine, now);
+            });
+        });
     if state.timing {
         Panel::bottom("timing")
             .resizable(false)
@@ -45,10 +55,15 @@ pub(super) fn show(
     let centre = CentralPanel::default().frame(Space::NONE);
     let place = centre.show(ui, |ui| {
         let place = bmode::show(ui, frame, model);
+        let sheet = &mut state.tools.sheet;
+        if let (Some(place), Some(frame)) = (&place, frame) {
+            calipers::show(ui, sheet, place, frame);
+            calipers::strip(ui, sheet);
+            calipers::table(ui, sheet, frame);
+        }
         if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
             mmode::aim(ui, place, frame, strip, model.frozen);
         }
-        toggles(ui, model, state, now);
         place
     });
     if model.mmode.as_ref().map(Strip::line) != line {
@@ -75,27 +90,20 @@ pub(super) fn show(
     place.inner
 }
 
-/// Buttons at the lower edge that open the panels.
+/// Buttons that open the panels.
 fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
-    let area = ui.max_rect();
-    let at = egui::pos2(area.left() + 10.0, area.bottom() - 30.0);
-    let room = egui::Rect::from_min_size(at, egui::vec2(300.0, 24.0));
-    ui.scope_builder(egui::UiBuilder::new().max_rect(room), |ui| {
-        ui.horizontal(|ui| {
-            for (open, name, tip) in [
-                (&mut state.console, "Console", "Settings (C)"),
-                (&mut state.timing, "Timings", "Where the time goes (T)"),
-                (&mut state.help, "Keys", "What the keyboard does (?)"),
-            ] {
-                ui.toggle_value(open, name).on_hover_text(tip);
-            }
-            let tip = "One scanline against time (M)";
-            let strip = ui.selectable_label(model.mmode.is_some(), "M-mode");
-            if strip.on_hover_text(tip).clicked() {
-                mmode::toggle(model, now);
-            }
-        });
-    });
+    for (open, name, tip) in [
+        (&mut state.console, "Console", "Settings (C)"),
+        (&mut state.timing, "Timings", "Where the time goes (T)"),
+        (&mut state.help, "Keys", "What the keyboard does (?)"),
+    ] {
+        ui.toggle_value(open, name).on_hover_text(tip);
+    }
+    let tip = "One scanline against time (M)";
+    let strip = ui.selectable_label(model.mmode.is_some(), "M-mode");
+    if strip.on_hover_text(tip).clicked() {
+        mmode::toggle(model, now);
+    }
 }
 
 fn help(ctx: &egui::Context, open: &mut bool) {

@@ -217,7 +217,7 @@ pub(super) fn aim(ui: &mut Ui, place: &Place, frame: &Frame, strip: &mut Strip, 
     };
     ui.painter().circle_filled(ends[1], 5.0, colour);
     if let (true, Some(point)) = (response.dragged(), response.interact_pointer_pos()) {
-        let [lateral, depth] = place.mm(point);
+        let [lateral, depth] = place.mm(point).to_array();
         strip.aim(nearest_line(probe, lateral, depth));
     }
     response.on_hover_text("The line of the M-mode strip: drag it");

@@ -12,6 +12,7 @@ use super::engine::{Frame, News};
 use super::session::{self, Session, Wake};
 use super::state::State;
 use super::statistics::{Sample, Times};
+use super::tools::Tools;
 use super::{Model, Options, ViewError, keys, layout, style};
 use crate::gpu::{AdapterKind, Device, GpuError, Interface, Painted, Placed, Shot, ValidationLog};
 use crate::scene::Scene;
@@ -96,6 +97,7 @@ impl Open {
             ray_query: device.supports_ray_query(),
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
+            tools: Tools::new(device.info()),
             quit: false,
         };
         let input = interface(&window, window.scale_factor() as f32, &device);
@@ -135,6 +137,7 @@ impl Open {
         } = self;
         // All that is on the lost device ends before there is another.
         drop(frame);
+        state.tools.lose();
         drop(session);
         let device = session::device(&plan.options)?;
         // Its texture is gone with the device.
@@ -166,6 +169,7 @@ impl Open {
             match news {
                 News::Frame(frame) => {
                     self.model.film(&frame);
+                    self.state.tools.record((*frame).clone());
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;
@@ -197,18 +201,18 @@ impl Open {
         let input = self.input.take_egui_input(&self.window);
         let context = self.input.egui_ctx().clone();
         let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
-        let frame = self.frame.as_ref();
-        let mut place = None;
+        let (mut shown, mut place) = (None, None);
         let mut output = context.run_ui(input, |ui| {
             keys::apply(ui.ctx(), model, state, touched);
-            place = layout::show(ui, model, state, times, frame, touched);
+            shown = state.tools.shown(model, ui.ctx());
+            place = layout::show(ui, model, state, times, shown.as_ref(), touched);
         });
+        let frame = shown.as_ref();
         self.tell();
         let platform = std::mem::take(&mut output.platform_output);
         self.input.handle_platform_output(&self.window, platform);
         let scale = output.pixels_per_point;
         let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
-        let frame = self.frame.as_ref();
         let placed: Vec<Placed> = (frame.iter().zip(&place))
             .map(|(frame, place)| {
                 let r = place.rect * scale;

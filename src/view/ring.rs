@@ -4,8 +4,12 @@ use std::sync::Arc;
 
 use crate::gpu::{Device, GpuError, Image, ImageDim, ImageFormat};
 
-/// Images of one size. Those that the window still shows, or that a submission of its reads, are
-/// left alone, so that neither waits for the other.
+/// Images that nobody reads and that are kept all the same, so that none has to be made for each
+/// frame. What a loop of images has let go beyond that is given back.
+const SPARE: usize = 2;
+
+/// Images of one size. Those that the window still shows or keeps, or that a submission of its
+/// reads, are left alone, so that neither waits for the other.
 pub(super) struct Ring {
     images: Vec<Image>,
     device: Arc<Device>,
@@ -23,6 +27,12 @@ impl Ring {
     pub(super) fn free(&mut self, [width, height]: [u32; 2]) -> Result<Image, GpuError> {
         let extent = [width, height, 1];
         self.images.retain(|image| image.extent() == extent);
+        let mut spare = 0;
+        self.images.retain(|image| {
+            let unread = image.is_unshared();
+            spare += usize::from(unread);
+            !unread || spare <= SPARE
+        });
         if let Some(image) = self.images.iter().find(|image| image.is_unshared()) {
             return Ok(image.clone());
         }
@@ -30,5 +40,60 @@ impl Ring {
         let image = Image::new(&self.device, "B-mode", dim, extent, format)?;
         self.images.push(image.clone());
         Ok(image)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::{Ring, SPARE};
+    use crate::gpu::test_device;
+    use crate::view::model::Cine;
+    use crate::view::model::cine::Limit;
+
+    #[test]
+    fn memory_is_that_of_the_loop_and_is_given_back_with_it() {
+        let device = test_device();
+        let mut ring = Ring::new(&device);
+        let frames = 12;
+        let mut cine = Cine::new(Limit {
+            frames,
+            bytes: 1 << 30,
+        });
+        let before = device.memory().current;
+        let mut full = 0;
+        for count in 1..40 {
+            let image = ring.free([256, 256]).unwrap();
+            cine.push(image.clone(), image.bytes(), Instant::now());
+            if count == frames + 1 {
+                full = device.memory().current;
+            }
+        }
+        assert_eq!(ring.images.len(), frames + 1);
+        assert_eq!(device.memory().current, full, "it does not grow any more");
+        cine.clear();
+        ring.free([256, 256]).unwrap();
+        assert_eq!(ring.images.len(), SPARE);
+        let left = device.memory().current - before;
+        let each = (full - before) / (frames as u64 + 1);
+        assert_eq!(left, SPARE as u64 * each);
+    }
+
+    #[test]
+    fn what_is_held_is_not_written() {
+        let device = test_device();
+        let mut ring = Ring::new(&device);
+        let held = ring.free([8, 8]).unwrap();
+        device.upload_image(&held, &[7; 256]).unwrap();
+        for _ in 0..5 {
+            let other = ring.free([8, 8]).unwrap();
+            device.upload_image(&other, &[9; 256]).unwrap();
+        }
+        assert_eq!(device.read_back_image(&held).unwrap(), [7; 256]);
+        // Another size is another set of images; what is held stays as it is.
+        ring.free([4, 4]).unwrap();
+        assert_eq!(ring.images.len(), 1);
+        assert_eq!(held.extent(), [8, 8, 1]);
     }
 }

@@ -1,6 +1,7 @@
 //! What of the window is open and chosen; not saved.
 
 use super::mmode;
+use super::tools::Tools;
 use crate::scene::settings::Machine;
 
 /// State of the window itself.
@@ -27,6 +28,8 @@ pub(super) struct State {
     pub(super) device: String,
     /// What went wrong last, until it goes right again.
     pub(super) problem: Option<String>,
+    /// Loop, measurements, texts.
+    pub(super) tools: Tools,
     /// The window is to be closed.
     pub(super) quit: bool,
 }

@@ -21,6 +21,8 @@ pub enum Key {
     Escape,
     /// `F1`, which is also `?`.
     Help,
+    Enter,
+    /// Also the signs of Latin-1.
     Letter(char),
     Control,
 }
@@ -33,6 +35,7 @@ impl Key {
             Self::Space => 0x20,
             Self::Escape => 0xff1b,
             Self::Help => 0xffbe,
+            Self::Enter => 0xff0d,
             Self::Letter(letter) => u32::from(letter),
             Self::Control => 0xffe3,
         }
@@ -244,10 +247,21 @@ impl Desk {
     }
 
     /// Clicks at a place of the display.
-    pub fn click(&self, (x, y): (u16, u16)) {
-        self.fake(xproto::MOTION_NOTIFY_EVENT, 0, (x as i16, y as i16));
-        std::thread::sleep(Duration::from_millis(100));
+    pub fn click(&self, at: (u16, u16)) {
+        self.drag(at, at);
+    }
+
+    /// Presses the button at one place of the display and releases it at another.
+    pub fn drag(&self, from: (u16, u16), to: (u16, u16)) {
+        let motion = |(x, y): (u16, u16)| {
+            self.fake(xproto::MOTION_NOTIFY_EVENT, 0, (x as i16, y as i16));
+            std::thread::sleep(Duration::from_millis(100));
+        };
+        motion(from);
         self.fake(xproto::BUTTON_PRESS_EVENT, 1, (0, 0));
+        if to != from {
+            motion(to);
+        }
         self.fake(xproto::BUTTON_RELEASE_EVENT, 1, (0, 0));
     }
 

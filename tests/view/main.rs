@@ -3,6 +3,7 @@
 
 mod desk;
 mod mmode;
+mod tools;
 
 use std::time::Duration;
 

@@ -116,6 +116,11 @@ impl Sheet {
         self.stop_editing();
     }
 
+    /// Takes a tool, or puts it away where it is in the hand.
+    pub fn toggle(&mut self, tool: Tool) {
+        self.take((self.tool != Some(tool)).then_some(tool));
+    }
+
     /// What is being drawn, where it would be finished now where the pointer is.
     pub fn draft(&self) -> Option<Draft> {
         let mut draft = self.draft.clone()?;
@@ -138,6 +143,11 @@ impl Sheet {
         if let Some(found) = self.marks.get(mark) {
             self.selected = Some((mark, found.points().len() - 1));
         }
+    }
+
+    /// Selects nothing.
+    pub fn deselect(&mut self) {
+        (self.selected, self.held) = (None, false);
     }
 
     /// The button went down at a place, mm; what lies within `reach` mm of it is meant.

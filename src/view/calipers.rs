@@ -1,0 +1,439 @@
+//! Measurements and texts on the image: the pointer, the drawing, the table of results.
+
+use std::f64::consts::TAU;
+
+use egui::{
+    Align2, Area, Color32, Event, FontId, Grid, Id, Key, Order, Painter, PointerButton, Pos2, Rect,
+    RichText, Sense, Shape, Stroke, TextEdit, TextWrapMode, Ui, pos2, vec2,
+};
+use glam::DVec2;
+
+use super::bmode::Place;
+use super::engine::Frame;
+use super::model::calipers::{Caliper, Kind, Reading};
+use super::model::sheet::{Note, Sheet, Tool, What};
+use super::style;
+
+/// How near the pointer has to be to take a point, points.
+const REACH: f32 = 9.0;
+/// Colours of the marks, in turn.
+const COLOURS: [Color32; 5] = [
+    Color32::from_rgb(255, 214, 84),
+    Color32::from_rgb(110, 214, 255),
+    Color32::from_rgb(160, 236, 120),
+    Color32::from_rgb(255, 150, 190),
+    Color32::from_rgb(200, 170, 255),
+];
+
+/// Takes what the pointer did over the picture, and draws all marks.
+pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame) {
+    let room = ui.max_rect().intersect(place.rect.expand(12.0));
+    pointer(ui, sheet, place, frame, room);
+    let painter = ui.painter_at(ui.max_rect());
+    for (index, mark) in sheet.marks().iter().enumerate() {
+        let mut colour = colour(mark.letter);
+        if mark.of != frame.moment() {
+            colour = colour.gamma_multiply(0.45);
+        }
+        match &mark.what {
+            What::Caliper(caliper) => {
+                draw(&painter, place, caliper, colour);
+                let at = to_screen(place, caliper.points[0]) + vec2(-7.0, -7.0);
+                letter(&painter, at, mark.letter, colour);
+            }
+            What::Note(note) if sheet.editing() != Some(index) => {
+                write(&painter, place, note, colour);
+            }
+            What::Note(_) => {}
+        }
+    }
+    if let Some((mark, point)) = sheet.selected() {
+        let at = to_screen(place, sheet.marks()[mark].points()[point]);
+        painter.circle_stroke(at, REACH, Stroke::new(1.0, style::TEXT));
+    }
+    draft(&painter, sheet, place);
+    editor(ui, sheet, place);
+}
+
+/// Marks are told apart by letter and colour.
+fn colour(letter: char) -> Color32 {
+    COLOURS[(u32::from(letter) - u32::from('A')) as usize % COLOURS.len()]
+}
+
+fn to_screen(place: &Place, point: DVec2) -> Pos2 {
+    place.at(point.x, point.y)
+}
+
+/// Every event on its own: several may have come since the window was last drawn.
+fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: Rect) {
+    let response = ui.interact(room, Id::new("image"), Sense::click_and_drag());
+    let reach = f64::from(REACH) * place.mm_per_point();
+    let over = response.hovered() || response.is_pointer_button_down_on();
+    let events = ui.input(|input| input.events.clone());
+    for event in events {
+        match event {
+            Event::PointerMoved(at) => sheet.motion(place.mm(at)),
+            Event::PointerButton {
+                pos,
+                button: PointerButton::Primary,
+                pressed,
+                ..
+            } => match pressed {
+                true if over && room.contains(pos) => {
+                    sheet.press(place.mm(pos), reach, frame.moment());
+                }
+                true => {}
+                false => sheet.release(place.mm(pos), reach),
+            },
+            _ => {}
+        }
+    }
+    if response.double_clicked()
+        && let Some((mark, 0)) = sheet.selected()
+        && matches!(sheet.marks()[mark].what, What::Note(_))
+    {
+        sheet.edit(mark);
+    }
+    if let (true, Some(at)) = (over, ui.input(|input| input.pointer.hover_pos())) {
+        let cursor = match (sheet.near(place.mm(at), reach), sheet.tool()) {
+            (Some(_), _) => egui::CursorIcon::Move,
+            (None, Some(Tool::Measure(_))) => egui::CursorIcon::Crosshair,
+            (None, Some(Tool::Note)) => egui::CursorIcon::Text,
+            (None, None) => return,
+        };
+        ui.set_cursor_icon(cursor);
+    }
+}
+
+/// What is being drawn, with what it measures so far beside the pointer.
+fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
+    let Some(draft) = sheet.draft() else { return };
+    let points: Vec<Pos2> = draft.points.iter().map(|&p| to_screen(place, p)).collect();
+    let end = points[points.len() - 1];
+    let colour = style::TEXT;
+    match draft.tool {
+        Tool::Measure(kind) if draft.points.len() == kind.points() => {
+            let caliper = Caliper::new(kind, draft.points);
+            draw(painter, place, &caliper, colour);
+            let text = reading(&caliper.reading()).join("  ");
+            label(painter, end + vec2(14.0, -10.0), &text, colour);
+        }
+        Tool::Measure(_) => {
+            points.iter().for_each(|&p| cross(painter, p, colour));
+            dots(painter, &points, colour);
+        }
+        Tool::Note if points[0] != end => arrow(painter, end, points[0], colour),
+        Tool::Note => {}
+    }
+}
+
+fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
+    let points: Vec<Pos2> = caliper
+        .points
+        .iter()
+        .map(|&p| to_screen(place, p))
+        .collect();
+    match caliper.kind {
+        Kind::Distance | Kind::Angle => dots(painter, &points, colour),
+        Kind::Ellipse => {
+            dots(painter, &points[..2], colour.gamma_multiply(0.5));
+            const SIDES: u32 = 72;
+            let at = |i| {
+                to_screen(
+                    place,
+                    caliper.outline(TAU * f64::from(i) / f64::from(SIDES)),
+                )
+            };
+            let outline: Vec<Pos2> = (0..=SIDES).map(at).collect();
+            dots(painter, &outline, colour);
+        }
+    }
+    points.iter().for_each(|&p| cross(painter, p, colour));
+}
+
+/// Dots that hide little of what is measured.
+fn dots(painter: &Painter, points: &[Pos2], colour: Color32) {
+    painter.extend(Shape::dotted_line(points, colour, 5.0, 0.9));
+}
+
+/// Open in the middle, so that the point itself is seen.
+fn cross(painter: &Painter, at: Pos2, colour: Color32) {
+    for (arm, width, tint) in [
+        (7.0, 3.0, Color32::from_black_alpha(150)),
+        (6.0, 1.4, colour),
+    ] {
+        let line = Stroke::new(width, tint);
+        for way in [
+            vec2(1.0, 0.0),
+            vec2(-1.0, 0.0),
+            vec2(0.0, 1.0),
+            vec2(0.0, -1.0),
+        ] {
+            painter.line_segment([at + 2.0 * way, at + arm * way], line);
+        }
+    }
+}
+
+fn letter(painter: &Painter, at: Pos2, letter: char, colour: Color32) {
+    let font = FontId::proportional(12.0);
+    let shadow = Color32::from_black_alpha(200);
+    painter.text(
+        at + vec2(1.0, 1.0),
+        Align2::RIGHT_BOTTOM,
+        letter,
+        font.clone(),
+        shadow,
+    );
+    painter.text(at, Align2::RIGHT_BOTTOM, letter, font, colour);
+}
+
+/// A text on a dark ground.
+fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
+    let font = FontId::proportional(13.0);
+    let galley = painter.layout_no_wrap(text.to_owned(), font, colour);
+    let room = Align2::LEFT_CENTER.anchor_size(at, galley.size());
+    painter.rect_filled(
+        room.expand2(vec2(4.0, 1.0)),
+        2.0,
+        Color32::from_black_alpha(170),
+    );
+    painter.galley(room.min, galley, colour);
+}
+
+fn arrow(painter: &Painter, from: Pos2, tip: Pos2, colour: Color32) {
+    let way = (tip - from).normalized();
+    let side = way.rot90();
+    let line = Stroke::new(1.4, colour);
+    painter.line_segment([from, tip], line);
+    for side in [side, -side] {
+        painter.line_segment([tip, tip - 9.0 * way + 4.0 * side], line);
+    }
+}
+
+fn write(painter: &Painter, place: &Place, note: &Note, colour: Color32) {
+    let at = to_screen(place, note.at);
+    if let Some(tip) = note.arrow {
+        arrow(painter, at, to_screen(place, tip), colour);
+    }
+    label(painter, at, &note.text, colour);
+}
+
+/// The field in which a note is typed; Enter or a click elsewhere keeps it.
+fn editor(ui: &Ui, sheet: &mut Sheet, place: &Place) {
+    let Some(index) = sheet.editing() else { return };
+    let What::Note(note) = &sheet.marks()[index].what else {
+        return;
+    };
+    let (mut text, at) = (note.text.clone(), to_screen(place, note.at));
+    Area::new(Id::new(("note", index)))
+        .order(Order::Foreground)
+        .fixed_pos(at - vec2(4.0, 11.0))
+        .show(ui.ctx(), |ui| {
+            let field = TextEdit::singleline(&mut text)
+                .desired_width(150.0)
+                .hint_text("text, Enter");
+            let response = ui.add(field);
+            if response.lost_focus() {
+                return true;
+            }
+            response.request_focus();
+            sheet.set_text(index, text);
+            false
+        })
+        .inner
+        .then(|| sheet.stop_editing());
+}
+
+/// What a measurement says, a line each.
+pub(super) fn reading(reading: &Reading) -> Vec<String> {
+    match reading {
+        Reading::Distance(mm) => vec![format!("{mm:.1} mm")],
+        Reading::Ellipse {
+            axes: [a, b],
+            circumference,
+            area,
+        } => vec![
+            format!("{a:.1} x {b:.1} mm"),
+            format!("C {circumference:.1} mm"),
+            format!("A {:.2} cm²", area / 100.0),
+        ],
+        Reading::Angle(degrees) => vec![format!("{degrees:.1}°")],
+    }
+}
+
+/// What was measured, beside the grey bar, where a sector leaves room.
+pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
+    let is_measured = |what: &What| matches!(what, What::Caliper(_));
+    if !sheet.marks().iter().any(|mark| is_measured(&mark.what)) {
+        return;
+    }
+    let corner = ui.max_rect().left_top() + vec2(46.0, 64.0);
+    let mut removed = None;
+    Area::new(Id::new("results"))
+        .fixed_pos(corner)
+        .constrain_to(ui.max_rect())
+        .show(ui.ctx(), |ui| {
+            egui::Frame::NONE
+                .fill(Color32::from_black_alpha(190))
+                .inner_margin(6)
+                .corner_radius(4)
+                .show(ui, |ui| {
+                    ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
+                    Grid::new("results")
+                        .num_columns(4)
+                        .spacing([8.0, 3.0])
+                        .show(ui, |ui| {
+                            for index in 0..sheet.marks().len() {
+                                row(ui, sheet, index, frame, &mut removed);
+                            }
+                        });
+                });
+        });
+    if let Some(mark) = removed {
+        sheet.remove(mark);
+    }
+}
+
+fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mut Option<usize>) {
+    let mark = &sheet.marks()[index];
+    let What::Caliper(caliper) = &mark.what else {
+        return;
+    };
+    let (kind, name, stands) = (
+        caliper.kind,
+        caliper.label.clone(),
+        mark.of == frame.moment(),
+    );
+    let lines = reading(&caliper.reading());
+    let letter = RichText::new(mark.letter)
+        .strong()
+        .color(colour(mark.letter));
+    let is_selected = sheet.selected().is_some_and(|(mark, _)| mark == index);
+    let tip = match stands {
+        true => "Select: arrow keys move its last point by a pixel, Del removes it",
+        false => "Measured on another image: the probe or the scene has moved since",
+    };
+    if ui
+        .selectable_label(is_selected, letter)
+        .on_hover_text(tip)
+        .clicked()
+    {
+        sheet.select(index);
+    }
+    named(ui, sheet, index, kind, name);
+    let colour = if stands { style::TEXT } else { style::FAINT };
+    ui.vertical(|ui| {
+        for line in lines {
+            ui.label(RichText::new(line).color(colour).size(13.0));
+        }
+    });
+    if ui.small_button("x").on_hover_text("Remove (Del)").clicked() {
+        *removed = Some(index);
+    }
+    ui.end_row();
+}
+
+/// The name of a measurement: chosen or typed.
+fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String) {
+    let shown = if name.is_empty() {
+        kind.name()
+    } else {
+        name.as_str()
+    };
+    let button = ui.menu_button(RichText::new(shown).size(12.0), |ui| {
+        ui.set_max_width(120.0);
+        let mut typed = name.clone();
+        let field = ui.add(
+            TextEdit::singleline(&mut typed)
+                .hint_text("name")
+                .char_limit(24),
+        );
+        if field.changed() {
+            sheet.set_text(index, typed);
+        }
+        if field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter)) {
+            ui.close();
+        }
+        for &label in kind.labels() {
+            if ui.button(label).clicked() {
+                sheet.set_text(index, label.to_owned());
+                ui.close();
+            }
+        }
+    });
+    button
+        .response
+        .on_hover_text("What is measured: choose a name or type one");
+}
+
+/// Buttons of the tools, a column at the left edge.
+pub(super) fn strip(ui: &mut Ui, sheet: &mut Sheet) {
+    let area = ui.max_rect();
+    let buttons: [(Tool, &str, Icon); 4] = [
+        (
+            Tool::Measure(Kind::Distance),
+            "Distance in mm: two clicks, or drag (L)",
+            |p, r, c| {
+                dots(p, &[r.left_bottom(), r.right_top()], c);
+                cross(p, r.left_bottom(), c);
+                cross(p, r.right_top(), c);
+            },
+        ),
+        (
+            Tool::Measure(Kind::Ellipse),
+            "Ellipse, circumference and area: the ends of one axis, then the width (O)",
+            |p, r, c| {
+                let radius = vec2(r.width() * 0.62, r.height() * 0.42);
+                p.add(egui::epaint::EllipseShape::stroke(
+                    r.center(),
+                    radius,
+                    Stroke::new(1.5, c),
+                ));
+            },
+        ),
+        (
+            Tool::Measure(Kind::Angle),
+            "Angle in degrees: a point on one arm, the vertex, a point on the other (K)",
+            |p, r, c| {
+                let line = Stroke::new(1.5, c);
+                p.line_segment([r.left_bottom(), r.right_top()], line);
+                p.line_segment([r.left_bottom(), r.right_bottom()], line);
+            },
+        ),
+        (
+            Tool::Note,
+            "Text: click to place it, or drag away from what it points at (N)",
+            |p, r, c| {
+                let font = FontId::proportional(17.0);
+                p.text(r.center(), Align2::CENTER_CENTER, "T", font, c);
+            },
+        ),
+    ];
+    let height = 30.0 * buttons.len() as f32;
+    let mut at = pos2(area.left() + 8.0, area.bottom() - 10.0 - height);
+    for (tool, tip, icon) in buttons {
+        let rect = Rect::from_min_size(at, vec2(30.0, 28.0));
+        if button(ui, rect, sheet.tool() == Some(tool), tip, icon) {
+            sheet.toggle(tool);
+        }
+        at.y += 30.0;
+    }
+}
+
+/// Draws a sign into its room with a colour.
+type Icon = fn(&Painter, Rect, Color32);
+
+fn button(ui: &mut Ui, rect: Rect, on: bool, tip: &str, icon: Icon) -> bool {
+    let response = ui.interact(rect, Id::new(tip), Sense::click());
+    let visuals = ui.style().interact_selectable(&response, on);
+    let painter = ui.painter();
+    painter.rect(
+        rect,
+        4.0,
+        visuals.weak_bg_fill,
+        visuals.bg_stroke,
+        egui::StrokeKind::Inside,
+    );
+    icon(painter, rect.shrink2(vec2(9.0, 8.0)), visuals.text_color());
+    response.on_hover_text(tip).clicked()
+}

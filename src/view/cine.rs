@@ -1,0 +1,133 @@
+//! The cine bar: freeze, and what was imaged last.
+
+use std::time::Instant;
+
+use egui::{
+    Align, ComboBox, CornerRadius, Layout, Rect, Response, Sense, Shape, Stroke, Ui, pos2, vec2,
+};
+
+use super::engine::Frame;
+use super::model::{Cine, Model};
+use super::style;
+
+/// Height of the bar, points.
+pub(super) const HEIGHT: f32 = 36.0;
+/// Room that speed and marks want beside the track, points.
+const WIDE: f32 = 520.0;
+/// How fast a loop can be played.
+const SPEEDS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
+
+/// Draws the bar into what is left of a row.
+pub(super) fn show(ui: &mut Ui, model: &mut Model, cine: &mut Cine<Frame>, now: Instant) {
+    let word = if model.frozen { "Live" } else { "Freeze" };
+    let tip = "Stop or start the image and the scene's time (Space)";
+    let button = egui::Button::new(word).selected(model.frozen);
+    if ui.add(button).on_hover_text(tip).clicked() {
+        model.freeze(!model.frozen, now);
+    }
+    if cine.is_empty() {
+        return;
+    }
+    if !model.frozen {
+        let span = cine.time_between(0, cine.len() - 1).as_secs_f64();
+        let text = format!("loop: {} images, {span:.1} s", cine.len());
+        let tip = "What was imaged last, to be looked through after Freeze";
+        ui.colored_label(style::FAINT, text).on_hover_text(tip);
+        return;
+    }
+    player(ui, cine, now);
+}
+
+fn player(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
+    let (word, tip) = match cine.is_playing() {
+        true => ("⏸", "Stop the loop (Enter)"),
+        false => ("▶", "Play the loop (Enter)"),
+    };
+    if ui.button(word).on_hover_text(tip).clicked() {
+        cine.play(!cine.is_playing(), now);
+    }
+    if ui.button("<").on_hover_text("One image back (,)").clicked() {
+        cine.step(-1);
+    }
+    if ui.button(">").on_hover_text("One image on (.)").clicked() {
+        cine.step(1);
+    }
+    let is_wide = ui.available_width() > WIDE;
+    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+        if is_wide {
+            speed(ui, cine, now);
+            let here = cine.cursor();
+            let tip = "The loop that plays and is saved ends with this image";
+            if ui.button("End").on_hover_text(tip).clicked() {
+                cine.mark_last(here);
+            }
+            let tip = "The loop that plays and is saved begins with this image";
+            if ui.button("Start").on_hover_text(tip).clicked() {
+                cine.mark_first(here);
+            }
+        }
+        let (cursor, last) = (cine.cursor(), cine.len() - 1);
+        let back = cine.time_between(cursor, last).as_secs_f64();
+        let text = format!("{} / {}   {:+.2} s", cursor + 1, cine.len(), -back);
+        // As wide as it gets, so that the track stands still.
+        ui.add_sized(vec2(118.0, 18.0), egui::Label::new(text))
+            .on_hover_text("Image of the loop; time before the newest");
+        track(ui, cine);
+    });
+}
+
+fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
+    let mut speed = cine.speed();
+    ComboBox::from_id_salt("speed")
+        .width(58.0)
+        .selected_text(format!("x {speed}"))
+        .show_ui(ui, |ui| {
+            for value in SPEEDS {
+                ui.selectable_value(&mut speed, value, format!("x {value}"));
+            }
+        })
+        .response
+        .on_hover_text("How fast the loop plays; 1 is the pace at which it was imaged");
+    if speed != cine.speed() {
+        cine.set_speed(speed, now);
+    }
+}
+
+/// One place per image; drag to look through them.
+fn track(ui: &mut Ui, cine: &mut Cine<Frame>) {
+    let size = vec2(ui.available_width().max(40.0), HEIGHT - 12.0);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+    let bar = rect.shrink2(vec2(6.0, 8.0));
+    scrub(&response, bar, cine);
+    let last = cine.len() - 1;
+    let x = |index: usize| {
+        let share = index as f32 / last.max(1) as f32;
+        bar.left() + share * bar.width()
+    };
+    let painter = ui.painter();
+    painter.rect_filled(bar, CornerRadius::same(2), style::BACK);
+    let [first, end] = cine.marks().map(x);
+    let part = Rect::from_x_y_ranges(first..=end, bar.y_range());
+    let dim = style::ACCENT.gamma_multiply(0.35);
+    painter.rect_filled(part, CornerRadius::same(2), dim);
+    for (at, inward) in [(first, 5.0), (end, -5.0)] {
+        let top = pos2(at, bar.top() - 4.0);
+        let corners = vec![top, top + vec2(inward, 0.0), pos2(at, bar.bottom())];
+        painter.add(Shape::convex_polygon(corners, style::ACCENT, Stroke::NONE));
+    }
+    let at = x(cine.cursor());
+    let line = Stroke::new(2.0, style::TEXT);
+    painter.vline(at, bar.y_range().expand(5.0), line);
+    response.on_hover_text("Drag to look through the loop; , and . step by one image");
+}
+
+fn scrub(response: &Response, bar: Rect, cine: &mut Cine<Frame>) {
+    let held = response.is_pointer_button_down_on() || response.clicked();
+    if let (true, Some(at)) = (held, response.interact_pointer_pos()) {
+        let share = ((at.x - bar.left()) / bar.width()).clamp(0.0, 1.0);
+        let index = (share * (cine.len() - 1) as f32).round() as usize;
+        if index != cine.cursor() || cine.is_playing() {
+            cine.seek(index);
+        }
+    }
+}
