@@ -10,11 +10,13 @@ mod catalogue;
 mod cine;
 mod console;
 pub mod engine;
+mod files;
 mod keys;
 mod layout;
 mod mmode;
 pub mod model;
 mod open;
+mod opening;
 mod ring;
 mod session;
 mod state;
@@ -37,6 +39,10 @@ use crate::sim::{SimError, Tracer};
 
 /// What a window is opened with.
 pub struct Options {
+    /// The scene file.
+    pub file: PathBuf,
+    /// What the command line says in its place.
+    pub overrides: Vec<(String, String)>,
     /// Which device; that it serves a window is set by [`run`].
     pub device: DeviceOptions,
     /// The kernels.

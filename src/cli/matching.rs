@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use insonify::output;
 use insonify::scene::Imaging;
-use insonify::scene::file::save;
+use insonify::scene::file::{Entry, save};
 use insonify::sim::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::sim::shaders::Library;
 use miette::{Result, miette};
@@ -121,7 +121,7 @@ pub fn run(args: &Match) -> Result<()> {
 /// Writes what has changed, unless nothing has and no other file is wanted.
 fn write(args: &Match, made: &Matching) -> Result<()> {
     let settings = settings(made, &args.common.overrides);
-    for (path, value) in &settings {
+    for (path, value) in settings.iter().filter_map(|(p, v)| Some((p, v.as_ref()?))) {
         output::line(format!("{path} = {value}"));
     }
     if settings.is_empty() {
@@ -138,13 +138,13 @@ fn write(args: &Match, made: &Matching) -> Result<()> {
 
 /// Entries of the scene file that have changed, as `--set` takes them; those that were overridden count,
 /// since the file may say something else.
-fn settings(made: &Matching, overrides: &[(String, String)]) -> Vec<(String, String)> {
+fn settings(made: &Matching, overrides: &[(String, String)]) -> Vec<Entry> {
     let (before, after) = (&made.before.imaging, &made.after.imaging);
     let mut out = Vec::new();
     let mut set = |key: &str, differs: bool, value: String| {
         let path = format!("imaging.{key}");
         if differs || overrides.iter().any(|(set, _)| set.starts_with(&path)) {
-            out.push((path, value));
+            out.push((path, Some(value)));
         }
     };
     let level = |decibel: f64| format!("\"{decibel} dB\"");

@@ -34,6 +34,8 @@ pub fn run(args: &View) -> Result<()> {
     let scene = args.common.scene(&args.scene)?;
     let common = args.common.clone();
     let options = Options {
+        file: args.scene.clone(),
+        overrides: common.overrides.clone(),
         // Both tracers: the console exchanges them.
         device: common.device_options(),
         library: Arc::new(Library::embedded()),

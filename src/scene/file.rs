@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::sweep::Variant;
-use super::{Scene, Warning};
+use super::{Origins, Scene, Tissue, Warning};
 
 mod anatomy;
 mod document;
@@ -15,6 +15,7 @@ mod nodes;
 mod parameters;
 mod placing;
 mod playing;
+mod preset;
 mod probe;
 mod save;
 mod schema;
@@ -26,7 +27,8 @@ mod trajectory;
 mod units;
 
 pub use error::SceneError;
-pub use save::save;
+pub use preset::{Preset, load_preset};
+pub use save::{Entry, save};
 pub use trajectory::load_trajectory;
 
 use document::{Document, Source};
@@ -83,6 +85,7 @@ impl Scene {
             tissues.index("background", file.background.as_deref().unwrap_or("water"))?;
         let mut anatomy = anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
         let graph = graph::build(&document, &file, &mut anatomy)?;
+        let instances = anatomy.origins(&file.mesh);
         let wires = anatomy::wires(&document, &file.wire)?;
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
         let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
@@ -106,9 +109,15 @@ impl Scene {
                 .to_string_lossy()
                 .into_owned()
         });
+        let tissues = tissues.used();
+        let bases = |tissue: &Tissue| tissues::bases(&file.tissues, &tissue.name);
+        let origins = Origins {
+            instances,
+            bases: tissues.iter().map(bases).collect(),
+        };
         let mut scene = Self {
             name,
-            tissues: tissues.used(),
+            tissues,
             background,
             meshes: anatomy.meshes,
             instances: anatomy.instances,
@@ -121,6 +130,7 @@ impl Scene {
             volume,
             fusion,
             tracker,
+            origins,
         };
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));

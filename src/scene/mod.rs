@@ -17,6 +17,7 @@ mod load_obj;
 mod load_stl;
 pub mod mesh;
 pub mod normals;
+mod origin;
 pub mod settings;
 pub mod shapes;
 pub mod suggest;
@@ -30,6 +31,7 @@ pub use fusion::{Acquired, Fusion};
 pub use graph::Graph;
 pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
+pub use origin::{Origin, Origins};
 pub use settings::{Imaging, Simulation};
 pub use tissue::Tissue;
 pub use tracker::Tracker;
@@ -140,6 +142,8 @@ pub struct Scene {
     pub fusion: Option<Fusion>,
     /// The tracked tool that may move the probe.
     pub tracker: Tracker,
+    /// Where its file says all this.
+    pub origins: Origins,
 }
 
 impl Scene {
@@ -160,6 +164,7 @@ impl Scene {
             volume: None,
             fusion: None,
             tracker: Tracker::default(),
+            origins: Origins::default(),
         }
     }
 

@@ -159,9 +159,21 @@ pub enum Machine {
 }
 
 impl Simulation {
+    /// Edge of a lattice cell, mm, where nobody says it: it follows the wavelength, 0.15 mm at 7 MHz,
+    /// as far as a scene file may say it. `frequency` in MHz.
+    pub fn default_cell(frequency: f64) -> f64 {
+        (1.05 / frequency).min(10.0)
+    }
+
     /// Share of its scatterers that a tissue keeps, 0..=1.
     pub fn thinning(&self) -> f64 {
         self.density_scale.min(1.0)
+    }
+
+    /// By what a cell is smaller than it would be without [`Self::density_scale`]: it holds one
+    /// scatterer at most, so more of them need more cells.
+    pub fn crowding(&self) -> f64 {
+        self.density_scale.max(1.0).cbrt()
     }
 
     /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.

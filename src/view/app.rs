@@ -110,6 +110,7 @@ impl App {
         let began = Instant::now();
         let shot = self.plan.options.screenshot.is_some();
         let painted = open.paint(&mut self.statistics, shot);
+        open.begin(&self.plan);
         let took = began.elapsed().as_secs_f64() * 1e3;
         self.statistics.add_interface(took);
         if open.is_done() {
@@ -152,7 +153,8 @@ impl ApplicationHandler<Wake> for App {
     }
 
     fn user_event(&mut self, events: &ActiveEventLoop, _: Wake) {
-        let failed = self.open.as_mut().map(Open::listen);
+        let plan = &mut self.plan;
+        let failed = self.open.as_mut().map(|open| open.listen(plan));
         if let Some(Err(error)) = failed {
             self.fail(events, error.into());
         }

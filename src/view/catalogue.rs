@@ -24,9 +24,16 @@ pub struct Entry {
 /// # Panics
 /// A key that scene files do not have.
 pub fn entry(key: &str) -> &'static Entry {
-    static ENTRIES: LazyLock<HashMap<String, Entry>> = LazyLock::new(|| read(REFERENCE));
     let found = ENTRIES.get(key);
     found.unwrap_or_else(|| panic!("docs/scenes.md has no key {key}"))
+}
+
+static ENTRIES: LazyLock<HashMap<String, Entry>> = LazyLock::new(|| read(REFERENCE));
+
+/// All keys, in no order.
+#[cfg(test)]
+pub(super) fn keys() -> impl Iterator<Item = &'static str> {
+    ENTRIES.keys().map(String::as_str)
 }
 
 fn read(document: &str) -> HashMap<String, Entry> {

@@ -12,6 +12,7 @@ use std::time::Instant;
 
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
+use super::files;
 use super::model::Model;
 use super::state::State;
 
@@ -21,6 +22,7 @@ pub(super) const WIDTH: f32 = 336.0;
 /// Draws the console into a side panel.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     actions(ui, model, now);
+    files::row(ui, model, &mut state.files);
     ui.separator();
     let before = model.settings.clone();
     ScrollArea::vertical()
@@ -31,8 +33,9 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
             section(ui, "Animation", false, &mut animate);
             let (settings, loaded) = (&mut model.settings, &model.loaded);
+            let lattice = model.file.lattice;
             section(ui, "Simulation", false, |ui| {
-                simulation::show(ui, settings, state)
+                simulation::show(ui, settings, state, lattice)
             });
             if let Some(fusion) = &mut settings.fusion {
                 section(ui, "Fusion", false, |ui| simulation::fusion(ui, fusion));

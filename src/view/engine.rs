@@ -12,7 +12,7 @@ use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
 use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::sim::shaders::Library;
-use crate::sim::{SimError, Simulator, image_size};
+use crate::sim::{SimError, Simulator, Tracer, image_size};
 
 /// Where the image lies in the probe's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,6 +93,10 @@ pub enum News {
     Frame(Box<Frame>),
     /// An order could not be carried out; the next one may.
     Refused(String),
+    /// The scene that was to be opened is there: pictures from now on are of it.
+    Opened,
+    /// It cannot be; the one before goes on.
+    NotOpened(String),
     /// Nothing more will come.
     Failed(SimError),
 }
@@ -100,9 +104,17 @@ pub enum News {
 struct State {
     /// The newest order that was not taken yet.
     order: Option<Order>,
+    /// A scene to go on with, and what to show of it.
+    opening: Option<(Box<Scene>, Order)>,
     frozen: bool,
     stop: bool,
     news: Vec<News>,
+}
+
+/// What there is to do next.
+enum Job {
+    Image(Order),
+    Open(Box<Scene>, Order),
 }
 
 struct Shared {
@@ -135,6 +147,7 @@ impl Engine {
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 order: Some(order),
+                opening: None,
                 frozen: false,
                 stop: false,
                 news: Vec::new(),
@@ -165,6 +178,14 @@ impl Engine {
         let mut state = self.shared.lock();
         state.order = Some(order);
         state.frozen = frozen;
+        drop(state);
+        self.shared.changed.notify_all();
+    }
+
+    /// Goes on with another scene, if the device can hold it beside the one before.
+    pub fn open(&self, scene: Scene, order: Order) {
+        let mut state = self.shared.lock();
+        state.opening = Some((Box::new(scene), order));
         drop(state);
         self.shared.changed.notify_all();
     }
@@ -202,8 +223,23 @@ impl Worker {
         let mut simulator = None;
         let mut last: Option<Order> = None;
         for index in 0.. {
-            let Some(order) = self.next(last.as_ref()) else {
-                return;
+            let order = match self.next(last.as_ref()) {
+                None => return,
+                Some(Job::Image(order)) => order,
+                Some(Job::Open(scene, order)) => match self.open(*scene, &order) {
+                    Ok(opened) => {
+                        simulator = Some(opened);
+                        self.tell(News::Opened);
+                        order
+                    }
+                    Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
+                        return self.tell(News::Failed(error));
+                    }
+                    Err(error) => {
+                        self.tell(News::NotOpened(error.to_string()));
+                        continue;
+                    }
+                },
             };
             match self.carry_out(&mut simulator, &order, index) {
                 Ok(frame) => self.tell(News::Frame(Box::new(frame))),
@@ -225,19 +261,22 @@ impl Worker {
 
     /// The newest order once there is one, or the last one again while its clock runs; nothing at
     /// the end.
-    fn next(&self, last: Option<&Order>) -> Option<Order> {
+    fn next(&self, last: Option<&Order>) -> Option<Job> {
         let mut state = self.shared.lock();
         loop {
             if state.stop {
                 return None;
             }
+            if let Some((scene, order)) = state.opening.take() {
+                return Some(Job::Open(scene, order));
+            }
             if !state.frozen {
                 if let Some(order) = state.order.take() {
-                    return Some(order);
+                    return Some(Job::Image(order));
                 }
                 if let Some(last) = last.filter(|last| last.clock.runs()) {
                     let at = Instant::now();
-                    return Some(Order { at, ..last.clone() });
+                    return Some(Job::Image(Order { at, ..last.clone() }));
                 }
             }
             let changed = self.shared.changed.wait(state);
@@ -245,9 +284,25 @@ impl Worker {
         }
     }
 
+    /// Uploads another scene; the one before stays until that is done.
+    fn open(&mut self, mut scene: Scene, order: &Order) -> Result<(Simulator, Tracer), SimError> {
+        order.settings.apply(&mut scene);
+        scene.set_time(order.clock.at(Instant::now()));
+        let tracer = order.settings.tracer;
+        let simulator = Simulator::new(&self.device, &self.library, &scene, tracer)?;
+        self.scene = scene;
+        self.fitted = None;
+        let mut state = self.shared.lock();
+        // What was ordered of the scene before means nothing here.
+        state.order = None;
+        state.frozen = false;
+        drop(state);
+        Ok((simulator, tracer))
+    }
+
     fn carry_out(
         &mut self,
-        simulator: &mut Option<(Simulator, crate::sim::Tracer)>,
+        simulator: &mut Option<(Simulator, Tracer)>,
         order: &Order,
         index: u32,
     ) -> Result<Frame, SimError> {

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use egui::{Event, Key, Modifiers};
 
+use super::files::Purpose;
 use super::model::calipers::Kind;
 use super::model::sheet::Tool;
 use super::model::{Axis, Model, STEP};
@@ -25,6 +26,8 @@ enum Action {
     Home,
     Undo,
     Redo,
+    Save,
+    Load,
     Console,
     Timing,
     Mmode,
@@ -37,7 +40,7 @@ enum Action {
 type Binding = (Key, bool, Action);
 
 /// Every key with its line in the list of keys; lines without a text belong to the one before.
-const BINDINGS: [(&str, &[Binding], &str); 19] = [
+const BINDINGS: &[(&str, &[Binding], &str)] = &[
     (
         "Left Right",
         &[
@@ -155,6 +158,11 @@ const BINDINGS: [(&str, &[Binding], &str); 19] = [
         "undo and redo settings",
     ),
     (
+        "Ctrl+S Ctrl+O",
+        &[(Key::S, true, Action::Save), (Key::O, true, Action::Load)],
+        "save settings (with Shift: as), load settings or a scene",
+    ),
+    (
         "C T M",
         &[
             (Key::C, false, Action::Console),
@@ -255,6 +263,9 @@ fn carry_out(
         Action::Home => model.place_probe(model.home, now),
         Action::Undo => return model.undo(now),
         Action::Redo => return model.redo(now),
+        Action::Save if modifiers.shift => state.files.ask(Purpose::Save, model),
+        Action::Save => state.files.save(model),
+        Action::Load => state.files.ask(Purpose::Load, model),
         Action::Console => state.console = !state.console,
         Action::Timing => state.timing = !state.timing,
         Action::Mmode => mmode::toggle(model, now),

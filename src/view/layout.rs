@@ -11,7 +11,7 @@ use super::model::Model;
 use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{calipers, cine, keys, mmode, style, timing};
+use super::{calipers, cine, files, keys, mmode, style, timing};
 
 /// Draws the interface; returns where the picture belongs.
 pub(super) fn show(
@@ -84,6 +84,7 @@ pub(super) fn show(
             state.problem = None;
         }
     }
+    files::dialog(ui.ctx(), model, &mut state.files, now);
     if state.help {
         help(ui.ctx(), &mut state.help);
     }

@@ -4,9 +4,11 @@ pub mod calipers;
 mod camera;
 pub mod cine;
 mod clock;
+mod entries;
 mod history;
 pub mod mmode;
 mod pose;
+mod saving;
 mod settings;
 pub mod sheet;
 
@@ -20,6 +22,7 @@ pub use clock::Clock;
 use history::History;
 use mmode::Strip;
 pub use pose::{Axis, STEP, moved};
+pub use saving::File;
 pub use settings::Settings;
 
 use super::engine::Frame;
@@ -49,6 +52,8 @@ pub struct Model {
     pub loaded: Settings,
     /// The pose of the scene file.
     pub home: DAffine3,
+    /// The scene file.
+    pub file: File,
     history: History,
     revision: u64,
     opened: Instant,
@@ -64,6 +69,8 @@ pub struct Placed {
     pub tissue: usize,
     /// All its keyframes have the same triangles.
     pub shares_topology: bool,
+    /// What says by which strategy the device follows it: the same for all that one selector switches.
+    pub switch: Option<String>,
 }
 
 /// What one picture of the simulation is made from.
@@ -84,8 +91,8 @@ pub struct Order {
 }
 
 impl Model {
-    /// The state of a scene as loaded, standing at `seconds`; it plays if it can.
-    pub fn new(scene: &Scene, tracer: Tracer, seconds: f64, now: Instant) -> Self {
+    /// The state of a scene as loaded from `file`, standing at `seconds`; it plays if it can.
+    pub fn new(scene: &Scene, file: File, tracer: Tracer, seconds: f64, now: Instant) -> Self {
         let settings = Settings::of(scene, tracer);
         let animated = is_animated(scene);
         Self {
@@ -97,14 +104,16 @@ impl Model {
             frozen: false,
             animated,
             mmode: None,
-            meshes: (scene.instances.iter())
-                .map(|i| Placed {
+            meshes: (scene.instances.iter().enumerate())
+                .map(|(index, i)| Placed {
                     name: i.name.clone(),
                     tissue: i.tissue,
                     shares_topology: scene.shares_topology(i),
+                    switch: scene.origins.instances.get(index).map(entries::switch),
                 })
                 .collect(),
             home: scene.world_from_probe,
+            file,
             history: History::default(),
             revision: 0,
             opened: now,
@@ -135,6 +144,7 @@ impl Model {
     /// Notes that the settings were `before` until now.
     pub fn note(&mut self, before: &Settings, now: Instant) {
         if *before != self.settings {
+            self.unite(before);
             self.history.push(before.clone(), now);
             self.touch(now);
         }

@@ -9,6 +9,9 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
 use super::engine::{Frame, News};
+use super::files::Files;
+use super::model::File;
+use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
 use super::statistics::{Sample, Times};
@@ -36,6 +39,10 @@ pub(super) struct Open {
     again: Option<Instant>,
     input: egui_winit::State,
     window: Arc<Window>,
+    title: String,
+    opening: Option<Opening>,
+    /// A scene that the simulation is to go on with.
+    coming: Option<Opened>,
 }
 
 /// What a session is made from, again where its device is lost.
@@ -75,16 +82,16 @@ impl Open {
     ) -> Result<(Self, ValidationLog), ViewError> {
         let window = session::window(events, &plan.scene.name)?;
         let device = session::device(&plan.options)?;
-        let lattice = plan.scene.simulation.cell * plan.scene.probe.frequency;
-        let simulation = &mut plan.scene.simulation;
-        let suited = (plan.options.prepare)(&device, simulation);
-        let tracer = suited.map_err(ViewError::Refused)?;
+        let (options, now) = (&plan.options, Instant::now());
+        let scene = plan.scene.clone();
+        let file = File::new(options.file.clone(), options.overrides.clone(), &scene);
+        let suited = opening::suited(scene, file, options, &device, options.seconds, now);
+        let Opened { scene, model } = suited.map_err(ViewError::Refused)?;
+        plan.scene = scene;
         let machine = match device.info().kind {
             AdapterKind::Cpu => Machine::Software,
             _ => Machine::Gpu,
         };
-        let now = Instant::now();
-        let model = Model::new(&plan.scene, tracer, plan.options.seconds, now);
         let state = State {
             console: true,
             timing: false,
@@ -93,7 +100,7 @@ impl Open {
             tissue: 0,
             mesh: 0,
             machine,
-            lattice,
+            files: Files::default(),
             ray_query: device.supports_ray_query(),
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
@@ -115,6 +122,9 @@ impl Open {
             again: None,
             input,
             window,
+            title: String::new(),
+            opening: None,
+            coming: None,
         };
         Ok((made, log))
     }
@@ -133,8 +143,12 @@ impl Open {
             input,
             window,
             touched,
+            title,
+            opening,
             ..
         } = self;
+        // What was handed over is lost with the device; it can be asked for again.
+        state.files.opening = opening.is_some();
         // All that is on the lost device ends before there is another.
         drop(frame);
         state.tools.lose();
@@ -158,13 +172,17 @@ impl Open {
             again: None,
             input,
             window,
+            title,
+            opening,
+            coming: None,
         };
         Ok((made, log))
     }
 
     /// Takes over what the simulation has to say; an error after which nothing more will come.
-    pub(super) fn listen(&mut self) -> Result<(), SimError> {
+    pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), SimError> {
         let mut failed = Ok(());
+        self.receive(plan);
         for news in self.session.engine.news() {
             match news {
                 News::Frame(frame) => {
@@ -175,11 +193,88 @@ impl Open {
                     self.state.problem = None;
                 }
                 News::Refused(problem) => self.state.problem = Some(problem),
+                News::Opened => self.adopt(plan),
+                News::NotOpened(problem) => self.refuse(problem),
                 News::Failed(error) => failed = Err(error),
             }
         }
         self.window.request_redraw();
         failed
+    }
+
+    /// Begins to open a scene where the user wants it.
+    pub(super) fn begin(&mut self, plan: &Plan) {
+        let files = &mut self.state.files;
+        if let Some(path) = files.wanted.take() {
+            // Said of this file; another one speaks for itself.
+            let of_this = path == self.model.file.path;
+            let overrides = self
+                .model
+                .file
+                .overrides
+                .iter()
+                .filter(|_| of_this)
+                .cloned();
+            files.opening = true;
+            let proxy = plan.proxy.clone();
+            self.opening = Some(Opening::begin(path, overrides.collect(), proxy));
+        }
+    }
+
+    /// Hands a scene that has been read to the simulation.
+    fn receive(&mut self, plan: &Plan) {
+        let device = &self.session.device;
+        let Some(opening) = &self.opening else { return };
+        let Some(ready) = opening.ready(&plan.options, device, Instant::now()) else {
+            return;
+        };
+        self.opening = None;
+        match ready {
+            Ok(opened) => {
+                let (scene, order) = (opened.scene.clone(), opened.model.order());
+                self.session.engine.open(scene, order);
+                self.coming = Some(opened);
+            }
+            Err(problem) => self.refuse(problem),
+        }
+    }
+
+    /// Goes on with the scene that the simulation has taken up.
+    fn adopt(&mut self, plan: &mut Plan) {
+        let opened = self.coming.take();
+        let Opened { scene, model } = opened.expect("nothing else was handed over");
+        self.told = model.revision();
+        self.model = model;
+        // It shows the scene before, as does all that was measured in it.
+        self.frame = None;
+        (self.state.tissue, self.state.mesh) = (0, 0);
+        self.state.tools.lose();
+        self.state.mmode = Default::default();
+        plan.scene = scene;
+        self.state.files.opening = false;
+        self.state.files.close();
+    }
+
+    fn refuse(&mut self, problem: String) {
+        self.coming = None;
+        self.state.files.opening = false;
+        if let Err(problem) = self.state.files.refuse(problem) {
+            self.state.problem = Some(problem);
+        }
+    }
+
+    /// Names scene and file, and whether there is something to save.
+    fn entitle(&mut self) {
+        let (model, files) = (&self.model, &self.state.files);
+        let mark = match model.is_modified(files.with_pose) {
+            true => "*",
+            false => "",
+        };
+        let title = format!("{mark}{} - insonify", model.title);
+        if title != self.title {
+            self.window.set_title(&title);
+            self.title = title;
+        }
     }
 
     /// Hands an event to the interface.
@@ -209,6 +304,7 @@ impl Open {
         });
         let frame = shown.as_ref();
         self.tell();
+        self.entitle();
         let platform = std::mem::take(&mut output.platform_output);
         self.input.handle_platform_output(&self.window, platform);
         let scale = output.pixels_per_point;
@@ -243,7 +339,8 @@ impl Open {
 
     /// Tells the simulation what has changed.
     fn tell(&mut self) {
-        if self.model.revision() != self.told {
+        // A scene that is coming has settings of its own.
+        if self.model.revision() != self.told && self.coming.is_none() {
             self.told = self.model.revision();
             let (order, frozen) = (self.model.order(), self.model.frozen);
             self.session.engine.order(order, frozen);

@@ -18,6 +18,7 @@ pub(super) struct Wake;
 pub(super) struct Session {
     pub(super) engine: Engine,
     pub(super) painter: Painter,
+    pub(super) device: Arc<Device>,
 }
 
 /// A window of the default size.
@@ -53,6 +54,10 @@ impl Session {
         // An event loop that is gone needs no news.
         let wake = move || drop(proxy.send_event(Wake));
         let engine = Engine::start(&device, options.library.clone(), scene, order, wake);
-        Ok(Self { engine, painter })
+        Ok(Self {
+            engine,
+            painter,
+            device,
+        })
     }
 }

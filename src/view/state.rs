@@ -1,5 +1,6 @@
 //! What of the window is open and chosen; not saved.
 
+use super::files::Files;
 use super::mmode;
 use super::tools::Tools;
 use crate::scene::settings::Machine;
@@ -20,12 +21,12 @@ pub(super) struct State {
     pub(super) mesh: usize,
     /// What the simulation runs on.
     pub(super) machine: Machine,
-    /// Edge of the scene file's lattice cell times its frequency, mm MHz: what qualities start from.
-    pub(super) lattice: f64,
     /// The device has ray queries.
     pub(super) ray_query: bool,
     /// Name and driver of the device.
     pub(super) device: String,
+    /// Saving, loading, opening.
+    pub(super) files: Files,
     /// What went wrong last, until it goes right again.
     pub(super) problem: Option<String>,
     /// Loop, measurements, texts.

@@ -12,7 +12,7 @@ use super::schema::{MeshTable, SurfaceTable, WireTable};
 use super::shelf::Shelf;
 use super::tissues::Tissues;
 use super::within;
-use crate::scene::{Instance, Issue, Keyframes, Mesh, Surface, Wire};
+use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Surface, Wire};
 
 /// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
 const MIN_SPACING: f64 = 1e-3;
@@ -35,6 +35,21 @@ pub(super) struct Anatomy {
     pub instances: Vec<Instance>,
     /// By table.
     pub placed: Vec<Placed>,
+}
+
+impl Anatomy {
+    /// Where the file describes each instance.
+    pub fn origins(&self, tables: &[MeshTable]) -> Vec<Origin> {
+        let of = |(table, placed): (&MeshTable, &Placed)| {
+            let origin = Origin {
+                mesh: table.name.clone(),
+                // What switches an animation is the mesh's own.
+                selector: table.parent.clone().filter(|_| table.keyframes.is_some()),
+            };
+            std::iter::repeat_n(origin, placed.instances.len())
+        };
+        tables.iter().zip(&self.placed).flat_map(of).collect()
+    }
 }
 
 /// Reads every mesh.

@@ -194,6 +194,12 @@ impl Document<'_> {
             .error(self.span(&segments), message.into(), Some(remedy.into()))
     }
 
+    /// Whether the top-level `table` has a key other than `but`.
+    pub fn says_of(&self, table: &str, but: &str) -> bool {
+        let table = self.root.get(table).and_then(|v| v.get_ref().as_table());
+        table.is_some_and(|t| t.keys().any(|key| key.get_ref() != but))
+    }
+
     /// Where the value of a dotted path, or its nearest parent, begins: for the order of tables.
     pub fn place(&self, path: &str) -> usize {
         let segments: Vec<_> = path.split('.').collect();

@@ -26,9 +26,8 @@ pub(super) fn simulation(
     table: SimulationTable,
     frequency: f64,
 ) -> Result<Simulation, SceneError> {
-    // The lattice follows the wavelength: 0.15 mm at 7 MHz.
     let mut out = Simulation {
-        cell: 1.05 / frequency,
+        cell: Simulation::default_cell(frequency),
         ..Simulation::default()
     };
     overlay!(table => out:
@@ -72,8 +71,7 @@ pub(super) fn simulation(
             unit,
         )?;
     }
-    // A cell holds one scatterer at most: more of them need more cells.
-    out.cell /= out.density_scale.max(1.0).cbrt();
+    out.cell /= out.crowding();
     Ok(out)
 }
 

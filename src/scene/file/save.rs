@@ -5,24 +5,29 @@ use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
-use toml_edit::{DocumentMut, Item, KeyMut, Table, TableLike, Value};
+use toml_edit::{DocumentMut, Item, Key, KeyMut, Table, TableLike, Value};
 
 use super::document::Source;
 use super::error::SceneError;
+use super::tissues::Tissues;
+use super::{parameters, probe};
 use crate::scene::suggest;
 
 /// What is wrong with a setting, and what to do about it.
 type Misfit = (String, String);
 
-/// Writes the scene file `from` to `to` (which may be the same) with `settings` in place: pairs as
-/// [`crate::scene::Scene::load`] takes them, path and value. What they replace keeps its comments. In
-/// another folder the files that the scene names are named from there. `to` is replaced at once, when
-/// all is written: no failure leaves half a file.
+/// What is to be written: a path as [`crate::scene::Scene::load`] takes it and its value, or none where
+/// the key is to go. Names with dots stand in quotes, as in TOML: `mesh."a.b".roughness`.
+pub type Entry = (String, Option<String>);
+
+/// Writes the scene file `from` to `to` (which may be the same) with `settings` in place. What they
+/// replace keeps its comments. In another folder the files that the scene names are named from there.
+/// `to` is replaced at once, when all is written: no failure leaves half a file.
 ///
 /// # Errors
 /// A file that cannot be read or written, a path that does not fit the file, a value that the key does
 /// not take. `to` is then as it was.
-pub fn save(from: &Path, to: &Path, settings: &[(String, String)]) -> Result<(), SceneError> {
+pub fn save(from: &Path, to: &Path, settings: &[Entry]) -> Result<(), SceneError> {
     let misfit = |(message, remedy): Misfit| SceneError::file(from, message, &remedy);
     let source = Source::read(from, &[])?;
     // Its own error would have no remedy.
@@ -32,8 +37,10 @@ pub fn save(from: &Path, to: &Path, settings: &[(String, String)]) -> Result<(),
         .parse()
         .map_err(|e| misfit((format!("{e}"), "check its syntax".to_owned())))?;
     for (path, value) in settings {
-        let segments: Vec<_> = path.split('.').collect();
-        into_table(document.as_table_mut(), &segments, parsed(value)).map_err(misfit)?;
+        let segments = segments(path);
+        let segments: Vec<_> = segments.iter().map(String::as_str).collect();
+        let value = value.as_deref().map(parsed);
+        into_table(document.as_table_mut(), &segments, value).map_err(misfit)?;
     }
     let folder = |path: &Path| {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
@@ -48,12 +55,22 @@ pub fn save(from: &Path, to: &Path, settings: &[(String, String)]) -> Result<(),
         Moved { old, new }.visit_document_mut(&mut document);
     }
     let text = document.to_string();
-    // Nothing is written that could not be read again.
-    Source::of(to, text.clone()).document()?.parse()?;
+    check(&Source::of(to, text.clone()))?;
     replace_file(to, &text).map_err(|e| {
         let remedy = "check that the folder can be written to and has room";
         SceneError::file(to, format!("cannot be written: {e}"), remedy)
     })
+}
+
+/// Fails on what could not be read again: nothing of that is written.
+fn check(source: &Source) -> Result<(), SceneError> {
+    let document = source.document()?;
+    let file = document.parse()?;
+    let (probe, _) = probe::build(&document, &file.probe)?;
+    parameters::simulation(&document, file.simulation, probe.frequency)?;
+    parameters::imaging(&document, file.imaging)?;
+    Tissues::new(&document, &file.tissues)?;
+    Ok(())
 }
 
 /// A value as the command line takes it: what is not TOML is a text.
@@ -61,16 +78,33 @@ fn parsed(value: &str) -> Value {
     value.parse().unwrap_or_else(|_| Value::from(value))
 }
 
-fn into_table(table: &mut dyn TableLike, path: &[&str], value: Value) -> Result<(), Misfit> {
+/// The parts of a path. Names on the command line are not quoted, and may hold what a bare key may not.
+fn segments(path: &str) -> Vec<String> {
+    match Key::parse(path) {
+        Ok(keys) => keys.iter().map(|key| key.get().to_owned()).collect(),
+        Err(_) => path.split('.').map(str::to_owned).collect(),
+    }
+}
+
+fn into_table(
+    table: &mut dyn TableLike,
+    path: &[&str],
+    value: Option<Value>,
+) -> Result<(), Misfit> {
     let (first, rest) = path.split_first().expect("a path has a part");
     if rest.is_empty() {
-        match table.get_mut(first).and_then(Item::as_value_mut) {
-            Some(old) => replace_value(old, value),
-            None => drop(table.insert(first, Item::Value(value))),
+        let old = table.get_mut(first).and_then(Item::as_value_mut);
+        match (old, value) {
+            (Some(old), Some(value)) => replace_value(old, value),
+            (None, Some(value)) => drop(table.insert(first, Item::Value(value))),
+            (_, None) => drop(table.remove(first)),
         }
         return Ok(());
     }
     if !table.contains_key(first) {
+        if value.is_none() {
+            return Ok(());
+        }
         let mut new = Table::new();
         new.decor_mut().set_prefix("\n");
         // A table of tables alone needs no heading.
@@ -96,7 +130,12 @@ fn into_table(table: &mut dyn TableLike, path: &[&str], value: Value) -> Result<
     }
 }
 
-fn into_value(inner: &mut Value, name: &str, rest: &[&str], value: Value) -> Result<(), Misfit> {
+fn into_value(
+    inner: &mut Value,
+    name: &str,
+    rest: &[&str],
+    value: Option<Value>,
+) -> Result<(), Misfit> {
     let array = match inner {
         Value::InlineTable(table) => return into_table(table, rest, value),
         Value::Array(array) => array,
@@ -107,12 +146,14 @@ fn into_value(inner: &mut Value, name: &str, rest: &[&str], value: Value) -> Res
         .map(|v| v.as_inline_table().and_then(|t| name_of(t)));
     let index = element(name, rest[0], &names.collect::<Vec<_>>())?;
     let inner = array.get_mut(index).expect("one of them");
-    match rest {
-        [_] => {
+    match (rest, value) {
+        ([_], Some(value)) => {
             replace_value(inner, value);
             Ok(())
         }
-        _ => into_value(inner, rest[0], &rest[1..], value),
+        // The others would be counted anew.
+        ([_], None) => Err(whole(name)),
+        (_, value) => into_value(inner, rest[0], &rest[1..], value),
     }
 }
 

@@ -31,8 +31,8 @@ name = "beat"
 period = 1
 "#;
 
-fn settings(pairs: &[(&str, &str)]) -> Vec<(String, String)> {
-    let owned = |&(path, value): &(&str, &str)| (path.to_owned(), value.to_owned());
+fn settings(pairs: &[(&str, &str)]) -> Vec<Entry> {
+    let owned = |&(path, value): &(&str, &str)| (path.to_owned(), Some(value.to_owned()));
     pairs.iter().map(owned).collect()
 }
 
@@ -61,7 +61,10 @@ fn only_what_is_set_changes() {
     assert_eq!(text, expected);
     let (saved, _) = Scene::load(&case.path(), &[]).expect("sound");
     std::fs::write(case.path(), COMMENTED).expect("written");
-    let (overridden, _) = Scene::load(&case.path(), &set).expect("sound");
+    let set = set
+        .into_iter()
+        .map(|(path, value)| (path, value.expect("set")));
+    let (overridden, _) = Scene::load(&case.path(), &set.collect::<Vec<_>>()).expect("sound");
     assert_eq!(
         saved.imaging, overridden.imaging,
         "as the command line sets it"
@@ -87,6 +90,42 @@ fn tables_in_any_spelling_are_found() {
         let saved = std::fs::read_to_string(case.path()).expect("there");
         assert_eq!(saved.trim_start(), expected, "{text}");
     }
+}
+
+#[test]
+fn what_is_taken_away_takes_nothing_else_along() {
+    let case = Case::new();
+    std::fs::write(case.path(), COMMENTED).expect("written");
+    let gone = |path: &str| (path.to_owned(), None);
+    let all = [
+        gone("imaging.gain"),
+        gone("imaging.noise"),
+        gone("mesh.b.parent"),
+        gone("probe.pose.position"),
+    ];
+    save(&case.path(), &case.path(), &all).expect("saved");
+    let text = std::fs::read_to_string(case.path()).expect("there");
+    let expected = COMMENTED
+        .replace("# Found by trying.\ngain = \"14 dB\" # loud\n", "")
+        .replace("parent = \"beat\"\n", "");
+    assert_eq!(text, expected, "what is not there needs no taking away");
+    let error = save(&case.path(), &case.path(), &[gone("imaging.psf_scale.0")]);
+    assert!(error.is_err(), "a list keeps its length");
+}
+
+#[test]
+fn names_with_dots_are_quoted() {
+    let case = Case::new();
+    let text = "[[mesh]]\nname = \"a.b\"\ntissue = \"fat\"\nfile = \"cube.obj\"\n";
+    std::fs::write(case.path(), text).expect("written");
+    let set = settings(&[
+        ("mesh.\"a.b\".roughness", "7"),
+        ("tissues.\"x y\".based_on", "fat"),
+    ]);
+    save(&case.path(), &case.path(), &set).expect("saved");
+    let saved = std::fs::read_to_string(case.path()).expect("there");
+    let more = "roughness = 7\n\n[tissues.\"x y\"]\nbased_on = \"fat\"\n";
+    assert_eq!(saved, format!("{text}{more}"));
 }
 
 #[test]
@@ -122,6 +161,8 @@ fn a_failure_leaves_the_file_alone() {
             "`mm` does not fit",
         ),
         (case.path(), ("imaging.gain", "loud"), "loud"),
+        (case.path(), ("imaging.gain", "999"), "gain is 999"),
+        (case.path(), ("tissues.fat.speed", "99"), "speed is 99"),
         (nowhere, ("imaging.gain", "1"), "folder cannot be used"),
     ] {
         let error = save(&case.path(), &to, &settings(&[set])).expect_err(cause);

@@ -90,6 +90,19 @@ fn unknown<'n>(
     document.fail(path, format!("unknown tissue `{name}`"), remedy)
 }
 
+/// Names of the tissues from which `name` takes what it does not say, the nearest first.
+pub(super) fn bases(tables: &BTreeMap<String, TissueTable>, name: &str) -> Vec<String> {
+    let mut out: Vec<String> = Vec::new();
+    let mut at = name;
+    while let Some(base) = tables.get(at).and_then(|table| table.based_on.as_deref())
+        && base != at
+    {
+        out.push(base.to_owned());
+        at = base;
+    }
+    out
+}
+
 /// The tissue `name` of the file, over what it is based on: another one of the file, a shipped
 /// one, or the shipped one of its own name.
 fn resolve(

@@ -2,13 +2,13 @@
 
 use std::time::Instant;
 
-use egui::{DragValue, Slider, Ui};
+use egui::{DragValue, Label, Slider, Ui};
 
 use super::controls::words;
 use crate::scene::Strategy;
 use crate::sim::Tracer;
 use crate::view::catalogue;
-use crate::view::model::Model;
+use crate::view::model::{Model, Placed};
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
     if !model.animated {
@@ -55,16 +55,29 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
     }
     let entry = catalogue::entry("selector.strategy");
     let tracer = model.settings.tracer;
+    // What one selector switches is followed by one strategy.
+    let mut shown: Vec<&Option<String>> = Vec::new();
     for (index, strategy) in model.settings.strategies.iter_mut().enumerate() {
-        if let Some(strategy) = strategy {
+        let switch = &model.meshes[index].switch;
+        if let Some(strategy) = strategy
+            && !(switch.is_some() && shown.contains(&switch))
+        {
+            shown.push(switch);
+            let together = |other: &&Placed| switch.is_some() && other.switch == *switch;
+            let meshes = || {
+                let own = std::slice::from_ref(&model.meshes[index]);
+                own.iter()
+                    .chain(model.meshes[index + 1..].iter().filter(together))
+            };
+            let shares = meshes().all(|mesh| mesh.shares_topology);
             ui.horizontal(|ui| {
-                let mesh = &model.meshes[index];
                 let possible = |s: &Strategy| match s {
                     Strategy::Union => tracer == Tracer::Bvh,
-                    s => mesh.shares_topology || !s.needs_shared_topology(),
+                    s => shares || !s.needs_shared_topology(),
                 };
                 words(ui, &format!("strategy {index}"), strategy, entry, possible);
-                ui.label(&mesh.name);
+                let names: Vec<_> = meshes().map(|mesh| mesh.name.as_str()).collect();
+                ui.add(Label::new(names.join(", ")).truncate());
             });
         }
     }

@@ -49,8 +49,7 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
     ui.collapsing("Beam", |ui| {
         grid(ui, "beam", |ui| beam(ui, &mut settings.probe))
     });
-    // The lattice follows the wavelength, as in scene files: else speckle would lose its scatterers.
-    settings.simulation.cell *= frequency / settings.probe.frequency;
+    settings.follow_frequency(frequency);
 }
 
 fn presets(ui: &mut Ui, settings: &mut Settings) {

@@ -9,7 +9,7 @@ use crate::sim::Tracer;
 use crate::view::model::Settings;
 use crate::view::state::State;
 
-pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State) {
+pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice: f64) {
     ui.horizontal(|ui| {
         ui.label("Quality")
             .on_hover_text("Path and scatterer counts that suit the device");
@@ -19,7 +19,8 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State) {
             ("reference", Quality::Reference),
         ] {
             if ui.button(name).clicked() {
-                settings.simulation.cell = state.lattice / settings.probe.frequency;
+                settings.simulation.cell = lattice / settings.probe.frequency;
+                settings.simulation.cell /= settings.simulation.crowding();
                 settings.simulation.set_quality(quality, state.machine);
             }
         }
@@ -38,6 +39,7 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State) {
                 }
             });
         ui.end_row();
+        let mut density = settings.simulation.density_scale;
         let s = &mut settings.simulation;
         count(ui, "simulation.paths", "Paths", &mut s.paths, 1..=128);
         number(
@@ -54,6 +56,31 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State) {
             &mut s.surface_gain,
             -30.0..=30.0,
         );
+        number(
+            ui,
+            "simulation.density_scale",
+            "Density",
+            &mut density,
+            0.1..=4.0,
+        );
+        number(
+            ui,
+            "simulation.roughness_scale",
+            "Roughness",
+            &mut s.roughness_scale,
+            0.1..=10.0,
+        );
+        number(
+            ui,
+            "simulation.thickness_scale",
+            "Thickness",
+            &mut s.thickness_scale,
+            0.0..=5.0,
+        );
+        if density != settings.simulation.density_scale {
+            settings.set_density_scale(density);
+        }
+        let s = &mut settings.simulation;
         number(ui, "simulation.cell", "Cell", &mut s.cell, 0.05..=1.0);
         let cells = &mut s.elevation_cells;
         number(
@@ -176,5 +203,11 @@ pub(super) fn fusion(ui: &mut Ui, fusion: &mut Fusion) {
         );
         count(ui, "fusion.blur", "Blur", &mut fusion.blur, 1..=128);
         choice(ui, "fusion.blend", "Blend", &mut fusion.blend);
+        switch(
+            ui,
+            "fusion.background_shadows",
+            "Shadows",
+            &mut fusion.background_shadows,
+        );
     });
 }

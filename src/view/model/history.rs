@@ -32,6 +32,11 @@ impl History {
         }
     }
 
+    /// What comes next is a change of its own.
+    pub(super) fn end_gesture(&mut self) {
+        self.last = None;
+    }
+
     pub(super) fn undo(&mut self, present: Settings) -> Option<Settings> {
         let before = self.past.pop()?;
         self.future.push(present);

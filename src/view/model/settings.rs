@@ -3,6 +3,7 @@
 use crate::probe::Probe;
 use crate::scene::{Fusion, Imaging, Scene, Simulation, Strategy, Surface, Tissue};
 use crate::sim::Tracer;
+use crate::view::catalogue;
 
 /// Settings of a scene that change while it is imaged.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,6 +42,25 @@ impl Settings {
             fusion: scene.fusion.clone(),
             tracer,
         }
+    }
+
+    /// The lattice follows the wavelength, as in scene files: else speckle would lose its scatterers.
+    /// `before` is the frequency that the cell suited, MHz.
+    pub fn follow_frequency(&mut self, before: f64) {
+        let frequency = self.probe.frequency;
+        if frequency != before {
+            let crowding = self.simulation.crowding();
+            let [least, most] = catalogue::entry("simulation.cell").range;
+            let cell = self.simulation.cell * crowding * before / frequency;
+            self.simulation.cell = cell.clamp(least, most) / crowding;
+        }
+    }
+
+    /// Sets [`Simulation::density_scale`]; cells shrink where there would be too few of them.
+    pub fn set_density_scale(&mut self, scale: f64) {
+        self.simulation.cell *= self.simulation.crowding();
+        self.simulation.density_scale = scale;
+        self.simulation.cell /= self.simulation.crowding();
     }
 
     /// Puts them into the scene that they were taken from.

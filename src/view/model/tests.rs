@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DVec3};
 
-use super::{Axis, Clock, Model, Settings, moved};
+use super::{Axis, Clock, File, Model, Settings, moved};
 use crate::scene::Scene;
 use crate::sim::Tracer;
 
@@ -31,7 +31,9 @@ fn scene() -> Scene {
 }
 
 fn model(now: Instant) -> Model {
-    Model::new(&scene(), Tracer::Bvh, 0.0, now)
+    let scene = scene();
+    let file = File::new("scene.toml".into(), Vec::new(), &scene);
+    Model::new(&scene, file, Tracer::Bvh, 0.0, now)
 }
 
 fn close(a: DVec3, b: DVec3) {

@@ -1,0 +1,139 @@
+//! A session's settings in scene files: written back, and taken from others.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::{Model, Settings, entries};
+use crate::scene::file::{Entry, load_preset, save};
+use crate::scene::{Origins, SceneError};
+
+/// The file that a session shows.
+#[derive(Clone, Debug)]
+pub struct File {
+    /// Where it is.
+    pub path: PathBuf,
+    /// What the command line says in its place.
+    pub overrides: Vec<(String, String)>,
+    /// Edge of its lattice cell times its frequency, mm MHz: before a quality that suits the device.
+    pub lattice: f64,
+    pub(super) origins: Origins,
+}
+
+#[cfg(test)]
+#[path = "saving_tests.rs"]
+mod tests;
+
+impl File {
+    /// The file at `path` with `overrides`, loaded as `scene`.
+    pub fn new(
+        path: PathBuf,
+        overrides: Vec<(String, String)>,
+        scene: &crate::scene::Scene,
+    ) -> Self {
+        Self {
+            path,
+            overrides,
+            lattice: entries::lattice(&Settings::of(scene, crate::sim::Tracer::Bvh)),
+            origins: scene.origins.clone(),
+        }
+    }
+}
+
+impl Model {
+    /// Whether settings differ from those of the file; `with_pose`: or the pose does.
+    pub fn is_modified(&self, with_pose: bool) -> bool {
+        let as_now = |tracer| Settings {
+            tracer,
+            ..self.loaded.clone()
+        };
+        as_now(self.settings.tracer) != self.settings || (with_pose && self.pose != self.home)
+    }
+
+    /// What the file has to say to give the settings, `with_pose` also the pose of the probe.
+    fn changes(&self, with_pose: bool) -> Vec<Entry> {
+        let file = &self.file;
+        let overrides = file.overrides.iter().cloned();
+        let mut out: Vec<Entry> = overrides.map(|(path, value)| (path, Some(value))).collect();
+        let (from, to) = (&self.loaded, &self.settings);
+        out.extend(entries::changes(from, to, &file.origins, file.lattice));
+        if with_pose {
+            out.extend(entries::pose(&self.pose));
+        }
+        out
+    }
+
+    /// Writes the settings, `with_pose` also the pose of the probe, into the session's file, or into
+    /// another one, which becomes the session's.
+    ///
+    /// # Errors
+    /// A file that cannot be written. It is then as it was, and so is the session.
+    pub fn save(&mut self, to: Option<&Path>, with_pose: bool) -> Result<(), SceneError> {
+        let to = to.unwrap_or(&self.file.path).to_owned();
+        let changes = self.changes(with_pose);
+        if !changes.is_empty() || to != self.file.path {
+            save(&self.file.path, &to, &changes)?;
+        }
+        let (before, now) = (
+            entries::lattice(&self.loaded),
+            entries::lattice(&self.settings),
+        );
+        if !entries::is_same_lattice(before, now) {
+            self.file.lattice = now;
+        }
+        self.file.path = to;
+        self.file.overrides.clear();
+        self.loaded = self.settings.clone();
+        if with_pose {
+            self.home = self.pose;
+        }
+        Ok(())
+    }
+
+    /// Takes probe, simulation and image formation from another scene file, as far as it speaks of
+    /// them. Anatomy and pose stay; one step back undoes it.
+    ///
+    /// # Errors
+    /// A file that cannot be used. Nothing has then changed.
+    pub fn load_settings(&mut self, path: &Path, now: Instant) -> Result<(), SceneError> {
+        let frequency = self.settings.probe.frequency;
+        let preset = load_preset(path, frequency)?;
+        let before = self.settings.clone();
+        let settings = &mut self.settings;
+        if let Some(probe) = preset.probe {
+            settings.probe = probe;
+            settings.follow_frequency(frequency);
+        }
+        if let Some(simulation) = preset.simulation {
+            settings.simulation = simulation;
+        }
+        if let Some(imaging) = preset.imaging {
+            settings.imaging = imaging;
+        }
+        self.history.end_gesture();
+        self.note(&before, now);
+        self.history.end_gesture();
+        Ok(())
+    }
+
+    /// Gives meshes that share a place in the file what one of them has got since `before`.
+    pub(super) fn unite(&mut self, before: &Settings) {
+        let (settings, origins) = (&mut self.settings, &self.file.origins.instances);
+        for (i, origin) in origins.iter().enumerate() {
+            let surface = settings.surfaces[i];
+            let strategy = settings.strategies[i];
+            let is_new = [
+                surface != before.surfaces[i],
+                strategy != before.strategies[i],
+            ];
+            for (j, other) in origins.iter().enumerate() {
+                if is_new[0] && other.mesh == origin.mesh {
+                    settings.surfaces[j] = surface;
+                }
+                let together = settings.strategies[j].is_some();
+                if is_new[1] && together && entries::switch(other) == entries::switch(origin) {
+                    settings.strategies[j] = strategy;
+                }
+            }
+        }
+    }
+}

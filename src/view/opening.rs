@@ -1,0 +1,87 @@
+//! A scene that is read while the window goes on.
+
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::Instant;
+
+use winit::event_loop::EventLoopProxy;
+
+use super::model::{File, Model};
+use super::session::Wake;
+use super::{Options, Refusal};
+use crate::gpu::Device;
+use crate::scene::{Scene, SceneError, Warning};
+
+type Loaded = Result<(Scene, Vec<Warning>), SceneError>;
+
+/// A scene on its way.
+pub(super) struct Opening {
+    path: PathBuf,
+    overrides: Vec<(String, String)>,
+    loaded: Receiver<Loaded>,
+}
+
+/// A scene with what the window starts from.
+pub(super) struct Opened {
+    pub(super) scene: Scene,
+    pub(super) model: Model,
+}
+
+impl Opening {
+    /// Begins to read `path`; the event loop is woken when that has ended.
+    pub(super) fn begin(
+        path: PathBuf,
+        overrides: Vec<(String, String)>,
+        proxy: EventLoopProxy<Wake>,
+    ) -> Self {
+        let (sender, loaded) = channel();
+        let (file, set) = (path.clone(), overrides.clone());
+        std::thread::spawn(move || {
+            // A window that is gone needs neither.
+            let _ = sender.send(Scene::load(&file, &set));
+            let _ = proxy.send_event(Wake);
+        });
+        Self {
+            path,
+            overrides,
+            loaded,
+        }
+    }
+
+    /// What has been read, suited to the device; nothing while it is not ready.
+    pub(super) fn ready(
+        &self,
+        options: &Options,
+        device: &Device,
+        now: Instant,
+    ) -> Option<Result<Opened, String>> {
+        let loaded = self.loaded.try_recv().ok()?;
+        Some(match loaded {
+            Ok((scene, warnings)) => {
+                for warning in &warnings {
+                    eprintln!("{warning}");
+                }
+                let file = File::new(self.path.clone(), self.overrides.clone(), &scene);
+                suited(scene, file, options, device, 0.0, now).map_err(|e| e.to_string())
+            }
+            Err(error) => Err(super::files::said(&error)),
+        })
+    }
+}
+
+/// The state of a window that opens `scene`, with counts that suit the device.
+///
+/// # Errors
+/// The device does not suit.
+pub(super) fn suited(
+    mut scene: Scene,
+    file: File,
+    options: &Options,
+    device: &Device,
+    seconds: f64,
+    now: Instant,
+) -> Result<Opened, Refusal> {
+    let tracer = (options.prepare)(device, &mut scene.simulation)?;
+    let model = Model::new(&scene, file, tracer, seconds, now);
+    Ok(Opened { scene, model })
+}
