@@ -1,4 +1,4 @@
-// Accumulators to complex samples: fixed point undone, lateral smoothing, noise.
+// Accumulators to complex samples: fixed point undone, lateral smoothing, contact, noise.
 //
 // One thread per (line, sample); neighbouring threads read neighbouring samples of the same line.
 #version 460
@@ -13,11 +13,30 @@ layout(std430, binding = 2) readonly buffer SurfaceBuffer { int surface[]; };
 layout(std430, binding = 3) readonly buffer VolumeBuffer { int volume[]; };
 layout(std430, binding = 4) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 5) buffer LateralBuffer { float lateral[]; };
+// Per line the coupled share of the transmit aperture; from frame.scanlines on how many of the elements
+// before each one are not coupled.
+layout(std430, binding = 6) readonly buffer ContactBuffer { float contact[]; };
 
 // Accumulators at and beyond this magnitude may have lost an echo.
 const int HEADROOM = 1 << 30;
 
 bool saturated(int v) { return v >= HEADROOM || v <= -HEADROOM; }
+
+// Elements before the place `at` (in elements from the face's edge) that are not coupled.
+float air_before(float at) {
+    uint i = min(uint(at), frame.scanlines - 1u);
+    float here = contact[frame.scanlines + i];
+    return here + (at - float(i)) * (contact[frame.scanlines + i + 1u] - here);
+}
+
+// What is left of the echoes of line l at sample k: coupled shares of what sends and what receives.
+float coupling(uint l, uint k) {
+    float count = float(frame.scanlines);
+    float middle = frame.kind == KIND_PHASED ? 0.5 * count : float(l) + 0.5;
+    float left = max(middle - rows[k].receive_reach, 0.0);
+    float right = min(middle + rows[k].receive_reach, count);
+    return contact[l] * (1.0 - (air_before(right) - air_before(left)) / (right - left));
+}
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
@@ -57,7 +76,7 @@ void main() {
     } else {
         v = vec2(float(volume[2u * own]), float(volume[2u * own + 1u]));
     }
-    vec2 iq = s * (rows[k].surface_undo / weights) + v * rows[k].volume_undo;
+    vec2 iq = (s * (rows[k].surface_undo / weights) + v * rows[k].volume_undo) * coupling(l, k);
 
     if (frame.noise > 0.0) {
         uvec4 bits = pcg4d(uvec4(l, k, frame.frame_index, frame.seed));

@@ -89,7 +89,7 @@ struct Row {
     float tgc;                                    // linear, applied to the IQ in detect
     float compensation;                           // linear, attenuation compensation of a weight at this depth
     float incoherent_gain;                        // keeps incoherent surface echoes at their energy through the averages
-    float unused0;
+    float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
 };
 
 // A straight stretch of a path inside one medium.

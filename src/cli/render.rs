@@ -105,6 +105,9 @@ pub fn run(args: &Render) -> Result<()> {
                 "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
                 "paths_lost": counters.paths_lost,
             },
+            "contact": simulator.contact().map(|touch| json!({
+                "share": touch.share, "depth_mm": touch.depth,
+            })),
             "saturated_samples": counters.saturated,
             "validation_messages": messages,
         });

@@ -22,7 +22,16 @@ pub const SUBJECT: Subject = Subject {
         let values = 8 * samples(&frame);
         let rows = size_of::<Row>() * frame.samples as usize;
         let counters = size_of::<Counters>();
-        vec![size_of::<Frame>(), rows, values, values, counters, values]
+        let contact = 8 * frame.scanlines as usize + 4;
+        vec![
+            size_of::<Frame>(),
+            rows,
+            values,
+            values,
+            counters,
+            values,
+            contact,
+        ]
     },
     extent: |job| {
         let frame: Frame = job.one("frame");
@@ -51,6 +60,13 @@ fn job(case: Case, size: Size) -> Job {
             .collect()
     };
     let (mut surface, volume) = (echoes(), echoes());
+    let mut contact = random.floats(frame.scanlines as usize, 0.0, 1.0);
+    let mut air = 0.0;
+    contact.push(air);
+    for coupled in random.floats(frame.scanlines as usize, 0.0, 1.0) {
+        air += coupled.round();
+        contact.push(air);
+    }
     if case == Case::NotFinite {
         rows[3].surface_undo = f32::NAN;
         rows[5].volume_undo = f32::INFINITY;
@@ -65,6 +81,7 @@ fn job(case: Case, size: Size) -> Job {
             Input::integers("volume", &volume),
             Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
             Input::output("lateral", Element::Float, surface.len()),
+            Input::floats("contact", &contact),
         ],
         push: Vec::new(),
     }
@@ -74,7 +91,8 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame: Frame = job.one("frame");
     let rows: Vec<Row> = job.get("rows");
     let (surface, volume): (Vec<i32>, Vec<i32>) = (job.get("surface"), job.get("volume"));
-    let expected = beam::beam(&frame, &rows, &surface, &volume);
+    let contact: Vec<f32> = job.get("contact");
+    let expected = beam::beam(&frame, &rows, [&surface, &volume], &contact);
     let got: Vec<f32> = job.after(outputs, "lateral");
     let counters: Vec<Counters> = job.after(outputs, "counters");
     let largest = |v: &[i32]| f64::from(v.iter().map(|x| x.unsigned_abs()).max().unwrap_or(0));

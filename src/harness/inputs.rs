@@ -115,7 +115,7 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 lateral_lines: 0.03 + 0.06 * depth,
                 tgc: 1.0 + 0.1 * depth,
                 compensation: 1.0 + 0.02 * depth,
-                ..Row::default()
+                receive_reach: 0.5 + 0.3 * depth,
             }
         })
         .collect()

@@ -1,6 +1,7 @@
-//! The transducer: element positions, rays, beam widths. Knows no Vulkan.
+//! The transducer: its face, rays, beam widths. Knows no Vulkan.
 
 pub mod beam;
+pub mod face;
 pub mod transducer;
 
 pub use transducer::{Kind, Probe};

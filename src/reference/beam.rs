@@ -1,13 +1,22 @@
-//! Twin of `beam`: both accumulators as amplitudes, smoothed laterally, with electronic noise.
+//! Twin of `beam`: both accumulators as amplitudes, smoothed laterally, weakened where the probe has
+//! lost contact, with electronic noise.
 
 use super::random::{gaussian, pcg4d};
-use crate::sim::layout::{FLAG_VOXEL, Frame, Row};
+use crate::sim::layout::{FLAG_VOXEL, Frame, KIND_PHASED, Row};
 
 /// Narrower kernels than this, in scanlines, smooth nothing.
 const NARROWEST: f64 = 0.05;
 
 /// Complex baseband lines: index 2 (l K + k) + {0: real, 1: imaginary}.
-pub fn beam(frame: &Frame, rows: &[Row], surface: &[i32], volume: &[i32]) -> Vec<f64> {
+///
+/// `contact` has the coupled share of each line's transmit aperture, then the sums, from 0 on, of what is
+/// not coupled of the elements before each.
+pub fn beam(
+    frame: &Frame,
+    rows: &[Row],
+    [surface, volume]: [&[i32]; 2],
+    contact: &[f32],
+) -> Vec<f64> {
     let mut out = Vec::with_capacity(surface.len());
     for l in 0..frame.scanlines {
         for k in 0..frame.samples {
@@ -15,6 +24,7 @@ pub fn beam(frame: &Frame, rows: &[Row], surface: &[i32], volume: &[i32]) -> Vec
             let words = pcg4d([l, k, frame.frame_index, frame.seed]);
             let weights = weights(row.lateral_lines.into());
             let reach = weights.len() as i64 / 2;
+            let coupling = coupling(frame, row, contact, l);
             for part in 0..2 {
                 let at = |j: i64| {
                     let line = i64::from(l) + j;
@@ -39,7 +49,8 @@ pub fn beam(frame: &Frame, rows: &[Row], surface: &[i32], volume: &[i32]) -> Vec
                     f64::from(volume[own]) * f64::from(row.volume_undo)
                 };
                 let noise = f64::from(frame.noise) * gaussian(words[part as usize]);
-                out.push(sums.surface / sums.weight + scatterers + noise);
+                let echoes = sums.surface / sums.weight + scatterers;
+                out.push(echoes * coupling + noise);
             }
         }
     }
@@ -51,6 +62,25 @@ pub fn saturated(surface: &[i32], volume: &[i32]) -> u32 {
     let full = |v: &[i32]| v.iter().any(|x| x.unsigned_abs() >= 1 << 30);
     let pairs = surface.chunks(2).zip(volume.chunks(2));
     pairs.filter(|(s, v)| full(s) || full(v)).count() as u32
+}
+
+/// What is left of the echoes of line `l`: coupled shares of what sends and of what receives, element by
+/// element.
+fn coupling(frame: &Frame, row: &Row, contact: &[f32], l: u32) -> f64 {
+    let (transmit, air) = contact.split_at(frame.scanlines as usize);
+    let count = f64::from(frame.scanlines);
+    let middle = match frame.kind {
+        KIND_PHASED => count / 2.0,
+        _ => f64::from(l) + 0.5,
+    };
+    let reach = f64::from(row.receive_reach);
+    let (left, right) = ((middle - reach).max(0.0), (middle + reach).min(count));
+    let elements = air.windows(2).enumerate().map(|(i, sums)| {
+        let i = i as f64;
+        let used = (right.min(i + 1.0) - left.max(i)).max(0.0);
+        used * (1.0 - (f64::from(sums[1]) - f64::from(sums[0])))
+    });
+    f64::from(transmit[l as usize]) * elements.sum::<f64>() / (right - left)
 }
 
 #[derive(Default)]
@@ -90,9 +120,34 @@ mod tests {
             surface_undo: 0.5,
             volume_undo: 0.25,
             lateral_lines,
+            receive_reach: 1.0,
             ..Row::default()
         };
         vec![row; samples]
+    }
+
+    /// All elements are coupled.
+    fn joined(frame: &Frame) -> Vec<f32> {
+        let lines = frame.scanlines as usize;
+        [vec![1.0; lines], vec![0.0; lines + 1]].concat()
+    }
+
+    // Of eight elements the last three are in air; apertures are three elements wide, on transmit as on
+    // receive, and two at the edges of the face.
+    #[test]
+    fn lines_lose_what_sends_and_what_receives() {
+        let (frame, mut rows) = (frame(8, 1), rows(1, 0.0));
+        rows[0].receive_reach = 1.5;
+        let share = [1.0, 1.0, 1.0, 1.0, 2.0 / 3.0, 1.0 / 3.0, 0.0, 0.0];
+        let sums = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0_f32];
+        let mut contact: Vec<f32> = share.map(|s| s as f32).to_vec();
+        contact.extend(sums);
+        let out = beam(&frame, &rows, [&[200; 16], &[0; 16]], &contact);
+        for (l, share) in share.into_iter().enumerate() {
+            let expected = 100.0 * share * share;
+            // Shares are given in single precision.
+            assert!((out[2 * l] - expected).abs() < 1e-4, "{l}: {}", out[2 * l]);
+        }
     }
 
     // Closed forms in f64; 1e-12 is rounding.
@@ -102,7 +157,7 @@ mod tests {
         let surface = vec![100; 160];
         let mut volume = vec![0; 160];
         volume[80] = 8;
-        let out = beam(&frame, &rows, &surface, &volume);
+        let out = beam(&frame, &rows, [&surface, &volume], &joined(&frame));
         for (i, v) in out.iter().enumerate() {
             let expected = if i == 80 { 52.0 } else { 50.0 };
             assert!((v - expected).abs() < 1e-12, "{i}: {v}");
@@ -114,7 +169,7 @@ mod tests {
         let (frame, rows) = (frame(41, 1), rows(1, 2.0));
         let mut surface = vec![0; 82];
         surface[2 * 20] = 1000;
-        let out = beam(&frame, &rows, &surface, &[0; 82]);
+        let out = beam(&frame, &rows, [&surface, &[0; 82]], &joined(&frame));
         let sum: f64 = out.iter().sum();
         assert!((sum - 500.0).abs() < 1e-9);
         let ratio = (out[2 * 22] / out[2 * 20]).ln();
@@ -132,7 +187,7 @@ mod tests {
         for draw in 0..4000 {
             let noise = |i: u32| (1000.0 * gaussian(pcg4d([i, draw, 0, 0])[0])) as i32;
             let volume: Vec<i32> = (0..400).map(noise).collect();
-            let out = beam(&frame, &rows, &[0; 400], &volume);
+            let out = beam(&frame, &rows, [&[0; 400], &volume], &joined(&frame));
             edge += out[0].powi(2) + out[1].powi(2);
             middle += out[200].powi(2) + out[201].powi(2);
         }
@@ -147,14 +202,14 @@ mod tests {
         frame.noise = 0.3;
         let rows = rows(100, 0.0);
         let zero = vec![0; 20_000];
-        let first = beam(&frame, &rows, &zero, &zero);
+        let first = beam(&frame, &rows, [&zero, &zero], &joined(&frame));
         let power = first.iter().map(|x| x * x).sum::<f64>() / 20_000.0;
         assert!(
             (power / 0.09 - 1.0).abs() < 0.04,
             "4 standard errors of 20 000 squares"
         );
         frame.frame_index = 1;
-        assert_ne!(first, beam(&frame, &rows, &zero, &zero));
+        assert_ne!(first, beam(&frame, &rows, [&zero, &zero], &joined(&frame)));
     }
 
     #[test]

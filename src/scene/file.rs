@@ -6,6 +6,7 @@ use super::sweep::Variant;
 use super::{Origins, Scene, Tissue, Warning};
 
 mod anatomy;
+mod contact;
 mod document;
 mod error;
 mod fusion;
@@ -101,6 +102,12 @@ impl Scene {
             &anatomy.meshes,
             &anatomy.instances,
         )?;
+        let contact = contact::build(
+            &document,
+            file.contact.as_ref(),
+            &anatomy.meshes,
+            &anatomy.instances,
+        )?;
         let tracker = tracker::build(&document, file.tracker.as_ref())?;
         warnings.extend(tissues.unused());
         let name = file.name.unwrap_or_else(|| {
@@ -129,6 +136,7 @@ impl Scene {
             imaging,
             volume,
             fusion,
+            contact,
             tracker,
             origins,
         };

@@ -7,6 +7,7 @@ use glam::DAffine3;
 
 pub mod animation;
 pub mod check;
+pub mod contact;
 pub mod file;
 pub mod fusion;
 pub mod graph;
@@ -26,6 +27,7 @@ pub mod tissue;
 pub mod topology;
 pub mod tracker;
 
+pub use contact::Contact;
 pub use file::SceneError;
 pub use fusion::{Acquired, Fusion};
 pub use graph::Graph;
@@ -140,6 +142,8 @@ pub struct Scene {
     pub volume: Option<Acquired>,
     /// How it is mixed with the simulation; none: everything is simulated.
     pub fusion: Option<Fusion>,
+    /// What the probe has to touch; none: every element is coupled wherever the probe is.
+    pub contact: Option<Contact>,
     /// The tracked tool that may move the probe.
     pub tracker: Tracker,
     /// Where its file says all this.
@@ -163,6 +167,7 @@ impl Scene {
             imaging: Imaging::default(),
             volume: None,
             fusion: None,
+            contact: None,
             tracker: Tracker::default(),
             origins: Origins::default(),
         }

@@ -109,6 +109,14 @@ impl MeshBvh {
     }
 }
 
+/// A binary hierarchy over `boxes`, for searches on the processor.
+pub(super) fn binary(boxes: &[Aabb]) -> Bvh2 {
+    match boxes.is_empty() {
+        true => Bvh2::default(),
+        false => build_bvh2(boxes, MESH, &mut Duration::default()),
+    }
+}
+
 fn wide(boxes: &[Aabb], params: BvhBuildParams) -> CwBvh {
     if boxes.is_empty() {
         CwBvh::default()

@@ -119,7 +119,7 @@ shared! {
         sigma_lateral: f32, sigma_elevation: f32,
         volume_gain: f32, point_gain: f32, surface_gain: f32,
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
-        tgc: f32, compensation: f32, incoherent_gain: f32, unused0: f32,
+        tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
     }
     /// A straight stretch of a path inside one medium.
     struct Segment {

@@ -2,6 +2,7 @@
 
 pub mod bvh;
 pub mod calibration;
+pub mod contact;
 pub mod dump;
 pub mod fields;
 pub mod fusion;
@@ -23,6 +24,7 @@ use std::time::Duration;
 use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
+use contact::Touch;
 use fusion::Fused;
 use passes::{Passes, frame_constants};
 pub use resize::image_size;
@@ -115,6 +117,8 @@ impl Simulator {
                 kernels: Kernels::new(device, library, &world, false)?,
                 buffers,
                 fusion,
+                skins: contact::Skins::default(),
+                touch: None,
                 world,
                 frame,
                 batches,
@@ -218,6 +222,11 @@ impl Simulator {
     /// for them included.
     pub fn update_time(&self) -> Duration {
         self.update_time
+    }
+
+    /// How the probe touched the skin in the last frame; none where the scene asks for no contact.
+    pub fn contact(&self) -> Option<Touch> {
+        self.passes.touch
     }
 
     /// Device memory of geometry and acceleration structures, bytes.

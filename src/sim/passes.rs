@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use super::contact::{self, Coupling, Skins, Touch};
 use super::fusion::{Fused, Simulated};
 use super::stages::{Batches, Buffers, Kernels, SCATTER_WINDOW, lines};
 use super::{SimError, World, layout, tables};
@@ -14,6 +15,9 @@ pub(super) struct Passes {
     pub(super) buffers: Buffers,
     /// Where the scene has an acquired volume.
     pub(super) fusion: Option<Fused>,
+    pub(super) skins: Skins,
+    /// How the probe touched the skin in the last frame.
+    pub(super) touch: Option<Touch>,
     pub(super) world: World,
     pub(super) frame: layout::Frame,
     pub(super) batches: Batches,
@@ -33,6 +37,10 @@ impl Passes {
         self.world.update(cmd, scene)?;
         (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index);
         cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
+        let coupling = Coupling::of(scene, &mut self.skins);
+        let shares = contact::table(scene, coupling.as_ref());
+        cmd.write(&self.buffers.contact, 0, bytemuck::cast_slice(&shares))?;
+        self.touch = coupling.map(|coupling| coupling.touch);
         if let Some(fusion) = &mut self.fusion {
             fusion.update(cmd, scene)?;
         }
@@ -152,6 +160,7 @@ impl Passes {
             &b.volume_echoes,
             &b.counters,
             &b.lateral,
+            &b.contact,
         ];
         self.per_sample(cmd, "beam", &self.kernels.beam, &bindings)
     }

@@ -64,6 +64,7 @@ fn holds(b: &Buffers, frame: &layout::Frame, tables: &Tables) -> bool {
             size_of::<layout::Surface>(),
         ),
         (&b.points, tables.points.len() as u64, 16),
+        (&b.contact, 2 * u64::from(frame.scanlines) + 1, 4),
         (&b.stacks, lines * (layout::MAX_STACK as u64 + 1), 4),
         (&b.segments, segments, size_of::<layout::Segment>()),
         (&b.segment_count, lines, 4),

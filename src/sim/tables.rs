@@ -5,6 +5,7 @@ use std::f64::consts::FRAC_PI_2;
 use glam::DAffine3;
 
 use super::calibration::{Calibration, LATERAL_CUT, amplitude};
+use super::contact::reach;
 use super::layout::{self, Rows};
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
@@ -197,7 +198,7 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 tgc: amplitude(calibration.tgc_db(z)) as f32,
                 compensation: compensation as f32,
                 incoherent_gain: calibration.incoherent_gain(z) as f32,
-                unused0: 0.0,
+                receive_reach: reach(scene, scene.probe.receive_aperture(z)) as f32,
             }
         })
         .collect()

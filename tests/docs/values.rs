@@ -55,6 +55,7 @@ pub fn place(path: &str) -> (String, String) {
             "[volume]\nfile = \"volume.mha\"\nrotate = { axis = [0, 0, 1], angle = 0 }\n\
              [fusion]\nmask = [\"one\"]\n",
         ),
+        "contact" => text.push_str("[contact]\nmesh = [\"one\"]\n"),
         "tracker" => text.push_str(
             "[tracker]\nworld_from_reference = { rotate = { axis = [0, 0, 1], angle = 0 } }\n\
              tool_from_probe = { rotate = { axis = [0, 0, 1], angle = 0 } }\n",
@@ -75,7 +76,7 @@ pub fn settings(scene: &Scene) -> String {
     let (instances, graph) = (&scene.instances, &scene.graph);
     write!(out, "{instances:?}{graph:?}{:?}{sizes:?}", scene.wires).expect("memory");
     let (volume, fusion, tracker) = (&scene.volume, &scene.fusion, &scene.tracker);
-    write!(out, "{volume:?}{fusion:?}{tracker:?}").expect("memory");
+    write!(out, "{volume:?}{fusion:?}{tracker:?}{:?}", scene.contact).expect("memory");
     out
 }
 

@@ -8,6 +8,7 @@ use insonify::gpu;
 use insonify::reference::{Accumulator, Owned, Segment};
 use insonify::reference::{axial, beam, detect, display, scatter};
 use insonify::scene::Scene;
+use insonify::sim::contact::{self, Coupling, Skins};
 use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
 
 use crate::check::Picture;
@@ -97,11 +98,12 @@ pub fn twin(scene: &Scene) -> Frame {
     let volume = scatter::scatter(&world, &segments);
     let single = |v: Vec<f64>| v.iter().map(|&x| x as f32).collect::<Vec<f32>>();
     let (frame, rows) = (&inputs.frame, &inputs.rows);
+    let coupling = Coupling::of(scene, &mut Skins::default());
     let lateral = single(beam::beam(
         frame,
         rows,
-        &narrow(&traced.surface),
-        &narrow(&volume),
+        [&narrow(&traced.surface), &narrow(&volume)],
+        &contact::table(scene, coupling.as_ref()),
     ));
     let iq = axial::axial(frame, &lateral);
     let levels = detect::detect(frame, rows, &single(iq.clone()));

@@ -28,6 +28,12 @@ fn values<T: Pod>(bytes: &[u8]) -> Vec<T> {
     bytemuck::pod_collect_to_vec(bytes)
 }
 
+/// What `beam` reads of the contact where every element is coupled.
+fn joined(frame: &Frame) -> Vec<f32> {
+    let lines = frame.scanlines as usize;
+    [vec![1.0; lines], vec![0.0; lines + 1]].concat()
+}
+
 impl Stages {
     pub fn new(device: &Arc<Device>) -> Self {
         Self {
@@ -65,6 +71,7 @@ impl Stages {
             input("volume", volume),
             input("counters", &[Counters::default()]),
             input("lateral", &vec![0f32; surface.len()]),
+            input("contact", &joined(frame)),
         ];
         let after = self.run("beam", inputs, [frame.samples, frame.scanlines]);
         let counters: Vec<Counters> = values(&after[4]);

@@ -185,6 +185,11 @@ focus = "70 mm"
 elevation_focus = "70 mm"
 slice_thickness = "8 mm"
 
+# Gel, and skin that would yield to the pressed face.
+[contact]
+mesh = ["skin"]
+gel = "5 mm"
+
 # Fluid attenuates less than the tissue that the curve assumes: the far sliders go down.
 [imaging]
 tgc_sliders = [0, 0, 0, -2, -4, -7, -10, -12]

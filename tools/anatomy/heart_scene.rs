@@ -165,6 +165,11 @@ position = [3, 0, 0]
 direction = [-0.16, 0, 0.987]
 lateral = [0.987, 0, 0.16]
 
+# Gel, and skin that would yield to the pressed face.
+[contact]
+mesh = ["skin", "fat", "intercostals"]
+gel = "5 mm"
+
 # Blood attenuates less than the tissue that the curve assumes: the far sliders go down.
 [imaging]
 tgc_sliders = [0, -1, -3, -6, -9, -12, -16, -20]

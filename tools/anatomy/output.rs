@@ -62,6 +62,15 @@ based_on = "kidney"
 echogenicity = "-12 dB"
 "#;
 
+/// What the probe has to touch.
+const CONTACT: &str = r#"# Joined over a gap that gel alone would not fill: real skin yields and lies around the curved face,
+# which this one, being rigid, cannot.
+[contact]
+mesh = ["skin"]
+gel = "9 mm"
+
+"#;
+
 /// The scene file for `parts`, whose meshes lie in `folder` beside it.
 pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> String {
     let mut out = format!(
@@ -82,6 +91,7 @@ pub fn scene(parts: &[Part], folder: &str, command: &str, triangles: usize) -> S
         out += &format!("# {}\n{}#\n", pose.title, pose_lines(&pose, "#   "));
     }
     out += "\n";
+    out += CONTACT;
     out += TISSUES;
     out += "\n# In rising priority: where two overlap, the later one wins.\n";
     for (priority, part) in parts.iter().enumerate() {

@@ -111,13 +111,8 @@ pub(super) fn fusion(
     )?;
     let masks = table.mask.iter().enumerate();
     let masks = masks.map(|(i, name)| {
-        mask(
-            document,
-            &format!("fusion.mask.{i}"),
-            name,
-            meshes,
-            instances,
-        )
+        let path = format!("fusion.mask.{i}");
+        closed_mesh(document, &path, name, "a mask", meshes, instances)
     });
     Ok(Some(Fusion {
         masks: masks.collect::<Result<_, _>>()?,
@@ -128,11 +123,13 @@ pub(super) fn fusion(
     }))
 }
 
-/// The instance that a mask names; it must have an inside, in every shape that it takes.
-fn mask(
+/// The instance of this name, which is to be `what`: it must have an inside, in every shape that it
+/// takes.
+pub(super) fn closed_mesh(
     document: &Document<'_>,
     path: &str,
     name: &str,
+    what: &str,
     meshes: &[Mesh],
     instances: &[Instance],
 ) -> Result<usize, SceneError> {
@@ -151,7 +148,7 @@ fn mask(
         return Err(document.fail(
             path,
             format!(
-                "`{name}` cannot be a mask: {open} of its edges are open, so that it has no inside"
+                "`{name}` cannot be {what}: {open} of its edges are open, so that it has no inside"
             ),
             "close it in the modeller, set its cap_openings = true, or name a closed mesh",
         ));

@@ -29,6 +29,7 @@ pub struct File {
     pub imaging: ImagingTable,
     pub volume: Option<VolumeTable>,
     pub fusion: Option<FusionTable>,
+    pub contact: Option<ContactTable>,
     pub tracker: Option<TrackerTable>,
     #[serde(default)]
     pub sweep: SweepTable,
@@ -164,6 +165,13 @@ pub struct FusionTable {
     pub blur: Option<u32>,
     pub blend: Option<Blend>,
     pub background_shadows: Option<bool>,
+}
+
+#[derive(Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ContactTable {
+    pub mesh: Vec<String>,
+    pub gel: Option<Length>,
 }
 
 #[derive(Debug, Default, Deserialize)]

@@ -104,6 +104,9 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     let each = layout::START_WORDS;
     let stacks = read(simulator, |b| &b.stacks, 4 * lines * each)?;
     array("stacks", Word, &stacks, each)?;
+    let shares = 4 * (2 * frame.scanlines as usize + 1);
+    let contact = read(simulator, |b| &b.contact, shares)?;
+    array("contact", Float, &contact, 1)?;
     let surface = read(simulator, |b| &b.surface_echoes, 8 * samples)?;
     array("surface", Integer, &surface, 2)?;
     let volume = read(simulator, |b| &b.volume_echoes, 8 * samples)?;

@@ -1,0 +1,52 @@
+//! The transducer's face: what touches the skin, and how much of it works for one line.
+
+use glam::DVec3;
+
+use super::{Kind, Probe};
+
+impl Probe {
+    /// Width of the face along its surface, mm. A phased array is modelled as a point; what touches the
+    /// skin is as wide as its aperture.
+    pub fn face_width(&self) -> f64 {
+        match self.kind {
+            Kind::Convex {
+                radius,
+                field_of_view,
+            } => radius * field_of_view,
+            Kind::Linear { width } => width,
+            Kind::Phased { .. } if self.aperture.is_finite() => self.aperture,
+            Kind::Phased { .. } => self.transmit_aperture(),
+        }
+    }
+
+    /// A point of the face in probe space, mm, and the unit normal there, towards the body. `across` and
+    /// `along` say where, from -1/2 to 1/2 of the face's width and of the elements' height.
+    pub fn face(&self, across: f64, along: f64) -> (DVec3, DVec3) {
+        let y = along * self.elevation_height;
+        match self.kind {
+            Kind::Convex {
+                radius,
+                field_of_view,
+            } => {
+                let (sin, cos) = (field_of_view * across).sin_cos();
+                let point = DVec3::new(radius * sin, y, radius * cos - radius);
+                (point, DVec3::new(sin, 0.0, cos))
+            }
+            Kind::Linear { .. } | Kind::Phased { .. } => {
+                (DVec3::new(self.face_width() * across, y, 0.0), DVec3::Z)
+            }
+        }
+    }
+
+    /// Width of the aperture that sends, mm: that of the transmit f-number at the focus, as the beam has
+    /// it ([`Probe::sigma_lateral`]). It may be wider than the face.
+    pub fn transmit_aperture(&self) -> f64 {
+        self.focus / self.f_number_transmit
+    }
+
+    /// Width of the aperture that receives from depth `z`, mm: it grows with the receive f-number up to
+    /// the largest one. It may be wider than the face.
+    pub fn receive_aperture(&self, z: f64) -> f64 {
+        (z / self.f_number_receive).min(self.aperture)
+    }
+}
