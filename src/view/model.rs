@@ -11,6 +11,7 @@ mod pose;
 mod saving;
 mod settings;
 pub mod sheet;
+pub mod skin;
 
 use std::time::Instant;
 

@@ -58,6 +58,23 @@ struct Body {
     object_from_world: DAffine3,
 }
 
+/// A line's crossing of a triangle.
+struct Crossing {
+    t: f64,
+    /// The line goes in.
+    entry: bool,
+    /// Outward, of any length.
+    normal: DVec3,
+}
+
+/// A part of a line in the body.
+struct Stretch {
+    begin: f64,
+    end: f64,
+    /// Outward where it begins, of any length.
+    normal: DVec3,
+}
+
 /// A mesh's triangles with boxes around them, object space.
 struct Tree {
     positions: Vec<DVec3>,
@@ -82,9 +99,9 @@ impl Tree {
         }
     }
 
-    /// Where the line meets triangles: place along it, and whether it goes in.
-    fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<(f64, bool)> {
-        let mut found: Vec<(f64, bool)> = Vec::new();
+    /// Where the line meets triangles, in order.
+    fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<Crossing> {
+        let mut found: Vec<Crossing> = Vec::new();
         let Some(root) = self.boxes.nodes.first() else {
             return found;
         };
@@ -99,15 +116,20 @@ impl Tree {
             let corners = triangle.map(|i| self.positions[i as usize]);
             if let Some([t, ..]) = intersect::triangle(corners, origin, direction) {
                 let [a, b, c] = corners;
-                found.push((t, direction.dot((b - a).cross(c - a)) < 0.0));
+                let normal = (b - a).cross(c - a);
+                found.push(Crossing {
+                    t,
+                    entry: direction.dot(normal) < 0.0,
+                    normal,
+                });
             }
         });
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut distinct: Vec<(f64, bool)> = Vec::with_capacity(found.len());
-        for (t, entry) in found {
-            let previous = distinct.iter().rev().find(|p| p.1 == entry);
-            if previous.is_none_or(|p| (t - p.0) * length > SAME_CROSSING) {
-                distinct.push((t, entry));
+        found.sort_by(|a, b| a.t.total_cmp(&b.t));
+        let mut distinct: Vec<Crossing> = Vec::with_capacity(found.len());
+        for crossing in found {
+            let previous = distinct.iter().rev().find(|p| p.entry == crossing.entry);
+            if previous.is_none_or(|p| (crossing.t - p.t) * length > SAME_CROSSING) {
+                distinct.push(crossing);
             }
         }
         distinct
@@ -117,36 +139,53 @@ impl Tree {
 impl Skin {
     /// Stretches of the line `origin + t direction` (world, mm) that lie in the body, in order; layers
     /// that touch are one.
-    pub fn inside(&self, origin: DVec3, direction: DVec3) -> Vec<[f64; 2]> {
-        let mut crossings: Vec<(f64, bool)> = Vec::new();
+    fn stretches(&self, origin: DVec3, direction: DVec3) -> Vec<Stretch> {
+        let mut crossings: Vec<Crossing> = Vec::new();
         for body in &self.bodies {
-            let o = body.object_from_world.transform_point3(origin);
-            let d = body.object_from_world.transform_vector3(direction);
-            crossings.extend(body.tree.crossings(o, d));
+            let object = &body.object_from_world;
+            let (o, d) = (
+                object.transform_point3(origin),
+                object.transform_vector3(direction),
+            );
+            let found = body.tree.crossings(o, d).into_iter();
+            crossings.extend(found.map(|crossing| Crossing {
+                // Normals go by the inverse transpose.
+                normal: object.matrix3.transpose() * crossing.normal,
+                ..crossing
+            }));
         }
-        crossings.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut stretches: Vec<[f64; 2]> = Vec::new();
-        let (mut depth, mut begin) = (0i32, 0.0);
-        for (t, entry) in crossings {
+        crossings.sort_by(|a, b| a.t.total_cmp(&b.t));
+        let mut stretches: Vec<Stretch> = Vec::new();
+        let (mut depth, mut begin, mut normal) = (0i32, 0.0, DVec3::ZERO);
+        for crossing in crossings {
             let before = depth;
-            depth += if entry { 1 } else { -1 };
+            depth += if crossing.entry { 1 } else { -1 };
             if before == 0 && depth == 1 {
-                begin = t;
+                (begin, normal) = (crossing.t, crossing.normal);
             } else if before == 1 && depth == 0 {
-                match stretches.last_mut().filter(|last| begin - last[1] < JOINED) {
-                    Some(last) => last[1] = t,
-                    None => stretches.push([begin, t]),
+                let end = crossing.t;
+                match stretches.last_mut().filter(|s| begin - s.end < JOINED) {
+                    Some(last) => last.end = end,
+                    None => stretches.push(Stretch { begin, end, normal }),
                 }
             }
         }
         stretches
     }
 
+    /// Where a ray (world, mm; its direction a unit vector) comes to the skin from outside: the point,
+    /// and the outward normal of the triangle there.
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(DVec3, DVec3)> {
+        let stretches = self.stretches(origin, direction);
+        let first = stretches.into_iter().find(|s| s.begin >= 0.0)?;
+        Some((origin + first.begin * direction, first.normal.normalize()))
+    }
+
     /// How far the skin is ahead of a point (world, mm) along a unit `direction`, mm; below 0 where the
     /// point lies in the body: then as far back it was entered. None: there is no body ahead.
     pub fn gap(&self, point: DVec3, direction: DVec3) -> Option<f64> {
-        let stretches = self.inside(point, direction);
-        let ahead = stretches.into_iter().find(|[_, end]| *end >= 0.0);
-        ahead.map(|[begin, _]| begin)
+        let stretches = self.stretches(point, direction);
+        let ahead = stretches.into_iter().find(|s| s.end >= 0.0);
+        ahead.map(|s| s.begin)
     }
 }

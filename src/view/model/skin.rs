@@ -1,0 +1,185 @@
+//! The probe held to the skin: which place a ray of the 3D view means, and the pose that slides there.
+
+use glam::{DAffine3, DMat3, DQuat, DVec3};
+
+use super::Ray;
+use crate::probe::Probe;
+use crate::scene::{Mesh, Scene};
+use crate::sim::contact::{Skin, Skins};
+
+/// How deep a probe that is put on the skin is pressed in, mm.
+pub const PRESS: f64 = 1.5;
+
+/// Points of the face, across and along, that are held against the skin when the probe is put on it.
+const FACE: [u32; 2] = [9, 3];
+/// Rings of points around a place, by the radius of the footprint, and points in each.
+const RINGS: [f64; 3] = [0.3, 0.6, 0.9];
+const RING: u32 = 8;
+/// How far the normal goes towards the one that was found, each time; on an edge of 90 degrees half of the
+/// way is exact and the whole of it would swing for ever.
+const STEP: f64 = 0.5;
+const STEPS: usize = 16;
+
+/// The skin of a scene, at any time.
+pub struct Body {
+    /// The scene's meshes but those of the skin are left out.
+    scene: Scene,
+    skins: Skins,
+}
+
+impl Body {
+    /// The skin that `scene` names for its contact; none where it names none.
+    pub fn of(scene: &Scene) -> Option<Self> {
+        let contact = scene.contact.as_ref()?;
+        let named = contact.skin.iter().map(|&i| &scene.instances[i]);
+        let used: Vec<usize> = named
+            .flat_map(|i| i.keyframes.meshes.iter().chain([&i.mesh]))
+            .copied()
+            .collect();
+        let meshes = scene.meshes.iter().enumerate();
+        let meshes = meshes.map(|(i, mesh)| match used.contains(&i) {
+            true => mesh.clone(),
+            false => Mesh::default(),
+        });
+        Some(Self {
+            scene: Scene {
+                meshes: meshes.collect(),
+                instances: scene.instances.clone(),
+                graph: scene.graph.clone(),
+                contact: scene.contact.clone(),
+                ..Scene::homogeneous(scene.tissues[scene.background].clone(), scene.probe.clone())
+            },
+            skins: Skins::default(),
+        })
+    }
+
+    /// As it is at `seconds` of the scene's time.
+    pub fn at(&mut self, seconds: f64) -> Skin {
+        self.scene.set_time(seconds);
+        self.skins.of(&self.scene)
+    }
+}
+
+/// A place of the skin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Spot {
+    /// Where it is, world, mm.
+    pub point: DVec3,
+    /// The skin's outward normal, averaged over a footprint.
+    pub normal: DVec3,
+}
+
+/// A probe over a skin.
+pub struct Hand<'s> {
+    skin: &'s Skin,
+    probe: &'s Probe,
+}
+
+impl<'s> Hand<'s> {
+    /// A hand that holds `probe` over `skin`.
+    pub fn new(skin: &'s Skin, probe: &'s Probe) -> Self {
+        Self { skin, probe }
+    }
+
+    /// The place that a ray comes to.
+    pub fn pick(&self, ray: &Ray) -> Option<Spot> {
+        let (point, normal) = self.skin.hit(ray.origin, ray.direction)?;
+        Some(self.spot(point, normal))
+    }
+
+    /// The place that the face's centre is held to: the foot of the perpendicular from there, where it
+    /// was found from the depth axis; without skin ahead the place at the face itself.
+    pub fn held(&self, pose: &DAffine3) -> Spot {
+        let centre = pose.translation;
+        let mut spot = Spot {
+            point: centre,
+            normal: -pose.transform_vector3(DVec3::Z).normalize(),
+        };
+        for _ in 0..4 {
+            let Some(gap) = self.skin.gap(centre, -spot.normal) else {
+                break;
+            };
+            spot = self.spot(centre - gap * spot.normal, spot.normal);
+        }
+        spot
+    }
+
+    /// The place `by` mm from a `spot` (world; what of it leaves the tangent plane is left out).
+    pub fn beside(&self, spot: &Spot, by: DVec3) -> Option<Spot> {
+        let along = by.reject_from(spot.normal).normalize_or_zero() * by.length();
+        // From above whatever the skin can rise by over the way.
+        let above = spot.point + along + spot.normal * (by.length() + self.footprint());
+        let (point, normal) = self.skin.hit(above, -spot.normal)?;
+        Some(self.spot(point, normal))
+    }
+
+    /// The pose slid from where it is held to another place: turned as the skin is, and not about its
+    /// normal, so that tilt, rock and rotation stay as they are; then moved along the normal until the face
+    /// is pressed in by `press` mm where it is deepest.
+    pub fn slid(&self, pose: &DAffine3, from: &Spot, to: &Spot, press: f64) -> DAffine3 {
+        let turn = match from.normal.dot(to.normal) > -0.999 {
+            true => DQuat::from_rotation_arc(from.normal, to.normal),
+            // Onto the other side of a body any axis would do: keep the image's lateral one.
+            false => DQuat::from_axis_angle(
+                pose.transform_vector3(DVec3::X).normalize(),
+                std::f64::consts::PI,
+            ),
+        };
+        let turned = (turn * DQuat::from_mat3(&pose.matrix3)).normalize();
+        let at = |point| DAffine3::from_mat3_translation(DMat3::from_quat(turned), point);
+        let placed = at(to.point);
+        let places = (0..FACE[0]).flat_map(|i| (0..FACE[1]).map(move |j| [i, j]));
+        let gaps = places.filter_map(|[i, j]| {
+            let share = |i: u32, count: u32| f64::from(i) / f64::from(count - 1) - 0.5;
+            let (point, _) = self.probe.face(share(i, FACE[0]), share(j, FACE[1]));
+            self.skin.gap(placed.transform_point3(point), -to.normal)
+        });
+        let least = gaps.fold(f64::INFINITY, f64::min);
+        let lift = if least.is_finite() {
+            least + press
+        } else {
+            press
+        };
+        at(to.point - to.normal * lift)
+    }
+
+    /// Radius of a disc as large as the face, mm: over it the skin's normal is averaged.
+    fn footprint(&self) -> f64 {
+        0.5 * (self.probe.face_width() * self.probe.elevation_height).sqrt()
+    }
+
+    /// The place at a point of the skin. Its normal is that of the plane that fits the skin best (least
+    /// squares of the heights over the footprint), which turns smoothly on the way over an edge as the
+    /// triangles' own normals do not. `normal` is where the search begins.
+    fn spot(&self, point: DVec3, normal: DVec3) -> Spot {
+        let radius = self.footprint();
+        let mut normal = normal;
+        for _ in 0..STEPS {
+            let (u, v) = normal.any_orthonormal_pair();
+            let (mut slope, mut weights) = (DVec3::ZERO, 0.0);
+            for ring in RINGS {
+                for i in 0..RING {
+                    let angle = std::f64::consts::TAU * f64::from(i) / f64::from(RING);
+                    let off = radius * ring * (angle.cos() * u + angle.sin() * v);
+                    // What is steeper than the footprint is wide counts as just as steep.
+                    let above = point + off + normal * radius;
+                    let gap = self.skin.gap(above, -normal).unwrap_or(f64::INFINITY);
+                    let height = (radius - gap).clamp(-radius, radius);
+                    let weight = 1.0 - ring * ring;
+                    slope += weight * height * off;
+                    weights += weight * off.length_squared() / 2.0;
+                }
+            }
+            let turn = slope / weights;
+            normal = (normal - STEP * turn).normalize();
+            if turn.length() < 1e-4 {
+                break;
+            }
+        }
+        Spot { point, normal }
+    }
+}
+
+#[cfg(test)]
+#[path = "skin_tests.rs"]
+mod tests;
