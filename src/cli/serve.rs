@@ -7,10 +7,10 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
-use miette::{IntoDiagnostic, Report, Result, miette};
+use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common};
-use insonify::igtl::{self, IgtlError, Picture, Server, Status, Tracked};
+use insonify::igtl::{self, Picture, Server, Status, Tracked};
 use insonify::output;
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
@@ -65,31 +65,14 @@ pub fn run(args: &Serve) -> Result<()> {
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let address = SocketAddr::new(args.igtl_bind, args.igtl_port);
     let settings = igtl::Settings::new(scene.tracker.clone());
-    let server = Server::bind(address, settings).map_err(advise)?;
+    let server = Server::bind(address, settings)
+        .map_err(|error| miette!(help = error.remedy(), "{error}"))?;
     if !args.igtl_bind.is_loopback() {
-        eprintln!(
-            "warning: whoever reaches this machine can move the probe and see the images; OpenIGTLink \
-             knows no passwords"
-        );
+        eprintln!("warning: {}", igtl::OPEN);
     }
     output::line(format!("listening at {} (OpenIGTLink)", server.address()));
     simulate(&mut simulator, &mut scene, &server, args)?;
     common.validated(&device)
-}
-
-fn advise(error: IgtlError) -> Report {
-    let IgtlError::Bind { cause, .. } = &error;
-    let help = match cause.kind() {
-        std::io::ErrorKind::AddrInUse => {
-            "another program listens there, such as a PlusServer or this program: choose another \
-             --igtl-port"
-        }
-        std::io::ErrorKind::AddrNotAvailable => {
-            "give --igtl-bind an address of this machine, such as 127.0.0.1 or 0.0.0.0"
-        }
-        _ => "choose another --igtl-port or --igtl-bind",
-    };
-    miette!(help = help, "{error}")
 }
 
 /// Makes an image whenever probe or anatomy have moved, and offers it to the clients.

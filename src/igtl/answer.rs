@@ -88,6 +88,9 @@ fn count(shared: &Shared, taken: bool) {
         true => status.poses += 1,
         false => status.ignored += 1,
     });
+    if taken {
+        shared.tell();
+    }
 }
 
 fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refused> {

@@ -28,6 +28,10 @@ pub const POSE_DEVICE: &str = "ProbeToWorld";
 /// The protocol's usual port.
 pub const PORT: u16 = 18944;
 
+/// What to say of a server that other machines reach.
+pub const OPEN: &str = "whoever reaches this machine can move the probe and see the images; OpenIGTLink \
+    knows no passwords";
+
 /// What is behind the locks here is whole between any two statements: a thread that has panicked
 /// holding one leaves nothing half done.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -36,6 +36,23 @@ pub enum IgtlError {
     },
 }
 
+impl IgtlError {
+    /// What the user can do about it.
+    pub fn remedy(&self) -> &'static str {
+        let Self::Bind { cause, .. } = self;
+        match cause.kind() {
+            ErrorKind::AddrInUse => {
+                "another program listens there, such as a PlusServer or this program: choose another \
+                 port (--igtl-port)"
+            }
+            ErrorKind::AddrNotAvailable => {
+                "give --igtl-bind an address of this machine, such as 127.0.0.1 or 0.0.0.0"
+            }
+            _ => "choose another --igtl-port or --igtl-bind",
+        }
+    }
+}
+
 /// How clients are treated.
 #[derive(Clone, Debug)]
 pub struct Settings {
@@ -98,12 +115,28 @@ pub(super) struct Shared {
     clients: Mutex<Vec<Arc<Client>>>,
     status: Mutex<Status>,
     stopping: AtomicBool,
+    /// What was published last is no longer what there is to see.
+    outdated: AtomicBool,
+    told: Box<dyn Fn() + Send + Sync>,
 }
 
 impl Shared {
     /// The frame that was published last.
     pub fn latest(&self) -> Option<Arc<Published>> {
         lock(&self.latest).clone()
+    }
+
+    /// What a client is sent that has just come.
+    fn first(&self) -> Option<Arc<Published>> {
+        match self.outdated.load(Ordering::Relaxed) {
+            true => None,
+            false => self.latest(),
+        }
+    }
+
+    /// Says that a pose has arrived, or that clients or errors are others than before.
+    pub fn tell(&self) {
+        (self.told)();
     }
 
     /// Changes the counts.
@@ -121,6 +154,7 @@ impl Shared {
             status.errors += 1;
             status.last_error = Some(why);
         });
+        self.tell();
     }
 }
 
@@ -137,6 +171,19 @@ impl Server {
     /// # Errors
     /// An address that is taken or not this machine's.
     pub fn bind(address: SocketAddr, settings: Settings) -> Result<Self, IgtlError> {
+        Self::bind_and_tell(address, settings, || {})
+    }
+
+    /// The same; `told` is called, from threads of the server, whenever a pose has arrived and when
+    /// clients or errors are others than before. It must not wait.
+    ///
+    /// # Errors
+    /// As [`Server::bind`].
+    pub fn bind_and_tell(
+        address: SocketAddr,
+        settings: Settings,
+        told: impl Fn() + Send + Sync + 'static,
+    ) -> Result<Self, IgtlError> {
         let fail = |cause| IgtlError::Bind { address, cause };
         let listener = TcpListener::bind(address).map_err(fail)?;
         // A listener that waited could not be stopped.
@@ -149,6 +196,8 @@ impl Server {
             clients: Mutex::new(Vec::new()),
             status: Mutex::new(Status::default()),
             stopping: AtomicBool::new(false),
+            outdated: AtomicBool::new(false),
+            told: Box::new(told),
         });
         let thread = {
             let shared = Arc::clone(&shared);
@@ -180,10 +229,17 @@ impl Server {
         let axes = self.shared.tracking.tracker().axes;
         let frame = Arc::new(Published::new(picture, axes.to_ras() * *world_from_probe));
         *lock(&self.shared.latest) = Some(Arc::clone(&frame));
+        self.shared.outdated.store(false, Ordering::Relaxed);
         let clients = lock(&self.shared.clients).clone();
         let late = clients.iter().filter(|c| c.offer(Arc::clone(&frame)));
         let late = late.count() as u64;
         self.shared.count(|status| status.images_dropped += late);
+    }
+
+    /// Says that there is something else to see than what was published last, which was not worth
+    /// publishing without clients: the next client is not sent the old one unasked.
+    pub fn outdate(&self) {
+        self.shared.outdated.store(true, Ordering::Relaxed);
     }
 
     /// What has happened so far.
@@ -258,7 +314,12 @@ impl Doorman {
             open && since.elapsed() < LINGER
         });
         let seated = self.threads.len();
-        self.shared.count(|status| status.clients = seated);
+        let mut before = seated;
+        self.shared
+            .count(|status| before = std::mem::replace(&mut status.clients, seated));
+        if seated != before {
+            self.shared.tell();
+        }
     }
 
     fn let_in(&mut self, stream: TcpStream, peer: SocketAddr) -> std::io::Result<()> {
@@ -266,6 +327,7 @@ impl Doorman {
         // Threads, not connections: one that is ending still takes room.
         if self.threads.len() >= most {
             self.shared.count(|status| status.refused += 1);
+            self.shared.tell();
             return self.refuse(stream, most);
         }
         stream.set_nonblocking(false)?;
@@ -275,7 +337,7 @@ impl Doorman {
         // Both under one lock: a frame that is published now reaches it one way or the other.
         let client = {
             let mut clients = lock(&self.shared.clients);
-            let client = Arc::new(Client::new(stream, peer, self.shared.latest()));
+            let client = Arc::new(Client::new(stream, peer, self.shared.first()));
             clients.push(Arc::clone(&client));
             client
         };
@@ -299,6 +361,7 @@ impl Doorman {
             status.accepted += 1;
             status.clients = seated;
         });
+        self.shared.tell();
         Ok(())
     }
 
