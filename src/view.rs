@@ -11,10 +11,13 @@ mod cine;
 mod console;
 pub mod engine;
 mod files;
+mod inputs;
 mod keys;
 mod layout;
+mod link;
 mod mmode;
 pub mod model;
+mod notice;
 mod open;
 mod opening;
 mod ring;
@@ -25,6 +28,7 @@ mod style;
 mod timing;
 mod tools;
 
+use std::net::IpAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -33,6 +37,7 @@ use winit::event_loop::EventLoop;
 pub use model::Model;
 
 use crate::gpu::{Device, DeviceOptions, GpuError};
+use crate::igtl::IgtlError;
 use crate::scene::{Scene, Simulation};
 use crate::sim::shaders::Library;
 use crate::sim::{SimError, Tracer};
@@ -53,8 +58,19 @@ pub struct Options {
     pub screenshot: Option<PathBuf>,
     /// Writes the timings into this file at the end.
     pub json: Option<PathBuf>,
+    /// Where OpenIGTLink clients are listened for from the start; nowhere without it.
+    pub listen: Option<Listen>,
     /// Suits path and scatterer counts to the device, and chooses a tracer that it has.
     pub prepare: Prepare,
+}
+
+/// Where OpenIGTLink clients are listened for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Listen {
+    /// Address of this machine.
+    pub address: IpAddr,
+    /// Port; 0 takes any that is free.
+    pub port: u16,
 }
 
 /// See [`Options::prepare`].
@@ -78,6 +94,13 @@ pub enum ViewError {
     /// The simulation, before its first image.
     #[error(transparent)]
     Sim(#[from] SimError),
+    /// Nobody can be listened for.
+    #[error("{error}: {}", error.remedy())]
+    Igtl {
+        /// Why.
+        #[from]
+        error: IgtlError,
+    },
     /// A file that was asked for.
     #[error("writing {}: {reason}", file.display())]
     Unwritten {

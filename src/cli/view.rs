@@ -1,5 +1,6 @@
 //! `insonify view`: a scene in a window.
 
+use std::net::{IpAddr, Ipv4Addr};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -8,7 +9,7 @@ use miette::{IntoDiagnostic, Result};
 use super::common::{Common, QualityChoice};
 use insonify::gpu::AdapterKind;
 use insonify::sim::shaders::Library;
-use insonify::view::{self, Options};
+use insonify::view::{self, Listen, Options};
 
 /// Arguments of `insonify view`.
 #[derive(Debug, clap::Args)]
@@ -18,6 +19,13 @@ pub struct View {
     scene: PathBuf,
     #[command(flatten)]
     common: Common,
+    /// Listens for OpenIGTLink at this port: trackers move the probe, viewers receive the images; 0
+    /// takes any port that is free, and says which. 18944 is the usual one.
+    #[arg(long, value_name = "PORT")]
+    igtl_port: Option<u16>,
+    /// Address of this machine to listen at; 0.0.0.0 lets other machines in.
+    #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires = "igtl_port")]
+    igtl_bind: IpAddr,
     /// Writes the window's picture (PNG) once it shows an image, and ends.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
@@ -42,6 +50,10 @@ pub fn run(args: &View) -> Result<()> {
         seconds: common.time,
         screenshot: args.screenshot.clone(),
         json: args.json.clone(),
+        listen: args.igtl_port.map(|port| Listen {
+            address: args.igtl_bind,
+            port,
+        }),
         prepare: Box::new(move |device, simulation| {
             let mut common = common.clone();
             // The probe is to be moved, not waited for.

@@ -8,6 +8,7 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::window::WindowId;
 
+use super::link::Link;
 use super::open::{Open, Plan};
 use super::session::Wake;
 use super::statistics::Times;
@@ -36,6 +37,7 @@ impl App {
                 scene,
                 options,
                 proxy,
+                link: Link::default(),
             },
             open: None,
             statistics: Times::default(),

@@ -5,6 +5,7 @@ mod anatomy;
 mod animation;
 mod controls;
 mod image;
+mod input;
 mod probe;
 mod simulation;
 
@@ -13,7 +14,7 @@ use std::time::Instant;
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::files;
-use super::model::Model;
+use super::model::{Model, Source};
 use super::state::State;
 
 /// Width of the console, points.
@@ -32,6 +33,9 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             section(ui, "Image", true, |ui| image::show(ui, &mut model.settings));
             let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
             section(ui, "Animation", false, &mut animate);
+            section(ui, "Probe input", false, |ui| {
+                input::show(ui, model, &mut state.inputs);
+            });
             let (settings, loaded) = (&mut model.settings, &model.loaded);
             let lattice = model.file.lattice;
             section(ui, "Simulation", false, |ui| {
@@ -83,7 +87,7 @@ fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
         }
         let tip = "Put the probe where the scene file has it (Home)";
         if ui.button("Home").on_hover_text(tip).clicked() {
-            model.place_probe(model.home, now);
+            model.place_probe(Source::Pointer, model.home, now);
         }
     });
 }

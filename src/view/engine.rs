@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use glam::DAffine3;
 
+use super::link::{Broadcast, Link};
 use super::model::{Order, Settings};
 use super::ring::Ring;
 use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
@@ -108,6 +109,8 @@ struct State {
     opening: Option<(Box<Scene>, Order)>,
     frozen: bool,
     stop: bool,
+    /// The last picture is to be sent once more.
+    resend: bool,
     news: Vec<News>,
 }
 
@@ -136,12 +139,14 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Uploads `scene` and carries out `order`. `wake` is called, from the thread, for each news.
-    pub fn start(
+    /// Uploads `scene` and carries out `order`. Clients of `link` receive every picture. `wake` is
+    /// called, from the thread, for each news.
+    pub(super) fn start(
         device: &Arc<Device>,
         library: Arc<Library>,
         scene: Scene,
         order: Order,
+        link: Link,
         wake: impl Fn() + Send + 'static,
     ) -> Self {
         let shared = Arc::new(Shared {
@@ -150,6 +155,7 @@ impl Engine {
                 opening: None,
                 frozen: false,
                 stop: false,
+                resend: false,
                 news: Vec::new(),
             }),
             changed: Condvar::new(),
@@ -157,6 +163,7 @@ impl Engine {
         let worker = Worker {
             shared: shared.clone(),
             ring: Ring::new(device),
+            broadcast: Broadcast::new(link, device),
             device: device.clone(),
             library,
             scene,
@@ -190,6 +197,12 @@ impl Engine {
         self.shared.changed.notify_all();
     }
 
+    /// Sends the last picture to the clients of the link once more.
+    pub(super) fn send_again(&self) {
+        self.shared.lock().resend = true;
+        self.shared.changed.notify_all();
+    }
+
     /// What has come since the last call, oldest first.
     pub fn news(&self) -> Vec<News> {
         std::mem::take(&mut self.shared.lock().news)
@@ -210,6 +223,7 @@ impl Drop for Engine {
 struct Worker {
     shared: Arc<Shared>,
     ring: Ring,
+    broadcast: Broadcast,
     device: Arc<Device>,
     library: Arc<Library>,
     scene: Scene,
@@ -269,6 +283,13 @@ impl Worker {
             }
             if let Some((scene, order)) = state.opening.take() {
                 return Some(Job::Open(scene, order));
+            }
+            if std::mem::take(&mut state.resend) {
+                drop(state);
+                // What is wrong with the device will be told by the next frame.
+                let _ = self.broadcast.again();
+                state = self.shared.lock();
+                continue;
             }
             if !state.frozen {
                 if let Some(order) = state.order.take() {
@@ -343,6 +364,7 @@ impl Worker {
             false => None,
         };
         let constants = simulator.constants();
+        self.broadcast.offer(&image, constants, order.pose)?;
         Ok(Frame {
             pixels,
             sector: Sector {

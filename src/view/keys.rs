@@ -7,7 +7,7 @@ use egui::{Event, Key, Modifiers};
 use super::files::Purpose;
 use super::model::calipers::Kind;
 use super::model::sheet::Tool;
-use super::model::{Axis, Model, STEP};
+use super::model::{Axis, Model, STEP, Source};
 use super::state::State;
 use super::{catalogue, mmode};
 
@@ -260,7 +260,7 @@ fn carry_out(
             model.touch(now);
         }
         Action::Play => {}
-        Action::Home => model.place_probe(model.home, now),
+        Action::Home => model.place_probe(Source::Keyboard, model.home, now),
         Action::Undo => return model.undo(now),
         Action::Redo => return model.redo(now),
         Action::Save if modifiers.shift => state.files.ask(Purpose::Save, model),

@@ -11,7 +11,7 @@ use super::model::Model;
 use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{calipers, cine, files, keys, mmode, style, timing};
+use super::{calipers, cine, files, keys, mmode, notice, style, timing};
 
 /// Draws the interface; returns where the picture belongs.
 pub(super) fn show(
@@ -64,6 +64,7 @@ pub(super) fn show(
         if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
             mmode::aim(ui, place, frame, strip, model.frozen);
         }
+        notice::show(ui, &state.inputs);
         place
     });
     if model.mmode.as_ref().map(Strip::line) != line {

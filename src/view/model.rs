@@ -1,9 +1,11 @@
 //! What the window shows and lets one change, without the window: settings, pose of the probe, clock.
 
+mod age;
 pub mod calipers;
 mod camera;
 pub mod cine;
 mod clock;
+mod devices;
 mod entries;
 mod history;
 pub mod mmode;
@@ -17,9 +19,11 @@ use std::time::Instant;
 
 use glam::DAffine3;
 
+pub use age::age;
 pub use camera::{Camera, Ray};
 pub use cine::Cine;
 pub use clock::Clock;
+pub use devices::{Devices, Source};
 use history::History;
 use mmode::Strip;
 pub use pose::{Axis, STEP, moved};
@@ -39,6 +43,8 @@ pub struct Model {
     pub settings: Settings,
     /// World from probe.
     pub pose: DAffine3,
+    /// Which device has the probe.
+    pub devices: Devices,
     /// Time of the scene.
     pub clock: Clock,
     /// The image stands still, and so does the clock.
@@ -101,6 +107,7 @@ impl Model {
             loaded: settings.clone(),
             settings,
             pose: scene.world_from_probe,
+            devices: Devices::default(),
             clock: Clock::new(seconds, animated, now),
             frozen: false,
             animated,
@@ -122,13 +129,26 @@ impl Model {
         }
     }
 
-    /// Moves the probe along or about one of its axes, by mm or radians.
+    /// Moves the probe along or about one of its axes, by mm or radians: a key was pressed.
     pub fn move_probe(&mut self, axis: Axis, amount: f64, now: Instant) {
-        self.place_probe(moved(&self.pose, axis, amount), now);
+        self.place_probe(Source::Keyboard, moved(&self.pose, axis, amount), now);
     }
 
-    /// Puts the probe somewhere.
-    pub fn place_probe(&mut self, pose: DAffine3, now: Instant) {
+    /// Puts the probe somewhere: a device other than the tracker has moved it.
+    pub fn place_probe(&mut self, source: Source, pose: DAffine3, now: Instant) {
+        self.devices.take(source);
+        self.settle(pose, now);
+    }
+
+    /// Hears where the tracker sees its tool (world from probe); the probe is there unless another
+    /// device has moved it since.
+    pub fn track(&mut self, pose: DAffine3, now: Instant) {
+        if self.devices.track(pose) {
+            self.settle(pose, now);
+        }
+    }
+
+    fn settle(&mut self, pose: DAffine3, now: Instant) {
         if pose != self.pose {
             self.pose = pose;
             self.touch(now);

@@ -10,6 +10,8 @@ use winit::window::Window;
 
 use super::engine::{Frame, News};
 use super::files::Files;
+use super::inputs::Inputs;
+use super::link::{Bell, Link};
 use super::model::File;
 use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
@@ -18,6 +20,7 @@ use super::statistics::{Sample, Times};
 use super::tools::Tools;
 use super::{Model, Options, ViewError, keys, layout, style};
 use crate::gpu::{AdapterKind, Device, GpuError, Interface, Painted, Placed, Shot, ValidationLog};
+use crate::output;
 use crate::scene::Scene;
 use crate::scene::settings::Machine;
 use crate::sim::SimError;
@@ -50,6 +53,8 @@ pub(super) struct Plan {
     pub(super) scene: Scene,
     pub(super) options: Options,
     pub(super) proxy: EventLoopProxy<Wake>,
+    /// The OpenIGTLink server stays whatever becomes of the device.
+    pub(super) link: Link,
 }
 
 impl Plan {
@@ -59,8 +64,16 @@ impl Plan {
         window: &Arc<Window>,
         model: &Model,
     ) -> Result<Session, ViewError> {
-        let (scene, proxy) = (self.scene.clone(), self.proxy.clone());
-        Session::new(device, window, &self.options, scene, model.order(), proxy)
+        let (scene, proxy, link) = (self.scene.clone(), self.proxy.clone(), self.link.clone());
+        Session::new(
+            device,
+            window,
+            &self.options,
+            scene,
+            model.order(),
+            proxy,
+            link,
+        )
     }
 }
 
@@ -92,6 +105,11 @@ impl Open {
             AdapterKind::Cpu => Machine::Software,
             _ => Machine::Gpu,
         };
+        let (link, bell) = (plan.link.clone(), Bell::new(plan.proxy.clone()));
+        let inputs = Inputs::new(link, bell, plan.scene.tracker.clone(), plan.options.listen)?;
+        if let Some(address) = inputs.address() {
+            output::line(format!("listening at {address} (OpenIGTLink)"));
+        }
         let state = State {
             console: true,
             timing: false,
@@ -105,6 +123,7 @@ impl Open {
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
             tools: Tools::new(device.info()),
+            inputs,
             quit: false,
         };
         let input = interface(&window, window.scale_factor() as f32, &device);
@@ -179,7 +198,8 @@ impl Open {
         Ok((made, log))
     }
 
-    /// Takes over what the simulation has to say; an error after which nothing more will come.
+    /// Takes over what simulation and devices have to say; an error after which nothing more will
+    /// come.
     pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), SimError> {
         let mut failed = Ok(());
         self.receive(plan);
@@ -198,6 +218,9 @@ impl Open {
                 News::Failed(error) => failed = Err(error),
             }
         }
+        self.look();
+        // Not left to the next drawing, which a window that is hidden may never see.
+        self.tell();
         self.window.request_redraw();
         failed
     }
@@ -378,11 +401,23 @@ impl Open {
 
     /// Draws if it is time to; when it will be, else.
     pub(super) fn due(&mut self, now: Instant) -> Option<Instant> {
+        if self.state.inputs.due.is_some_and(|at| at <= now) {
+            // The tracker is lost, or has been for longer.
+            self.look();
+            self.window.request_redraw();
+        }
         if self.again.is_some_and(|at| at <= now) {
             self.again = None;
             self.window.request_redraw();
         }
-        self.again
+        self.again.into_iter().chain(self.state.inputs.due).min()
+    }
+
+    /// Looks what devices have to say.
+    fn look(&mut self) {
+        if self.state.inputs.look(&mut self.model) {
+            self.session.engine.send_again();
+        }
     }
 
     /// The user wants to leave.

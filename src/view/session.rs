@@ -6,12 +6,13 @@ use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
 use super::engine::Engine;
+use super::link::Link;
 use super::model::Order;
 use super::{Options, ViewError};
 use crate::gpu::{Device, DeviceOptions, Painter};
 use crate::scene::Scene;
 
-/// News of the simulation.
+/// There is news of the simulation, or of a device.
 pub(super) struct Wake;
 
 /// Window, device, simulation. Fields drop in order: the simulation ends first.
@@ -49,11 +50,12 @@ impl Session {
         scene: Scene,
         order: Order,
         proxy: EventLoopProxy<Wake>,
+        link: Link,
     ) -> Result<Self, ViewError> {
         let painter = Painter::new(&device, window.clone())?;
         // An event loop that is gone needs no news.
         let wake = move || drop(proxy.send_event(Wake));
-        let engine = Engine::start(&device, options.library.clone(), scene, order, wake);
+        let engine = Engine::start(&device, options.library.clone(), scene, order, link, wake);
         Ok(Self {
             engine,
             painter,

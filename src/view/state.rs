@@ -1,6 +1,7 @@
 //! What of the window is open and chosen; not saved.
 
 use super::files::Files;
+use super::inputs::Inputs;
 use super::mmode;
 use super::tools::Tools;
 use crate::scene::settings::Machine;
@@ -31,6 +32,8 @@ pub(super) struct State {
     pub(super) problem: Option<String>,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,
+    /// What moves the probe.
+    pub(super) inputs: Inputs,
     /// The window is to be closed.
     pub(super) quit: bool,
 }

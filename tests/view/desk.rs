@@ -302,6 +302,15 @@ impl Desk {
         Duration::from_millis(10 * ticks)
     }
 
+    /// Most memory that the program has held so far, bytes.
+    pub fn memory(&self) -> u64 {
+        let path = format!("/proc/{}/status", self.program.id());
+        let text = std::fs::read_to_string(path).expect("the program runs");
+        let line = text.lines().find_map(|l| l.strip_prefix("VmHWM:"));
+        let value = line.and_then(|l| l.split_whitespace().next()?.parse::<u64>().ok());
+        1024 * value.expect("a size")
+    }
+
     /// Ctrl+Q; the program has to end by itself, without an error.
     pub fn quit(mut self) {
         let control = self.code(Key::Control);

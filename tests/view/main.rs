@@ -1,9 +1,14 @@
 //! The window as a person uses it: the real program on a virtual display, driven by keys and pointer,
 //! watched by its pixels.
 
+// Shared with the tests of the protocol, which use all of it.
+#[allow(dead_code)]
+#[path = "../igtl/client.rs"]
+mod client;
 mod desk;
 mod mmode;
 mod tools;
+mod tracker;
 
 use std::time::Duration;
 

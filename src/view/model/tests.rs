@@ -3,7 +3,7 @@ use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DVec3};
 
-use super::{Axis, Clock, File, Model, Settings, moved};
+use super::{Axis, Clock, File, Model, Settings, Source, moved};
 use crate::scene::Scene;
 use crate::sim::Tracer;
 
@@ -162,7 +162,7 @@ fn every_change_is_a_new_revision_and_nothing_else_is() {
         last = model.revision();
         is_new
     };
-    model.place_probe(model.pose, now);
+    model.place_probe(Source::Keyboard, model.pose, now);
     let same = model.settings.clone();
     model.note(&same, now);
     model.undo(now);

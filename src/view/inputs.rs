@@ -1,0 +1,122 @@
+//! The devices beside keyboard and mouse that move the probe.
+
+use std::net::{IpAddr, SocketAddr};
+use std::time::{Duration, Instant};
+
+use super::link::{Bell, Link, Report};
+use super::model::{Model, age};
+use super::{Listen, ViewError};
+use crate::igtl::{PORT, Tracked};
+use crate::scene::Tracker;
+
+/// Devices with what is known of them.
+pub(super) struct Inputs {
+    link: Link,
+    bell: Bell,
+    /// How the scene calibrates the tracker.
+    tracker: Tracker,
+    /// What to listen at once the user switches it on.
+    pub(super) listen: Listen,
+    /// What the server said last; nothing while there is none.
+    pub(super) report: Option<Report>,
+    /// Why there is none although the user wanted it.
+    pub(super) refused: Option<String>,
+    /// When to look again although nothing comes.
+    pub(super) due: Option<Instant>,
+    /// Clients that the simulation has been told of.
+    greeted: u64,
+    /// Pose of the tracker that has been taken over.
+    followed: u64,
+}
+
+impl Inputs {
+    /// Listens from the start where the user asked for it.
+    ///
+    /// # Errors
+    /// An address that cannot be listened at.
+    pub(super) fn new(
+        link: Link,
+        bell: Bell,
+        tracker: Tracker,
+        listen: Option<Listen>,
+    ) -> Result<Self, ViewError> {
+        let mut inputs = Self {
+            link,
+            bell,
+            tracker,
+            listen: listen.unwrap_or(Listen {
+                address: IpAddr::from([127, 0, 0, 1]),
+                port: PORT,
+            }),
+            report: None,
+            refused: None,
+            due: None,
+            greeted: 0,
+            followed: 0,
+        };
+        if listen.is_some() {
+            inputs.open()?;
+        }
+        Ok(inputs)
+    }
+
+    /// Where clients are listened for.
+    pub(super) fn address(&self) -> Option<SocketAddr> {
+        self.report.as_ref().map(|report| report.address)
+    }
+
+    fn open(&mut self) -> Result<(), ViewError> {
+        let Listen { address, port } = self.listen;
+        let (tracker, bell) = (self.tracker.clone(), self.bell.clone());
+        self.link.open((address, port), tracker, bell)?;
+        self.report = self.link.report();
+        (self.greeted, self.followed) = (0, 0);
+        Ok(())
+    }
+
+    /// Listens for clients, or ends their connections, as the user wants it in the window.
+    pub(super) fn switch(&mut self, on: bool) {
+        self.refused = None;
+        if on {
+            self.refused = self.open().err().map(|error| error.to_string());
+        } else {
+            self.link.close();
+            (self.report, self.due) = (None, None);
+        }
+    }
+
+    /// Looks what has come: the tracker moves the probe. Whether a client has come that waits for a
+    /// picture.
+    pub(super) fn look(&mut self, model: &mut Model) -> bool {
+        // First, so that what comes from now on is looked at again.
+        self.bell.answer();
+        self.report = self.link.report();
+        self.due = self.next();
+        let Some(report) = &self.report else {
+            return false;
+        };
+        if let Tracked::Live(pose) = &report.tracked
+            && std::mem::replace(&mut self.followed, pose.number) != pose.number
+        {
+            model.track(pose.world_from_probe, pose.arrived);
+        }
+        let accepted = report.status.accepted;
+        std::mem::replace(&mut self.greeted, accepted) < accepted
+    }
+
+    /// When there is something else to show although nothing comes: the tracker is lost, or the time
+    /// since then reads differently.
+    fn next(&self) -> Option<Instant> {
+        match &self.report.as_ref()?.tracked {
+            Tracked::Never => None,
+            Tracked::Live(pose) => {
+                let timeout = Duration::from_secs_f64(self.tracker.timeout);
+                pose.arrived.checked_add(timeout + Duration::from_millis(1))
+            }
+            Tracked::Lost(pose) => {
+                let (_, rest) = age(pose.arrived.elapsed());
+                Instant::now().checked_add(rest)
+            }
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! OpenIGTLink beside the window: its server, which may be opened and closed at any time, and the
+//! pictures for whoever is connected.
+
+use std::net::{IpAddr, SocketAddr};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use glam::DAffine3;
+use winit::event_loop::EventLoopProxy;
+
+use super::session::Wake;
+use crate::gpu::{Device, GpuError, Image};
+use crate::igtl::{IgtlError, Picture, Server, Settings, Status, Tracked};
+use crate::scene::Tracker;
+use crate::sim::layout;
+
+/// Wakes the event loop once for all that has come since it looked last: whatever a device or a
+/// client sends, no more than one wake waits.
+#[derive(Clone)]
+pub(super) struct Bell {
+    rung: Arc<AtomicBool>,
+    proxy: EventLoopProxy<Wake>,
+}
+
+impl Bell {
+    pub(super) fn new(proxy: EventLoopProxy<Wake>) -> Self {
+        Self {
+            rung: Arc::default(),
+            proxy,
+        }
+    }
+
+    /// Called by any thread after it has put something where the event loop looks.
+    pub(super) fn ring(&self) {
+        if !self.rung.swap(true, Ordering::AcqRel) {
+            // An event loop that is gone needs no news.
+            let _ = self.proxy.send_event(Wake);
+        }
+    }
+
+    /// Called by the event loop before it looks.
+    pub(super) fn answer(&self) {
+        self.rung.store(false, Ordering::Release);
+    }
+}
+
+/// What the server says.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Report {
+    /// Where it listens.
+    pub(super) address: SocketAddr,
+    /// What has happened so far.
+    pub(super) status: Status,
+    /// What is known of the tracker.
+    pub(super) tracked: Tracked,
+}
+
+/// The server, if there is one; window and simulation share it. Nothing that is done under its lock
+/// waits for the network.
+#[derive(Clone, Default)]
+pub(super) struct Link(Arc<Mutex<Option<Server>>>);
+
+impl Link {
+    /// A server stays whole whatever its users do, so poisoning is ignored.
+    fn lock(&self) -> MutexGuard<'_, Option<Server>> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Listens for clients in place of the server before; port 0 takes any that is free.
+    pub(super) fn open(
+        &self,
+        (address, port): (IpAddr, u16),
+        tracker: Tracker,
+        bell: Bell,
+    ) -> Result<SocketAddr, IgtlError> {
+        let mut server = self.lock();
+        // The old one first: it may hold the port.
+        *server = None;
+        let (at, settings) = (SocketAddr::new(address, port), Settings::new(tracker));
+        let opened = Server::bind_and_tell(at, settings, move || bell.ring())?;
+        Ok(server.insert(opened).address())
+    }
+
+    /// Ends all connections.
+    pub(super) fn close(&self) {
+        *self.lock() = None;
+    }
+
+    /// What the server says; nothing without one.
+    pub(super) fn report(&self) -> Option<Report> {
+        self.lock().as_ref().map(|server| Report {
+            address: server.address(),
+            status: server.status(),
+            tracked: server.pose(),
+        })
+    }
+}
+
+/// The simulation's side: its last picture, for clients.
+pub(super) struct Broadcast {
+    link: Link,
+    device: Arc<Device>,
+    last: Option<(Image, layout::Frame, DAffine3)>,
+}
+
+impl Broadcast {
+    pub(super) fn new(link: Link, device: &Arc<Device>) -> Self {
+        Self {
+            link,
+            device: device.clone(),
+            last: None,
+        }
+    }
+
+    /// Offers a finished picture with its constants and the pose at which it was taken.
+    pub(super) fn offer(
+        &mut self,
+        image: &Image,
+        constants: &layout::Frame,
+        pose: DAffine3,
+    ) -> Result<(), GpuError> {
+        self.last = Some((image.clone(), *constants, pose));
+        self.again()
+    }
+
+    /// Offers the last picture again, as to a client that has just come. It is copied to the host
+    /// only where there is a client; who takes it when is the server's business.
+    pub(super) fn again(&self) -> Result<(), GpuError> {
+        let Some((image, constants, pose)) = &self.last else {
+            return Ok(());
+        };
+        let clients = match &*self.link.lock() {
+            Some(server) => {
+                // Until there is a client, or has been published what follows.
+                server.outdate();
+                server.status().clients
+            }
+            None => 0,
+        };
+        if clients == 0 {
+            return Ok(());
+        }
+        let rgba = self.device.read_back_image(image)?;
+        let picture = Picture::new(constants, &rgba);
+        if let Some(server) = &*self.link.lock() {
+            server.publish(picture, pose);
+        }
+        Ok(())
+    }
+}
