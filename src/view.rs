@@ -38,6 +38,7 @@ pub use model::Model;
 
 use crate::gpu::{Device, DeviceOptions, GpuError};
 use crate::igtl::IgtlError;
+use crate::scene::animation::Track;
 use crate::scene::{Scene, Simulation};
 use crate::sim::shaders::Library;
 use crate::sim::{SimError, Tracer};
@@ -58,6 +59,8 @@ pub struct Options {
     pub screenshot: Option<PathBuf>,
     /// Writes the timings into this file at the end.
     pub json: Option<PathBuf>,
+    /// A trajectory that the probe goes along from the start, and the file that it is from.
+    pub trajectory: Option<(Track, PathBuf)>,
     /// Where OpenIGTLink clients are listened for from the start; nowhere without it.
     pub listen: Option<Listen>,
     /// Suits path and scatterer counts to the device, and chooses a tracer that it has.

@@ -56,12 +56,6 @@ impl Sweep {
 /// Poses of the probe in the world from a trajectory: one at each of its times, or `frames` evenly
 /// from its first time to its last. What it leaves out, position or rotation, stays the scene's.
 pub fn stations_of(track: &Track, scene: &Scene, frames: Option<u32>) -> Vec<Station> {
-    let (_, rotation, translation) = scene.world_from_probe.to_scale_rotation_translation();
-    let rest = Trs {
-        translation,
-        rotation,
-        ..Trs::default()
-    };
     let times: Vec<f64> = match (frames, track.span()) {
         (Some(frames), Some((first, last))) => {
             let step = (last - first) / f64::from(frames.max(2) - 1);
@@ -73,6 +67,25 @@ pub fn stations_of(track: &Track, scene: &Scene, frames: Option<u32>) -> Vec<Sta
             times.dedup();
             times
         }
+    };
+    stations(track, scene, times)
+}
+
+/// The same, `rate` poses a second from its first time on: `frames` of them, or up to its last time.
+pub fn stations_at(track: &Track, scene: &Scene, rate: f64, frames: Option<u32>) -> Vec<Station> {
+    let (first, last) = track.span().unwrap_or_default();
+    // The last one must not be lost to rounding.
+    let all = || ((last - first) * rate + 1e-6) as u32 + 1;
+    let times = (0..frames.unwrap_or_else(all)).map(|i| first + f64::from(i) / rate);
+    stations(track, scene, times.collect())
+}
+
+fn stations(track: &Track, scene: &Scene, times: Vec<f64>) -> Vec<Station> {
+    let (_, rotation, translation) = scene.world_from_probe.to_scale_rotation_translation();
+    let rest = Trs {
+        translation,
+        rotation,
+        ..Trs::default()
     };
     let station = |time| Station {
         time,

@@ -3,15 +3,16 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use miette::{Context, IntoDiagnostic, Result};
+use glam::DAffine3;
+use miette::{Context, IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::common::{self, Common, Progress};
 use super::images::Images;
 use super::movie::Movie;
+use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
-use insonify::output;
-use insonify::scene::Scene;
+use insonify::scene::{Scene, file};
 use insonify::sim::Simulator;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
@@ -27,13 +28,20 @@ pub struct Render {
     /// where the number goes. NAME.gif is an animation of all frames, played again and again.
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Frames to simulate; each is written, timings are over all. --dump takes the last.
-    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=100_000))]
-    frames: u32,
-    /// Frames per second of the scene's time [default: time stands still, and only noise differs].
-    /// Without it an animated GIF shows 10 frames a second.
+    /// Frames to simulate; each is written, timings are over all. --dump takes the last. [default: 1;
+    /// along a trajectory one for each of its rows, or as many as --fps makes of it]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: Option<u32>,
+    /// Frames per second of the scene's time [default: time stands still, and only noise differs;
+    /// along a trajectory it goes on as that does]. Without it an animated GIF shows 10 frames a
+    /// second, or as many as the trajectory has.
     #[arg(long, value_parser = rate)]
     fps: Option<f64>,
+    /// Poses of the probe (.csv, .toml): what the window has recorded, or columns time_s, x_mm, y_mm,
+    /// z_mm, qw, qx, qy, qz. --frames alone are spread evenly from its first row to its last. --time
+    /// is the scene's time at its first row.
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
     /// Writes every stage as a numbered array with its axes into this folder.
@@ -149,6 +157,54 @@ fn reload(simulator: &mut Simulator, library: &mut Library) {
 #[cfg(not(feature = "compile"))]
 fn reload(_: &mut Simulator, _: &mut Library) {}
 
+/// What a frame shows.
+struct Moment {
+    /// Time of the scene, s.
+    seconds: f64,
+    /// World from probe, where a trajectory gives it.
+    pose: Option<DAffine3>,
+}
+
+/// Times and poses of all frames.
+fn moments(args: &Render, scene: &Scene) -> Result<Vec<Moment>> {
+    let start = args.common.time;
+    let Some(path) = &args.trajectory else {
+        let gone = |index| args.fps.map_or(0.0, |fps| f64::from(index) / fps);
+        let moment = |index| Moment {
+            seconds: start + gone(index),
+            pose: None,
+        };
+        return Ok((0..args.frames.unwrap_or(1)).map(moment).collect());
+    };
+    let track = file::load_trajectory(path)?;
+    let stations = match args.fps {
+        Some(fps) => acquire::stations_at(&track, scene, fps, args.frames),
+        None => acquire::stations_of(&track, scene, args.frames),
+    };
+    if stations.len() > 100_000 {
+        return Err(miette!(
+            help = "give --frames or a lower --fps",
+            "{} makes {} frames; at most 100000 are rendered",
+            path.display(),
+            stations.len()
+        ));
+    }
+    let first = stations[0].time;
+    let moment = |station: &Station| Moment {
+        seconds: start + station.time - first,
+        pose: Some(station.world_from_probe),
+    };
+    Ok(stations.iter().map(moment).collect())
+}
+
+/// Frames per second of a trajectory's rows, in the mean.
+fn pace(args: &Render, moments: &[Moment]) -> Option<f64> {
+    args.trajectory.as_ref()?;
+    let (first, last) = (moments.first()?, moments.last()?);
+    let seconds = last.seconds - first.seconds;
+    (seconds > 0.0).then(|| (moments.len() - 1) as f64 / seconds)
+}
+
 /// All frames, each written as an image; the device's timings of each. The scene stands at the time
 /// of the last frame afterwards.
 fn simulate(
@@ -156,21 +212,27 @@ fn simulate(
     library: &mut Library,
     scene: &mut Scene,
     args: &Render,
-    file: &Path,
+    output: &Path,
 ) -> Result<Vec<FrameTimings>> {
-    let mut movie = match Movie::is_meant(file) {
-        true => Some(Movie::new(file, args.fps)?),
+    let moments = moments(args, scene)?;
+    let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
+    let mut movie = match Movie::is_meant(output) {
+        true => Some(Movie::new(
+            output,
+            args.fps.or_else(|| pace(args, &moments)),
+        )?),
         false => None,
     };
-    let images = Images::new(file, args.frames);
-    let mut progress = Progress::new(args.frames, "frames");
+    let images = Images::new(output, frames);
+    let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
-    for index in 0..args.frames {
+    for (index, moment) in (0..).zip(moments) {
         reload(simulator, library);
-        if let Some(fps) = args.fps {
-            scene.set_time(args.common.time + f64::from(index) / fps);
+        if let Some(pose) = moment.pose {
+            scene.world_from_probe = pose;
         }
+        scene.set_time(moment.seconds);
         if index > 0 && !unseen.is_empty() {
             let still = scene.masks_off_the_image();
             unseen.retain(|mask| still.contains(mask));
@@ -189,8 +251,8 @@ fn simulate(
     timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();
     match movie {
-        Some(_) => output::line(file.display()),
-        None => output::line(&images),
+        Some(_) => insonify::output::line(output.display()),
+        None => insonify::output::line(&images),
     }
     Ok(timings)
 }

@@ -8,6 +8,8 @@ use miette::{IntoDiagnostic, Result};
 
 use super::common::{Common, QualityChoice};
 use insonify::gpu::AdapterKind;
+use insonify::scene::animation::Track;
+use insonify::scene::file;
 use insonify::sim::shaders::Library;
 use insonify::view::{self, Listen, Options};
 
@@ -19,6 +21,10 @@ pub struct View {
     scene: PathBuf,
     #[command(flatten)]
     common: Common,
+    /// Lets the probe go along a trajectory (.csv, .toml) from the start: one that the window has
+    /// recorded, or any as scene files take them.
+    #[arg(long, value_name = "FILE")]
+    trajectory: Option<PathBuf>,
     /// Listens for OpenIGTLink at this port: trackers move the probe, viewers receive the images; 0
     /// takes any port that is free, and says which. 18944 is the usual one.
     #[arg(long, value_name = "PORT")]
@@ -50,6 +56,7 @@ pub fn run(args: &View) -> Result<()> {
         seconds: common.time,
         screenshot: args.screenshot.clone(),
         json: args.json.clone(),
+        trajectory: trajectory(args)?,
         listen: args.igtl_port.map(|port| Listen {
             address: args.igtl_bind,
             port,
@@ -65,4 +72,11 @@ pub fn run(args: &View) -> Result<()> {
         }),
     };
     view::run(scene, options).into_diagnostic()
+}
+
+fn trajectory(args: &View) -> Result<Option<(Track, PathBuf)>> {
+    let Some(path) = &args.trajectory else {
+        return Ok(None);
+    };
+    Ok(Some((file::load_trajectory(path)?, path.clone())))
 }

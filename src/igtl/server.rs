@@ -223,6 +223,11 @@ impl Server {
         self.shared.tracking.now()
     }
 
+    /// Goes on with another scene's tracker. Poses by the one before are forgotten.
+    pub fn calibrate(&self, tracker: Tracker) {
+        self.shared.tracking.calibrate(tracker);
+    }
+
     /// Offers a picture and the pose at which it was taken to every client: those that are still
     /// taking an older one get the newest when they are done. Does not wait for the network.
     pub fn publish(&self, picture: Picture, world_from_probe: &DAffine3) {

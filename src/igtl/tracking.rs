@@ -47,7 +47,7 @@ impl Tracked {
 
 /// The latest pose with what turns messages into it.
 pub(super) struct Tracking {
-    tracker: Tracker,
+    tracker: Mutex<Tracker>,
     last: Mutex<Option<Last>>,
 }
 
@@ -60,20 +60,26 @@ struct Last {
 impl Tracking {
     pub fn new(tracker: Tracker) -> Self {
         Self {
-            tracker,
+            tracker: Mutex::new(tracker),
             last: Mutex::new(None),
         }
     }
 
-    pub fn tracker(&self) -> &Tracker {
-        &self.tracker
+    pub fn tracker(&self) -> Tracker {
+        lock(&self.tracker).clone()
+    }
+
+    /// Goes on with another calibration. Poses by the one before are forgotten.
+    pub fn calibrate(&self, tracker: Tracker) {
+        *lock(&self.tracker) = tracker;
+        *lock(&self.last) = None;
     }
 
     pub fn now(&self) -> Tracked {
         match &*lock(&self.last) {
             None => Tracked::Never,
             Some(last) => {
-                let timeout = Duration::from_secs_f64(self.tracker.timeout);
+                let timeout = Duration::from_secs_f64(self.tracker().timeout);
                 match last.missing || last.pose.arrived.elapsed() > timeout {
                     true => Tracked::Lost(last.pose),
                     false => Tracked::Live(last.pose),
@@ -85,7 +91,7 @@ impl Tracking {
     /// Whether this tool moves the probe. Without a choice all do, but for what was sent from here:
     /// some programs send back what they receive.
     fn is_meant(&self, device: &Label<20>) -> bool {
-        match &self.tracker.device {
+        match &lock(&self.tracker).device {
             Some(wanted) => device.is(wanted),
             None => !device.is(POSE_DEVICE),
         }
@@ -115,11 +121,12 @@ impl Tracking {
         let reported = DAffine3::from_cols_array(&matrix.map(f64::from));
         let reported =
             rigid(reported).map_err(|why| format!("{device} is no pose of a probe: {why}"))?;
+        let world_from_probe = self.tracker().world_from_probe(reported);
         let mut last = lock(&self.last);
         let number = last.as_ref().map_or(0, |last| last.pose.number) + 1;
         *last = Some(Last {
             pose: Pose {
-                world_from_probe: self.tracker.world_from_probe(reported),
+                world_from_probe,
                 arrived: Instant::now(),
                 number,
                 device,

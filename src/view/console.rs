@@ -34,7 +34,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
             section(ui, "Animation", false, &mut animate);
             section(ui, "Probe input", false, |ui| {
-                input::show(ui, model, &mut state.inputs);
+                input::show(ui, model, &mut state.inputs, now);
             });
             let (settings, loaded) = (&mut model.settings, &model.loaded);
             let lattice = model.file.lattice;

@@ -168,6 +168,7 @@ impl Engine {
             library,
             scene,
             fitted: None,
+            imaged: Instant::now(),
             wake: Box::new(wake),
         };
         let thread = std::thread::Builder::new()
@@ -229,6 +230,8 @@ struct Worker {
     scene: Scene,
     /// Settings that the simulator's buffers are known to hold.
     fitted: Option<Arc<Settings>>,
+    /// The moment that the last picture shows.
+    imaged: Instant,
     wake: Box<dyn Fn() + Send>,
 }
 
@@ -273,8 +276,8 @@ impl Worker {
         (self.wake)();
     }
 
-    /// The newest order once there is one, or the last one again while its clock runs; nothing at
-    /// the end.
+    /// The newest order once there is one, or the last one again while it looks different by itself;
+    /// nothing at the end.
     fn next(&self, last: Option<&Order>) -> Option<Job> {
         let mut state = self.shared.lock();
         loop {
@@ -295,9 +298,8 @@ impl Worker {
                 if let Some(order) = state.order.take() {
                     return Some(Job::Image(order));
                 }
-                if let Some(last) = last.filter(|last| last.clock.runs()) {
-                    let at = Instant::now();
-                    return Some(Job::Image(Order { at, ..last.clone() }));
+                if let Some(last) = last.filter(|last| last.runs(self.imaged)) {
+                    return Some(Job::Image(last.again(Instant::now())));
                 }
             }
             let changed = self.shared.changed.wait(state);
@@ -330,7 +332,9 @@ impl Worker {
         let began = Instant::now();
         let seconds = order.clock.at(began);
         order.settings.apply(&mut self.scene);
-        self.scene.world_from_probe = order.pose;
+        let pose = order.pose(began);
+        self.scene.world_from_probe = pose;
+        self.imaged = began;
         self.scene.set_time(seconds);
         let (scene, library, tracer) = (&self.scene, &self.library, order.settings.tracer);
         if simulator.as_ref().is_none_or(|(_, made)| *made != tracer) {
@@ -364,7 +368,7 @@ impl Worker {
             false => None,
         };
         let constants = simulator.constants();
-        self.broadcast.offer(&image, constants, order.pose)?;
+        self.broadcast.offer(&image, constants, pose)?;
         Ok(Frame {
             pixels,
             sector: Sector {
@@ -375,7 +379,7 @@ impl Worker {
             image,
             probe: scene.probe.clone(),
             settings,
-            pose: order.pose,
+            pose,
             seconds,
             revision: order.revision,
             at: order.at,

@@ -1,13 +1,16 @@
 //! The devices beside keyboard and mouse that move the probe.
 
 use std::net::{IpAddr, SocketAddr};
+use std::path::Path;
 use std::time::{Duration, Instant};
 
+use super::files::said;
 use super::link::{Bell, Link, Report};
-use super::model::{Model, age};
+use super::model::{Kept, Model, Ways, age};
 use super::{Listen, ViewError};
 use crate::igtl::{PORT, Tracked};
 use crate::scene::Tracker;
+use crate::scene::file::load_trajectory;
 
 /// Devices with what is known of them.
 pub(super) struct Inputs {
@@ -21,6 +24,10 @@ pub(super) struct Inputs {
     pub(super) report: Option<Report>,
     /// Why there is none although the user wanted it.
     pub(super) refused: Option<String>,
+    /// The trajectory file that is written and read.
+    pub(super) path: String,
+    /// What is wrong with it.
+    pub(super) problem: Option<String>,
     /// When to look again although nothing comes.
     pub(super) due: Option<Instant>,
     /// Clients that the simulation has been told of.
@@ -50,6 +57,8 @@ impl Inputs {
             }),
             report: None,
             refused: None,
+            path: "trajectory.csv".to_owned(),
+            problem: None,
             due: None,
             greeted: 0,
             followed: 0,
@@ -63,6 +72,13 @@ impl Inputs {
     /// Where clients are listened for.
     pub(super) fn address(&self) -> Option<SocketAddr> {
         self.report.as_ref().map(|report| report.address)
+    }
+
+    /// Goes on with another scene's tracker.
+    pub(super) fn calibrate(&mut self, tracker: Tracker) {
+        self.link.calibrate(tracker.clone());
+        self.tracker = tracker;
+        self.followed = 0;
     }
 
     fn open(&mut self) -> Result<(), ViewError> {
@@ -85,6 +101,38 @@ impl Inputs {
         }
     }
 
+    /// Writes what was recorded.
+    pub(super) fn save(&mut self, ways: &mut Ways) {
+        let Some(kept) = &mut ways.kept else { return };
+        let Some(recording) = &kept.unsaved else {
+            return;
+        };
+        let written = std::fs::write(&self.path, recording.text());
+        self.problem = match written {
+            Ok(()) => {
+                kept.unsaved = None;
+                kept.name = name(Path::new(&self.path));
+                None
+            }
+            Err(error) => Some(format!(
+                "writing {}: {error}: give the name of a file in a folder that you may write to",
+                self.path
+            )),
+        };
+    }
+
+    /// Reads a trajectory.
+    pub(super) fn load(&mut self, ways: &mut Ways) {
+        let path = Path::new(&self.path);
+        self.problem = match load_trajectory(path) {
+            Ok(track) => {
+                ways.kept = Some(Kept::loaded(track, name(path)));
+                None
+            }
+            Err(error) => Some(said(&error)),
+        };
+    }
+
     /// Looks what has come: the tracker moves the probe. Whether a client has come that waits for a
     /// picture.
     pub(super) fn look(&mut self, model: &mut Model) -> bool {
@@ -98,7 +146,7 @@ impl Inputs {
         if let Tracked::Live(pose) = &report.tracked
             && std::mem::replace(&mut self.followed, pose.number) != pose.number
         {
-            model.track(pose.world_from_probe, pose.arrived);
+            model.track(&pose.device.text(), pose.world_from_probe, pose.arrived);
         }
         let accepted = report.status.accepted;
         std::mem::replace(&mut self.greeted, accepted) < accepted
@@ -119,4 +167,10 @@ impl Inputs {
             }
         }
     }
+}
+
+/// A file's name without its folder.
+pub(super) fn name(path: &Path) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    name.to_string_lossy().into_owned()
 }

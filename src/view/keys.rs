@@ -24,6 +24,8 @@ enum Action {
     Delete,
     Play,
     Home,
+    Record,
+    Replay,
     Undo,
     Redo,
     Save,
@@ -93,6 +95,14 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "Home",
         &[(Key::Home, false, Action::Home)],
         "probe back to the scene file's pose",
+    ),
+    (
+        "R Ctrl+R",
+        &[
+            (Key::R, false, Action::Record),
+            (Key::R, true, Action::Replay),
+        ],
+        "record where the probe goes; replay it",
     ),
     (
         "Space",
@@ -261,6 +271,8 @@ fn carry_out(
         }
         Action::Play => {}
         Action::Home => model.place_probe(Source::Keyboard, model.home, now),
+        Action::Record => model.record(now),
+        Action::Replay => model.replay(now),
         Action::Undo => return model.undo(now),
         Action::Redo => return model.redo(now),
         Action::Save if modifiers.shift => state.files.ask(Purpose::Save, model),

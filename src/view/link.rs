@@ -81,6 +81,13 @@ impl Link {
         Ok(server.insert(opened).address())
     }
 
+    /// Goes on with another scene's tracker.
+    pub(super) fn calibrate(&self, tracker: Tracker) {
+        if let Some(server) = &*self.lock() {
+            server.calibrate(tracker);
+        }
+    }
+
     /// Ends all connections.
     pub(super) fn close(&self) {
         *self.lock() = None;

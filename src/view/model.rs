@@ -14,6 +14,8 @@ mod saving;
 mod settings;
 pub mod sheet;
 pub mod skin;
+pub mod trajectory;
+mod ways;
 
 use std::time::Instant;
 
@@ -29,6 +31,8 @@ use mmode::Strip;
 pub use pose::{Axis, STEP, moved};
 pub use saving::File;
 pub use settings::Settings;
+use trajectory::Replay;
+pub use ways::{Kept, Ways};
 
 use super::engine::Frame;
 use crate::scene::graph::NodeKind;
@@ -45,6 +49,8 @@ pub struct Model {
     pub pose: DAffine3,
     /// Which device has the probe.
     pub devices: Devices,
+    /// The trajectory that is recorded or replayed.
+    pub ways: Ways,
     /// Time of the scene.
     pub clock: Clock,
     /// The image stands still, and so does the clock.
@@ -85,8 +91,10 @@ pub struct Placed {
 pub struct Order {
     /// The console's settings.
     pub settings: Settings,
-    /// World from probe.
-    pub pose: DAffine3,
+    /// World from probe, but for a replay.
+    pose: DAffine3,
+    /// The trajectory along which the probe goes.
+    replay: Option<Replay>,
     /// Time of the scene.
     pub clock: Clock,
     /// The picture's pixels are wanted outside the device, too.
@@ -95,6 +103,27 @@ pub struct Order {
     pub revision: u64,
     /// When the change was made: an input event's arrival.
     pub at: Instant,
+}
+
+impl Order {
+    /// World from probe at a moment.
+    pub fn pose(&self, now: Instant) -> DAffine3 {
+        match &self.replay {
+            Some(replay) => replay.pose(&self.clock, now),
+            None => self.pose,
+        }
+    }
+
+    /// The same once more, decided now.
+    pub fn again(&self, at: Instant) -> Self {
+        Self { at, ..self.clone() }
+    }
+
+    /// Whether it looks different by itself after `since`.
+    pub fn runs(&self, since: Instant) -> bool {
+        let replays = |replay: &Replay| replay.moves(&self.clock, since);
+        self.clock.runs() || self.replay.as_ref().is_some_and(replays)
+    }
 }
 
 impl Model {
@@ -108,6 +137,7 @@ impl Model {
             settings,
             pose: scene.world_from_probe,
             devices: Devices::default(),
+            ways: Ways::default(),
             clock: Clock::new(seconds, animated, now),
             frozen: false,
             animated,
@@ -131,26 +161,28 @@ impl Model {
 
     /// Moves the probe along or about one of its axes, by mm or radians: a key was pressed.
     pub fn move_probe(&mut self, axis: Axis, amount: f64, now: Instant) {
+        self.stop(now);
         self.place_probe(Source::Keyboard, moved(&self.pose, axis, amount), now);
     }
 
     /// Puts the probe somewhere: a device other than the tracker has moved it.
     pub fn place_probe(&mut self, source: Source, pose: DAffine3, now: Instant) {
         self.devices.take(source);
-        self.settle(pose, now);
+        self.settle(source.name(), pose, now);
     }
 
-    /// Hears where the tracker sees its tool (world from probe); the probe is there unless another
+    /// Hears where the tracker sees its `tool` (world from probe); the probe is there unless another
     /// device has moved it since.
-    pub fn track(&mut self, pose: DAffine3, now: Instant) {
+    pub fn track(&mut self, tool: &str, pose: DAffine3, now: Instant) {
         if self.devices.track(pose) {
-            self.settle(pose, now);
+            self.settle(tool, pose, now);
         }
     }
 
-    fn settle(&mut self, pose: DAffine3, now: Instant) {
-        if pose != self.pose {
+    fn settle(&mut self, device: &str, pose: DAffine3, now: Instant) {
+        if self.stop(now) || pose != self.pose {
             self.pose = pose;
+            self.write(device, pose, now);
             self.touch(now);
         }
     }
@@ -158,7 +190,11 @@ impl Model {
     /// Stops or starts the image; the clock goes on from where it stopped.
     pub fn freeze(&mut self, frozen: bool, now: Instant) {
         self.frozen = frozen;
+        self.follow(now);
         self.clock.hold(frozen, now);
+        if let Some(replay) = &mut self.ways.replay {
+            replay.hold(frozen, now);
+        }
         self.touch(now);
     }
 
@@ -221,6 +257,7 @@ impl Model {
             settings: self.settings.clone(),
             pose: self.pose,
             clock: self.clock,
+            replay: self.ways.replay.clone(),
             reads_back: self.mmode.is_some(),
             revision: self.revision,
             at: self.changed,

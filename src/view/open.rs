@@ -10,9 +10,9 @@ use winit::window::Window;
 
 use super::engine::{Frame, News};
 use super::files::Files;
-use super::inputs::Inputs;
+use super::inputs::{self, Inputs};
 use super::link::{Bell, Link};
-use super::model::File;
+use super::model::{File, Kept};
 use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
@@ -99,7 +99,10 @@ impl Open {
         let scene = plan.scene.clone();
         let file = File::new(options.file.clone(), options.overrides.clone(), &scene);
         let suited = opening::suited(scene, file, options, &device, options.seconds, now);
-        let Opened { scene, model } = suited.map_err(ViewError::Refused)?;
+        let Opened { scene, mut model } = suited.map_err(ViewError::Refused)?;
+        if let Some((track, file)) = plan.options.trajectory.take() {
+            model.await_replay(Kept::loaded(track, inputs::name(&file)), now);
+        }
         plan.scene = scene;
         let machine = match device.info().kind {
             AdapterKind::Cpu => Machine::Software,
@@ -206,6 +209,10 @@ impl Open {
         for news in self.session.engine.news() {
             match news {
                 News::Frame(frame) => {
+                    self.model.follow(Instant::now());
+                    if self.frame.is_none() {
+                        self.model.begin_replay(Instant::now());
+                    }
                     self.model.film(&frame);
                     self.state.tools.record((*frame).clone());
                     self.frame = Some(*frame);
@@ -273,6 +280,7 @@ impl Open {
         (self.state.tissue, self.state.mesh) = (0, 0);
         self.state.tools.lose();
         self.state.mmode = Default::default();
+        self.state.inputs.calibrate(scene.tracker.clone());
         plan.scene = scene;
         self.state.files.opening = false;
         self.state.files.close();

@@ -246,6 +246,14 @@ impl Desk {
         self.fake(xproto::KEY_RELEASE_EVENT, code, (0, 0));
     }
 
+    /// Presses and releases a key while Ctrl is held.
+    pub fn hold_control(&self, key: Key) {
+        let control = self.code(Key::Control);
+        self.fake(xproto::KEY_PRESS_EVENT, control, (0, 0));
+        self.press(key);
+        self.fake(xproto::KEY_RELEASE_EVENT, control, (0, 0));
+    }
+
     /// Clicks at a place of the display.
     pub fn click(&self, at: (u16, u16)) {
         self.drag(at, at);
@@ -313,10 +321,7 @@ impl Desk {
 
     /// Ctrl+Q; the program has to end by itself, without an error.
     pub fn quit(mut self) {
-        let control = self.code(Key::Control);
-        self.fake(xproto::KEY_PRESS_EVENT, control, (0, 0));
-        self.press(Key::Letter('q'));
-        self.fake(xproto::KEY_RELEASE_EVENT, control, (0, 0));
+        self.hold_control(Key::Letter('q'));
         let began = Instant::now();
         loop {
             if let Some(status) = self.program.try_wait().expect("a child") {

@@ -9,6 +9,7 @@ mod desk;
 mod mmode;
 mod tools;
 mod tracker;
+mod trajectory;
 
 use std::time::Duration;
 

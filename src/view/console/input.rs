@@ -1,8 +1,8 @@
 //! What moves the probe, and the network that it is moved from.
 
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
-use egui::{DragValue, RichText, Ui};
+use egui::{DragValue, RichText, TextEdit, Ui};
 
 use super::controls::grid;
 use crate::igtl::{OPEN, Tracked};
@@ -11,11 +11,14 @@ use crate::view::link::Report;
 use crate::view::model::{Model, Source, age};
 use crate::view::style;
 
-pub(super) fn show(ui: &mut Ui, model: &Model, inputs: &mut Inputs) {
+pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Instant) {
     let holder = model.devices.holder();
     grid(ui, "devices", |ui| {
         device(ui, "Keyboard", holder == Some(Source::Keyboard), |ui| {
             ui.label("arrows, A D W S Q E: see Keys (?)");
+        });
+        device(ui, "Replay", holder == Some(Source::Replay), |ui| {
+            ui.label(replay(model, now));
         });
         device(ui, "Tracker", holder == Some(Source::Tracker), |ui| {
             tracker(ui, inputs.report.as_ref());
@@ -23,6 +26,9 @@ pub(super) fn show(ui: &mut Ui, model: &Model, inputs: &mut Inputs) {
     });
     ui.add_space(4.0);
     network(ui, inputs);
+    ui.add_space(4.0);
+    way(ui, model, now);
+    file(ui, model, inputs);
 }
 
 /// A line: a device, marked where it has the probe, and how it is.
@@ -88,5 +94,102 @@ fn network(ui: &mut Ui, inputs: &mut Inputs) {
     if let Some(last) = &status.last_error {
         let text = format!("{} faults, the last: {last}", status.errors);
         ui.label(RichText::new(text).color(style::FAINT));
+    }
+}
+
+/// How the trajectory is.
+fn replay(model: &Model, now: Instant) -> String {
+    let ways = &model.ways;
+    match (&ways.recorder, &ways.replay, &ways.kept) {
+        (Some(recorder), _, _) => {
+            let (seconds, rows) = (recorder.seconds(now), recorder.rows());
+            format!("recording: {seconds:.1} s, {rows} poses")
+        }
+        (_, Some(replay), _) => {
+            let at = replay.position(&model.clock, now);
+            format!("{at:.1} of {:.1} s", replay.length())
+        }
+        (_, _, Some(kept)) => {
+            let unsaved = if kept.unsaved.is_some() {
+                ", not saved"
+            } else {
+                ""
+            };
+            format!("{:.1} s, {}{unsaved}", kept.seconds(), kept.name)
+        }
+        _ => "nothing recorded".to_owned(),
+    }
+}
+
+/// Recording and replay.
+fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
+    ui.horizontal(|ui| {
+        let is_recording = model.ways.recorder.is_some();
+        let word = if is_recording {
+            "Stop recording"
+        } else {
+            "Record"
+        };
+        let tip = "Record where the probe goes, whatever moves it (R)";
+        if ui.button(word).on_hover_text(tip).clicked() {
+            model.record(now);
+        }
+        if is_recording {
+            // The seconds count on while nothing else is drawn.
+            ui.ctx().request_repaint_after(Duration::from_millis(500));
+        }
+        let is_replaying = model.ways.replay.is_some();
+        let word = if is_replaying {
+            "Stop replay"
+        } else {
+            "Replay"
+        };
+        let tip = "Let the probe go along the trajectory; whatever else moves it takes it (Ctrl+R)";
+        let button = egui::Button::new(word);
+        let enabled = is_replaying || model.ways.kept.is_some() && !is_recording;
+        if ui.add_enabled(enabled, button).on_hover_text(tip).clicked() {
+            model.replay(now);
+        }
+        let tip = "Begin again at its end; for the next replay";
+        ui.checkbox(&mut model.ways.looped, "loop")
+            .on_hover_text(tip);
+    });
+    let tip = "As fast as the scene's time passes, from the time at which the recording began; else at \
+               the recorded pace. For the next replay";
+    let choice = egui::Checkbox::new(&mut model.ways.with_scene, "with the scene's time");
+    ui.add_enabled(model.animated, choice).on_hover_text(tip);
+}
+
+/// The file of the trajectory.
+fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs) {
+    ui.horizontal(|ui| {
+        let field = TextEdit::singleline(&mut inputs.path).desired_width(180.0);
+        ui.add(field)
+            .on_hover_text("Trajectory file (.csv): time_s, x_mm, y_mm, z_mm, qw, qx, qy, qz");
+        let unsaved = model
+            .ways
+            .kept
+            .as_ref()
+            .is_some_and(|k| k.unsaved.is_some());
+        let replaces = std::path::Path::new(&inputs.path).exists();
+        let word = if replaces && unsaved {
+            "Replace"
+        } else {
+            "Save"
+        };
+        let button = ui.add_enabled(unsaved, egui::Button::new(word));
+        if button.on_hover_text("Write what was recorded").clicked() {
+            inputs.save(&mut model.ways);
+        }
+        if ui
+            .button("Load")
+            .on_hover_text("Read a trajectory")
+            .clicked()
+        {
+            inputs.load(&mut model.ways);
+        }
+    });
+    if let Some(problem) = &inputs.problem {
+        ui.label(RichText::new(problem).color(style::WARN));
     }
 }

@@ -14,6 +14,8 @@ pub enum Source {
     Keyboard,
     /// The mouse, in the window.
     Pointer,
+    /// A trajectory that is replayed.
+    Replay,
     /// A tool that an OpenIGTLink client reports.
     Tracker,
 }
@@ -24,6 +26,7 @@ impl Source {
         match self {
             Self::Keyboard => "keyboard",
             Self::Pointer => "mouse",
+            Self::Replay => "replay",
             Self::Tracker => "tracker",
         }
     }

@@ -30,7 +30,7 @@ fn scene() -> Scene {
     Scene::load(Path::new(&file), &[]).unwrap().0
 }
 
-fn model(now: Instant) -> Model {
+pub(super) fn model(now: Instant) -> Model {
     let scene = scene();
     let file = File::new("scene.toml".into(), Vec::new(), &scene);
     Model::new(&scene, file, Tracer::Bvh, 0.0, now)
