@@ -10,7 +10,6 @@ mod common;
 mod images;
 mod info;
 mod matching;
-mod movie;
 mod reconstruct;
 mod render;
 mod serve;

@@ -1,7 +1,32 @@
-//! Standard output, which its reader may close at any time.
+//! What is said of a frame, and standard output, which its reader may close at any time.
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stdout};
+
+use serde_json::{Value, json};
+
+use crate::probe::Probe;
+use crate::scene::{Imaging, Simulation};
+
+/// Settings of a frame, and the counts that follow from them.
+pub fn settings(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Value {
+    let lines = probe.scanlines * probe.elevation_layers;
+    json!({
+        "counts": {
+            "lines": lines,
+            "samples": probe.samples,
+            "paths_per_line": simulation.paths,
+            "paths": u64::from(lines) * u64::from(simulation.paths),
+            "cell_mm": simulation.cell,
+            "scatterer_cells_per_mm3": simulation.cell.powi(-3),
+            "elevation_cells": simulation.elevation_cells,
+            "volume_floor_db": simulation.volume_floor,
+        },
+        "probe": format!("{probe:?}"),
+        "simulation": format!("{simulation:?}"),
+        "imaging": format!("{imaging:?}"),
+    })
+}
 
 /// Writes a line to standard output. Where nobody reads any more (`insonify info | head -1`) it is
 /// dropped, and the program goes on: its files and its exit code are wanted all the same.

@@ -6,6 +6,7 @@
 mod app;
 mod bmode;
 mod calipers;
+mod captures;
 mod catalogue;
 mod cine;
 mod console;
@@ -21,9 +22,11 @@ mod notice;
 mod open;
 mod opening;
 mod ring;
+mod saved;
 mod session;
 mod state;
 mod statistics;
+mod strip;
 mod style;
 mod timing;
 mod tools;
@@ -63,6 +66,8 @@ pub struct Options {
     pub trajectory: Option<(Track, PathBuf)>,
     /// Where OpenIGTLink clients are listened for from the start; nowhere without it.
     pub listen: Option<Listen>,
+    /// Folder of stills and clips.
+    pub captures: PathBuf,
     /// Suits path and scatterer counts to the device, and chooses a tracer that it has.
     pub prepare: Prepare,
 }

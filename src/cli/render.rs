@@ -9,14 +9,18 @@ use serde_json::{Map, Value, json};
 
 use super::common::{self, Common, Progress};
 use super::images::Images;
-use super::movie::Movie;
 use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
+use insonify::movie::Movie;
+use insonify::output;
 use insonify::scene::{Scene, file};
 use insonify::sim::Simulator;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
 use insonify::statistics::Statistics;
+
+/// Frames of an animation shown per second where the scene's time stands still.
+const SHOWN: f64 = 10.0;
 
 /// Arguments of `insonify render`.
 #[derive(Debug, clap::Args)]
@@ -97,7 +101,7 @@ pub fn run(args: &Render) -> Result<()> {
         let memory = device.memory();
         let report = json!({
             "scene": args.scene.display().to_string(),
-            "settings": settings(&scene),
+            "settings": output::settings(&scene.probe, &scene.simulation, &scene.imaging),
             "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
             "tracer": tracer.to_string(),
             "triangles": scene.triangles(),
@@ -216,11 +220,9 @@ fn simulate(
 ) -> Result<Vec<FrameTimings>> {
     let moments = moments(args, scene)?;
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
+    let shown = args.fps.or_else(|| pace(args, &moments)).unwrap_or(SHOWN);
     let mut movie = match Movie::is_meant(output) {
-        true => Some(Movie::new(
-            output,
-            args.fps.or_else(|| pace(args, &moments)),
-        )?),
+        true => Some(Movie::new(output).into_diagnostic()?),
         false => None,
     };
     let images = Images::new(output, frames);
@@ -240,7 +242,10 @@ fn simulate(
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
         match &mut movie {
-            Some(movie) => movie.add(width, height, &rgba)?,
+            Some(movie) => {
+                let end = f64::from(index + 1) / shown;
+                movie.add(width, height, &rgba, end).into_diagnostic()?;
+            }
             None => dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?,
         }
         progress.done(index + 1);
@@ -251,34 +256,14 @@ fn simulate(
     timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();
     match movie {
-        Some(_) => insonify::output::line(output.display()),
-        None => insonify::output::line(&images),
+        Some(_) => output::line(output.display()),
+        None => output::line(&images),
     }
     Ok(timings)
 }
 
 fn default_output(scene: &Path) -> PathBuf {
     PathBuf::from(scene.file_stem().unwrap_or_default()).with_extension("png")
-}
-
-fn settings(scene: &Scene) -> Value {
-    let (probe, simulation) = (&scene.probe, &scene.simulation);
-    let lines = probe.scanlines * probe.elevation_layers;
-    json!({
-        "counts": {
-            "lines": lines,
-            "samples": probe.samples,
-            "paths_per_line": simulation.paths,
-            "paths": u64::from(lines) * u64::from(simulation.paths),
-            "cell_mm": simulation.cell,
-            "scatterer_cells_per_mm3": simulation.cell.powi(-3),
-            "elevation_cells": simulation.elevation_cells,
-            "volume_floor_db": simulation.volume_floor,
-        },
-        "probe": format!("{probe:?}"),
-        "simulation": format!("{simulation:?}"),
-        "imaging": format!("{:?}", scene.imaging),
-    })
 }
 
 /// Per stage, in frame order; a stage that ran more than once per frame counts whole.

@@ -35,6 +35,9 @@ pub struct View {
     /// Writes the window's picture (PNG) once it shows an image, and ends.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
+    /// Folder that stills (F2) and clips (F3) are written to; made where it does not exist.
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    captures: PathBuf,
     /// Writes the timings of the last frames as one JSON object at the end.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
@@ -61,6 +64,7 @@ pub fn run(args: &View) -> Result<()> {
             address: args.igtl_bind,
             port,
         }),
+        captures: args.captures.clone(),
         prepare: Box::new(move |device, simulation| {
             let mut common = common.clone();
             // The probe is to be moved, not waited for.

@@ -158,6 +158,11 @@ impl Painter {
         Ok(Painted::Shown(Some(self.shot(&buffer, extent))))
     }
 
+    /// Whether the pixels of the window can be had.
+    pub fn can_be_read(&self) -> bool {
+        self.swapchain.as_ref().is_some_and(|chain| chain.readable)
+    }
+
     /// The next picture, of a new swapchain where the window has changed; none where there is none.
     fn acquire(&mut self, size: [u32; 2], slot: usize) -> Result<Option<usize>, GpuError> {
         // A window that is being dragged may change again before the picture is there.

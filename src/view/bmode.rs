@@ -16,6 +16,8 @@ const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
 pub(super) struct Place {
     /// The whole image, points.
     pub(super) rect: Rect,
+    /// The image and what is written around it, points.
+    pub(super) area: Rect,
     /// Points per mm, across and down: equal but for what rounding to pixels makes of them.
     scale: [f64; 2],
     left: f64,
@@ -46,6 +48,7 @@ impl Place {
         };
         Self {
             rect,
+            area,
             scale: [
                 per_mm(rect.width(), texels[0]),
                 per_mm(rect.height(), texels[1]),

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use egui::{
     Align2, Area, Color32, Event, FontId, Grid, Id, Key, Order, Painter, PointerButton, Pos2, Rect,
-    RichText, Sense, Shape, Stroke, TextEdit, TextWrapMode, Ui, pos2, vec2,
+    RichText, Sense, Shape, Stroke, TextEdit, TextWrapMode, Ui, vec2,
 };
 use glam::DVec2;
 
@@ -12,7 +12,7 @@ use super::bmode::Place;
 use super::engine::Frame;
 use super::model::calipers::{Caliper, Kind, Reading};
 use super::model::sheet::{Note, Sheet, Tool, What};
-use super::style;
+use super::{keys, style};
 
 /// How near the pointer has to be to take a point, points.
 const REACH: f32 = 9.0;
@@ -70,8 +70,19 @@ fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: R
     let reach = f64::from(REACH) * place.mm_per_point();
     let over = response.hovered() || response.is_pointer_button_down_on();
     let events = ui.input(|input| input.events.clone());
+    let types = ui.ctx().egui_wants_keyboard_input();
     for event in events {
         match event {
+            Event::Key {
+                key,
+                pressed: true,
+                modifiers,
+                ..
+            } if !types => {
+                if let Some(tool) = keys::tool(key, modifiers) {
+                    sheet.toggle(tool);
+                }
+            }
             Event::PointerMoved(at) => sheet.motion(place.mm(at)),
             Event::PointerButton {
                 pos,
@@ -152,12 +163,12 @@ fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
 }
 
 /// Dots that hide little of what is measured.
-fn dots(painter: &Painter, points: &[Pos2], colour: Color32) {
+pub(super) fn dots(painter: &Painter, points: &[Pos2], colour: Color32) {
     painter.extend(Shape::dotted_line(points, colour, 5.0, 0.9));
 }
 
 /// Open in the middle, so that the point itself is seen.
-fn cross(painter: &Painter, at: Pos2, colour: Color32) {
+pub(super) fn cross(painter: &Painter, at: Pos2, colour: Color32) {
     for (arm, width, tint) in [
         (7.0, 3.0, Color32::from_black_alpha(150)),
         (6.0, 1.4, colour),
@@ -280,6 +291,7 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
                 .show(ui, |ui| {
                     ui.style_mut().wrap_mode = Some(TextWrapMode::Extend);
                     Grid::new("results")
+                        .min_col_width(0.0)
                         .num_columns(4)
                         .spacing([8.0, 3.0])
                         .show(ui, |ui| {
@@ -364,76 +376,4 @@ fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String)
     button
         .response
         .on_hover_text("What is measured: choose a name or type one");
-}
-
-/// Buttons of the tools, a column at the left edge.
-pub(super) fn strip(ui: &mut Ui, sheet: &mut Sheet) {
-    let area = ui.max_rect();
-    let buttons: [(Tool, &str, Icon); 4] = [
-        (
-            Tool::Measure(Kind::Distance),
-            "Distance in mm: two clicks, or drag (L)",
-            |p, r, c| {
-                dots(p, &[r.left_bottom(), r.right_top()], c);
-                cross(p, r.left_bottom(), c);
-                cross(p, r.right_top(), c);
-            },
-        ),
-        (
-            Tool::Measure(Kind::Ellipse),
-            "Ellipse, circumference and area: the ends of one axis, then the width (O)",
-            |p, r, c| {
-                let radius = vec2(r.width() * 0.62, r.height() * 0.42);
-                p.add(egui::epaint::EllipseShape::stroke(
-                    r.center(),
-                    radius,
-                    Stroke::new(1.5, c),
-                ));
-            },
-        ),
-        (
-            Tool::Measure(Kind::Angle),
-            "Angle in degrees: a point on one arm, the vertex, a point on the other (K)",
-            |p, r, c| {
-                let line = Stroke::new(1.5, c);
-                p.line_segment([r.left_bottom(), r.right_top()], line);
-                p.line_segment([r.left_bottom(), r.right_bottom()], line);
-            },
-        ),
-        (
-            Tool::Note,
-            "Text: click to place it, or drag away from what it points at (N)",
-            |p, r, c| {
-                let font = FontId::proportional(17.0);
-                p.text(r.center(), Align2::CENTER_CENTER, "T", font, c);
-            },
-        ),
-    ];
-    let height = 30.0 * buttons.len() as f32;
-    let mut at = pos2(area.left() + 8.0, area.bottom() - 10.0 - height);
-    for (tool, tip, icon) in buttons {
-        let rect = Rect::from_min_size(at, vec2(30.0, 28.0));
-        if button(ui, rect, sheet.tool() == Some(tool), tip, icon) {
-            sheet.toggle(tool);
-        }
-        at.y += 30.0;
-    }
-}
-
-/// Draws a sign into its room with a colour.
-type Icon = fn(&Painter, Rect, Color32);
-
-fn button(ui: &mut Ui, rect: Rect, on: bool, tip: &str, icon: Icon) -> bool {
-    let response = ui.interact(rect, Id::new(tip), Sense::click());
-    let visuals = ui.style().interact_selectable(&response, on);
-    let painter = ui.painter();
-    painter.rect(
-        rect,
-        4.0,
-        visuals.weak_bg_fill,
-        visuals.bg_stroke,
-        egui::StrokeKind::Inside,
-    );
-    icon(painter, rect.shrink2(vec2(9.0, 8.0)), visuals.text_color());
-    response.on_hover_text(tip).clicked()
 }

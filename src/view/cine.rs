@@ -6,19 +6,22 @@ use egui::{
     Align, ComboBox, CornerRadius, Layout, Rect, Response, Sense, Shape, Stroke, Ui, pos2, vec2,
 };
 
+use super::captures::Format;
 use super::engine::Frame;
 use super::model::{Cine, Model};
 use super::style;
+use super::tools::Tools;
 
 /// Height of the bar, points.
 pub(super) const HEIGHT: f32 = 36.0;
 /// Room that speed and marks want beside the track, points.
-const WIDE: f32 = 520.0;
+const WIDE: f32 = 560.0;
 /// How fast a loop can be played.
 const SPEEDS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 
 /// Draws the bar into what is left of a row.
-pub(super) fn show(ui: &mut Ui, model: &mut Model, cine: &mut Cine<Frame>, now: Instant) {
+pub(super) fn show(ui: &mut Ui, model: &mut Model, tools: &mut Tools, now: Instant) {
+    let cine = &mut tools.cine;
     let word = if model.frozen { "Live" } else { "Freeze" };
     let tip = "Stop or start the image and the scene's time (Space)";
     let button = egui::Button::new(word).selected(model.frozen);
@@ -35,10 +38,10 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, cine: &mut Cine<Frame>, now: 
         ui.colored_label(style::FAINT, text).on_hover_text(tip);
         return;
     }
-    player(ui, cine, now);
+    player(ui, cine, &mut tools.format, now);
 }
 
-fn player(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
+fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant) {
     let (word, tip) = match cine.is_playing() {
         true => ("⏸", "Stop the loop (Enter)"),
         false => ("▶", "Play the loop (Enter)"),
@@ -55,6 +58,7 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
     let is_wide = ui.available_width() > WIDE;
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         if is_wide {
+            choose(ui, format);
             speed(ui, cine, now);
             let here = cine.cursor();
             let tip = "The loop that plays and is saved ends with this image";
@@ -91,6 +95,23 @@ fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
     if speed != cine.speed() {
         cine.set_speed(speed, now);
     }
+}
+
+fn choose(ui: &mut Ui, format: &mut Format) {
+    let name = |format| match format {
+        Format::Gif => "GIF",
+        Format::Sequence => "PNGs",
+    };
+    ComboBox::from_id_salt("format")
+        .width(56.0)
+        .selected_text(name(*format))
+        .show_ui(ui, |ui| {
+            for value in [Format::Gif, Format::Sequence] {
+                ui.selectable_value(format, value, name(value));
+            }
+        })
+        .response
+        .on_hover_text("How a clip is saved (F3): an animated GIF, or a folder of PNG files");
 }
 
 /// One place per image; drag to look through them.

@@ -22,6 +22,8 @@ enum Action {
     Loop,
     Take(Tool),
     Delete,
+    Still,
+    Clip,
     Play,
     Home,
     Record,
@@ -141,6 +143,14 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "remove what is selected; arrows move its point by a pixel",
     ),
     (
+        "F2 F3",
+        &[
+            (Key::F2, false, Action::Still),
+            (Key::F3, false, Action::Clip),
+        ],
+        "save the image, save the loop",
+    ),
+    (
         "P",
         &[(Key::P, false, Action::Play)],
         "play and pause the animation",
@@ -222,6 +232,15 @@ pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, n
     }
 }
 
+/// The tool that a key takes. Whoever follows the pointer takes it: a click before the key belongs to the
+/// tool before, though both may arrive at once.
+pub(super) fn tool(key: Key, modifiers: Modifiers) -> Option<Tool> {
+    match action(key, modifiers) {
+        Some(Action::Take(tool)) => Some(tool),
+        _ => None,
+    }
+}
+
 fn action(key: Key, modifiers: Modifiers) -> Option<Action> {
     let bindings = BINDINGS.iter().flat_map(|(_, bindings, _)| *bindings);
     let mut found = bindings.filter(|b| b.0 == key && b.1 == modifiers.command);
@@ -263,8 +282,11 @@ fn carry_out(
             cine.play(!cine.is_playing(), now);
         }
         Action::Frame(_) | Action::Loop => {}
-        Action::Take(tool) => state.tools.sheet.toggle(tool),
+        // In turn with the pointer: see `tool`.
+        Action::Take(_) => {}
         Action::Delete => drop(state.tools.sheet.delete()),
+        Action::Still => state.tools.want_still(),
+        Action::Clip => state.tools.want_clip(),
         Action::Play if model.animated => {
             model.clock.play(!model.clock.is_playing(), now);
             model.touch(now);

@@ -11,7 +11,7 @@ use super::model::Model;
 use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{calipers, cine, files, keys, mmode, notice, style, timing};
+use super::{calipers, cine, files, keys, mmode, notice, saved, strip, style, timing};
 
 /// Draws the interface; returns where the picture belongs.
 pub(super) fn show(
@@ -36,7 +36,7 @@ pub(super) fn show(
             ui.horizontal_centered(|ui| {
                 toggles(ui, model, state, now);
                 ui.separator();
-                cine::show(ui, model, &mut state.tools.cine, now);
+                cine::show(ui, model, &mut state.tools, now);
             });
         });
     if state.timing {
@@ -58,13 +58,14 @@ pub(super) fn show(
         let sheet = &mut state.tools.sheet;
         if let (Some(place), Some(frame)) = (&place, frame) {
             calipers::show(ui, sheet, place, frame);
-            calipers::strip(ui, sheet);
             calipers::table(ui, sheet, frame);
+            strip::show(ui, &mut state.tools);
         }
         if let (Some(place), Some(frame), Some(strip)) = (&place, frame, &mut model.mmode) {
             mmode::aim(ui, place, frame, strip, model.frozen);
         }
         notice::show(ui, &state.inputs);
+        saved::show(ui, &mut state.tools);
         place
     });
     if model.mmode.as_ref().map(Strip::line) != line {

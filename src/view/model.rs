@@ -13,6 +13,7 @@ mod pose;
 mod saving;
 mod settings;
 pub mod sheet;
+pub mod sidecar;
 pub mod skin;
 pub mod trajectory;
 mod ways;

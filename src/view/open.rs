@@ -17,7 +17,7 @@ use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
 use super::statistics::{Sample, Times};
-use super::tools::Tools;
+use super::tools::{Tools, cropped};
 use super::{Model, Options, ViewError, keys, layout, style};
 use crate::gpu::{AdapterKind, Device, GpuError, Interface, Painted, Placed, Shot, ValidationLog};
 use crate::output;
@@ -58,6 +58,12 @@ pub(super) struct Plan {
 }
 
 impl Plan {
+    fn tools(&self, device: &Device) -> Tools {
+        let (folder, proxy) = (self.options.captures.clone(), self.proxy.clone());
+        // An event loop that is gone needs no news.
+        Tools::new(device.info(), folder, move || drop(proxy.send_event(Wake)))
+    }
+
     fn session(
         &self,
         device: Arc<Device>,
@@ -125,7 +131,7 @@ impl Open {
             ray_query: device.supports_ray_query(),
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
-            tools: Tools::new(device.info()),
+            tools: plan.tools(&device),
             inputs,
             quit: false,
         };
@@ -357,12 +363,24 @@ impl Open {
             textures: std::mem::take(&mut output.textures_delta),
         };
         let size = [size.width, size.height];
-        let painted = self.session.painter.paint(size, &placed, interface, shot)?;
+        let painter = &mut self.session.painter;
+        let tools = &mut self.state.tools;
+        let marked = tools.wants_shot() && painter.can_be_read();
+        let painted = painter.paint(size, &placed, interface, shot || marked)?;
+        let picture = match &painted {
+            Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
+            Painted::Skipped => None,
+        };
+        let around = picture.zip(place).map(|(picture, place)| {
+            let r = place.area * scale;
+            cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
+        });
+        tools.save(&self.model, around);
         self.schedule(&output);
         match painted {
-            Painted::Shown(shot) => {
+            Painted::Shown(picture) => {
                 self.seen(times);
-                Ok(shot)
+                Ok(picture.filter(|_| shot))
             }
             Painted::Skipped => Ok(None),
         }

@@ -1,17 +1,33 @@
-//! The working tools: what is kept, measured and written on the image.
+//! The working tools: what is kept, measured, written on the image, and saved.
 
-use glam::DVec2;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Instant;
 
+use glam::{DAffine3, DVec2};
+use serde_json::{Value, json};
+
+use super::captures::{CaptureError, Captures, Clip, Format, Sidecar, Still};
 use super::engine::Frame;
 use super::model::cine::Limit;
 use super::model::sheet::{Moment, Sheet};
+use super::model::sidecar::{self, Area};
 use super::model::{Axis, Cine, Model};
-use crate::gpu::DeviceInfo;
+use super::saved::Notices;
+use crate::gpu::{DeviceInfo, Shot};
+use crate::output;
 
 /// Most frames of the loop.
 const FRAMES: usize = 256;
 /// Most bytes of the loop, where the device has sixteen times as many.
 const BYTES: u64 = 256 << 20;
+
+/// What was to be saved last.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Wanted {
+    Still,
+    Clip,
+}
 
 /// State of the tools.
 pub(super) struct Tools {
@@ -20,18 +36,44 @@ pub(super) struct Tools {
     pub(super) cine: Cine<Frame>,
     /// Measurements and texts.
     pub(super) sheet: Sheet,
+    /// What is being saved.
+    pub(super) captures: Captures,
+    /// Where to.
+    pub(super) folder: PathBuf,
+    /// How clips are written.
+    pub(super) format: Format,
+    /// What is said of it.
+    pub(super) notices: Notices,
+    /// Name and driver of the device.
+    device: String,
+    /// To be saved once the window has been drawn.
+    due: Option<Wanted>,
+    last: Wanted,
     was_frozen: bool,
 }
 
 impl Tools {
-    /// For a device.
-    pub(super) fn new(device: &DeviceInfo) -> Self {
+    /// For a device. Captures go to `folder`; `wake` is called, from another thread, when one has
+    /// come to its end.
+    pub(super) fn new(
+        device: &DeviceInfo,
+        folder: PathBuf,
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> Self {
         Self {
             cine: Cine::new(Limit {
                 frames: FRAMES,
                 bytes: BYTES.min(device.memory_bytes / 16),
             }),
             sheet: Sheet::default(),
+            captures: Captures::new(wake),
+            // What is said of it names it in full.
+            folder: std::path::absolute(&folder).unwrap_or(folder),
+            format: Format::Gif,
+            notices: Notices::default(),
+            device: format!("{} ({})", device.name, device.driver),
+            due: None,
+            last: Wanted::Still,
             was_frozen: false,
         }
     }
@@ -60,7 +102,7 @@ impl Tools {
         if !model.frozen {
             self.cine.go_live();
         }
-        if let Some(wait) = self.cine.tick(std::time::Instant::now()) {
+        if let Some(wait) = self.cine.tick(Instant::now()) {
             ctx.request_repaint_after(wait);
         }
         self.cine.shown().cloned()
@@ -81,10 +123,146 @@ impl Tools {
         }
     }
 
+    /// Saves the image that is shown, once it has been drawn with its marks.
+    pub(super) fn want_still(&mut self) {
+        (self.due, self.last) = (Some(Wanted::Still), Wanted::Still);
+    }
+
+    /// Saves the marked part of the loop.
+    pub(super) fn want_clip(&mut self) {
+        (self.due, self.last) = (Some(Wanted::Clip), Wanted::Clip);
+    }
+
+    /// Saves again what was to be saved last.
+    pub(super) fn want_again(&mut self) {
+        self.due = Some(self.last);
+    }
+
+    /// Whether a picture of the window is wanted.
+    pub(super) fn wants_shot(&self) -> bool {
+        self.due == Some(Wanted::Still) && !self.sheet.marks().is_empty()
+    }
+
+    /// Saves what is wanted. `marked` is the picture of the window around the image.
+    pub(super) fn save(&mut self, model: &Model, marked: Option<Shot>) {
+        let (wanted, stem) = (self.due.take(), sidecar::stem(&model.title));
+        let Some(frame) = self.cine.shown().cloned() else {
+            return;
+        };
+        let folder = self.folder.clone();
+        match wanted {
+            Some(Wanted::Still) => {
+                let mut sidecar = self.about(model, &frame);
+                sidecar.extend(settings(model, &frame, Some(&frame.pose)));
+                sidecar.extend(sidecar::marks(self.sheet.marks(), &frame.moment()));
+                let still = Still {
+                    frame,
+                    sidecar,
+                    marked,
+                };
+                self.captures.still(folder, stem, still);
+            }
+            Some(Wanted::Clip) => {
+                let clip = self.marked_loop(model, &frame);
+                self.captures.clip(folder, stem, clip);
+            }
+            None => {}
+        }
+    }
+
+    /// The marked part of the loop at the speed at which it plays.
+    fn marked_loop(&self, model: &Model, shown: &Frame) -> Clip {
+        let (mut frames, mut end) = (Vec::new(), 0.0);
+        let (mut times, mut all_settings) = (Vec::new(), Vec::<Value>::new());
+        let mut last: Option<&Frame> = None;
+        for (index, (frame, time)) in self.cine.marked().enumerate() {
+            end += time.as_secs_f64() / self.cine.speed();
+            times.push(json!({
+                "time_s": frame.seconds,
+                "shown_until_s": end,
+                "pose": sidecar::pose(&frame.pose),
+            }));
+            if last.is_none_or(|last| !Arc::ptr_eq(&last.settings, &frame.settings)) {
+                // Where the probe was is said of each frame.
+                let mut settings = settings(model, frame, None);
+                settings.insert("from_frame".into(), index.into());
+                all_settings.push(settings.into());
+            }
+            last = Some(frame);
+            frames.push((frame.clone(), end));
+        }
+        let mut sidecar = self.about(model, shown);
+        for key in ["time_s", "pose"] {
+            sidecar.shift_remove(key);
+        }
+        sidecar.insert("speed".into(), self.cine.speed().into());
+        sidecar.insert("frames".into(), times.into());
+        sidecar.insert("settings".into(), all_settings.into());
+        Clip {
+            frames,
+            sidecar,
+            format: self.format,
+        }
+    }
+
+    /// What pictures and clips say alike.
+    fn about(&self, model: &Model, frame: &Frame) -> Sidecar {
+        let [width, height, _] = frame.image.extent();
+        let area = Area {
+            size: [width, height],
+            pitch: frame.sector.pitch,
+            corner: [frame.sector.left, frame.sector.top],
+        };
+        let said = json!({
+            "program": concat!("insonify ", env!("CARGO_PKG_VERSION")),
+            "scene": model.title,
+            "scene_file": model.file.path.display().to_string(),
+            "device": self.device,
+            "image": sidecar::image(&area),
+            "time_s": frame.seconds,
+            "pose": sidecar::pose(&frame.pose),
+        });
+        match said {
+            Value::Object(map) => map,
+            _ => unreachable!("made as one"),
+        }
+    }
+
+    /// Says what has become of captures.
+    pub(super) fn collect(&mut self) {
+        for outcome in self.captures.finished() {
+            match outcome {
+                Ok(Some(file)) => self.notices.saved(format!("Saved {}", file.display())),
+                Ok(None) => self.notices.saved("Cancelled; nothing was saved".into()),
+                Err(error @ (CaptureError::File { .. } | CaptureError::Gpu(_))) => {
+                    self.notices.failed(error.to_string());
+                }
+            }
+        }
+    }
+
     /// Lets go of everything that a device holds.
     pub(super) fn lose(&mut self) {
+        self.captures.wait();
         self.cine.clear();
     }
+}
+
+/// What of the scene file is to be replaced to get a frame again, as `--set` takes it, and the settings in
+/// full.
+fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
+    let settings = &frame.settings;
+    let set = model.entries(settings, pose).into_iter();
+    let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
+    let all = output::settings(&settings.probe, &settings.simulation, &settings.imaging);
+    let said = [
+        ("set", set.into()),
+        ("settings", all),
+        ("tracer", settings.tracer.to_string().into()),
+    ];
+    said.into_iter()
+        .map(|(key, value)| (key.to_owned(), value))
+        .collect()
 }
 
 impl Frame {
@@ -94,5 +272,36 @@ impl Frame {
             pose: self.pose,
             seconds: self.seconds,
         }
+    }
+}
+
+/// The part of a picture of the window inside `area`, pixels: left, top, right, bottom.
+pub(super) fn cropped(shot: &Shot, area: [f32; 4]) -> Shot {
+    let limit = |at: f32, size: u32| at.round().clamp(0.0, size as f32) as usize;
+    let [width, height] = shot.size;
+    let (left, right) = (limit(area[0], width), limit(area[2], width));
+    let (top, bottom) = (limit(area[1], height), limit(area[3], height));
+    let row =
+        |y: usize| &shot.rgba[4 * (y * width as usize + left)..4 * (y * width as usize + right)];
+    Shot {
+        size: [(right - left) as u32, (bottom - top) as u32],
+        rgba: (top..bottom).flat_map(row).copied().collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Shot, cropped};
+
+    #[test]
+    fn a_part_of_a_picture_is_that_part() {
+        let shot = Shot {
+            size: [4, 3],
+            rgba: (0..12).flat_map(|i| [i, 0, 0, 255]).collect(),
+        };
+        let part = cropped(&shot, [1.2, 0.6, 9.0, 3.0]);
+        assert_eq!(part.size, [3, 2]);
+        let red: Vec<u8> = part.rgba.chunks(4).map(|p| p[0]).collect();
+        assert_eq!(red, [5, 6, 7, 9, 10, 11]);
     }
 }

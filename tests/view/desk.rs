@@ -22,6 +22,8 @@ pub enum Key {
     /// `F1`, which is also `?`.
     Help,
     Enter,
+    F2,
+    F3,
     /// Also the signs of Latin-1.
     Letter(char),
     Control,
@@ -36,6 +38,8 @@ impl Key {
             Self::Escape => 0xff1b,
             Self::Help => 0xffbe,
             Self::Enter => 0xff0d,
+            Self::F2 => 0xffbf,
+            Self::F3 => 0xffc0,
             Self::Letter(letter) => u32::from(letter),
             Self::Control => 0xffe3,
         }
@@ -120,13 +124,22 @@ pub struct Desk {
 impl Desk {
     /// Opens a scene's window at the upper left corner; nothing where there is no X server.
     pub fn open(scene: &str, arguments: &[&str]) -> Option<Self> {
+        Self::open_scaled(scene, arguments, 1.0)
+    }
+
+    /// The same on a display on which a point is `scale` pixels.
+    pub fn open_scaled(scene: &str, arguments: &[&str], scale: f64) -> Option<Self> {
         let display = Display::open()?;
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("scene.toml");
         std::fs::write(&file, scene).expect("written");
         let (x, screen) = x11rb::connect(Some(&display.name)).expect("the X server answers");
         let root = x.setup().roots[screen].root;
-        let program = display.program(&file, arguments).spawn().expect("started");
+        let program = display
+            .program(&file, arguments)
+            .env("WINIT_X11_SCALE_FACTOR", scale.to_string())
+            .spawn()
+            .expect("started");
         let mut desk = Self {
             program,
             x,

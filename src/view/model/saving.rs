@@ -3,6 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
+use glam::DAffine3;
+
 use super::{Model, Settings, entries};
 use crate::scene::file::{Entry, load_preset, save};
 use crate::scene::{Origins, SceneError};
@@ -51,13 +53,24 @@ impl Model {
 
     /// What the file has to say to give the settings, `with_pose` also the pose of the probe.
     fn changes(&self, with_pose: bool) -> Vec<Entry> {
+        self.entries(&self.settings, with_pose.then_some(&self.pose))
+    }
+
+    /// What the file has to say to give `settings`, which were this session's once, and a pose of the
+    /// probe: paths and values of its keys; without a value those that it must not have.
+    pub fn entries(&self, settings: &Settings, pose: Option<&DAffine3>) -> Vec<Entry> {
         let file = &self.file;
         let overrides = file.overrides.iter().cloned();
         let mut out: Vec<Entry> = overrides.map(|(path, value)| (path, Some(value))).collect();
-        let (from, to) = (&self.loaded, &self.settings);
-        out.extend(entries::changes(from, to, &file.origins, file.lattice));
-        if with_pose {
-            out.extend(entries::pose(&self.pose));
+        let from = &self.loaded;
+        out.extend(entries::changes(
+            from,
+            settings,
+            &file.origins,
+            file.lattice,
+        ));
+        if let Some(pose) = pose {
+            out.extend(entries::pose(pose));
         }
         out
     }

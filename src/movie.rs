@@ -5,19 +5,23 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use gif::{Encoder, Frame, Repeat};
-use miette::{Context, IntoDiagnostic, Result};
-
-/// Frames shown per second where time stands still.
-const SHOWN: f64 = 10.0;
+/// Why an animation was not written.
+#[derive(Debug, thiserror::Error)]
+#[error("writing {}: {cause}", path.display())]
+pub struct MovieError {
+    /// The file.
+    pub path: PathBuf,
+    /// What the system says, or the format.
+    pub cause: String,
+}
 
 /// An animated GIF that is being written: 256 greys, played again and again. All frames share one
 /// palette, because some viewers show frames with a palette of their own in black.
 pub struct Movie {
     path: PathBuf,
     state: State,
-    /// Frames per second.
-    rate: f64,
-    frames: u32,
+    /// Hundredths of a second that the frames so far are shown.
+    shown: f64,
 }
 
 /// The format wants to know the size of the first frame before anything else.
@@ -34,33 +38,44 @@ impl Movie {
         extension.is_some_and(|e| e.eq_ignore_ascii_case("gif"))
     }
 
-    /// Begins a file that shows `rate` frames per second.
+    /// Begins a file, over one that there is.
     ///
     /// # Errors
     /// What the file system says.
-    pub fn new(path: &Path, rate: Option<f64>) -> Result<Self> {
-        let file = File::create(path)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("writing {}", path.display()))?;
+    pub fn new(path: &Path) -> Result<Self, MovieError> {
+        let file = File::create(path).map_err(|e| failed(path, e))?;
         Ok(Self {
             path: path.to_owned(),
             state: State::Empty(BufWriter::new(file)),
-            rate: rate.unwrap_or(SHOWN),
-            frames: 0,
+            shown: 0.0,
         })
     }
 
-    /// Adds a frame: the red channel of RGBA bytes, row by row, of the size of the first one.
+    /// Adds a frame that is shown until `end`, s from the beginning: the red channel of RGBA bytes, row
+    /// by row, of the size of the first one.
     ///
     /// # Errors
     /// What the file system says; an image larger than the format can be.
-    pub fn add(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
-        self.write(width, height, rgba)
-            .into_diagnostic()
-            .wrap_err_with(|| format!("writing {}", self.path.display()))
+    pub fn add(
+        &mut self,
+        width: u32,
+        height: u32,
+        rgba: &[u8],
+        end: f64,
+    ) -> Result<(), MovieError> {
+        let delay = centiseconds(self.shown, end);
+        self.shown = 100.0 * end;
+        self.write(width, height, rgba, delay)
+            .map_err(|e| failed(&self.path, e))
     }
 
-    fn write(&mut self, width: u32, height: u32, rgba: &[u8]) -> Result<(), gif::EncodingError> {
+    fn write(
+        &mut self,
+        width: u32,
+        height: u32,
+        rgba: &[u8],
+        delay: u16,
+    ) -> Result<(), gif::EncodingError> {
         let large = |_| std::io::Error::other("a GIF has at most 65535 pixels a side");
         let width = u16::try_from(width).map_err(large)?;
         let height = u16::try_from(height).map_err(large)?;
@@ -77,7 +92,7 @@ impl Movie {
         encoder.write_frame(&Frame {
             width,
             height,
-            delay: centiseconds(self.frames, self.rate) as u16,
+            delay,
             buffer: rgba
                 .chunks_exact(4)
                 .map(|p| p[0])
@@ -85,19 +100,24 @@ impl Movie {
                 .into(),
             ..Frame::default()
         })?;
-        self.frames += 1;
         self.state = State::Begun(encoder);
         Ok(())
     }
 }
 
-/// How long a frame is shown, in the hundredths of a second that the format counts in: rounded such
-/// that the error does not add up.
-fn centiseconds(frame: u32, rate: f64) -> u32 {
-    let begin = |frame: f64| (100.0 * frame / rate).round();
-    let shown = begin(f64::from(frame) + 1.0) - begin(f64::from(frame));
+fn failed(path: &Path, cause: impl ToString) -> MovieError {
+    MovieError {
+        path: path.to_owned(),
+        cause: cause.to_string(),
+    }
+}
+
+/// How long a frame that begins at so many hundredths of a second is shown until `end`, s, in the
+/// hundredths that the format counts in: rounded such that the error does not add up.
+fn centiseconds(begin: f64, end: f64) -> u16 {
+    let shown = (100.0 * end).round() - begin.round();
     // Viewers slow down what is shorter than two hundredths.
-    shown.clamp(2.0, 65_535.0) as u32
+    shown.clamp(2.0, 65_535.0) as u16
 }
 
 #[cfg(test)]
@@ -109,14 +129,16 @@ mod tests {
     #[test]
     fn durations_add_up() {
         for (rate, frames) in [(10.0, 7), (30.0, 30), (24.0, 100), (15.0, 61), (0.1, 3)] {
-            let total: u32 = (0..frames).map(|i| centiseconds(i, rate)).sum();
-            let exact = 100.0 * f64::from(frames) / rate;
+            let at = |i: u32| f64::from(i) / rate;
+            let shown = (0..frames).map(|i| centiseconds(100.0 * at(i), at(i + 1)));
+            let total: u32 = shown.map(u32::from).sum();
+            let exact = 100.0 * at(frames);
             assert!(
                 (f64::from(total) - exact).abs() <= 0.5,
                 "{rate}: {total} {exact}"
             );
         }
-        assert_eq!(centiseconds(0, 1000.0), 2);
+        assert_eq!(centiseconds(0.0, 0.001), 2);
     }
 
     #[test]
@@ -128,9 +150,9 @@ mod tests {
             grey.flat_map(|g| [g, g, g, if g < 9 { 0 } else { 255 }])
                 .collect()
         };
-        let mut movie = Movie::new(&path, Some(20.0)).expect("made");
-        for offset in [0, 7] {
-            movie.add(16, 16, &picture(offset)).expect("written");
+        let mut movie = Movie::new(&path).expect("made");
+        for (offset, end) in [(0, 0.05), (7, 0.1)] {
+            movie.add(16, 16, &picture(offset), end).expect("written");
         }
         drop(movie);
         let file = std::io::BufReader::new(File::open(&path).expect("there"));

@@ -1,0 +1,234 @@
+//! Stills and clips: read back from the device and written on threads of their own.
+
+mod files;
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::JoinHandle;
+
+use serde_json::{Map, Value};
+
+use self::files::{Claim, grey_png};
+use super::engine::Frame;
+use crate::gpu::{GpuError, Shot};
+use crate::movie::{Movie, MovieError};
+
+/// What is written beside a picture: see `docs/window.md`.
+pub(super) type Sidecar = Map<String, Value>;
+
+/// Why nothing was saved. What was to be saved is still there.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CaptureError {
+    /// A file or folder.
+    #[error(
+        "{} cannot be written: {cause}. Name a folder that can be written to and has room; \
+         nothing is lost", path.display()
+    )]
+    File {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system says.
+        cause: String,
+    },
+    /// The image cannot be read back.
+    #[error("the image cannot be read back: {0}")]
+    Gpu(#[from] GpuError),
+}
+
+impl CaptureError {
+    fn file(path: &Path, cause: impl ToString) -> Self {
+        Self::File {
+            path: path.to_owned(),
+            cause: cause.to_string(),
+        }
+    }
+}
+
+impl From<MovieError> for CaptureError {
+    fn from(error: MovieError) -> Self {
+        Self::file(&error.path, error.cause)
+    }
+}
+
+/// One image.
+pub(super) struct Still {
+    /// What is saved.
+    pub(super) frame: Frame,
+    /// What is written beside it, and into it.
+    pub(super) sidecar: Sidecar,
+    /// The same with its marks, as in the window.
+    pub(super) marked: Option<Shot>,
+}
+
+/// How a clip is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Format {
+    /// One animated GIF.
+    Gif,
+    /// A folder of PNG files.
+    Sequence,
+}
+
+/// Images one after the other.
+pub(super) struct Clip {
+    /// Each with the time until which it is shown, s from the beginning.
+    pub(super) frames: Vec<(Frame, f64)>,
+    /// What is written beside them.
+    pub(super) sidecar: Sidecar,
+    /// How.
+    pub(super) format: Format,
+}
+
+/// How far a capture is.
+pub(super) struct Progress {
+    done: AtomicU32,
+    total: u32,
+    cancelled: AtomicBool,
+}
+
+impl Progress {
+    /// Images that are written, and all.
+    pub(super) fn count(&self) -> [u32; 2] {
+        [self.done.load(Ordering::Relaxed), self.total]
+    }
+
+    /// Nothing of it is to be kept.
+    pub(super) fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::Relaxed)
+    }
+}
+
+/// What became of a capture: the file or folder, nothing where it was cancelled.
+pub(super) type Outcome = Result<Option<PathBuf>, CaptureError>;
+
+struct Job {
+    progress: Arc<Progress>,
+    thread: JoinHandle<()>,
+}
+
+/// All captures. Those under way are finished before this is gone.
+pub(super) struct Captures {
+    jobs: Vec<Job>,
+    done: (Sender<Outcome>, Receiver<Outcome>),
+    wake: Arc<dyn Fn() + Send + Sync>,
+}
+
+impl Captures {
+    /// None yet. `wake` is called, from their threads, when one has come to its end.
+    pub(super) fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
+        Self {
+            jobs: Vec::new(),
+            done: channel(),
+            wake: Arc::new(wake),
+        }
+    }
+
+    /// Saves an image as `STEM-NNNN.png` in a folder, which is made where it does not exist.
+    pub(super) fn still(&mut self, folder: PathBuf, stem: String, still: Still) {
+        self.begin(1, move |_| {
+            let rgba = still.frame.image.read_back()?;
+            let mut claim = Claim::new(&folder, &stem)?;
+            let [width, height, _] = still.frame.image.extent();
+            let pitch = still.frame.sector.pitch;
+            let mut sidecar = still.sidecar;
+            let file = claim.add(".png");
+            sidecar.insert("file".into(), files::name(&file));
+            let text = Value::Object(sidecar.clone()).to_string();
+            let picture = grey_png([width, height], &rgba, pitch, Some(&text));
+            files::write_new(&file, &picture)?;
+            if let Some(shot) = still.marked {
+                let file = claim.add("-marked.png");
+                sidecar.insert("marked_file".into(), files::name(&file));
+                files::write_new(&file, &files::colour_png(shot.size, &shot.rgba))?;
+            }
+            claim.keep(&sidecar)?;
+            Ok(Some(file))
+        });
+    }
+
+    /// Saves images as `STEM-NNNN.gif`, or as `STEM-NNNN/0000.png` and so on.
+    pub(super) fn clip(&mut self, folder: PathBuf, stem: String, clip: Clip) {
+        let total = clip.frames.len() as u32;
+        self.begin(total, move |progress| {
+            let mut claim = Claim::new(&folder, &stem)?;
+            let target = match clip.format {
+                Format::Gif => claim.add(".gif"),
+                Format::Sequence => claim.add_folder()?,
+            };
+            let mut movie = match clip.format {
+                Format::Gif => Some(Movie::new(&target)?),
+                Format::Sequence => None,
+            };
+            for (index, (frame, end)) in clip.frames.into_iter().enumerate() {
+                if progress.is_cancelled() {
+                    return Ok(None);
+                }
+                let rgba = frame.image.read_back()?;
+                let [width, height, _] = frame.image.extent();
+                match &mut movie {
+                    Some(movie) => movie.add(width, height, &rgba, end)?,
+                    None => {
+                        let file = target.join(format!("{index:04}.png"));
+                        let picture = grey_png([width, height], &rgba, frame.sector.pitch, None);
+                        files::write_new(&file, &picture)?;
+                    }
+                }
+                progress.done.fetch_add(1, Ordering::Relaxed);
+            }
+            let mut sidecar = clip.sidecar;
+            sidecar.insert("file".into(), files::name(&target));
+            claim.keep(&sidecar)?;
+            Ok(Some(target))
+        });
+    }
+
+    fn begin(&mut self, total: u32, work: impl FnOnce(&Progress) -> Outcome + Send + 'static) {
+        let progress = Arc::new(Progress {
+            done: AtomicU32::new(0),
+            total,
+            cancelled: AtomicBool::new(false),
+        });
+        let (of_thread, sender, wake) = (progress.clone(), self.done.0.clone(), self.wake.clone());
+        let thread = std::thread::Builder::new()
+            .name("capture".into())
+            .spawn(move || {
+                // The receiver lives until this thread was waited for.
+                let _ = sender.send(work(&of_thread));
+                wake();
+            })
+            .expect("a thread can be started");
+        self.jobs.push(Job { progress, thread });
+    }
+
+    /// Those that are under way.
+    pub(super) fn running(&self) -> impl Iterator<Item = &Arc<Progress>> {
+        let running = self.jobs.iter().filter(|job| !job.thread.is_finished());
+        running.map(|job| &job.progress)
+    }
+
+    /// What has come to its end since the last call.
+    pub(super) fn finished(&mut self) -> Vec<Outcome> {
+        self.jobs.retain(|job| !job.thread.is_finished());
+        self.done.1.try_iter().collect()
+    }
+
+    /// Waits until none is under way.
+    pub(super) fn wait(&mut self) {
+        for job in self.jobs.drain(..) {
+            // A panic of the thread has been printed by itself.
+            let _ = job.thread.join();
+        }
+    }
+}
+
+impl Drop for Captures {
+    fn drop(&mut self) {
+        self.wait();
+    }
+}

@@ -1,0 +1,186 @@
+//! What is written beside a picture that is saved: where and when it was taken, with which settings,
+//! and what was measured on it.
+
+use glam::DAffine3;
+use serde_json::{Map, Value, json};
+
+use super::calipers::Reading;
+use super::sheet::{Mark, Moment, What};
+
+/// Where a picture lies in the image plane.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Area {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// Edge of a pixel, mm.
+    pub pitch: f64,
+    /// Lateral place of the left edge and depth of the upper edge, mm.
+    pub corner: [f64; 2],
+}
+
+/// Size and place of a picture.
+pub fn image(area: &Area) -> Value {
+    json!({
+        "width": area.size[0],
+        "height": area.size[1],
+        "pixel_pitch_mm": area.pitch,
+        "left_mm": area.corner[0],
+        "top_mm": area.corner[1],
+    })
+}
+
+/// The probe's axes and the centre of its face in the world.
+pub fn pose(world_from_probe: &DAffine3) -> Value {
+    let m = world_from_probe.matrix3;
+    let place = world_from_probe.translation;
+    json!({
+        "position_mm": place.to_array(),
+        "lateral": m.x_axis.to_array(),
+        "elevation": m.y_axis.to_array(),
+        "depth": m.z_axis.to_array(),
+    })
+}
+
+/// Measurements and texts on the picture of a moment, under the keys `measurements` and `texts`. Each
+/// says whether it was put on this picture or on another one.
+pub fn marks(marks: &[Mark], moment: &Moment) -> Map<String, Value> {
+    let (mut measurements, mut texts) = (Vec::new(), Vec::new());
+    for mark in marks {
+        let here = mark.of == *moment;
+        match &mark.what {
+            What::Caliper(caliper) => {
+                let points: Vec<_> = caliper.points.iter().map(|p| p.to_array()).collect();
+                let mut entry = json!({
+                    "letter": mark.letter,
+                    "kind": caliper.kind.name(),
+                    "label": caliper.label,
+                    "points_mm": points,
+                    "of_this_image": here,
+                });
+                let entry_map = entry.as_object_mut().expect("made as one");
+                entry_map.extend(values(&caliper.reading()));
+                measurements.push(entry);
+            }
+            What::Note(note) => texts.push(json!({
+                "text": note.text,
+                "at_mm": note.at.to_array(),
+                "arrow_mm": note.arrow.map(|tip| tip.to_array()),
+                "of_this_image": here,
+            })),
+        }
+    }
+    let mut out = Map::new();
+    out.insert("measurements".into(), Value::Array(measurements));
+    out.insert("texts".into(), Value::Array(texts));
+    out
+}
+
+fn values(reading: &Reading) -> Map<String, Value> {
+    let pairs = match *reading {
+        Reading::Distance(mm) => vec![("length_mm", json!(mm))],
+        Reading::Ellipse {
+            axes,
+            circumference,
+            area,
+        } => vec![
+            ("axes_mm", json!(axes)),
+            ("circumference_mm", json!(circumference)),
+            ("area_mm2", json!(area)),
+        ],
+        Reading::Angle(degrees) => vec![("angle_deg", json!(degrees))],
+    };
+    pairs
+        .into_iter()
+        .map(|(key, value)| (key.into(), value))
+        .collect()
+}
+
+/// A title as part of a file's name: letters, digits and hyphens.
+pub fn stem(title: &str) -> String {
+    let plain = |c: char| {
+        if c.is_ascii_alphanumeric() {
+            c.to_ascii_lowercase()
+        } else {
+            '-'
+        }
+    };
+    let text: String = title.chars().map(plain).collect();
+    let words: Vec<&str> = text.split('-').filter(|word| !word.is_empty()).collect();
+    match words.is_empty() {
+        true => "image".into(),
+        false => words.join("-").chars().take(60).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{DAffine3, DVec2, DVec3, dvec2};
+    use serde_json::json;
+
+    use super::super::calipers::{Caliper, Kind};
+    use super::super::sheet::{Mark, Moment, Note, What};
+    use super::{marks, pose, stem};
+
+    #[test]
+    fn names_of_files_are_plain() {
+        for (title, expected) in [
+            ("General-purpose phantom", "general-purpose-phantom"),
+            ("../../etc/passwd", "etc-passwd"),
+            ("Fœtus 20 wk: AC/HC", "f-tus-20-wk-ac-hc"),
+            ("", "image"),
+            ("...", "image"),
+        ] {
+            assert_eq!(stem(title), expected);
+        }
+        assert_eq!(stem(&"a".repeat(999)).len(), 60);
+    }
+
+    #[test]
+    fn measurements_say_what_they_measure_and_where() {
+        let moment = Moment {
+            pose: DAffine3::from_translation(DVec3::new(1.0, 2.0, 3.0)),
+            seconds: 0.5,
+        };
+        let later = Moment {
+            seconds: 0.6,
+            ..moment
+        };
+        let caliper = |kind, points: &[DVec2], label: &str| Caliper {
+            label: label.into(),
+            ..Caliper::new(kind, points.to_vec())
+        };
+        let note = Note {
+            text: "vessel".into(),
+            at: dvec2(1.0, 2.0),
+            arrow: None,
+        };
+        let all = [
+            Mark {
+                letter: 'A',
+                what: What::Caliper(caliper(
+                    Kind::Distance,
+                    &[DVec2::ZERO, dvec2(3.0, 4.0)],
+                    "BPD",
+                )),
+                of: moment,
+            },
+            Mark {
+                letter: 'B',
+                what: What::Note(note),
+                of: later,
+            },
+        ];
+        let said = marks(&all, &moment);
+        let expected = json!([{
+            "letter": "A", "kind": "distance", "label": "BPD",
+            "points_mm": [[0.0, 0.0], [3.0, 4.0]],
+            "of_this_image": true,
+            "length_mm": 5.0,
+        }]);
+        assert_eq!(said["measurements"], expected);
+        assert_eq!(said["texts"][0]["text"], "vessel");
+        assert_eq!(said["texts"][0]["of_this_image"], false);
+        assert_eq!(pose(&moment.pose)["position_mm"], json!([1.0, 2.0, 3.0]));
+        assert_eq!(pose(&moment.pose)["depth"], json!([0.0, 0.0, 1.0]));
+    }
+}

@@ -1,0 +1,141 @@
+//! The buttons of the tools: a column at the left edge.
+
+use std::f32::consts::FRAC_PI_4;
+
+use egui::{
+    Align2, Color32, FontId, Id, Painter, Rect, Sense, Shape, Stroke, StrokeKind, Ui, pos2, vec2,
+};
+
+use super::calipers::{cross, dots};
+use super::model::calipers::Kind;
+use super::model::sheet::Tool;
+use super::tools::Tools;
+
+/// Height of a button with the gap below it, points.
+const PITCH: f32 = 30.0;
+
+/// Draws a sign into its room with a colour.
+type Icon = fn(&Painter, Rect, Color32);
+
+/// What the pointer does: sign and meaning.
+const TOOLS: [(Tool, &str, Icon); 4] = [
+    (
+        Tool::Measure(Kind::Distance),
+        "Distance in mm: two clicks, or drag (L)",
+        |p, r, c| {
+            dots(p, &[r.left_bottom(), r.right_top()], c);
+            cross(p, r.left_bottom(), c);
+            cross(p, r.right_top(), c);
+        },
+    ),
+    (
+        Tool::Measure(Kind::Ellipse),
+        "Ellipse, its circumference and area: the ends of one axis, then the width (O)",
+        |p, r, c| {
+            let radius = vec2(r.width() * 0.62, r.height() * 0.42);
+            let line = Stroke::new(1.5, c);
+            p.add(egui::epaint::EllipseShape::stroke(r.center(), radius, line));
+        },
+    ),
+    (
+        Tool::Measure(Kind::Angle),
+        "Angle in degrees: a point on one arm, the vertex, a point on the other (K)",
+        |p, r, c| {
+            let line = Stroke::new(1.5, c);
+            p.line_segment([r.left_bottom(), r.right_top()], line);
+            p.line_segment([r.left_bottom(), r.right_bottom()], line);
+        },
+    ),
+    (
+        Tool::Note,
+        "Text: click to place it, or drag away from what it points at (N)",
+        |p, r, c| {
+            let font = FontId::proportional(17.0);
+            p.text(r.center(), Align2::CENTER_CENTER, "T", font, c);
+        },
+    ),
+];
+
+fn bin(p: &Painter, r: Rect, c: Color32) {
+    let line = Stroke::new(1.5, c);
+    p.line_segment([r.left_top(), r.right_bottom()], line);
+    p.line_segment([r.right_top(), r.left_bottom()], line);
+}
+
+fn camera(p: &Painter, r: Rect, c: Color32) {
+    let line = Stroke::new(1.5, c);
+    p.rect_stroke(r.expand2(vec2(2.0, 0.0)), 2.0, line, StrokeKind::Middle);
+    p.circle_stroke(r.center(), 3.2, line);
+}
+
+fn film(p: &Painter, r: Rect, c: Color32) {
+    let line = Stroke::new(1.5, c);
+    let frame = r.expand2(vec2(2.0, 0.0));
+    p.rect_stroke(frame, 1.0, line, StrokeKind::Middle);
+    let side = vec2(r.height() * 0.3, 0.0).length();
+    let turned = |k: f32| {
+        let angle = k * 8.0 / 3.0 * FRAC_PI_4;
+        r.center() + side * egui::Vec2::angled(angle)
+    };
+    let corners = vec![turned(0.0), turned(1.0), turned(2.0)];
+    p.add(Shape::convex_polygon(corners, c, Stroke::NONE));
+}
+
+/// Draws the column into the lower left corner.
+pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
+    let area = ui.max_rect();
+    let has_marks = !tools.sheet.marks().is_empty();
+    let height = PITCH * (TOOLS.len() as f32 + 3.0) + 6.0;
+    let mut at = pos2(area.left() + 8.0, area.bottom() - 8.0 - height);
+    let mut next = |gap: f32| {
+        let rect = Rect::from_min_size(at, vec2(30.0, 28.0));
+        at.y += PITCH + gap;
+        rect
+    };
+    for (tool, tip, icon) in TOOLS {
+        if button(
+            ui,
+            next(0.0),
+            tools.sheet.tool() == Some(tool),
+            true,
+            tip,
+            icon,
+        ) {
+            tools.sheet.toggle(tool);
+        }
+    }
+    let tip = "Remove all measurements and texts";
+    if button(ui, next(6.0), false, has_marks, tip, bin) {
+        tools.sheet.clear();
+    }
+    let has_image = !tools.cine.is_empty();
+    let tip = "Save this image: PNG and sidecar (F2)";
+    if button(ui, next(0.0), false, has_image, tip, camera) {
+        tools.want_still();
+    }
+    let tip = "Save the loop between its marks as a clip (F3)";
+    if button(ui, next(0.0), false, has_image, tip, film) {
+        tools.want_clip();
+    }
+}
+
+fn button(ui: &mut Ui, rect: Rect, on: bool, enabled: bool, tip: &str, icon: Icon) -> bool {
+    let sense = if enabled {
+        Sense::click()
+    } else {
+        Sense::hover()
+    };
+    let response = ui.interact(rect, Id::new(tip), sense);
+    let visuals = match enabled {
+        true => ui.style().interact_selectable(&response, on),
+        false => ui.visuals().widgets.noninteractive,
+    };
+    let (painter, room) = (ui.painter(), rect.shrink2(vec2(9.0, 8.0)));
+    let (fill, colour) = match enabled {
+        true => (visuals.weak_bg_fill, visuals.text_color()),
+        false => (Color32::TRANSPARENT, Color32::from_gray(70)),
+    };
+    painter.rect(rect, 4.0, fill, visuals.bg_stroke, StrokeKind::Inside);
+    icon(painter, room, colour);
+    response.on_hover_text(tip).clicked()
+}
