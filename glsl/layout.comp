@@ -15,6 +15,7 @@ layout(std430, binding = 4) buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 5) buffer SegmentBuffer { Segment segments[]; };
 layout(std430, binding = 6) buffer CountersBuffer { Counters counters[]; };
 layout(std430, binding = 7) buffer FusionBuffer { Fusion fusions[]; };
+layout(std430, binding = 8) buffer SurveyBuffer { Survey surveys[]; };
 
 void main() {
     frames[0].kind = 0u;
@@ -25,4 +26,5 @@ void main() {
     segments[0].line = 0u;
     counters[0].rays = 0u;
     fusions[0].blur = 0u;
+    surveys[0].flags = 0u;
 }

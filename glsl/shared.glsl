@@ -110,6 +110,20 @@ struct Fusion {
     uint blend; uint unused0;                     // BLEND_*
 };
 
+const uint SURVEY_CUT = 1u;         // what lies before the image plane is cut away
+const uint SURVEY_IMAGE = 2u;       // the B-mode image is shown where it lies
+const uint SURVEY_SOME_HIDDEN = 4u; // of some instance the opacity is 0
+
+// How the anatomy is looked at from outside.
+struct Survey {
+    vec4 eye;          // world, mm
+    vec4 right;        // world: one pixel to the right, at distance 1
+    vec4 down;         // one pixel down
+    vec4 forward;      // unit
+    uint width; uint height; uint flags; uint unused0;
+    vec4 housing;      // of the probe, mm: half its width, half its thickness; height of its head, and with the handle
+};
+
 struct Hit { float t; uint instance; uint primitive; float u; float v; };
 
 // What a frame reports; all counts.

@@ -16,6 +16,7 @@ mod inputs;
 mod keys;
 mod layout;
 mod link;
+pub mod look;
 mod mmode;
 pub mod model;
 mod notice;
@@ -28,6 +29,7 @@ mod state;
 mod statistics;
 mod strip;
 mod style;
+mod survey;
 mod timing;
 mod tools;
 

@@ -84,5 +84,6 @@ subjects!(
     difference,
     reduce,
     collapse,
-    fuse
+    fuse,
+    survey
 );

@@ -2,7 +2,9 @@
 
 use std::mem::size_of;
 
-use insonify::sim::layout::{Counters, Frame, Fusion, Instance, Row, Segment, Surface, Tissue};
+use insonify::sim::layout::{
+    Counters, Frame, Fusion, Instance, Row, Segment, Surface, Survey, Tissue,
+};
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
 use spirq::ty::{StructType, Type};
@@ -21,9 +23,9 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> [Mirror; 8] {
+fn mirrors() -> [Mirror; 9] {
     mirrors!(
-        Frame, Tissue, Surface, Instance, Row, Segment, Counters, Fusion
+        Frame, Tissue, Surface, Instance, Row, Segment, Counters, Fusion, Survey
     )
 }
 

@@ -45,7 +45,7 @@ pub struct Common {
 /// Which tracer follows the rays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum TracerChoice {
-    /// Ray query where the device has it, else the compute BVH.
+    /// Ray query where the device has it in hardware, else the compute BVH.
     Auto,
     /// The device's ray-tracing hardware, or its emulation.
     RayQuery,

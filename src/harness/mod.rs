@@ -27,6 +27,7 @@ mod refit;
 mod run;
 mod scatter;
 mod shadow;
+mod survey;
 mod trace;
 mod worlds;
 
@@ -221,7 +222,7 @@ pub struct Subject {
 }
 
 /// Every kernel, in the order of a frame after the two that only tests use.
-pub const SUBJECTS: [Subject; 20] = [
+pub const SUBJECTS: [Subject; 21] = [
     geometry::SUBJECT,
     rays::SUBJECT,
     interpolate::SUBJECT,
@@ -242,4 +243,5 @@ pub const SUBJECTS: [Subject; 20] = [
     reduce::SUBJECT,
     collapse::SUBJECT,
     fuse::SUBJECT,
+    survey::SUBJECT,
 ];

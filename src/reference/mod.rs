@@ -32,6 +32,7 @@ pub mod scatter;
 pub mod segment;
 pub mod shadow;
 pub mod stack;
+pub mod survey;
 pub mod texture;
 pub mod trace;
 pub mod way;

@@ -60,6 +60,13 @@ pub const FLAG_SLOTS: u32 = 256;
 /// Only what a masking instance encloses is heard.
 pub const FLAG_MASKED: u32 = 512;
 
+/// What lies before the image plane is cut away.
+pub const SURVEY_CUT: u32 = 1;
+/// The B-mode image is shown where it lies.
+pub const SURVEY_IMAGE: u32 = 2;
+/// Of some instance the opacity is 0.
+pub const SURVEY_SOME_HIDDEN: u32 = 4;
+
 macro_rules! shared {
     ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(
         $(#[$doc])*
@@ -134,6 +141,12 @@ shared! {
         voxel_from_world: Rows,
         size_x: u32, size_y: u32, size_z: u32, blur: u32,
         slope: f32, intercept: f32, blend: u32, unused0: u32,
+    }
+    /// How the anatomy is looked at from outside.
+    struct Survey {
+        eye: [f32; 4], right: [f32; 4], down: [f32; 4], forward: [f32; 4],
+        width: u32, height: u32, flags: u32, unused0: u32,
+        housing: [f32; 4],
     }
     /// What a frame reports.
     struct Counters {

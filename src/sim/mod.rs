@@ -14,6 +14,7 @@ mod resize;
 pub mod shaders;
 pub mod special;
 mod stages;
+pub mod survey;
 pub mod tables;
 pub mod tracer;
 pub mod world;
@@ -30,6 +31,7 @@ use passes::{Passes, frame_constants};
 pub use resize::image_size;
 use shaders::Library;
 use stages::{Buffers, Kernels};
+use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
 use world::World;
@@ -58,6 +60,8 @@ pub struct Simulator {
     fused: bool,
     /// Where the next frames are copied.
     shown_on: Option<Image>,
+    /// Once the anatomy was looked at.
+    surveyor: Option<Surveyor>,
     update_time: Duration,
 }
 
@@ -112,6 +116,7 @@ impl Simulator {
             counting: false,
             fused: false,
             shown_on: None,
+            surveyor: None,
             update_time: Duration::ZERO,
             passes: Passes {
                 kernels: Kernels::new(device, library, &world, false)?,
@@ -200,6 +205,7 @@ impl Simulator {
             fusion.reload(&self.device, library, world.tracer())?;
         }
         self.passes.kernels = kernels;
+        self.surveyor = None;
         self.passes.world.reload(shapers);
         Ok(())
     }

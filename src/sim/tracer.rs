@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use crate::gpu::Device;
+use crate::gpu::{AdapterKind, Device};
 
 /// How rays find surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -14,11 +14,13 @@ pub enum Tracer {
 }
 
 impl Tracer {
-    /// The wanted tracer; without a wish the device's ray query where it has one, else the compute
-    /// hierarchy with a line that says why.
+    /// The wanted tracer; without a wish the device's ray query where it has one in hardware, else
+    /// the compute hierarchy, which is two to three times as fast as ray queries that a driver on
+    /// the processor emulates (benches/RESULTS.md); with a line that says why where there are none.
     pub fn choose(wanted: Option<Self>, device: &Device) -> (Self, Option<String>) {
         match wanted {
             Some(tracer) => (tracer, None),
+            None if device.info().kind == AdapterKind::Cpu => (Self::Bvh, None),
             None if device.supports_ray_query() => (Self::RayQuery, None),
             None => {
                 let why = format!(

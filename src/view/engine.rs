@@ -2,11 +2,12 @@
 
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
 use super::link::{Broadcast, Link};
+use super::look::{Look, Pictured};
 use super::model::{Order, Settings};
 use super::ring::Ring;
 use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
@@ -88,10 +89,15 @@ pub struct Frame {
     pub world_bytes: u64,
 }
 
+/// Longest time for which moving the eye of the 3D view may put off the next image while time passes.
+const PUT_OFF: Duration = Duration::from_millis(300);
+
 /// What the simulation has to say.
 pub enum News {
     /// A picture.
     Frame(Box<Frame>),
+    /// A picture of the anatomy.
+    Survey(Box<Pictured>),
     /// An order could not be carried out; the next one may.
     Refused(String),
     /// The scene that was to be opened is there: pictures from now on are of it.
@@ -108,6 +114,10 @@ struct State {
     /// A scene to go on with, and what to show of it.
     opening: Option<(Box<Scene>, Order)>,
     frozen: bool,
+    /// How the anatomy is looked at, if it is.
+    look: Option<Look>,
+    /// It is not pictured like this yet.
+    looks_new: bool,
     stop: bool,
     /// The last picture is to be sent once more.
     resend: bool,
@@ -116,8 +126,11 @@ struct State {
 
 /// What there is to do next.
 enum Job {
+    /// An image, and the anatomy with it.
     Image(Order),
     Open(Box<Scene>, Order),
+    /// Only the anatomy, from another side.
+    Survey,
 }
 
 struct Shared {
@@ -154,6 +167,8 @@ impl Engine {
                 order: Some(order),
                 opening: None,
                 frozen: false,
+                look: None,
+                looks_new: false,
                 stop: false,
                 resend: false,
                 news: Vec::new(),
@@ -162,13 +177,15 @@ impl Engine {
         });
         let worker = Worker {
             shared: shared.clone(),
-            ring: Ring::new(device),
+            ring: Ring::new(device, "B-mode"),
             broadcast: Broadcast::new(link, device),
+            pictures: Ring::new(device, "survey"),
             device: device.clone(),
             library,
             scene,
             fitted: None,
             imaged: Instant::now(),
+            left: None,
             wake: Box::new(wake),
         };
         let thread = std::thread::Builder::new()
@@ -204,6 +221,15 @@ impl Engine {
         self.shared.changed.notify_all();
     }
 
+    /// How the anatomy is to be pictured from now on, frozen or not; with nothing it is not.
+    pub fn look(&self, look: Option<Look>) {
+        let mut state = self.shared.lock();
+        state.looks_new = look.is_some();
+        state.look = look;
+        drop(state);
+        self.shared.changed.notify_all();
+    }
+
     /// What has come since the last call, oldest first.
     pub fn news(&self) -> Vec<News> {
         std::mem::take(&mut self.shared.lock().news)
@@ -221,10 +247,19 @@ impl Drop for Engine {
     }
 }
 
+/// What the device holds the results of.
+struct Imaged {
+    probe: Probe,
+    pose: DAffine3,
+    ended: Instant,
+    took: Duration,
+}
+
 struct Worker {
     shared: Arc<Shared>,
     ring: Ring,
     broadcast: Broadcast,
+    pictures: Ring,
     device: Arc<Device>,
     library: Arc<Library>,
     scene: Scene,
@@ -232,6 +267,8 @@ struct Worker {
     fitted: Option<Arc<Settings>>,
     /// The moment that the last picture shows.
     imaged: Instant,
+    /// What it left on the device.
+    left: Option<Imaged>,
     wake: Box<dyn Fn() + Send>,
 }
 
@@ -239,15 +276,16 @@ impl Worker {
     fn run(mut self) {
         let mut simulator = None;
         let mut last: Option<Order> = None;
-        for index in 0.. {
-            let order = match self.next(last.as_ref()) {
-                None => return,
-                Some(Job::Image(order)) => order,
-                Some(Job::Open(scene, order)) => match self.open(*scene, &order) {
+        let mut index = 0;
+        while let Some(job) = self.next(last.as_ref()) {
+            let order = match job {
+                Job::Survey => None,
+                Job::Image(order) => Some(order),
+                Job::Open(scene, order) => match self.open(*scene, &order) {
                     Ok(opened) => {
                         simulator = Some(opened);
                         self.tell(News::Opened);
-                        order
+                        Some(order)
                     }
                     Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
                         return self.tell(News::Failed(error));
@@ -258,17 +296,43 @@ impl Worker {
                     }
                 },
             };
-            match self.carry_out(&mut simulator, &order, index) {
-                Ok(frame) => self.tell(News::Frame(Box::new(frame))),
-                // Everything on the device is gone with it.
-                Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
-                    return self.tell(News::Failed(error));
+            if let Some(order) = order {
+                let frame = self.carry_out(&mut simulator, &order, index);
+                index += 1;
+                last = Some(order);
+                let told = frame.map(|frame| News::Frame(Box::new(frame)));
+                if !self.report(told, simulator.is_none()) {
+                    return;
                 }
-                Err(error) if simulator.is_none() => return self.tell(News::Failed(error)),
-                Err(error) => self.tell(News::Refused(error.to_string())),
             }
-            last = Some(order);
+            let Some((simulator, _)) = &mut simulator else {
+                continue;
+            };
+            if let Some(pictured) = self.picture(simulator).transpose() {
+                let told = pictured.map(|pictured| News::Survey(Box::new(pictured)));
+                if !self.report(told, false) {
+                    return;
+                }
+            }
         }
+    }
+
+    /// Hands news over; whether there will be more.
+    fn report(&self, news: Result<News, SimError>, fatal: bool) -> bool {
+        match news {
+            Ok(news) => self.tell(news),
+            // Everything on the device is gone with it.
+            Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
+                self.tell(News::Failed(error));
+                return false;
+            }
+            Err(error) if fatal => {
+                self.tell(News::Failed(error));
+                return false;
+            }
+            Err(error) => self.tell(News::Refused(error.to_string())),
+        }
+        true
     }
 
     fn tell(&self, news: News) {
@@ -277,7 +341,7 @@ impl Worker {
     }
 
     /// The newest order once there is one, or the last one again while it looks different by itself;
-    /// nothing at the end.
+    /// nothing at the end. A new look at the anatomy goes first for as long as the last image took.
     fn next(&self, last: Option<&Order>) -> Option<Job> {
         let mut state = self.shared.lock();
         loop {
@@ -294,13 +358,16 @@ impl Worker {
                 state = self.shared.lock();
                 continue;
             }
-            if !state.frozen {
-                if let Some(order) = state.order.take() {
-                    return Some(Job::Image(order));
-                }
-                if let Some(last) = last.filter(|last| last.runs(self.imaged)) {
-                    return Some(Job::Image(last.again(Instant::now())));
-                }
+            let running = last.filter(|last| last.runs(self.imaged));
+            let due = !state.frozen && (state.order.is_some() || running.is_some());
+            if let (Some(left), true) = (&self.left, state.looks_new)
+                && (!due || left.ended.elapsed() < left.took.min(PUT_OFF))
+            {
+                return Some(Job::Survey);
+            }
+            if due {
+                let again = || running.expect("due without an order").again(Instant::now());
+                return Some(Job::Image(state.order.take().unwrap_or_else(again)));
             }
             let changed = self.shared.changed.wait(state);
             state = changed.unwrap_or_else(PoisonError::into_inner);
@@ -315,12 +382,36 @@ impl Worker {
         let simulator = Simulator::new(&self.device, &self.library, &scene, tracer)?;
         self.scene = scene;
         self.fitted = None;
+        self.left = None;
         let mut state = self.shared.lock();
         // What was ordered of the scene before means nothing here.
         state.order = None;
         state.frozen = false;
         drop(state);
         Ok((simulator, tracer))
+    }
+
+    /// The anatomy of the last image as it is looked at now, if it is.
+    fn picture(&mut self, simulator: &mut Simulator) -> Result<Option<Pictured>, SimError> {
+        let mut state = self.shared.lock();
+        state.looks_new = false;
+        let (Some(look), Some(left)) = (state.look.clone(), &self.left) else {
+            return Ok(None);
+        };
+        drop(state);
+        // The window may still look at the scene before.
+        if look.sight.looks.len() != self.scene.instances.len() {
+            return Ok(None);
+        }
+        let image = self.pictures.free(look.sight.size)?;
+        let timings = simulator.survey(&self.library, &look.sight, &image)?;
+        Ok(Some(Pictured {
+            image,
+            look,
+            probe: left.probe.clone(),
+            pose: left.pose,
+            ms: timings.total_ms(),
+        }))
     }
 
     fn carry_out(
@@ -367,6 +458,12 @@ impl Worker {
             }
             false => None,
         };
+        self.left = Some(Imaged {
+            probe: scene.probe.clone(),
+            pose,
+            ended: Instant::now(),
+            took: began.elapsed(),
+        });
         let constants = simulator.constants();
         self.broadcast.offer(&image, constants, pose)?;
         Ok(Frame {

@@ -33,6 +33,7 @@ enum Action {
     Save,
     Load,
     Console,
+    Survey,
     Timing,
     Mmode,
     Help,
@@ -183,13 +184,14 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "save settings (with Shift: as), load settings or a scene",
     ),
     (
-        "C T M",
+        "C V T M",
         &[
             (Key::C, false, Action::Console),
+            (Key::V, false, Action::Survey),
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
         ],
-        "console, timings, M-mode",
+        "console, 3D view, timings, M-mode",
     ),
     (
         "? Esc",
@@ -301,6 +303,7 @@ fn carry_out(
         Action::Save => state.files.save(model),
         Action::Load => state.files.ask(Purpose::Load, model),
         Action::Console => state.console = !state.console,
+        Action::Survey => state.survey.open = !state.survey.open,
         Action::Timing => state.timing = !state.timing,
         Action::Mmode => mmode::toggle(model, now),
         Action::Help => state.help = !state.help,

@@ -7,21 +7,31 @@ use egui::{Align2, CentralPanel, Frame as Space, Panel, RichText, Ui};
 use super::bmode::{self, Place};
 use super::console;
 use super::engine::Frame;
+use super::look::Pictured;
 use super::model::Model;
 use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{calipers, cine, files, keys, mmode, notice, saved, strip, style, timing};
+use super::{calipers, cine, files, keys, mmode, notice, saved, strip, style, survey, timing};
 
-/// Draws the interface; returns where the picture belongs.
+/// Where pictures belong.
+#[derive(Default)]
+pub(super) struct Places {
+    /// The B-mode image.
+    pub(super) image: Option<Place>,
+    /// The 3D view.
+    pub(super) survey: Option<survey::Place>,
+}
+
+/// Draws the interface; returns where the pictures belong.
 pub(super) fn show(
     ui: &mut Ui,
     model: &mut Model,
     state: &mut State,
     statistics: &Times,
-    frame: Option<&Frame>,
+    (frame, pictured): (Option<&Frame>, Option<&Pictured>),
     now: Instant,
-) -> Option<Place> {
+) -> Places {
     let line = model.mmode.as_ref().map(Strip::line);
     if state.console {
         Panel::right("console")
@@ -51,7 +61,16 @@ pub(super) fn show(
             .exact_size(mmode::HEIGHT)
             .show(ui, |ui| mmode::show(ui, model, &mut state.mmode));
     }
-    // Transparent: the picture is below the interface.
+    // Transparent: the pictures are below the interface.
+    let room = survey::width(ui.available_width()).filter(|_| state.survey.open);
+    let survey = room.map(|width| {
+        let panel = Panel::right("survey").resizable(false).exact_size(width);
+        let panel = panel.frame(Space::NONE).show_separator_line(false);
+        let shown = panel.show(ui, |ui| {
+            survey::show(ui, model, &mut state.survey, pictured)
+        });
+        shown.inner
+    });
     let centre = CentralPanel::default().frame(Space::NONE);
     let place = centre.show(ui, |ui| {
         let place = bmode::show(ui, frame, model);
@@ -90,13 +109,21 @@ pub(super) fn show(
     if state.help {
         help(ui.ctx(), &mut state.help);
     }
-    place.inner
+    Places {
+        image: place.inner,
+        survey,
+    }
 }
 
 /// Buttons that open the panels.
 fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     for (open, name, tip) in [
         (&mut state.console, "Console", "Settings (C)"),
+        (
+            &mut state.survey.open,
+            "3D",
+            "Anatomy, probe and fan from outside (V)",
+        ),
         (&mut state.timing, "Timings", "Where the time goes (T)"),
         (&mut state.help, "Keys", "What the keyboard does (?)"),
     ] {

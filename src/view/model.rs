@@ -9,12 +9,14 @@ mod devices;
 mod entries;
 mod history;
 pub mod mmode;
+mod palette;
 mod pose;
 mod saving;
 mod settings;
 pub mod sheet;
 pub mod sidecar;
 pub mod skin;
+mod survey;
 pub mod trajectory;
 mod ways;
 
@@ -29,9 +31,11 @@ pub use clock::Clock;
 pub use devices::{Devices, Source};
 use history::History;
 use mmode::Strip;
+pub use palette::Show;
 pub use pose::{Axis, STEP, moved};
 pub use saving::File;
 pub use settings::Settings;
+pub use survey::{Shown, Survey};
 use trajectory::Replay;
 pub use ways::{Kept, Ways};
 
@@ -62,6 +66,8 @@ pub struct Model {
     pub mmode: Option<Strip>,
     /// The placed meshes, as [`Settings::surfaces`].
     pub meshes: Vec<Placed>,
+    /// The 3D view; a change is no new revision, since the image stays.
+    pub survey: Survey,
     /// The settings of the scene file.
     pub loaded: Settings,
     /// The pose of the scene file.
@@ -151,6 +157,7 @@ impl Model {
                     switch: scene.origins.instances.get(index).map(entries::switch),
                 })
                 .collect(),
+            survey: Survey::new(scene),
             home: scene.world_from_probe,
             file,
             history: History::default(),

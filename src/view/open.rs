@@ -11,14 +11,16 @@ use winit::window::Window;
 use super::engine::{Frame, News};
 use super::files::Files;
 use super::inputs::{self, Inputs};
+use super::layout::Places;
 use super::link::{Bell, Link};
+use super::look::{Look, Pictured};
 use super::model::{File, Kept};
 use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
 use super::statistics::{Sample, Times};
 use super::tools::{Tools, cropped};
-use super::{Model, Options, ViewError, keys, layout, style};
+use super::{Model, Options, ViewError, keys, layout, style, survey};
 use crate::gpu::{AdapterKind, Device, GpuError, Interface, Painted, Placed, Shot, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
@@ -29,13 +31,19 @@ use crate::sim::SimError;
 pub(super) struct Open {
     /// The picture last finished; before the session, so that its device is still there.
     frame: Option<Frame>,
+    /// The same of the 3D view.
+    pictured: Option<Pictured>,
     session: Session,
     model: Model,
     state: State,
     /// Revision of the model that the simulation has been told.
     told: u64,
+    /// How it has been told to look at the anatomy.
+    look: Option<Look>,
     /// The picture has not been on the screen yet.
     fresh: bool,
+    /// What the last pictures of the 3D view took, ms, until they are noted.
+    pictures_ms: Vec<f64>,
     /// When the last input arrived.
     touched: Instant,
     /// When the interface wants to be drawn again.
@@ -122,6 +130,7 @@ impl Open {
         let state = State {
             console: true,
             timing: false,
+            survey: survey::State::default(),
             help: false,
             mmode: Default::default(),
             tissue: 0,
@@ -141,11 +150,14 @@ impl Open {
         window.request_redraw();
         let made = Self {
             frame: None,
+            pictured: None,
             session,
             told: model.revision(),
+            look: None,
             model,
             state,
             fresh: false,
+            pictures_ms: Vec::new(),
             touched: now,
             again: None,
             input,
@@ -165,6 +177,7 @@ impl Open {
     ) -> Result<(Self, ValidationLog), ViewError> {
         let Self {
             frame,
+            pictured,
             session,
             model,
             mut state,
@@ -178,7 +191,7 @@ impl Open {
         // What was handed over is lost with the device; it can be asked for again.
         state.files.opening = opening.is_some();
         // All that is on the lost device ends before there is another.
-        drop(frame);
+        drop((frame, pictured));
         state.tools.lose();
         drop(session);
         let device = session::device(&plan.options)?;
@@ -191,11 +204,14 @@ impl Open {
         window.request_redraw();
         let made = Self {
             frame: None,
+            pictured: None,
             session,
             told: model.revision(),
+            look: None,
             model,
             state,
             fresh: false,
+            pictures_ms: Vec::new(),
             touched,
             again: None,
             input,
@@ -224,6 +240,11 @@ impl Open {
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;
+                }
+                News::Survey(pictured) => {
+                    self.pictures_ms.push(pictured.ms);
+                    self.state.survey.learn(&pictured);
+                    self.pictured = Some(*pictured);
                 }
                 News::Refused(problem) => self.state.problem = Some(problem),
                 News::Opened => self.adopt(plan),
@@ -283,6 +304,7 @@ impl Open {
         self.model = model;
         // It shows the scene before, as does all that was measured in it.
         self.frame = None;
+        (self.pictured, self.look) = (None, None);
         (self.state.tissue, self.state.mesh) = (0, 0);
         self.state.tools.lose();
         self.state.mmode = Default::default();
@@ -333,30 +355,37 @@ impl Open {
         let input = self.input.take_egui_input(&self.window);
         let context = self.input.egui_ctx().clone();
         let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
-        let (mut shown, mut place) = (None, None);
+        let pictured = self.pictured.as_ref();
+        let (mut shown, mut places) = (None, Places::default());
         let mut output = context.run_ui(input, |ui| {
             keys::apply(ui.ctx(), model, state, touched);
             shown = state.tools.shown(model, ui.ctx());
-            place = layout::show(ui, model, state, times, shown.as_ref(), touched);
+            let pictures = (shown.as_ref(), pictured);
+            places = layout::show(ui, model, state, times, pictures, touched);
         });
-        let frame = shown.as_ref();
         self.tell();
+        self.point(&places, output.pixels_per_point);
         self.entitle();
         let platform = std::mem::take(&mut output.platform_output);
         self.input.handle_platform_output(&self.window, platform);
         let scale = output.pixels_per_point;
         let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
-        let placed: Vec<Placed> = (frame.iter().zip(&place))
-            .map(|(frame, place)| {
-                let r = place.rect * scale;
-                Placed {
-                    image: &frame.image,
-                    to: [r.left(), r.top(), r.right(), r.bottom()],
-                }
+        let image = shown.as_ref().map(|frame| &frame.image);
+        let survey = self.pictured.as_ref().map(|pictured| &pictured.image);
+        let rects = [
+            (image, places.image.as_ref().map(|place| place.rect)),
+            (survey, places.survey.map(|place| place.rect)),
+        ];
+        let placed: Vec<Placed> = (rects.into_iter())
+            .filter_map(|(image, rect)| {
+                let r = rect? * scale;
+                let to = [r.left(), r.top(), r.right(), r.bottom()];
+                Some(Placed { image: image?, to })
             })
             .collect();
         let size = self.window.inner_size();
-        let shot = shot && frame.is_some();
+        let looked = self.pictured.as_ref().map(|pictured| &pictured.look);
+        let shot = shot && image.is_some() && looked == self.look.as_ref();
         let interface = Interface {
             pixels_per_point: scale,
             primitives: &primitives,
@@ -371,7 +400,7 @@ impl Open {
             Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
             Painted::Skipped => None,
         };
-        let around = picture.zip(place).map(|(picture, place)| {
+        let around = picture.zip(places.image.as_ref()).map(|(picture, place)| {
             let r = place.area * scale;
             cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
         });
@@ -383,6 +412,19 @@ impl Open {
                 Ok(picture.filter(|_| shot))
             }
             Painted::Skipped => Ok(None),
+        }
+    }
+
+    /// Tells the simulation how the anatomy is looked at.
+    fn point(&mut self, places: &Places, scale: f32) {
+        let (model, state) = (&self.model, &self.state.survey);
+        let look = (places.survey).map(|place| place.look(model, state, scale));
+        if look != self.look {
+            if look.is_none() {
+                self.pictured = None;
+            }
+            self.session.engine.look(look.clone());
+            self.look = look;
         }
     }
 
@@ -412,6 +454,7 @@ impl Open {
 
     /// Notes that the picture has been handed to the screen.
     fn seen(&mut self, times: &mut Times) {
+        (self.pictures_ms.drain(..)).for_each(|ms| times.add_survey(ms));
         if !std::mem::take(&mut self.fresh) {
             return;
         }

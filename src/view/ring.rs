@@ -11,13 +11,15 @@ const SPARE: usize = 2;
 /// Images of one size. Those that the window still shows or keeps, or that a submission of its
 /// reads, are left alone, so that neither waits for the other.
 pub(super) struct Ring {
+    name: &'static str,
     images: Vec<Image>,
     device: Arc<Device>,
 }
 
 impl Ring {
-    pub(super) fn new(device: &Arc<Device>) -> Self {
+    pub(super) fn new(device: &Arc<Device>, name: &'static str) -> Self {
         Self {
+            name,
             images: Vec::new(),
             device: device.clone(),
         }
@@ -37,7 +39,7 @@ impl Ring {
             return Ok(image.clone());
         }
         let (dim, format) = (ImageDim::D2, ImageFormat::Rgba8Unorm);
-        let image = Image::new(&self.device, "B-mode", dim, extent, format)?;
+        let image = Image::new(&self.device, self.name, dim, extent, format)?;
         self.images.push(image.clone());
         Ok(image)
     }
@@ -55,7 +57,7 @@ mod tests {
     #[test]
     fn memory_is_that_of_the_loop_and_is_given_back_with_it() {
         let device = test_device();
-        let mut ring = Ring::new(&device);
+        let mut ring = Ring::new(&device, "B-mode");
         let frames = 12;
         let mut cine = Cine::new(Limit {
             frames,
@@ -83,7 +85,7 @@ mod tests {
     #[test]
     fn what_is_held_is_not_written() {
         let device = test_device();
-        let mut ring = Ring::new(&device);
+        let mut ring = Ring::new(&device, "B-mode");
         let held = ring.free([8, 8]).unwrap();
         device.upload_image(&held, &[7; 256]).unwrap();
         for _ in 0..5 {

@@ -12,6 +12,8 @@ pub(super) struct State {
     pub(super) console: bool,
     /// The timing panel is open.
     pub(super) timing: bool,
+    /// The 3D view.
+    pub(super) survey: super::survey::State,
     /// The list of keys is open.
     pub(super) help: bool,
     /// The M-mode strip.

@@ -28,6 +28,8 @@ pub(super) struct Times {
     samples: VecDeque<Sample>,
     /// How long the window's own frames took, from the start of drawing to the screen.
     interface: VecDeque<f64>,
+    /// What pictures of the 3D view took on the device.
+    survey: VecDeque<f64>,
 }
 
 impl Times {
@@ -38,6 +40,16 @@ impl Times {
     /// Notes a frame of the window, ms.
     pub(super) fn add_interface(&mut self, ms: f64) {
         push(&mut self.interface, ms);
+    }
+
+    /// Notes a picture of the 3D view, ms on the device.
+    pub(super) fn add_survey(&mut self, ms: f64) {
+        push(&mut self.survey, ms);
+    }
+
+    /// Times of the 3D view's pictures, ms.
+    pub(super) fn survey(&self) -> Vec<f64> {
+        self.survey.iter().copied().collect()
     }
 
     /// Times of the window's own frames, ms.
@@ -62,6 +74,7 @@ impl Times {
             "frame_ms": both(&self.of(|s| s.wall)),
             "structures_ms": both(&self.of(|s| s.update)),
             "latency_ms": both(&self.of(|s| s.latency)),
+            "survey_ms": both(&self.survey()),
             "interface_ms": both(&self.interface()),
         })
     }

@@ -81,6 +81,11 @@ fn totals(ui: &mut Ui, statistics: &Times, frame: Option<&Frame>, state: &State)
                 &statistics.of(|s| s.latency),
             ),
             (
+                "3D view",
+                "A picture of the 3D view on the device",
+                &statistics.survey(),
+            ),
+            (
                 "interface",
                 "A frame of this window, from the start of drawing to the screen",
                 &statistics.interface(),

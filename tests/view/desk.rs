@@ -281,7 +281,12 @@ impl Desk {
         motion(from);
         self.fake(xproto::BUTTON_PRESS_EVENT, 1, (0, 0));
         if to != from {
-            motion(to);
+            // Through places between, as a hand does.
+            let between = |share: u16| {
+                let at = |a: u16, b: u16| (a * (4 - share) + b * share) / 4;
+                (at(from.0, to.0), at(from.1, to.1))
+            };
+            (1..=4).for_each(|share| motion(between(share)));
         }
         self.fake(xproto::BUTTON_RELEASE_EVENT, 1, (0, 0));
     }

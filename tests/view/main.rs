@@ -7,6 +7,7 @@
 mod client;
 mod desk;
 mod mmode;
+mod survey;
 mod tools;
 mod tracker;
 mod trajectory;
@@ -42,8 +43,8 @@ to = [8, 2, 15]
 
 /// Widths and heights of the default window's parts, pixels: the console is on the right.
 const CONSOLE: [u16; 4] = [1280 - 336, 0, 336, 720];
-/// The part in which the image is.
-const IMAGE: [u16; 4] = [200, 100, 500, 500];
+/// The part in which the image is; the 3D view is between it and the console.
+const IMAGE: [u16; 4] = [60, 100, 400, 500];
 
 #[test]
 fn a_window_opens_follows_the_keys_and_closes() {

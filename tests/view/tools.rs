@@ -77,7 +77,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     });
 
     // The track of the bar: its left end is the first image again.
-    desk.click((378, 702));
+    desk.click((411, 702));
     desk.wait_for("the first by the pointer", |d| d.grab(IMAGE) == shown[0]);
 
     // What is saved is what is shown: the first picture, which `render` makes as well.

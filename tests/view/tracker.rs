@@ -9,8 +9,8 @@ use crate::client::{Client, shift};
 use crate::desk::{Desk, Key};
 use crate::{IMAGE, SCENE, brightness, difference};
 
-/// Where a notice is, over the image and between its texts.
-const NOTICE: [u16; 4] = [250, 4, 440, 44];
+/// Where a notice is, over the image and below its texts.
+const NOTICE: [u16; 4] = [16, 54, 440, 42];
 
 /// A window that listens; the scene with a tracker that reports in the scene's own frame.
 fn open(timeout: &str, more: &[&str]) -> Option<(Desk, SocketAddr)> {

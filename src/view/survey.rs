@@ -1,0 +1,251 @@
+//! The 3D view: anatomy, probe and fan, pictured by the simulation; the pointer moves the eye.
+
+mod fan;
+mod tissues;
+
+use std::time::{Duration, Instant};
+
+use egui::{Align2, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
+use glam::{DVec2, DVec3};
+
+use super::look::{Look, Pictured};
+use super::model::{Camera, Model};
+use super::style;
+
+/// Narrowest that the view is of use, points.
+const LEAST: f32 = 240.0;
+/// Points of a wheel's turn that bring the eye a step nearer.
+const NOTCH: f64 = 50.0;
+/// A picture may take this long while something moves, ms; else it is made coarser.
+const SWIFT: f64 = 60.0;
+/// Least pixels of the picture for each of the panel's, along an edge.
+const COARSEST: f64 = 0.25;
+/// Everything is at rest when nothing has moved for this long.
+const REST: Duration = Duration::from_millis(160);
+
+/// What of the 3D view is open and under way; not saved.
+pub(super) struct State {
+    /// The view is open.
+    pub(super) open: bool,
+    /// The list of tissues is open.
+    tissues: bool,
+    /// Until when eye, probe or anatomy count as moving.
+    moving: Option<Instant>,
+    /// Revision of the model that was seen last.
+    revision: u64,
+    /// What a pixel of the last pictures took on the device, ms.
+    pixel_ms: f64,
+}
+
+impl Default for State {
+    fn default() -> Self {
+        Self {
+            open: true,
+            tissues: false,
+            moving: None,
+            revision: 0,
+            pixel_ms: 0.0,
+        }
+    }
+}
+
+impl State {
+    /// Learns from a finished picture.
+    pub(super) fn learn(&mut self, pictured: &Pictured) {
+        let [width, height] = pictured.look.sight.size.map(f64::from);
+        self.pixel_ms = pictured.ms / (width * height);
+    }
+
+    /// Pixels of the picture for each of the panel's, along an edge: fewer while something moves
+    /// and the device is slow, more where it is quick, against jagged outlines.
+    fn detail(&self, pixels: f64, now: Instant) -> f64 {
+        let moving = self.moving.is_some_and(|until| now < until);
+        let ms = pixels * self.pixel_ms;
+        let fine = if moving { SWIFT / 4.0 } else { 4.0 * SWIFT };
+        if ms > 0.0 && 4.0 * ms < fine {
+            return 2.0;
+        }
+        let steps = [1.0, 0.5, 1.0 / 3.0];
+        let quick = |detail: &f64| !moving || ms * detail * detail <= SWIFT;
+        steps.into_iter().find(quick).unwrap_or(COARSEST)
+    }
+
+    /// Notes whether something has moved; draws again at rest, when pictures are fine again.
+    fn watch(&mut self, ui: &Ui, model: &Model, eye_moved: bool) {
+        let now = Instant::now();
+        let changed = std::mem::replace(&mut self.revision, model.revision()) != model.revision();
+        if eye_moved || changed || model.clock.runs() {
+            self.moving = Some(now + REST);
+        }
+        if let Some(until) = self.moving {
+            let left = until.saturating_duration_since(now);
+            if left == Duration::ZERO {
+                self.moving = None;
+            } else if !model.clock.runs() {
+                ui.ctx().request_repaint_after(left);
+            }
+        }
+    }
+}
+
+/// Where the view is on the screen.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    /// All of it, points.
+    pub(super) rect: Rect,
+}
+
+impl Place {
+    fn panel(&self) -> DVec2 {
+        DVec2::new(self.rect.width().into(), self.rect.height().into())
+    }
+
+    /// Where on the screen a point of the world is seen, with `camera`.
+    pub(super) fn project(&self, camera: &Camera, point: DVec3) -> Option<egui::Pos2> {
+        let at = camera.project(self.panel(), point)?;
+        Some(self.rect.min + vec2(at.x as f32, at.y as f32))
+    }
+
+    /// How the anatomy is to be pictured here; `scale`: pixels per point.
+    pub(super) fn look(&self, model: &Model, state: &State, scale: f32) -> Look {
+        let pixels = self.panel() * f64::from(scale);
+        let detail = state.detail(pixels.x * pixels.y, Instant::now());
+        let size = (pixels * detail).round().max(DVec2::ONE);
+        Look {
+            sight: model.survey.sight([size.x as u32, size.y as u32]),
+            camera: model.survey.camera,
+        }
+    }
+}
+
+/// Width of the view in a room of `width` points; nothing where both would be too narrow.
+pub(super) fn width(width: f32) -> Option<f32> {
+    let half = (width / 2.0).floor();
+    (half >= LEAST).then_some(half)
+}
+
+/// Draws everything over the picture into the whole of `ui`, and moves the eye.
+pub(super) fn show(
+    ui: &mut Ui,
+    model: &mut Model,
+    state: &mut State,
+    pictured: Option<&Pictured>,
+) -> Place {
+    let place = Place {
+        rect: ui.max_rect(),
+    };
+    let id = ui.id().with("survey");
+    let response = ui.interact(place.rect, id, Sense::click_and_drag());
+    let before = model.survey.camera;
+    navigate(ui, &response, &place, &mut model.survey.camera);
+    state.watch(ui, model, before != model.survey.camera);
+    let painter = ui.painter_at(place.rect);
+    if let Some(pictured) = pictured {
+        fan::show(&painter, &place, pictured, &model.survey.wires);
+    } else {
+        let (middle, font) = (place.rect.center(), FontId::proportional(14.0));
+        let text = "Preparing the 3D view";
+        painter.text(middle, Align2::CENTER_CENTER, text, font, style::FAINT);
+    }
+    let edge = Stroke::new(1.0, egui::Color32::from_gray(48));
+    painter.vline(place.rect.left(), place.rect.y_range(), edge);
+    let below = place.rect.left_bottom() + vec2(10.0, -8.0);
+    let hint = "drag: turn    Shift+drag: move    wheel: nearer, farther";
+    let font = FontId::proportional(10.0);
+    painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
+    buttons(ui, &place, model, state);
+    if state.tissues {
+        tissues::show(ui, place.rect, &mut model.survey.shown);
+    }
+    place
+}
+
+fn navigate(ui: &Ui, response: &Response, place: &Place, camera: &mut Camera) {
+    let panel = place.panel();
+    let delta = response.drag_delta();
+    let by = DVec2::new(delta.x.into(), delta.y.into());
+    let shift = ui.input(|input| input.modifiers.shift);
+    if response.dragged_by(PointerButton::Middle)
+        || (shift && response.dragged_by(PointerButton::Primary))
+    {
+        camera.pan(panel, by);
+    } else if response.dragged() {
+        camera.orbit(panel, by);
+    }
+    if response.hovered() {
+        let (wheel, pinch) = ui.input(|input| (input.smooth_scroll_delta.y, input.zoom_delta()));
+        let wheel = f64::from(wheel) / NOTCH;
+        // A pinch to twice the size halves the distance: six steps and a half.
+        let pinch = f64::from(pinch).ln() / (1.0f64 / 0.9).ln();
+        camera.zoom(wheel + pinch);
+    }
+}
+
+fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut State) {
+    let at = place.rect.left_top() + vec2(10.0, 8.0);
+    let room = Rect::from_min_max(at, pos2(place.rect.right() - 8.0, at.y + 24.0));
+    let (pose, probe) = (model.pose, &model.settings.probe);
+    let survey = &mut model.survey;
+    ui.scope_builder(egui::UiBuilder::new().max_rect(room), |ui| {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.toggle_value(&mut state.tissues, "Tissues")
+                .on_hover_text("Which tissues are shown, and which as glass");
+            ui.toggle_value(&mut survey.cut, "Cut")
+                .on_hover_text("Cut away what lies between the eye and the image plane");
+            ui.separator();
+            let tip = "Look at the image plane as the B-mode image shows it";
+            if ui.button("Front").on_hover_text(tip).clicked() {
+                survey.camera.face(&pose);
+            }
+            let tip = "Look along the probe into the body";
+            if ui.button("Along").on_hover_text(tip).clicked() {
+                survey.camera.along(&pose);
+            }
+            let tip = "Probe and fan from the side, all of them in view";
+            if ui.button("Reset").on_hover_text(tip).clicked() {
+                survey.reset(&pose, probe);
+            }
+        });
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slow_device_is_coarse_while_the_eye_moves_and_a_quick_one_fine() {
+        let now = Instant::now();
+        let state = |moving: bool, pixel_ms| State {
+            moving: moving.then_some(now + REST),
+            pixel_ms,
+            ..State::default()
+        };
+        let detail = |moving, ms: f64| state(moving, ms / 1e5).detail(1e5, now);
+        assert_eq!(detail(false, 500.0), 1.0);
+        assert_eq!(detail(true, 5000.0), COARSEST);
+        assert_eq!(detail(true, 500.0), 1.0 / 3.0);
+        assert_eq!(detail(true, 100.0), 0.5);
+        assert_eq!(detail(true, 50.0), 1.0);
+        assert_eq!(detail(true, 1.0), 2.0);
+        assert_eq!(detail(false, 50.0), 2.0);
+        assert_eq!(detail(false, 0.0), 1.0, "not measured yet");
+    }
+
+    #[test]
+    fn what_the_eye_looks_at_is_in_the_middle() {
+        let place = Place {
+            rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)),
+        };
+        let camera = Camera::front(&glam::DAffine3::IDENTITY, DVec3::X, 50.0);
+        let seen = place.project(&camera, DVec3::X).expect("in front");
+        assert!((seen - place.rect.center()).length() < 1e-3);
+    }
+
+    #[test]
+    fn there_is_no_view_where_there_is_no_room() {
+        assert_eq!(width(300.0), None);
+        assert_eq!(width(945.0), Some(472.0));
+    }
+}
