@@ -271,9 +271,10 @@ fn measures_the_phantom(scale: f64) {
     let Some(mut desk) = Desk::open_scaled(scene, &arguments, scale) else {
         return;
     };
-    // The console would leave little room beside it where everything is larger.
+    // Console and 3D view would leave little room beside them where everything is larger.
     desk.resize(1280, 720);
     desk.press(Key::Letter('c'));
+    desk.press(Key::Letter('v'));
     let picture = [0, 0, 1280, (720.0 - 40.0 * scale) as u16];
     let width = usize::from(picture[2]);
     // The ruler takes more room than the grey bar.
