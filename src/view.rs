@@ -22,6 +22,7 @@ pub mod model;
 mod notice;
 mod open;
 mod opening;
+mod pads;
 mod ring;
 mod saved;
 mod session;

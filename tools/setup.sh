@@ -11,7 +11,7 @@ say() { printf 'setup: %s\n' "$*" >&2; }
 manual() {
   say "$1"
   say "install by hand, then run this again:"
-  say "  a C compiler and linker (cc), the Vulkan loader (libvulkan.so.1),"
+  say "  a C compiler and linker (cc), pkg-config and libudev with its header (libudev-dev), the Vulkan loader (libvulkan.so.1),"
   say "  a Vulkan driver (your GPU's, or Mesa's lavapipe, 25 or newer for ray query)"
   say "  for the window: libX11, libX11-xcb, libXcursor, libXi, libXrandr, libxkbcommon, libxkbcommon-x11"
   [ "$mode" = run ] || say "  the Khronos validation layers, SPIRV-Tools (spirv-val), Xvfb, cmake, a C++ compiler, Python 3"
@@ -29,6 +29,9 @@ has_driver() {
 
 want=()
 command -v cc >/dev/null || want+=(gcc libc6-dev)
+# Game pads: what the program is linked with.
+command -v pkg-config >/dev/null || want+=(pkg-config)
+pkg-config --exists libudev 2>/dev/null || want+=(libudev-dev)
 has_library libvulkan.so.1 || want+=(libvulkan1)
 # The window's libraries are opened at run time; every desktop has them, a bare server has not.
 if [ "$mode" != run ] || [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then

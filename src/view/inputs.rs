@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 use super::files::said;
 use super::link::{Bell, Link, Report};
 use super::model::{Kept, Model, Ways, age};
+use super::pads::{Pads, Word};
 use super::{Listen, ViewError};
 use crate::igtl::{PORT, Tracked};
 use crate::scene::Tracker;
@@ -24,6 +25,9 @@ pub(super) struct Inputs {
     pub(super) report: Option<Report>,
     /// Why there is none although the user wanted it.
     pub(super) refused: Option<String>,
+    pads: Pads,
+    /// What the game pads said last.
+    pub(super) word: Word,
     /// The trajectory file that is written and read.
     pub(super) path: String,
     /// What is wrong with it.
@@ -47,6 +51,7 @@ impl Inputs {
         tracker: Tracker,
         listen: Option<Listen>,
     ) -> Result<Self, ViewError> {
+        let pads = Pads::start(bell.clone());
         let mut inputs = Self {
             link,
             bell,
@@ -57,6 +62,8 @@ impl Inputs {
             }),
             report: None,
             refused: None,
+            pads,
+            word: Word::default(),
             path: "trajectory.csv".to_owned(),
             problem: None,
             due: None,
@@ -138,6 +145,7 @@ impl Inputs {
     pub(super) fn look(&mut self, model: &mut Model) -> bool {
         // First, so that what comes from now on is looked at again.
         self.bell.answer();
+        self.word = self.pads.take();
         self.report = self.link.report();
         self.due = self.next();
         let Some(report) = &self.report else {

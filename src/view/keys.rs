@@ -7,7 +7,8 @@ use egui::{Event, Key, Modifiers};
 use super::files::Purpose;
 use super::model::calipers::Kind;
 use super::model::sheet::Tool;
-use super::model::{Axis, Model, STEP, Source};
+use super::model::{Axis, Model, Press, STEP, Source};
+use super::pads::{self, Word};
 use super::state::State;
 use super::{catalogue, mmode};
 
@@ -247,6 +248,27 @@ fn action(key: Key, modifiers: Modifiers) -> Option<Action> {
     let bindings = BINDINGS.iter().flat_map(|(_, bindings, _)| *bindings);
     let mut found = bindings.filter(|b| b.0 == key && b.1 == modifiers.command);
     found.next().map(|b| b.2)
+}
+
+/// What a game pad has to say: the probe goes on, and buttons do what keys do.
+pub(super) fn apply_pads(word: &Word, model: &mut Model, state: &mut State, now: Instant) {
+    for (axis, amount) in pads::steps(word.travel) {
+        model.move_by(Source::Pad, axis, amount, now);
+    }
+    for press in &word.presses {
+        let action = match *press {
+            Press::Freeze => Action::Freeze,
+            Press::Play => Action::Play,
+            Press::Record => Action::Record,
+            Press::Gain(by) => Action::Gain(by),
+            Press::Depth(by) => Action::Depth(by),
+            Press::Home => {
+                model.place_probe(Source::Pad, model.home, now);
+                continue;
+            }
+        };
+        carry_out(action, Modifiers::NONE, model, state, now);
+    }
 }
 
 fn carry_out(

@@ -9,6 +9,7 @@ mod devices;
 mod entries;
 mod history;
 pub mod mmode;
+mod pad;
 mod palette;
 mod pose;
 mod saving;
@@ -31,6 +32,7 @@ pub use clock::Clock;
 pub use devices::{Devices, Source};
 use history::History;
 use mmode::Strip;
+pub use pad::{Control, Pad, Press};
 pub use palette::Show;
 pub use pose::{Axis, STEP, moved};
 pub use saving::File;
@@ -169,8 +171,13 @@ impl Model {
 
     /// Moves the probe along or about one of its axes, by mm or radians: a key was pressed.
     pub fn move_probe(&mut self, axis: Axis, amount: f64, now: Instant) {
+        self.move_by(Source::Keyboard, axis, amount, now);
+    }
+
+    /// The same by another device that shifts and turns.
+    pub fn move_by(&mut self, source: Source, axis: Axis, amount: f64, now: Instant) {
         self.stop(now);
-        self.place_probe(Source::Keyboard, moved(&self.pose, axis, amount), now);
+        self.place_probe(source, moved(&self.pose, axis, amount), now);
     }
 
     /// Puts the probe somewhere: a device other than the tracker has moved it.

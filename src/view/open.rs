@@ -487,6 +487,8 @@ impl Open {
         if self.state.inputs.look(&mut self.model) {
             self.session.engine.send_again();
         }
+        let word = self.state.inputs.word.clone();
+        keys::apply_pads(&word, &mut self.model, &mut self.state, Instant::now());
     }
 
     /// The user wants to leave.

@@ -29,6 +29,24 @@ pub(super) struct Word {
     pub(super) presses: Vec<Press>,
 }
 
+impl Word {
+    /// The probe has gone on for `step` as `pad` was held.
+    fn go(&mut self, pad: &Pad, step: Duration) {
+        let seconds = step.min(STEP).as_secs_f64();
+        for (travel, speed) in self.travel.iter_mut().zip(pad.speeds()) {
+            *travel += speed * seconds;
+        }
+    }
+
+    /// Takes a control's new state over into `pad`.
+    fn hear(&mut self, pad: &mut Pad, control: Control) {
+        let press = pad.set(control);
+        if self.presses.len() < PRESSES {
+            self.presses.extend(press);
+        }
+    }
+}
+
 /// The pads of this machine.
 pub(super) struct Pads(Arc<Mutex<Word>>);
 
@@ -87,14 +105,12 @@ impl Listener {
             let moves = pads.values().any(Pad::moves);
             let event = gilrs.next_event_blocking(moves.then_some(TICK));
             let now = Instant::now();
-            let step = (now - last).min(STEP).as_secs_f64();
+            let step = now - last;
             last = now;
             let mut word = lock(&self.word);
             // At the speeds that were held until this event.
-            for speeds in pads.values().map(Pad::speeds) {
-                for (travel, speed) in word.travel.iter_mut().zip(speeds) {
-                    *travel += speed * step;
-                }
+            for pad in pads.values() {
+                word.go(pad, step);
             }
             let Some(event) = event else {
                 drop(word);
@@ -106,16 +122,10 @@ impl Listener {
             if event.event == EventType::Disconnected {
                 pads.remove(&event.id);
             } else if let Some(control) = Control::of(&event.event) {
-                let press = pads.entry(event.id).or_default().set(control);
-                if word.presses.len() < PRESSES {
-                    word.presses.extend(press);
-                }
+                word.hear(pads.entry(event.id).or_default(), control);
             }
             drop(word);
-            if matches!(
-                event.event,
-                EventType::Connected | EventType::Disconnected
-            ) {
+            if matches!(event.event, EventType::Connected | EventType::Disconnected) {
                 self.names(&gilrs);
             }
             self.bell.ring();
@@ -173,4 +183,42 @@ fn unreadable() -> Option<String> {
 pub(super) fn steps(travel: [f64; 6]) -> impl Iterator<Item = (Axis, f64)> {
     let all = Axis::ALL.into_iter().zip(travel);
     all.filter(|(_, amount)| *amount != 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use gilrs::{Axis as Stick, Button};
+
+    use super::{PRESSES, Word, steps};
+    use crate::view::model::{Axis, Control, Pad, Press};
+
+    #[test]
+    fn a_stick_that_is_held_moves_the_probe_as_long_as_that() {
+        let (mut word, mut pad) = (Word::default(), Pad::default());
+        word.go(&pad, Duration::from_millis(40));
+        assert_eq!(steps(word.travel).count(), 0);
+        word.hear(&mut pad, Control::Stick(Stick::LeftStickX, -1.0));
+        for _ in 0..10 {
+            word.go(&pad, Duration::from_millis(16));
+        }
+        // A thread that could not run for a second.
+        word.go(&pad, Duration::from_secs(1));
+        let gone: Vec<(Axis, f64)> = steps(word.travel).collect();
+        let [(Axis::Lateral, mm)] = gone[..] else {
+            panic!("{gone:?}")
+        };
+        // 30 mm/s for 160 ms, and for the 50 ms that a step stands for at most.
+        assert!((mm + 30.0 * 0.21).abs() < 1e-9, "{mm}");
+    }
+
+    #[test]
+    fn presses_wait_for_the_window_and_not_without_end() {
+        let (mut word, mut pad) = (Word::default(), Pad::default());
+        for value in [1.0, 0.0].repeat(2 * PRESSES) {
+            word.hear(&mut pad, Control::Button(Button::South, value));
+        }
+        assert_eq!(word.presses, [Press::Freeze; PRESSES]);
+    }
 }

@@ -9,6 +9,7 @@ use crate::igtl::{OPEN, Tracked};
 use crate::view::inputs::Inputs;
 use crate::view::link::Report;
 use crate::view::model::{Model, Source, age};
+use crate::view::pads::Word;
 use crate::view::style;
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Instant) {
@@ -16,6 +17,9 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Ins
     grid(ui, "devices", |ui| {
         device(ui, "Keyboard", holder == Some(Source::Keyboard), |ui| {
             ui.label("arrows, A D W S Q E: see Keys (?)");
+        });
+        device(ui, "Game pad", holder == Some(Source::Pad), |ui| {
+            pad(ui, &inputs.word);
         });
         device(ui, "Replay", holder == Some(Source::Replay), |ui| {
             ui.label(replay(model, now));
@@ -42,6 +46,18 @@ fn device(ui: &mut Ui, name: &str, holds: bool, state: impl FnOnce(&mut Ui)) {
     ui.label(mark).on_hover_text(tip);
     ui.horizontal_wrapped(state);
     ui.end_row();
+}
+
+fn pad(ui: &mut Ui, word: &Word) {
+    let tip = "Left stick: slide. Right stick: rotate and tilt, with L1 held rock and tilt. R2, L2: press, \
+               lift. R1 held: a quarter of the speed. Cross of buttons: gain, depth. A: freeze, B: play, \
+               X: record, Y: home.";
+    match (&word.problem, word.names.as_slice()) {
+        (Some(problem), _) => ui.label(RichText::new(problem).color(style::FAINT)),
+        (None, []) => ui.label("none"),
+        (None, names) => ui.label(names.join(", ")),
+    }
+    .on_hover_text(tip);
 }
 
 fn tracker(ui: &mut Ui, report: Option<&Report>) {

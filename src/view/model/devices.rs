@@ -14,6 +14,8 @@ pub enum Source {
     Keyboard,
     /// The mouse, in the window.
     Pointer,
+    /// A game pad.
+    Pad,
     /// A trajectory that is replayed.
     Replay,
     /// A tool that an OpenIGTLink client reports.
@@ -26,6 +28,7 @@ impl Source {
         match self {
             Self::Keyboard => "keyboard",
             Self::Pointer => "mouse",
+            Self::Pad => "game pad",
             Self::Replay => "replay",
             Self::Tracker => "tracker",
         }
