@@ -1,6 +1,7 @@
 //! Measurements and texts on the image: the pointer, the drawing, the table of results.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use egui::{
     Align2, Area, Color32, Event, FontId, Grid, Id, Key, Order, Painter, PointerButton, Pos2, Rect,
@@ -91,7 +92,13 @@ fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: R
                 ..
             } => match pressed {
                 true if over && room.contains(pos) => {
-                    sheet.press(place.mm(pos), reach, frame.moment());
+                    let at = place.mm(pos);
+                    match note_at(ui, sheet, place, pos) {
+                        Some(mark) if sheet.near(at, reach).is_none() && !sheet.is_drawing() => {
+                            sheet.hold((mark, 0), at);
+                        }
+                        _ => sheet.press(at, reach, frame.moment()),
+                    }
                 }
                 true => {}
                 false => sheet.release(place.mm(pos), reach),
@@ -114,6 +121,22 @@ fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: R
         };
         ui.set_cursor_icon(cursor);
     }
+}
+
+/// The note whose text is at a place of the screen.
+fn note_at(ui: &Ui, sheet: &Sheet, place: &Place, at: Pos2) -> Option<usize> {
+    let is_meant = |what: &What| match what {
+        What::Note(note) => {
+            let galley = laid_out(ui.painter(), &note.text, Color32::WHITE);
+            let left = to_screen(place, note.at);
+            Align2::LEFT_CENTER
+                .anchor_size(left, galley.size())
+                .expand(4.0)
+                .contains(at)
+        }
+        What::Caliper(_) => false,
+    };
+    sheet.marks().iter().rposition(|mark| is_meant(&mark.what))
 }
 
 /// What is being drawn, with what it measures so far beside the pointer.
@@ -198,10 +221,13 @@ fn letter(painter: &Painter, at: Pos2, letter: char, colour: Color32) {
     painter.text(at, Align2::RIGHT_BOTTOM, letter, font, colour);
 }
 
+fn laid_out(painter: &Painter, text: &str, colour: Color32) -> Arc<egui::Galley> {
+    painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), colour)
+}
+
 /// A text on a dark ground.
 fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
-    let font = FontId::proportional(13.0);
-    let galley = painter.layout_no_wrap(text.to_owned(), font, colour);
+    let galley = laid_out(painter, text, colour);
     let room = Align2::LEFT_CENTER.anchor_size(at, galley.size());
     painter.rect_filled(
         room.expand2(vec2(4.0, 1.0)),

@@ -232,3 +232,48 @@ impl Drop for Captures {
         self.wait();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+    use std::time::Duration;
+
+    use super::{Captures, Progress};
+
+    /// Works until it is cancelled.
+    fn endless(progress: &Progress) -> super::Outcome {
+        while !progress.is_cancelled() {
+            progress.done.fetch_add(1, Ordering::Relaxed);
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        Ok(None)
+    }
+
+    #[test]
+    fn captures_run_aside_are_cancelled_and_come_to_an_end() {
+        let woken = Arc::new(AtomicU32::new(0));
+        let counter = woken.clone();
+        let mut captures = Captures::new(move || drop(counter.fetch_add(1, Ordering::Relaxed)));
+        captures.begin(1000, endless);
+        captures.begin(1, |_| Ok(Some(PathBuf::from("a.png"))));
+        let first = captures.running().next().expect("it runs").clone();
+        while first.count()[0] == 0 {
+            std::thread::yield_now();
+        }
+        assert_eq!(first.count()[1], 1000);
+        first.cancel();
+        captures.wait();
+        assert_eq!(
+            (captures.running().count(), woken.load(Ordering::Relaxed)),
+            (0, 2)
+        );
+        let mut files: Vec<_> = (captures.finished().into_iter())
+            .map(|outcome| outcome.expect("nothing fails"))
+            .collect();
+        files.sort();
+        assert_eq!(files, [None, Some(PathBuf::from("a.png"))]);
+        assert!(captures.finished().is_empty(), "each is told once");
+    }
+}

@@ -72,7 +72,8 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
         }
         let (cursor, last) = (cine.cursor(), cine.len() - 1);
         let back = cine.time_between(cursor, last).as_secs_f64();
-        let text = format!("{} / {}   {:+.2} s", cursor + 1, cine.len(), -back);
+        // Zero has no sign.
+        let text = format!("{} / {}   {:.2} s", cursor + 1, cine.len(), 0.0 - back);
         // As wide as it gets, so that the track stands still.
         ui.add_sized(vec2(118.0, 18.0), egui::Label::new(text))
             .on_hover_text("Image of the loop; time before the newest");

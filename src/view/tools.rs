@@ -145,13 +145,15 @@ impl Tools {
 
     /// Saves what is wanted. `marked` is the picture of the window around the image.
     pub(super) fn save(&mut self, model: &Model, marked: Option<Shot>) {
-        let (wanted, stem) = (self.due.take(), sidecar::stem(&model.title));
+        let Some(wanted) = self.due.take() else {
+            return;
+        };
         let Some(frame) = self.cine.shown().cloned() else {
             return;
         };
-        let folder = self.folder.clone();
+        let (folder, stem) = (self.folder.clone(), sidecar::stem(&model.title));
         match wanted {
-            Some(Wanted::Still) => {
+            Wanted::Still => {
                 let mut sidecar = self.about(model, &frame);
                 sidecar.extend(settings(model, &frame, Some(&frame.pose)));
                 sidecar.extend(sidecar::marks(self.sheet.marks(), &frame.moment()));
@@ -162,11 +164,10 @@ impl Tools {
                 };
                 self.captures.still(folder, stem, still);
             }
-            Some(Wanted::Clip) => {
+            Wanted::Clip => {
                 let clip = self.marked_loop(model, &frame);
                 self.captures.clip(folder, stem, clip);
             }
-            None => {}
         }
     }
 

@@ -93,8 +93,8 @@ pub struct Sheet {
     /// Where the pointer was last, mm.
     pointer: DVec2,
     selected: Option<Handle>,
-    /// The selected point follows the pointer.
-    held: bool,
+    /// How far the selected point is from the pointer that it follows, mm.
+    held: Option<DVec2>,
     editing: Option<usize>,
 }
 
@@ -128,6 +128,11 @@ impl Sheet {
         Some(draft)
     }
 
+    /// Whether something is being drawn.
+    pub fn is_drawing(&self) -> bool {
+        self.draft.is_some()
+    }
+
     /// The point that keys move.
     pub fn selected(&self) -> Option<Handle> {
         self.selected
@@ -147,7 +152,15 @@ impl Sheet {
 
     /// Selects nothing.
     pub fn deselect(&mut self) {
-        (self.selected, self.held) = (None, false);
+        (self.selected, self.held) = (None, None);
+    }
+
+    /// Takes a point with the pointer at a place, mm: both move alike from here on.
+    pub fn hold(&mut self, handle: Handle, at: DVec2) {
+        let (mark, point) = handle;
+        self.stop_editing();
+        self.selected = Some(handle);
+        self.held = Some(self.marks[mark].points()[point] - at);
     }
 
     /// The button went down at a place, mm; what lies within `reach` mm of it is meant.
@@ -157,9 +170,10 @@ impl Sheet {
         if self.draft.is_some() {
             return self.add(at);
         }
-        self.selected = self.near(at, reach);
-        self.held = self.selected.is_some();
-        if let (None, Some(tool)) = (self.selected, self.tool) {
+        self.deselect();
+        if let Some(handle) = self.near(at, reach) {
+            self.hold(handle, at);
+        } else if let Some(tool) = self.tool {
             let points = vec![at];
             self.draft = Some(Draft { tool, points, of });
         }
@@ -168,8 +182,8 @@ impl Sheet {
     /// The pointer is elsewhere now, mm.
     pub fn motion(&mut self, at: DVec2) {
         self.pointer = at;
-        if let (true, Some((mark, point))) = (self.held, self.selected) {
-            self.marks[mark].drag(point, at);
+        if let (Some(apart), Some((mark, point))) = (self.held, self.selected) {
+            self.marks[mark].drag(point, at + apart);
         }
     }
 
@@ -177,7 +191,7 @@ impl Sheet {
     /// than `reach` mm.
     pub fn release(&mut self, at: DVec2, reach: f64) {
         self.motion(at);
-        self.held = false;
+        self.held = None;
         let Some(draft) = &self.draft else { return };
         let last = *draft.points.last().expect("the first point made it");
         if draft.tool == Tool::Note || last.distance(at) > reach {
@@ -259,7 +273,7 @@ impl Sheet {
 
     /// Removes a mark.
     pub fn remove(&mut self, mark: usize) {
-        (self.selected, self.editing, self.held) = (None, None, false);
+        (self.selected, self.editing, self.held) = (None, None, None);
         self.marks.remove(mark);
     }
 
@@ -388,11 +402,15 @@ mod tests {
         drag(&mut sheet, [0.0, 10.0], [20.0, 10.0]);
         drag(&mut sheet, [0.0, 30.0], [20.0, 30.0]);
         // Near an end it is taken, though a tool is in the hand.
-        drag(&mut sheet, [20.3, 10.4], [25.0, 10.0]);
-        assert_eq!((sheet.marks().len(), distance(&sheet, 0)), (2, 25.0));
+        drag(&mut sheet, [20.3, 10.4], [25.3, 10.4]);
+        assert_eq!(sheet.marks().len(), 2);
+        assert!((distance(&sheet, 0) - 25.0).abs() < 1e-12);
         assert_eq!(sheet.selected(), Some((0, 1)));
+        // Taken and let go where it is, it stays.
+        click(&mut sheet, 25.6, 9.8);
+        assert!((distance(&sheet, 0) - 25.0).abs() < 1e-12);
         assert!(sheet.nudge(dvec2(-0.5, 0.0)));
-        assert_eq!(distance(&sheet, 0), 24.5);
+        assert!((distance(&sheet, 0) - 24.5).abs() < 1e-12);
         assert!(sheet.delete() && !sheet.delete());
         assert_eq!((sheet.marks().len(), distance(&sheet, 0)), (1, 20.0));
         drag(&mut sheet, [50.0, 10.0], [60.0, 10.0]);
