@@ -14,6 +14,9 @@ use super::state::State;
 use super::statistics::Times;
 use super::{calipers, cine, files, keys, mmode, notice, saved, strip, style, survey, timing};
 
+/// Room that the toggles and the loop want beside each other, points.
+const BAR: f32 = 760.0;
+
 /// Where pictures belong.
 #[derive(Default)]
 pub(super) struct Places {
@@ -39,15 +42,22 @@ pub(super) fn show(
             .exact_size(console::WIDTH)
             .show(ui, |ui| console::show(ui, model, state, now));
     }
+    // Below each other where there is no room beside each other.
+    let rows = if ui.available_width() < BAR { 2 } else { 1 };
     Panel::bottom("bar")
         .resizable(false)
-        .exact_size(cine::HEIGHT)
-        .show(ui, |ui| {
-            ui.horizontal_centered(|ui| {
+        .exact_size(cine::HEIGHT * rows as f32)
+        .show(ui, |ui| match rows {
+            1 => drop(ui.horizontal_centered(|ui| {
                 toggles(ui, model, state, now);
                 ui.separator();
                 cine::show(ui, model, &mut state.tools, now);
-            });
+            })),
+            _ => {
+                ui.add_space(6.0);
+                ui.horizontal(|ui| toggles(ui, model, state, now));
+                ui.horizontal(|ui| cine::show(ui, model, &mut state.tools, now));
+            }
         });
     if state.timing {
         Panel::bottom("timing")

@@ -11,8 +11,10 @@ use super::model::calipers::Kind;
 use super::model::sheet::Tool;
 use super::tools::Tools;
 
-/// Height of a button with the gap below it, points.
-const PITCH: f32 = 30.0;
+/// Height of a button with the gap below it, points; where there is little room, and else.
+const PITCH: [f32; 2] = [26.0, 30.0];
+/// Height that is little room, points.
+const LITTLE: f32 = 420.0;
 
 /// Draws a sign into its room with a colour.
 type Icon = fn(&Painter, Rect, Color32);
@@ -85,11 +87,12 @@ fn film(p: &Painter, r: Rect, c: Color32) {
 pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
     let area = ui.max_rect();
     let has_marks = !tools.sheet.marks().is_empty();
-    let height = PITCH * (TOOLS.len() as f32 + 3.0) + 6.0;
+    let pitch = PITCH[usize::from(area.height() > LITTLE)];
+    let height = pitch * (TOOLS.len() as f32 + 3.0) + 6.0;
     let mut at = pos2(area.left() + 8.0, area.bottom() - 8.0 - height);
     let mut next = |gap: f32| {
-        let rect = Rect::from_min_size(at, vec2(30.0, 28.0));
-        at.y += PITCH + gap;
+        let rect = Rect::from_min_size(at, vec2(30.0, pitch - 2.0));
+        at.y += pitch + gap;
         rect
     };
     for (tool, tip, icon) in TOOLS {

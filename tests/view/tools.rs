@@ -320,6 +320,14 @@ fn measures_the_phantom(scale: f64) {
     desk.press(Key::Letter('o'));
     desk.drag(at(-65.0, 78.0), at(-55.0, 78.0));
     desk.click(at(-60.0, 83.0));
+    // A text; its letters are keys of the console and others, which do nothing meanwhile.
+    desk.press(Key::Letter('n'));
+    desk.drag(at(-60.0, 78.0), at(-45.0, 110.0));
+    desk.settle(picture);
+    for letter in "cyst".chars() {
+        desk.press(Key::Letter(letter));
+    }
+    desk.press(Key::Enter);
     desk.settle(picture);
     desk.press(Key::F2);
     let said = sidecar(&mut desk, &captures, "general-purpose-phantom-0001.json");
@@ -350,8 +358,13 @@ fn measures_the_phantom(scale: f64) {
     let slack = 4.0 * 0.71 / (10.0 * mm);
     println!("scale {scale}, angle {angle:.2}, area {area:.2} of {circle:.2} mm2");
     assert!((area / circle - 1.0).abs() < slack, "{area} {circle}");
+    assert_eq!(said["texts"][0]["text"], "cyst");
+    let tip = &said["texts"][0]["arrow_mm"];
+    let [x, z] = [0, 1].map(|axis| tip[axis].as_f64().expect("a number"));
+    assert!((x + 60.0).hypot(z - 78.0) < 1.0, "{tip}");
     let marked = image::open(captures.join("general-purpose-phantom-0001-marked.png"));
     assert!(marked.expect("with its marks").width() > 600);
+    assert_eq!(said["set"]["probe.pose.position"], "[0, 0, 0]");
     desk.quit();
 }
 
