@@ -76,8 +76,8 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
         difference(&d.grab(IMAGE), &shown[0]) > 0.5
     });
 
-    // The track of the bar: its left end is the first image again.
-    desk.click((411, 702));
+    // The track of the bar: beyond its left end is the first image again.
+    desk.drag((560, 702), (300, 702));
     desk.wait_for("the first by the pointer", |d| d.grab(IMAGE) == shown[0]);
 
     // What is saved is what is shown: the first picture, which `render` makes as well.
