@@ -15,7 +15,7 @@ use super::tools::Tools;
 /// Height of the bar, points.
 pub(super) const HEIGHT: f32 = 36.0;
 /// Room that speed and marks want beside the track, points.
-const WIDE: f32 = 560.0;
+const WIDE: f32 = 440.0;
 /// How fast a loop can be played.
 const SPEEDS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 
