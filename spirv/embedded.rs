@@ -27,6 +27,7 @@
     ("shadow_query", include_bytes!("shadow_query.spv")),
     ("survey_bvh", include_bytes!("survey_bvh.spv")),
     ("survey_query", include_bytes!("survey_query.spv")),
+    ("tint", include_bytes!("tint.spv")),
     ("trace_bvh", include_bytes!("trace_bvh.spv")),
     ("trace_count", include_bytes!("trace_count.spv")),
     ("trace_query", include_bytes!("trace_query.spv")),

@@ -23,6 +23,7 @@ mod notice;
 mod open;
 mod opening;
 mod pads;
+mod real;
 mod ring;
 mod saved;
 mod session;
@@ -61,6 +62,8 @@ pub struct Options {
     pub library: Arc<Library>,
     /// Time of the scene at the start, s.
     pub seconds: f64,
+    /// Size of the interface, 1 as the display asks for it.
+    pub scale: f32,
     /// Writes the window's picture into this file (PNG) once it shows an image, and ends.
     pub screenshot: Option<PathBuf>,
     /// Writes the timings into this file at the end.
@@ -112,6 +115,12 @@ pub enum ViewError {
         #[from]
         error: IgtlError,
     },
+    /// The device was lost a second time in a short while.
+    #[error(
+        "{0}; it had been lost a moment before, so it was not opened again: lower the quality \
+         (--quality draft), choose another --device, or install a newer driver"
+    )]
+    LostAgain(Box<ViewError>),
     /// A file that was asked for.
     #[error("writing {}: {reason}", file.display())]
     Unwritten {

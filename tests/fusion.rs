@@ -7,10 +7,11 @@ use std::path::Path;
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use insonify::gpu::{Device, Kernel, test_device};
+use insonify::gpu::{Device, Image, ImageDim, ImageFormat, Kernel, test_device};
 use insonify::harness::{self, Case, SUBJECTS, Size};
 use insonify::scene::{Acquired, Scene, SceneError};
 use insonify::sim::dump;
+use insonify::sim::fusion::Tint;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::volume::Voxels;
@@ -464,5 +465,62 @@ fn a_bone_throws_its_shadow_into_a_real_acquired_volume() {
     let beside = (0..clear.len()).filter(|at| (at % width).abs_diff(width / 2) > 80);
     for at in beside {
         assert_eq!(dark[at].to_bits(), clear[at].to_bits(), "{at}");
+    }
+}
+
+#[test]
+fn the_tint_marks_the_acquired_pixels_and_leaves_the_image_alone() {
+    let device = test_device();
+    let tint = Tint {
+        colour: [255, 0, 128],
+        opacity: 1.0,
+    };
+    for (settings, is_hard) in [
+        ("blur = 1\n", true),
+        ("blur = 9\n", false),
+        ("blur = 9\nblend = \"smooth\"\n", false),
+        ("blur = 9\nblend = \"multiband\"\n", true),
+    ] {
+        let scene = load(&format!("{FUSED}{settings}")).expect("sound");
+        let library = Library::embedded();
+        let mut simulator = Simulator::new(&device, &library, &scene, Tracer::Bvh).unwrap();
+        simulator.frame(&scene, 0).unwrap();
+        let plain = simulator.pixels().unwrap();
+        assert_eq!(simulator.tinted_pixels().unwrap(), None, "nobody asked");
+        let (dim, format) = (ImageDim::D2, ImageFormat::Rgba8Unorm);
+        let extent = [plain.0, plain.1, 1];
+        let image = Image::new(&device, "tinted", dim, extent, format).unwrap();
+        simulator.tint_on(Some((image.clone(), tint)));
+        simulator.frame(&scene, 0).unwrap();
+        assert!(simulator.pixels().unwrap() == plain, "{settings}");
+        let tinted = simulator.tinted_pixels().unwrap().expect("asked for");
+        assert!(device.read_back_image(&image).unwrap() == tinted);
+        let steps = simulator.fusion_steps().unwrap().expect("fused");
+        let (mut acquired, mut simulated, mut mixed) = (0, 0, 0);
+        let pixels = plain.2.chunks_exact(4).zip(tinted.chunks_exact(4));
+        for ((plain, tinted), share) in pixels.zip(&steps.blurred) {
+            match *share {
+                _ if plain[3] == 0 => assert_eq!(tinted, plain, "outside the sector"),
+                0.0 => {
+                    assert_eq!(tinted, plain);
+                    simulated += 1;
+                }
+                1.0 => {
+                    assert_eq!(tinted, [255, 0, 128, 255]);
+                    acquired += 1;
+                }
+                _ => {
+                    assert!(tinted[0] >= plain[0] && tinted[1] <= plain[1]);
+                    mixed += 1;
+                }
+            }
+        }
+        assert!(acquired > 1000 && simulated > 1000, "{settings}");
+        // A hard mask is mixed only where its border passes between two samples.
+        assert_eq!(mixed > 2000, !is_hard, "{settings}: {mixed}");
+        // Another frame without it is the same again.
+        simulator.tint_on(None);
+        simulator.frame(&scene, 0).unwrap();
+        assert!(simulator.pixels().unwrap() == plain);
     }
 }

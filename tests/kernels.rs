@@ -85,5 +85,6 @@ subjects!(
     reduce,
     collapse,
     fuse,
-    survey
+    survey,
+    tint
 );

@@ -32,6 +32,10 @@ pub struct View {
     /// Address of this machine to listen at; 0.0.0.0 lets other machines in.
     #[arg(long, value_name = "ADDR", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST), requires = "igtl_port")]
     igtl_bind: IpAddr,
+    /// Size of texts and controls, 0.5 to 3; 1 is what the display asks for. Ctrl+Plus and Ctrl+Minus
+    /// change it.
+    #[arg(long, default_value = "1", value_parser = scale)]
+    scale: f32,
     /// Writes the window's picture (PNG) once it shows an image, and ends.
     #[arg(long, value_name = "FILE")]
     screenshot: Option<PathBuf>,
@@ -41,6 +45,14 @@ pub struct View {
     /// Writes the timings of the last frames as one JSON object at the end.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+}
+
+fn scale(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    match (0.5..=3.0).contains(&value) {
+        true => Ok(value),
+        false => Err("it must lie between 0.5 and 3".into()),
+    }
 }
 
 /// Runs the command.
@@ -57,6 +69,7 @@ pub fn run(args: &View) -> Result<()> {
         device: common.device_options(),
         library: Arc::new(Library::embedded()),
         seconds: common.time,
+        scale: args.scale,
         screenshot: args.screenshot.clone(),
         json: args.json.clone(),
         trajectory: trajectory(args)?,

@@ -28,6 +28,7 @@ mod run;
 mod scatter;
 mod shadow;
 mod survey;
+mod tint;
 mod trace;
 mod worlds;
 
@@ -222,7 +223,7 @@ pub struct Subject {
 }
 
 /// Every kernel, in the order of a frame after the two that only tests use.
-pub const SUBJECTS: [Subject; 21] = [
+pub const SUBJECTS: [Subject; 22] = [
     geometry::SUBJECT,
     rays::SUBJECT,
     interpolate::SUBJECT,
@@ -244,4 +245,5 @@ pub const SUBJECTS: [Subject; 21] = [
     collapse::SUBJECT,
     fuse::SUBJECT,
     survey::SUBJECT,
+    tint::SUBJECT,
 ];

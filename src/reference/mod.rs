@@ -34,6 +34,7 @@ pub mod shadow;
 pub mod stack;
 pub mod survey;
 pub mod texture;
+pub mod tint;
 pub mod trace;
 pub mod way;
 pub mod world;

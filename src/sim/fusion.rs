@@ -14,13 +14,16 @@ use crate::scene::{Acquired, Fusion, Scene};
 use bands::{Bands, Images};
 use shadows::Shadows;
 use texture::Texture;
+use tint::Tinting;
 
 pub use steps::Steps;
+pub use tint::Tint;
 
 mod bands;
 mod shadows;
 mod steps;
 mod texture;
+mod tint;
 
 /// Everything of which a frame without fusion has no need.
 pub(super) struct Fused {
@@ -29,6 +32,7 @@ pub(super) struct Fused {
     kernels: Kernels,
     shadows: Shadows,
     bands: Bands,
+    tinting: Tinting,
     /// Whether the last frame was blended by bands.
     banded: bool,
     /// The frame's [`layout::Fusion`].
@@ -99,6 +103,7 @@ impl Fused {
             kernels: Kernels::new(device, library, tracer)?,
             shadows: Shadows::new(device, library, frame, tracer)?,
             bands: Bands::new(device, library, pixels)?,
+            tinting: Tinting::new(device, library, pixels)?,
             banded: false,
             constants: new("fusion", size_of::<layout::Fusion>() as u64)?,
             prescan: new("prescan", 8 * samples)?,
@@ -119,10 +124,17 @@ impl Fused {
     ) -> Result<(), GpuError> {
         let kernels = Kernels::new(device, library, tracer)?;
         let shadows = shadows::Kernels::new(device, library, tracer)?;
+        let tint = Tinting::kernel(device, library)?;
         self.bands.kernels = bands::Kernels::new(device, library)?;
+        self.tinting.kernel = tint;
         self.shadows.kernels = shadows;
         self.kernels = kernels;
         Ok(())
+    }
+
+    /// Device memory of the volume, bytes.
+    pub(super) fn volume_bytes(&self) -> u64 {
+        self.texture.image.bytes()
     }
 
     /// What the user should know of the volume.

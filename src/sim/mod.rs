@@ -8,6 +8,7 @@ pub mod fields;
 pub mod fusion;
 pub mod layout;
 pub mod matching;
+pub mod memory;
 mod passes;
 pub mod placement;
 mod resize;
@@ -26,7 +27,8 @@ use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use contact::Touch;
-use fusion::Fused;
+use fusion::{Fused, Tint};
+pub use memory::Memory;
 use passes::{Passes, frame_constants};
 pub use resize::image_size;
 use shaders::Library;
@@ -62,6 +64,7 @@ pub struct Simulator {
     shown_on: Option<Image>,
     /// Once the anatomy was looked at.
     surveyor: Option<Surveyor>,
+    tinted_on: Option<(Image, Tint)>,
     update_time: Duration,
 }
 
@@ -117,6 +120,7 @@ impl Simulator {
             fused: false,
             shown_on: None,
             surveyor: None,
+            tinted_on: None,
             update_time: Duration::ZERO,
             passes: Passes {
                 kernels: Kernels::new(device, library, &world, false)?,
@@ -170,6 +174,10 @@ impl Simulator {
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
             cmd.copy_to_image(passes.pixels(self.fused), image)?;
+        }
+        if let (Some((image, tint)), true) = (&self.tinted_on, self.fused) {
+            let tinted = passes.tint(&mut cmd, tint)?;
+            cmd.copy_to_image(tinted, image)?;
         }
         cmd.submit()?;
         Ok(self.frames.take_timings())
@@ -235,9 +243,13 @@ impl Simulator {
         self.passes.touch
     }
 
-    /// Device memory of geometry and acceleration structures, bytes.
-    pub fn world_bytes(&self) -> u64 {
-        self.passes.world.bytes()
+    /// What the scene takes of the device's memory.
+    pub fn memory(&self) -> Memory {
+        let fusion = self.passes.fusion.as_ref();
+        Memory {
+            volume: fusion.map_or(0, Fused::volume_bytes),
+            ..self.passes.world.memory()
+        }
     }
 
     /// Waits for the frames in flight; their timings, oldest first.

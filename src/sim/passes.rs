@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::contact::{self, Coupling, Skins, Touch};
-use super::fusion::{Fused, Simulated};
+use super::fusion::{Fused, Simulated, Tint};
 use super::stages::{Batches, Buffers, Kernels, SCATTER_WINDOW, lines};
 use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
@@ -227,6 +227,13 @@ impl Passes {
         };
         fused.record(cmd, &self.world, fusion, &simulated)?;
         Ok(true)
+    }
+
+    /// Colours what of the mixed image is acquired.
+    pub(super) fn tint(&mut self, cmd: &mut Commands, tint: &Tint) -> Result<&Buffer, GpuError> {
+        let fused = self.fusion.as_mut().expect("the frame was fused");
+        let size = [self.frame.image_width, self.frame.image_height];
+        fused.tint(cmd, &self.buffers.frame, size, tint)
     }
 
     pub(super) fn display(&self, cmd: &mut Commands) -> Result<(), GpuError> {

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use super::bvh::BvhError;
 use super::fields::Fields;
 use super::layout;
+use super::memory::Memory;
 use super::shaders::Library;
 use super::tracer::Tracer;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
@@ -292,18 +293,16 @@ impl World {
         place.order.as_ref().map_or(index, |o| o[index] as usize)
     }
 
-    /// Device memory of geometry and structure, bytes.
-    pub fn bytes(&self) -> u64 {
+    /// Device memory of geometry, structures and fields.
+    pub fn memory(&self) -> Memory {
         let g = &self.geometry;
-        let buffers = [
-            &g.instances,
-            &g.vertices,
-            &g.normals,
-            &g.triangles,
-            &g.fields,
-        ];
-        let buffers: u64 = buffers.iter().map(|b| b.size()).sum();
-        buffers + self.top.bytes() + self.changing.bytes()
+        let buffers = [&g.instances, &g.vertices, &g.normals, &g.triangles];
+        Memory {
+            geometry: buffers.iter().map(|b| b.size()).sum(),
+            structures: self.top.bytes() + self.changing.bytes(),
+            fields: g.fields.size(),
+            volume: 0,
+        }
     }
 }
 

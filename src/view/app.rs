@@ -94,6 +94,10 @@ impl App {
                 | ViewError::Sim(SimError::Gpu(GpuError::DeviceLost { .. }))
         );
         let again = self.lost.is_some_and(|at| at.elapsed() < PATIENCE);
+        let error = match lost && again {
+            true => ViewError::LostAgain(Box::new(error)),
+            false => error,
+        };
         match self.open.take() {
             Some(open) if lost && !again => {
                 self.lost = Some(Instant::now());

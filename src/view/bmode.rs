@@ -5,8 +5,11 @@ use glam::{DVec2, dvec2};
 
 use super::engine::{Frame, Sector};
 use super::model::Model;
-use super::style;
+use super::{real, style};
 use crate::probe::Kind;
+
+/// Width below which the second line has no room for both sides, points.
+const NARROW: f32 = 440.0;
 
 /// Room around the image, points: left (grey bar), top (texts), right (ruler), bottom.
 const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
@@ -101,6 +104,7 @@ pub(super) fn show(ui: &mut Ui, frame: Option<&Frame>, model: &Model) -> Option<
     ruler(&painter, &place, frame);
     grey_bar(&painter, area, &place, frame);
     orientation(&painter, &place, frame);
+    real::legend(&painter, area, frame, model);
     Some(place)
 }
 
@@ -142,6 +146,10 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     let mut line = format!("{:.1} frames/s", 1e3 / frame.wall_ms.max(1e-3));
     if model.animated {
         line = format!("{:.2} s   {line}", frame.seconds);
+    }
+    // In a narrow window the probe's settings need the room.
+    if area.width() < NARROW {
+        return;
     }
     painter.text(
         at + vec2(0.0, 20.0),

@@ -4,6 +4,7 @@
 mod anatomy;
 mod animation;
 mod controls;
+mod fusion;
 mod image;
 mod input;
 mod probe;
@@ -36,14 +37,14 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             section(ui, "Probe input", false, |ui| {
                 input::show(ui, model, &mut state.inputs, now);
             });
-            let (settings, loaded) = (&mut model.settings, &model.loaded);
-            let lattice = model.file.lattice;
+            let (settings, lattice) = (&mut model.settings, model.file.lattice);
             section(ui, "Simulation", false, |ui| {
                 simulation::show(ui, settings, state, lattice)
             });
-            if let Some(fusion) = &mut settings.fusion {
-                section(ui, "Fusion", false, |ui| simulation::fusion(ui, fusion));
+            if settings.fusion.is_some() {
+                section(ui, "Fusion", false, |ui| fusion::show(ui, model, now));
             }
+            let (settings, loaded) = (&mut model.settings, &model.loaded);
             section(ui, "Tissues", false, |ui| {
                 anatomy::tissues(ui, settings, loaded, &mut state.tissue);
             });

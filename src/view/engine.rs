@@ -14,7 +14,7 @@ use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
 use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::sim::shaders::Library;
-use crate::sim::{SimError, Simulator, Tracer, image_size};
+use crate::sim::{Memory, SimError, Simulator, Tracer, image_size};
 
 /// Where the image lies in the probe's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -58,6 +58,8 @@ impl Pixels {
 pub struct Frame {
     /// The B-mode image; nobody writes it while there are clones.
     pub image: Image,
+    /// The same with its acquired pixels coloured, where that was asked for and there are some.
+    pub tinted: Option<Image>,
     /// Its pixels, where [`Order::reads_back`].
     pub pixels: Option<Arc<Pixels>>,
     /// Where it lies.
@@ -85,8 +87,10 @@ pub struct Frame {
     pub update_ms: f64,
     /// Memory of the device.
     pub memory: MemoryUse,
-    /// Of that, geometry and acceleration structures, bytes.
-    pub world_bytes: u64,
+    /// Of that, what the scene takes.
+    pub scene_memory: Memory,
+    /// Of that, images, those of the loop included, bytes.
+    pub image_bytes: u64,
 }
 
 /// Longest time for which moving the eye of the 3D view may put off the next image while time passes.
@@ -447,9 +451,15 @@ impl Worker {
         };
         let image = self.ring.free(image_size(scene))?;
         simulator.show_on(Some(image.clone()));
+        let tinted = match order.tint.filter(|_| scene.shows_volume()) {
+            Some(tint) => Some((self.ring.free(image_size(scene))?, tint)),
+            None => None,
+        };
+        simulator.tint_on(tinted.clone());
         simulator.frame(scene, index)?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         simulator.show_on(None);
+        simulator.tint_on(None);
         let pixels = match order.reads_back {
             true => {
                 let (width, height, rgba) = simulator.pixels()?;
@@ -474,6 +484,7 @@ impl Worker {
                 pitch: f64::from(constants.pixel_pitch),
             },
             image,
+            tinted: tinted.map(|(image, _)| image),
             probe: scene.probe.clone(),
             settings,
             pose,
@@ -485,7 +496,8 @@ impl Worker {
             wall_ms: began.elapsed().as_secs_f64() * 1e3,
             update_ms: simulator.update_time().as_secs_f64() * 1e3,
             memory: self.device.memory(),
-            world_bytes: simulator.world_bytes(),
+            scene_memory: simulator.memory(),
+            image_bytes: self.ring.bytes(),
         })
     }
 }

@@ -37,6 +37,7 @@ enum Action {
     Survey,
     Timing,
     Mmode,
+    Real,
     Help,
     Close,
     Quit,
@@ -185,14 +186,15 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "save settings (with Shift: as), load settings or a scene",
     ),
     (
-        "C V T M",
+        "C V T M B",
         &[
             (Key::C, false, Action::Console),
             (Key::V, false, Action::Survey),
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
+            (Key::B, false, Action::Real),
         ],
-        "console, 3D view, timings, M-mode",
+        "console, 3D view, timings, M-mode, which pixels are real",
     ),
     (
         "? Esc",
@@ -202,6 +204,12 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
             (Key::Escape, false, Action::Close),
         ],
         "this list; close it",
+    ),
+    // The interface does these itself.
+    (
+        "Ctrl+Plus Ctrl+Minus Ctrl+0",
+        &[],
+        "texts and controls larger, smaller, as usual",
     ),
     ("Ctrl+Q", &[(Key::Q, true, Action::Quit)], "quit"),
 ];
@@ -328,6 +336,10 @@ fn carry_out(
         Action::Survey => state.survey.open = !state.survey.open,
         Action::Timing => state.timing = !state.timing,
         Action::Mmode => mmode::toggle(model, now),
+        Action::Real => {
+            model.real.shown = !model.real.shown;
+            model.touch(now);
+        }
         Action::Help => state.help = !state.help,
         Action::Close if state.help => state.help = false,
         Action::Close => drop(state.tools.sheet.cancel()),

@@ -17,6 +17,9 @@ use super::{calipers, cine, files, keys, mmode, notice, saved, strip, style, sur
 /// Room that the toggles and the loop want beside each other, points.
 const BAR: f32 = 760.0;
 
+/// Least height that is left to the image beside a panel of timings, points.
+const LEAST_IMAGE: f32 = 200.0;
+
 /// Where pictures belong.
 #[derive(Default)]
 pub(super) struct Places {
@@ -59,11 +62,15 @@ pub(super) fn show(
                 ui.horizontal(|ui| cine::show(ui, model, &mut state.tools, now));
             }
         });
-    if state.timing {
+    // Where there is no room for both, the panel takes the image's place.
+    let alone = state.timing && ui.available_height() < timing::HEIGHT + LEAST_IMAGE;
+    if alone {
+        CentralPanel::default().show(ui, |ui| timing::show(ui, statistics, frame, model, state));
+    } else if state.timing {
         Panel::bottom("timing")
             .resizable(false)
             .exact_size(timing::HEIGHT)
-            .show(ui, |ui| timing::show(ui, statistics, frame, state));
+            .show(ui, |ui| timing::show(ui, statistics, frame, model, state));
     }
     if model.mmode.is_some() {
         Panel::bottom("mmode")
@@ -72,7 +79,7 @@ pub(super) fn show(
             .show(ui, |ui| mmode::show(ui, model, &mut state.mmode));
     }
     // Transparent: the pictures are below the interface.
-    let room = survey::width(ui.available_width()).filter(|_| state.survey.open);
+    let room = survey::width(ui.available_width()).filter(|_| state.survey.open && !alone);
     let survey = room.map(|width| {
         let panel = Panel::right("survey").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
@@ -83,6 +90,9 @@ pub(super) fn show(
     });
     let centre = CentralPanel::default().frame(Space::NONE);
     let place = centre.show(ui, |ui| {
+        if alone {
+            return None;
+        }
         let place = bmode::show(ui, frame, model);
         let sheet = &mut state.tools.sheet;
         if let (Some(place), Some(frame)) = (&place, frame) {

@@ -12,6 +12,7 @@ pub mod mmode;
 mod pad;
 mod palette;
 mod pose;
+pub mod real;
 mod saving;
 mod settings;
 pub mod sheet;
@@ -35,6 +36,7 @@ use mmode::Strip;
 pub use pad::{Control, Pad, Press};
 pub use palette::Show;
 pub use pose::{Axis, STEP, moved};
+use real::Real;
 pub use saving::File;
 pub use settings::Settings;
 pub use survey::{Shown, Survey};
@@ -45,6 +47,7 @@ use super::engine::Frame;
 use crate::scene::graph::NodeKind;
 use crate::scene::{Scene, animation};
 use crate::sim::Tracer;
+use crate::sim::fusion::Tint;
 
 /// The state of a session.
 pub struct Model {
@@ -76,6 +79,8 @@ pub struct Model {
     pub home: DAffine3,
     /// The scene file.
     pub file: File,
+    /// How acquired pixels are marked.
+    pub real: Real,
     history: History,
     revision: u64,
     opened: Instant,
@@ -91,6 +96,10 @@ pub struct Placed {
     pub tissue: usize,
     /// All its keyframes have the same triangles.
     pub shares_topology: bool,
+    /// Its shapes over time; 0 where it has one.
+    pub keyframes: usize,
+    /// Triangles of its shape.
+    pub triangles: usize,
     /// What says by which strategy the device follows it: the same for all that one selector switches.
     pub switch: Option<String>,
 }
@@ -100,6 +109,8 @@ pub struct Placed {
 pub struct Order {
     /// The console's settings.
     pub settings: Settings,
+    /// How acquired pixels are coloured in an image beside the other, if they are.
+    pub tint: Option<Tint>,
     /// World from probe, but for a replay.
     pose: DAffine3,
     /// The trajectory along which the probe goes.
@@ -156,12 +167,15 @@ impl Model {
                     name: i.name.clone(),
                     tissue: i.tissue,
                     shares_topology: scene.shares_topology(i),
+                    keyframes: i.keyframes.meshes.len(),
+                    triangles: scene.meshes[i.mesh].triangles.len(),
                     switch: scene.origins.instances.get(index).map(entries::switch),
                 })
                 .collect(),
             survey: Survey::new(scene),
             home: scene.world_from_probe,
             file,
+            real: Real::default(),
             history: History::default(),
             revision: 0,
             opened: now,
@@ -217,7 +231,10 @@ impl Model {
     pub fn note(&mut self, before: &Settings, now: Instant) {
         if *before != self.settings {
             self.unite(before);
-            self.history.push(before.clone(), now);
+            let (origins, lattice) = (&self.file.origins, self.file.lattice);
+            let changes = entries::changes(before, &self.settings, origins, lattice);
+            let paths = changes.into_iter().map(|(path, _)| path).collect();
+            self.history.push(before.clone(), paths, now);
             self.touch(now);
         }
     }
@@ -270,6 +287,7 @@ impl Model {
     pub fn order(&self) -> Order {
         Order {
             settings: self.settings.clone(),
+            tint: self.real.tint(),
             pose: self.pose,
             clock: self.clock,
             replay: self.ways.replay.clone(),

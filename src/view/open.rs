@@ -19,8 +19,9 @@ use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
 use super::statistics::{Sample, Times};
+use super::timing::{self, costs};
 use super::tools::{Tools, cropped};
-use super::{Model, Options, ViewError, keys, layout, style, survey};
+use super::{Model, Options, ViewError, keys, layout, real, style, survey};
 use crate::gpu::{AdapterKind, Device, GpuError, Interface, Painted, Placed, Shot, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
@@ -91,10 +92,12 @@ impl Plan {
     }
 }
 
-/// Input for a window on `device`. Textures of an interface before are gone with its device: this
+/// Input for a window on `device`, its interface `zoom` times as large as usual. Textures of an interface before are gone with its device: this
 /// one sends them again.
-fn interface(window: &Window, scale: f32, device: &Device) -> egui_winit::State {
+fn interface(window: &Window, zoom: f32, device: &Device) -> egui_winit::State {
     let context = egui::Context::default();
+    context.set_zoom_factor(zoom);
+    let scale = window.scale_factor() as f32;
     style::apply(&context);
     let root = egui::ViewportId::ROOT;
     let limit = device.limits().max_image_2d as usize;
@@ -131,6 +134,7 @@ impl Open {
             console: true,
             timing: false,
             survey: survey::State::default(),
+            times: timing::Page::default(),
             help: false,
             mmode: Default::default(),
             tissue: 0,
@@ -138,13 +142,14 @@ impl Open {
             machine,
             files: Files::default(),
             ray_query: device.supports_ray_query(),
+            heap: device.info().memory_bytes,
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
             tools: plan.tools(&device),
             inputs,
             quit: false,
         };
-        let input = interface(&window, window.scale_factor() as f32, &device);
+        let input = interface(&window, plan.options.scale, &device);
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
@@ -198,7 +203,7 @@ impl Open {
         // Its texture is gone with the device.
         state.mmode = Default::default();
         state.problem = Some(format!("{error}. It was opened again."));
-        let input = interface(&window, input.egui_ctx().pixels_per_point(), &device);
+        let input = interface(&window, input.egui_ctx().zoom_factor(), &device);
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
@@ -307,6 +312,7 @@ impl Open {
         (self.pictured, self.look) = (None, None);
         (self.state.tissue, self.state.mesh) = (0, 0);
         self.state.tools.lose();
+        self.state.tools.sheet = Default::default();
         self.state.mmode = Default::default();
         self.state.inputs.calibrate(scene.tracker.clone());
         plan.scene = scene;
@@ -370,7 +376,8 @@ impl Open {
         self.input.handle_platform_output(&self.window, platform);
         let scale = output.pixels_per_point;
         let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
-        let image = shown.as_ref().map(|frame| &frame.image);
+        let model = &self.model;
+        let image = shown.as_ref().map(|frame| real::image(frame, model));
         let survey = self.pictured.as_ref().map(|pictured| &pictured.image);
         let rects = [
             (image, places.image.as_ref().map(|place| place.rect)),
@@ -463,6 +470,7 @@ impl Open {
                 stages: frame.timings.passes.clone(),
                 wall: frame.wall_ms,
                 update: frame.update_ms,
+                strategy: costs::strategies(&frame.settings.strategies),
                 latency: frame.at.elapsed().as_secs_f64() * 1e3,
             });
         }

@@ -25,6 +25,11 @@ impl Ring {
         }
     }
 
+    /// All images, those that others keep included, bytes.
+    pub(super) fn bytes(&self) -> u64 {
+        self.images.iter().map(Image::bytes).sum()
+    }
+
     /// An image of `width` by `height` that nobody reads.
     pub(super) fn free(&mut self, [width, height]: [u32; 2]) -> Result<Image, GpuError> {
         let extent = [width, height, 1];

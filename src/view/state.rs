@@ -3,6 +3,7 @@
 use super::files::Files;
 use super::inputs::Inputs;
 use super::mmode;
+use super::timing;
 use super::tools::Tools;
 use crate::scene::settings::Machine;
 
@@ -14,6 +15,8 @@ pub(super) struct State {
     pub(super) timing: bool,
     /// The 3D view.
     pub(super) survey: super::survey::State,
+    /// What of the timing panel is shown.
+    pub(super) times: timing::Page,
     /// The list of keys is open.
     pub(super) help: bool,
     /// The M-mode strip.
@@ -26,6 +29,8 @@ pub(super) struct State {
     pub(super) machine: Machine,
     /// The device has ray queries.
     pub(super) ray_query: bool,
+    /// Size of the device's largest heap of its own, bytes.
+    pub(super) heap: u64,
     /// Name and driver of the device.
     pub(super) device: String,
     /// Saving, loading, opening.

@@ -18,6 +18,8 @@ pub(super) struct Sample {
     pub(super) wall: f64,
     /// What the processor took for acceleration structures.
     pub(super) update: f64,
+    /// How the device followed what changes its shape.
+    pub(super) strategy: String,
     /// From input to the screen.
     pub(super) latency: f64,
 }
@@ -79,6 +81,11 @@ impl Times {
         })
     }
 
+    /// The pictures, oldest first.
+    pub(super) fn samples(&self) -> impl ExactSizeIterator<Item = &Sample> {
+        self.samples.iter()
+    }
+
     /// One value of each picture, oldest first.
     pub(super) fn of(&self, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
         self.samples.iter().map(value).collect()
@@ -95,16 +102,25 @@ impl Times {
         names
     }
 
-    /// The whole time that each picture spent in a stage.
+    /// The whole time that each picture spent in a stage, those that had none left out.
     pub(super) fn stage(&self, name: &str) -> Vec<f64> {
-        self.of(|sample| {
-            let named = sample.stages.iter().filter(|(stage, _)| stage == name);
-            named.map(|(_, ms)| ms).sum()
-        })
+        let times = self.samples.iter().filter_map(|sample| sample.stage(name));
+        times.collect()
     }
 }
 
 impl Sample {
+    /// The frame, or its stages where they overlap with the one before and sum up to more.
+    pub(super) fn whole(&self) -> f64 {
+        self.wall.max(self.device())
+    }
+
+    /// The whole time spent in a stage, if it was there.
+    pub(super) fn stage(&self, name: &str) -> Option<f64> {
+        let named = self.stages.iter().filter(|(stage, _)| stage == name);
+        named.map(|(_, ms)| *ms).reduce(|a, b| a + b)
+    }
+
     /// All stages.
     pub(super) fn device(&self) -> f64 {
         self.stages.iter().map(|(_, ms)| ms).sum()

@@ -1,59 +1,142 @@
-//! The timing panel.
+//! The timing panel: where the time goes, frame by frame, and what lies in the device's memory.
 
-use egui::{Color32, Pos2, Rect, Sense, Stroke, Ui, vec2};
+use egui::{Color32, ScrollArea, Ui};
 
 use super::engine::Frame;
+use super::model::Model;
 use super::state::State;
-use super::statistics::{REMEMBERED, Sample, Times};
+use super::statistics::{Sample, Times};
 use super::style;
 use crate::statistics::Statistics;
+
+pub(super) mod costs;
+mod graph;
 
 /// Height of the panel, points.
 pub(super) const HEIGHT: f32 = 212.0;
 
+/// Width of the totals, points.
+const TOTALS: f32 = 200.0;
+
+/// Stages in a column.
+const ROWS: usize = 8;
+
+/// What is shown beside the stages.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Page {
+    /// Each of the last frames.
+    #[default]
+    Frames,
+    /// What it costs to follow what moves.
+    Structures,
+    /// What lies on the device.
+    Memory,
+}
+
+/// Colours of stages, in the order of a frame; no two neighbours are alike.
+const COLOURS: [Color32; 12] = [
+    Color32::from_rgb(92, 176, 196),
+    Color32::from_rgb(206, 141, 84),
+    Color32::from_rgb(126, 168, 92),
+    Color32::from_rgb(170, 122, 190),
+    Color32::from_rgb(206, 190, 98),
+    Color32::from_rgb(98, 128, 202),
+    Color32::from_rgb(204, 108, 120),
+    Color32::from_rgb(104, 188, 150),
+    Color32::from_rgb(150, 140, 128),
+    Color32::from_rgb(196, 120, 172),
+    Color32::from_rgb(140, 196, 214),
+    Color32::from_rgb(228, 174, 138),
+];
+
+/// Colour of a stage of a frame.
+fn colour(stages: &[String], name: &str) -> Color32 {
+    let at = stages.iter().position(|stage| stage == name);
+    COLOURS[at.unwrap_or(0) % COLOURS.len()]
+}
+
+/// Milliseconds as they are written.
+fn written(ms: f64) -> String {
+    match ms.is_nan() {
+        true => "-".into(),
+        false => format!("{ms:.1}"),
+    }
+}
+
 /// Median, 99th percentile.
 fn pair(values: &[f64]) -> [String; 2] {
     let found = Statistics::of(values.iter().copied());
-    [found.median, found.p99].map(|ms| match ms.is_nan() {
-        true => "-".into(),
-        false => format!("{ms:.1}"),
-    })
+    [found.median, found.p99].map(written)
 }
 
-pub(super) fn show(ui: &mut Ui, statistics: &Times, frame: Option<&Frame>, state: &State) {
-    ui.horizontal_top(|ui| {
-        ui.vertical(|ui| {
-            ui.strong("Device time by stage, ms");
-            stages(ui, statistics);
-        });
-        ui.separator();
-        ui.vertical(|ui| {
-            ui.strong("Frames and latency");
-            totals(ui, statistics, frame, state);
-        });
-        ui.separator();
-        ui.vertical(|ui| {
-            ui.strong(format!("Last {REMEMBERED} frames, ms"));
-            graph(ui, statistics);
+pub(super) fn show(
+    ui: &mut Ui,
+    times: &Times,
+    frame: Option<&Frame>,
+    model: &Model,
+    state: &mut State,
+) {
+    // A narrow window shows the rest on the way.
+    ScrollArea::horizontal().show(ui, |ui| {
+        ui.horizontal_top(|ui| {
+            ui.vertical(|ui| {
+                ui.strong("Device time by stage, ms")
+                    .on_hover_text("Median and 99th percentile of the last frames");
+                stages(ui, times);
+            });
+            ui.separator();
+            ui.vertical(|ui| {
+                ui.set_width(TOTALS);
+                ui.strong("Frames and latency, ms");
+                totals(ui, times, state);
+            });
+            ui.separator();
+            ui.vertical(|ui| {
+                ui.horizontal(|ui| {
+                    for (page, name, tip) in [
+                        (Page::Frames, "Frames", "Each of the last frames, by stage"),
+                        (
+                            Page::Structures,
+                            "Structures",
+                            "What it costs that rays follow what moves",
+                        ),
+                        (Page::Memory, "Memory", "What lies in the device's memory"),
+                    ] {
+                        ui.selectable_value(&mut state.times, page, name)
+                            .on_hover_text(tip);
+                    }
+                });
+                match state.times {
+                    Page::Frames => graph::show(ui, times),
+                    Page::Structures => costs::structures(ui, times, model),
+                    Page::Memory => costs::memory(ui, frame, state.heap),
+                }
+            });
         });
     });
 }
 
-fn stages(ui: &mut Ui, statistics: &Times) {
-    let names = statistics.stages();
+fn stages(ui: &mut Ui, times: &Times) {
+    let names = times.stages();
     // Two columns of stages: a fused frame has more than the panel is high.
     ui.horizontal_top(|ui| {
-        for (column, names) in names.chunks(8).enumerate() {
+        for (column, some) in names.chunks(ROWS).enumerate() {
             egui::Grid::new(("stages", column))
                 .num_columns(3)
+                .spacing([6.0, 1.0])
                 .show(ui, |ui| {
                     for head in ["", "median", "p99"] {
                         ui.small(head);
                     }
                     ui.end_row();
-                    for name in names {
-                        ui.label(name);
-                        for cell in pair(&statistics.stage(name)) {
+                    for name in some {
+                        ui.horizontal(|ui| {
+                            let (dot, _) =
+                                ui.allocate_exact_size([8.0; 2].into(), egui::Sense::hover());
+                            ui.painter().rect_filled(dot, 2.0, colour(&names, name));
+                            ui.label(name);
+                        });
+                        for cell in pair(&times.stage(name)) {
                             ui.monospace(cell);
                         }
                         ui.end_row();
@@ -63,89 +146,55 @@ fn stages(ui: &mut Ui, statistics: &Times) {
     });
 }
 
-fn totals(ui: &mut Ui, statistics: &Times, frame: Option<&Frame>, state: &State) {
-    let wall = statistics.of(|s| s.wall);
-    let device = statistics.of(Sample::device);
-    egui::Grid::new("totals").num_columns(3).show(ui, |ui| {
-        for (name, tip, values) in [
-            ("device", "All stages of a frame on the device", &device),
-            ("frame", "From taking an order to the finished image", &wall),
-            (
-                "structures",
-                "What the processor takes to bring acceleration structures up to date",
-                &statistics.of(|s| s.update),
-            ),
-            (
-                "latency",
-                "From the input, or the reading of the clock, to the image handed to the screen",
-                &statistics.of(|s| s.latency),
-            ),
-            (
-                "3D view",
-                "A picture of the 3D view on the device",
-                &statistics.survey(),
-            ),
-            (
-                "interface",
-                "A frame of this window, from the start of drawing to the screen",
-                &statistics.interface(),
-            ),
-        ] {
-            ui.label(name).on_hover_text(tip);
-            for cell in pair(values) {
-                ui.monospace(cell);
+fn totals(ui: &mut Ui, times: &Times, state: &State) {
+    let wall = times.of(|s| s.wall);
+    let device = times.of(Sample::device);
+    egui::Grid::new("totals")
+        .num_columns(3)
+        .spacing([6.0, 1.0])
+        .show(ui, |ui| {
+            for head in ["", "median", "p99"] {
+                ui.small(head);
             }
             ui.end_row();
-        }
-    });
+            for (name, tip, values) in [
+                ("device", "All stages of a frame on the device", &device),
+                ("frame", "From taking an order to the finished image", &wall),
+                (
+                    "structures",
+                    "What the processor takes to bring acceleration structures up to date",
+                    &times.of(|s| s.update),
+                ),
+                (
+                    "latency",
+                    "From the input, or the reading of the clock, to the image handed to the screen",
+                    &times.of(|s| s.latency),
+                ),
+                (
+                    "3D view",
+                    "A picture of the 3D view on the device",
+                    &times.survey(),
+                ),
+                (
+                    "interface",
+                    "A frame of this window, from the start of drawing to the screen",
+                    &times.interface(),
+                ),
+            ] {
+                ui.label(name).on_hover_text(tip);
+                for cell in pair(values) {
+                    ui.monospace(cell);
+                }
+                ui.end_row();
+            }
+        });
     if !wall.is_empty() {
         let median = Statistics::of(wall).median;
         ui.label(format!("{:.1} frames per second", 1e3 / median));
     }
-    if let Some(frame) = frame {
-        let mib = |bytes: u64| bytes as f64 / f64::from(1 << 20);
-        ui.label(format!(
-            "memory {:.0} MiB, most {:.0}; anatomy {:.0}",
-            mib(frame.memory.current),
-            mib(frame.memory.peak),
-            mib(frame.world_bytes)
-        ));
-    }
-    ui.small(&state.device);
-}
-
-/// A bar per frame, from the left; the line is at 1/30 s.
-fn graph(ui: &mut Ui, statistics: &Times) {
-    let size = vec2(
-        ui.available_width().min(480.0),
-        ui.available_height().min(HEIGHT - 40.0),
-    );
-    let (area, _) = ui.allocate_exact_size(size, Sense::hover());
-    let painter = ui.painter_at(area);
-    painter.rect_filled(area, 2.0, style::BACK);
-    let values = statistics.of(|s| s.wall);
-    let most = values.iter().copied().fold(1e3 / 30.0, f64::max) * 1.1;
-    let height = |ms: f64| area.height() * (ms / most) as f32;
-    let width = area.width() / REMEMBERED as f32;
-    for (at, ms) in values.iter().enumerate() {
-        let left = area.left() + at as f32 * width;
-        let top = Pos2::new(left, area.bottom() - height(*ms));
-        let bar = Rect::from_min_max(top, Pos2::new(left + width.max(1.0), area.bottom()));
-        painter.rect_filled(bar, 0.0, style::ACCENT);
-    }
-    let line = area.bottom() - height(1e3 / 30.0);
-    painter.hline(
-        area.x_range(),
-        line,
-        Stroke::new(1.0, Color32::from_gray(110)),
-    );
-    let label = format!("{most:.0}");
-    let font = egui::FontId::proportional(10.0);
-    painter.text(
-        area.left_top(),
-        egui::Align2::LEFT_TOP,
-        label,
-        font,
-        style::FAINT,
-    );
+    let device = egui::RichText::new(&state.device)
+        .color(style::FAINT)
+        .small();
+    ui.add(egui::Label::new(device).truncate())
+        .on_hover_text(&state.device);
 }

@@ -14,7 +14,7 @@ use super::model::sheet::{Moment, Sheet};
 use super::model::sidecar::{self, Area};
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
-use crate::gpu::{DeviceInfo, Shot};
+use crate::gpu::{DeviceInfo, Image, Shot};
 use crate::output;
 
 /// Most frames of the loop.
@@ -88,7 +88,8 @@ impl Tools {
         if self.cine.newest().is_some_and(|last| !is_like(last)) {
             self.cine.clear();
         }
-        let (bytes, at) = (frame.image.bytes(), frame.finished);
+        let tinted = frame.tinted.as_ref().map_or(0, Image::bytes);
+        let (bytes, at) = (frame.image.bytes() + tinted, frame.finished);
         self.cine.push(frame, bytes, at);
     }
 

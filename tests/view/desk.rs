@@ -2,7 +2,7 @@
 
 use std::io::{BufRead, BufReader, IoSlice};
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
 use x11rb::connection::{Connection, RequestConnection as _};
@@ -27,6 +27,8 @@ pub enum Key {
     /// Also the signs of Latin-1.
     Letter(char),
     Control,
+    /// Any other, by its X symbol.
+    Symbol(u32),
 }
 
 impl Key {
@@ -42,6 +44,7 @@ impl Key {
             Self::F3 => 0xffc0,
             Self::Letter(letter) => u32::from(letter),
             Self::Control => 0xffe3,
+            Self::Symbol(symbol) => symbol,
         }
     }
 }
@@ -55,13 +58,19 @@ pub struct Display {
 impl Display {
     /// Starts one; where there is none to start nothing, and it is said.
     pub fn open() -> Option<Self> {
+        Self::sized([1366, 768])
+    }
+
+    /// One of so many pixels.
+    pub fn sized([width, height]: [u16; 2]) -> Option<Self> {
+        let screen = format!("{width}x{height}x24");
         let started = Command::new("Xvfb")
             .args([
                 "-displayfd",
                 "1",
                 "-screen",
                 "0",
-                "1366x768x24",
+                &screen,
                 "-nolisten",
                 "tcp",
             ])
@@ -118,7 +127,7 @@ pub struct Desk {
     root: xproto::Window,
     window: xproto::Window,
     _display: Display,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Desk {
@@ -129,24 +138,35 @@ impl Desk {
 
     /// The same on a display on which a point is `scale` pixels.
     pub fn open_scaled(scene: &str, arguments: &[&str], scale: f64) -> Option<Self> {
-        let display = Display::open()?;
+        let scaled = |_: &Path, command: &mut Command| {
+            command.env("WINIT_X11_SCALE_FACTOR", scale.to_string());
+        };
+        Self::open_on(Display::open()?, scene, arguments, scaled)
+    }
+
+    /// The same on a display, with other files in the scene's folder, or another environment: what
+    /// `prepare` makes of both.
+    pub fn open_on(
+        display: Display,
+        scene: &str,
+        arguments: &[&str],
+        prepare: impl FnOnce(&Path, &mut Command),
+    ) -> Option<Self> {
         let folder = tempfile::tempdir().expect("a folder");
         let file = folder.path().join("scene.toml");
         std::fs::write(&file, scene).expect("written");
         let (x, screen) = x11rb::connect(Some(&display.name)).expect("the X server answers");
         let root = x.setup().roots[screen].root;
-        let program = display
-            .program(&file, arguments)
-            .env("WINIT_X11_SCALE_FACTOR", scale.to_string())
-            .spawn()
-            .expect("started");
+        let mut command = display.program(&file, arguments);
+        prepare(folder.path(), &mut command);
+        let program = command.spawn().expect("started");
         let mut desk = Self {
             program,
             x,
             root,
             window: 0,
             _display: display,
-            _folder: folder,
+            folder,
         };
         desk.wait_for("a window", Desk::find);
         desk.focus();
@@ -267,6 +287,28 @@ impl Desk {
         self.fake(xproto::KEY_RELEASE_EVENT, control, (0, 0));
     }
 
+    /// The scene file as it is now.
+    pub fn scene(&self) -> String {
+        std::fs::read_to_string(self.folder.path().join("scene.toml")).expect("a scene")
+    }
+
+    /// The folder of the scene file.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Waits until the program has ended by itself.
+    pub fn ended(mut self) -> ExitStatus {
+        let began = Instant::now();
+        loop {
+            if let Some(status) = self.program.try_wait().expect("a child") {
+                return status;
+            }
+            assert!(began.elapsed() < PATIENCE, "the program does not end");
+            std::thread::sleep(Duration::from_millis(30));
+        }
+    }
+
     /// Clicks at a place of the display.
     pub fn click(&self, at: (u16, u16)) {
         self.drag(at, at);
@@ -338,17 +380,10 @@ impl Desk {
     }
 
     /// Ctrl+Q; the program has to end by itself, without an error.
-    pub fn quit(mut self) {
+    pub fn quit(self) {
         self.hold_control(Key::Letter('q'));
-        let began = Instant::now();
-        loop {
-            if let Some(status) = self.program.try_wait().expect("a child") {
-                assert!(status.success(), "{status}");
-                return;
-            }
-            assert!(began.elapsed() < PATIENCE, "the program does not end");
-            std::thread::sleep(Duration::from_millis(30));
-        }
+        let status = self.ended();
+        assert!(status.success(), "{status}");
     }
 }
 

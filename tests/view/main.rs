@@ -7,6 +7,8 @@
 mod client;
 mod desk;
 mod mmode;
+mod panels;
+mod robust;
 mod survey;
 mod tools;
 mod tracker;

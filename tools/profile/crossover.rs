@@ -174,7 +174,7 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
             let (rig, samples) = &found[0];
             let structures = Statistics::of(samples.iter().map(|s| s.structures));
             let frame = Statistics::of(samples.iter().map(|s| s.frame));
-            let megabytes = rig.simulator.world_bytes() as f64 / 1e6;
+            let megabytes = rig.simulator.memory().total() as f64 / 1e6;
             curve
                 .points
                 .push([triangles as f64, structures.median.max(1e-4)]);

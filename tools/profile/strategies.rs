@@ -150,7 +150,7 @@ fn report(
     for run in runs {
         let of = |part: fn(&Sample) -> f64| Statistics::of(run.samples.iter().map(part));
         let (structures, trace, frame) = (of(|s| s.structures), of(|s| s.trace), of(|s| s.frame));
-        let megabytes = run.rig.simulator.world_bytes() as f64 / 1e6;
+        let megabytes = run.rig.simulator.memory().total() as f64 / 1e6;
         let counts = match tracer {
             Tracer::Bvh => Some(count(machine, run, period)?),
             Tracer::RayQuery => None,

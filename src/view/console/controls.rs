@@ -42,6 +42,9 @@ pub(super) fn grid(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
 /// A slider over the `usual` values; typing takes all that a scene file may give.
 fn slider(ui: &mut Ui, key: &str, entry: &Entry, value: &mut f64, usual: RangeInclusive<f64>) {
     let wide = *usual.start() > 0.0 && usual.end() / usual.start() > 50.0;
+    // A long unit needs the room.
+    let beyond = entry.unit.len().saturating_sub(5) as f32;
+    ui.spacing_mut().slider_width -= 7.0 * beyond;
     let slider = Slider::new(value, usual)
         .clamping(SliderClamping::Never)
         .logarithmic(wide)

@@ -1,9 +1,8 @@
-//! Path tracing, scatterers, and fusion with an acquired volume.
+//! Path tracing and scatterers.
 
 use egui::{ComboBox, Ui};
 
 use super::controls::{choice, count, grid, number, number_or, switch};
-use crate::scene::Fusion;
 use crate::scene::settings::Quality;
 use crate::sim::Tracer;
 use crate::view::model::Settings;
@@ -190,24 +189,5 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice:
             );
             count(ui, "simulation.seed", "Seed", &mut s.seed, 0..=1000);
         });
-    });
-}
-
-pub(super) fn fusion(ui: &mut Ui, fusion: &mut Fusion) {
-    grid(ui, "fusion", |ui| {
-        choice(
-            ui,
-            "fusion.surroundings",
-            "Around the mask",
-            &mut fusion.surroundings,
-        );
-        count(ui, "fusion.blur", "Blur", &mut fusion.blur, 1..=128);
-        choice(ui, "fusion.blend", "Blend", &mut fusion.blend);
-        switch(
-            ui,
-            "fusion.background_shadows",
-            "Shadows",
-            &mut fusion.background_shadows,
-        );
     });
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::Settings;
 
-/// Changes that follow each other faster are one: the drag of a slider.
+/// Changes of one thing that follow each other faster are one: the drag of a slider.
 const GESTURE: Duration = Duration::from_millis(700);
 /// Steps that are kept.
 const DEPTH: usize = 100;
@@ -14,14 +14,22 @@ const DEPTH: usize = 100;
 pub(super) struct History {
     past: Vec<Settings>,
     future: Vec<Settings>,
-    last: Option<Instant>,
+    last: Option<Gesture>,
+}
+
+/// A change that may go on.
+struct Gesture {
+    /// What it changes.
+    paths: Vec<String>,
+    at: Instant,
 }
 
 impl History {
-    /// Notes what the settings were before a change.
-    pub(super) fn push(&mut self, before: Settings, now: Instant) {
-        let goes_on = self.last.is_some_and(|last| now - last < GESTURE);
-        self.last = Some(now);
+    /// Notes what the settings were before a change of what lies at `paths`.
+    pub(super) fn push(&mut self, before: Settings, paths: Vec<String>, now: Instant) {
+        let last = self.last.as_ref();
+        let goes_on = last.is_some_and(|last| now - last.at < GESTURE && last.paths == paths);
+        self.last = Some(Gesture { paths, at: now });
         self.future.clear();
         if goes_on && !self.past.is_empty() {
             return;

@@ -136,6 +136,12 @@ fn a_gesture_is_undone_at_once_and_can_be_done_again() {
         model.note(&before, later(ms));
     }
     assert_eq!(model.undoable(), [true, false]);
+    // Another setting is another change, however soon.
+    let before = model.settings.clone();
+    model.settings.imaging.dynamic_range += 1.0;
+    model.note(&before, later(5100));
+    model.undo(later(5200));
+    assert_eq!(model.settings, before);
     model.undo(later(6000));
     assert_eq!(model.settings.imaging.gain, 22.0);
     model.undo(later(6000));

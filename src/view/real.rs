@@ -1,0 +1,56 @@
+//! Which pixels are real: the image that shows it, and its legend.
+
+use egui::{Align2, Color32, FontId, Rect, pos2, vec2};
+
+use super::engine::Frame;
+use super::model::Model;
+use super::model::real::COLOUR;
+use super::style;
+use crate::gpu::Image;
+
+/// The image of a frame that is wanted on the screen.
+pub(super) fn image<'f>(frame: &'f Frame, model: &Model) -> &'f Image {
+    let tinted = frame.tinted.as_ref().filter(|_| model.real.shown);
+    tinted.unwrap_or(&frame.image)
+}
+
+/// Grey level of the legend's samples.
+const GREY: u8 = 110;
+
+/// What the colours mean, at the upper right of `area`; where nothing is coloured, why.
+pub(super) fn legend(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
+    if !model.real.shown {
+        return;
+    }
+    let font = FontId::proportional(12.0);
+    let mut right = area.right() - 12.0;
+    let y = area.top() + 49.0;
+    // From the right, below what is written there.
+    let text = |x: f32, words: &str| {
+        let at = pos2(x, y);
+        painter.text(at, Align2::RIGHT_CENTER, words, font.clone(), style::TEXT)
+    };
+    if frame.tinted.is_none() {
+        let words = match frame.settings.fusion {
+            Some(_) => "no pixel is acquired",
+            None => "all pixels are simulated: there is no acquired volume",
+        };
+        text(right, words);
+        return;
+    }
+    let [r, g, b] = COLOUR;
+    let share = model.real.opacity as f32;
+    let over = |grey: u8| {
+        let mix = |c: u8| (f32::from(grey) + share * (f32::from(c) - f32::from(grey))) as u8;
+        Color32::from_rgb(mix(r), mix(g), mix(b))
+    };
+    for (colour, words) in [
+        (Color32::from_gray(GREY), "simulated"),
+        (over(GREY), "acquired"),
+    ] {
+        let place = text(right, words);
+        let swatch = pos2(place.left() - 20.0, y - 5.0);
+        painter.rect_filled(Rect::from_min_size(swatch, vec2(15.0, 10.0)), 2.0, colour);
+        right = swatch.x - 10.0;
+    }
+}
