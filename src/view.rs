@@ -12,6 +12,7 @@ mod cine;
 mod console;
 pub mod engine;
 mod files;
+mod hold;
 mod inputs;
 mod keys;
 mod layout;

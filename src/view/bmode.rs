@@ -155,9 +155,29 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
         at + vec2(0.0, 20.0),
         Align2::RIGHT_TOP,
         line,
-        small,
+        small.clone(),
         style::FAINT,
     );
+    if let Some((line, is_good)) = contact(frame, model) {
+        let colour = if is_good { style::FAINT } else { style::WARN };
+        painter.text(at + vec2(0.0, 36.0), Align2::RIGHT_TOP, line, small, colour);
+    }
+}
+
+/// Share of the face below which an examiner would see to more gel or pressure.
+const GOOD_CONTACT: f64 = 0.9;
+
+/// What there is to say of the contact with the skin, and whether it is good.
+fn contact(frame: &Frame, model: &Model) -> Option<(String, bool)> {
+    let touch = frame.contact?;
+    let held = match model.hold.as_ref().is_some_and(|hold| hold.stays) {
+        true => "held   ",
+        false => "",
+    };
+    // Rounded down: what is not whole does not say so.
+    let share = (100.0 * touch.share).floor();
+    let text = format!("{held}contact {share:.0} %   pressed {:.1} mm", touch.depth);
+    Some((text, touch.share >= GOOD_CONTACT))
 }
 
 /// Millimetres between labels: as few as leave 40 points between them.

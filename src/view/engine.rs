@@ -13,6 +13,7 @@ use super::ring::Ring;
 use crate::gpu::{Device, FrameTimings, GpuError, Image, MemoryUse};
 use crate::probe::Probe;
 use crate::scene::Scene;
+use crate::sim::contact::Touch;
 use crate::sim::shaders::Library;
 use crate::sim::{Memory, SimError, Simulator, Tracer, image_size};
 
@@ -70,6 +71,8 @@ pub struct Frame {
     pub settings: Arc<Settings>,
     /// World from probe.
     pub pose: DAffine3,
+    /// How the probe touches the skin; none where the scene asks for no contact.
+    pub contact: Option<Touch>,
     /// Time of the scene, s.
     pub seconds: f64,
     /// [`Order::revision`] of what it shows.
@@ -488,6 +491,7 @@ impl Worker {
             probe: scene.probe.clone(),
             settings,
             pose,
+            contact: simulator.contact(),
             seconds,
             revision: order.revision,
             at: order.at,

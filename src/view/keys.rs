@@ -35,6 +35,7 @@ enum Action {
     Load,
     Console,
     Survey,
+    Hold,
     Timing,
     Mmode,
     Real,
@@ -95,6 +96,11 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
             (Key::E, false, Action::Move(Axis::Rotate, 1.0)),
         ],
         "rotate about the depth axis (2 deg)",
+    ),
+    (
+        "H",
+        &[(Key::H, false, Action::Hold)],
+        "hold the probe to the skin: it slides along it",
     ),
     (
         "Home",
@@ -334,6 +340,10 @@ fn carry_out(
         Action::Load => state.files.ask(Purpose::Load, model),
         Action::Console => state.console = !state.console,
         Action::Survey => state.survey.open = !state.survey.open,
+        Action::Hold => {
+            let stays = model.hold.as_ref().is_some_and(|hold| hold.stays);
+            model.stay_on_skin(!stays, now);
+        }
         Action::Timing => state.timing = !state.timing,
         Action::Mmode => mmode::toggle(model, now),
         Action::Real => {

@@ -8,6 +8,7 @@ mod clock;
 mod devices;
 mod entries;
 mod history;
+pub mod hold;
 pub mod mmode;
 mod pad;
 mod palette;
@@ -32,6 +33,7 @@ pub use cine::Cine;
 pub use clock::Clock;
 pub use devices::{Devices, Source};
 use history::History;
+use hold::Hold;
 use mmode::Strip;
 pub use pad::{Control, Pad, Press};
 pub use palette::Show;
@@ -77,6 +79,8 @@ pub struct Model {
     pub loaded: Settings,
     /// The pose of the scene file.
     pub home: DAffine3,
+    /// What holds the probe to the skin, where the scene names one.
+    pub hold: Option<Hold>,
     /// The scene file.
     pub file: File,
     /// How acquired pixels are marked.
@@ -174,6 +178,7 @@ impl Model {
                 .collect(),
             survey: Survey::new(scene),
             home: scene.world_from_probe,
+            hold: Hold::of(scene),
             file,
             real: Real::default(),
             history: History::default(),
@@ -188,10 +193,12 @@ impl Model {
         self.move_by(Source::Keyboard, axis, amount, now);
     }
 
-    /// The same by another device that shifts and turns.
+    /// The same by any device that shifts and turns; on the skin where the probe is to stay there.
     pub fn move_by(&mut self, source: Source, axis: Axis, amount: f64, now: Instant) {
         self.stop(now);
-        self.place_probe(source, moved(&self.pose, axis, amount), now);
+        let on_skin = self.moved_on_skin(axis, amount, now);
+        let pose = on_skin.unwrap_or_else(|| moved(&self.pose, axis, amount));
+        self.place_probe(source, pose, now);
     }
 
     /// Puts the probe somewhere: a device other than the tracker has moved it.

@@ -9,8 +9,8 @@ use egui::{Align2, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos
 use glam::{DVec2, DVec3};
 
 use super::look::{Look, Pictured};
-use super::model::{Camera, Model};
-use super::style;
+use super::model::{Camera, Model, Ray};
+use super::{hold, style};
 
 /// Narrowest that the view is of use, points.
 const LEAST: f32 = 240.0;
@@ -35,6 +35,8 @@ pub(super) struct State {
     revision: u64,
     /// What a pixel of the last pictures took on the device, ms.
     pixel_ms: f64,
+    /// The probe in the pointer's hand.
+    hold: hold::State,
 }
 
 impl Default for State {
@@ -45,6 +47,7 @@ impl Default for State {
             moving: None,
             revision: 0,
             pixel_ms: 0.0,
+            hold: hold::State::default(),
         }
     }
 }
@@ -106,6 +109,12 @@ impl Place {
         Some(self.rect.min + vec2(at.x as f32, at.y as f32))
     }
 
+    /// What is seen at a place of the screen, with `camera`.
+    pub(super) fn ray(&self, camera: &Camera, at: egui::Pos2) -> Ray {
+        let off = at - self.rect.min;
+        camera.ray(self.panel(), DVec2::new(off.x.into(), off.y.into()))
+    }
+
     /// How the anatomy is to be pictured here; `scale`: pixels per point.
     pub(super) fn look(&self, model: &Model, state: &State, scale: f32) -> Look {
         let pixels = self.panel() * f64::from(scale);
@@ -137,7 +146,9 @@ pub(super) fn show(
     let id = ui.id().with("survey");
     let response = ui.interact(place.rect, id, Sense::click_and_drag());
     let before = model.survey.camera;
-    navigate(ui, &response, &place, &mut model.survey.camera);
+    if !hold::show(ui, &response, &place, model, &mut state.hold) {
+        navigate(ui, &response, &place, &mut model.survey.camera);
+    }
     state.watch(ui, model, before != model.survey.camera);
     let painter = ui.painter_at(place.rect);
     if let Some(pictured) = pictured {
@@ -150,7 +161,12 @@ pub(super) fn show(
     let edge = Stroke::new(1.0, egui::Color32::from_gray(48));
     painter.vline(place.rect.left(), place.rect.y_range(), edge);
     let below = place.rect.left_bottom() + vec2(10.0, -8.0);
-    let hint = "drag: turn    Shift+drag: move    wheel: nearer, farther";
+    let hint = match model.hold.is_some() {
+        true => {
+            "probe, skin: drag slides, Shift leans, Ctrl+wheel rotates; right drag turns the view"
+        }
+        false => "drag: turn    Shift+drag: move    wheel: nearer, farther",
+    };
     let font = FontId::proportional(10.0);
     painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
     buttons(ui, &place, model, state);
@@ -184,28 +200,28 @@ fn navigate(ui: &Ui, response: &Response, place: &Place, camera: &mut Camera) {
 fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut State) {
     let at = place.rect.left_top() + vec2(10.0, 8.0);
     let room = Rect::from_min_max(at, pos2(place.rect.right() - 8.0, at.y + 24.0));
-    let (pose, probe) = (model.pose, &model.settings.probe);
-    let survey = &mut model.survey;
+    let pose = model.pose;
     ui.scope_builder(egui::UiBuilder::new().max_rect(room), |ui| {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.toggle_value(&mut state.tissues, "Tissues")
                 .on_hover_text("Which tissues are shown, and which as glass");
-            ui.toggle_value(&mut survey.cut, "Cut")
+            ui.toggle_value(&mut model.survey.cut, "Cut")
                 .on_hover_text("Cut away what lies between the eye and the image plane");
             ui.separator();
             let tip = "Look at the image plane as the B-mode image shows it";
             if ui.button("Front").on_hover_text(tip).clicked() {
-                survey.camera.face(&pose);
+                model.survey.camera.face(&pose);
             }
             let tip = "Look along the probe into the body";
             if ui.button("Along").on_hover_text(tip).clicked() {
-                survey.camera.along(&pose);
+                model.survey.camera.along(&pose);
             }
             let tip = "Probe and fan from the side, all of them in view";
             if ui.button("Reset").on_hover_text(tip).clicked() {
-                survey.reset(&pose, probe);
+                model.survey.reset(&pose, &model.settings.probe);
             }
+            hold::button(ui, model);
         });
     });
 }

@@ -17,6 +17,9 @@ const PATIENCE: Duration = Duration::from_secs(90);
 pub enum Key {
     Right,
     Home,
+    PageUp,
+    PageDown,
+    Shift,
     Space,
     Escape,
     /// `F1`, which is also `?`.
@@ -36,6 +39,9 @@ impl Key {
         match self {
             Self::Right => 0xff53,
             Self::Home => 0xff50,
+            Self::PageUp => 0xff55,
+            Self::PageDown => 0xff56,
+            Self::Shift => 0xffe1,
             Self::Space => 0x20,
             Self::Escape => 0xff1b,
             Self::Help => 0xffbe,
@@ -309,6 +315,15 @@ impl Desk {
         }
     }
 
+    /// Holds a key down, or lets it go.
+    pub fn hold(&self, key: Key, down: bool) {
+        let kind = match down {
+            true => xproto::KEY_PRESS_EVENT,
+            false => xproto::KEY_RELEASE_EVENT,
+        };
+        self.fake(kind, self.code(key), (0, 0));
+    }
+
     /// Clicks at a place of the display.
     pub fn click(&self, at: (u16, u16)) {
         self.drag(at, at);
@@ -330,6 +345,25 @@ impl Desk {
             };
             (1..=4).for_each(|share| motion(between(share)));
         }
+        self.fake(xproto::BUTTON_RELEASE_EVENT, 1, (0, 0));
+    }
+
+    /// Drags so slowly that a busy program, too, sees it under way.
+    pub fn pull(&self, from: (u16, u16), to: (u16, u16)) {
+        const STEPS: i32 = 8;
+        let pause = || std::thread::sleep(Duration::from_millis(150));
+        let motion = |step: i32| {
+            let between = |a: u16, b: u16| {
+                (i32::from(a) + (i32::from(b) - i32::from(a)) * step / STEPS) as i16
+            };
+            let at = (between(from.0, to.0), between(from.1, to.1));
+            self.fake(xproto::MOTION_NOTIFY_EVENT, 0, at);
+            pause();
+        };
+        motion(0);
+        self.fake(xproto::BUTTON_PRESS_EVENT, 1, (0, 0));
+        pause();
+        (1..=STEPS).for_each(motion);
         self.fake(xproto::BUTTON_RELEASE_EVENT, 1, (0, 0));
     }
 

@@ -5,6 +5,7 @@
 #[allow(dead_code)]
 #[path = "../igtl/client.rs"]
 mod client;
+mod contact;
 mod desk;
 mod mmode;
 mod panels;

@@ -106,7 +106,7 @@ impl<'s> Hand<'s> {
 
     /// The place `by` mm from a `spot` (world; what of it leaves the tangent plane is left out).
     pub fn beside(&self, spot: &Spot, by: DVec3) -> Option<Spot> {
-        let along = by.reject_from(spot.normal).normalize_or_zero() * by.length();
+        let along = by.reject_from(spot.normal);
         // From above whatever the skin can rise by over the way.
         let above = spot.point + along + spot.normal * (by.length() + self.footprint());
         let (point, normal) = self.skin.hit(above, -spot.normal)?;

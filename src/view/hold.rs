@@ -1,0 +1,320 @@
+//! The pointer on the 3D view where it moves the probe: it slides on the skin, leans and turns.
+
+use std::time::Instant;
+
+use egui::{Color32, CursorIcon, Painter, PointerButton, Pos2, Response, Shape, Stroke, Ui, Vec2};
+use glam::{DAffine3, DVec3};
+
+use super::model::hold::Seen;
+use super::model::skin::Spot;
+use super::model::{Axis, Camera, Model, Source};
+use super::style;
+use super::survey::Place;
+use crate::probe::Probe;
+
+/// Length of the probe's handle, by which it is leaned, mm.
+const HANDLE: f64 = 105.0;
+/// Height of its head, mm.
+const HEAD: f64 = 32.0;
+/// What is this near to the probe, points, means the probe.
+const NEAR: f32 = 16.0;
+/// A wheel's notch, points, turns the probe by so much, rad.
+const TURN: f64 = 2.0 * std::f64::consts::PI / 180.0;
+const NOTCH: f64 = 50.0;
+/// Most that the probe leans at one event, rad.
+const LEAN: f64 = 0.2;
+/// Points that the handle's end has to move for a radian: what moves it less is looked along.
+const SEEN: f64 = 30.0;
+
+/// What the pointer does with the probe.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Drag {
+    /// Slides it to the skin under the pointer, which is so far from the place that it is held to.
+    Over(Vec2),
+    /// Slides it in its image plane, likewise.
+    InPlane(Vec2),
+    /// Leans it.
+    Lean,
+}
+
+/// What is under way; not saved.
+#[derive(Default)]
+pub(super) struct State {
+    drag: Option<Drag>,
+}
+
+/// Moves the probe as the pointer says, and shows where it would go. Whether pointer and wheel have been
+/// used for it; else they are the eye's.
+pub(super) fn show(
+    ui: &Ui,
+    response: &Response,
+    place: &Place,
+    model: &mut Model,
+    state: &mut State,
+) -> bool {
+    let now = Instant::now();
+    if model.hold.is_none() {
+        return false;
+    }
+    let turned = response.hovered() && turn(ui, model, now);
+    let begins = response.drag_started_by(PointerButton::Primary);
+    if begins && let Some(at) = ui.input(|input| input.pointer.press_origin()) {
+        state.drag = drag_at(ui, at, place, model, now);
+    }
+    if !response.dragged_by(PointerButton::Primary) && !begins {
+        state.drag = None;
+    }
+    let Some(drag) = state.drag else {
+        let free = !response.dragged() && response.hovered();
+        if let Some(at) = response.hover_pos().filter(|_| free) {
+            hover(ui, at, place, model, now);
+        }
+        return turned;
+    };
+    ui.ctx().set_cursor_icon(CursorIcon::Grabbing);
+    let delta = response.drag_delta();
+    if delta != Vec2::ZERO
+        && let Some(at) = response.interact_pointer_pos()
+    {
+        carry_out(drag, at, delta, place, model, now);
+    } else if begins && let (Drag::Over(off), Some(at)) = (drag, response.interact_pointer_pos()) {
+        // Pressed on the skin beside it, the probe comes.
+        carry_out(Drag::Over(off), at, delta, place, model, now);
+    }
+    true
+}
+
+/// The button that keeps the probe on the skin, where there is one.
+pub(super) fn button(ui: &mut Ui, model: &mut Model) {
+    let Some(stays) = model.hold.as_ref().map(|hold| hold.stays) else {
+        return;
+    };
+    let tip = "Keys and game pad keep the probe on the skin; Page Up and Page Down set how deep it is \
+        pressed in (H)";
+    let button = ui.selectable_label(stays, "On skin").on_hover_text(tip);
+    if button.clicked() {
+        model.stay_on_skin(!stays, Instant::now());
+    }
+}
+
+/// Whether the wheel with Ctrl or Alt has turned the probe about its depth axis.
+fn turn(ui: &Ui, model: &mut Model, now: Instant) -> bool {
+    let (modifiers, points) = ui.input(|input| {
+        // With Ctrl the wheel arrives as a zoom, by a factor of e for 200 points.
+        let points = match input.modifiers.command {
+            true => f64::from(input.zoom_delta()).ln() * 200.0,
+            false => f64::from(input.smooth_scroll_delta.y + input.smooth_scroll_delta.x),
+        };
+        (input.modifiers, points)
+    });
+    if !(modifiers.command || modifiers.alt) {
+        return false;
+    }
+    if points != 0.0 {
+        model.move_by(Source::Pointer, Axis::Rotate, points / NOTCH * TURN, now);
+    }
+    true
+}
+
+/// What a drag that begins at `at` does: nothing where there is neither probe nor skin.
+fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Drag> {
+    let camera = model.survey.camera;
+    let on_probe = is_probe(at, place, &camera, &model.pose, &model.settings.probe);
+    let spot = spot_at(at, place, model, now);
+    if !on_probe && spot.is_none() {
+        return None;
+    }
+    if ui.input(|input| input.modifiers.shift) {
+        return Some(Drag::Lean);
+    }
+    if !on_probe {
+        return Some(Drag::Over(Vec2::ZERO));
+    }
+    let held = model.spot_held(now)?;
+    let off = place.project(&camera, held.point)? - at;
+    Some(match model.survey.cut {
+        true => Drag::InPlane(off),
+        false => Drag::Over(off),
+    })
+}
+
+/// The skin that is seen at a place of the screen.
+fn spot_at(at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Spot> {
+    let seen = match model.survey.cut {
+        true => Seen::BehindPlane,
+        false => Seen::Whole,
+    };
+    let ray = place.ray(&model.survey.camera, at);
+    model.spot_seen(&ray, seen, now)
+}
+
+fn carry_out(drag: Drag, at: Pos2, delta: Vec2, place: &Place, model: &mut Model, now: Instant) {
+    let camera = model.survey.camera;
+    match drag {
+        Drag::Over(off) => {
+            // Over what cannot be seen of the skin, and beside it, the probe stays.
+            if let Some(spot) = spot_at(at + off, place, model, now) {
+                model.slide_to(&spot, now);
+            }
+        }
+        Drag::InPlane(off) => model.slide_in_plane(&place.ray(&camera, at + off), now),
+        Drag::Lean => {
+            if let Some(angles) = lean(delta, place, &camera, &model.pose) {
+                model.lean(angles, now);
+            }
+        }
+    }
+}
+
+/// Rock and tilt with which the end of the handle follows the pointer by `delta` points; least squares,
+/// damped where the handle is looked along.
+fn lean(delta: Vec2, place: &Place, camera: &Camera, pose: &DAffine3) -> Option<[f64; 2]> {
+    let end = |pose: &DAffine3| {
+        let end = place.project(camera, pose.transform_point3(DVec3::NEG_Z * HANDLE))?;
+        Some([f64::from(end.x), f64::from(end.y)])
+    };
+    const SMALL: f64 = 1e-3;
+    let rest = end(pose)?;
+    let by = |axis| {
+        let [x, y] = end(&super::model::moved(pose, axis, SMALL))?;
+        Some([(x - rest[0]) / SMALL, (y - rest[1]) / SMALL])
+    };
+    let (a, b) = (by(Axis::Rock)?, by(Axis::Tilt)?);
+    let dot = |u: [f64; 2], v: [f64; 2]| u[0] * v[0] + u[1] * v[1];
+    let wanted = [f64::from(delta.x), f64::from(delta.y)];
+    let (aa, bb, ab) = (dot(a, a) + SEEN * SEEN, dot(b, b) + SEEN * SEEN, dot(a, b));
+    let (da, db) = (dot(a, wanted), dot(b, wanted));
+    let determinant = aa * bb - ab * ab;
+    let angles = [
+        (bb * da - ab * db) / determinant,
+        (aa * db - ab * da) / determinant,
+    ];
+    Some(angles.map(|angle| angle.clamp(-LEAN, LEAN)))
+}
+
+/// Whether the pointer is on the probe: on its head, which is as wide as the face, or near to its handle.
+fn is_probe(at: Pos2, place: &Place, camera: &Camera, pose: &DAffine3, probe: &Probe) -> bool {
+    let seen = |point: DVec3| place.project(camera, pose.transform_point3(point));
+    let row = |lift: f64| {
+        let face = (0..=8).map(|i| probe.face(f64::from(i) / 8.0 - 0.5, 0.0).0);
+        let row = face.map(|point| seen(point + DVec3::NEG_Z * lift));
+        row.collect::<Option<Vec<Pos2>>>()
+    };
+    let (Some(mut head), Some(top)) = (row(0.0), row(HEAD)) else {
+        return false;
+    };
+    head.extend(top.into_iter().rev());
+    let handle = [DVec3::ZERO, DVec3::NEG_Z * HANDLE].map(seen);
+    let handle = handle.into_iter().flatten().collect();
+    encloses(&head, at)
+        || [head, handle]
+            .iter()
+            .any(|line: &Vec<Pos2>| is_near(line, at))
+}
+
+fn is_near(line: &[Pos2], at: Pos2) -> bool {
+    line.windows(2).any(|ends| {
+        let along = ends[1] - ends[0];
+        let share = (at - ends[0]).dot(along) / along.length_sq().max(1e-6);
+        (at - ends[0] - along * share.clamp(0.0, 1.0)).length() < NEAR
+    })
+}
+
+/// A ray to the right crosses the polygon an odd number of times.
+fn encloses(polygon: &[Pos2], at: Pos2) -> bool {
+    let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
+    let crossed = sides.filter(|(a, b)| {
+        let share = (at.y - a.y) / (b.y - a.y);
+        (a.y > at.y) != (b.y > at.y) && at.x < a.x + share * (b.x - a.x)
+    });
+    crossed.count() % 2 == 1
+}
+
+/// Where the probe would be if one pressed here.
+fn hover(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) {
+    let camera = model.survey.camera;
+    if is_probe(at, place, &camera, &model.pose, &model.settings.probe) {
+        ui.ctx().set_cursor_icon(CursorIcon::Grab);
+        return;
+    }
+    let Some(pose) = spot_at(at, place, model, now).and_then(|spot| model.pose_at(&spot, now))
+    else {
+        return;
+    };
+    ui.ctx().set_cursor_icon(CursorIcon::Crosshair);
+    let painter = ui.painter_at(place.rect);
+    ghost(&painter, place, &camera, &pose, &model.settings.probe);
+}
+
+/// Outline of the face and the way into the body.
+fn ghost(painter: &Painter, place: &Place, camera: &Camera, pose: &DAffine3, probe: &Probe) {
+    let seen = |point: DVec3| place.project(camera, pose.transform_point3(point));
+    let [r, g, b, _] = style::ACCENT.to_array();
+    let colour = Color32::from_rgba_unmultiplied(r, g, b, 190);
+    let line = Stroke::new(1.6, colour);
+    let edge = |along: f64| {
+        let points = (0..=16).map(move |i| (f64::from(i) / 16.0 - 0.5, along));
+        points.filter_map(|(across, along)| seen(probe.face(across, along).0))
+    };
+    let rim: Vec<Pos2> = edge(-0.5)
+        .chain(edge(0.5).collect::<Vec<_>>().into_iter().rev())
+        .collect();
+    painter.add(Shape::closed_line(rim, line));
+    if let (Some(from), Some(to)) = (seen(DVec3::ZERO), seen(DVec3::Z * 30.0)) {
+        painter.arrow(from, to - from, line);
+    }
+    // The mark of the first scanline.
+    if let Some(mark) = seen(probe.face(-0.5, 0.0).0) {
+        painter.circle_filled(mark, 3.0, colour);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use egui::{Rect, pos2, vec2};
+    use glam::{DAffine3, DMat3, DVec3};
+
+    use super::*;
+
+    fn place() -> Place {
+        Place {
+            rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)),
+        }
+    }
+
+    // The eye stands before the image plane: rock moves the handle sideways, tilt towards the eye.
+    #[test]
+    fn the_handle_follows_the_pointer() {
+        let pose = DAffine3::from_mat3_translation(DMat3::IDENTITY, DVec3::new(3.0, 4.0, 5.0));
+        let mut camera = Camera::front(&pose, pose.translation, 150.0);
+        let place = place();
+        camera.orbit(glam::DVec2::new(400.0, 500.0), glam::DVec2::new(70.0, 60.0));
+        let end = |pose: &DAffine3| {
+            let end = pose.transform_point3(DVec3::NEG_Z * HANDLE);
+            place.project(&camera, end).expect("in front")
+        };
+        for wanted in [vec2(3.0, 0.0), vec2(0.0, 3.0), vec2(-2.0, 1.0)] {
+            let [rock, tilt] = lean(wanted, &place, &camera, &pose).expect("seen");
+            let leaned = super::super::model::moved(&pose, Axis::Rock, rock);
+            let leaned = super::super::model::moved(&leaned, Axis::Tilt, tilt);
+            let went = end(&leaned) - end(&pose);
+            // The damping takes some of it.
+            assert!(
+                (went - wanted).length() < 0.4 * wanted.length(),
+                "{went:?} {wanted:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_probe_is_where_it_is_drawn() {
+        let (pose, probe) = (DAffine3::IDENTITY, Probe::abdominal());
+        let camera = Camera::front(&pose, DVec3::Z * 60.0, 150.0);
+        let place = place();
+        let at = |p: DVec3| place.project(&camera, p).expect("in front");
+        let on = |p: DVec3| is_probe(at(p), &place, &camera, &pose, &probe);
+        assert!(on(DVec3::ZERO) && on(DVec3::NEG_Z * 60.0));
+        assert!(on(probe.face(0.45, 0.0).0) && on(DVec3::new(15.0, 0.0, -18.0)));
+        assert!(!on(DVec3::Z * 60.0) && !on(DVec3::new(60.0, 0.0, -40.0)));
+    }
+}
