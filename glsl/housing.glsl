@@ -72,7 +72,8 @@ HousingHit housing_hit(vec3 from, vec3 to) {
     head = between(head, from.x, to.x, -half_width, half_width, x);
     head = between(head, from.y, to.y, -half_thickness, half_thickness, y);
     head = between(head, from.z, to.z, -survey.housing.z, 0.0, z);
-    if (frame.kind == KIND_CONVEX) {
+    // The cylinder of a small array would end within the head.
+    if (frame.kind == KIND_CONVEX && frame.radius > survey.housing.z) {
         float r = frame.radius;
         head = within(head, vec2(from.x, from.z + r) / r, vec2(to.x, to.z) / r, vec2(1.0), z);
     }

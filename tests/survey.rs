@@ -150,6 +150,7 @@ fn what_is_before_the_image_plane_is_cut_away_and_only_that() {
 fn a_ball_in_the_plane_shows_its_section() {
     // Wider than the linear probe's image: its section shows on both sides of it, flat.
     let (scene, mut survey, _) = view(28.0, 0.0);
+    survey.cut = true;
     survey.camera.face(&scene.world_from_probe);
     let sight = survey.sight(SIZE);
     let panel = DVec2::from(SIZE.map(f64::from));

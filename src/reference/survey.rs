@@ -211,7 +211,7 @@ impl View<'_> {
         sides.extend(slab(DVec3::Y, -half_thickness, half_thickness));
         sides.extend(slab(DVec3::Z, -head, 0.0));
         let frame = self.world.frame;
-        if frame.kind == KIND_CONVEX {
+        if frame.kind == KIND_CONVEX && f64::from(frame.radius) > head {
             let r = f64::from(frame.radius);
             let scale = DVec3::new(1.0 / r, 0.0, 1.0 / r);
             sides.push(Side::Cylinder(scale, DVec3::new(0.0, 0.0, -r)));

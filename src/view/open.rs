@@ -242,6 +242,7 @@ impl Open {
                     }
                     self.model.film(&frame);
                     self.state.tools.record((*frame).clone());
+                    self.state.survey.pace(frame.wall_ms);
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;

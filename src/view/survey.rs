@@ -16,8 +16,10 @@ use super::{hold, style};
 const LEAST: f32 = 240.0;
 /// Points of a wheel's turn that bring the eye a step nearer.
 const NOTCH: f64 = 50.0;
-/// A picture may take this long while something moves, ms; else it is made coarser.
+/// A picture may take this long while the eye moves, ms; else it is made coarser.
 const SWIFT: f64 = 60.0;
+/// Share of an image's time that a picture may take while probe or anatomy move.
+const SHARE: f64 = 0.15;
 /// Least pixels of the picture for each of the panel's, along an edge.
 const COARSEST: f64 = 0.25;
 /// Everything is at rest when nothing has moved for this long.
@@ -29,8 +31,10 @@ pub(super) struct State {
     pub(super) open: bool,
     /// The list of tissues is open.
     tissues: bool,
-    /// Until when eye, probe or anatomy count as moving.
-    moving: Option<Instant>,
+    /// Until when something counts as moving: the eye, or probe and anatomy.
+    moving: [Option<Instant>; 2],
+    /// What the last image took, ms.
+    image_ms: f64,
     /// Revision of the model that was seen last.
     revision: u64,
     /// What a pixel of the last pictures took on the device, ms.
@@ -44,7 +48,8 @@ impl Default for State {
         Self {
             open: true,
             tissues: false,
-            moving: None,
+            moving: [None; 2],
+            image_ms: 0.0,
             revision: 0,
             pixel_ms: 0.0,
             hold: hold::State::default(),
@@ -59,17 +64,26 @@ impl State {
         self.pixel_ms = pictured.ms / (width * height);
     }
 
+    /// Notes what an image took, ms.
+    pub(super) fn pace(&mut self, image_ms: f64) {
+        self.image_ms = image_ms;
+    }
+
     /// Pixels of the picture for each of the panel's, along an edge: fewer while something moves
     /// and the device is slow, more where it is quick, against jagged outlines.
     fn detail(&self, pixels: f64, now: Instant) -> f64 {
-        let moving = self.moving.is_some_and(|until| now < until);
+        let moves = |until: Option<Instant>| until.is_some_and(|until| now < until);
         let ms = pixels * self.pixel_ms;
-        let fine = if moving { SWIFT / 4.0 } else { 4.0 * SWIFT };
+        let (budget, fine) = match self.moving.map(moves) {
+            [true, _] => (SWIFT, SWIFT / 4.0),
+            [false, true] => (SWIFT.max(SHARE * self.image_ms), SWIFT / 4.0),
+            [false, false] => (f64::INFINITY, 4.0 * SWIFT),
+        };
         if ms > 0.0 && 4.0 * ms < fine {
             return 2.0;
         }
         let steps = [1.0, 0.5, 1.0 / 3.0];
-        let quick = |detail: &f64| !moving || ms * detail * detail <= SWIFT;
+        let quick = |detail: &f64| ms * detail * detail <= budget;
         steps.into_iter().find(quick).unwrap_or(COARSEST)
     }
 
@@ -77,15 +91,16 @@ impl State {
     fn watch(&mut self, ui: &Ui, model: &Model, eye_moved: bool) {
         let now = Instant::now();
         let changed = std::mem::replace(&mut self.revision, model.revision()) != model.revision();
-        if eye_moved || changed || model.clock.runs() {
-            self.moving = Some(now + REST);
-        }
-        if let Some(until) = self.moving {
-            let left = until.saturating_duration_since(now);
-            if left == Duration::ZERO {
-                self.moving = None;
-            } else if !model.clock.runs() {
-                ui.ctx().request_repaint_after(left);
+        let moved = [eye_moved, changed || model.clock.runs()];
+        for (until, moved) in self.moving.iter_mut().zip(moved) {
+            if moved {
+                *until = Some(now + REST);
+            }
+            let left = until.map(|until| until.saturating_duration_since(now));
+            match left {
+                None => {}
+                Some(Duration::ZERO) => *until = None,
+                Some(left) => ui.ctx().request_repaint_after(left),
             }
         }
     }
@@ -233,20 +248,28 @@ mod tests {
     #[test]
     fn a_slow_device_is_coarse_while_the_eye_moves_and_a_quick_one_fine() {
         let now = Instant::now();
-        let state = |moving: bool, pixel_ms| State {
-            moving: moving.then_some(now + REST),
-            pixel_ms,
-            ..State::default()
+        let detail = |moving: [bool; 2], ms: f64| {
+            let state = State {
+                moving: moving.map(|moves| moves.then_some(now + REST)),
+                pixel_ms: ms / 1e5,
+                image_ms: 2000.0,
+                ..State::default()
+            };
+            state.detail(1e5, now)
         };
-        let detail = |moving, ms: f64| state(moving, ms / 1e5).detail(1e5, now);
-        assert_eq!(detail(false, 500.0), 1.0);
-        assert_eq!(detail(true, 5000.0), COARSEST);
-        assert_eq!(detail(true, 500.0), 1.0 / 3.0);
-        assert_eq!(detail(true, 100.0), 0.5);
-        assert_eq!(detail(true, 50.0), 1.0);
-        assert_eq!(detail(true, 1.0), 2.0);
-        assert_eq!(detail(false, 50.0), 2.0);
-        assert_eq!(detail(false, 0.0), 1.0, "not measured yet");
+        let (eye, anatomy, rest) = ([true, false], [false, true], [false; 2]);
+        assert_eq!(detail(rest, 500.0), 1.0);
+        assert_eq!(detail(rest, 50.0), 2.0);
+        assert_eq!(detail(rest, 0.0), 1.0, "not measured yet");
+        assert_eq!(detail(eye, 5000.0), COARSEST);
+        assert_eq!(detail(eye, 500.0), 1.0 / 3.0);
+        assert_eq!(detail(eye, 100.0), 0.5);
+        assert_eq!(detail(eye, 50.0), 1.0);
+        assert_eq!(detail(eye, 1.0), 2.0);
+        assert_eq!(detail([true; 2], 500.0), 1.0 / 3.0);
+        // A seventh of an image's two seconds.
+        assert_eq!(detail(anatomy, 250.0), 1.0);
+        assert_eq!(detail(anatomy, 500.0), 0.5);
     }
 
     #[test]

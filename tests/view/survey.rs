@@ -49,10 +49,14 @@ fn tissues_are_hidden_and_the_view_closes() {
     };
     desk.wait_for("the anatomy", |d| brightness(&d.grab(VIEW)) > 15.0);
     let console = desk.settle(CONSOLE);
-    // "Cut" off: the half before the image plane comes back.
-    let cut = desk.settle(VIEW);
+    // "Cut": the half before the image plane goes, and comes back.
+    let whole = desk.settle(VIEW);
     desk.click((549, 17));
-    desk.wait_for("the whole cyst", |d| difference(&d.grab(VIEW), &cut) > 0.2);
+    desk.wait_for("the section", |d| difference(&d.grab(VIEW), &whole) > 0.2);
+    desk.click((549, 17));
+    desk.wait_for("the whole cyst", |d| {
+        difference(&d.grab(VIEW), &whole) < 0.1
+    });
     // The list, and "None" in it.
     desk.click((506, 17));
     let open = desk.settle(VIEW);
@@ -61,10 +65,10 @@ fn tissues_are_hidden_and_the_view_closes() {
     desk.settle(VIEW);
     desk.press(Key::Letter('v'));
     desk.wait_for("the image in the view's place", |d| {
-        difference(&d.grab(VIEW), &cut) > 5.0
+        difference(&d.grab(VIEW), &whole) > 5.0
     });
     desk.press(Key::Letter('v'));
-    desk.wait_for("the view", |d| difference(&d.grab(VIEW), &cut) < 20.0);
+    desk.wait_for("the view", |d| difference(&d.grab(VIEW), &whole) < 20.0);
     assert!(difference(&desk.settle(CONSOLE), &console) < 1.0);
     desk.quit();
 }

@@ -16,7 +16,7 @@ use Show::{Hidden, SeeThrough, Solid};
 /// Colours (sRGB) of tissues as anatomical atlases have them, by a word of their names; the first
 /// that is found counts. Layers and vessels that enclose organs are glass, those around everything
 /// but the skin are left out: one wants to see the organs.
-const KNOWN: [(&str, [u8; 3], Show); 34] = [
+const KNOWN: [(&str, [u8; 3], Show); 36] = [
     ("membranous", [236, 226, 200], Solid),
     ("bone", [236, 226, 200], Solid),
     ("cartilage", [196, 214, 216], Solid),
@@ -25,6 +25,8 @@ const KNOWN: [(&str, [u8; 3], Show); 34] = [
     ("fat", [238, 208, 128], Hidden),
     ("muscle", [172, 78, 70], Hidden),
     ("lung", [232, 164, 166], SeeThrough),
+    ("pelvis", [204, 150, 132], SeeThrough),
+    ("chest", [204, 150, 132], Hidden),
     ("liver", [158, 78, 58], Solid),
     ("spleen", [128, 58, 84], Solid),
     ("pancreas", [222, 178, 108], Solid),

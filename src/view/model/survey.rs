@@ -95,7 +95,7 @@ impl Survey {
         }
         Self {
             camera: overview(&scene.world_from_probe, &scene.probe),
-            cut: true,
+            cut: false,
             shown,
             tissues: scene.instances.iter().map(|i| i.tissue).collect(),
             wires: (scene.wires.iter())
