@@ -2,7 +2,7 @@
 //! to the window.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
@@ -11,22 +11,23 @@ use winit::window::Window;
 use super::engine::{Frame, News};
 use super::files::Files;
 use super::inputs::{self, Inputs};
-use super::layout::Places;
 use super::link::{Bell, Link};
 use super::look::{Look, Pictured};
 use super::model::{File, Kept};
 use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
-use super::statistics::{Sample, Times};
-use super::timing::{self, costs};
-use super::tools::{Tools, cropped};
-use super::{Model, Options, ViewError, keys, layout, real, style, survey};
-use crate::gpu::{AdapterKind, Device, GpuError, Interface, Painted, Placed, Shot, ValidationLog};
+use super::timing;
+use super::tools::Tools;
+use super::{Model, Options, ViewError, keys, style, survey};
+use crate::gpu::{AdapterKind, Device, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
 use crate::scene::settings::Machine;
 use crate::sim::SimError;
+
+mod paint;
+mod scenes;
 
 /// A window with its simulation, and what the user has made of them.
 pub(super) struct Open {
@@ -92,8 +93,8 @@ impl Plan {
     }
 }
 
-/// Input for a window on `device`, its interface `zoom` times as large as usual. Textures of an interface before are gone with its device: this
-/// one sends them again.
+/// Input for a window on `device`, its interface `zoom` times as large as usual. Textures of an
+/// interface before are gone with its device: this one sends them again.
 fn interface(window: &Window, zoom: f32, device: &Device) -> egui_winit::State {
     let context = egui::Context::default();
     context.set_zoom_factor(zoom);
@@ -153,25 +154,7 @@ impl Open {
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
-        let made = Self {
-            frame: None,
-            pictured: None,
-            session,
-            told: model.revision(),
-            look: None,
-            model,
-            state,
-            fresh: false,
-            pictures_ms: Vec::new(),
-            touched: now,
-            again: None,
-            input,
-            window,
-            title: String::new(),
-            opening: None,
-            coming: None,
-        };
-        Ok((made, log))
+        Ok((Self::with(session, model, state, input, window), log))
     }
 
     /// The same window on a new device, after `error`. The log is the new device's.
@@ -188,7 +171,6 @@ impl Open {
             mut state,
             input,
             window,
-            touched,
             title,
             opening,
             ..
@@ -208,6 +190,22 @@ impl Open {
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
         let made = Self {
+            title,
+            opening,
+            ..Self::with(session, model, state, input, window)
+        };
+        Ok((made, log))
+    }
+
+    /// Before the first picture.
+    fn with(
+        session: Session,
+        model: Model,
+        state: State,
+        input: egui_winit::State,
+        window: Arc<Window>,
+    ) -> Self {
+        Self {
             frame: None,
             pictured: None,
             session,
@@ -217,15 +215,14 @@ impl Open {
             state,
             fresh: false,
             pictures_ms: Vec::new(),
-            touched,
+            touched: Instant::now(),
             again: None,
             input,
             window,
-            title,
-            opening,
+            title: String::new(),
+            opening: None,
             coming: None,
-        };
-        Ok((made, log))
+        }
     }
 
     /// Takes over what simulation and devices have to say; an error after which nothing more will
@@ -265,70 +262,6 @@ impl Open {
         failed
     }
 
-    /// Begins to open a scene where the user wants it.
-    pub(super) fn begin(&mut self, plan: &Plan) {
-        let files = &mut self.state.files;
-        if let Some(path) = files.wanted.take() {
-            // Said of this file; another one speaks for itself.
-            let of_this = path == self.model.file.path;
-            let overrides = self
-                .model
-                .file
-                .overrides
-                .iter()
-                .filter(|_| of_this)
-                .cloned();
-            files.opening = true;
-            let proxy = plan.proxy.clone();
-            self.opening = Some(Opening::begin(path, overrides.collect(), proxy));
-        }
-    }
-
-    /// Hands a scene that has been read to the simulation.
-    fn receive(&mut self, plan: &Plan) {
-        let device = &self.session.device;
-        let Some(opening) = &self.opening else { return };
-        let Some(ready) = opening.ready(&plan.options, device, Instant::now()) else {
-            return;
-        };
-        self.opening = None;
-        match ready {
-            Ok(opened) => {
-                let (scene, order) = (opened.scene.clone(), opened.model.order());
-                self.session.engine.open(scene, order);
-                self.coming = Some(opened);
-            }
-            Err(problem) => self.refuse(problem),
-        }
-    }
-
-    /// Goes on with the scene that the simulation has taken up.
-    fn adopt(&mut self, plan: &mut Plan) {
-        let opened = self.coming.take();
-        let Opened { scene, model } = opened.expect("nothing else was handed over");
-        self.told = model.revision();
-        self.model = model;
-        // It shows the scene before, as does all that was measured in it.
-        self.frame = None;
-        (self.pictured, self.look) = (None, None);
-        (self.state.tissue, self.state.mesh) = (0, 0);
-        self.state.tools.lose();
-        self.state.tools.sheet = Default::default();
-        self.state.mmode = Default::default();
-        self.state.inputs.calibrate(scene.tracker.clone());
-        plan.scene = scene;
-        self.state.files.opening = false;
-        self.state.files.close();
-    }
-
-    fn refuse(&mut self, problem: String) {
-        self.coming = None;
-        self.state.files.opening = false;
-        if let Err(problem) = self.state.files.refuse(problem) {
-            self.state.problem = Some(problem);
-        }
-    }
-
     /// Names scene and file, and whether there is something to save.
     fn entitle(&mut self) {
         let (model, files) = (&self.model, &self.state.files);
@@ -353,89 +286,6 @@ impl Open {
         }
     }
 
-    /// One picture of the window; with its pixels where they are wanted and there is an image.
-    pub(super) fn paint(
-        &mut self,
-        times: &mut Times,
-        shot: bool,
-    ) -> Result<Option<Shot>, GpuError> {
-        let input = self.input.take_egui_input(&self.window);
-        let context = self.input.egui_ctx().clone();
-        let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
-        let pictured = self.pictured.as_ref();
-        let (mut shown, mut places) = (None, Places::default());
-        let mut output = context.run_ui(input, |ui| {
-            keys::apply(ui.ctx(), model, state, touched);
-            shown = state.tools.shown(model, ui.ctx());
-            let pictures = (shown.as_ref(), pictured);
-            places = layout::show(ui, model, state, times, pictures, touched);
-        });
-        self.tell();
-        self.point(&places, output.pixels_per_point);
-        self.entitle();
-        let platform = std::mem::take(&mut output.platform_output);
-        self.input.handle_platform_output(&self.window, platform);
-        let scale = output.pixels_per_point;
-        let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
-        let model = &self.model;
-        let image = shown.as_ref().map(|frame| real::image(frame, model));
-        let survey = self.pictured.as_ref().map(|pictured| &pictured.image);
-        let rects = [
-            (image, places.image.as_ref().map(|place| place.rect)),
-            (survey, places.survey.map(|place| place.rect)),
-        ];
-        let placed: Vec<Placed> = (rects.into_iter())
-            .filter_map(|(image, rect)| {
-                let r = rect? * scale;
-                let to = [r.left(), r.top(), r.right(), r.bottom()];
-                Some(Placed { image: image?, to })
-            })
-            .collect();
-        let size = self.window.inner_size();
-        let looked = self.pictured.as_ref().map(|pictured| &pictured.look);
-        let shot = shot && image.is_some() && looked == self.look.as_ref();
-        let interface = Interface {
-            pixels_per_point: scale,
-            primitives: &primitives,
-            textures: std::mem::take(&mut output.textures_delta),
-        };
-        let size = [size.width, size.height];
-        let painter = &mut self.session.painter;
-        let tools = &mut self.state.tools;
-        let marked = tools.wants_shot() && painter.can_be_read();
-        let painted = painter.paint(size, &placed, interface, shot || marked)?;
-        let picture = match &painted {
-            Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
-            Painted::Skipped => None,
-        };
-        let around = picture.zip(places.image.as_ref()).map(|(picture, place)| {
-            let r = place.area * scale;
-            cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
-        });
-        tools.save(&self.model, around);
-        self.schedule(&output);
-        match painted {
-            Painted::Shown(picture) => {
-                self.seen(times);
-                Ok(picture.filter(|_| shot))
-            }
-            Painted::Skipped => Ok(None),
-        }
-    }
-
-    /// Tells the simulation how the anatomy is looked at.
-    fn point(&mut self, places: &Places, scale: f32) {
-        let (model, state) = (&self.model, &self.state.survey);
-        let look = (places.survey).map(|place| place.look(model, state, scale));
-        if look != self.look {
-            if look.is_none() {
-                self.pictured = None;
-            }
-            self.session.engine.look(look.clone());
-            self.look = look;
-        }
-    }
-
     /// Tells the simulation what has changed.
     fn tell(&mut self) {
         // A scene that is coming has settings of its own.
@@ -443,37 +293,6 @@ impl Open {
             self.told = self.model.revision();
             let (order, frozen) = (self.model.order(), self.model.frozen);
             self.session.engine.order(order, frozen);
-        }
-    }
-
-    /// Draws again when the interface wants to move.
-    fn schedule(&mut self, output: &egui::FullOutput) {
-        let root = output.viewport_output.get(&egui::ViewportId::ROOT);
-        let delay = root.map_or(Duration::MAX, |root| root.repaint_delay);
-        self.again = match delay {
-            Duration::ZERO => {
-                self.window.request_redraw();
-                None
-            }
-            // Beyond what an instant can hold: never.
-            delay => Instant::now().checked_add(delay),
-        };
-    }
-
-    /// Notes that the picture has been handed to the screen.
-    fn seen(&mut self, times: &mut Times) {
-        (self.pictures_ms.drain(..)).for_each(|ms| times.add_survey(ms));
-        if !std::mem::take(&mut self.fresh) {
-            return;
-        }
-        if let Some(frame) = &self.frame {
-            times.add(Sample {
-                stages: frame.timings.passes.clone(),
-                wall: frame.wall_ms,
-                update: frame.update_ms,
-                strategy: costs::strategies(&frame.settings.strategies),
-                latency: frame.at.elapsed().as_secs_f64() * 1e3,
-            });
         }
     }
 

@@ -1,0 +1,127 @@
+//! A picture of the window.
+
+use std::time::{Duration, Instant};
+
+use super::Open;
+use crate::gpu::{GpuError, Interface, Painted, Placed, Shot};
+use crate::view::layout::{self, Places};
+use crate::view::statistics::{Sample, Times};
+use crate::view::timing::costs;
+use crate::view::tools::cropped;
+use crate::view::{keys, real};
+
+impl Open {
+    /// One picture of the window; with its pixels where they are wanted and there is an image.
+    pub(in crate::view) fn paint(
+        &mut self,
+        times: &mut Times,
+        shot: bool,
+    ) -> Result<Option<Shot>, GpuError> {
+        let input = self.input.take_egui_input(&self.window);
+        let context = self.input.egui_ctx().clone();
+        let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
+        let pictured = self.pictured.as_ref();
+        let (mut shown, mut places) = (None, Places::default());
+        let mut output = context.run_ui(input, |ui| {
+            keys::apply(ui.ctx(), model, state, touched);
+            shown = state.tools.shown(model, ui.ctx());
+            let pictures = (shown.as_ref(), pictured);
+            places = layout::show(ui, model, state, times, pictures, touched);
+        });
+        self.tell();
+        self.point(&places, output.pixels_per_point);
+        self.entitle();
+        let platform = std::mem::take(&mut output.platform_output);
+        self.input.handle_platform_output(&self.window, platform);
+        let scale = output.pixels_per_point;
+        let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
+        let model = &self.model;
+        let image = shown.as_ref().map(|frame| real::image(frame, model));
+        let survey = self.pictured.as_ref().map(|pictured| &pictured.image);
+        let rects = [
+            (image, places.image.as_ref().map(|place| place.rect)),
+            (survey, places.survey.map(|place| place.rect)),
+        ];
+        let placed: Vec<Placed> = (rects.into_iter())
+            .filter_map(|(image, rect)| {
+                let r = rect? * scale;
+                let to = [r.left(), r.top(), r.right(), r.bottom()];
+                Some(Placed { image: image?, to })
+            })
+            .collect();
+        let size = self.window.inner_size();
+        let looked = self.pictured.as_ref().map(|pictured| &pictured.look);
+        let shot = shot && image.is_some() && looked == self.look.as_ref();
+        let interface = Interface {
+            pixels_per_point: scale,
+            primitives: &primitives,
+            textures: std::mem::take(&mut output.textures_delta),
+        };
+        let size = [size.width, size.height];
+        let painter = &mut self.session.painter;
+        let tools = &mut self.state.tools;
+        let marked = tools.wants_shot() && painter.can_be_read();
+        let painted = painter.paint(size, &placed, interface, shot || marked)?;
+        let picture = match &painted {
+            Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
+            Painted::Skipped => None,
+        };
+        let around = picture.zip(places.image.as_ref()).map(|(picture, place)| {
+            let r = place.area * scale;
+            cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
+        });
+        tools.save(&self.model, around);
+        self.schedule(&output);
+        match painted {
+            Painted::Shown(picture) => {
+                self.seen(times);
+                Ok(picture.filter(|_| shot))
+            }
+            Painted::Skipped => Ok(None),
+        }
+    }
+
+    /// Tells the simulation how the anatomy is looked at.
+    fn point(&mut self, places: &Places, scale: f32) {
+        let (model, state) = (&self.model, &self.state.survey);
+        let look = (places.survey).map(|place| place.look(model, state, scale));
+        if look != self.look {
+            if look.is_none() {
+                self.pictured = None;
+            }
+            self.session.engine.look(look.clone());
+            self.look = look;
+        }
+    }
+
+    /// Draws again when the interface wants to move.
+    fn schedule(&mut self, output: &egui::FullOutput) {
+        let root = output.viewport_output.get(&egui::ViewportId::ROOT);
+        let delay = root.map_or(Duration::MAX, |root| root.repaint_delay);
+        self.again = match delay {
+            Duration::ZERO => {
+                self.window.request_redraw();
+                None
+            }
+            // Beyond what an instant can hold: never.
+            delay => Instant::now().checked_add(delay),
+        };
+    }
+
+    /// Notes that the picture has been handed to the screen.
+    fn seen(&mut self, times: &mut Times) {
+        (self.pictures_ms.drain(..)).for_each(|ms| times.add_survey(ms));
+        if !std::mem::take(&mut self.fresh) {
+            return;
+        }
+        if let Some(frame) = &self.frame {
+            times.add(Sample {
+                stages: frame.timings.passes.clone(),
+                wall: frame.wall_ms,
+                update: frame.update_ms,
+                strategy: costs::strategies(&frame.settings.strategies),
+                latency: frame.at.elapsed().as_secs_f64() * 1e3,
+            });
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! Another scene in the same window.
+
+use std::time::Instant;
+
+use super::{Open, Plan};
+use crate::view::opening::{Opened, Opening};
+
+impl Open {
+    /// Begins to open a scene where the user wants it.
+    pub(in crate::view) fn begin(&mut self, plan: &Plan) {
+        let files = &mut self.state.files;
+        if let Some(path) = files.wanted.take() {
+            // Said of this file; another one speaks for itself.
+            let of_this = path == self.model.file.path;
+            let overrides = self
+                .model
+                .file
+                .overrides
+                .iter()
+                .filter(|_| of_this)
+                .cloned();
+            files.opening = true;
+            let proxy = plan.proxy.clone();
+            self.opening = Some(Opening::begin(path, overrides.collect(), proxy));
+        }
+    }
+
+    /// Hands a scene that has been read to the simulation.
+    pub(super) fn receive(&mut self, plan: &Plan) {
+        let device = &self.session.device;
+        let Some(opening) = &self.opening else { return };
+        let Some(ready) = opening.ready(&plan.options, device, Instant::now()) else {
+            return;
+        };
+        self.opening = None;
+        match ready {
+            Ok(opened) => {
+                let (scene, order) = (opened.scene.clone(), opened.model.order());
+                self.session.engine.open(scene, order);
+                self.coming = Some(opened);
+            }
+            Err(problem) => self.refuse(problem),
+        }
+    }
+
+    /// Goes on with the scene that the simulation has taken up.
+    pub(super) fn adopt(&mut self, plan: &mut Plan) {
+        let opened = self.coming.take();
+        let Opened { scene, model } = opened.expect("nothing else was handed over");
+        self.told = model.revision();
+        self.model = model;
+        // It shows the scene before, as does all that was measured in it.
+        self.frame = None;
+        (self.pictured, self.look) = (None, None);
+        (self.state.tissue, self.state.mesh) = (0, 0);
+        self.state.tools.lose();
+        self.state.tools.sheet = Default::default();
+        self.state.mmode = Default::default();
+        self.state.inputs.calibrate(scene.tracker.clone());
+        plan.scene = scene;
+        self.state.files.opening = false;
+        self.state.files.close();
+    }
+
+    pub(super) fn refuse(&mut self, problem: String) {
+        self.coming = None;
+        self.state.files.opening = false;
+        if let Err(problem) = self.state.files.refuse(problem) {
+            self.state.problem = Some(problem);
+        }
+    }
+}
