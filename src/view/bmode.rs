@@ -160,7 +160,9 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     );
     if let Some((line, is_good)) = contact(frame, model) {
         let colour = if is_good { style::FAINT } else { style::WARN };
-        painter.text(at + vec2(0.0, 36.0), Align2::RIGHT_TOP, line, small, colour);
+        // Above the ruler's first label.
+        let font = FontId::proportional(11.0);
+        painter.text(at + vec2(0.0, 34.0), Align2::RIGHT_TOP, line, font, colour);
     }
 }
 
