@@ -121,7 +121,7 @@ fn the_pointer_slides_leans_and_turns_the_probe() {
     home(&mut desk);
 
     // Beside the body the drag turns the view, and the image stays.
-    let view = desk.settle(VIEW);
+    let view = desk.rest(VIEW);
     desk.pull((920, 60), (860, 90));
     desk.wait_for("the view to turn", |d| {
         difference(&d.grab(VIEW), &view) > 0.5

@@ -231,6 +231,23 @@ impl Desk {
         self.grab(part)
     }
 
+    /// Waits until a part stays as it is because the program has nothing left to do: on a slow device
+    /// what comes last, as the finest picture of the anatomy, may be seconds away.
+    pub fn rest(&mut self, part: [u16; 4]) -> Vec<u8> {
+        let mut last = (self.grab(part), self.processor_time());
+        let mut since = Instant::now();
+        self.wait_for("the program to come to rest", |desk| {
+            let now = (desk.grab(part), desk.processor_time());
+            // A tick of the clock that counts.
+            let worked = now.1 - last.1 > Duration::from_millis(10);
+            if worked || now.0 != last.0 {
+                (last, since) = (now, Instant::now());
+            }
+            since.elapsed() > Duration::from_secs(1)
+        });
+        last.0
+    }
+
     /// Waits until something is so.
     pub fn wait_for(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let began = Instant::now();
