@@ -161,6 +161,7 @@ impl Simulator {
         let passes = &mut self.passes;
         let mut cmd = self.frames.begin()?;
         self.update_time = passes.update(&mut cmd, scene, self.coincident, index)?;
+        passes.touch(&mut cmd, scene)?;
         passes.clear(&mut cmd);
         passes.origin(&mut cmd)?;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {

@@ -37,14 +37,19 @@ impl Passes {
         self.world.update(cmd, scene)?;
         (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index);
         cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
-        let coupling = Coupling::of(scene, &mut self.skins);
-        let shares = contact::table(scene, coupling.as_ref());
-        cmd.write(&self.buffers.contact, 0, bytemuck::cast_slice(&shares))?;
-        self.touch = coupling.map(|coupling| coupling.touch);
         if let Some(fusion) = &mut self.fusion {
             fusion.update(cmd, scene)?;
         }
         Ok(began.elapsed())
+    }
+
+    /// Holds the probe's face against the skin: which of its elements are coupled.
+    pub(super) fn touch(&mut self, cmd: &mut Commands, scene: &Scene) -> Result<(), GpuError> {
+        let coupling = Coupling::of(scene, &mut self.skins);
+        let shares = contact::table(scene, coupling.as_ref());
+        cmd.write(&self.buffers.contact, 0, bytemuck::cast_slice(&shares))?;
+        self.touch = coupling.map(|coupling| coupling.touch);
+        Ok(())
     }
 
     pub(super) fn clear(&self, cmd: &mut Commands) {

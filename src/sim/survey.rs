@@ -16,8 +16,10 @@ use crate::gpu::{
 const RIM: f64 = 3.0;
 /// Half the width of a probe whose face is a point, mm.
 const POINT: f64 = 10.0;
-/// Height of the probe's head, and of head and handle, mm.
-const HEIGHT: [f32; 2] = [32.0, 105.0];
+/// Height of the probe's head above the middle of its face, mm.
+pub const HEAD: f64 = 32.0;
+/// Height of head and handle, mm.
+pub const HANDLE: f64 = 105.0;
 
 /// What is seen, from where.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,8 +82,8 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
     [
         (half_width + RIM) as f32,
         (half_thickness + RIM) as f32,
-        HEIGHT[0],
-        HEIGHT[1],
+        HEAD as f32,
+        HANDLE as f32,
     ]
 }
 
@@ -101,23 +103,35 @@ impl Surveyor {
         sight: &Sight,
     ) -> Result<Self, GpuError> {
         let stem = format!("survey_{}", tracer.suffix());
-        let new = |name: &str, size: u64| device.buffer(name, size.max(16), BufferKind::Storage);
+        let size = size_of::<layout::Survey>() as u64;
+        let [looks, picture] = buffers(device, sight)?;
         Ok(Self {
             kernel: Kernel::new(device, &stem, library.words(&stem), &[])?,
-            constants: new("survey", size_of::<layout::Survey>() as u64)?,
-            looks: new("looks", 16 * sight.looks.len() as u64)?,
-            picture: new("survey picture", bytes(sight))?,
+            constants: device.buffer("survey", size, BufferKind::Storage)?,
+            looks,
+            picture,
         })
     }
 
     fn holds(&self, sight: &Sight) -> bool {
-        self.picture.size() >= bytes(sight) && self.looks.size() >= 16 * sight.looks.len() as u64
+        let [looks, picture] = bytes(sight);
+        self.looks.size() >= looks && self.picture.size() >= picture
     }
 }
 
-/// Of the picture.
-fn bytes(sight: &Sight) -> u64 {
-    4 * u64::from(sight.size[0]) * u64::from(sight.size[1])
+/// Of looks and picture.
+fn bytes(sight: &Sight) -> [u64; 2] {
+    let [width, height] = sight.size.map(u64::from);
+    [16 * sight.looks.len() as u64, 4 * width * height].map(|size| size.max(16))
+}
+
+/// Looks and picture.
+fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError> {
+    let [looks, picture] = bytes(sight);
+    Ok([
+        device.buffer("looks", looks, BufferKind::Storage)?,
+        device.buffer("survey picture", picture, BufferKind::Storage)?,
+    ])
 }
 
 impl Simulator {
@@ -137,13 +151,15 @@ impl Simulator {
     ) -> Result<FrameTimings, SimError> {
         let passes = &self.passes;
         assert_eq!(sight.looks.len(), passes.world.rows().len(), "looks");
-        let surveyor = match self.surveyor.take().filter(|made| made.holds(sight)) {
+        let mut surveyor = match self.surveyor.take() {
             Some(made) => made,
-            None => {
-                self.frames.wait()?;
-                Surveyor::new(&self.device, library, passes.world.tracer(), sight)?
-            }
+            None => Surveyor::new(&self.device, library, passes.world.tracer(), sight)?,
         };
+        if !surveyor.holds(sight) {
+            // The pipeline stays: a window that is dragged larger asks for many sizes.
+            self.frames.wait()?;
+            [surveyor.looks, surveyor.picture] = buffers(&self.device, sight)?;
+        }
         let mut cmd = self.frames.begin()?;
         cmd.scope("survey");
         surveyor.record(&mut cmd, sight, passes, self.fused)?;
