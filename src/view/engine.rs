@@ -63,8 +63,6 @@ pub struct Frame {
     pub image: Image,
     /// The same with its acquired pixels coloured, where that was asked for and there are some.
     pub tinted: Option<Image>,
-    /// Its pixels, where [`Order::reads_back`].
-    pub pixels: Option<Arc<Pixels>>,
     /// Where it lies.
     pub sector: Sector,
     /// The probe that it was made with.
@@ -103,8 +101,9 @@ const PUT_OFF: Duration = Duration::from_millis(300);
 
 /// What the simulation has to say.
 pub enum News {
-    /// A picture.
-    Frame(Box<Frame>),
+    /// A picture; its pixels, where [`Order::reads_back`]. They are not the frame's, of which the loop
+    /// holds hundreds.
+    Frame(Box<Frame>, Option<Pixels>),
     /// A picture of the anatomy.
     Survey(Box<Pictured>),
     /// An order could not be carried out; the next one may.

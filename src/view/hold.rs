@@ -11,11 +11,8 @@ use super::model::{Axis, Camera, Model, Source};
 use super::style;
 use super::survey::Place;
 use crate::probe::Probe;
+use crate::sim::survey::{HANDLE, HEAD};
 
-/// Length of the probe's handle, by which it is leaned, mm.
-const HANDLE: f64 = 105.0;
-/// Height of its head, mm.
-const HEAD: f64 = 32.0;
 /// What is this near to the probe, points, means the probe.
 const NEAR: f32 = 16.0;
 /// A wheel's notch, points, turns the probe by so much, rad.

@@ -77,6 +77,8 @@ pub(super) fn show(
             .resizable(false)
             .exact_size(mmode::HEIGHT)
             .show(ui, |ui| mmode::show(ui, model, &mut state.mmode));
+    } else {
+        state.mmode.close();
     }
     // Transparent: the pictures are below the interface.
     let room = survey::width(ui.available_width()).filter(|_| state.survey.open && !alone);

@@ -119,20 +119,27 @@ impl Broadcast {
         }
     }
 
-    /// Offers a finished picture with its constants and the pose at which it was taken.
+    /// Offers a finished picture, with its pixels where they have been read, its constants and the pose
+    /// at which it was taken.
     pub(super) fn offer(
         &mut self,
         image: &Image,
+        rgba: Option<&[u8]>,
         constants: &layout::Frame,
         pose: DAffine3,
     ) -> Result<(), GpuError> {
         self.last = Some((image.clone(), *constants, pose));
-        self.again()
+        self.send(rgba)
     }
 
-    /// Offers the last picture again, as to a client that has just come. It is copied to the host
-    /// only where there is a client; who takes it when is the server's business.
+    /// Offers the last picture again, as to a client that has just come.
     pub(super) fn again(&self) -> Result<(), GpuError> {
+        self.send(None)
+    }
+
+    /// The picture is copied to the host only where there is a client; who takes it when is the server's
+    /// business.
+    fn send(&self, rgba: Option<&[u8]>) -> Result<(), GpuError> {
         let Some((image, constants, pose)) = &self.last else {
             return Ok(());
         };
@@ -147,8 +154,10 @@ impl Broadcast {
         if clients == 0 {
             return Ok(());
         }
-        let rgba = self.device.read_back_image(image)?;
-        let picture = Picture::new(constants, &rgba);
+        let picture = match rgba {
+            Some(rgba) => Picture::new(constants, rgba),
+            None => Picture::new(constants, &self.device.read_back_image(image)?),
+        };
         if let Some(server) = &*self.link.lock() {
             server.publish(picture, pose);
         }

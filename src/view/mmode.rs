@@ -29,8 +29,8 @@ pub(super) struct Panel {
     window: f64,
     /// What is measured.
     span: Option<Span>,
-    /// The strip on the device.
-    texture: Option<TextureHandle>,
+    /// The strip on the device, and what is in it: revision, seconds across, pixels across.
+    texture: Option<(TextureHandle, (u64, f64, usize))>,
 }
 
 impl Default for Panel {
@@ -40,6 +40,13 @@ impl Default for Panel {
             span: None,
             texture: None,
         }
+    }
+}
+
+impl Panel {
+    /// Gives the strip's texture back: the next strip begins anew.
+    pub(super) fn close(&mut self) {
+        self.texture = None;
     }
 }
 
@@ -157,14 +164,14 @@ fn measured(ui: &mut Ui, span: Option<Span>) {
 fn draw(ui: &Ui, strip: &Strip, panel: &mut Panel, inner: Rect, end: f64) {
     let pixels = inner.width() * ui.ctx().pixels_per_point();
     let width = (pixels as usize).clamp(16, WIDEST);
-    let raster = strip.raster(end, panel.window, width);
-    let image = ColorImage::from_gray([width, ROWS], &raster);
-    let texture = panel.texture.get_or_insert_with(|| {
-        let empty = ColorImage::from_gray([1, 1], &[0]);
-        ui.ctx()
-            .load_texture("M-mode", empty, TextureOptions::LINEAR)
-    });
-    texture.set(image, TextureOptions::LINEAR);
+    let wanted = (strip.revision(), panel.window, width);
+    let drawn = panel.texture.take().filter(|(_, drawn)| *drawn == wanted);
+    let (texture, _) = panel.texture.insert(drawn.unwrap_or_else(|| {
+        let raster = strip.raster(end, panel.window, width);
+        let image = ColorImage::from_gray([width, ROWS], &raster);
+        let made = (ui.ctx()).load_texture("M-mode", image, TextureOptions::LINEAR);
+        (made, wanted)
+    }));
     let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
     ui.painter().image(texture.id(), inner, all, Color32::WHITE);
 }

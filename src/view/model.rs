@@ -45,7 +45,7 @@ pub use survey::{Shown, Survey};
 use trajectory::Replay;
 pub use ways::{Kept, Ways};
 
-use super::engine::Frame;
+use super::engine::{Frame, Pixels};
 use crate::scene::graph::NodeKind;
 use crate::scene::{Scene, animation};
 use crate::sim::Tracer;
@@ -278,10 +278,10 @@ impl Model {
         self.revision
     }
 
-    /// Adds a picture to the strip of the M-mode. Where nothing in the scene moves the strip's time is
-    /// that of the pictures: what moves then is the probe.
-    pub fn film(&mut self, frame: &Frame) {
-        if let (Some(strip), Some(pixels)) = (&mut self.mmode, &frame.pixels) {
+    /// Adds a picture to the strip of the M-mode, if it is drawn. Where nothing in the scene moves the
+    /// strip's time is that of the pictures: what moves then is the probe.
+    pub fn film(&mut self, frame: &Frame, pixels: &Pixels) {
+        if let Some(strip) = &mut self.mmode {
             let seconds = match self.animated {
                 true => frame.seconds,
                 false => frame.at.duration_since(self.opened).as_secs_f64(),

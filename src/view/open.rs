@@ -232,12 +232,14 @@ impl Open {
         self.receive(plan);
         for news in self.session.engine.news() {
             match news {
-                News::Frame(frame) => {
+                News::Frame(frame, pixels) => {
                     self.model.follow(Instant::now());
                     if self.frame.is_none() {
                         self.model.begin_replay(Instant::now());
                     }
-                    self.model.film(&frame);
+                    if let Some(pixels) = pixels {
+                        self.model.film(&frame, &pixels);
+                    }
                     self.state.tools.record((*frame).clone());
                     self.state.survey.pace(frame.wall_ms);
                     self.frame = Some(*frame);

@@ -79,9 +79,7 @@ impl Tools {
     }
 
     /// Keeps a finished image.
-    pub(super) fn record(&mut self, mut frame: Frame) {
-        // They are read back where they are wanted.
-        frame.pixels = None;
+    pub(super) fn record(&mut self, frame: Frame) {
         let is_like = |last: &Frame| {
             last.sector == frame.sector && last.image.extent() == frame.image.extent()
         };

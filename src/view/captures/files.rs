@@ -4,8 +4,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Cursor, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
-use crc::{CRC_32_ISO_HDLC, Crc};
-use image::{DynamicImage, GrayImage, ImageFormat, RgbaImage};
+use image::{DynamicImage, ImageFormat, RgbaImage};
 use serde_json::Value;
 
 use super::{CaptureError, Sidecar};
@@ -115,41 +114,34 @@ pub(super) fn grey_png(
     text: Option<&str>,
 ) -> Vec<u8> {
     let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
-    let picture = GrayImage::from_raw(width, height, grey).expect("one byte per pixel");
-    let bare = encoded(picture.into());
-    // Signature and header come first; scale and text may follow (PNG, third edition, 5.6).
-    let (head, rest) = bare.split_at(8 + 25);
     let per_metre = (1000.0 / pitch).round() as u32;
-    let scale = [&per_metre.to_be_bytes()[..], &per_metre.to_be_bytes(), &[1]].concat();
-    let mut out = [head, &chunk(*b"pHYs", &scale)].concat();
+    let mut out = Vec::new();
+    let mut encoder = png::Encoder::new(&mut out, width, height);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.set_pixel_dims(Some(png::PixelDimensions {
+        xppu: per_metre,
+        yppu: per_metre,
+        unit: png::Unit::Meter,
+    }));
     if let Some(text) = text {
-        // Neither compressed nor in a language.
-        let content = [b"insonify\0\0\0\0\0", text.as_bytes()].concat();
-        out.extend(chunk(*b"iTXt", &content));
+        let added = encoder.add_itxt_chunk("insonify".into(), text.into());
+        added.expect("nothing is written yet");
     }
-    out.extend(rest);
+    let written = encoder.write_header().and_then(|mut writer| {
+        writer.write_image_data(&grey)?;
+        writer.finish()
+    });
+    written.expect("one byte per pixel, into memory");
     out
 }
 
 /// As it is.
 pub(super) fn colour_png([width, height]: [u32; 2], rgba: &[u8]) -> Vec<u8> {
     let picture = RgbaImage::from_raw(width, height, rgba.to_vec()).expect("four bytes per pixel");
-    encoded(DynamicImage::from(picture).to_rgb8().into())
-}
-
-fn encoded(picture: DynamicImage) -> Vec<u8> {
     let mut out = Cursor::new(Vec::new());
-    let written = picture.write_to(&mut out, ImageFormat::Png);
+    let written = (DynamicImage::from(picture).to_rgb8()).write_to(&mut out, ImageFormat::Png);
     written.expect("a picture fits into memory twice");
     out.into_inner()
-}
-
-/// Length, type, content and check sum (PNG, third edition, 5.3).
-fn chunk(kind: [u8; 4], content: &[u8]) -> Vec<u8> {
-    let body = [&kind, content].concat();
-    let sum = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&body);
-    let length = (content.len() as u32).to_be_bytes();
-    [&length[..], &body, &sum.to_be_bytes()].concat()
 }
 
 #[cfg(test)]

@@ -94,7 +94,7 @@ impl Worker {
                 let frame = self.carry_out(&mut simulator, &order, index);
                 index += 1;
                 last = Some(order);
-                let told = frame.map(|frame| News::Frame(Box::new(frame)));
+                let told = frame.map(|(frame, pixels)| News::Frame(Box::new(frame), pixels));
                 if !self.report(told, simulator.is_none()) {
                     return;
                 }
@@ -213,7 +213,7 @@ impl Worker {
         simulator: &mut Option<(Simulator, Tracer)>,
         order: &Order,
         index: u32,
-    ) -> Result<Frame, SimError> {
+    ) -> Result<(Frame, Option<Pixels>), SimError> {
         let began = Instant::now();
         let seconds = order.clock.at(began);
         order.settings.apply(&mut self.scene);
@@ -254,7 +254,7 @@ impl Worker {
             true => {
                 let (width, height, rgba) = simulator.pixels()?;
                 let size = [width, height];
-                Some(Arc::new(Pixels { size, rgba }))
+                Some(Pixels { size, rgba })
             }
             false => None,
         };
@@ -265,9 +265,9 @@ impl Worker {
             took: began.elapsed(),
         });
         let constants = simulator.constants();
-        self.broadcast.offer(&image, constants, pose)?;
-        Ok(Frame {
-            pixels,
+        let rgba = pixels.as_ref().map(|pixels| pixels.rgba.as_slice());
+        self.broadcast.offer(&image, rgba, constants, pose)?;
+        let frame = Frame {
             sector: Sector {
                 left: f64::from(constants.image_left),
                 top: f64::from(constants.image_top),
@@ -289,6 +289,7 @@ impl Worker {
             memory: self.device.memory(),
             scene_memory: simulator.memory(),
             image_bytes: self.ring.bytes(),
-        })
+        };
+        Ok((frame, pixels))
     }
 }

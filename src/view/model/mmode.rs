@@ -26,6 +26,7 @@ pub struct Strip {
     line: u32,
     probe: Option<Probe>,
     columns: VecDeque<Column>,
+    revision: u64,
 }
 
 impl Strip {
@@ -47,12 +48,19 @@ impl Strip {
         if line != self.line {
             self.line = line;
             self.columns.clear();
+            self.revision += 1;
         }
+    }
+
+    /// Grows with every change.
+    pub fn revision(&self) -> u64 {
+        self.revision
     }
 
     /// Adds what an image shows along the line at `seconds`. A strip of another probe, or of a time
     /// that was left by going back, is gone; the same moment again replaces its column.
     pub fn add(&mut self, seconds: f64, probe: &Probe, sector: Sector, pixels: &Pixels) {
+        self.revision += 1;
         if self.probe.as_ref() != Some(probe) {
             self.columns.clear();
             self.probe = Some(probe.clone());
