@@ -1,11 +1,17 @@
-// Complex baseband deposit: an echo at one-way time T lands between two axial samples with the
-// phase of the two-way carrier, so that position is kept to a fraction of a sample.
+// Complex baseband deposit: an echo at one-way time T carries the phase of the two-way carrier there.
 
 const float FIXED_LIMIT = 1073741824.0; // 2^30
 
 vec2 carrier(float time) {
     float angle = -6.283185307 * fract(2.0 * frame.frequency * time);
     return vec2(cos(angle), sin(angle));
+}
+
+// What the three samples about the nearest one get of an echo that lies `f` samples, -1/2 to 1/2, behind
+// it: the parabola through them, whose centre is the echo's and whose spread is zero.
+vec3 deposit_shares(float f) {
+    float square = f * f;
+    return vec3(0.5 * (square - f), 1.0 - square, 0.5 * (square + f));
 }
 
 // `dither` in [0, 1): 0.5 rounds to the nearest; uniform ones keep the mean of what is less than a unit.

@@ -8,6 +8,14 @@ uvec4 pcg4d(uvec4 v) {
     return v;
 }
 
+uvec3 pcg3d(uvec3 v) {
+    v = v * 1664525u + 1013904223u;
+    v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
+    v ^= v >> 16u;
+    v.x += v.y * v.z; v.y += v.z * v.x; v.z += v.x * v.y;
+    return v;
+}
+
 // [0, 1) with 24 bits.
 float unit(uint bits) { return float(bits >> 8u) * (1.0 / 16777216.0); }
 

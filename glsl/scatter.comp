@@ -1,12 +1,12 @@
 #version 460
-// Echoes of scatterers and point targets along the segments of one line. One workgroup owns one
-// (line, chunk of its segments, window of samples) and gathers in shared memory, so that global
-// atomics happen once per sample. Threads work across lattice planes (or samples, in voxel mode).
+// Echoes of scatterers and point targets along the segments of one scanline. One workgroup owns one
+// (scanline, chunk of its segments, window of samples) and gathers in shared memory, so that global
+// atomics happen once per sample. A thread walks what one segment has in one bin of samples.
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "random.glsl"
 
-layout(local_size_x = 128) in;
+layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) readonly buffer TissueBuffer { Tissue tissues[]; };
@@ -26,20 +26,26 @@ layout(constant_id = 0) const bool DEFORMING = true;
 #include "probe.glsl"
 #include "field.glsl"
 #include "texture.glsl"
+#include "angles.glsl"
 #include "deposit.glsl"
 
-const uint THREADS = 128u;
-const uint WINDOW = 2048u;   // samples per workgroup: 16 KiB of shared memory
+const uint THREADS = 64u;
 const float POINT_SHIFT = 0.01234;   // of a layer's pitch
-const uint BATCH = 32u;      // segments whose work is shared out at once
+const float LOG2_E = 1.44269504;
+const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
+const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
+const uint PIECES = SCATTER_BIN / SCATTER_SLOT;   // of a bin, in which deformed tissue is searched
+const int SLOTS_BESIDE = BESIDE * int(PIECES);
+const float LEVEL_UNIT = 65536.0;         // of the integers by which levels are compared
+const int SILENT = -0x40000000;
 
-shared int echoes[2u * WINDOW];
-shared uint work_end[BATCH];
+shared int echoes[2u * SCATTER_WINDOW];
+shared int loudest[(BINS + 2u * uint(BESIDE)) * PIECES];   // per slot, of all segments of the scanline; also beside the window
+shared uint work_end[THREADS];
 shared uint shared_candidates;
 shared uint shared_deposits;
 
 uint window_begin;
-float layer_y;               // elevation of this line's layer, mm
 
 // A segment in the frame of its scatterers.
 struct Stretch {
@@ -48,6 +54,7 @@ struct Stretch {
     vec3 spread; float share;
     float speed; float absorption;
     vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
+    float layer_y;       // elevation of the line's layer, mm
     uint tissue; uint instance;
 };
 
@@ -70,9 +77,10 @@ Stretch world_stretch(uint at) {
     s.instance = segments[at].instance;
     s.speed = tissues[s.tissue].speed;
     s.absorption = tissues[s.tissue].absorption;
+    uint line = segments[at].line;
+    s.layer_y = elevation(line / frame.scanlines);
     s.off = vec2(0.0);
     if (frame.beam_width > 0.0) {
-        uint line = segments[at].line;
         vec3 o, d, lateral;
         probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
         s.off = vec2(dot(probe_point(s.o) - o, lateral), dot(probe_vector(s.d), lateral));
@@ -89,8 +97,10 @@ Stretch texture_stretch(uint at) {
     return s;
 }
 
-float kappa_at(Stretch s, float x) {
-    return frame.speed * (s.time + x / s.speed) / frame.sample_pitch;
+float samples_per_mm(Stretch s) { return frame.speed / (s.speed * frame.sample_pitch); }
+float kappa_at(Stretch s, float x) { return frame.speed * s.time / frame.sample_pitch + x * samples_per_mm(s); }
+float distance_at(Stretch s, float kappa) {
+    return (kappa * frame.sample_pitch / frame.speed - s.time) * s.speed;
 }
 
 uint row_at(float kappa) {
@@ -99,9 +109,14 @@ uint row_at(float kappa) {
 
 // A stretch with a number that is none has no echoes. NaN fails every comparison.
 bool is_finite(Stretch s) {
-    return abs(s.extent) < 1e18 && abs(s.time) < 1e18
-        && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)));
+    return abs(s.extent) < 1e18 && abs(s.time) < 1e18 && abs(s.weight) < 1e18 && abs(s.share) < 1e18
+        && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)))
+        && all(lessThan(abs(s.e_l), vec3(2.0))) && all(lessThan(abs(s.spread), vec3(1e18)));
 }
+
+bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
+
+bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
 
 // What a rough reflection spreads over many resolution cells averages down; what lies off the
 // scanline is heard less.
@@ -113,168 +128,214 @@ float thinning(Stretch s, float x, float sigma_l, float sigma_e) {
     return beam * min(1.0, sqrt(s.share / cells));
 }
 
-void deposit(float kappa, float time, float amplitude, bool point) {
-    float base = floor(kappa);
-    vec2 q = amplitude * carrier(time);
-    for (int i = 0; i < 2; ++i) {
-        float at = base + float(i);
-        if (!(at >= 0.0 && at < float(frame.samples))) continue;
-        uint k = uint(at);
-        uint slot = k - window_begin;
-        if (slot >= WINDOW) continue;
-        float gain = point ? rows[k].point_gain : rows[k].volume_gain;
-        vec2 v = q * gain * (i == 0 ? 1.0 - (kappa - base) : kappa - base);
-        atomicAdd(echoes[2u * slot], to_fixed(v.x, frame.volume_scale, 0.5));
-        atomicAdd(echoes[2u * slot + 1u], to_fixed(v.y, frame.volume_scale, 0.5));
+// How loud its speckle is at distance x: one-way weight times echogenicity, log2.
+float level_at(Stretch s, float x) {
+    uint row = row_at(kappa_at(s, x));
+    float weight = s.weight * thinning(s, x, rows[row].sigma_lateral, rows[row].sigma_elevation);
+    return log2(weight) - s.absorption * LOG2_E * x + tissues[s.tissue].level;
+}
+
+// First and last bin that a stretch passes; none: the last is before the first.
+ivec2 bins_of(Stretch s) {
+    float begin = kappa_at(s, 0.0), end = kappa_at(s, s.extent);
+    if (!(end > 0.0) || !(begin < float(frame.samples))) return ivec2(0, -1);
+    return ivec2(row_at(begin) / SCATTER_BIN, row_at(end) / SCATTER_BIN);
+}
+
+// First and last slot that a stretch fills.
+ivec2 slots_of(Stretch s) {
+    vec2 ends = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)), vec2(0.0), vec2(float(frame.samples))) / float(SCATTER_SLOT);
+    return ivec2(int(ceil(ends.x)), int(floor(ends.y)) - 1);
+}
+
+// Level where a stretch is held against the others of a bin.
+float level_in(Stretch s, int bin) {
+    return level_at(s, clamp(distance_at(s, float(bin) * float(SCATTER_BIN) + 0.5 * float(SCATTER_BIN)), 0.0, s.extent));
+}
+
+#include "lattice.glsl"
+
+// Adds to a sample of the window; 1 where the sum could not hold it.
+uint deposit_at(int slot, vec2 v) {
+    if (slot >= 0 && slot < int(min(SCATTER_WINDOW, frame.samples - window_begin))) {
+        vec2 held = clamp(v, vec2(-FIXED_LIMIT), vec2(FIXED_LIMIT));
+        atomicAdd(echoes[2 * slot], int(floor(held.x + 0.5)));
+        atomicAdd(echoes[2 * slot + 1], int(floor(held.y + 0.5)));
     }
+    return max(abs(v.x), abs(v.y)) < FIXED_LIMIT ? 0u : 1u;
 }
 
-bool present(uvec4 bits, float presence) {
-    uint low = ((bits.x & 255u) << 16u) | ((bits.y & 255u) << 8u) | (bits.z & 255u);
-    return float(low) * (1.0 / 16777216.0) < presence;
+// Half the beam's width at a row, mm: an ellipse in the plane of width and height, of which the
+// layer's edge nearest to the middle counts.
+float half_width(Stretch s, uint row) {
+    float nearest = max(abs(s.layer_y) - frame.elevation_reach, 0.0);
+    float height = nearest / (frame.lateral_cut * rows[row].sigma_elevation);
+    return frame.lateral_cut * rows[row].sigma_lateral * sqrt(max(1.0 - height * height, 0.0));
 }
 
-// Brings the dominant axis to x, keeping the order cyclic, and back.
-vec3 turn(vec3 v, uint axis) { return axis == 0u ? v : (axis == 1u ? v.yzx : v.zxy); }
-ivec3 turn_back(ivec3 v, uint axis) { return axis == 0u ? v : (axis == 1u ? v.zxy : v.yzx); }
+int slot_of(float kappa) { return int(clamp(floor(kappa + 0.5), -1e6, 1e9)) - int(window_begin); }
 
-uint dominant_axis(vec3 d) {
-    vec3 a = abs(d);
-    return a.x >= a.y && a.x >= a.z ? 0u : (a.y >= a.z ? 1u : 2u);
-}
+// Scatterers of one lattice near a stretch, plane by plane. x: the distances at which planes are crossed
+// that belong to this work. A cell counts when its middle is within the beam's width, taken where the
+// axis crosses the plane's middle, and within the layer's slab; its scatterer, within the stretch's ends.
+uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
+    Lattice lattice = lattice_of(s.tissue, number);
+    Walk walk = walk_of(s.d, s.e_l, s.e_e);
+    float h = lattice.edge;
+    // The lattice about the middle: what is summed below is small.
+    float x_middle = clamp(0.5 * (x.x + x.y), 0.0, s.extent);
+    vec3 middle = s.o + x_middle * s.d;
+    vec3 nearest = floor(middle / h);
+    vec3 rest = fma(-nearest, vec3(h), middle);
+    ivec3 base = ivec3(nearest);
+    vec2 planes = (x - x_middle) / walk.step;
+    ivec2 plane = cells_between(vec2(min(planes.x, planes.y), max(planes.x, planes.y)), rest[walk.a], h);
 
-// Part of a segment that can reach this window's samples, one sample of margin.
-vec2 window_extent(Stretch s) {
-    float per_sample = frame.sample_pitch / frame.speed * s.speed;
-    float x0 = ((float(window_begin) - 1.0) * frame.sample_pitch / frame.speed - s.time) * s.speed;
-    float x1 = x0 + (float(WINDOW) + 2.0) * per_sample;
-    return vec2(max(x0, 0.0), min(x1, s.extent));
-}
-
-// Half thickness, along the dominant axis, of what the beam may reach at distance x.
-float plane_margin(Stretch s, float x, float el_a, float ee_a) {
-    float sigma = max(rows[row_at(kappa_at(s, x))].sigma_lateral, rows[row_at(kappa_at(s, x) + 40.0)].sigma_lateral);
-    return 1.05 * frame.lateral_cut * sigma * abs(el_a) + frame.elevation_reach * abs(ee_a);
-}
-
-// First lattice plane and number of planes of a stretch.
-ivec2 lattice_planes(Stretch s) {
-    vec2 x = window_extent(s);
-    if (!(x.y > x.x)) return ivec2(0);
-    uint axis = dominant_axis(s.d);
-    float o = turn(s.o, axis).x, d = turn(s.d, axis).x;
-    float el = turn(s.e_l, axis).x, ee = turn(s.e_e, axis).x;
-    float a = o + x.x * d, b = o + x.y * d;
-    float margin_a = plane_margin(s, x.x, el, ee), margin_b = plane_margin(s, x.y, el, ee);
-    float low = d > 0.0 ? a - margin_a : b - margin_b;
-    float high = d > 0.0 ? b + margin_b : a + margin_a;
-    int first = int(floor(low / frame.cell));
-    return ivec2(first, int(floor(high / frame.cell)) - first + 1);
-}
-
-// Echo of a scatterer at `rel` from the stretch's origin, if it is within the beam and, along it, `within`.
-bool hear(Stretch s, vec3 rel, uint bits, float factor, vec2 within) {
-    float rho_e = dot(rel, s.e_e);
-    if (abs(rho_e) > frame.elevation_reach) return false;
-    float x = dot(rel, s.d);
-    if (!(x >= within.x && x < within.y)) return false;
-    float rho_l = dot(rel, s.e_l);
-    float time = s.time + x / s.speed;
-    float at = frame.speed * time / frame.sample_pitch;
-    uint row = row_at(at);
-    float sigma_l = rows[row].sigma_lateral;
-    if (abs(rho_l) > frame.lateral_cut * sigma_l) return false;
-    float sigma_e = rows[row].sigma_elevation;
-    float l = rho_l / sigma_l;
-    float e = (layer_y + rho_e) / sigma_e;
-    float amplitude = factor * exp(-0.5 * (l * l + e * e) - s.absorption * x)
-        * thinning(s, x, sigma_l, sigma_e)
-        * (tissues[s.tissue].mean + tissues[s.tissue].sigma * gaussian(bits));
-    deposit(at, time, amplitude, false);
-    return true;
-}
-
-// All scatterers of one lattice plane that the beam reaches.
-uvec2 march_plane(Stretch s, int plane, vec2 within) {
-    uint axis = dominant_axis(s.d);
-    vec3 o = turn(s.o, axis), d = turn(s.d, axis), el = turn(s.e_l, axis), ee = turn(s.e_e, axis);
-    float h = frame.cell;
-    float middle = (float(plane) + 0.5) * h;
-    float x_middle = (middle - o.x) / d.x;
-
-    float sigma = rows[row_at(kappa_at(s, x_middle))].sigma_lateral;
-    float reach = (0.5 * h + 1.2 * frame.lateral_cut * sigma * abs(el.x) + frame.elevation_reach * abs(ee.x)) / abs(d.x);
-    sigma = max(sigma, max(rows[row_at(kappa_at(s, x_middle - reach))].sigma_lateral,
-                           rows[row_at(kappa_at(s, x_middle + reach))].sigma_lateral));
-    float lateral_reach = frame.lateral_cut * sigma;
-    if (x_middle + reach < within.x || x_middle - reach > within.y) return uvec2(0u);
-
-    float presence = tissues[s.tissue].presence;
-    uint seed = tissues[s.tissue].seed;
     float depth = tissues[s.tissue].texture_depth;
-    float factor = s.weight;
-    if (depth > 0.0) {
-        vec3 crossing = s.o + x_middle * s.d;
-        factor *= 1.0 + depth * tissue_texture(crossing / tissues[s.tissue].texture_length, seed);
-    }
+    float per_mm = samples_per_mm(s);
+    float kappa_middle = kappa_at(s, x_middle);
+    float turns_middle = 2.0 * frame.frequency * (s.time + x_middle / s.speed);
+    turns_middle -= floor(turns_middle);
+    float turns_per_mm = 2.0 * frame.frequency / s.speed;
+    float reach = frame.elevation_reach;
+    ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
 
-    // The beam's cross-section seen along d on the plane: centre and oblique axes in (y, z).
-    vec2 slope = d.yz / d.x;
-    vec2 u_l = el.yz - el.x * slope;
-    vec2 u_e = ee.yz - ee.x * slope;
-    vec2 centre = o.yz + slope * (middle - o.x);
-    bool swap = abs(u_l.y) > abs(u_l.x);
-    if (swap) { slope = slope.yx; u_l = u_l.yx; u_e = u_e.yx; centre = centre.yx; }
-    float kappa = u_l.y / u_l.x;
-    float half_row = abs(slope.x) * 0.5 * h + lateral_reach * abs(u_l.x) + frame.elevation_reach * abs(u_e.x);
-    float half_column = 0.5 * h * (abs(kappa) + abs(slope.y - kappa * slope.x))
-        + frame.elevation_reach * abs(u_e.y - kappa * u_e.x);
-    float inverse_h = 1.0 / h;
-    int row_first = int(floor((centre.x - half_row) * inverse_h));
-    int row_last = int(floor((centre.x + half_row) * inverse_h));
+    uvec3 count = uvec3(0u);
+    for (int i = plane.x; i < plane.y; ++i) {
+        float da = (float(i) + 0.5) * h - rest[walk.a];
+        float ahead = walk.step * da;         // of the middle, where the axis crosses the plane
+        uint row = row_at(kappa_middle + ahead * per_mm);
+        float wanted = wanted_level(s.tissue, rows[row].lattice_level, drowned);
+        float power = level_power(wanted, number);
+        float width = half_width(s, row);
+        if (!(power > 0.0) || !(width > 0.0)) continue;
+        float x_plane = x_middle + ahead;
+        float sigma_l = rows[row].sigma_lateral, sigma_e = rows[row].sigma_elevation;
 
-    uvec2 count = uvec2(0u);
-    for (int r = row_first; r <= row_last; ++r) {
-        float column = centre.y + kappa * ((float(r) + 0.5) * h - centre.x);
-        int column_first = int(floor((column - half_column) * inverse_h));
-        int column_last = int(floor((column + half_column) * inverse_h));
-        for (int c = column_first; c <= column_last; ++c) {
-            count.x += 1u;
-            ivec3 cell = turn_back(swap ? ivec3(plane, c, r) : ivec3(plane, r, c), axis);
-            uvec4 bits = pcg4d(uvec4(uvec3(cell), seed));
-            if (!present(bits, presence)) continue;
-            vec3 p = (vec3(cell) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h;
-            vec3 rel = p - s.o;
-            if (!hear(s, rel, bits.w, factor, vec2(0.0, s.extent))) continue;
+        // Over the plane the beam's shape and the gain change linearly, from samples on both sides.
+        uint below = row - min(row, 16u), above = min(row + 16u, frame.samples - 1u);
+        float run = per_mm / max(float(above - below), 1.0);
+        vec3 here = beam_shape(row);
+        vec3 slope = (beam_shape(above) - beam_shape(below)) * run;
+        // A row holds for its whole sample: its numbers are those of the sample's middle.
+        float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
+
+        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, sigma_l, sigma_e) * frame.volume_scale;
+        if (depth > 0.0) {
+            strength *= 1.0 + depth * tissue_texture((s.o + x_plane * s.d) / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
+        }
+        float falling = slope.z - s.absorption * LOG2_E;
+        float constant = here.z - slope.z * row_ahead - s.absorption * LOG2_E * x_middle;
+
+        ivec2 row_range = rows_between(walk, da, width, reach, rest[walk.b], h);
+        // Rows and their cells in one loop: threads that run together all have a cell nearly every time.
+        int j = row_range.x - 1;
+        ivec2 column = ivec2(0);
+        while (j < row_range.y) {
+            if (column.x >= column.y) {
+                j += 1;
+                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), width, reach, rest[walk.c], h);
+            }
+            ivec3 at = i * step_a + j * step_b + column.x * step_c;
+            bool counts = column.x < column.y && j < row_range.y;
+            column.x += 1;
+            uvec3 bits = pcg3d(uvec3(base + at) + lattice.key);
+            vec3 rel = (vec3(at) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h - rest;
+            float dx = dot(rel, s.d);
+            float along = x_middle + dx;
+            count.x += uint(counts);
+            if (!counts || !present(lattice, bits) || !(along >= 0.0 && along < s.extent)) continue;
+            float across = dot(rel, s.e_l);
+            float up = s.layer_y + dot(rel, s.e_e);
+            float off_row = dx - row_ahead;
+            float exponent = constant + falling * dx - (here.x + slope.x * off_row) * across * across
+                - (here.y + slope.y * off_row) * up * up;
+            vec2 v = strength * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
+            v = (bits.z & 1u) == 0u ? v : -v;
             count.y += 1u;
+            count.z += deposit_at(slot_of(kappa_middle + dx * per_mm), v);
         }
     }
     return count;
 }
 
+// How far ahead of the crossing of its plane a cell's scatterer can be.
+float plane_margin(Stretch s, vec2 x, int number) {
+    Walk walk = walk_of(s.d, s.e_l, s.e_e);
+    float width = max(half_width(s, row_at(kappa_at(s, x.x))), half_width(s, row_at(kappa_at(s, x.y))));
+    return 0.51 * lattice_edge(number) * (abs(s.d.x) + abs(s.d.y) + abs(s.d.z))
+        + (1.2 * width + frame.elevation_reach * abs(walk.slant)) * abs(walk.along.y / walk.across.y)
+        + frame.elevation_reach * abs(s.d[walk.c] * walk.inverse_c);
+}
+
 #include "pieces.glsl"
 
-// Whole samples inside a stretch: first and number (voxel mode).
-ivec2 voxel_samples(Stretch s) {
-    vec2 x = window_extent(s);
-    if (!(x.y > x.x)) return ivec2(0);
-    int first = int(ceil(kappa_at(s, x.x)));
-    return ivec2(first, int(ceil(kappa_at(s, x.y))) - first);
+// All that a stretch has in one bin of the window, or beside it.
+uvec3 march_bin(Stretch s, int bin, int piece) {
+    ivec2 passed = bins_of(s);
+    float level = level_in(s, bin);
+    uint middle = min(uint(bin) * SCATTER_BIN + SCATTER_BIN / 2u, frame.samples - 1u);
+    float black = rows[middle].black;
+    if (level < black - UNHEARD) return uvec3(0u);
+    // What something else is louder than all along the bin, as far as the stretch reaches.
+    vec2 reached = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)) / float(SCATTER_SLOT), -1e6, 1e6);
+    int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
+    int slot = max(int(floor(reached.x)), bin * int(PIECES));
+    int last_slot = min(min(int(floor(reached.y)), bin * int(PIECES) + int(PIECES) - 1), int((frame.samples - 1u) / SCATTER_SLOT));
+    int over = 0x7fffffff;
+    for (; slot <= last_slot; ++slot) over = min(over, loudest[slot - window]);
+    float drowned = 2.0 * max(max(float(over) / LEVEL_UNIT, black) - level, 0.0);
+
+    uint begin = uint(bin) * SCATTER_BIN;
+    uint end = begin + SCATTER_BIN;
+    bool field = deforms(s);
+    if (field) {
+        begin += uint(piece) * SCATTER_SLOT;
+        end = begin + SCATTER_SLOT;
+    }
+    vec2 x = vec2(distance_at(s, float(begin)), distance_at(s, float(end)));
+    // Before the first sample and behind the last there is no other bin.
+    bool first = begin == 0u || bin == passed.x && (!field || x.x <= 0.0);
+    bool last = end >= frame.samples || bin == passed.y && (!field || x.y >= s.extent);
+    x = vec2(first ? 0.0 : max(x.x, 0.0), last ? s.extent : min(x.y, s.extent));
+    if (!(x.y > x.x)) return uvec3(0u);
+
+    // Levels that some plane may need.
+    float lowest = 1e9, highest = -1e9;
+    for (int i = 0; i < 3; ++i) {
+        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, 0.5 * float(i))))].lattice_level, drowned);
+        lowest = min(lowest, wanted);
+        highest = max(highest, wanted);
+    }
+    int number = int(floor(max(lowest - 0.1, 0.0)));
+    int coarsest = int(floor(min(highest + 0.1 + LEVEL_FADE, float(LATTICE_LEVELS))));
+    uvec3 count = uvec3(0u);
+    for (; number <= coarsest; ++number) {
+        if (field) {
+            count += march_piece(s, number, x, drowned);
+        } else {
+            // Planes crossed beyond the ends have scatterers before them.
+            float margin = plane_margin(s, x, number);
+            count += march_planes(s, number, vec2(x.x - (first ? margin : 0.0), x.y + (last ? margin : 0.0)), drowned);
+        }
+    }
+    return count;
 }
 
 // One equally spaced sample looked up in the voxel grid; the jitter hides the grid from the carrier.
-uvec2 march_sample(Stretch s, int k) {
-    float x = (float(k) * frame.sample_pitch / frame.speed - s.time) * s.speed;
+uvec3 march_sample(Stretch s, int k) {
+    float x = distance_at(s, float(k));
+    if (!(x >= 0.0 && x < s.extent)) return uvec3(0u);
     vec3 p = s.o + x * s.d;
     if (deforms(s)) p = reference_point(load_field(field_of(s.instance)), p);
     ivec3 cell = ivec3(floor(p / frame.cell));
     uint seed = tissues[s.tissue].seed;
     uvec4 bits = pcg4d(uvec4(uvec3(cell), seed));
-    if (!present(bits, tissues[s.tissue].presence)) return uvec2(1u, 0u);
-    float kappa = float(k) + unit(bits.x) - 0.5;
+    uint low = ((bits.x & 255u) << 16u) | ((bits.y & 255u) << 8u) | (bits.z & 255u);
+    if (!(float(low) * (1.0 / 16777216.0) < tissues[s.tissue].presence)) return uvec3(1u, 0u, 0u);
     uint row = row_at(float(k));
     float sigma_e = rows[row].sigma_elevation;
-    float e = layer_y / sigma_e;
+    float e = s.layer_y / sigma_e;
     float factor = 1.0;
     if (tissues[s.tissue].texture_depth > 0.0) {
         factor += tissues[s.tissue].texture_depth * tissue_texture(p / tissues[s.tissue].texture_length, seed);
@@ -282,106 +343,140 @@ uvec2 march_sample(Stretch s, int k) {
     float amplitude = s.weight * factor * exp(-0.5 * e * e - s.absorption * x)
         * thinning(s, x, rows[row].sigma_lateral, sigma_e)
         * (tissues[s.tissue].mean + tissues[s.tissue].sigma * gaussian(bits.w));
-    deposit(kappa, kappa * frame.sample_pitch / frame.speed, amplitude, false);
-    return uvec2(1u);
+    float kappa = float(k) + unit(bits.x) - 0.5;
+    int slot = slot_of(kappa);
+    vec2 q = amplitude * frame.volume_scale * carrier(kappa * frame.sample_pitch / frame.speed);
+    float gain = rows[min(uint(max(slot, 0)) + window_begin, frame.samples - 1u)].volume_gain;
+    return uvec3(1u, 1u, deposit_at(slot, q * gain));
 }
 
-void march_point(Stretch s, vec4 point) {
-    if (!is_finite(s)) return;
+// One point target: 1 for each sample that could not hold it.
+uint march_point(Stretch s, vec4 point) {
     vec3 rel = point.xyz - s.o;
     float x = dot(rel, s.d);
-    if (!(x >= 0.0 && x < s.extent)) return;
+    if (!(x >= 0.0 && x < s.extent)) return 0u;
     float rho_e = dot(rel, s.e_e);
     // Layers meet off the round numbers at which points lie: rounding must not give one to two, or none.
     float pitch = frame.slice_thickness / float(frame.layers);
     float height = rho_e - POINT_SHIFT * pitch;
-    if (!(height >= -0.5 * pitch && height < 0.5 * pitch)) return;
+    if (!(height >= -0.5 * pitch && height < 0.5 * pitch)) return 0u;
     float rho_l = dot(rel, s.e_l);
     float time = s.time + x / s.speed;
     float at = frame.speed * time / frame.sample_pitch;
     uint row = row_at(at);
     float sigma_l = rows[row].sigma_lateral, sigma_e = rows[row].sigma_elevation;
     float l = rho_l / sigma_l;
-    if (abs(l) > 4.0) return;
-    float e = (layer_y + rho_e) / sigma_e;
-    deposit(at, time, s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, sigma_l, sigma_e), true);
+    if (abs(l) > 4.0) return 0u;
+    float e = (s.layer_y + rho_e) / sigma_e;
+    vec2 q = s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, sigma_l, sigma_e)
+        * frame.volume_scale * carrier(time);
+    vec3 shares = deposit_shares(at - floor(at + 0.5));
+    int slot = slot_of(at) - 1;
+    uint saturated = 0u;
+    for (int i = 0; i < 3; ++i) {
+        uint k = uint(clamp(slot + i + int(window_begin), 0, int(frame.samples) - 1));
+        saturated += deposit_at(slot + i, q * (shares[i] * rows[k].point_gain));
+    }
+    return saturated;
 }
 
-// First item of work and number of items: samples, pieces or lattice planes.
+// First item of work and number of items: samples, or bins (of deformed tissue: pieces of them) of the
+// window, and of those beside it.
 ivec2 work_of(Stretch s, bool voxel) {
-    if (voxel) return voxel_samples(s);
-    return deforms(s) ? field_pieces(s) : lattice_planes(s);
+    if (voxel) {
+        int first = max(int(ceil(clamp(kappa_at(s, 0.0), -1.0, 1e6))), int(window_begin)) - int(window_begin);
+        int last = min(int(ceil(clamp(kappa_at(s, s.extent), 0.0, 1e6))), int(window_begin + SCATTER_WINDOW) + 1);
+        return ivec2(first + int(window_begin), max(last - first - int(window_begin), 0));
+    }
+    ivec2 passed = bins_of(s);
+    int window = int(window_begin / SCATTER_BIN);
+    int first = max(passed.x, window - BESIDE);
+    int last = min(passed.y, window + int(BINS) + BESIDE - 1);
+    int items = deforms(s) ? int(PIECES) : 1;
+    return ivec2(first * items, max(last - first + 1, 0) * items);
 }
 
 void main() {
-    uint line = gl_WorkGroupID.x;
+    uint scanline = gl_WorkGroupID.x;
     uint thread = gl_LocalInvocationID.x;
-    uint lines = frame.scanlines * frame.layers;
-    uint available = line < lines ? min(segment_count[line], frame.segment_capacity) : 0u;
-    window_begin = gl_WorkGroupID.z * WINDOW;
-    uint layer = line / frame.scanlines;
-    layer_y = elevation(layer);
+    window_begin = gl_WorkGroupID.z * SCATTER_WINDOW;
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
-
     uint chunks = gl_NumWorkGroups.y;
-    uint mine = gl_WorkGroupID.y < available ? (available - gl_WorkGroupID.y + chunks - 1u) / chunks : 0u;
-    // Where nothing is heard there is nothing to gather.
-    if (mine == 0u) return;
 
-    for (uint i = thread; i < 2u * WINDOW; i += THREADS) echoes[i] = 0;
+    for (uint i = thread; i < 2u * SCATTER_WINDOW; i += THREADS) echoes[i] = 0;
+    for (uint i = thread; i < (BINS + 2u * uint(BESIDE)) * PIECES; i += THREADS) loudest[i] = SILENT;
     if (thread == 0u) { shared_candidates = 0u; shared_deposits = 0u; }
     barrier();
 
-    uvec2 count = uvec2(0u);
-    for (uint batch = 0u; batch < mine; batch += BATCH) {
-        uint size = min(BATCH, mine - batch);
-        if (thread < size) {
-            uint at = line * frame.segment_capacity + gl_WorkGroupID.y + (batch + thread) * chunks;
-            Stretch s = texture_stretch(at);
-            bool scatters = tissues[s.tissue].presence > 0.0 && is_finite(s);
-            work_end[thread] = !scatters ? 0u : uint(max(work_of(s, voxel).y, 0));
-        }
-        barrier();
-        if (thread == 0u) {
-            for (uint i = 1u; i < size; ++i) work_end[i] += work_end[i - 1u];
-        }
-        barrier();
-        uint total = work_end[size - 1u];
-        uint owner = 0u, loaded = NONE;
-        Stretch s;
-        int first = 0;
-        vec2 within = vec2(0.0);
-        for (uint item = thread; item < total; item += THREADS) {
-            while (item >= work_end[owner]) owner += 1u;
-            if (loaded != owner) {
-                s = texture_stretch(line * frame.segment_capacity + gl_WorkGroupID.y + (batch + owner) * chunks);
-                first = work_of(s, voxel).x;
-                within = window_extent(s);
-                loaded = owner;
+    // What drowns what: the loudest stretch in each bin, of all layers.
+    for (uint layer = 0u; layer < frame.layers && !voxel; ++layer) {
+        uint line = layer * frame.scanlines + scanline;
+        uint available = min(segment_count[line], frame.segment_capacity);
+        for (uint i = thread; i < available; i += THREADS) {
+            Stretch s = world_stretch(line * frame.segment_capacity + i);
+            ivec2 filled = sounds(s) ? slots_of(s) : ivec2(0, -1);
+            int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
+            int last = min(filled.y, window + int(BINS * PIECES) + 2 * SLOTS_BESIDE - 1);
+            for (int slot = max(filled.x, window); slot <= last; ++slot) {
+                float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
+                atomicMax(loudest[slot - window], int(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
             }
-            int index = first + int(item - (owner == 0u ? 0u : work_end[owner - 1u]));
-            if (voxel) count += march_sample(s, index);
-            else if (deforms(s)) count += march_piece(s, index);
-            else count += march_plane(s, index, within);
         }
-        for (uint i = 0u; i < size && frame.points > 0u; ++i) {
-            Stretch w = world_stretch(line * frame.segment_capacity + gl_WorkGroupID.y + (batch + i) * chunks);
-            for (uint p = thread; p < frame.points; p += THREADS) march_point(w, points[p]);
-        }
-        barrier();
     }
-    if (count.x > 0u) { atomicAdd(shared_candidates, count.x); atomicAdd(shared_deposits, count.y); }
     barrier();
 
-    uint base = 2u * ((line % frame.scanlines) * frame.samples + window_begin);
-    uint end = 2u * min(WINDOW, frame.samples - min(window_begin, frame.samples));
-    for (uint i = thread; i < end && line < lines; i += THREADS) {
+    for (uint layer = 0u; layer < frame.layers; ++layer) {
+        uvec3 count = uvec3(0u);
+        uint line = layer * frame.scanlines + scanline;
+        uint available = min(segment_count[line], frame.segment_capacity);
+        uint mine = gl_WorkGroupID.y < available ? (available - gl_WorkGroupID.y + chunks - 1u) / chunks : 0u;
+        uint from = line * frame.segment_capacity + gl_WorkGroupID.y;
+        if (thread == 0u && gl_WorkGroupID.z == 0u && mine > 0u) atomicAdd(counters.segments, mine);
+        for (uint batch = 0u; batch < mine; batch += THREADS) {
+            uint size = min(THREADS, mine - batch);
+            if (thread < size) {
+                Stretch s = world_stretch(from + (batch + thread) * chunks);
+                work_end[thread] = sounds(s) ? uint(max(work_of(s, voxel).y, 0)) : 0u;
+            }
+            barrier();
+            if (thread == 0u) {
+                for (uint i = 1u; i < size; ++i) work_end[i] += work_end[i - 1u];
+            }
+            barrier();
+            uint total = work_end[size - 1u];
+            uint owner = 0u;
+            for (uint item = thread; item < total; item += THREADS) {
+                while (item >= work_end[owner]) owner += 1u;
+                Stretch s = texture_stretch(from + (batch + owner) * chunks);
+                int index = work_of(s, voxel).x + int(item - (owner == 0u ? 0u : work_end[owner - 1u]));
+                if (voxel) {
+                    count += march_sample(s, index);
+                } else {
+                    int items = deforms(s) ? int(PIECES) : 1;
+                    count += march_bin(s, index / items, index % items);
+                }
+            }
+            for (uint i = 0u; i < size && frame.points > 0u; ++i) {
+                Stretch w = world_stretch(from + (batch + i) * chunks);
+                uint end = is_finite(w) ? frame.points : 0u;
+                for (uint p = thread; p < end; p += THREADS) count.z += march_point(w, points[p]);
+            }
+            barrier();
+        }
+        // Here: naga loses values that two loops carry when they are used after both.
+        if (count.x > 0u) { atomicAdd(shared_candidates, count.x); atomicAdd(shared_deposits, count.y); }
+        if (count.z > 0u) atomicAdd(counters.saturated, count.z);
+    }
+    barrier();
+
+    uint base = 2u * (scanline * frame.samples + window_begin);
+    uint end = 2u * min(SCATTER_WINDOW, frame.samples - min(window_begin, frame.samples));
+    for (uint i = thread; i < end; i += THREADS) {
         int v = echoes[i];
         if (v != 0) atomicAdd(volume_echoes[base + i], v);
     }
     if (thread == 0u && shared_candidates > 0u) {
         atomicAdd(counters.candidates, shared_candidates);
         atomicAdd(counters.deposits, shared_deposits);
-        atomicAdd(counters.segments, mine);
     }
 }

@@ -31,6 +31,15 @@ const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
 const uint BLEND_MULTIBAND = 2u;
 
+// Lattices of scatterers: each level has cells of twice the volume of the one before.
+const uint LATTICE_LEVELS = 24u;
+const float LEVEL_FADE = 0.25;      // part of a level over which the next one takes over
+const float ALL_LEVELS = -1000.0;
+const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gathers
+const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one stretch
+const uint SCATTER_SLOT = 16u;      // samples over which stretches are held against each other
+const float UNHEARD = 3.3219281;    // log2(10): 20 dB under black nothing is summed
+
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
 const uint KIND_PHASED = 2u;
@@ -58,7 +67,10 @@ struct Frame {
 struct Tissue {
     float speed; float impedance; float absorption; float presence;   // mm/us, MRayl, Np/mm at f0, rho
     float mean; float sigma; float texture_depth; float texture_length; // calibrated amplitudes, k, mm
-    uint seed; uint unused0; uint unused1; uint unused2;
+    uint seed;
+    float density;                     // of scatterers of one amplitude, per cell of the finest lattice, that make its speckle
+    float amplitude;                   // RMS of a cell of the finest lattice, without texture
+    float level;                       // echogenicity, log2
 };
 
 struct Surface {
@@ -90,6 +102,8 @@ struct Row {
     float compensation;                           // linear, attenuation compensation of a weight at this depth
     float incoherent_gain;                        // keeps incoherent surface echoes at their energy through the averages
     float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
+    float lattice_level;                          // of the lattice that is as dense as speckle needs; below ALL_LEVELS: the finest
+    float black;                                  // one-way weight times echogenicity that shows as black, log2
 };
 
 // A straight stretch of a path inside one medium.

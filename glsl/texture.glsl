@@ -1,21 +1,29 @@
 // Low-frequency tissue texture: two octaves of value noise with unit variance.
 
-float texture_value(ivec3 cell, uint seed) {
-    return 2.0 * unit(pcg4d(uvec4(uvec3(cell), seed ^ 0x9e3779b9u)).x) - 1.0;
+// One word of three: they fold into one that is then mixed (prospecting by C. Wellons' lowbias32).
+uint texture_hash(uint folded) {
+    folded ^= folded >> 16u;
+    folded *= 0x7feb352du;
+    folded ^= folded >> 15u;
+    folded *= 0x846ca68bu;
+    return folded ^ folded >> 16u;
 }
 
 float value_noise(vec3 p, uint seed) {
     vec3 base = floor(p);
     vec3 f = p - base;
     vec3 w = f * f * (3.0 - 2.0 * f);
-    ivec3 c = ivec3(base);
-    float sum = 0.0;
-    for (int i = 0; i < 8; ++i) {
-        ivec3 corner = ivec3(i & 1, (i >> 1) & 1, i >> 2);
-        vec3 side = mix(1.0 - w, w, vec3(corner));
-        sum += side.x * side.y * side.z * texture_value(c + corner, seed);
+    const uvec3 FOLD = uvec3(0x8da6b343u, 0xd8163841u, 0xcb1ab31fu);
+    uvec3 near = uvec3(ivec3(base)) * FOLD + uvec3(seed, 0u, 0u);
+    uvec3 far = near + FOLD;
+    uvec4 plane = uvec4(near.x ^ near.y, far.x ^ near.y, near.x ^ far.y, far.x ^ far.y);
+    vec4 sum = vec4(0.0);
+    for (uint i = 0u; i < 4u; ++i) {
+        vec2 ends = vec2(unit(texture_hash(plane[i] ^ near.z)), unit(texture_hash(plane[i] ^ far.z)));
+        sum[i] = mix(ends.x, ends.y, w.z);
     }
-    return sum;
+    vec2 row = mix(sum.xz, sum.yw, w.x);
+    return 2.0 * mix(row.x, row.y, w.y) - 1.0;
 }
 
 // Variance of one octave: (26/35)^3 of smoothstep weights, 1/3 of the values; 5/4 for both octaves.

@@ -73,20 +73,21 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uve
     uint l = line % frame.scanlines;
     float y = elevation(line / frame.scanlines);
     float kappa = frame.speed * time / frame.sample_pitch;
-    float base = floor(kappa);
+    float nearest = floor(kappa + 0.5);
+    vec3 shares = deposit_shares(kappa - nearest);
     vec2 q = carrier(time);
     q = vec2(amplitude.x * q.x - amplitude.y * q.y, amplitude.x * q.y + amplitude.y * q.x);
-    for (int i = 0; i < 2; ++i) {
-        float at = base + float(i);
+    for (int i = 0; i < 3; ++i) {
+        float at = nearest + float(i - 1);
         if (!(at >= 0.0 && at < float(frame.samples))) continue;
         uint k = uint(at);
         float sigma = rows[k].sigma_elevation;
         float gain = rows[k].surface_gain * exp(-0.5 * y * y / (sigma * sigma));
         if (incoherent) gain *= rows[k].incoherent_gain;
-        vec2 v = q * gain * (i == 0 ? 1.0 - (kappa - base) : kappa - base);
+        vec2 v = q * gain * shares[i];
         uint slot = 2u * (l * frame.samples + k);
-        int re = to_fixed(v.x, frame.surface_scale, unit(dither[2 * i]));
-        int im = to_fixed(v.y, frame.surface_scale, unit(dither[2 * i + 1]));
+        int re = to_fixed(v.x, frame.surface_scale, float(dither[i] >> 16u) * (1.0 / 65536.0));
+        int im = to_fixed(v.y, frame.surface_scale, float(dither[i] & 0xffffu) * (1.0 / 65536.0));
         if (re != 0) atomicAdd(surface_echoes[slot], re);
         if (im != 0) atomicAdd(surface_echoes[slot + 1u], im);
     }

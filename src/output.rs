@@ -19,7 +19,7 @@ pub fn settings(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Va
             "paths": u64::from(lines) * u64::from(simulation.paths),
             "cell_mm": simulation.cell,
             "scatterer_cells_per_mm3": simulation.cell.powi(-3),
-            "elevation_cells": simulation.elevation_cells,
+            "scatterers_per_resolution_cell": simulation.scatterers_per_resolution_cell,
             "volume_floor_db": simulation.volume_floor,
         },
         "probe": format!("{probe:?}"),

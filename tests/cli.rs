@@ -177,7 +177,7 @@ fn quality_sets_the_counts_that_the_user_does_not() {
     };
     let proof = counts(&["--quality", "reference"]);
     assert_eq!(proof["paths_per_line"], 128);
-    assert_eq!(proof["elevation_cells"], 0.0);
+    assert_eq!(proof["scatterers_per_resolution_cell"], 0.0);
     let mixed = counts(&["--quality", "reference", "--set", "simulation.paths=3"]);
     assert_eq!(mixed["paths_per_line"], 3);
     assert_eq!(mixed["cell_mm"], proof["cell_mm"]);

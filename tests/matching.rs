@@ -25,7 +25,6 @@ samples = 1600
 paths = 1
 max_reflections = 0
 cell = "0.1 mm"
-elevation_cells = 3
 [imaging]
 image_height = 300
 gain = 16 # loud

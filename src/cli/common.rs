@@ -197,7 +197,9 @@ fn set_quality(
         match key.as_str() {
             "simulation.paths" => simulation.paths = by_hand.paths,
             "simulation.cell" => simulation.cell = by_hand.cell,
-            "simulation.elevation_cells" => simulation.elevation_cells = by_hand.elevation_cells,
+            "simulation.scatterers_per_resolution_cell" => {
+                simulation.scatterers_per_resolution_cell = by_hand.scatterers_per_resolution_cell
+            }
             "simulation.volume_floor" => simulation.volume_floor = by_hand.volume_floor,
             _ => {}
         }

@@ -116,6 +116,8 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 tgc: 1.0 + 0.1 * depth,
                 compensation: 1.0 + 0.02 * depth,
                 receive_reach: 0.5 + 0.3 * depth,
+                lattice_level: 0.5 + 0.05 * depth,
+                black: -12.0 + 0.02 * depth,
             }
         })
         .collect()

@@ -8,9 +8,7 @@ use super::{Case, Check, Element, Extent, Input, Job, Size, Subject, trace, worl
 use crate::reference::{Segment, origin, scatter};
 use crate::sim::layout::{self, Counters, FLAG_VOXEL, Frame, Row, Tissue};
 
-/// Samples of one work group, WINDOW in the kernel.
-const WINDOW: u32 = 2048;
-/// Work groups that share a line's segments.
+/// Work groups that share a scanline's segments.
 const CHUNKS: u32 = 2;
 
 pub const SUBJECT: Subject = Subject {
@@ -23,8 +21,8 @@ pub const SUBJECT: Subject = Subject {
     sizes,
     extent: |job| {
         let frame: Frame = job.one("frame");
-        let windows = frame.samples.div_ceil(WINDOW);
-        Extent::Groups([lines(&frame) as u32, CHUNKS, windows])
+        let windows = frame.samples.div_ceil(layout::SCATTER_WINDOW);
+        Extent::Groups([frame.scanlines, CHUNKS, windows])
     },
     check,
     plant: |job, outputs| {

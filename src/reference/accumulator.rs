@@ -25,7 +25,13 @@ pub struct Accumulator {
 }
 
 /// Rounding to the nearest unit.
-pub const NEAREST: [f64; 4] = [0.5; 4];
+pub const NEAREST: [f64; 6] = [0.5; 6];
+
+/// What the three samples about the nearest one get of an echo that lies `f` samples, -1/2 to 1/2, behind
+/// it: the parabola through them. Their centre is the echo's, and their spread is zero.
+fn shares(f: f64) -> [f64; 3] {
+    [(f * f - f) / 2.0, 1.0 - f * f, (f * f + f) / 2.0]
+}
 
 /// Fixed point as the device rounds it; also whether it was clamped.
 fn to_fixed(scaled: f64, dither: f64) -> (i64, bool) {
@@ -59,10 +65,10 @@ impl Accumulator {
         (self.kappa(time).floor() as i64).clamp(0, self.samples - 1) as usize
     }
 
-    /// One echo of `amplitude` at one-way time `time` (us) on scanline `l`, turned by `phase` (rad)
-    /// beyond the carrier and split linearly over two samples; `gain` is per sample and includes the
+    /// Adds one echo of `amplitude` at one-way time `time` (us) on scanline `l`, turned by `phase` (rad)
+    /// beyond the carrier and shared by three samples; `gain` is per sample and includes the
     /// fixed-point scale. `dither` is added before rounding down: real and imaginary part of the first
-    /// sample, then of the second. Echoes at no finite time are lost.
+    /// sample, then of the next ones. Echoes at no finite time are lost.
     pub fn deposit(
         &mut self,
         l: u32,
@@ -70,29 +76,70 @@ impl Accumulator {
         amplitude: f64,
         phase: f64,
         gain: impl Fn(usize) -> f64,
-        dither: [f64; 4],
+        dither: [f64; 6],
     ) {
         let kappa = self.kappa(time);
         if !kappa.is_finite() {
             return;
         }
+        let angle = phase + self.angle(time);
+        let nearest = (kappa + 0.5).floor();
+        for (i, share) in shares(kappa - nearest).into_iter().enumerate() {
+            let k = nearest as i64 + i as i64 - 1;
+            self.add(
+                l,
+                k,
+                share * amplitude,
+                angle,
+                &gain,
+                [dither[2 * i], dither[2 * i + 1]],
+            );
+        }
+    }
+
+    /// Adds one echo to the nearest sample alone, with the phase of its own time: of many, which lie
+    /// anywhere between samples, the sum is as fine as the pulse.
+    pub fn deposit_nearest(
+        &mut self,
+        l: u32,
+        time: f64,
+        amplitude: f64,
+        gain: impl Fn(usize) -> f64,
+    ) {
+        let kappa = self.kappa(time);
+        if kappa.is_finite() {
+            let k = (kappa + 0.5).floor() as i64;
+            self.add(l, k, amplitude, self.angle(time), &gain, [0.5; 2]);
+        }
+    }
+
+    /// Phase of the two-way carrier at one-way time `time`, rad.
+    fn angle(&self, time: f64) -> f64 {
         let turns = 2.0 * self.frequency * time;
-        let (sin, cos) = (phase - TAU * (turns - turns.floor())).sin_cos();
-        let k = kappa.floor() as i64;
-        let f = kappa - kappa.floor();
-        for (i, (k, share)) in [(k, 1.0 - f), (k + 1, f)].into_iter().enumerate() {
-            if !(0..self.samples).contains(&k) {
-                continue;
-            }
-            let at = l as usize * self.samples as usize + k as usize;
-            let scaled = share * amplitude * gain(k as usize);
-            self.deposits[at] += 1;
-            for (part, value) in [scaled * cos, scaled * sin].into_iter().enumerate() {
-                let (fixed, clamped) = to_fixed(value, dither[2 * i + part]);
-                self.exact[2 * at + part] += value;
-                self.fixed[2 * at + part] += fixed;
-                self.saturated += u32::from(clamped);
-            }
+        -TAU * (turns - turns.floor())
+    }
+
+    fn add(
+        &mut self,
+        l: u32,
+        k: i64,
+        amplitude: f64,
+        angle: f64,
+        gain: &impl Fn(usize) -> f64,
+        dither: [f64; 2],
+    ) {
+        if !(0..self.samples).contains(&k) {
+            return;
+        }
+        let at = l as usize * self.samples as usize + k as usize;
+        let scaled = amplitude * gain(k as usize);
+        self.deposits[at] += 1;
+        let (sin, cos) = angle.sin_cos();
+        for (part, value) in [scaled * cos, scaled * sin].into_iter().enumerate() {
+            let (fixed, clamped) = to_fixed(value, dither[part]);
+            self.exact[2 * at + part] += value;
+            self.fixed[2 * at + part] += fixed;
+            self.saturated += u32::from(clamped);
         }
     }
 }
@@ -117,12 +164,18 @@ mod tests {
         let mut expected = vec![0.0; 32];
         for &(l, kappa, amplitude) in echoes {
             let time = kappa * 0.25 / 1.5;
-            let k = kappa.floor() as usize;
             let angle = -2.0 * TAU * 5.0 * time;
-            for (k, share) in [(k, 1.0 - kappa.fract()), (k + 1, kappa.fract())] {
-                if k < 8 {
-                    expected[2 * (8 * l + k)] += amplitude * share * angle.cos();
-                    expected[2 * (8 * l + k) + 1] += amplitude * share * angle.sin();
+            // Lagrange's parabola through the three samples about the nearest.
+            let middle = kappa.round();
+            for k in [middle - 1.0, middle, middle + 1.0] {
+                let others = [middle - 1.0, middle, middle + 1.0]
+                    .into_iter()
+                    .filter(|&o| o != k);
+                let share: f64 = others.map(|o| (kappa - o) / (k - o)).product();
+                if (0.0..8.0).contains(&k) {
+                    let at = 2 * (8 * l + k as usize);
+                    expected[at] += amplitude * share * angle.cos();
+                    expected[at + 1] += amplitude * share * angle.sin();
                 }
             }
         }
@@ -135,7 +188,7 @@ mod tests {
         let echoes = [
             (0, 2.25, 1.0),
             (0, 2.75, 0.5),
-            (1, 7.5, 2.0),
+            (1, 7.4, 2.0),
             (1, 0.0, -1.0),
         ];
         let mut sum = Accumulator::new(&frame());
@@ -157,17 +210,46 @@ mod tests {
             worst(&overwritten.exact, &echoes) > 0.1,
             "overwriting is caught"
         );
-        assert_eq!(sum.deposits.iter().sum::<u32>(), 7, "sample 8 is outside");
+        assert_eq!(
+            sum.deposits.iter().sum::<u32>(),
+            10,
+            "samples -1 and 8 are outside"
+        );
+    }
+
+    // Three points on a parabola reproduce any parabola: sum, centre and spread of the shares are exact.
+    #[test]
+    fn shares_keep_an_echo_s_centre_and_do_not_widen_it() {
+        for f in [-0.5, -0.3, 0.0, 0.1, 0.49] {
+            let [before, at, behind] = shares(f);
+            assert!((before + at + behind - 1.0).abs() < 1e-15);
+            assert!((behind - before - f).abs() < 1e-15);
+            let spread = before * (f + 1.0).powi(2) + at * f * f + behind * (f - 1.0).powi(2);
+            assert!(spread.abs() < 1e-15, "{f}: {spread}");
+            // The linear split, which this replaces, has f (1 - f).
+            assert!(f <= 0.0 || (1.0 - f) * f * f + f * (1.0 - f).powi(2) > 0.05);
+        }
+    }
+
+    #[test]
+    fn the_nearest_sample_gets_all_with_the_phase_of_the_echo_s_own_time() {
+        let mut a = Accumulator::new(&frame());
+        let time = 2.4 * 0.25 / 1.5;
+        a.deposit_nearest(0, time, 3.0, |_| 1.0);
+        let angle = -2.0 * TAU * 5.0 * time;
+        assert!((a.exact[4] - 3.0 * angle.cos()).abs() < 1e-12);
+        assert!((a.exact[5] - 3.0 * angle.sin()).abs() < 1e-12);
+        assert_eq!(a.deposits.iter().sum::<u32>(), 1);
     }
 
     #[test]
     fn fixed_point_rounds_each_term_and_reports_clamping() {
         let mut a = Accumulator::new(&frame());
-        a.deposit(0, 0.0, 0.4, 0.0, |_| 1.0, NEAREST);
-        a.deposit(0, 0.0, 0.4, 0.0, |_| 1.0, NEAREST);
+        a.deposit_nearest(0, 0.0, 0.4, |_| 1.0);
+        a.deposit_nearest(0, 0.0, 0.4, |_| 1.0);
         assert_eq!((a.fixed[0], a.saturated), (0, 0));
         assert!((a.exact[0] - 0.8).abs() < 1e-15);
-        a.deposit(0, 0.0, -2e9, 0.0, |_| 1.0, NEAREST);
+        a.deposit_nearest(0, 0.0, -2e9, |_| 1.0);
         assert_eq!((a.fixed[0], a.saturated), (-(1 << 30), 1));
     }
 }

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 
 pub use super::Owned as Fixture;
-use crate::sim::layout::{Frame, Instance, NONE, Row, Rows, Surface, Tissue};
+use crate::sim::layout::{ALL_LEVELS, Frame, Instance, NONE, Row, Rows, Surface, Tissue};
 
 pub fn rows_of(m: &DAffine3) -> Rows {
     std::array::from_fn(|i| {
@@ -20,6 +20,8 @@ pub fn tissue(speed: f32, impedance: f32, absorption: f32) -> Tissue {
         absorption,
         presence: 1.0,
         sigma: 1.0,
+        density: 1.0,
+        amplitude: 1.0,
         texture_length: 1.0,
         seed: 77,
         ..Tissue::default()
@@ -39,6 +41,8 @@ impl Fixture {
             surface_gain: 1.0,
             incoherent_gain: 1.0,
             compensation: 1.0,
+            lattice_level: ALL_LEVELS,
+            black: ALL_LEVELS,
             ..Row::default()
         };
         Self {

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::acoustics::mirror;
 use super::geometry::{beam_weight, world_line};
 use super::interface::MIRROR;
-use super::random::{pcg4d, unit};
+use super::random::pcg4d;
 use super::stack::Stack;
 use crate::sim::layout::Frame;
 
@@ -60,8 +60,17 @@ impl Path {
     }
 
     /// What is added before rounding down: per sample of a deposit, real and imaginary part.
-    pub(super) fn dither(&self, frame: &Frame) -> [f64; 4] {
-        pcg4d([self.line, self.n, self.key(), frame.seed ^ 0x51ed_270b]).map(unit)
+    pub(super) fn dither(&self, frame: &Frame) -> [f64; 6] {
+        let words = pcg4d([self.line, self.n, self.key(), frame.seed ^ 0x51ed_270b]);
+        std::array::from_fn(|i| {
+            let word = words[i / 2];
+            let half = if i % 2 == 0 {
+                word >> 16
+            } else {
+                word & 0xffff
+            };
+            f64::from(half) / 65_536.0
+        })
     }
 
     /// Scanline and layer.

@@ -27,6 +27,20 @@ pub fn pcg4d(v: [u32; 4]) -> [u32; 4] {
     v
 }
 
+/// Three words hashed into three (same source).
+pub fn pcg3d(v: [u32; 3]) -> [u32; 3] {
+    let mix = |v: &mut [u32; 3]| {
+        for [to, a, b] in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
+            v[to] = v[to].wrapping_add(v[a].wrapping_mul(v[b]));
+        }
+    };
+    let mut v = v.map(|x| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    mix(&mut v);
+    v = v.map(|x| x ^ (x >> 16));
+    mix(&mut v);
+    v
+}
+
 /// Uniform in [0, 1) with 24 bits.
 pub fn unit(bits: u32) -> f64 {
     f64::from(bits >> 8) / 16_777_216.0

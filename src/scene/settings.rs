@@ -92,8 +92,9 @@ pub struct Simulation {
     pub scatter_mode: ScatterMode,
     /// Edge of a lattice cell or voxel, mm.
     pub cell: f64,
-    /// Elevational reach of one layer in cells; 0 visits the whole slab that the layer owns.
-    pub elevation_cells: f64,
+    /// Scatterers per resolution cell down to which lattices are thinned, where they hold more: those of
+    /// tissue that is sparser stay. 0 thins nothing.
+    pub scatterers_per_resolution_cell: f64,
     /// What the lattice is fixed to.
     pub texture_space: TextureSpace,
     /// Reflected paths whose attenuation-compensated weight falls below this level, dB, carry no
@@ -178,16 +179,16 @@ impl Simulation {
 
     /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
     pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
-        let (paths, cell, elevation_cells, volume_floor) = match (quality, machine) {
-            (Quality::Draft, Machine::Software) => (2, 4.0 / 3.0, 1.0, -50.0),
+        let (paths, cell, scatterers, volume_floor) = match (quality, machine) {
+            (Quality::Draft, Machine::Software) => (2, 1.0, 5.0, -50.0),
             (Quality::Standard, Machine::Software) | (Quality::Draft, Machine::Gpu) => {
-                (8, 1.0, 1.0, -50.0)
+                (8, 1.0, 8.0, -50.0)
             }
-            (Quality::Standard, Machine::Gpu) => (32, 1.0, 2.0, -60.0),
+            (Quality::Standard, Machine::Gpu) => (32, 1.0, 16.0, -60.0),
             (Quality::Reference, _) => (128, 2.0 / 3.0, 0.0, -80.0),
         };
         self.paths = paths;
-        self.elevation_cells = elevation_cells;
+        self.scatterers_per_resolution_cell = scatterers;
         self.volume_floor = volume_floor;
         // A voxel's edge is a look, not a cost: there is one lookup per sample whatever its size.
         if self.scatter_mode == ScatterMode::Lattice {
@@ -214,7 +215,7 @@ impl Default for Simulation {
             beam_width: f64::INFINITY,
             scatter_mode: ScatterMode::Lattice,
             cell: 0.15,
-            elevation_cells: 1.0,
+            scatterers_per_resolution_cell: 8.0,
             texture_space: TextureSpace::Tissue,
             volume_floor: -50.0,
             speckle_gain: 0.0,
@@ -256,11 +257,11 @@ mod tests {
             simulation
         };
         let more = |a: &Simulation, b: &Simulation| {
-            let reach = |s: &Simulation| match s.elevation_cells {
+            let scatterers = |s: &Simulation| match s.scatterers_per_resolution_cell {
                 0.0 => f64::INFINITY,
                 n => n,
             };
-            a.paths <= b.paths && a.cell >= b.cell && reach(a) <= reach(b)
+            a.paths <= b.paths && a.cell >= b.cell && scatterers(a) <= scatterers(b)
         };
         for machine in [Software, Gpu] {
             let [draft, standard, proof] =

@@ -5,10 +5,10 @@
 
 mod headroom;
 
-use std::f64::consts::{LN_10, PI};
+use std::f64::consts::{LN_10, PI, TAU};
 
 use super::special::{erf, sinc};
-use crate::scene::settings::ScatterMode;
+use crate::scene::settings::{Sampling, ScatterMode};
 use crate::scene::{Scene, Tissue};
 
 /// RMS envelope of unattenuated liver relative to a perfect mirror, dB. No source gives it; at
@@ -17,7 +17,7 @@ const LIVER_LEVEL: f64 = -45.0;
 /// Largest compensation of surface echoes at deposit, dB. They are up to 45 dB above speckle, so
 /// that they need less to stay above the rounding, and more would cost headroom.
 const SURFACE_COMPENSATION_LIMIT: f64 = 42.0;
-/// Scatterers count up to this many lateral sigmas from the beam axis (amplitude .044).
+/// Scatterers count up to this many sigmas of the beam from its axis (amplitude .044).
 pub const LATERAL_CUT: f64 = 2.5;
 /// Largest brightening of layers that sample only a part of the beam, as a power: 30 dB. Beyond,
 /// the layers miss the beam altogether and darkness is the honest picture.
@@ -65,9 +65,8 @@ impl<'a> Calibration<'a> {
     pub fn new(scene: &'a Scene) -> Self {
         let sigma = scene.probe.sigma_axial() * scene.imaging.psf_scale[0];
         let samples = sigma / scene.probe.sample_pitch();
-        // Linear splitting convolves with a triangle of variance 1/6 sample^2. A pulse narrower
-        // than that cannot be represented: it shows as the triangle alone.
-        let axial_sigma = (samples * samples - 1.0 / 6.0).max(0.01).sqrt();
+        // A pulse much narrower than a sample cannot be represented.
+        let axial_sigma = samples.max(0.1);
         let radius = ((4.0 * axial_sigma).ceil() as i32).min(32);
         Self {
             scene,
@@ -118,16 +117,10 @@ impl<'a> Calibration<'a> {
         amplitude(self.scene.imaging.noise) / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
     }
 
-    /// Elevational half-width in which one layer sees scatterers, mm.
+    /// Elevational half-width in which one layer sees scatterers, mm: its share of the slice.
     pub fn elevation_reach(&self) -> f64 {
         let probe = &self.scene.probe;
-        let half_pitch = probe.slice_thickness / (2.0 * f64::from(probe.elevation_layers));
-        let cells = self.scene.simulation.elevation_cells;
-        if cells > 0.0 {
-            (cells * self.scene.simulation.cell / 2.0).min(half_pitch)
-        } else {
-            half_pitch
-        }
+        probe.slice_thickness / (2.0 * f64::from(probe.elevation_layers))
     }
 
     fn elevations(&self) -> impl Iterator<Item = f64> + '_ {
@@ -174,24 +167,82 @@ impl<'a> Calibration<'a> {
             .recip()
     }
 
-    /// S_e^2: energy of the full elevational beam, sqrt(pi) sigma_e, over what the layers see of
-    /// it, sum_e int_{-reach}^{reach} exp(-(y_e + rho)^2 / sigma_e^2) drho.
-    pub fn elevation_power(&self, z: f64) -> f64 {
+    /// Energy of the whole two-way beam across and up, pi sigma_x sigma_e, over what the layers hear of
+    /// it: each its slab, to the edge of an ellipse of [`LATERAL_CUT`] sigmas.
+    pub fn beam_power(&self, z: f64) -> f64 {
         let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
-        let seen: f64 = self
+        let heard: f64 = self
             .elevations()
-            .map(|y| erf((y + reach) / sigma) - erf((y - reach) / sigma))
+            .map(|y| {
+                let nearest = (y.abs() - reach).max(0.0) / (LATERAL_CUT * sigma);
+                let width = LATERAL_CUT * (1.0 - nearest * nearest).max(0.0).sqrt();
+                erf(width) * (erf((y + reach) / sigma) - erf((y - reach) / sigma)) / 2.0
+            })
             .sum();
-        (2.0 / seen.max(1e-12)).min(ELEVATION_GAIN_LIMIT)
+        (1.0 / heard.max(1e-12)).min(ELEVATION_GAIN_LIMIT)
     }
 
-    /// int u^2 over the continuous position of an echo, u the linear split followed by the axial
-    /// kernel, at integer lag `m` between two echoes; samples.
+    /// The resolution cell at depth `z`, mm^3: the volume whose scatterers make as much of the fourth
+    /// moment as all under the point-spread function h, (int h^2)^2 / int h^4; sqrt(2 pi) sigma per axis, less
+    /// where the slice ends within the beam.
+    pub fn resolution_cell(&self, z: f64) -> f64 {
+        let sigma = self.sigma_elevation(z);
+        let end = self.scene.probe.slice_thickness / 2.0 / sigma;
+        let up = TAU.sqrt() * sigma * erf(end).powi(2) / erf(std::f64::consts::SQRT_2 * end);
+        let axial = self.scene.probe.sigma_axial() * self.scene.imaging.psf_scale[0];
+        TAU * self.sigma_lateral(z) * axial * up
+    }
+
+    /// Level of the lattice that is as dense as speckle needs at depth `z`: the log2 of the volume that
+    /// a cell may have, in cells of the finest one. Minus infinity: none may be thinned.
+    pub fn lattice_level(&self, z: f64) -> f64 {
+        let simulation = &self.scene.simulation;
+        if simulation.scatterers_per_resolution_cell <= 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        let volume = self.resolution_cell(z) / simulation.scatterers_per_resolution_cell;
+        (volume / simulation.cell.powi(3)).log2()
+    }
+
+    /// What shows as black at depth `z`: one-way weight times echogenicity, log2. Minus infinity where
+    /// nothing may be left out. Paths that share what they carry are held against their share.
+    pub fn black(&self, z: f64) -> f64 {
+        let (imaging, simulation) = (&self.scene.imaging, &self.scene.simulation);
+        if simulation.scatterers_per_resolution_cell <= 0.0 {
+            return f64::NEG_INFINITY;
+        }
+        let shown = amplitude(-imaging.gain - imaging.dynamic_range);
+        let level = shown / (self.speckle_target() * amplitude(self.tgc_db(z)));
+        let alike = simulation.sampling == Sampling::MainPath
+            && simulation.origin_jitter <= 0.0
+            && simulation.emission_lobe == f64::INFINITY
+            && !simulation.rough_transmission;
+        let share = if alike {
+            1.0
+        } else {
+            f64::from(simulation.paths.max(1))
+        };
+        (level / share).log2()
+    }
+
+    /// Density of scatterers of one amplitude and either sign, per lattice cell, whose speckle has the
+    /// fourth moment of `tissue`'s own: rho over the kurtosis of a normal amplitude of mean mu,
+    /// (m^4 + 6 m^2 + 3) / (1 + m^2)^2 with m = mu / sigma.
+    pub fn scatterer_density(&self, tissue: &Tissue) -> f64 {
+        let rho = tissue.density_of_scatterers * self.scene.simulation.thinning();
+        let square = tissue.mean_over_sigma.powi(2);
+        rho * (1.0 + square).powi(2) / (square * square + 6.0 * square + 3.0)
+    }
+
+    /// RMS of a lattice cell of `tissue`, without its low-frequency texture, whose power is 1 + k^2.
+    pub fn cell_amplitude(&self, tissue: &Tissue) -> f64 {
+        amplitude(tissue.echogenicity) / (1.0 + tissue.texture_depth.powi(2)).sqrt()
+    }
+
+    /// int u^2 over the continuous position of an echo, u the axial kernel about the sample nearest to it,
+    /// at integer lag `m` between two echoes; samples.
     fn axial_energy(&self, m: usize) -> f64 {
-        // Both pieces are linear in the fraction f: int f^2 = 1/3, int f(1-f) = 1/6.
-        let at = |m| autocorrelation(&self.axial_taps, m);
-        let below = if m == 0 { 1 } else { m - 1 };
-        2.0 / 3.0 * at(m) + (at(m + 1) + at(below)) / 6.0
+        autocorrelation(&self.axial_taps, m)
     }
 
     fn speckle_target(&self) -> f64 {
@@ -201,8 +252,8 @@ impl<'a> Calibration<'a> {
     /// What a scatterer's calibrated amplitude is multiplied with at depth `z`, before attenuation
     /// compensation.
     ///
-    /// Lattice: E|IQ|^2 = C^2 v h^-3 (int u^2 dz) (sqrt(pi) erf(cut)) sqrt(pi) with the factor
-    /// 1/sqrt(sigma_x sigma_e) that makes speckle flat with depth; v = 1 is liver.
+    /// Lattice: E|IQ|^2 = C^2 v h^-3 (int u^2 dz) pi sigma_x sigma_e over [`Self::beam_power`], v the power
+    /// of a cell; v = 1 is liver.
     /// Voxel: E|IQ|^2 = C^2 v S_lateral S_axial sum_e w_e^2; lookups in one voxel are equal, so
     /// both sums run over pairs, weighted with the probability 1 - distance/h that a lattice
     /// along the beam puts both into one voxel.
@@ -212,7 +263,7 @@ impl<'a> Calibration<'a> {
         let energy = match simulation.scatter_mode {
             ScatterMode::Lattice => {
                 let beam = self.sigma_lateral(z) * self.sigma_elevation(z);
-                let slice = PI * erf(LATERAL_CUT) * beam / self.elevation_power(z);
+                let slice = PI * beam / self.beam_power(z);
                 h.powi(-3) * self.axial_energy(0) * dz * slice
             }
             ScatterMode::Voxel => {
@@ -253,19 +304,14 @@ impl<'a> Calibration<'a> {
         (area(self.scene.probe.focus) / area(z)).sqrt()
     }
 
-    /// Mean and standard deviation of a tissue's scatterer amplitudes, scaled such that the power
+    /// Mean and standard deviation of a tissue's amplitudes in the voxel grid, scaled such that the power
     /// v (1 + k^2) is its echogenicity, with v = rho (sigma^2 + mu^2) - (rho mu)^2 |Phi|^2: the
-    /// carrier kills what repeats from cell to cell. Phi is the characteristic function of the
-    /// uniform position inside a cell, for a beam along a lattice axis; k is the depth of the
-    /// low-frequency texture of unit variance.
+    /// carrier kills what repeats from voxel to voxel. Phi is the characteristic function of the
+    /// uniform position inside a sample; k is the depth of the low-frequency texture of unit variance.
     pub fn scatterer_amplitudes(&self, tissue: &Tissue) -> (f64, f64) {
         let probe = &self.scene.probe;
-        let simulation = &self.scene.simulation;
-        let phi = match simulation.scatter_mode {
-            ScatterMode::Lattice => sinc(2.0 * probe.frequency * simulation.cell / tissue.speed),
-            ScatterMode::Voxel => sinc(2.0 * probe.frequency * probe.sample_pitch() / probe.speed),
-        };
-        let rho = tissue.density_of_scatterers * simulation.thinning();
+        let phi = sinc(2.0 * probe.frequency * probe.sample_pitch() / probe.speed);
+        let rho = tissue.density_of_scatterers * self.scene.simulation.thinning();
         let m = tissue.mean_over_sigma;
         let variance = rho * (1.0 + m * m) - (rho * m * phi).powi(2);
         let power = amplitude(tissue.echogenicity).powi(2);

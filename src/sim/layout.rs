@@ -32,6 +32,21 @@ pub const SAMPLING_PLAIN: u32 = 1;
 /// Paths that part at the first interaction.
 pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
 
+/// Number of the coarsest lattice of scatterers; each has cells of twice the volume of the one before.
+pub const LATTICE_LEVELS: u32 = 24;
+/// Part of a level over which the next one takes over.
+pub const LEVEL_FADE: f32 = 0.25;
+/// A row whose `lattice_level` is not above this asks for the finest lattice, whatever drowns it.
+pub const ALL_LEVELS: f32 = -1000.0;
+/// Samples that one workgroup of `scatter` gathers.
+pub const SCATTER_WINDOW: u32 = 1024;
+/// Samples in which a thread of it walks one stretch.
+pub const SCATTER_BIN: u32 = 64;
+/// Samples over which stretches are held against each other.
+pub const SCATTER_SLOT: u32 = 16;
+/// log2(10): 20 dB under black nothing is summed.
+pub const UNHEARD: f32 = 3.321_928_1;
+
 /// Curved array.
 pub const KIND_CONVEX: u32 = 0;
 /// Flat array.
@@ -104,7 +119,7 @@ shared! {
     struct Tissue {
         speed: f32, impedance: f32, absorption: f32, presence: f32,
         mean: f32, sigma: f32, texture_depth: f32, texture_length: f32,
-        seed: u32, unused0: u32, unused1: u32, unused2: u32,
+        seed: u32, density: f32, amplitude: f32, level: f32,
     }
     /// Echo properties of one side of a mesh.
     struct Surface {
@@ -127,6 +142,7 @@ shared! {
         volume_gain: f32, point_gain: f32, surface_gain: f32,
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
+        lattice_level: f32, black: f32,
     }
     /// A straight stretch of a path inside one medium.
     struct Segment {

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::contact::{self, Coupling, Skins, Touch};
 use super::fusion::{Fused, Simulated, Tint};
-use super::stages::{Batches, Buffers, Kernels, SCATTER_WINDOW, lines};
+use super::stages::{Batches, Buffers, Kernels, lines};
 use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
 use crate::scene::Scene;
@@ -134,9 +134,9 @@ impl Passes {
         cmd.dispatch_groups(
             &self.kernels.scatter,
             [
-                lines(&self.frame),
+                self.frame.scanlines,
                 chunks,
-                self.frame.samples.div_ceil(SCATTER_WINDOW),
+                self.frame.samples.div_ceil(layout::SCATTER_WINDOW),
             ],
             &[],
             &[

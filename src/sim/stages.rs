@@ -10,8 +10,6 @@ use crate::gpu::{Buffer, BufferKind, Device, GpuError, Kernel};
 
 /// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
 const SEGMENT_BUDGET: u64 = 96 << 20;
-/// Axial samples that one workgroup of `scatter` gathers (WINDOW in the kernel).
-pub(super) const SCATTER_WINDOW: u32 = 2048;
 
 /// How the paths of a frame are dealt out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -14,6 +14,8 @@ use crate::scene::{Scene, Surface, Wire};
 
 /// The kernel ends a path by setting its weight to 0, which has to be below every limit.
 const LEAST_WEIGHT: f32 = 1e-30;
+/// An amplitude twice as large, dB.
+const DECIBEL_PER_OCTAVE: f64 = 6.020_599_913;
 /// Roughness at and above which a surface is a perfect mirror.
 const MIRROR: f64 = 1e9;
 
@@ -199,6 +201,10 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 compensation: compensation as f32,
                 incoherent_gain: calibration.incoherent_gain(z) as f32,
                 receive_reach: reach(scene, scene.probe.receive_aperture(z)) as f32,
+                lattice_level: calibration
+                    .lattice_level(z)
+                    .max(f64::from(layout::ALL_LEVELS)) as f32,
+                black: calibration.black(z).max(f64::from(layout::ALL_LEVELS)) as f32,
             }
         })
         .collect()
@@ -234,7 +240,10 @@ pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
                 },
                 // Distinct lattices, by Knuth's multiplicative hash of the index.
                 seed: scene.simulation.seed ^ (i as u32 + 1).wrapping_mul(2_654_435_761),
-                ..layout::Tissue::default()
+                density: calibration.scatterer_density(tissue) as f32,
+                amplitude: calibration.cell_amplitude(tissue) as f32,
+                level: (tissue.echogenicity / DECIBEL_PER_OCTAVE).max(f64::from(layout::ALL_LEVELS))
+                    as f32,
             }
         })
         .collect()

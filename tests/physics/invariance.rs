@@ -39,29 +39,29 @@ fn sampling_grid(bench: &Bench, physics: Physics) -> Outcome {
         (1, 0.0, 2048),
         (3, 0.0, 2048),
         (7, 0.0, 2048),
-        (1, 1.0, 2048),
-        (3, 1.0, 2048),
-        (7, 1.0, 2048),
-        (7, 1.0, 4096),
-        (7, 1.0, 8192),
+        (1, 8.0, 2048),
+        (3, 8.0, 2048),
+        (7, 8.0, 2048),
+        (7, 8.0, 4096),
+        (7, 8.0, 8192),
     ];
-    for (layers, cells, samples) in settings {
+    for (layers, scatterers, samples) in settings {
         let mut scene = homogeneous(64, 1.0, 1);
         scene.probe.elevation_layers = layers;
         scene.probe.samples = samples;
-        scene.simulation.elevation_cells = cells;
+        scene.simulation.scatterers_per_resolution_cell = scatterers;
         if physics == Physics::Planted {
             scene.simulation.speckle_gain = -decibel(f64::from(layers));
         }
         let frame = render(&scene);
         let level = |band| decibel(mean(&intensities(&frame, &scene, band, 1).concat()));
         let dots: Vec<[f64; 2]> = BANDS.map(|b| [(b[0] + b[1]) / 2.0, level(b)]).to_vec();
-        let slab = if cells > 0.0 {
-            "a cell each"
+        let density = if scatterers > 0.0 {
+            "thinned lattice"
         } else {
-            "whole slabs"
+            "whole lattice"
         };
-        let label = format!("{layers} layers, {slab}, {samples} samples");
+        let label = format!("{layers} layers, {density}, {samples} samples");
         for [z, measured] in &dots {
             out.compare(
                 format!("{name}: {label}, at {z} mm; dB"),
@@ -104,7 +104,6 @@ const PATHS: u32 = 25;
 /// Speckle turned aside by a wall of pressure reflection `r` that all lines meet above 45 mm.
 fn turned_aside(r: f64) -> Scene {
     let mut scene = homogeneous(24, 1.0, 1);
-    scene.simulation.elevation_cells = 1.0;
     scene.simulation.paths = PATHS;
     scene.simulation.max_reflections = 1;
     let impedance = 1.630 * (1.0 + r) / (1.0 - r);
@@ -258,7 +257,6 @@ fn organ(m: DAffine3) -> Scene {
     let mut scene = linear(8, 6.0, silent(1.540, 1.630, 0.0));
     scene.probe.depth = 40.0;
     scene.probe.samples = 1024;
-    scene.simulation.elevation_cells = 0.0;
     scene.world_from_probe = m;
     let around = m * DAffine3::from_translation(DVec3::new(3.1, 5.3, -7.0));
     add_box(

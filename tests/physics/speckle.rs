@@ -17,7 +17,6 @@ use crate::scenes::{linear, tissue};
 pub fn homogeneous(lines: u32, pitch: f64, seed: u32) -> Scene {
     let mut scene = linear(lines, f64::from(lines) * pitch, tissue(1.540, 1.630, 0.0));
     scene.probe.f_number_transmit = 20.0;
-    scene.simulation.elevation_cells = 0.0;
     scene.simulation.seed = seed;
     scene.imaging.tgc_attenuation = 0.0;
     scene.imaging.dynamic_range = 100.0;

@@ -32,7 +32,7 @@ pub(super) fn simulation(
     };
     overlay!(table => out:
         paths, sampling, sequence, max_interactions, max_reflections, min_weight, coherence,
-        rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, elevation_cells,
+        rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, scatterers_per_resolution_cell,
         texture_space, density_scale, roughness_scale, thickness_scale, seed;
         origin_jitter, beam_width, cell, volume_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
@@ -54,7 +54,12 @@ pub(super) fn simulation(
         ("emission_lobe", out.emission_lobe, (1.0, INF), ""),
         ("beam_width", out.beam_width, (0.01, INF), "mm"),
         ("cell", out.cell, (0.01, 10.0), "mm"),
-        ("elevation_cells", out.elevation_cells, (0.0, 1000.0), ""),
+        (
+            "scatterers_per_resolution_cell",
+            out.scatterers_per_resolution_cell,
+            (0.0, 1000.0),
+            "",
+        ),
         ("volume_floor", out.volume_floor, LEVEL, "dB"),
         ("speckle_gain", out.speckle_gain, LEVEL, "dB"),
         ("surface_gain", out.surface_gain, LEVEL, "dB"),

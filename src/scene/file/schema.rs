@@ -121,7 +121,7 @@ pub struct SimulationTable {
     pub beam_width: Option<Length>,
     pub scatter_mode: Option<ScatterMode>,
     pub cell: Option<Length>,
-    pub elevation_cells: Option<f64>,
+    pub scatterers_per_resolution_cell: Option<f64>,
     pub texture_space: Option<TextureSpace>,
     pub volume_floor: Option<Level>,
     pub speckle_gain: Option<Level>,

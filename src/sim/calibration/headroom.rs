@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::{Calibration, amplitude};
+use crate::scene::Tissue;
 use crate::scene::settings::ScatterMode;
 use crate::sim::tables::{wire_points, wire_spacing};
 
@@ -20,23 +21,31 @@ fn largest_gaussian() -> f64 {
 const LARGEST_TEXTURE: f64 = 1.5 / 0.413_29;
 
 impl Calibration<'_> {
-    /// Largest amplitude and power over all tissues, with its place at one depth.
-    fn loudest(&self) -> (f64, f64) {
-        self.scene
-            .tissues
-            .iter()
-            .fold((0.0, 0.0), |(a, p), tissue| {
-                let (mean, sigma) = self.scatterer_amplitudes(tissue);
-                let largest = (mean.abs() + largest_gaussian() * sigma)
-                    * (1.0 + tissue.texture_depth * LARGEST_TEXTURE);
-                // A sample is longer, in mm, where sound is faster.
-                let power = if sigma > 0.0 {
-                    amplitude(tissue.echogenicity).powi(2) * tissue.speed / self.scene.probe.speed
-                } else {
-                    0.0
-                };
-                (f64::max(a, largest), f64::max(p, power))
-            })
+    /// Largest amplitude and power over all tissues at depth `z`. What is drowned sounds by louder
+    /// scatterers, as much as its weight is less.
+    fn loudest(&self, z: f64) -> (f64, f64) {
+        let voxel = self.scene.simulation.scatter_mode == ScatterMode::Voxel;
+        // Of the next level where it takes over; half a level is less than a factor of 1.5.
+        let thinned = self.lattice_level(z).max(0.0) + 1.0;
+        let over = |(a, p): (f64, f64), tissue: &Tissue| {
+            let (mean, sigma) = self.scatterer_amplitudes(tissue);
+            if sigma == 0.0 {
+                return (a, p);
+            }
+            let bare = match voxel {
+                true => mean.abs() + largest_gaussian() * sigma,
+                false => {
+                    let density = self.scatterer_density(tissue);
+                    self.cell_amplitude(tissue) * thinned.exp2().max(1.0 / density).sqrt()
+                }
+            };
+            let largest = bare * (1.0 + tissue.texture_depth * LARGEST_TEXTURE);
+            // A sample is longer, in mm, where sound is faster.
+            let power =
+                amplitude(tissue.echogenicity).powi(2) * tissue.speed / self.scene.probe.speed;
+            (f64::max(a, largest), f64::max(p, power))
+        };
+        self.scene.tissues.iter().fold((0.0, 0.0), over)
     }
 
     /// Bound on one component of the scatterers' sum in one sample at depth `z`, compensated.
@@ -46,21 +55,21 @@ impl Calibration<'_> {
     /// 2 L V) but for a probability of 2 exp(-L) per sample; L = 35 makes that 1e-15, never in
     /// 1e9 samples. (About 8.4 standard deviations plus 23 times the loudest scatterer.) The
     /// absolute sum would be an order of magnitude more, for phases that cannot all agree.
-    /// Voxel: per layer at most three lookups reach a sample, with shares that sum to 2: absolute.
+    /// Voxel: per layer one lookup reaches a sample: absolute.
     /// Twice either, since reflected branches may add at most as much again.
     pub fn scatterer_bound(&self, z: f64) -> f64 {
-        let (largest, power) = self.loudest();
+        let (largest, power) = self.loudest(z);
         let gain = self.speckle_gain(z) * amplitude(self.compensation_db(z));
         if self.scene.simulation.scatter_mode == ScatterMode::Voxel {
-            return 4.0 * largest * gain * self.elevation_weights(z);
+            return 2.0 * largest * gain * self.elevation_weights(z);
         }
         let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
         let nearest = self.elevations().fold(f64::INFINITY, |n, y| n.min(y.abs()));
         let beside = (nearest - reach).max(0.0) / sigma;
         let m = largest * gain * (-beside * beside / 2.0).exp();
-        // The triangle of the linear split has energy 2/3; half the power is in each component.
+        // Half the power is in each component.
         let rms = self.speckle_target() * amplitude(self.compensation_db(z));
-        let v = power * rms * rms * (2.0 / 3.0) / self.axial_energy(0) / 2.0;
+        let v = power * rms * rms / self.axial_energy(0) / 2.0;
         let l = 35.0;
         2.0 * (l * m / 3.0 + ((l * m / 3.0).powi(2) + 2.0 * l * v).sqrt())
     }

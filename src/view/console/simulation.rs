@@ -81,20 +81,14 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice:
         }
         let s = &mut settings.simulation;
         number(ui, "simulation.cell", "Cell", &mut s.cell, 0.05..=1.0);
-        let cells = &mut s.elevation_cells;
         number(
             ui,
-            "simulation.elevation_cells",
-            "Cells across",
-            cells,
-            0.0..=16.0,
-        );
-        choice(
-            ui,
-            "simulation.scatter_mode",
+            "simulation.scatterers_per_resolution_cell",
             "Scatterers",
-            &mut s.scatter_mode,
+            &mut s.scatterers_per_resolution_cell,
+            0.0..=64.0,
         );
+        choice(ui, "simulation.scatter_mode", "Lookup", &mut s.scatter_mode);
         choice(
             ui,
             "simulation.texture_space",

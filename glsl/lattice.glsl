@@ -1,0 +1,119 @@
+// Lattices of scatterers, as coarse as speckle allows, and how a beam walks them; src/reference/lattice.rs
+// says why. The includer declares tissues[], rows[] and frame and includes random.glsl.
+
+// A cell's edge on three levels in a row, of which each has twice the volume of the one before.
+const float EDGES[3] = float[3](1.0, 1.259921, 1.5874011);
+
+// One level of a tissue's lattices.
+struct Lattice {
+    float edge;            // mm
+    uint presence;         // cells of 65536 that hold a scatterer
+    float amplitude;
+    uvec3 key;
+};
+
+float lattice_edge(int number) {
+    return frame.cell * EDGES[number % 3] * float(1u << uint(number / 3));
+}
+
+Lattice lattice_of(uint tissue, int number) {
+    float volume = float(1u << uint(number));
+    float presence = min(tissues[tissue].density * volume, 1.0);
+    Lattice lattice;
+    lattice.edge = lattice_edge(number);
+    lattice.presence = max(uint(presence * 65536.0 + 0.5), 1u);
+    lattice.amplitude = tissues[tissue].amplitude * sqrt(volume / presence);
+    lattice.key = pcg4d(uvec4(tissues[tissue].seed, uint(number), 0u, 0u)).xyz;
+    return lattice;
+}
+
+bool present(Lattice lattice, uvec3 bits) {
+    return (((bits.x & 255u) << 8u) | (bits.y & 255u)) < lattice.presence;
+}
+
+// Which lattice a piece of tissue needs: `wanted` of the axial row, or what still holds eight cells for
+// each of the tissue's own scatterers; coarser by what drowns it.
+float wanted_level(uint tissue, float wanted, float drowned) {
+    if (wanted <= ALL_LEVELS) return 0.0;
+    float own = -log2(8.0 * tissues[tissue].density);
+    return clamp(max(wanted, own) + drowned, 0.0, float(LATTICE_LEVELS));
+}
+
+// Share of the power that a level carries where `wanted` is needed.
+float level_power(float wanted, int number) {
+    float above = wanted - float(number);
+    return min(clamp((above + LEVEL_FADE) / LEVEL_FADE, 0.0, 1.0), clamp((1.0 - above) / LEVEL_FADE, 0.0, 1.0));
+}
+
+// Two-way beam at a row: by how much it falls per mm^2 across and up, and the gain; all log2.
+vec3 beam_shape(uint row) {
+    float l = rows[row].sigma_lateral, e = rows[row].sigma_elevation;
+    return vec3(0.72134752 / (l * l), 0.72134752 / (e * e), log2(rows[row].volume_gain));
+}
+
+// How a lattice is walked under a beam: axis a along it, b across, c through the slab of the layer.
+struct Walk {
+    uint a; uint b; uint c;
+    vec2 along; vec2 across;   // per mm of a and b within the slab's middle plane: along the beam, and across
+    vec2 tilt;                 // what c falls by per mm of a and b within that plane
+    float inverse_c;           // of the slab's normal
+    float slant;               // what lies 1 mm above the slab's middle plane, along c, lies this much across
+    float drift;               // of the axis, mm of b per mm of a
+    float step;                // along the axis per mm of a
+};
+
+// Keeps away from zero, where a field squeezes tissue to nothing.
+float at_least(float v, float least) { return v < 0.0 ? min(v, -least) : max(v, least); }
+
+// The three directions of the beam in the lattice's space: covectors, where tissue is deformed.
+Walk walk_of(vec3 d, vec3 lateral, vec3 up) {
+    Walk w;
+    vec3 size = abs(up);
+    w.c = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
+    w.a = (w.c + 1u) % 3u;
+    w.b = (w.c + 2u) % 3u;
+    w.inverse_c = 1.0 / at_least(up[w.c], 0.2);
+    vec2 tilt = vec2(up[w.a], up[w.b]) * w.inverse_c;
+    vec2 along = vec2(d[w.a], d[w.b]) - d[w.c] * tilt;
+    vec2 across = vec2(lateral[w.a], lateral[w.b]) - lateral[w.c] * tilt;
+    if (abs(across.x) > abs(across.y)) {
+        uint a = w.a;
+        w.a = w.b;
+        w.b = a;
+        tilt = tilt.yx;
+        along = along.yx;
+        across = across.yx;
+    }
+    w.across = vec2(across.x, at_least(across.y, 0.25));
+    w.along = along;
+    w.tilt = tilt;
+    w.slant = at_least(lateral[w.c] * w.inverse_c, 1e-4);
+    w.drift = -w.across.x / w.across.y;
+    w.step = at_least(w.along.x + w.along.y * w.drift, 0.2);
+    return w;
+}
+
+ivec3 unit_step(uint axis) { return ivec3(equal(uvec3(axis), uvec3(0u, 1u, 2u))); }
+
+// Cells, of edge h, whose middles lie in `ends` about `rest`: the first, and the first behind. At most
+// 1024: whatever a spoiled number says, the walk ends.
+ivec2 cells_between(vec2 ends, float rest, float h) {
+    vec2 at = clamp(ceil((ends + rest) / h - 0.5), -1e6, 1e6);
+    return ivec2(int(at.x), int(min(at.y, at.x + 1024.0)));
+}
+
+// Cells of the plane at `da` whose middles may lie within `width` of the axis and `reach` of the slab's
+// middle plane.
+ivec2 rows_between(Walk walk, float da, float width, float reach, float rest, float h) {
+    float half_range = (width + abs(walk.slant) * reach) / abs(walk.across.y);
+    return cells_between(walk.drift * da + vec2(-half_range, half_range), rest, h);
+}
+
+// Of those in one row the cells that do.
+ivec2 columns_between(Walk walk, vec2 at, float width, float reach, float rest, float h) {
+    float across = dot(walk.across, at);
+    vec2 up = (vec2(-width, width) - across) / walk.slant;
+    vec2 both = vec2(max(min(up.x, up.y), -reach), min(max(up.x, up.y), reach)) * walk.inverse_c;
+    if (walk.inverse_c < 0.0) both = both.yx;
+    return cells_between(both - dot(walk.tilt, at), rest, h);
+}
