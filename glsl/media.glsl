@@ -1,9 +1,15 @@
-// Which medium encloses a point: a small stack of instance ids, entered in order.
+// Which medium encloses a point: a small stack of instance ids, entered in order. Stacks are passed
+// `inout` also where they are only read: a copy would move all of them.
 
 struct Media { uint count; uint ids[MAX_STACK]; };
 
+void copy_media(inout Media to, inout Media from) {
+    to.count = from.count;
+    for (uint i = 0u; i < from.count; ++i) to.ids[i] = from.ids[i];
+}
+
 // The entry of highest priority; ties go to the one entered last. NONE: the background.
-uint current_instance(Media media) {
+uint current_instance(inout Media media) {
     uint best = NONE;
     int priority = -2147483647;
     for (uint i = 0u; i < media.count; ++i) {
@@ -19,7 +25,7 @@ uint tissue_of(uint instance) {
 
 // Whether echoes from here are wanted: everywhere, or only inside the mask that is cut into an
 // acquired image.
-bool is_heard(Media media) {
+bool is_heard(inout Media media) {
     if ((frame.flags & FLAG_MASKED) == 0u) return true;
     for (uint i = 0u; i < media.count; ++i) {
         if (instances[media.ids[i]].masks != 0u) return true;

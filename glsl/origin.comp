@@ -11,19 +11,19 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer InstanceBuffer { Instance instances[]; };
-layout(std430, binding = 2) readonly buffer VertexBuffer { float vertices[]; };
-layout(std430, binding = 3) readonly buffer NormalBuffer { float normals[]; };
-layout(std430, binding = 4) readonly buffer TriangleBuffer { uint triangles[]; };
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer InstanceBuffer { Instance instances[]; };
+layout(std430, binding = 2) restrict readonly buffer VertexBuffer { float vertices[]; };
+layout(std430, binding = 3) restrict readonly buffer NormalBuffer { float normals[]; };
+layout(std430, binding = 4) restrict readonly buffer TriangleBuffer { uint triangles[]; };
 #ifdef RAY_QUERY
 layout(binding = 5) uniform accelerationStructureEXT tlas;
 #else
-layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
+layout(std430, binding = 5) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 6) buffer StackBuffer { uint stacks[]; };
-layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 8) readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 6) restrict buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 7) restrict buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 8) restrict readonly buffer TissueBuffer { Tissue tissues[]; };
 
 #include "triangle.glsl"
 
@@ -86,56 +86,26 @@ void note_crossing(uint instance, bool entering, uint order) {
     }
 }
 
-// The other surface at a hit, where surfaces coincide; how far past them both the ray is.
-Hit coincident_hit(vec3 o, vec3 d, Hit hit, inout float past) {
-    Hit twin = Hit(hit.t, NONE, NONE, 0.0, 0.0);
-    vec3 p = o + hit.t * d;
-    float clearance = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
-    past = hit.t + clearance;
-    if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-        twin = closest_hit(o, d, max(hit.t - clearance, 0.0), past, hit.instance);
-        if (twin.instance != NONE) past = max(past, twin.t + clearance);
-    }
-    return twin;
-}
-
 bool enters(vec3 d, Hit hit) { return dot(d, surface_geometric_normal(hit)) < 0.0; }
 
-void toggle(inout Media media, vec3 d, Hit hit) {
-    if (!cross_interface(media, hit.instance, enters(d, hit))) atomicAdd(counters.stack_overflow, 1u);
-}
-
-// Goes straight on as long as nothing is heard: to the last surface before, with the media there.
-void follow_way(vec3 o, vec3 d, inout Media media, inout float travelled, inout float weight, inout uint interactions) {
-    wanted = ALL;
-    float t_min = 0.0;
-    for (uint order = 1u; order <= MAX_CROSSINGS; ++order) {
-        Hit hit = closest_hit(o, d, t_min, frame.depth, NONE);
-        if (hit.instance == NONE) break;
-        float past;
-        Hit twin = coincident_hit(o, d, hit, past);
-        // As in trace, the lower instance first.
-        bool turned = twin.instance < hit.instance;
-        Media next = media;
-        if (turned) toggle(next, d, twin);
-        toggle(next, d, hit);
-        if (twin.instance != NONE && !turned) toggle(next, d, twin);
-        if (is_heard(next)) break;
-        uint before = current_instance(media), after = current_instance(next);
-        uint t1 = tissue_of(before), t2 = tissue_of(after);
-        float t = twin.instance == NONE ? hit.t : max(hit.t, twin.t);
-        weight *= exp(-tissues[t1].absorption * (t - travelled));
-        if (before != after) {
-            weight *= passed(tissues[t1].impedance, tissues[t2].impedance);
-            interactions += 1u;
+// What encloses the start, once all crossings are noted. The outermost first: it is left last.
+void enclose(inout Media media) {
+    media.count = 0u;
+    uint last = NONE;
+    for (uint i = 0u; i < open_count; ++i) {
+        uint best = MAX_OPEN;
+        for (uint j = 0u; j < open_count; ++j) {
+            if (open_net[j] > 0 && open_order[j] < last && (best == MAX_OPEN || open_order[j] > open_order[best])) best = j;
         }
-        travelled = t;
-        media = next;
-        t_min = past;
+        if (best == MAX_OPEN) break;
+        if (media.count == MAX_STACK) { atomicAdd(counters.stack_overflow, 1u); break; }
+        media.ids[media.count] = open_ids[best];
+        media.count += 1u;
+        last = open_order[best];
     }
 }
 
-void write_start(uint line, Media media, float travelled, float weight, uint interactions) {
+void write_start(uint line, inout Media media, float travelled, float weight, uint interactions) {
     uint base = line * START_WORDS;
     stacks[base] = media.count;
     for (uint i = 0u; i < MAX_STACK; ++i) stacks[base + 1u + i] = i < media.count ? media.ids[i] : NONE;
@@ -152,50 +122,93 @@ void main() {
     o = world_point(o);
     d = world_vector(d);
     line_start = o;
-    Media media;
+    Media media, after;
     media.count = 0u;
     // A path that is aimed elsewhere has a way of its own.
     bool masked = (frame.flags & FLAG_MASKED) != 0u && frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
-    float mask_t = 0.0;
-    if (masked) {
-        wanted = MASKS;
-        Hit mask = closest_hit(o, d, 0.0, 1e9, NONE);
-        if (mask.instance == NONE) {
-            // Outside of all masks, and none is ahead.
-            report_counts();
-            write_start(line, media, 0.0, 0.0, 0u);
-            return;
-        }
-        mask_t = mask.t;
-    }
-    wanted = AROUND;
+    float mask_t = 0.0, travelled = 0.0, weight = 1.0;
+    uint interactions = 0u, rays = 0u;
+    // Whether a mask is ahead; then what encloses the start; then the way to the mask, straight on as
+    // long as nothing is heard. One loop for all: the walk through the hierarchy is in the kernel once.
+    wanted = masked ? MASKS : AROUND;
     float t_min = 0.0;
-    for (uint order = 1u; order <= MAX_CROSSINGS; ++order) {
-        Hit hit = closest_hit(o, d, t_min, 1e9, NONE);
-        if (hit.instance == NONE) break;
-        Hit twin = coincident_hit(o, d, hit, t_min);
-        note_crossing(hit.instance, enters(d, hit), 2u * order);
-        if (twin.instance != NONE) note_crossing(twin.instance, enters(d, twin), 2u * order + 1u);
-    }
-    // The outermost first: it is left last.
-    uint last = NONE;
-    for (uint i = 0u; i < open_count; ++i) {
-        uint best = MAX_OPEN;
-        for (uint j = 0u; j < open_count; ++j) {
-            if (open_net[j] > 0 && open_order[j] < last && (best == MAX_OPEN || open_order[j] > open_order[best])) best = j;
+    uint order = 0u;
+    // The first of two surfaces that coincide was found; the ray looks for the other.
+    bool pairing = false;
+    Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
+    float close = 0.0;
+    bool done = false;
+    while (true) {
+        Hit hit = closest_hit(o, d, pairing ? max(first.t - close, 0.0) : t_min,
+            pairing ? first.t + close : (wanted == ALL ? frame.depth : 1e9), pairing ? first.instance : NONE);
+        rays += 1u;
+        if (wanted == MASKS) {
+            // Outside of all masks, and none is ahead.
+            if (hit.instance == NONE) { weight = 0.0; done = true; }
+            mask_t = hit.t;
+            wanted = AROUND;
+        } else if (!pairing && hit.instance != NONE && (frame.flags & FLAG_COINCIDENT) != 0u) {
+            first = hit;
+            pairing = true;
+            vec3 p = o + hit.t * d;
+            close = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+        } else {
+            Hit twin = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+            if (pairing) {
+                twin = hit;
+                hit = first;
+                pairing = false;
+            } else {
+                vec3 p = o + hit.t * d;
+                close = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
+            }
+            bool met = hit.instance != NONE;
+            uint surfaces = met ? (twin.instance != NONE ? 2u : 1u) : 0u;
+            order += 1u;
+            t_min = hit.t + close;
+            if (twin.instance != NONE) t_min = max(t_min, twin.t + close);
+            if (wanted == ALL) copy_media(after, media);
+            // As in trace, the lower instance first.
+            bool turned = wanted == ALL && twin.instance < hit.instance;
+            for (uint i = 0u; i < surfaces; ++i) {
+                Hit each = hit;
+                if ((i == 0u) == turned) each = twin;
+                bool entering = enters(d, each);
+                if (wanted == AROUND) note_crossing(each.instance, entering, 2u * order + i);
+                else if (!cross_interface(after, each.instance, entering)) atomicAdd(counters.stack_overflow, 1u);
+            }
+            if (wanted == AROUND) {
+                if (!met || order == MAX_CROSSINGS) {
+                    enclose(media);
+                    done = !masked || is_heard(media);
+                    if (!done && mask_t >= frame.depth) { weight = 0.0; done = true; }
+                    wanted = ALL;
+                    t_min = 0.0;
+                    order = 0u;
+                }
+            } else {
+                done = !met || is_heard(after);
+                if (!done) {
+                    uint before = current_instance(media), behind = current_instance(after);
+                    uint t1 = tissue_of(before), t2 = tissue_of(behind);
+                    float t = twin.instance == NONE ? hit.t : max(hit.t, twin.t);
+                    weight *= exp(-tissues[t1].absorption * (t - travelled));
+                    if (before != behind) {
+                        weight *= passed(tissues[t1].impedance, tissues[t2].impedance);
+                        interactions += 1u;
+                    }
+                    travelled = t;
+                    copy_media(media, after);
+                    done = order == MAX_CROSSINGS;
+                }
+            }
         }
-        if (best == MAX_OPEN) break;
-        if (media.count == MAX_STACK) { atomicAdd(counters.stack_overflow, 1u); break; }
-        media.ids[media.count] = open_ids[best];
-        media.count += 1u;
-        last = open_order[best];
+        if (done) {
+            // Inside the loop: naga loses values that a loop carries when they are used after it.
+            atomicAdd(counters.rays, rays);
+            report_counts();
+            write_start(line, media, travelled, weight, interactions);
+            break;
+        }
     }
-    float travelled = 0.0, weight = 1.0;
-    uint interactions = 0u;
-    if (masked && !is_heard(media)) {
-        if (mask_t >= frame.depth) weight = 0.0;
-        else follow_way(o, d, media, travelled, weight, interactions);
-    }
-    report_counts();
-    write_start(line, media, travelled, weight, interactions);
 }

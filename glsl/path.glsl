@@ -13,7 +13,6 @@ struct Path {
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
     uint interactions; uint reflections; uint crossings;
     bool branch;
-    Media media;
 };
 
 uvec4 draw(uint n, uint key, uint purpose) {
@@ -24,10 +23,10 @@ float clearance(vec3 p) {
     return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
 }
 
-Path start(uint line, uint n) {
+// Path n of a line, and what encloses it, where origin lets it begin.
+void start(uint line, uint n, out Path path, inout Media media) {
     vec3 o, d, lateral;
     probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
-    Path path;
     path.direction = world_vector(d);
     path.lateral = world_vector(lateral);
     uvec4 bits = draw(n, 0u, PURPOSE_JITTER);
@@ -47,8 +46,8 @@ Path start(uint line, uint n) {
     path.crossings = 0u;
     path.branch = false;
     uint at = line * START_WORDS;
-    path.media.count = stacks[at];
-    for (uint i = 0u; i < MAX_STACK; ++i) path.media.ids[i] = stacks[at + 1u + i];
+    media.count = stacks[at];
+    for (uint i = 0u; i < media.count; ++i) media.ids[i] = stacks[at + 1u + i];
     float travelled = uintBitsToFloat(stacks[at + MAX_STACK + 1u]);
     if (travelled > 0.0) {
         path.origin += travelled * path.direction;
@@ -57,7 +56,6 @@ Path start(uint line, uint n) {
     }
     path.weight = uintBitsToFloat(stacks[at + MAX_STACK + 2u]);
     path.interactions = stacks[at + MAX_STACK + 3u];
-    return path;
 }
 
 void reflect_path(inout Path path, vec3 m, float roughness, float turn) {

@@ -11,20 +11,20 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer TissueBuffer { Tissue tissues[]; };
-layout(std430, binding = 2) readonly buffer InstanceBuffer { Instance instances[]; };
-layout(std430, binding = 3) readonly buffer VertexBuffer { float vertices[]; };
-layout(std430, binding = 4) readonly buffer NormalBuffer { float normals[]; };
-layout(std430, binding = 5) readonly buffer TriangleBuffer { uint triangles[]; };
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 2) restrict readonly buffer InstanceBuffer { Instance instances[]; };
+layout(std430, binding = 3) restrict readonly buffer VertexBuffer { float vertices[]; };
+layout(std430, binding = 4) restrict readonly buffer NormalBuffer { float normals[]; };
+layout(std430, binding = 5) restrict readonly buffer TriangleBuffer { uint triangles[]; };
 #ifdef RAY_QUERY
 layout(binding = 6) uniform accelerationStructureEXT tlas;
 #else
-layout(std430, binding = 6) readonly buffer NodeBuffer { uvec4 nodes[]; };
+layout(std430, binding = 6) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 7) readonly buffer StackBuffer { uint stacks[]; };
-layout(std430, binding = 8) readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 9) buffer PieceBuffer { vec4 pieces[]; };
+layout(std430, binding = 7) restrict readonly buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 8) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 9) restrict buffer PieceBuffer { vec4 pieces[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -46,7 +46,7 @@ layout(std430, binding = 9) buffer PieceBuffer { vec4 pieces[]; };
 const float DARK = -200.0;
 const float NOTHING = 1e-30;
 
-Tissue medium(Media media) {
+Tissue medium(inout Media media) {
     uint i = tissue_of(current_instance(media));
     Tissue t;
     t.speed = tissues[i].speed;
@@ -56,46 +56,20 @@ Tissue medium(Media media) {
 }
 
 // The middle of the beam: the path of `trace` before anything random.
-Path middle(uint line) {
-    Path path = start(line, 0u);
+void middle(uint line, out Path path, inout Media media) {
+    start(line, 0u, path, media);
     vec3 o, d, lateral;
     probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
     path.direction = world_vector(d);
     path.lateral = world_vector(lateral);
     path.origin = world_point(o) + path.time * frame.speed * path.direction;
     path.spread = vec3(0.0);
-    return path;
-}
-
-// A surface, or two that coincide: what is behind, whose surface it is, and how far past it is.
-struct Meeting { Hit hit; Media after; float past; };
-
-Meeting meet(Path path, Hit hit) {
-    float close = clearance(surface_position(hit));
-    Meeting m;
-    m.hit = hit;
-    m.after = path.media;
-    m.past = hit.t + close;
-    Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
-    if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-        other = closest_hit(path.origin, path.direction, max(hit.t - close, 0.0), m.past, hit.instance);
-        if (other.instance != NONE) m.past = max(m.past, other.t + close);
-        if (other.instance < hit.instance) {
-            m.hit = other;
-            other = hit;
-        }
-    }
-    cross_interface(m.after, m.hit.instance, dot(path.direction, surface_geometric_normal(m.hit)) < 0.0);
-    if (other.instance != NONE) {
-        cross_interface(m.after, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0);
-    }
-    return m;
 }
 
 // Sends the path through; the part of its intensity that is reflected, 1 where nothing gets through.
-float pass(inout Path path, Meeting m, Tissue t1, Tissue t2) {
-    vec3 n_geometric = surface_geometric_normal(m.hit);
-    vec3 n = surface_shading_normal(m.hit);
+float pass(inout Path path, Hit hit, Tissue t1, Tissue t2) {
+    vec3 n_geometric = surface_geometric_normal(hit);
+    vec3 n = surface_shading_normal(hit);
     if (dot(path.direction, n_geometric) >= 0.0) { n_geometric = -n_geometric; n = -n; }
     if (!(dot(path.direction, n) < 0.0)) n = n_geometric;
     float cos_i = -dot(path.direction, n);
@@ -104,7 +78,7 @@ float pass(inout Path path, Meeting m, Tissue t1, Tissue t2) {
         float kappa = frame.speed * path.time / frame.sample_pitch;
         uint row = uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
         vec3 along = path.direction + cos_i * n + 0.01 * path.lateral;
-        width = surface_curvature(m.hit, along) * rows[row].sigma_lateral;
+        width = surface_curvature(hit, along) * rows[row].sigma_lateral;
     }
     float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
     bool through = transmit_path(path, n, n_geometric, t1.speed, t2.speed) || width > 0.0;
@@ -114,7 +88,9 @@ float pass(inout Path path, Meeting m, Tissue t1, Tissue t2) {
 void main() {
     uint line = gl_GlobalInvocationID.x;
     if (line >= frame.scanlines * frame.layers) return;
-    Path path = middle(line);
+    Path path;
+    Media media, after;
+    middle(line, path, media);
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     uint next = line * MAX_PIECES;
@@ -124,9 +100,14 @@ void main() {
     bool fresh = true;
     // No mask lies on the line, or nothing gets past a surface.
     bool lost = path.weight <= 0.0;
-    for (uint crossing = 0u;; ++crossing) {
-        Tissue t1 = medium(path.media);
-        bool heard = is_heard(path.media);
+    // The first of two surfaces that coincide was found; the ray looks for the other.
+    bool pairing = false;
+    Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
+    float close = 0.0;
+    uint crossing = 0u;
+    while (true) {
+        Tissue t1 = medium(media);
+        bool heard = is_heard(media);
         // Around the mask sound goes on at the speed of the recording.
         Tissue way = t1;
         if (!heard) {
@@ -135,7 +116,7 @@ void main() {
         }
         float excess = heard ? t1.absorption - surrounding : 0.0;
         bool ends = lost || crossing == limit || next + 1u == last;
-        if (fresh || ends) {
+        if (!pairing && (fresh || ends)) {
             float kappa = crossing == 0u ? 0.0 : frame.speed * path.time / frame.sample_pitch;
             float slope = ends ? 0.0 : excess * t1.speed * frame.sample_pitch / frame.speed;
             pieces[next] = vec4(kappa, level, slope, 0.0);
@@ -143,31 +124,56 @@ void main() {
             fresh = false;
         }
         float t_end = (time_end - path.time) * way.speed;
-        Hit hit = Hit(t_end, NONE, NONE, 0.0, 0.0);
-        if (!ends) hit = closest_hit(path.origin, path.direction, path.t_min, t_end, NONE);
-        if (hit.instance == NONE) {
+        // Nothing is met by a ray without room.
+        Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.t - close, 0.0) : path.t_min,
+            pairing ? first.t + close : (ends ? -1.0 : t_end), pairing ? first.instance : NONE);
+        Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+        if (pairing) {
+            other = hit;
+            hit = first;
+            pairing = false;
+        } else if (hit.instance == NONE) {
             // What nothing follows holds to the end of the line.
             pieces[next] = vec4(FAR_PIECE, 0.0, 0.0, 0.0);
             break;
+        } else {
+            close = clearance(surface_position(hit));
+            if ((frame.flags & FLAG_COINCIDENT) != 0u) {
+                first = hit;
+                pairing = true;
+                continue;
+            }
         }
-        Meeting m = meet(path, hit);
-        bool heard_after = is_heard(m.after);
-        bool same = current_instance(m.after) == current_instance(path.media);
+        crossing += 1u;
+        float past = hit.t + close;
+        if (other.instance != NONE) past = max(past, other.t + close);
+        if (other.instance < hit.instance) {
+            Hit found = hit;
+            hit = other;
+            other = found;
+        }
+        copy_media(after, media);
+        cross_interface(after, hit.instance, dot(path.direction, surface_geometric_normal(hit)) < 0.0);
+        if (other.instance != NONE) {
+            cross_interface(after, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0);
+        }
+        bool heard_after = is_heard(after);
+        bool same = current_instance(after) == current_instance(media);
         if (same && heard == heard_after) {
-            path.t_min = m.past;
-            path.media = m.after;
+            path.t_min = past;
+            copy_media(media, after);
             continue;
         }
-        advance(path, m.hit.t, way, surface_position(m.hit));
-        level -= excess * m.hit.t;
+        advance(path, hit.t, way, surface_position(hit));
+        level -= excess * hit.t;
         fresh = heard || heard_after;
         if (same || !fresh) {
-            path.t_min = max(path.t_min, m.past - m.hit.t);
+            path.t_min = max(path.t_min, past - hit.t);
         } else {
-            float reflected = pass(path, m, t1, medium(m.after));
+            float reflected = pass(path, hit, t1, medium(after));
             lost = reflected >= 1.0;
             level = lost ? DARK : level + log(max(1.0 - reflected, NOTHING));
         }
-        path.media = m.after;
+        copy_media(media, after);
     }
 }

@@ -16,6 +16,12 @@ const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;
 const uint SAMPLING_SHARED_PRIMARY = 2u;
 
+// What the paths of a dispatch of trace do.
+const uint ROLE_WHOLE = 0u;         // they echo, and at every surface choose one way
+const uint ROLE_MAIN = 1u;          // they go through every surface and write down its interaction
+const uint ROLE_BRANCHES = 2u;      // they echo at what was written down and follow what is reflected there
+const uint ECHO_BLOCK = 8u;         // paths that one thread takes one after the other at an interaction
+
 const uint FLAG_ROUGH_TRANSMISSION = 1u;
 const uint FLAG_FACE_REFLECTION = 2u;
 const uint FLAG_COINCIDENT = 4u;    // some instances share triangles exactly
@@ -113,6 +119,20 @@ struct Segment {
     vec4 lateral_weight;   // unit lateral axis e_l carried along the path; weight at the origin
     vec4 spread;           // lateral variance a + 2 b x + c x^2 (mm^2) after rough reflections; path share
     uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
+};
+
+// A main path where it has arrived at a surface, before anything random.
+struct Interaction {
+    vec4 origin_weight;
+    vec4 direction_time;
+    vec4 lateral_reflectance;
+    vec4 geometric_turn;   // normal turned against the path; deviation of the reflected direction over the beam
+    vec4 shading;          // likewise; w unused
+    vec4 spread;           // w unused
+    uint path; uint instance; uint surface;
+    uint before; uint behind;                        // tissues
+    uint interactions; uint crossings;               // of the path up to here, with this one
+    uint enclosing; uint media[MAX_STACK];           // what encloses the path before the surface
 };
 
 // How an acquired volume is mixed with the simulation.

@@ -2,37 +2,43 @@
 #version 460
 // Paths of one (scanline, elevation layer) through the anatomy: surface echoes are deposited,
 // stretches inside a medium are written out as segments for scatter. docs/kernels.md has the steps.
+//
+// In the main-path scheme two dispatches: one follows what is transmitted and writes down each of
+// its interactions, the next lets every path echo at each of them and follows what is reflected there.
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #ifdef RAY_QUERY
 #extension GL_EXT_ray_query : require
 #endif
 #include "shared.glsl"
 #include "random.glsl"
 
-// One thread is one path: x runs over lines, y over paths.
+// x runs over lines, y over paths; in the second dispatch y over interactions, z over ECHO_BLOCKs of paths.
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer TissueBuffer { Tissue tissues[]; };
-layout(std430, binding = 2) readonly buffer SurfaceBuffer { Surface surfaces[]; };
-layout(std430, binding = 3) readonly buffer InstanceBuffer { Instance instances[]; };
-layout(std430, binding = 4) readonly buffer VertexBuffer { float vertices[]; };
-layout(std430, binding = 5) readonly buffer NormalBuffer { float normals[]; };
-layout(std430, binding = 6) readonly buffer TriangleBuffer { uint triangles[]; };
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { Surface surfaces[]; };
+layout(std430, binding = 3) restrict readonly buffer InstanceBuffer { Instance instances[]; };
+layout(std430, binding = 4) restrict readonly buffer VertexBuffer { float vertices[]; };
+layout(std430, binding = 5) restrict readonly buffer NormalBuffer { float normals[]; };
+layout(std430, binding = 6) restrict readonly buffer TriangleBuffer { uint triangles[]; };
 #ifdef RAY_QUERY
 layout(binding = 7) uniform accelerationStructureEXT tlas;
 #else
-layout(std430, binding = 7) readonly buffer NodeBuffer { uvec4 nodes[]; };
+layout(std430, binding = 7) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 8) readonly buffer StackBuffer { uint stacks[]; };
-layout(std430, binding = 9) readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 10) buffer SurfaceEchoBuffer { int surface_echoes[]; };
-layout(std430, binding = 11) buffer SegmentBuffer { Segment segments[]; };
-layout(std430, binding = 12) buffer SegmentCountBuffer { uint segment_count[]; };
-layout(std430, binding = 13) buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 14) readonly buffer FieldBuffer { float fields[]; };
+layout(std430, binding = 8) restrict readonly buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 9) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 10) restrict buffer SurfaceEchoBuffer { int surface_echoes[]; };
+layout(std430, binding = 11) restrict buffer SegmentBuffer { Segment segments[]; };
+layout(std430, binding = 12) restrict buffer SegmentCountBuffer { uint segment_count[]; };
+layout(std430, binding = 13) restrict buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 14) restrict readonly buffer FieldBuffer { float fields[]; };
+layout(std430, binding = 15) restrict buffer InteractionBuffer { Interaction interactions[]; };
+layout(std430, binding = 16) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
 
-layout(push_constant) uniform Push { uint path_begin; uint path_count; };
+layout(push_constant) uniform Push { uint role; uint path_begin; uint path_count; uint line_begin; uint line_count; };
 
 // Whether everything but masks is transparent to rays.
 bool masks_only = false;
@@ -57,6 +63,10 @@ bool masks_only = false;
 #include "deposit.glsl"
 #include "path.glsl"
 #include "count.glsl"
+
+// What encloses the path, and what will behind the surface that it has met.
+Media media;
+Media after;
 
 uint row_of(float time) {
     float kappa = frame.speed * time / frame.sample_pitch;
@@ -93,14 +103,18 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uve
     }
 }
 
-// Which part of the volume this path stands for, and how many paths average down its echoes.
-void emit_segment(Path path, uint line, uint n, uint instance, float extent) {
-    bool alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0
+// Whether no two paths of a line differ before their first reflection.
+bool paths_are_alike() {
+    return frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0
         && (frame.flags & FLAG_ROUGH_TRANSMISSION) == 0u;
-    bool whole = alike && (frame.sampling == SAMPLING_MAIN_PATH
+}
+
+// Which part of the volume this path stands for, and how many paths average down its echoes.
+void emit_segment(inout Path path, uint line, uint n, uint instance, float extent) {
+    bool whole = paths_are_alike() && (frame.sampling == SAMPLING_MAIN_PATH
         || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
     if (whole && n != 0u) return;
-    if (!is_heard(path.media)) return;
+    if (!is_heard(media)) return;
     uint tissue = tissue_of(instance);
     if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
     if (path.branch && path.weight * rows[row_of(path.time)].compensation < frame.volume_floor) return;
@@ -147,226 +161,351 @@ float off_axis(uint line, vec3 position) {
     return dot(probe_point(position) - o, lateral);
 }
 
-// The echo of one interface by one path; m is the sampled micro-normal.
-void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tissue t1, Tissue t2, vec3 m) {
+// An interface that a path has arrived at; normals are turned against the path.
+struct Interface {
+    vec3 geometric; vec3 shading;
+    float reflectance;
+    float turn;                     // deviation of the reflected direction over the beam
+    bool curved;                    // over the beam: something gets through beside a totally reflected middle
+    uint instance; uint surface;
+    uint before; uint behind;       // tissues
+};
+
+// What one path sends back from one interface: a part in phase, and one from behind the surface.
+struct Echo {
+    uint waiting;                   // bit 0: the part in phase, bit 1: the other
+    uint key;
+    float time; vec2 in_phase;
+    float late; vec2 behind;
+};
+
+// m is the sampled micro-normal.
+void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interface at, vec3 m) {
+    Surface s = load_surface(at.surface);
+    Tissue t1 = load_tissue(at.before), t2 = load_tissue(at.behind);
     float cos_m = -dot(path.direction, m);
     float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_m);
     float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
     if (facing <= 0.0) return;
     float amplitude = path.weight * r * pow(facing, s.specularity) * s.gain * beam_weight(off_axis(line, path.origin));
-    uvec4 words = draw(n, key, PURPOSE_THICKNESS);
+    uvec4 words = draw(n, echo.key, PURPOSE_THICKNESS);
     float q = s.thickness * abs(gaussian(words.x & 0xffff0000u | words.y >> 16u));
     float late = path.time + q / t1.speed;
     float behind = amplitude * exp(-t1.absorption * q);
-    uvec4 dither = dither_words(line, n, key);
+    echo.waiting = 1u;
     if ((frame.flags & FLAG_COHERENT) != 0u) {
-        deposit_surface(line, late, vec2(path.share * behind, 0.0), false, dither);
+        echo.time = late;
+        echo.in_phase = vec2(path.share * behind, 0.0);
         return;
     }
-    deposit_surface(line, path.time, vec2(s.coherence * path.share * amplitude, 0.0), false, dither);
+    echo.time = path.time;
+    echo.in_phase = vec2(s.coherence * path.share * amplitude, 0.0);
     if (s.coherence >= 1.0) return;
     // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
     // tracer would choose the phase.
-    vec3 p = tissue_point(instance, path.origin) * 2.0 + 0.381966;
+    vec3 p = tissue_point(at.instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
     float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
-    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)), true, dither);
+    echo.waiting = 3u;
+    echo.late = late;
+    echo.behind = incoherent * vec2(cos(phi), sin(phi));
+}
+
+// The interface at a hit, where the path has arrived.
+void meet(out Interface at, Hit hit, bool entering, inout Path path, uint before, uint behind) {
+    at.instance = hit.instance;
+    at.surface = entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside;
+    at.before = before;
+    at.behind = behind;
+    at.geometric = surface_geometric_normal(hit);
+    at.shading = surface_shading_normal(hit);
+    if (!entering) { at.geometric = -at.geometric; at.shading = -at.shading; }
+    if (!(dot(path.direction, at.shading) < 0.0)) at.shading = at.geometric;
+    Tissue t1 = load_tissue(before), t2 = load_tissue(behind);
+    float cos_i = -dot(path.direction, at.shading);
+    float width = 0.0;
+    if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
+        float sigma = rows[row_of(path.time)].sigma_lateral;
+        // In the plane of incidence; along the image where there is none.
+        vec3 along = path.direction + cos_i * at.shading + 0.01 * path.lateral;
+        width = surface_curvature(hit, along) * sqrt(sigma * sigma + path.spread.x);
+    }
+    at.reflectance = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
+    at.turn = 2.0 * width / max(cos_i, 1e-3);
+    at.curved = width > 0.0;
+}
+
+void write_down(uint slot, inout Path path, uint n, inout Interface at) {
+    interactions[slot].origin_weight = vec4(path.origin, path.weight);
+    interactions[slot].direction_time = vec4(path.direction, path.time);
+    interactions[slot].lateral_reflectance = vec4(path.lateral, at.reflectance);
+    interactions[slot].geometric_turn = vec4(at.geometric, at.turn);
+    interactions[slot].shading = vec4(at.shading, 0.0);
+    interactions[slot].spread = vec4(path.spread, 0.0);
+    interactions[slot].path = n;
+    interactions[slot].instance = at.instance;
+    interactions[slot].surface = at.surface;
+    interactions[slot].before = at.before;
+    interactions[slot].behind = at.behind;
+    interactions[slot].interactions = path.interactions;
+    interactions[slot].crossings = path.crossings;
+    interactions[slot].enclosing = media.count;
+    for (uint i = 0u; i < media.count; ++i) interactions[slot].media[i] = media.ids[i];
+}
+
+// The path as it arrived where it was written down.
+void recall(uint slot, out Path path, out Interface at) {
+    path.origin = interactions[slot].origin_weight.xyz;
+    path.weight = interactions[slot].origin_weight.w;
+    path.direction = interactions[slot].direction_time.xyz;
+    path.time = interactions[slot].direction_time.w;
+    path.lateral = interactions[slot].lateral_reflectance.xyz;
+    path.spread = interactions[slot].spread.xyz;
+    path.interactions = interactions[slot].interactions;
+    path.crossings = interactions[slot].crossings;
+    path.t_min = clearance(path.origin);
+    path.handedness = 1.0;
+    path.share = 1.0 / float(frame.paths);
+    path.probability = 1.0;
+    path.reflections = 0u;
+    path.branch = false;
+    at.geometric = interactions[slot].geometric_turn.xyz;
+    at.turn = interactions[slot].geometric_turn.w;
+    at.shading = interactions[slot].shading.xyz;
+    at.reflectance = interactions[slot].lateral_reflectance.w;
+    at.curved = false;
+    at.instance = interactions[slot].instance;
+    at.surface = interactions[slot].surface;
+    at.before = interactions[slot].before;
+    at.behind = interactions[slot].behind;
+    media.count = interactions[slot].enclosing;
+    for (uint i = 0u; i < media.count; ++i) media.ids[i] = interactions[slot].media[i];
 }
 
 void main() {
-    uint line = gl_GlobalInvocationID.x;
-    uint n = path_begin + gl_GlobalInvocationID.y;
-    if (line >= frame.scanlines * frame.layers || gl_GlobalInvocationID.y >= path_count) return;
+    uint row = gl_GlobalInvocationID.x;
+    uint line = line_begin + row;
+    if (row >= line_count) return;
+    uint next = path_begin + gl_GlobalInvocationID.y, last = next + 1u;
+    uint main_path = row * path_count + gl_GlobalInvocationID.y;
+    uint slot = main_path * frame.max_interactions;
+    if (role == ROLE_BRANCHES) {
+        if (gl_GlobalInvocationID.y >= path_count * frame.max_interactions) return;
+        main_path = row * path_count + gl_GlobalInvocationID.y / frame.max_interactions;
+        if (gl_GlobalInvocationID.y % frame.max_interactions >= interaction_count[main_path]) return;
+        slot = row * path_count * frame.max_interactions + gl_GlobalInvocationID.y;
+        next = interactions[slot].path;
+        last = next + 1u;
+        if (paths_are_alike()) {
+            next = ECHO_BLOCK * gl_GlobalInvocationID.z;
+            last = min(next + ECHO_BLOCK, frame.paths);
+        }
+    } else if (gl_GlobalInvocationID.y >= path_count) {
+        return;
+    }
 
-    Path path = start(line, n);
-    Path main_path = path;
-    bool resume = false;
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
-    uint rays = 0u, interactions = 0u;
-    // Whether a mask is known to lie ahead of a path that is outside of all. Where all paths of a
-    // line begin alike, origin has looked.
-    bool aimed = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
+    uint rays = 0u, met = 0u, written = 0u;
+    // Main paths that this one stands for.
+    uint copies = role == ROLE_MAIN && paths_are_alike() ? frame.paths : 1u;
+    Path path;
+    Echo echo;
+    echo.waiting = 0u;
+    uint n = next;
+    bool going = false;
+    // Whether a mask is known to lie ahead of a path that is outside of all.
+    bool aimed = false;
+    // The first of two surfaces that coincide was found; the ray looks for the other.
+    bool pairing = false;
+    Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
+    float close = 0.0;
 
-    // A main path spawns at most one branch per interaction, and a branch spawns none.
-    uint guards = limit * (frame.max_interactions + 2u);
+    // A crossing takes three rays at most.
+    uint guards = 4u * limit * (last - next + 1u);
     for (uint guard = 0u;; ++guard) {
-        bool alive = path.interactions < frame.max_interactions && path.crossings < limit
+        while (echo.waiting != 0u) {
+            bool behind = (echo.waiting & 1u) == 0u;
+            echo.waiting &= behind ? 0u : 2u;
+            deposit_surface(line, behind ? echo.late : echo.time, behind ? echo.behind : echo.in_phase, behind,
+                dither_words(line, n, echo.key));
+        }
+        bool alive = going && path.interactions < frame.max_interactions && path.crossings < limit
             && path.weight >= frame.min_weight && path.time < time_end;
+        bool recalled = false;
+        Interface at;
         if (!alive || guard == guards) {
-            if (!resume || guard == guards) {
+            if (next >= last || guard == guards) {
                 // Inside the loop: naga loses values that a loop carries when they are used after it.
-                atomicAdd(counters.rays, rays);
+                if (rays > 0u) atomicAdd(counters.rays, rays);
                 report_counts();
-                if (interactions > 0u) atomicAdd(counters.interactions, interactions);
+                if (met > 0u) atomicAdd(counters.interactions, met);
+                if (role == ROLE_MAIN) interaction_count[main_path] = written;
                 break;
             }
-            resume = false;
-            aimed = false;
-            path = main_path;
-            continue;
-        }
-        uint before = current_instance(path.media);
-        Tissue t1 = load_tissue(tissue_of(before));
-        bool heard = is_heard(path.media);
-        // An acquired image is laid out at the probe's speed: so is the way to the mask.
-        Tissue way = t1;
-        if (!heard) way.speed = frame.speed;
-        float t_end = (time_end - path.time) * way.speed;
-        float face = path.reflections > 0u ? face_distance(probe_point(path.origin), probe_vector(path.direction)) : -1.0;
-        bool at_face = face > path.t_min && face < t_end;
-        if (at_face) t_end = face;
-        bool bounces = at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections;
-        if (!heard && !aimed && !bounces) {
-            // Nothing more is heard of what flies past all masks.
-            masks_only = true;
-            Hit mask = closest_hit(path.origin, path.direction, path.t_min, t_end, NONE);
-            masks_only = false;
-            rays += 1u;
-            if (mask.instance == NONE) {
-                path.weight = 0.0;
+            n = next;
+            next += 1u;
+            going = true;
+            if (role != ROLE_BRANCHES) {
+                start(line, n, path, media);
+                // Where all paths of a line begin alike, origin has looked.
+                aimed = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
                 continue;
             }
-        }
-        aimed = !heard;
-        Hit hit = closest_hit(path.origin, path.direction, path.t_min, t_end, NONE);
-        rays += 1u;
+            recall(slot, path, at);
+            aimed = false;
+            recalled = true;
+        } else {
+            uint before = current_instance(media);
+            Tissue way = load_tissue(tissue_of(before));
+            bool heard = is_heard(media);
+            // An acquired image is laid out at the probe's speed: so is the way to the mask.
+            if (!heard) way.speed = frame.speed;
+            float t_end = (time_end - path.time) * way.speed;
+            float face = path.reflections > 0u ? face_distance(probe_point(path.origin), probe_vector(path.direction)) : -1.0;
+            bool at_face = face > path.t_min && face < t_end;
+            if (at_face) t_end = face;
+            bool bounces = at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections;
 
-        if (hit.instance == NONE) {
-            emit_segment(path, line, n, before, t_end);
-            vec3 end = path.origin + t_end * path.direction;
-            if (bounces) {
-                aimed = false;
-                advance(path, t_end, way, end);
-                path.interactions += 1u;
-                interactions += 1u;
-                vec3 normal = world_vector(face_normal(probe_point(end)));
-                float cos_face = dot(path.direction, normal);
-                float retro = path.weight * path.share * beam_weight(off_axis(line, end));
-                if (cos_face < 0.0 && heard) {
-                    uvec4 dither = dither_words(line, n, path.interactions + 32u * path.reflections);
-                    deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false, dither);
-                }
-                reflect_path(path, normal, SPECULAR, 0.0);
-            } else {
-                path.weight = 0.0;
-            }
-            continue;
-        }
-
-        float past = hit.t + clearance(surface_position(hit));
-        Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
-        if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-            float from = max(hit.t - clearance(surface_position(hit)), 0.0);
-            other = closest_hit(path.origin, path.direction, from, past, hit.instance);
+            masks_only = !heard && !aimed && !bounces && !pairing;
+            Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.t - close, 0.0) : path.t_min,
+                pairing ? first.t + close : t_end, pairing ? first.instance : NONE);
             rays += 1u;
-            if (other.instance != NONE) past = max(past, other.t + clearance(surface_position(hit)));
+            if (masks_only) {
+                // Nothing more is heard of what flies past all masks.
+                if (hit.instance == NONE) path.weight = 0.0;
+                aimed = true;
+                continue;
+            }
+            Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+            if (pairing) {
+                other = hit;
+                hit = first;
+                pairing = false;
+            } else {
+                aimed = !heard;
+                if (hit.instance == NONE) {
+                    emit_segment(path, line, n, before, t_end);
+                    if (!bounces) {
+                        path.weight = 0.0;
+                        continue;
+                    }
+                    aimed = false;
+                    vec3 end = path.origin + t_end * path.direction;
+                    advance(path, t_end, way, end);
+                    path.interactions += 1u;
+                    met += 1u;
+                    vec3 normal = world_vector(face_normal(probe_point(end)));
+                    float cos_face = dot(path.direction, normal);
+                    float retro = path.weight * path.share * beam_weight(off_axis(line, end));
+                    if (cos_face < 0.0 && heard) {
+                        echo.waiting = 1u;
+                        echo.key = path.interactions + 32u * path.reflections;
+                        echo.time = path.time;
+                        echo.in_phase = vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0);
+                    }
+                    reflect_path(path, normal, SPECULAR, 0.0);
+                    continue;
+                }
+                close = clearance(surface_position(hit));
+                if ((frame.flags & FLAG_COINCIDENT) != 0u) {
+                    first = hit;
+                    pairing = true;
+                    continue;
+                }
+            }
+            float past = hit.t + close;
+            if (other.instance != NONE) past = max(past, other.t + close);
             // Rounding chooses which of the two is found first; it must not choose whose echo it is.
             if (other.instance < hit.instance) {
                 Hit found = hit;
                 hit = other;
                 other = found;
             }
-        }
-        vec3 position = surface_position(hit);
-        vec3 n_geometric = surface_geometric_normal(hit);
-        bool entering = dot(path.direction, n_geometric) < 0.0;
-        Media media = path.media;
-        if (!cross_interface(media, hit.instance, entering)) atomicAdd(counters.stack_overflow, 1u);
-        if (other.instance != NONE
-            && !cross_interface(media, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0)) {
-            atomicAdd(counters.stack_overflow, 1u);
-        }
-        uint after = current_instance(media);
-        path.crossings += 1u;
-        bool heard_after = is_heard(media);
-        bool outside = !heard && !heard_after;
-        if (after == before || outside) {
-            if (heard_after != heard || after != before) {
+            vec3 position = surface_position(hit);
+            bool entering = dot(path.direction, surface_geometric_normal(hit)) < 0.0;
+            copy_media(after, media);
+            if (!cross_interface(after, hit.instance, entering)) atomicAdd(counters.stack_overflow, copies);
+            if (other.instance != NONE
+                && !cross_interface(after, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0)) {
+                atomicAdd(counters.stack_overflow, copies);
+            }
+            uint behind = current_instance(after);
+            path.crossings += 1u;
+            bool heard_after = is_heard(after);
+            bool outside = !heard && !heard_after;
+            bool passes = behind == before || outside;
+            if (passes && heard_after == heard && behind == before) {
+                path.t_min = past;
+                copy_media(media, after);
+                continue;
+            }
+            emit_segment(path, line, n, before, hit.t);
+            advance(path, hit.t, way, position);
+            if (passes) {
                 // The mask begins or ends within a medium: the stretch is cut there. Outside another
                 // medium begins, and sound goes straight on.
-                emit_segment(path, line, n, before, hit.t);
-                advance(path, hit.t, way, position);
                 path.t_min = max(path.t_min, past - hit.t);
-                if (after != before) {
-                    path.weight *= passed(t1.impedance, tissues[tissue_of(after)].impedance);
+                if (behind != before) {
+                    path.weight *= passed(tissues[tissue_of(before)].impedance, tissues[tissue_of(behind)].impedance);
                     path.interactions += 1u;
                 }
-            } else {
-                path.t_min = past;
+                copy_media(media, after);
+                continue;
             }
-            path.media = media;
-            continue;
+            aimed = false;
+            path.interactions += 1u;
+            meet(at, hit, entering, path, tissue_of(before), tissue_of(behind));
+            if (role == ROLE_MAIN) {
+                write_down(slot + written, path, n, at);
+                written += 1u;
+            }
         }
 
-        emit_segment(path, line, n, before, hit.t);
-        advance(path, hit.t, way, position);
-        aimed = false;
-        path.interactions += 1u;
-        interactions += 1u;
+        bool rough_through = (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u;
         uint key = path.interactions + 32u * path.reflections;
-        vec3 n_shading = surface_shading_normal(hit);
-        if (!entering) { n_geometric = -n_geometric; n_shading = -n_shading; }
-        if (!(dot(path.direction, n_shading) < 0.0)) n_shading = n_geometric;
-        Tissue t2 = load_tissue(tissue_of(after));
-        Surface s = load_surface(entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside);
-
-        float cos_i = -dot(path.direction, n_shading);
-        float width = 0.0;
-        if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
-            float sigma = rows[row_of(path.time)].sigma_lateral;
-            // In the plane of incidence; along the image where there is none.
-            vec3 along = path.direction + cos_i * n_shading + 0.01 * path.lateral;
-            width = surface_curvature(hit, along) * sqrt(sigma * sigma + path.spread.x);
+        vec3 m = at.shading;
+        bool rough = false;
+        if (role != ROLE_MAIN || rough_through) {
+            rough = rough_normal(path.direction, at.shading, at.geometric, surfaces[at.surface].roughness, n, key,
+                frame.seed, (frame.flags & FLAG_SOBOL) != 0u, m);
         }
-        float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
-        float turn = 2.0 * width / max(cos_i, 1e-3);
-        vec3 m;
-        bool rough = rough_normal(path.direction, n_shading, n_geometric, s.roughness, n, key, frame.seed, (frame.flags & FLAG_SOBOL) != 0u, m);
-        if (rough) echo(path, line, n, key, hit.instance, s, t1, t2, m);
-
-        bool can_reflect = rough && path.reflections < frame.max_reflections;
-        bool splits = frame.sampling == SAMPLING_MAIN_PATH && !path.branch;
-        bool reflects;
-        if (splits) {
-            float wanted = clamp(ceil(float(frame.paths) * reflected), 1.0, float(frame.paths));
-            reflects = can_reflect && float(n) < wanted;
-            main_path = path;
-            if (reflects) {
+        bool reflects = false;
+        if (role != ROLE_MAIN) {
+            met += 1u;
+            echo.key = key;
+            if (rough) make_echo(echo, path, line, n, at, m);
+            bool can_reflect = rough && path.reflections < frame.max_reflections;
+            if (recalled) {
+                float wanted = clamp(ceil(float(frame.paths) * at.reflectance), 1.0, float(frame.paths));
+                reflects = can_reflect && float(n) < wanted;
+                going = reflects;
                 path.branch = true;
-                path.weight *= reflected;
+                path.weight *= at.reflectance;
                 path.share = 1.0 / wanted;
-            }
-            // The main path goes on behind the interface, now or after its branch.
-            vec3 refracting = rough && (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u ? m : n_shading;
-            bool through = reflected < 1.0
-                && (transmit_path(main_path, refracting, n_geometric, t1.speed, t2.speed) || width > 0.0);
-            main_path.weight = through ? main_path.weight * (1.0 - reflected) : 0.0;
-            main_path.media = media;
-            if (reflects) {
-                resume = true;
-                reflect_path(path, m, s.roughness, turn);
             } else {
-                path = main_path;
+                float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
+                if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
+                reflects = choice < at.reflectance;
+                path.probability *= reflects ? at.reflectance : 1.0 - at.reflectance;
+                going = can_reflect || !reflects;
             }
+        }
+        if (!going) continue;
+        if (reflects) {
+            reflect_path(path, m, surfaces[at.surface].roughness, at.turn);
             continue;
         }
-        float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
-        if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
-        reflects = choice < reflected;
-        path.probability *= reflects ? reflected : 1.0 - reflected;
-        if (reflects) {
-            if (can_reflect) reflect_path(path, m, s.roughness, turn);
-            else path.weight = 0.0;
-        } else {
-            vec3 refracting = rough && (frame.flags & FLAG_ROUGH_TRANSMISSION) != 0u ? m : n_shading;
-            path.media = media;
-            // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
-            if (!transmit_path(path, refracting, n_geometric, t1.speed, t2.speed) && !(width > 0.0)) {
-                atomicAdd(counters.paths_lost, 1u);
-                path.weight = 0.0;
-            }
+        // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
+        bool through = transmit_path(path, rough && rough_through ? m : at.shading, at.geometric, tissues[at.before].speed,
+            tissues[at.behind].speed) || at.curved;
+        if (role == ROLE_MAIN) {
+            path.weight = through && at.reflectance < 1.0 ? path.weight * (1.0 - at.reflectance) : 0.0;
+        } else if (!through) {
+            atomicAdd(counters.paths_lost, 1u);
+            path.weight = 0.0;
         }
+        copy_media(media, after);
     }
 }

@@ -322,7 +322,7 @@ fn alone(device: &Arc<Device>, library: &Library, folder: &Path, names: &[&str])
         let stem = subject.stems[0];
         let kernel = Kernel::new(device, stem, library.words(stem), &[]).expect(stem);
         let extent = (subject.extent)(&job);
-        let outcome = harness::run(device, &kernel, &job, extent).expect(stem);
+        let outcome = harness::run(device, &kernel, &job, &extent).expect(stem);
         for check in (subject.check)(&job, &outcome.outputs) {
             assert!(check.passed(), "{name}: {check}");
         }

@@ -19,7 +19,7 @@ fn subject(name: &str) {
         for case in Case::ALL {
             let job = (subject.job)(case, Size::Small);
             let extent = (subject.extent)(&job);
-            let mut outputs = harness::run(&device, &kernel, &job, extent)
+            let mut outputs = harness::run(&device, &kernel, &job, &extent)
                 .unwrap()
                 .outputs;
             for check in (subject.check)(&job, &outputs) {

@@ -241,7 +241,7 @@ fn checked(device: &Arc<Device>, library: &Library, dump: &Path, name: &str) {
     let stem = subject.stems[0];
     let kernel = Kernel::new(device, stem, library.words(stem), &[]).expect(stem);
     let extent = (subject.extent)(&job);
-    let outcome = harness::run(device, &kernel, &job, extent).expect(stem);
+    let outcome = harness::run(device, &kernel, &job, &extent).expect(stem);
     for check in (subject.check)(&job, &outcome.outputs) {
         assert!(check.passed(), "{name}: {check}");
     }

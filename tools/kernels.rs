@@ -162,7 +162,7 @@ fn run(
         let mut fastest = f64::INFINITY;
         let mut outputs = Vec::new();
         for _ in 0..REPEATS {
-            let outcome = harness::run(device, &kernel, &job, extent).into_diagnostic()?;
+            let outcome = harness::run(device, &kernel, &job, &extent).into_diagnostic()?;
             fastest = fastest.min(outcome.milliseconds);
             outputs = outcome.outputs;
         }
@@ -198,7 +198,7 @@ fn check(device: &Arc<Device>, library: &Library) -> Result<bool> {
             for case in Case::ALL {
                 let job = (subject.job)(case, Size::Small);
                 let extent = (subject.extent)(&job);
-                let outcome = harness::run(device, &kernel, &job, extent).into_diagnostic()?;
+                let outcome = harness::run(device, &kernel, &job, &extent).into_diagnostic()?;
                 output::line(format_args!(
                     "{} {case:?}: {:.3} ms",
                     kernel.name(),

@@ -14,9 +14,9 @@ use insonify::gpu::FrameTimings;
 use insonify::movie::Movie;
 use insonify::output;
 use insonify::scene::{Scene, file};
-use insonify::sim::Simulator;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
 use insonify::statistics::Statistics;
 
 /// Frames of an animation shown per second where the scene's time stands still.
@@ -54,6 +54,10 @@ pub struct Render {
     /// Writes settings, timings, memory and counters as one JSON object.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Counts the steps that rays take through the hierarchies, for --json; with the compute tracer only.
+    /// Frames take longer.
+    #[arg(long)]
+    count: bool,
     /// Compiles the kernels of this folder instead of using the built-in ones.
     #[cfg(feature = "compile")]
     #[arg(long, value_name = "DIR")]
@@ -81,6 +85,15 @@ pub fn run(args: &Render) -> Result<()> {
 
     let loaded = Instant::now();
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
+    if args.count {
+        if tracer != Tracer::Bvh {
+            return Err(miette!(
+                help = "add --tracer bvh",
+                "nobody can count the steps of the ray query"
+            ));
+        }
+        simulator.count(&library, true).into_diagnostic()?;
+    }
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
     let output = args
@@ -99,6 +112,7 @@ pub fn run(args: &Render) -> Result<()> {
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
         let memory = device.memory();
+        let per_ray = |steps| f64::from(steps) / f64::from(counters.rays.max(1));
         let report = json!({
             "scene": args.scene.display().to_string(),
             "settings": output::settings(&scene.probe, &scene.simulation, &scene.imaging),
@@ -117,6 +131,12 @@ pub fn run(args: &Render) -> Result<()> {
                 "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
                 "paths_lost": counters.paths_lost,
             },
+            "steps": args.count.then(|| json!({
+                "node_visits": counters.node_visits, "top_visits": counters.top_visits,
+                "triangle_tests": counters.triangle_tests, "instances_reached": counters.instances_reached,
+                "node_visits_per_ray": per_ray(counters.node_visits),
+                "triangle_tests_per_ray": per_ray(counters.triangle_tests),
+            })),
             "contact": simulator.contact().map(|touch| json!({
                 "share": touch.share, "depth_mm": touch.depth,
             })),

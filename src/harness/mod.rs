@@ -36,6 +36,7 @@ mod worlds;
 use bytemuck::Pod;
 
 pub use crate::npy::Element;
+use crate::sim::rounds::Round;
 pub use check::Check;
 pub use run::{Outcome, run};
 
@@ -159,7 +160,7 @@ pub struct Job {
     /// Bindings; where a ray-query variant binds an acceleration structure, the compute variant's
     /// nodes stand, and floats where an image is bound, of the size that `fusion` says.
     pub inputs: Vec<Input>,
-    /// Push constants.
+    /// Push constants; of a kernel that is dispatched several times, what they are made of.
     pub push: Vec<u8>,
 }
 
@@ -195,12 +196,14 @@ impl Job {
 }
 
 /// Extent of a dispatch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Threads per axis, rounded up to whole work groups.
     Threads([u32; 3]),
     /// Work groups per axis.
     Groups([u32; 3]),
+    /// Several dispatches, each after the one before, with push constants of their own.
+    Rounds(Vec<Round>),
 }
 
 /// One kernel under test.

@@ -26,7 +26,7 @@ pub fn run(
     device: &Arc<Device>,
     kernel: &Kernel,
     job: &Job,
-    extent: Extent,
+    extent: &Extent,
 ) -> Result<Outcome, GpuError> {
     let scene = (kernel.bindings().iter())
         .any(|b| b.kind == BindingKind::AccelerationStructure)
@@ -54,10 +54,16 @@ pub fn run(
     let (_, timings) = device.once_timed(|commands| {
         commands.scope(kernel.name());
         match extent {
-            Extent::Threads(threads) => commands.dispatch(kernel, threads, &job.push, &bindings),
+            Extent::Threads(threads) => commands.dispatch(kernel, *threads, &job.push, &bindings),
             Extent::Groups(groups) => {
-                commands.dispatch_groups(kernel, groups, &job.push, &bindings)
+                commands.dispatch_groups(kernel, *groups, &job.push, &bindings)
             }
+            Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
+                let push = bytemuck::cast_slice(&round.push);
+                commands.dispatch(kernel, round.threads, push, &bindings)?;
+                commands.barrier(Stage::Compute, Stage::Compute);
+                Ok(())
+            }),
         }
     })?;
     let mut outputs = Vec::new();

@@ -9,9 +9,10 @@ use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use crate::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, Row,
+    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame, Interaction, Row,
     SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, START_WORDS, Surface, Tissue,
 };
+use crate::sim::rounds::Rounds;
 
 pub const SUBJECT: Subject = Subject {
     name: "trace",
@@ -25,8 +26,8 @@ pub const SUBJECT: Subject = Subject {
     sizes,
     extent: |job| {
         let frame: Frame = job.one("frame");
-        let paths: [u32; 2] = bytemuck::pod_read_unaligned(&job.push);
-        Extent::Threads([lines(&frame) as u32, paths[1], 1])
+        let [begin, count]: [u32; 2] = bytemuck::pod_read_unaligned(&job.push);
+        Extent::Rounds(Rounds::new(&frame, count).of(&frame, begin..begin + count))
     },
     check,
     plant: |job, outputs| {
@@ -65,8 +66,15 @@ fn sizes(job: &Job) -> Vec<usize> {
         4 * lines(&frame),
         size_of::<Counters>(),
         worlds::field_size(job),
+        size_of::<Interaction>() * rounds(job).interactions() as usize,
+        4 * rounds(job).main_paths() as usize,
     ]);
     sizes
+}
+
+fn rounds(job: &Job) -> Rounds {
+    let [_, count]: [u32; 2] = bytemuck::pod_read_unaligned(&job.push);
+    Rounds::new(&job.one("frame"), count)
 }
 
 /// Frame, tissues, surfaces, the world's five bindings, and its fields.
@@ -85,7 +93,8 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
             FLAG_COINCIDENT | FLAG_COHERENT | FLAG_WORLD_TEXTURE | FLAG_FOOTPRINT | FLAG_SOBOL,
             6,
         ),
-        Case::One => (SAMPLING_SHARED_PRIMARY, 0, 1),
+        // Main paths of their own.
+        Case::One => (SAMPLING_MAIN_PATH, FLAG_ROUGH_TRANSMISSION, 3),
         _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL, 8),
     };
     let mut tissues = worlds::tissues();
@@ -135,6 +144,13 @@ fn job(case: Case, size: Size) -> Job {
         Input::sum("segment_count", Element::Word, lines(&frame)),
         Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
         fields,
+    ]);
+    let rounds = rounds(&job);
+    let interactions = rounds.interactions() as usize * size_of::<Interaction>() / 4;
+    let main_paths = rounds.main_paths() as usize;
+    job.inputs.extend([
+        Input::output("interactions", Element::Word, interactions),
+        Input::output("interaction_count", Element::Word, main_paths),
     ]);
     job
 }

@@ -46,6 +46,14 @@ pub const SCATTER_BIN: u32 = 64;
 pub const SCATTER_SLOT: u32 = 16;
 /// log2(10): 20 dB under black nothing is summed.
 pub const UNHEARD: f32 = 3.321_928_1;
+/// Paths that echo and choose one way at every surface.
+pub const ROLE_WHOLE: u32 = 0;
+/// Main paths, which write their interactions down.
+pub const ROLE_MAIN: u32 = 1;
+/// Echoes at the interactions written down, and what is reflected there.
+pub const ROLE_BRANCHES: u32 = 2;
+/// Paths that one thread takes one after the other at an interaction.
+pub const ECHO_BLOCK: u32 = 8;
 
 /// Curved array.
 pub const KIND_CONVEX: u32 = 0;
@@ -151,6 +159,19 @@ shared! {
         lateral_weight: [f32; 4],
         spread: [f32; 4],
         tissue: u32, instance: u32, line: u32, handedness: f32,
+    }
+    /// A main path where it has arrived at a surface, before anything random.
+    struct Interaction {
+        origin_weight: [f32; 4],
+        direction_time: [f32; 4],
+        lateral_reflectance: [f32; 4],
+        geometric_turn: [f32; 4],
+        shading: [f32; 4],
+        spread: [f32; 4],
+        path: u32, instance: u32, surface: u32,
+        before: u32, behind: u32,
+        interactions: u32, crossings: u32,
+        enclosing: u32, media: [u32; MAX_STACK],
     }
     /// How an acquired volume is mixed with the simulation.
     struct Fusion {

@@ -12,6 +12,7 @@ pub mod memory;
 mod passes;
 pub mod placement;
 mod resize;
+pub mod rounds;
 pub mod shaders;
 pub mod special;
 mod stages;
@@ -108,7 +109,7 @@ impl Simulator {
         let coincident = scene.coincident_triangles() > 0;
         let (frame, batches) = frame_constants(scene, &world, coincident, 0);
         let tables = Tables::new(scene);
-        let buffers = Buffers::new(device, &frame, &tables)?;
+        let buffers = Buffers::new(device, &frame, &batches.rounds, &tables)?;
         let fusion = Fused::new(device, library, scene, &frame, tracer)?;
         let simulator = Self {
             device: Arc::clone(device),

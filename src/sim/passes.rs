@@ -94,31 +94,35 @@ impl Passes {
             cmd.fill(&b.segment_count, 0);
             cmd.barrier(Stage::Transfer, Stage::Compute);
         }
-        let count = self.batches.paths.min(self.frame.paths - path_begin);
+        let path_end = self.frame.paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
-        cmd.dispatch(
-            &self.kernels.trace,
-            [lines(&self.frame), count, 1],
-            bytemuck::cast_slice(&[path_begin, count]),
-            &[
-                Binding::Buffer(&b.frame),
-                Binding::Buffer(&b.tissues),
-                Binding::Buffer(&b.surfaces),
-                Binding::Buffer(w.instances()),
-                Binding::Buffer(w.vertices()),
-                Binding::Buffer(w.normals()),
-                Binding::Buffer(w.triangles()),
-                w.structure(),
-                Binding::Buffer(&b.stacks),
-                Binding::Buffer(&b.rows),
-                Binding::Buffer(&b.surface_echoes),
-                Binding::Buffer(&b.segments),
-                Binding::Buffer(&b.segment_count),
-                Binding::Buffer(&b.counters),
-                Binding::Buffer(w.fields()),
-            ],
-        )?;
-        cmd.barrier(Stage::Compute, Stage::Compute);
+        for round in self.batches.rounds.of(&self.frame, path_begin..path_end) {
+            cmd.dispatch(
+                &self.kernels.trace,
+                round.threads,
+                bytemuck::cast_slice(&round.push),
+                &[
+                    Binding::Buffer(&b.frame),
+                    Binding::Buffer(&b.tissues),
+                    Binding::Buffer(&b.surfaces),
+                    Binding::Buffer(w.instances()),
+                    Binding::Buffer(w.vertices()),
+                    Binding::Buffer(w.normals()),
+                    Binding::Buffer(w.triangles()),
+                    w.structure(),
+                    Binding::Buffer(&b.stacks),
+                    Binding::Buffer(&b.rows),
+                    Binding::Buffer(&b.surface_echoes),
+                    Binding::Buffer(&b.segments),
+                    Binding::Buffer(&b.segment_count),
+                    Binding::Buffer(&b.counters),
+                    Binding::Buffer(w.fields()),
+                    Binding::Buffer(&b.interactions),
+                    Binding::Buffer(&b.interaction_count),
+                ],
+            )?;
+            cmd.barrier(Stage::Compute, Stage::Compute);
+        }
         Ok(())
     }
 

@@ -1,6 +1,7 @@
 //! Frames of another size than the simulator was made for, and where they are shown.
 
 use super::passes::frame_constants;
+use super::rounds::Rounds;
 use super::shaders::Library;
 use super::stages::{Buffers, lines};
 use super::{Fused, Settings, SimError, Simulator, Tables, layout};
@@ -18,11 +19,11 @@ impl Simulator {
         let world = &self.passes.world;
         let (frame, batches) = frame_constants(scene, world, self.coincident, 0);
         let tables = Tables::new(scene);
-        if holds(&self.passes.buffers, &frame, &tables) {
+        if holds(&self.passes.buffers, &frame, &batches.rounds, &tables) {
             return Ok(false);
         }
         self.frames.wait()?;
-        let buffers = Buffers::new(&self.device, &frame, &tables)?;
+        let buffers = Buffers::new(&self.device, &frame, &batches.rounds, &tables)?;
         let fusion = Fused::new(&self.device, library, scene, &frame, world.tracer())?;
         let passes = &mut self.passes;
         (passes.buffers, passes.fusion) = (buffers, fusion);
@@ -46,7 +47,7 @@ pub fn image_size(scene: &Scene) -> [u32; 2] {
     [frame.image_width, frame.image_height]
 }
 
-fn holds(b: &Buffers, frame: &layout::Frame, tables: &Tables) -> bool {
+fn holds(b: &Buffers, frame: &layout::Frame, rounds: &Rounds, tables: &Tables) -> bool {
     let samples = u64::from(frame.scanlines) * u64::from(frame.samples);
     let lines = u64::from(lines(frame));
     let segments = lines * u64::from(frame.segment_capacity);
@@ -65,9 +66,15 @@ fn holds(b: &Buffers, frame: &layout::Frame, tables: &Tables) -> bool {
         ),
         (&b.points, tables.points.len() as u64, 16),
         (&b.contact, 2 * u64::from(frame.scanlines) + 1, 4),
-        (&b.stacks, lines * (layout::MAX_STACK as u64 + 1), 4),
+        (&b.stacks, lines * layout::START_WORDS as u64, 4),
         (&b.segments, segments, size_of::<layout::Segment>()),
         (&b.segment_count, lines, 4),
+        (
+            &b.interactions,
+            rounds.interactions(),
+            size_of::<layout::Interaction>(),
+        ),
+        (&b.interaction_count, rounds.main_paths(), 4),
         (&b.iq, samples, 8),
         (&b.pixels, pixels, 4),
     ]

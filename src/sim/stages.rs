@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::layout;
+use super::rounds::{self, Rounds, one_speaks_for_all};
 use super::shaders::Library;
 use super::tables::Tables;
 use super::world::World;
@@ -18,6 +19,8 @@ pub(super) struct Batches {
     pub(super) capacity: u32,
     /// Paths traced before their segments are scattered.
     pub(super) paths: u32,
+    /// How `trace` goes over them.
+    pub(super) rounds: Rounds,
 }
 
 impl Batches {
@@ -33,22 +36,17 @@ impl Batches {
             return Self {
                 capacity: per_path.min(affordable.max(1)),
                 paths: frame.paths,
+                rounds: Rounds::new(frame, frame.paths),
             };
         }
-        let paths = (affordable / per_path).clamp(1, frame.paths);
+        let most = (affordable / per_path).min(rounds::most_paths(frame));
+        let paths = most.clamp(1, frame.paths);
         Self {
             capacity: paths * per_path,
             paths,
+            rounds: Rounds::new(frame, paths),
         }
     }
-}
-
-/// Path 0 alone writes segments: in the main-path scheme, where all paths start alike.
-fn one_speaks_for_all(frame: &layout::Frame) -> bool {
-    let alike = frame.origin_jitter <= 0.0
-        && frame.emission_lobe <= 0.0
-        && frame.flags & layout::FLAG_ROUGH_TRANSMISSION == 0;
-    frame.sampling == layout::SAMPLING_MAIN_PATH && alike
 }
 
 impl Batches {
@@ -79,6 +77,8 @@ pub(super) struct Buffers {
     pub(super) stacks: Buffer,
     pub(super) segments: Buffer,
     pub(super) segment_count: Buffer,
+    pub(super) interactions: Buffer,
+    pub(super) interaction_count: Buffer,
     pub(super) surface_echoes: Buffer,
     pub(super) volume_echoes: Buffer,
     pub(super) lateral: Buffer,
@@ -92,6 +92,7 @@ impl Buffers {
     pub(super) fn new(
         device: &Arc<Device>,
         frame: &layout::Frame,
+        rounds: &Rounds,
         tables: &Tables,
     ) -> Result<Self, GpuError> {
         let new = |name: &str, count: u64, each: usize| {
@@ -120,6 +121,12 @@ impl Buffers {
             stacks: new("media stacks", lines * layout::START_WORDS as u64, 4)?,
             segments: new("segments", segments, size_of::<layout::Segment>())?,
             segment_count: new("segment count", lines, 4)?,
+            interactions: new(
+                "interactions",
+                rounds.interactions(),
+                size_of::<layout::Interaction>(),
+            )?,
+            interaction_count: new("interaction count", rounds.main_paths(), 4)?,
             surface_echoes: new("surface echoes", samples, 8)?,
             volume_echoes: new("volume echoes", samples, 8)?,
             lateral: new("lateral", samples, 8)?,

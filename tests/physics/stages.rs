@@ -51,7 +51,7 @@ impl Stages {
             push: vec![],
         };
         let extent = Extent::Threads([threads[0], threads[1], 1]);
-        let outcome = harness::run(&self.device, &kernel, &job, extent).expect("the kernel runs");
+        let outcome = harness::run(&self.device, &kernel, &job, &extent).expect("the kernel runs");
         assert_eq!(self.device.validation_messages(), Vec::<String>::new());
         outcome.outputs
     }

@@ -1,0 +1,181 @@
+//! The dispatches by which `trace` goes over the paths of a frame.
+
+use std::ops::Range;
+
+use super::layout::{
+    self, ECHO_BLOCK, FLAG_ROUGH_TRANSMISSION, Frame, Interaction, ROLE_BRANCHES, ROLE_MAIN,
+    ROLE_WHOLE, SAMPLING_MAIN_PATH,
+};
+
+/// Largest buffer of interactions, bytes; frames that have more are traced by groups of lines.
+const INTERACTION_BUDGET: u64 = 32 << 20;
+/// Work groups that Vulkan promises along an axis.
+const MOST_GROUPS: u32 = 65_535;
+
+/// Path 0 alone writes segments: in the main-path scheme, where all paths start alike.
+pub(super) fn one_speaks_for_all(frame: &Frame) -> bool {
+    let alike = frame.origin_jitter <= 0.0
+        && frame.emission_lobe <= 0.0
+        && frame.flags & FLAG_ROUGH_TRANSMISSION == 0;
+    frame.sampling == SAMPLING_MAIN_PATH && alike
+}
+
+/// Paths that can be traced together as far as their interactions go.
+pub(super) fn most_paths(frame: &Frame) -> u32 {
+    if frame.sampling != SAMPLING_MAIN_PATH {
+        return MOST_GROUPS;
+    }
+    let affordable = INTERACTION_BUDGET / path_bytes(frame);
+    (MOST_GROUPS / slots(frame)).min(u32::try_from(affordable).unwrap_or(u32::MAX))
+}
+
+/// Interactions that a main path may have.
+fn slots(frame: &Frame) -> u32 {
+    frame.max_interactions.max(1)
+}
+
+fn path_bytes(frame: &Frame) -> u64 {
+    u64::from(slots(frame)) * size_of::<Interaction>() as u64
+}
+
+/// One dispatch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Round {
+    /// Push constants: role, first path, paths, first line, lines.
+    pub push: [u32; 5],
+    /// Threads per axis.
+    pub threads: [u32; 3],
+}
+
+/// How many lines and main paths of each are traced together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rounds {
+    lines: u32,
+    /// Main paths of a line; none where paths choose at every surface.
+    mains: u32,
+    slots: u32,
+}
+
+impl Rounds {
+    /// For batches of up to `paths` paths of each line.
+    pub fn new(frame: &Frame, paths: u32) -> Self {
+        let lines = frame.scanlines * frame.layers;
+        let mains = match frame.sampling {
+            layout::SAMPLING_MAIN_PATH if one_speaks_for_all(frame) => 1,
+            layout::SAMPLING_MAIN_PATH => paths,
+            _ => 0,
+        };
+        let line_bytes = path_bytes(frame) * u64::from(mains);
+        let affordable = INTERACTION_BUDGET.checked_div(line_bytes);
+        let affordable = affordable.map_or(u32::MAX, |n| u32::try_from(n).unwrap_or(u32::MAX));
+        Self {
+            lines: affordable.clamp(1, lines.max(1)),
+            mains,
+            slots: slots(frame),
+        }
+    }
+
+    /// Main paths traced together.
+    pub fn main_paths(&self) -> u64 {
+        u64::from(self.lines) * u64::from(self.mains)
+    }
+
+    /// Interactions for which there must be room.
+    pub fn interactions(&self) -> u64 {
+        self.main_paths() * u64::from(self.slots)
+    }
+
+    /// The dispatches that trace `paths` of all lines, in order, each after the one before.
+    pub fn of(&self, frame: &Frame, paths: Range<u32>) -> Vec<Round> {
+        let all = frame.scanlines * frame.layers;
+        let (begin, count) = (paths.start, paths.len() as u32);
+        let round = |role, count, line, lines, y, z| Round {
+            push: [role, begin, count, line, lines],
+            threads: [lines, y, z],
+        };
+        if self.mains == 0 {
+            return vec![round(ROLE_WHOLE, count, 0, all, count, 1)];
+        }
+        let (mains, blocks) = match one_speaks_for_all(frame) {
+            true => (1, count.div_ceil(ECHO_BLOCK)),
+            false => (count, 1),
+        };
+        let mut rounds = Vec::new();
+        for first in (0..all).step_by(self.lines as usize) {
+            let lines = self.lines.min(all - first);
+            rounds.push(round(ROLE_MAIN, mains, first, lines, mains, 1));
+            let met = mains * self.slots;
+            rounds.push(round(ROLE_BRANCHES, mains, first, lines, met, blocks));
+        }
+        rounds
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::layout::{FLAG_ROUGH_TRANSMISSION, SAMPLING_PLAIN};
+
+    fn frame(paths: u32, max_interactions: u32) -> Frame {
+        Frame {
+            scanlines: 192,
+            layers: 7,
+            paths,
+            max_interactions,
+            sampling: SAMPLING_MAIN_PATH,
+            ..Frame::default()
+        }
+    }
+
+    /// How often the rounds of `role` take each line.
+    fn lines(rounds: &[Round], role: u32) -> Vec<u32> {
+        let mut taken = vec![0; 192 * 7];
+        for round in rounds.iter().filter(|r| r.push[0] == role) {
+            let first = round.push[3] as usize;
+            for line in &mut taken[first..first + round.push[4] as usize] {
+                *line += 1;
+            }
+            assert_eq!(round.threads[0], round.push[4]);
+        }
+        taken
+    }
+
+    #[test]
+    fn every_line_is_traced_once_and_no_buffer_or_dispatch_is_too_large() {
+        let mut own = frame(3000, 256);
+        own.flags = FLAG_ROUGH_TRANSMISSION;
+        for frame in [frame(8, 32), frame(100_000, 256), own] {
+            let paths = frame.paths.min(most_paths(&frame));
+            let rounds = Rounds::new(&frame, paths);
+            assert!(rounds.interactions() * size_of::<Interaction>() as u64 <= INTERACTION_BUDGET);
+            let taken = rounds.of(&frame, 0..paths);
+            for role in [ROLE_MAIN, ROLE_BRANCHES] {
+                assert_eq!(lines(&taken, role), [1; 192 * 7]);
+            }
+            assert!(
+                taken
+                    .iter()
+                    .all(|r| r.threads[1..].iter().all(|&n| n <= MOST_GROUPS))
+            );
+            // Main paths are there before their branches.
+            let roles: Vec<u32> = taken.iter().map(|r| r.push[0]).collect();
+            assert!(roles.chunks(2).all(|r| r == [ROLE_MAIN, ROLE_BRANCHES]));
+        }
+    }
+
+    #[test]
+    fn one_main_path_stands_for_all_that_are_alike() {
+        let threads = |frame: &Frame| {
+            let rounds = Rounds::new(frame, 40).of(frame, 0..40);
+            rounds.iter().map(|r| r.threads).collect::<Vec<_>>()
+        };
+        let mut frame = frame(40, 32);
+        assert_eq!(threads(&frame), [[1344, 1, 1], [1344, 32, 5]]);
+        frame.flags = FLAG_ROUGH_TRANSMISSION;
+        let own = threads(&frame);
+        assert_eq!(own[0][1..], [40, 1]);
+        assert_eq!(own[1][1..], [40 * 32, 1]);
+        frame.sampling = SAMPLING_PLAIN;
+        assert_eq!(threads(&frame), [[1344, 40, 1]]);
+    }
+}
