@@ -14,9 +14,9 @@ use insonify::gpu::FrameTimings;
 use insonify::movie::Movie;
 use insonify::output;
 use insonify::scene::{Scene, file};
-use insonify::sim::Simulator;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
 use insonify::statistics::Statistics;
 
 /// Frames of an animation shown per second where the scene's time stands still.
@@ -54,6 +54,10 @@ pub struct Render {
     /// Writes settings, timings, memory and counters as one JSON object.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
+    /// Adds to --json what rays come to on their way: nodes, triangles and instances, per ray; in one
+    /// more frame, by kernels of the compute tracer that count.
+    #[arg(long, requires = "json")]
+    steps: bool,
     /// Compiles the kernels of this folder instead of using the built-in ones.
     #[cfg(feature = "compile")]
     #[arg(long, value_name = "DIR")]
@@ -96,6 +100,11 @@ pub fn run(args: &Render) -> Result<()> {
     for lost in common::lost(&counters) {
         eprintln!("warning: {lost}");
     }
+    let contact = simulator.contact();
+    let steps = match args.steps {
+        true => Some(steps(&mut simulator, &library, &scene, tracer)?),
+        false => None,
+    };
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
         let memory = device.memory();
@@ -117,7 +126,8 @@ pub fn run(args: &Render) -> Result<()> {
                 "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
                 "paths_lost": counters.paths_lost,
             },
-            "contact": simulator.contact().map(|touch| json!({
+            "steps_per_ray": steps,
+            "contact": contact.map(|touch| json!({
                 "share": touch.share, "depth_mm": touch.depth,
             })),
             "saturated_samples": counters.saturated,
@@ -129,6 +139,30 @@ pub fn run(args: &Render) -> Result<()> {
             .wrap_err_with(|| format!("writing {}", file.display()))?;
     }
     args.common.validated(&device)
+}
+
+/// What the rays of one more frame come to, per ray.
+fn steps(
+    simulator: &mut Simulator,
+    library: &Library,
+    scene: &Scene,
+    tracer: Tracer,
+) -> Result<Value> {
+    if tracer != Tracer::Bvh {
+        return Err(miette!(
+            help = "take --tracer bvh, or leave --steps out",
+            "the steps of the ray query cannot be counted"
+        ));
+    }
+    simulator.count(library, true).into_diagnostic()?;
+    simulator.frame(scene, 0).into_diagnostic()?;
+    let c = simulator.counters().into_diagnostic()?;
+    let per_ray = |count: u32| f64::from(count) / f64::from(c.rays.max(1));
+    Ok(json!({
+        "node_visits": per_ray(c.node_visits), "top_visits": per_ray(c.top_visits),
+        "triangle_tests": per_ray(c.triangle_tests),
+        "instances_reached": per_ray(c.instances_reached),
+    }))
 }
 
 #[cfg(feature = "compile")]
