@@ -8,13 +8,17 @@
 // A child is 0 (none), 001 and 24 + its slot (inner), or the unary count of its primitives and their
 // offset. Primitives are triangles, or in the top level places in a table of instances, which
 // begins at the node nodes[0].y; of an instance's places rays enter the one that its row's `slot` names.
-// The top level's root is the node nodes[0].x; NONE: nothing is placed.
+// Where several instances share a structure, the table has one of them, and each triangle is asked
+// whose it is before one that is transparent or not shown can be met.
+// The top level's root is the node nodes[0].x; NONE: nothing is placed. nodes[0].z: of those that share
+// a structure some are not shown.
 
 const uint BVH_STACK = 32u;    // the builder refuses deeper trees
 
-// Which other instances are transparent.
+// Which other instances are transparent, and whether any may be.
 #ifndef RAY_SKIPS
 #define RAY_SKIPS(i) false
+#define RAY_SELECTS false
 #endif
 
 #ifdef COUNT
@@ -70,11 +74,20 @@ uint bvh_children(BvhRay ray, uint meta, uvec3 lo, uvec3 hi, vec3 scale, vec3 ne
         | (met.w ? (bits >> 24u) << (place >> 24u) : 0u);
 }
 
-void bvh_triangle(BvhRay ray, uint instance, uint triangle, float t_min, inout Hit hit) {
+// Whether rays pass by what is found in a structure that instances share.
+bool bvh_passes(uint entered, uint triangle, uint skip_instance) {
+    if (instances[entered].owners == 0u) return false;   // the top level has asked
+    uint owner = triangle_owner(entered, triangle);
+    return owner == skip_instance || instances[owner].slot == NONE || RAY_SKIPS(owner);
+}
+
+// `selects`: whether any instance may be passed by.
+void bvh_triangle(BvhRay ray, uint entered, uint triangle, float t_min, bool selects, uint skip_instance, inout Hit hit) {
     TriangleHit h = triangle_hit(ray.sheared, triangle);
     if (min(h.edges.x, min(h.edges.y, h.edges.z)) < 0.0 && max(h.edges.x, max(h.edges.y, h.edges.z)) > 0.0) return;
     if (!(h.sum != 0.0 && h.t > t_min && h.t < hit.t)) return;
-    hit = Hit(h.t, instance, triangle, h.u, h.v);
+    if (selects && bvh_passes(entered, triangle, skip_instance)) return;
+    hit = Hit(h.t, entered, triangle, h.u, h.v);
 #ifdef COUNT
     bvh_triangle_hits += 1u;
 #endif
@@ -83,6 +96,7 @@ void bvh_triangle(BvhRay ray, uint instance, uint triangle, float t_min, inout H
 #ifdef COUNT
 // Whether a ray in object space meets the bounds of what an instance shows before t_max.
 bool bvh_bounds_met(uint instance, BvhRay ray, float t_min, float t_max) {
+    if (instances[instance].owners != 0u) return true;   // rows have no bounds of what they share
     vec3 a = (instances[instance].low.xyz - ray.origin) * ray.inverse;
     vec3 b = (instances[instance].high.xyz - ray.origin) * ray.inverse;
     vec3 enter = min(a, b), leave = max(a, b);
@@ -100,6 +114,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
     bool finite = all(lessThan(abs(origin), vec3(1e18))) && all(lessThan(abs(direction), vec3(1e18)));
     if (root == NONE || !finite || !(size > 1e-18) || !(t_min >= 0.0) || !(t_max >= t_min)) return hit;
 
+    bool selects = skip_instance != NONE || nodes[0].z != 0u || (RAY_SELECTS);
     uvec2 stack[BVH_STACK];
     uint depth = 0u;
     uint instance = NONE;     // whose triangles are walked; NONE: the top level
@@ -152,12 +167,12 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
 #ifdef COUNT
                 bvh_triangle_tests += 1u;
 #endif
-                bvh_triangle(ray, instance, primitive, t_min, hit);
+                bvh_triangle(ray, instance, primitive, t_min, selects, skip_instance, hit);
                 continue;
             }
             uint entered = nodes[5u * nodes[0].y + primitive / 4u][primitive % 4u];
-            if (entered == skip_instance || instances[entered].slot != primitive) continue;
-            if (RAY_SKIPS(entered)) continue;
+            bool passed_by = entered == skip_instance || instances[entered].slot != primitive || RAY_SKIPS(entered);
+            if (passed_by && instances[entered].owners == 0u) continue;
             // What is left of the top level waits below `base`.
             if (primitives.y != 0u && depth < BVH_STACK) {
                 stack[depth] = primitives;
@@ -195,5 +210,6 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             inner = stack[depth];
         }
     }
+    if (hit.instance != NONE) hit.instance = triangle_owner(hit.instance, hit.primitive);
     return hit;
 }

@@ -1,8 +1,8 @@
 // Closest hit by the device's ray query. Same interface as intersect_bvh.glsl.
 //
 // The includer enables GL_EXT_ray_query, includes triangle.glsl, and declares `tlas`, whose
-// instances carry our instance as custom index and whose meshes hold the triangles in the same order
-// as triangles[]. It defines RAY_MASK, the mask bits of the entries that are shown, and RAY_SLOTS,
+// instances carry our instance as custom index (one of those that share a structure) and whose meshes
+// hold the triangles in the same order as triangles[]. It defines RAY_MASK, the mask bits of the entries that are shown, and RAY_SLOTS,
 // whether entries that are not shown share them; then an instance's row says which one is. It may
 // define RAY_SKIPS(i), whether instance i is transparent, and RAY_SELECTS, whether any may be.
 
@@ -10,6 +10,11 @@
 #define RAY_SKIPS(i) false
 #define RAY_SELECTS false
 #endif
+
+// Whose the triangle is that a structure has at `index`.
+uint query_owner(uint entered, uint index) {
+    return triangle_owner(entered, instances[entered].first_triangle + index);
+}
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
@@ -27,7 +32,8 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
     rayQueryInitializeEXT(query, tlas, opacity, RAY_MASK, origin, t_min, direction, t_max);
     while (rayQueryProceedEXT(query)) {
         if (rayQueryGetIntersectionTypeEXT(query, false) != gl_RayQueryCandidateIntersectionTriangleEXT) continue;
-        uint instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false));
+        uint instance = query_owner(uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, false)),
+            uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, false)));
         uint slot = uint(rayQueryGetIntersectionInstanceIdEXT(query, false));
         if (RAY_SKIPS(instance)) continue;
         if (instance != skip_instance && instances[instance].slot == slot) rayQueryConfirmIntersectionEXT(query);
@@ -35,9 +41,10 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
     if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
         vec2 uv = rayQueryGetIntersectionBarycentricsEXT(query, true);
         hit.t = rayQueryGetIntersectionTEXT(query, true);
-        hit.instance = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
-        hit.primitive = instances[hit.instance].first_triangle
-            + uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
+        uint entered = uint(rayQueryGetIntersectionInstanceCustomIndexEXT(query, true));
+        uint index = uint(rayQueryGetIntersectionPrimitiveIndexEXT(query, true));
+        hit.instance = query_owner(entered, index);
+        hit.primitive = instances[entered].first_triangle + index;
         hit.u = uv.x;
         hit.v = uv.y;
         // The device only chooses the triangle; where it is met, both tracers must say alike.

@@ -89,12 +89,13 @@ struct Instance {
     vec4 object_from_world[3];
     vec4 texture_from_world[3];        // rigid: the frame in which the scatterer lattice rests
     uint tissue; int priority; uint surface_outside; uint surface_inside;
-    uint first_triangle; uint triangles; uint bvh_root;
+    uint first_triangle; uint triangles; uint bvh_root;   // of all that share a structure with it
     uint slot;                         // the top-level entry that is shown, of those that the instance has
     vec4 low; vec4 high;               // object-space bounds of what is shown; w unused
     uint field;                        // where its displacements begin, in vectors; NONE: none
     uint masks;                        // 1: it is part of the fusion's mask
-    uint unused0; uint unused1;
+    uint owners;                       // word of triangles[] where the list begins of whose they are; 0: all its own
+    uint unused0;
 };
 
 // Per axial sample k, at depth k * sample_pitch.

@@ -49,6 +49,14 @@ vec3 object_direction(uint instance, vec3 d) {
     return e;
 }
 
+// Whose triangle it is, of those in the structure of `entered`, which instances at one place may share.
+uint triangle_owner(uint entered, uint triangle) {
+    uint list = instances[entered].owners;
+    if (list == 0u) return entered;
+    uint i = triangle - instances[entered].first_triangle;
+    return triangles[list + i / 2u] >> (16u * (i & 1u)) & 0xffffu;
+}
+
 vec3 triangle_vertex(uint index) {
     return vec3(vertices[3u * index], vertices[3u * index + 1u], vertices[3u * index + 2u]);
 }

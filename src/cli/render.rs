@@ -54,10 +54,10 @@ pub struct Render {
     /// Writes settings, timings, memory and counters as one JSON object.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
-    /// Counts the steps that rays take through the hierarchies, for --json; with the compute tracer only.
-    /// Frames take longer.
-    #[arg(long)]
-    count: bool,
+    /// Adds to --json what rays come to on their way: nodes, triangles and instances, per ray; in one
+    /// more frame, by kernels of the compute tracer that count.
+    #[arg(long, requires = "json")]
+    steps: bool,
     /// Compiles the kernels of this folder instead of using the built-in ones.
     #[cfg(feature = "compile")]
     #[arg(long, value_name = "DIR")]
@@ -85,15 +85,6 @@ pub fn run(args: &Render) -> Result<()> {
 
     let loaded = Instant::now();
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
-    if args.count {
-        if tracer != Tracer::Bvh {
-            return Err(miette!(
-                help = "add --tracer bvh",
-                "nobody can count the steps of the ray query"
-            ));
-        }
-        simulator.count(&library, true).into_diagnostic()?;
-    }
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
     let output = args
@@ -109,10 +100,14 @@ pub fn run(args: &Render) -> Result<()> {
     for lost in common::lost(&counters) {
         eprintln!("warning: {lost}");
     }
+    let contact = simulator.contact();
+    let steps = match args.steps {
+        true => Some(steps(&mut simulator, &library, &scene, tracer)?),
+        false => None,
+    };
     let messages = device.validation_messages();
     if let Some(file) = &args.json {
         let memory = device.memory();
-        let per_ray = |steps| f64::from(steps) / f64::from(counters.rays.max(1));
         let report = json!({
             "scene": args.scene.display().to_string(),
             "settings": output::settings(&scene.probe, &scene.simulation, &scene.imaging),
@@ -131,13 +126,8 @@ pub fn run(args: &Render) -> Result<()> {
                 "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
                 "paths_lost": counters.paths_lost,
             },
-            "steps": args.count.then(|| json!({
-                "node_visits": counters.node_visits, "top_visits": counters.top_visits,
-                "triangle_tests": counters.triangle_tests, "instances_reached": counters.instances_reached,
-                "node_visits_per_ray": per_ray(counters.node_visits),
-                "triangle_tests_per_ray": per_ray(counters.triangle_tests),
-            })),
-            "contact": simulator.contact().map(|touch| json!({
+            "steps_per_ray": steps,
+            "contact": contact.map(|touch| json!({
                 "share": touch.share, "depth_mm": touch.depth,
             })),
             "saturated_samples": counters.saturated,
@@ -149,6 +139,30 @@ pub fn run(args: &Render) -> Result<()> {
             .wrap_err_with(|| format!("writing {}", file.display()))?;
     }
     args.common.validated(&device)
+}
+
+/// What the rays of one more frame come to, per ray.
+fn steps(
+    simulator: &mut Simulator,
+    library: &Library,
+    scene: &Scene,
+    tracer: Tracer,
+) -> Result<Value> {
+    if tracer != Tracer::Bvh {
+        return Err(miette!(
+            help = "take --tracer bvh, or leave --steps out",
+            "the steps of the ray query cannot be counted"
+        ));
+    }
+    simulator.count(library, true).into_diagnostic()?;
+    simulator.frame(scene, 0).into_diagnostic()?;
+    let c = simulator.counters().into_diagnostic()?;
+    let per_ray = |count: u32| f64::from(count) / f64::from(c.rays.max(1));
+    Ok(json!({
+        "node_visits": per_ray(c.node_visits), "top_visits": per_ray(c.top_visits),
+        "triangle_tests": per_ray(c.triangle_tests),
+        "instances_reached": per_ray(c.instances_reached),
+    }))
 }
 
 #[cfg(feature = "compile")]

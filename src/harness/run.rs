@@ -121,6 +121,8 @@ fn build(device: &Arc<Device>, job: &Job) -> Result<Tlas, GpuError> {
     let mut order: Vec<_> = instances.iter().enumerate().collect();
     order.retain(|(_, i)| i.triangles > 0);
     order.sort_by_key(|(_, i)| i.slot);
+    // One stands for all that share a structure.
+    order.dedup_by(|(_, b), (_, a)| a.owners != 0 && a.slot == b.slot);
     let placed: Vec<_> = order
         .into_iter()
         .map(|(index, i)| TlasInstance {

@@ -96,6 +96,7 @@ impl Builder {
                 instance,
                 bounds: trees[mesh].bounds,
                 world_from_object,
+                partial: false,
             })
             .collect();
         nodes.place(&placed, false).expect("a small world");
@@ -262,14 +263,17 @@ pub fn field_size(job: &Job) -> usize {
 pub fn sizes(job: &Job) -> Vec<usize> {
     let instances: Vec<Instance> = job.get("instances");
     let triangles: Vec<[u32; 3]> = job.get("triangles");
-    let vertices = triangles.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize;
-    let used = instances.iter().map(|i| i.first_triangle + i.triangles);
+    let ends = instances.iter().map(|i| i.first_triangle + i.triangles);
+    let used = &triangles[..ends.max().unwrap_or(0) as usize];
+    let vertices = used.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize;
+    let owners = instances.iter().filter(|i| i.owners != 0);
+    let words = owners.map(|i| i.owners + i.triangles.div_ceil(2)).max();
     let roots = instances.iter().map(|i| i.bvh_root).filter(|&r| r != NONE);
     let needed = [
         0,
         12 * vertices,
         12 * vertices,
-        12 * used.max().unwrap_or(0) as usize,
+        (12 * used.len()).max(4 * words.unwrap_or(0) as usize),
         80 * (1 + roots.max().unwrap_or(0) as usize),
     ];
     needed.to_vec()

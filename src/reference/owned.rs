@@ -23,7 +23,7 @@ pub struct Owned {
     pub positions: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
-    /// Vertex indices; an instance owns a range.
+    /// Vertex indices; an instance owns a range, or shares it ([`Geometry::triangles`]).
     pub triangles: Vec<[u32; 3]>,
     /// Displacement fields, in vectors.
     pub fields: Vec<[f32; 3]>,

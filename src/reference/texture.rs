@@ -114,7 +114,7 @@ mod tests {
         let count = found.len() as f64;
         let spread = (0.3 * 0.7 * n as f64).sqrt();
         assert!((count - 0.3 * n as f64).abs() < 4.0 * spread);
-        let mean = |f: &dyn Fn(&Scatterer) -> f64| found.iter().map(f).sum::<f64>() / count;
+        let mean = |f: &dyn Fn(&Voxel) -> f64| found.iter().map(f).sum::<f64>() / count;
         assert!((mean(&|s| s.amplitude) - 2.0).abs() < 4.0 * 0.5 / count.sqrt());
         assert!((mean(&|s| (s.amplitude - 2.0).powi(2)) - 0.25).abs() < 4.0 * 0.36 / count.sqrt());
         // Presence must not pull the jitter from its mean 1/2 (deviation 0.2887).

@@ -19,8 +19,21 @@ pub struct Geometry<'a> {
     /// Unit outward shading normals, one per vertex.
     pub normals: &'a [[f32; 3]],
     /// Vertex indices, counter-clockwise seen from outside; an instance owns the range
-    /// `first_triangle..first_triangle + triangles`.
+    /// `first_triangle..first_triangle + triangles`, or shares it. Behind them, lists of whose the
+    /// shared ones are.
     pub triangles: &'a [[u32; 3]],
+}
+
+impl Geometry<'_> {
+    /// Whose `triangle` is, of those in the range of `instance`, which has this index.
+    fn owner(&self, instance: &Instance, index: usize, triangle: usize) -> usize {
+        if instance.owners == 0 {
+            return index;
+        }
+        let place = triangle - instance.first_triangle as usize;
+        let word = self.triangles.as_flattened()[instance.owners as usize + place / 2];
+        (word >> (16 * (place % 2)) & 0xffff) as usize
+    }
 }
 
 /// The inputs of `origin`, `trace` and `scatter`.
@@ -80,7 +93,15 @@ impl World<'_> {
     /// All crossings with `t_min` < t < `t_max`, by increasing distance.
     pub fn crossings(&self, o: DVec3, d: DVec3, [t_min, t_max]: [f64; 2]) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
+        let mut shared = Vec::new();
         for (index, instance) in self.instances.iter().enumerate() {
+            if instance.owners != 0 {
+                // Instances that share a range share their placement.
+                if shared.contains(&instance.owners) {
+                    continue;
+                }
+                shared.push(instance.owners);
+            }
             let object = affine(&instance.object_from_world);
             let (o, d) = (object.transform_point3(o), object.transform_vector3(d));
             let first = instance.first_triangle as usize;
@@ -93,7 +114,7 @@ impl World<'_> {
                     let [a, b, c] = corners;
                     found.push(Crossing {
                         t,
-                        instance: index as u32,
+                        instance: self.geometry.owner(instance, index, triangle) as u32,
                         triangle,
                         uv: [u, v],
                         entry: d.dot((b - a).cross(c - a)) < 0.0,

@@ -53,6 +53,18 @@ pub enum NodeKind {
     },
 }
 
+/// What an instance's place follows.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Carrier {
+    /// The nearest transform above it that moves, by node.
+    pub mover: Option<usize>,
+    /// Placements from there down that are not the identity, outermost first. Instances that agree in
+    /// both keep their places relative to each other.
+    pub within: Vec<DAffine3>,
+    /// Whether a selector shows it at some times only.
+    pub switched: bool,
+}
+
 /// A node at a time.
 struct State {
     world: DAffine3,
@@ -89,6 +101,33 @@ impl Graph {
             }
             states.push(State { world, shown });
         }
+    }
+
+    /// What each of `count` instances follows; nothing for those that are not in the graph.
+    pub fn carriers(&self, count: usize) -> Vec<Carrier> {
+        let mut of_nodes: Vec<Carrier> = Vec::with_capacity(self.nodes.len());
+        let mut carriers = vec![Carrier::default(); count];
+        for (number, node) in self.nodes.iter().enumerate() {
+            let above = node.parent.map(|parent| of_nodes[parent].clone());
+            let mut carrier = above.unwrap_or_default();
+            carrier.switched |= node.alternative.is_some();
+            match &node.kind {
+                NodeKind::Transform { motion, .. } if !matches!(motion, Motion::Still) => {
+                    carrier.mover = Some(number);
+                    carrier.within.clear();
+                }
+                NodeKind::Transform { rest, .. } | NodeKind::Mesh { rest, .. } => {
+                    let moves = *rest != DAffine3::IDENTITY;
+                    carrier.within.extend(moves.then_some(*rest));
+                }
+                NodeKind::Group | NodeKind::Selector(_) => {}
+            }
+            if let NodeKind::Mesh { instance, .. } = node.kind {
+                carriers[instance] = carrier.clone();
+            }
+            of_nodes.push(carrier);
+        }
+        carriers
     }
 
     /// What has to hold for an instance to be shown: selectors, by node, and the choice of each.

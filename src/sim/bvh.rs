@@ -82,10 +82,21 @@ impl MeshBvh {
     }
 
     fn with(mesh: &Mesh, params: BvhBuildParams) -> Self {
-        let boxes: Vec<Aabb> = mesh
-            .triangles
-            .iter()
-            .map(|t| Aabb::from_points(&t.map(|i| Vec3A::from(mesh.positions[i as usize]))))
+        Self::of_triangles(&mesh.positions, &mesh.triangles, params)
+    }
+
+    /// Builds the hierarchy of `triangles` over `positions`, of which some may be others'.
+    pub fn over(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Self {
+        Self::of_triangles(positions, triangles, MESH)
+    }
+
+    fn of_triangles(
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        params: BvhBuildParams,
+    ) -> Self {
+        let boxes: Vec<Aabb> = (triangles.iter())
+            .map(|t| Aabb::from_points(&t.map(|i| Vec3A::from(positions[i as usize]))))
             .collect();
         let tree = wide(&boxes, params);
         Self {
@@ -153,6 +164,8 @@ pub struct Placed {
     pub bounds: [[f32; 3]; 2],
     /// World from object space, mm.
     pub world_from_object: DAffine3,
+    /// Whether instances share it of which some are not shown.
+    pub partial: bool,
 }
 
 /// All nodes of a scene. First come the header, the top level and its table of instances, so that
@@ -251,6 +264,7 @@ impl SceneBvh {
             return Err(BvhError::TooDeep(needed));
         }
         self.nodes[0][0] = if boxes.is_empty() { NONE } else { 1 };
+        self.nodes[0][2] = placed.iter().any(|p| p.partial).into();
         for (slot, node) in self.nodes[1..].iter_mut().zip(&wide.nodes) {
             *slot = place(*node, 1, 0);
         }

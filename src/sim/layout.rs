@@ -142,7 +142,7 @@ shared! {
         tissue: u32, priority: i32, surface_outside: u32, surface_inside: u32,
         first_triangle: u32, triangles: u32, bvh_root: u32, slot: u32,
         low: [f32; 4], high: [f32; 4],
-        field: u32, masks: u32, unused0: u32, unused1: u32,
+        field: u32, masks: u32, owners: u32, unused0: u32,
     }
     /// What one axial sample needs to know.
     struct Row {

@@ -22,7 +22,7 @@ pub mod tracer;
 pub mod world;
 
 use std::sync::Arc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
@@ -158,10 +158,10 @@ impl Simulator {
     /// # Errors
     /// What Vulkan says; a lost device names the last pass.
     pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
-        self.adopt(scene)?;
+        let exchanged = self.adopt(scene)?;
         let passes = &mut self.passes;
         let mut cmd = self.frames.begin()?;
-        self.update_time = passes.update(&mut cmd, scene, self.coincident, index)?;
+        self.update_time = exchanged + passes.update(&mut cmd, scene, self.coincident, index)?;
         passes.touch(&mut cmd, scene)?;
         passes.clear(&mut cmd);
         passes.origin(&mut cmd)?;
@@ -185,8 +185,9 @@ impl Simulator {
         Ok(self.frames.take_timings())
     }
 
-    /// Takes over settings and strategies that the device does not have yet, after the frames in flight.
-    fn adopt(&mut self, scene: &Scene) -> Result<(), SimError> {
+    /// Takes over settings, strategies and placements that the device does not have yet, after the
+    /// frames in flight. How long structures took that had to be made anew.
+    fn adopt(&mut self, scene: &Scene) -> Result<Duration, SimError> {
         let settings = Settings::of(scene);
         if settings != self.settings {
             // The tables carry scales and levels that belong to the frame's constants.
@@ -195,11 +196,13 @@ impl Simulator {
             self.upload_tables()?;
             self.settings = settings;
         }
-        if !self.passes.world.serves(scene) {
-            self.frames.wait()?;
-            self.passes.world.exchange(&self.device, scene)?;
+        if self.passes.world.serves(scene) {
+            return Ok(Duration::ZERO);
         }
-        Ok(())
+        self.frames.wait()?;
+        let began = Instant::now();
+        self.passes.world.exchange(&self.device, scene)?;
+        Ok(began.elapsed())
     }
 
     /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
@@ -235,7 +238,7 @@ impl Simulator {
     }
 
     /// What the processor took to record the last frame's changes of the scene, trees that it built
-    /// for them included.
+    /// for them included: also those of instances that no longer move with what they shared one with.
     pub fn update_time(&self) -> Duration {
         self.update_time
     }

@@ -3,6 +3,7 @@
 mod arrays;
 mod changing;
 mod entry;
+mod joined;
 mod refit;
 mod top;
 
@@ -20,6 +21,7 @@ pub use arrays::Arrays;
 use arrays::Place;
 use changing::Changing;
 use entry::Mask;
+use joined::Sets;
 use top::Top;
 
 /// Why the anatomy is not on the device.
@@ -47,6 +49,9 @@ pub struct World {
     places: Vec<Place>,
     /// Of instances that change their shape on the device.
     regions: Vec<Option<Place>>,
+    sets: Sets,
+    /// Per instance whether it has left those that it shared a structure with.
+    apart: Vec<bool>,
     changing: Changing,
     top: Top,
     rows: Vec<layout::Instance>,
@@ -96,7 +101,8 @@ impl World {
         scene: &Scene,
         tracer: Tracer,
     ) -> Result<Self, WorldError> {
-        Self::with_fields(device, kernels, scene, tracer, Fields::build(scene))
+        let apart = vec![false; scene.instances.len()];
+        Self::with_fields(device, kernels, scene, tracer, Fields::build(scene), apart)
     }
 
     fn with_fields(
@@ -105,6 +111,7 @@ impl World {
         scene: &Scene,
         tracer: Tracer,
         fields: Fields,
+        apart: Vec<bool>,
     ) -> Result<Self, WorldError> {
         let union = |i: &&crate::scene::Instance| i.keyframes.strategy == Strategy::Union;
         if let Some(node) = scene.instances.iter().find(union)
@@ -112,7 +119,8 @@ impl World {
         {
             return Err(WorldError::Union(node.name.clone()));
         }
-        let arrays = Arrays::new(scene, tracer, fields)?;
+        let sets = Sets::new(scene, &apart);
+        let arrays = Arrays::with_sets(scene, tracer, fields, sets)?;
         let geometry = Geometry {
             instances: upload(device, "instances", bytemuck::cast_slice(&arrays.instances))?,
             vertices: upload(device, "vertices", bytemuck::cast_slice(&arrays.vertices))?,
@@ -124,11 +132,13 @@ impl World {
         let mut world = Self {
             tracer,
             changing: Changing::new(device, kernels, scene, tracer, &geometry, &arrays.regions)?,
-            top: Top::new(device, scene, arrays.bvh)?,
+            top: Top::new(device, scene, &arrays.sets, arrays.bvh)?,
             geometry,
             fields: arrays.fields,
             places: arrays.places,
             regions: arrays.regions,
+            sets: arrays.sets,
+            apart,
             rows: arrays.instances,
             mask: Mask::default(),
             made_for: scene
@@ -146,11 +156,13 @@ impl World {
         failed.map_or(Ok(world), Err)
     }
 
-    /// Whether [`Self::update`] can show `scene`: its keyframes and strategies are those of [`Self::new`].
+    /// Whether [`Self::update`] can show `scene`: its keyframes and strategies are those of [`Self::new`],
+    /// and what shares a structure has stayed together.
     pub fn serves(&self, scene: &Scene) -> bool {
-        self.agrees(scene, |made, now| {
+        let same = |made: &Keyframes, now: &Keyframes| {
             made.deforms_as(now) && made.strategy == now.strategy
-        })
+        };
+        self.agrees(scene, same) && self.sets.hold(scene)
     }
 
     fn agrees(&self, scene: &Scene, same: impl Fn(&Keyframes, &Keyframes) -> bool) -> bool {
@@ -159,7 +171,8 @@ impl World {
     }
 
     /// Uploads `scene` anew where [`Self::serves`] says no. How tissue deforms, which takes long to
-    /// find, is kept where only strategies were exchanged.
+    /// find, is kept where only strategies or placements were exchanged. What has left those that it
+    /// shared a structure with has one of its own from then on, so that it can go on moving.
     ///
     /// # Errors
     /// Those of [`Self::new`]; the world then is what it was.
@@ -168,7 +181,9 @@ impl World {
             true => self.fields.clone(),
             false => Fields::build(scene),
         };
-        *self = Self::with_fields(device, &self.kernels, scene, self.tracer, fields)?;
+        let mut apart = self.apart.clone();
+        self.sets.mark_apart(scene, &mut apart);
+        *self = Self::with_fields(device, &self.kernels, scene, self.tracer, fields, apart)?;
         Ok(())
     }
 
@@ -180,7 +195,7 @@ impl World {
 
     /// Records what changed since the last call: shapes, instance rows and the top level, or nothing;
     /// with the barriers between them and to the kernels behind. Returns whether anything did.
-    /// Meshes and the number of instances must be those of [`Self::new`].
+    /// Meshes and the number of instances must be those of [`Self::new`], and [`Self::serves`] must say yes.
     ///
     /// # Errors
     /// When recording fails, or the moved instances need a deeper top level than the kernel walks.
@@ -203,13 +218,17 @@ impl World {
             &mut self.regions,
             &mut self.top,
         )?;
-        let entries = entry::entries(scene, &self.places, &self.regions);
+        assert!(
+            self.sets.hold(scene),
+            "what shares a structure has come apart"
+        );
+        let entries = entry::entries(scene, &self.places, &self.regions, &self.sets);
         let placed = self
             .top
             .place(commands, scene, entries, self.changing.structures())?;
-        let (places, regions) = (&self.places, &self.regions);
+        let (places, regions, sets) = (&self.places, &self.regions, &self.sets);
         let (entries, slots) = (self.top.entries(), self.top.slots());
-        let rows = entry::rows(scene, places, regions, &self.fields, entries, slots);
+        let rows = entry::rows(scene, places, regions, sets, &self.fields, entries, slots);
         self.mask = entry::mask(scene, self.top.entries());
         let rewritten = rows != self.rows;
         if rewritten {
@@ -287,7 +306,10 @@ impl World {
     /// Index in [`crate::scene::Mesh::triangles`] of a hit's primitive, for what `instance` shows:
     /// `mesh`.
     pub fn triangle(&self, instance: usize, mesh: usize, primitive: u32) -> usize {
-        let place = self.regions[instance].as_ref();
+        let meshes = &self.made_for[instance].meshes;
+        let shape = meshes.iter().position(|&m| m == mesh).unwrap_or(0);
+        let shared = self.sets.of(instance).map(|(_, set)| &set.shapes[shape]);
+        let place = self.regions[instance].as_ref().or(shared);
         let place = place.unwrap_or(&self.places[mesh]);
         let index = (primitive - place.first_triangle) as usize;
         place.order.as_ref().map_or(index, |o| o[index] as usize)

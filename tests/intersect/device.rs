@@ -93,9 +93,15 @@ impl Rig {
     pub fn update(&mut self, scene: &Scene) -> bool {
         self.meshes = scene.instances.iter().map(|i| i.mesh).collect();
         let world = &mut self.world;
-        self.device
+        let other = !world.serves(scene);
+        if other {
+            world.exchange(&self.device, scene).unwrap();
+        }
+        let device = &self.device;
+        let changed = device
             .once(|commands| Ok(world.update(commands, scene).unwrap()))
-            .unwrap()
+            .unwrap();
+        changed || other
     }
 
     pub fn trace(&self, rays: &[Ray]) -> Vec<Traced> {

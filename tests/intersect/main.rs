@@ -5,6 +5,7 @@
 mod beating;
 mod compare;
 mod device;
+mod joined;
 mod keyframes;
 mod placements;
 mod rays;

@@ -96,6 +96,7 @@ fn places(trees: &[(usize, f64)], of: &[MeshBvh]) -> Vec<Placed> {
         instance: 10 + i as u32,
         bounds: of[tree].bounds,
         world_from_object: DAffine3::from_translation(DVec3::new(x, 0.0, 0.0)),
+        partial: false,
     });
     placed.collect()
 }

@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::entry;
+use super::joined::{Set, Sets};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh};
 use crate::sim::fields::Fields;
@@ -25,6 +26,9 @@ pub(super) struct Place {
     pub(super) order: Option<Vec<u32>>,
     /// Of an instance that changes its shape: how often the device has made it.
     pub(super) version: u64,
+    /// Of what instances share: where in the triangles, in words, the list begins of whose each is;
+    /// 0: they are of one.
+    pub(super) owners: u32,
 }
 
 /// What of a mesh has to stay on the device.
@@ -40,12 +44,13 @@ pub(super) enum Need {
     Structure,
 }
 
-/// What each mesh of a scene has to have on the device.
-pub(super) fn needs(scene: &Scene) -> Vec<Need> {
+/// What each mesh of a scene has to have on the device; the triangles of `sets` lie with these.
+pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
     let mut needs = vec![Need::Nothing; scene.meshes.len()];
-    for instance in &scene.instances {
+    for (i, instance) in scene.instances.iter().enumerate() {
         let keyframes = &instance.keyframes;
         let need = match keyframes.strategy {
+            _ if sets.of(i).is_some() => Need::Vertices,
             _ if keyframes.meshes.is_empty() => Need::Structure,
             Strategy::Selector | Strategy::Update | Strategy::Mask | Strategy::Union => {
                 Need::Structure
@@ -77,7 +82,8 @@ pub struct Arrays {
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
-    /// Indices into the vertices.
+    /// Indices into the vertices; behind them, two to a word, whose the triangles are that instances
+    /// share.
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,
@@ -86,6 +92,17 @@ pub struct Arrays {
     pub(super) places: Vec<Place>,
     /// Per instance that changes its shape on the device: room for the largest of its keyframes.
     pub(super) regions: Vec<Option<Place>>,
+    /// Which instances share a structure.
+    pub(super) sets: Sets,
+}
+
+/// One structure of a set before it has its place.
+struct Joint {
+    /// Indices into the vertices, in the order of the array.
+    triangles: Vec<[u32; 3]>,
+    /// Of each the instance, and its index in that one's mesh.
+    from: Vec<(u16, u32)>,
+    tree: Option<MeshBvh>,
 }
 
 impl Arrays {
@@ -98,6 +115,16 @@ impl Arrays {
     /// # Panics
     /// When a mesh has not one normal per vertex.
     pub fn new(scene: &Scene, tracer: Tracer, fields: Fields) -> Result<Self, BvhError> {
+        Self::with_sets(scene, tracer, fields, Sets::new(scene, &[]))
+    }
+
+    /// As [`Self::new`], with the instances of `sets` sharing structures.
+    pub(super) fn with_sets(
+        scene: &Scene,
+        tracer: Tracer,
+        fields: Fields,
+        sets: Sets,
+    ) -> Result<Self, BvhError> {
         let mut arrays = Self {
             instances: Vec::new(),
             vertices: Vec::new(),
@@ -107,8 +134,9 @@ impl Arrays {
             fields,
             places: Vec::new(),
             regions: Vec::new(),
+            sets,
         };
-        let needs = needs(scene);
+        let needs = needs(scene, &arrays.sets);
         let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
             .map(|(mesh, need)| {
                 let walked = tracer == Tracer::Bvh && *need == Need::Structure;
@@ -119,11 +147,19 @@ impl Arrays {
             let place = arrays.add(mesh, tree, need);
             arrays.places.push(place);
         }
+        let owners = arrays.join(scene, tracer);
         for instance in &scene.instances {
             let region = is_dynamic(instance).then(|| arrays.reserve(scene, instance));
             arrays.regions.push(region);
         }
-        let entries = entry::entries(scene, &arrays.places, &arrays.regions);
+        arrays.put_owners(&owners);
+        let Self {
+            places,
+            regions,
+            sets,
+            ..
+        } = &arrays;
+        let entries = entry::entries(scene, places, regions, sets);
         let slots = match &mut arrays.bvh {
             Some(bvh) => {
                 bvh.place(&placed(&entries), false)?;
@@ -131,9 +167,86 @@ impl Arrays {
             }
             None => (0..entries.len() as u32).collect(),
         };
-        let (places, regions, fields) = (&arrays.places, &arrays.regions, &arrays.fields);
-        arrays.instances = entry::rows(scene, places, regions, fields, &entries, &slots);
+        let (places, regions, sets) = (&arrays.places, &arrays.regions, &arrays.sets);
+        let fields = &arrays.fields;
+        arrays.instances = entry::rows(scene, places, regions, sets, fields, &entries, &slots);
         Ok(arrays)
+    }
+
+    /// Appends the structures of the sets; whose their triangles are, one list after the other, each
+    /// of an even length.
+    fn join(&mut self, scene: &Scene, tracer: Tracer) -> Vec<u16> {
+        let shapes = |set: &Set| {
+            let keyframes = scene.instances[set.members[0]].keyframes.meshes.len();
+            keyframes.max(1)
+        };
+        let all = self.sets.all.iter().enumerate();
+        let wanted: Vec<_> = all
+            .flat_map(|(number, set)| (0..shapes(set)).map(move |shape| (number, shape)))
+            .collect();
+        let joints: Vec<Joint> = (wanted.par_iter())
+            .map(|&(set, shape)| self.joint(scene, tracer, &self.sets.all[set], shape))
+            .collect();
+        let mut owners = Vec::new();
+        for (&(set, shape), joint) in wanted.iter().zip(joints) {
+            let set = &mut self.sets.all[set];
+            let mut place = Place {
+                first_triangle: self.triangles.len() as u32,
+                triangles: joint.triangles.len() as u32,
+                root: NONE,
+                bounds: set.bounds(scene, &self.places, shape),
+                order: Some(joint.from.iter().map(|from| from.1).collect()),
+                owners: owners.len() as u32 / 2,
+                ..Place::default()
+            };
+            if let (Some(bvh), Some(tree)) = (&mut self.bvh, &joint.tree) {
+                place.root = bvh.add(tree, place.first_triangle);
+            }
+            self.triangles.extend(joint.triangles);
+            owners.extend(joint.from.iter().map(|from| from.0));
+            owners.resize(owners.len().next_multiple_of(2), 0);
+            set.shapes.push(place);
+        }
+        owners
+    }
+
+    fn joint(&self, scene: &Scene, tracer: Tracer, set: &Set, shape: usize) -> Joint {
+        let (mut triangles, mut from) = (Vec::new(), Vec::new());
+        for &member in &set.members {
+            let mesh = Set::mesh(scene, member, shape);
+            let first_vertex = self.places[mesh].first_vertex;
+            triangles.extend(ordered(&scene.meshes[mesh], None, first_vertex));
+            let count = scene.meshes[mesh].triangles.len() as u32;
+            from.extend((0..count).map(|t| (member as u16, t)));
+        }
+        let tree = (tracer == Tracer::Bvh).then(|| MeshBvh::over(&self.vertices, &triangles));
+        if let Some(tree) = &tree {
+            let order = || tree.triangle_order.iter().map(|&t| t as usize);
+            triangles = order().map(|t| triangles[t]).collect();
+            from = order().map(|t| from[t]).collect();
+        }
+        Joint {
+            triangles,
+            from,
+            tree,
+        }
+    }
+
+    /// Appends the sets' lists behind all triangles.
+    fn put_owners(&mut self, owners: &[u16]) {
+        let first = 3 * self.triangles.len() as u32;
+        for set in &mut self.sets.all {
+            for place in &mut set.shapes {
+                place.owners += first;
+            }
+        }
+        let words: Vec<u32> = (owners.chunks_exact(2))
+            .map(|pair| u32::from(pair[0]) | u32::from(pair[1]) << 16)
+            .collect();
+        let word = |i: usize| words.get(i).copied().unwrap_or(0);
+        let rows = (0..words.len()).step_by(3);
+        self.triangles
+            .extend(rows.map(|i| [word(i), word(i + 1), word(i + 2)]));
     }
 
     fn add(&mut self, mesh: &Mesh, tree: Option<MeshBvh>, need: Need) -> Place {
@@ -149,8 +262,7 @@ impl Arrays {
             triangles: mesh.triangles.len() as u32,
             root: NONE,
             bounds: mesh.bounds(),
-            order: None,
-            version: 0,
+            ..Place::default()
         };
         if need >= Need::Vertices {
             self.vertices.extend_from_slice(&mesh.positions);
@@ -206,6 +318,7 @@ pub(super) fn placed(entries: &[entry::Entry]) -> Vec<Placed> {
         instance: e.instance,
         bounds: e.bounds,
         world_from_object: e.world_from_object,
+        partial: matches!(e.geometry, entry::Geometry::Joined { partial: true, .. }),
     };
     entries.iter().map(place).collect()
 }

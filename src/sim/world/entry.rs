@@ -3,6 +3,7 @@
 use glam::DAffine3;
 
 use super::arrays::{Bounds, Place, is_dynamic};
+use super::joined::Sets;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
@@ -25,6 +26,15 @@ pub(super) enum Geometry {
     },
     /// Whichever keyframe the instance's row names.
     Union,
+    /// What the instance shares with others, of which it is the first.
+    Joined {
+        /// Number of the set.
+        set: usize,
+        /// Number of its structure.
+        shape: usize,
+        /// Whether some that share it are not shown.
+        partial: bool,
+    },
 }
 
 /// A place of the top level. Equal entries need no new top level.
@@ -41,7 +51,7 @@ fn by_mask(number: usize) -> u8 {
     1 << (1 + number % MASKS)
 }
 
-fn union(a: Bounds, b: Bounds) -> Bounds {
+pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
     let corner = |side: usize, pick: fn(f32, f32) -> f32| {
         std::array::from_fn(|axis| pick(a[side][axis], b[side][axis]))
     };
@@ -58,8 +68,13 @@ pub(super) fn capacity(scene: &Scene) -> usize {
 }
 
 /// Entries of the scene as it stands: what has triangles and is shown, and what is only passed by.
-/// `regions` are those of the instances that change their shape.
-pub(super) fn entries(scene: &Scene, places: &[Place], regions: &[Option<Place>]) -> Vec<Entry> {
+/// `regions` are those of the instances that change their shape, and `sets` of those that share one.
+pub(super) fn entries(
+    scene: &Scene,
+    places: &[Place],
+    regions: &[Option<Place>],
+    sets: &Sets,
+) -> Vec<Entry> {
     let mut entries = Vec::new();
     for (i, instance) in scene.instances.iter().enumerate() {
         let keyframes = &instance.keyframes;
@@ -70,6 +85,20 @@ pub(super) fn entries(scene: &Scene, places: &[Place], regions: &[Option<Place>]
             world_from_object: instance.world_from_object,
             mask,
         };
+        if let Some((number, set)) = sets.of(i) {
+            let hidden = set.members.iter().filter(|&&m| !scene.instances[m].shown);
+            let hidden = hidden.count();
+            if set.members[0] == i && hidden < set.members.len() {
+                let shape = set.shape(scene);
+                let geometry = Geometry::Joined {
+                    set: number,
+                    shape,
+                    partial: hidden > 0,
+                };
+                entries.push(entry(geometry, set.shapes[shape].bounds, ALWAYS));
+            }
+            continue;
+        }
         let mesh = |mesh: usize, mask| {
             let place = &places[mesh];
             (place.triangles > 0).then(|| entry(Geometry::Mesh(mesh), place.bounds, mask))
@@ -110,13 +139,16 @@ pub(super) fn rows(
     scene: &Scene,
     places: &[Place],
     regions: &[Option<Place>],
+    sets: &Sets,
     fields: &Fields,
     entries: &[Entry],
     slots: &[u32],
 ) -> Vec<layout::Instance> {
     let mut rows: Vec<_> = (scene.instances.iter().zip(regions).enumerate())
         .map(|(i, (placed, region))| {
-            let place = region.as_ref().unwrap_or(&places[placed.mesh]);
+            let own = region.as_ref().unwrap_or(&places[placed.mesh]);
+            let shared = sets.of(i).map(|(_, set)| &set.shapes[set.shape(scene)]);
+            let place = shared.unwrap_or(own);
             let corner = |c: [f32; 3]| [c[0], c[1], c[2], 0.0];
             layout::Instance {
                 world_from_object: matrix_rows(&placed.world_from_object),
@@ -130,15 +162,22 @@ pub(super) fn rows(
                 triangles: place.triangles,
                 bvh_root: place.root,
                 slot: NONE,
-                low: corner(place.bounds[0]),
-                high: corner(place.bounds[1]),
+                low: corner(own.bounds[0]),
+                high: corner(own.bounds[1]),
                 field: fields.offset(scene, i),
                 masks: u32::from(scene.is_mask(i)),
+                owners: place.owners,
                 ..layout::Instance::default()
             }
         })
         .collect();
     for (entry, &slot) in entries.iter().zip(slots) {
+        if let Geometry::Joined { set, .. } = entry.geometry {
+            for &i in &sets.all[set].members {
+                rows[i].slot = if scene.instances[i].shown { slot } else { NONE };
+            }
+            continue;
+        }
         let instance = &scene.instances[entry.instance as usize];
         if instance.shown && shows(instance, entry) {
             rows[entry.instance as usize].slot = slot;
@@ -164,9 +203,13 @@ pub(super) struct Mask {
 /// The mask under which every entry that is shown is met.
 pub(super) fn mask(scene: &Scene, entries: &[Entry]) -> Mask {
     let seen = |entry: &&Entry| {
+        if let Geometry::Joined { partial, .. } = entry.geometry {
+            return !partial;
+        }
         let instance = &scene.instances[entry.instance as usize];
         instance.shown && shows(instance, entry)
     };
+    // What instances share is always entered, whichever of them is shown.
     let bits = entries
         .iter()
         .filter(seen)

@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use super::WorldError;
-use super::arrays::{Need, needs, placed};
+use super::arrays::{Need, needs, ordered, placed};
 use super::entry::{self, Entry, Geometry};
+use super::joined::{Set, Sets};
 use crate::gpu::{
     Binding, Blas, BlasInput, BlasOptions, Buffer, Commands, Device, GpuError, Stage, Tlas,
     TlasInstance,
@@ -22,6 +23,8 @@ enum Structure {
     /// No structure for a mesh that needs none of its own.
     Query {
         meshes: Vec<Option<Blas>>,
+        /// By set and shape.
+        joined: Vec<Vec<Blas>>,
         tlas: Tlas,
     },
 }
@@ -38,6 +41,7 @@ impl Top {
     pub(super) fn new(
         device: &Arc<Device>,
         scene: &Scene,
+        sets: &Sets,
         bvh: Option<SceneBvh>,
     ) -> Result<Self, GpuError> {
         let structure = match bvh {
@@ -49,7 +53,8 @@ impl Top {
             None => {
                 let capacity = entry::capacity(scene).max(1) as u32;
                 Structure::Query {
-                    meshes: build_meshes(device, scene)?,
+                    meshes: build_meshes(device, scene, sets)?,
+                    joined: build_joined(device, scene, sets)?,
                     tlas: Tlas::new(device, "anatomy", capacity)?,
                 }
             }
@@ -82,13 +87,18 @@ impl Top {
                 commands.write(nodes, 0, bytemuck::cast_slice(changed))?;
                 self.slots = bvh.slots.clone();
             }
-            Structure::Query { meshes, tlas } => {
+            Structure::Query {
+                meshes,
+                joined,
+                tlas,
+            } => {
                 let instances: Vec<_> = entries
                     .iter()
                     .map(|entry| TlasInstance {
                         blas: match entry.geometry {
                             Geometry::Mesh(mesh) => meshes[mesh].as_ref(),
                             Geometry::Changing { .. } => changing[entry.instance as usize].as_ref(),
+                            Geometry::Joined { set, shape, .. } => Some(&joined[set][shape]),
                             Geometry::Union => unreachable!("refused with the ray query"),
                         }
                         .expect("entries have triangles, and these a structure"),
@@ -138,15 +148,24 @@ impl Top {
     pub(super) fn bytes(&self) -> u64 {
         match &self.structure {
             Structure::Bvh { nodes, .. } => nodes.size(),
-            Structure::Query { meshes, tlas } => {
-                tlas.bytes() + meshes.iter().flatten().map(Blas::bytes).sum::<u64>()
+            Structure::Query {
+                meshes,
+                joined,
+                tlas,
+            } => {
+                let all = meshes.iter().flatten().chain(joined.iter().flatten());
+                tlas.bytes() + all.map(Blas::bytes).sum::<u64>()
             }
         }
     }
 }
 
-fn build_meshes(device: &Arc<Device>, scene: &Scene) -> Result<Vec<Option<Blas>>, GpuError> {
-    let all = || scene.meshes.iter().zip(needs(scene));
+fn build_meshes(
+    device: &Arc<Device>,
+    scene: &Scene,
+    sets: &Sets,
+) -> Result<Vec<Option<Blas>>, GpuError> {
+    let all = || scene.meshes.iter().zip(needs(scene, sets));
     let walked = |(mesh, need): &(&crate::scene::Mesh, Need)| {
         *need == Need::Structure && !mesh.triangles.is_empty()
     };
@@ -162,4 +181,32 @@ fn build_meshes(device: &Arc<Device>, scene: &Scene) -> Result<Vec<Option<Blas>>
     Ok(all()
         .map(|mesh| walked(&mesh).then(|| built.next()).flatten())
         .collect())
+}
+
+/// Structures of sets, whose triangles lie as they do in the arrays: member after member.
+fn build_joined(
+    device: &Arc<Device>,
+    scene: &Scene,
+    sets: &Sets,
+) -> Result<Vec<Vec<Blas>>, GpuError> {
+    let mut built = Vec::new();
+    for set in &sets.all {
+        let mut shapes = Vec::new();
+        for shape in 0..set.shapes.len() {
+            let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+            for &member in &set.members {
+                let mesh = &scene.meshes[Set::mesh(scene, member, shape)];
+                triangles.extend(ordered(mesh, None, positions.len() as u32));
+                positions.extend_from_slice(&mesh.positions);
+            }
+            let input = BlasInput {
+                name: "joined",
+                positions: &positions,
+                triangles: &triangles,
+            };
+            shapes.extend(Blas::build_many(device, &[input], BlasOptions::default())?);
+        }
+        built.push(shapes);
+    }
+    Ok(built)
 }

@@ -1,0 +1,163 @@
+//! Instances that share one structure: what stays together is walked once, not once each.
+//!
+//! Nested organs overlap, and a ray enters the structure of each that is around it. Instances whose
+//! places never differ share the object space, so that one structure over the triangles of all of them
+//! needs no other vertices, and rays meet the same triangles at the same distances.
+
+use std::collections::BTreeMap;
+
+use glam::DAffine3;
+
+use super::arrays::{Bounds, Place};
+use super::entry::union;
+use crate::scene::{Instance, Scene, Strategy};
+
+/// Instances numbered from here on have structures of their own: a triangle's owner takes 16 bits.
+const OWNERS: usize = 1 << 16;
+
+/// Instances that share their structures.
+#[derive(Clone, Debug)]
+pub(super) struct Set {
+    /// Indices into [`Scene::instances`], ascending; two at least.
+    pub(super) members: Vec<usize>,
+    /// Their structure at each keyframe, or the only one.
+    pub(super) shapes: Vec<Place>,
+}
+
+impl Set {
+    /// The mesh that member `instance` shows in structure `shape`.
+    pub(super) fn mesh(scene: &Scene, instance: usize, shape: usize) -> usize {
+        let instance = &scene.instances[instance];
+        let keyframe = instance.keyframes.meshes.get(shape);
+        keyframe.copied().unwrap_or(instance.mesh)
+    }
+
+    /// The number of the present structure.
+    pub(super) fn shape(&self, scene: &Scene) -> usize {
+        present(&scene.instances[self.members[0]])
+    }
+
+    /// Box around all members at `shape`, whose meshes lie at `places`.
+    pub(super) fn bounds(&self, scene: &Scene, places: &[Place], shape: usize) -> Bounds {
+        let boxes = self.members.iter();
+        let boxes = boxes.map(|&i| places[Self::mesh(scene, i, shape)].bounds);
+        boxes.reduce(union).expect("a set has members")
+    }
+
+    /// Whether all members are where, and in the shape that, the others are.
+    fn holds(&self, scene: &Scene) -> bool {
+        let first = &scene.instances[self.members[0]];
+        let with_first = |&i: &usize| {
+            let other = &scene.instances[i];
+            other.world_from_object == first.world_from_object && present(other) == present(first)
+        };
+        self.members.iter().all(with_first)
+    }
+}
+
+/// Number of the keyframe that an instance shows; 0 for a constant shape.
+fn present(instance: &Instance) -> usize {
+    let meshes = &instance.keyframes.meshes;
+    let shown = meshes.iter().position(|&mesh| mesh == instance.mesh);
+    shown.unwrap_or(0)
+}
+
+/// All sets of a scene.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Sets {
+    pub(super) all: Vec<Set>,
+    /// Per instance the set that it is in.
+    of: Vec<Option<usize>>,
+}
+
+impl Sets {
+    /// The sets of `scene`, without structures yet: instances with the same placement that nothing
+    /// moves apart, whose shapes are constant or keyframes exchanged together by selectors, and whose
+    /// meshes no other instance shows, so that no triangle is stored twice. `apart` are those that
+    /// have been moved on their own before.
+    pub(super) fn new(scene: &Scene, apart: &[bool]) -> Self {
+        let mut uses = vec![0_u32; scene.meshes.len()];
+        for instance in &scene.instances {
+            for &mesh in shapes(instance) {
+                uses[mesh] += 1;
+            }
+        }
+        let carriers = scene.graph.carriers(scene.instances.len());
+        let mut alike: BTreeMap<Vec<u64>, Vec<usize>> = BTreeMap::new();
+        for (i, instance) in scene.instances.iter().enumerate().take(OWNERS) {
+            let keyframes = &instance.keyframes;
+            let own = shapes(instance)
+                .iter()
+                .all(|&m| uses[m] == 1 && !scene.meshes[m].triangles.is_empty());
+            let together = keyframes.meshes.is_empty() || keyframes.group.is_some();
+            let selected = keyframes.strategy == Strategy::Selector;
+            let loose = apart.get(i).copied().unwrap_or(false);
+            let carrier = &carriers[i];
+            if !own || !together || !selected || loose || carrier.switched {
+                continue;
+            }
+            let number = |n: Option<usize>| n.map_or(0, |n| n as u64 + 1);
+            let mut key = vec![
+                number(carrier.mover),
+                keyframes.meshes.len() as u64,
+                number(keyframes.group.filter(|_| !keyframes.meshes.is_empty())),
+            ];
+            let within = carrier.mover.map_or(&[][..], |_| &carrier.within);
+            for placement in within.iter().chain([&instance.world_from_object]) {
+                key.extend(placement.to_cols_array().map(f64::to_bits));
+            }
+            alike.entry(key).or_default().push(i);
+        }
+        let mut sets = Self {
+            all: Vec::new(),
+            of: vec![None; scene.instances.len()],
+        };
+        let mut found: Vec<_> = alike.into_values().filter(|m| m.len() > 1).collect();
+        found.sort();
+        for members in found {
+            for &i in &members {
+                sets.of[i] = Some(sets.all.len());
+            }
+            sets.all.push(Set {
+                members,
+                shapes: Vec::new(),
+            });
+        }
+        sets
+    }
+
+    /// The set that an instance is in.
+    pub(super) fn of(&self, instance: usize) -> Option<(usize, &Set)> {
+        let set = self.of[instance]?;
+        Some((set, &self.all[set]))
+    }
+
+    /// Whether all members of every set are together still.
+    pub(super) fn hold(&self, scene: &Scene) -> bool {
+        self.all.iter().all(|set| set.holds(scene))
+    }
+
+    /// Marks those in `apart` that have left most of their set.
+    pub(super) fn mark_apart(&self, scene: &Scene, apart: &mut [bool]) {
+        for set in self.all.iter().filter(|set| !set.holds(scene)) {
+            let state = |i: usize| {
+                let instance = &scene.instances[i];
+                (instance.world_from_object, present(instance))
+            };
+            let alike = |a: (DAffine3, usize)| set.members.iter().filter(move |&&i| state(i) == a);
+            let most = set.members.iter().map(|&i| state(i));
+            let most = most.max_by_key(|&a| alike(a).count());
+            for &i in &set.members {
+                apart[i] |= Some(state(i)) != most;
+            }
+        }
+    }
+}
+
+/// Meshes that an instance may show.
+fn shapes(instance: &Instance) -> &[usize] {
+    match instance.keyframes.meshes.is_empty() {
+        true => std::slice::from_ref(&instance.mesh),
+        false => &instance.keyframes.meshes,
+    }
+}
