@@ -1,59 +1,57 @@
-// Axial point-spread function: a real Gaussian along each line of the complex baseband.
+// Axial point-spread function, a real Gaussian along each line of the complex baseband, and detection:
+// time-gain compensation, envelope, logarithm.
 //
-// One thread per (line, sample); a workgroup stages its stretch of the line and the kernel's reach
-// on both sides in shared memory, so that each sample is read once from memory.
+// A thread makes AXIAL_SAMPLES neighbouring samples of a line: a sample that it reads counts in all of them
+// that it reaches.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
+#include "numbers.glsl"
 
-layout(local_size_x = 128) in;
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer LateralBuffer { float lateral[]; };
-layout(std430, binding = 2) buffer IqBuffer { float iq[]; };
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 2) restrict readonly buffer LateralBuffer { vec2 lateral[]; };
+layout(std430, binding = 3) restrict buffer IqBuffer { vec2 iq[]; };
+layout(std430, binding = 4) restrict buffer LogBuffer { float log_image[]; };
 
-const int THREADS = 128;
 const int REACH = 32;
-const int STAGED = THREADS + 2 * REACH;
-
-shared float staged_re[STAGED];
-shared float staged_im[STAGED];
-shared float taps[REACH + 1];
+const float DECIBEL_PER_OCTAVE = 6.020599913; // 20 log10(2)
 
 void main() {
-    int local = int(gl_LocalInvocationID.x);
-    int first = int(gl_WorkGroupID.x) * THREADS - REACH;
-    uint l = gl_GlobalInvocationID.y;
     int samples = int(frame.samples);
-    bool inside = l < frame.scanlines;
+    int first = int(gl_GlobalInvocationID.x) * AXIAL_SAMPLES;
+    uint l = gl_GlobalInvocationID.y;
+    if (first >= samples || l >= frame.scanlines) { return; }
+    int line = int(l) * samples;
 
     float sigma = frame.axial_sigma;
     int radius = int(min(ceil(4.0 * sigma), float(REACH)));
-    if (local <= REACH) {
-        taps[local] = local == 0 ? 1.0 : exp(-0.5 * float(local * local) / (sigma * sigma));
+    vec2 sums[AXIAL_SAMPLES];
+    // tap[n] is the weight, in output sample first + n, of the sample that is being read.
+    float tap[AXIAL_SAMPLES];
+    for (int n = 0; n < AXIAL_SAMPLES; ++n) {
+        sums[n] = vec2(0.0);
+        tap[n] = 0.0;
     }
-    for (int i = local; i < STAGED; i += THREADS) {
-        int k = first + i;
-        bool held = inside && k >= 0 && k < samples;
-        uint at = 2u * (l * frame.samples + uint(max(k, 0)));
-        float re = 0.0;
-        float im = 0.0;
-        if (held) {
-            re = lateral[at];
-            im = lateral[at + 1u];
+    for (int j = -radius; j < AXIAL_SAMPLES + radius; ++j) {
+        for (int n = AXIAL_SAMPLES - 1; n > 0; --n) { tap[n] = tap[n - 1]; }
+        tap[0] = j == 0 ? 1.0 : exp(-0.5 * float(j * j) / (sigma * sigma));
+        int k = first + j;
+        if (k < 0 || k >= samples) { continue; }
+        vec2 heard = lateral[line + k];
+        for (int n = 0; n < AXIAL_SAMPLES; ++n) {
+            // Beyond the reach there is no tap at all: what is not finite stays where it is heard.
+            if (abs(j - n) <= radius) { sums[n] += tap[n] * heard; }
         }
-        staged_re[i] = re;
-        staged_im[i] = im;
     }
-    barrier();
-
-    int k = first + REACH + local;
-    if (!inside || k >= samples) { return; }
-    vec2 sum = vec2(0.0);
-    for (int j = -radius; j <= radius; ++j) {
-        int i = local + REACH + j;
-        sum += taps[abs(j)] * vec2(staged_re[i], staged_im[i]);
+    for (int n = 0; n < AXIAL_SAMPLES; ++n) {
+        int k = first + n;
+        if (k >= samples) { break; }
+        iq[line + k] = sums[n];
+        float envelope = length(sums[n]) * rows[k].tgc;
+        float level = DECIBEL_PER_OCTAVE * log2(max(envelope, 1e-20) * frame.inverse_reference);
+        float v = clamp(1.0 + level * frame.inverse_range, 0.0, 1.0);
+        log_image[line + k] = not_a_number(envelope) ? 0.0 : v;
     }
-    uint at = 2u * (l * frame.samples + uint(k));
-    iq[at] = sum.x;
-    iq[at + 1u] = sum.y;
 }

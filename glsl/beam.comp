@@ -1,26 +1,27 @@
 // Accumulators to complex samples: fixed point undone, lateral smoothing, contact, noise.
 //
-// One thread per (line, sample); neighbouring threads read neighbouring samples of the same line.
+// A thread makes one sample of BEAM_LINES neighbouring scanlines: an echo that it reads counts in all of
+// them that it reaches. Neighbouring threads read neighbouring samples of the same line.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "random.glsl"
 
 layout(local_size_x = 64) in;
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 2) readonly buffer SurfaceBuffer { int surface[]; };
-layout(std430, binding = 3) readonly buffer VolumeBuffer { int volume[]; };
-layout(std430, binding = 4) buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 5) buffer LateralBuffer { float lateral[]; };
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { ivec2 surface[]; };
+layout(std430, binding = 3) restrict readonly buffer VolumeBuffer { ivec2 volume[]; };
+layout(std430, binding = 4) restrict buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 5) restrict buffer LateralBuffer { vec2 lateral[]; };
 // Per line the coupled share of the transmit aperture; from frame.scanlines on how many of the elements
 // before each one are not coupled.
-layout(std430, binding = 6) readonly buffer ContactBuffer { float contact[]; };
+layout(std430, binding = 6) restrict readonly buffer ContactBuffer { float contact[]; };
 
 // Accumulators at and beyond this magnitude may have lost an echo.
 const int HEADROOM = 1 << 30;
 
-bool saturated(int v) { return v >= HEADROOM || v <= -HEADROOM; }
+bool saturated(ivec2 v) { return any(greaterThanEqual(v, ivec2(HEADROOM))) || any(lessThanEqual(v, ivec2(-HEADROOM))); }
 
 // Elements before the place `at` (in elements from the face's edge) that are not coupled.
 float air_before(float at) {
@@ -29,24 +30,24 @@ float air_before(float at) {
     return here + (at - float(i)) * (contact[frame.scanlines + i + 1u] - here);
 }
 
-// What is left of the echoes of line l at sample k: coupled shares of what sends and what receives.
-float coupling(uint l, uint k) {
+// What is left of the echoes of line l where `reach` elements on either side receive: coupled shares of
+// what sends and what receives.
+float coupling(uint l, float reach) {
+    float sends = contact[l];
     float count = float(frame.scanlines);
+    if (contact[2u * frame.scanlines] == 0.0) { return sends; }
     float middle = frame.kind == KIND_PHASED ? 0.5 * count : float(l) + 0.5;
-    float left = max(middle - rows[k].receive_reach, 0.0);
-    float right = min(middle + rows[k].receive_reach, count);
-    return contact[l] * (1.0 - (air_before(right) - air_before(left)) / (right - left));
+    float left = max(middle - reach, 0.0);
+    float right = min(middle + reach, count);
+    return sends * (1.0 - (air_before(right) - air_before(left)) / (right - left));
 }
 
 void main() {
     uint k = gl_GlobalInvocationID.x;
-    uint l = gl_GlobalInvocationID.y;
-    if (k >= frame.samples || l >= frame.scanlines) { return; }
-    uint own = l * frame.samples + k;
-    if (saturated(surface[2u * own]) || saturated(surface[2u * own + 1u])
-        || saturated(volume[2u * own]) || saturated(volume[2u * own + 1u])) {
-        atomicAdd(counters.saturated, 1u);
-    }
+    int first = int(gl_WorkGroupID.y) * BEAM_LINES;
+    int samples = int(frame.samples);
+    int scanlines = int(frame.scanlines);
+    if (k >= frame.samples) { return; }
 
     float sigma = rows[k].lateral_lines;
     int radius = sigma < 0.05 ? 0 : int(min(ceil(3.0 * sigma), 16.0));
@@ -54,34 +55,61 @@ void main() {
     float falloff = -0.5 / max(sigma * sigma, 0.0025);
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
 
-    vec2 s = vec2(0.0);
-    vec2 v = vec2(0.0);
-    float weights = 0.0;
-    float energy_here = 0.0;
+    vec2 s[BEAM_LINES];
+    vec2 v[BEAM_LINES];
+    float weights[BEAM_LINES];
+    float energies[BEAM_LINES];
+    // tap[n] is the weight, in output line first + n, of the line that is being read.
+    float tap[BEAM_LINES];
+    for (int n = 0; n < BEAM_LINES; ++n) {
+        s[n] = vec2(0.0);
+        v[n] = vec2(0.0);
+        weights[n] = 0.0;
+        energies[n] = 0.0;
+        tap[n] = 0.0;
+    }
     float energy_full = 0.0;
-    for (int j = -radius; j <= radius; ++j) {
-        float w = exp(falloff * float(j * j));
-        energy_full += w * w;
-        int line = int(l) + j;
-        if (line < 0 || line >= int(frame.scanlines)) { continue; }
-        uint i = 2u * (uint(line) * frame.samples + k);
-        weights += w;
-        energy_here += w * w;
-        s += w * vec2(float(surface[i]), float(surface[i + 1u]));
-        if (voxel) { v += w * vec2(float(volume[i]), float(volume[i + 1u])); }
+    uint full = 0u;
+    for (int j = -radius; j < BEAM_LINES + radius; ++j) {
+        for (int n = BEAM_LINES - 1; n > 0; --n) { tap[n] = tap[n - 1]; }
+        tap[0] = j <= radius ? exp(falloff * float(j * j)) : 0.0;
+        energy_full += tap[0] * tap[0];
+        int line = first + j;
+        if (line < 0 || line >= scanlines) { continue; }
+        uint at = uint(line * samples) + k;
+        ivec2 echo = surface[at];
+        if (j >= 0 && j < BEAM_LINES && saturated(echo)) { full |= 1u << uint(j); }
+        vec2 e = vec2(echo);
+        for (int n = 0; n < BEAM_LINES; ++n) {
+            weights[n] += tap[n];
+            s[n] += tap[n] * e;
+        }
+        if (voxel) {
+            vec2 e = vec2(volume[at]);
+            for (int n = 0; n < BEAM_LINES; ++n) {
+                energies[n] += tap[n] * tap[n];
+                v[n] += tap[n] * e;
+            }
+        }
     }
-    // Speckle adds in power, surface echoes in amplitude: each keeps its level at the edges.
-    if (voxel) {
-        v *= sqrt(energy_full / energy_here);
-    } else {
-        v = vec2(float(volume[2u * own]), float(volume[2u * own + 1u]));
+    float surface_undo = rows[k].surface_undo;
+    float volume_undo = rows[k].volume_undo;
+    float reach = rows[k].receive_reach;
+    for (int n = 0; n < BEAM_LINES; ++n) {
+        uint l = uint(first + n);
+        if (l >= frame.scanlines) { break; }
+        uint own = l * frame.samples + k;
+        ivec2 echo = volume[own];
+        if (saturated(echo)) { full |= 1u << uint(n); }
+        // Speckle adds in power, surface echoes in amplitude: each keeps its level at the edges.
+        vec2 scatterers = vec2(echo);
+        if (voxel) { scatterers = v[n] * sqrt(energy_full / energies[n]); }
+        vec2 iq = (s[n] * (surface_undo / weights[n]) + scatterers * volume_undo) * coupling(l, reach);
+        if (frame.noise > 0.0) {
+            uvec4 bits = pcg4d(uvec4(l, k, frame.frame_index, frame.seed));
+            iq += frame.noise * vec2(gaussian(bits.x), gaussian(bits.y));
+        }
+        lateral[own] = iq;
     }
-    vec2 iq = (s * (rows[k].surface_undo / weights) + v * rows[k].volume_undo) * coupling(l, k);
-
-    if (frame.noise > 0.0) {
-        uvec4 bits = pcg4d(uvec4(l, k, frame.frame_index, frame.seed));
-        iq += frame.noise * vec2(gaussian(bits.x), gaussian(bits.y));
-    }
-    lateral[2u * own] = iq.x;
-    lateral[2u * own + 1u] = iq.y;
+    if (full != 0u) { atomicAdd(counters.saturated, uint(bitCount(full))); }
 }

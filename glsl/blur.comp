@@ -1,31 +1,56 @@
-// Box sums along one axis of the image, of the converted mask and of its weight: one thread per pixel.
+// Box sums down the columns of an image of pairs of values, written with rows and columns exchanged:
+// run twice, it sums over squares and the image stands upright again.
+//
+// A thread makes BLUR_SUMS neighbouring sums of a column: what all of them have in common is read and
+// added once. Nothing is subtracted, so that a value that is no number spoils only sums that hold it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 
-layout(local_size_x = 16, local_size_y = 8) in;
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer FusionBuffer { Fusion fusion; };
-layout(std430, binding = 2) readonly buffer SourceBuffer { float source[]; };
-layout(std430, binding = 3) buffer SumBuffer { float sums[]; };
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer FusionBuffer { Fusion fusion; };
+layout(std430, binding = 2) restrict readonly buffer SourceBuffer { vec2 source[]; };
+layout(std430, binding = 3) restrict buffer SumBuffer { vec2 sums[]; };
 
-layout(push_constant) uniform Push { uint down; };  // 0: along rows, 1: along columns
+layout(push_constant) uniform Push { uint turned; };  // 1: the source has rows and columns exchanged
+
+// Beyond the image's edge its outermost pixels count on.
+vec2 read(int x, int y, int width, int height) { return source[clamp(y, 0, height - 1) * width + x]; }
 
 void main() {
-    uint i = gl_GlobalInvocationID.x;
-    uint j = gl_GlobalInvocationID.y;
-    if (i >= frame.image_width || j >= frame.image_height) { return; }
-    // An even box reaches one pixel farther to the left and up: half a pixel of shift.
-    int first = -int(fusion.blur / 2u);
-    int last = first + int(fusion.blur) - 1;
-    vec2 sum = vec2(0.0);
-    for (int tap = first; tap <= last; ++tap) {
-        int x = down == 0u ? clamp(int(i) + tap, 0, int(frame.image_width) - 1) : int(i);
-        int y = down == 0u ? int(j) : clamp(int(j) + tap, 0, int(frame.image_height) - 1);
-        uint at = 2u * (uint(y) * frame.image_width + uint(x));
-        sum += vec2(source[at], source[at + 1u]);
+    int x = int(gl_GlobalInvocationID.x);
+    int first = int(gl_GlobalInvocationID.y) * BLUR_SUMS;
+    int width = int(turned == 0u ? frame.image_width : frame.image_height);
+    int height = int(turned == 0u ? frame.image_height : frame.image_width);
+    if (x >= width || first >= height) { return; }
+    int taps = int(fusion.blur);
+    // An even box reaches one pixel farther up: half a pixel of shift.
+    int top = first - taps / 2;
+    vec2 sum[BLUR_SUMS];
+    for (int n = 0; n < BLUR_SUMS; ++n) { sum[n] = vec2(0.0); }
+    if (taps < BLUR_SUMS) {
+        for (int n = 0; n < BLUR_SUMS; ++n) {
+            for (int i = n; i < n + taps; ++i) { sum[n] += read(x, top + i, width, height); }
+        }
+    } else {
+        // Of the first sum, the last pixel is the first that all have; what lies before it is missing in
+        // more and more of them, and what follows its end comes to more and more.
+        vec2 shared_sum = vec2(0.0);
+        for (int i = BLUR_SUMS - 1; i < taps; ++i) { shared_sum += read(x, top + i, width, height); }
+        vec2 before = vec2(0.0);
+        sum[BLUR_SUMS - 1] = shared_sum;
+        for (int n = BLUR_SUMS - 2; n >= 0; --n) {
+            before += read(x, top + n, width, height);
+            sum[n] = shared_sum + before;
+        }
+        vec2 behind = vec2(0.0);
+        for (int n = 1; n < BLUR_SUMS; ++n) {
+            behind += read(x, top + taps - 1 + n, width, height);
+            sum[n] += behind;
+        }
     }
-    uint at = 2u * (j * frame.image_width + i);
-    sums[at] = sum.x;
-    sums[at + 1u] = sum.y;
+    for (int n = 0; n < BLUR_SUMS; ++n) {
+        if (first + n < height) { sums[x * height + first + n] = sum[n]; }
+    }
 }

@@ -3,18 +3,15 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 
-layout(local_size_x = 16, local_size_y = 8) in;
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer PrescanBuffer { float prescan[]; };
-layout(std430, binding = 2) buffer MaskBuffer { float mask[]; };
-layout(std430, binding = 3) buffer BackgroundBuffer { float background[]; };
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer PrescanBuffer { vec2 prescan[]; };
+layout(std430, binding = 2) restrict buffer MaskBuffer { vec2 mask[]; };
+layout(std430, binding = 3) restrict buffer BackgroundBuffer { float background[]; };
 
 #include "sector.glsl"
 
-vec2 pair(uint column, uint row) {
-    uint at = 2u * (column * frame.samples + row);
-    return vec2(prescan[at], prescan[at + 1u]);
-}
+vec2 pair(uint column, uint row) { return prescan[column * frame.samples + row]; }
 
 vec2 bilinear(vec2 at) {
     vec2 p = clamp(at, vec2(0.0), vec2(float(frame.scanlines - 1u), float(frame.samples - 1u)));
@@ -35,7 +32,6 @@ void main() {
     vec2 v = vec2(0.0);
     if (inside) { v = bilinear(at); }
     uint pixel = j * frame.image_width + i;
-    mask[2u * pixel] = v.x;
-    mask[2u * pixel + 1u] = inside ? 1.0 : 0.0;
+    mask[pixel] = vec2(v.x, inside ? 1.0 : 0.0);
     background[pixel] = v.y;
 }

@@ -4,11 +4,11 @@
 #include "shared.glsl"
 #include "numbers.glsl"
 
-layout(local_size_x = 16, local_size_y = 8) in;
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer LogBuffer { float log_image[]; };
-layout(std430, binding = 2) readonly buffer GreyBuffer { uint grey[256]; };
-layout(std430, binding = 3) buffer PixelBuffer { uint pixels[]; };
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer LogBuffer { float log_image[]; };
+layout(std430, binding = 2) restrict readonly buffer GreyBuffer { uint grey[256]; };
+layout(std430, binding = 3) restrict buffer PixelBuffer { uint pixels[]; };
 
 #include "sector.glsl"
 

@@ -4,15 +4,15 @@
 #include "shared.glsl"
 #include "numbers.glsl"
 
-layout(local_size_x = 16, local_size_y = 8) in;
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer FusionBuffer { Fusion fusion; };
-layout(std430, binding = 2) readonly buffer SimulatedBuffer { uint simulated[]; };
-layout(std430, binding = 3) readonly buffer BackgroundBuffer { float background[]; };
-layout(std430, binding = 4) readonly buffer SumBuffer { float sums[]; };
-layout(std430, binding = 5) buffer FusedBuffer { uint fused[]; };
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer FusionBuffer { Fusion fusion; };
+layout(std430, binding = 2) restrict readonly buffer SimulatedBuffer { uint simulated[]; };
+layout(std430, binding = 3) restrict readonly buffer BackgroundBuffer { float background[]; };
+layout(std430, binding = 4) restrict readonly buffer SumBuffer { vec2 sums[]; };
+layout(std430, binding = 5) restrict buffer FusedBuffer { uint fused[]; };
 // What blending by bands adds to the acquired image; read by that only.
-layout(std430, binding = 6) readonly buffer ChangeBuffer { float change[]; };
+layout(std430, binding = 6) restrict readonly buffer ChangeBuffer { float change[]; };
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
@@ -26,7 +26,8 @@ void main() {
             v = background[at] + change[at];
         } else {
             // Division may round; where the whole box is outside, the weight is 1 to the last bit.
-            float m = sums[2u * at] >= sums[2u * at + 1u] ? 1.0 : sums[2u * at] / sums[2u * at + 1u];
+            vec2 sum = sums[at];
+            float m = sum.x >= sum.y ? 1.0 : sum.x / sum.y;
             if (fusion.blend == BLEND_SMOOTH) { m = m * m * (3.0 - 2.0 * m); }
             v = m * background[at] + (1.0 - m) * (float(pixel & 0xffu) / 255.0);
         }

@@ -11,6 +11,10 @@ const uint MAX_STACK = 16u;         // media that may enclose one point
 const uint START_WORDS = MAX_STACK + 4u;
 const uint MAX_PIECES = 64u;        // of the level of what is transmitted along a line
 const float FAR_PIECE = 1e30;       // begins behind every sample: there are no more
+// Outputs of a thread, which share what it reads.
+const int BEAM_LINES = 8;           // neighbouring scanlines of one sample
+const int AXIAL_SAMPLES = 8;        // neighbouring samples of one scanline
+const int BLUR_SUMS = 16;           // neighbouring sums of one column
 
 const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;

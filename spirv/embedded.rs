@@ -7,7 +7,6 @@
     ("collapse", include_bytes!("collapse.spv")),
     ("convert", include_bytes!("convert.spv")),
     ("darken", include_bytes!("darken.spv")),
-    ("detect", include_bytes!("detect.spv")),
     ("difference", include_bytes!("difference.spv")),
     ("display", include_bytes!("display.spv")),
     ("fuse", include_bytes!("fuse.spv")),

@@ -96,9 +96,7 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
         ] {
             assert!(figures[key].is_object(), "{key}");
         }
-        for stage in [
-            "origin", "trace", "scatter", "beam", "axial", "detect", "display",
-        ] {
+        for stage in ["origin", "trace", "scatter", "beam", "axial", "display"] {
             assert!(
                 figures["stages_ms"][stage]["p99"].as_f64() > Some(0.0),
                 "{stage}"

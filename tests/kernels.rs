@@ -56,6 +56,7 @@ macro_rules! subjects {
             assert_eq!(tested, SUBJECTS.map(|s| s.name));
             let mut stems: Vec<&str> = SUBJECTS.iter().flat_map(|s| s.stems).copied().collect();
             stems.sort_unstable();
+            stems.dedup(); // `detect` is the last step of `axial`
             let dir = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
             let variants = source::variants(dir.as_ref()).unwrap();
             let kernels = variants.iter().filter(|v| !v.keep_names).map(|v| v.stem.as_str());

@@ -64,9 +64,9 @@ fn every_way_of_being_stale_is_noticed() {
     };
     let older = "older than its sources";
     edit(
-        glsl.join("detect.comp"),
+        glsl.join("darken.comp"),
         &append,
-        &[&format!("detect.spv: {older}")],
+        &[&format!("darken.spv: {older}")],
     );
     // An include: everything that uses it is stale, directly or not.
     let by_include = [
@@ -79,9 +79,9 @@ fn every_way_of_being_stale_is_noticed() {
         &[&by_include[0], &by_include[1]],
     );
     edit(
-        spirv.join("detect.spv"),
+        spirv.join("darken.spv"),
         &flip,
-        &["detect.spv: not the bytes"],
+        &["darken.spv: not the bytes"],
     );
     let other_flags = |bytes: Vec<u8>| {
         let text = String::from_utf8(bytes).unwrap();
@@ -101,9 +101,9 @@ fn every_way_of_being_stale_is_noticed() {
         found()
     );
     fs::remove_file(spirv.join("orphan.spv")).unwrap();
-    fs::remove_file(glsl.join("detect.comp")).unwrap();
+    fs::remove_file(glsl.join("darken.comp")).unwrap();
     assert!(
-        found().contains("detect: stamped, but no kernel"),
+        found().contains("darken: stamped, but no kernel"),
         "{}",
         found()
     );

@@ -1,10 +1,11 @@
-//! What animation costs, acceleration structures made anew against those that are switched; and what
-//! fusion with an acquired volume saves.
+//! What animation costs, acceleration structures made anew against those that are switched; what fusion
+//! with an acquired volume saves; what the stages of a frame take.
 //!
 //! ```text
 //! cargo run --release --bin profile -- strategies scenes/heart.toml
 //! cargo run --release --bin profile -- crossover
 //! cargo run --release --bin profile -- paper --json paper.json
+//! cargo run --release --bin profile -- stages scenes/*.toml
 //! ```
 //! Times are the device's own; what the processor does for a frame (recording, and the trees of the
 //! compute tracer) is counted with them. Compared runs take turns frame by frame, so that a machine
@@ -34,12 +35,14 @@ mod measure;
 mod paper;
 #[path = "common/provenance.rs"]
 mod provenance;
+#[path = "profile/stages.rs"]
+mod stages;
 #[path = "profile/strategies.rs"]
 mod strategies;
 #[path = "profile/table.rs"]
 mod table;
 
-/// Measures what animation and fusion cost on this machine.
+/// Measures what frames, animation and fusion cost on this machine.
 #[derive(Parser)]
 #[command(name = "profile")]
 struct Arguments {
@@ -70,6 +73,10 @@ enum Command {
     Crossover(crossover::Arguments),
     /// Tables I to III of Starkov et al. 2019, beside the paper's numbers.
     Paper(paper::Arguments),
+    /// What each stage of a frame takes, beside its bytes and operations, and how long a picture takes.
+    Stages(stages::Arguments),
+    /// Acceleration structures of the device alone.
+    Builds(builds::Arguments),
 }
 
 /// What all measurements share.
@@ -113,6 +120,8 @@ fn main() -> Result<ExitCode> {
         Command::Strategies(arguments) => strategies::run(&machine, &arguments)?,
         Command::Crossover(arguments) => crossover::run(&machine, &arguments)?,
         Command::Paper(arguments) => paper::run(&machine, &arguments)?,
+        Command::Stages(arguments) => stages::run(&machine, &arguments)?,
+        Command::Builds(arguments) => builds::alone(&machine, &arguments)?,
     }
     Ok(ExitCode::SUCCESS)
 }

@@ -1,11 +1,11 @@
-//! `axial`: the pulse's envelope along each line.
+//! `axial`: the pulse's envelope along each line. What it detects of it is the subject `detect`.
 
 use std::mem::size_of;
 
-use super::inputs::{Random, frame, samples};
+use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::axial;
-use crate::sim::layout::Frame;
+use crate::sim::layout::{AXIAL_SAMPLES, Frame, Row};
 
 pub const SUBJECT: Subject = Subject {
     name: "axial",
@@ -13,20 +13,27 @@ pub const SUBJECT: Subject = Subject {
     tolerance: "2e-6 of the kernel's sum times the largest sample: each tap is good to 2e-7 (exp), \
                 and 65 terms round at 6e-8 each",
     job,
-    sizes: |job| {
-        let values = 8 * samples(&job.one("frame"));
-        vec![size_of::<Frame>(), values, values]
-    },
-    extent: |job| {
-        let frame: Frame = job.one("frame");
-        Extent::Threads([frame.samples, frame.scanlines, 1])
-    },
+    sizes,
+    extent,
     check,
     plant: |job, outputs| {
         // One sample too far to the right.
         job.edit(outputs, "iq", |iq: &mut [f32]| iq.rotate_right(2));
     },
 };
+
+pub(super) fn sizes(job: &Job) -> Vec<usize> {
+    let frame: Frame = job.one("frame");
+    let rows = size_of::<Row>() * frame.samples as usize;
+    let count = samples(&frame);
+    vec![size_of::<Frame>(), rows, 8 * count, 8 * count, 4 * count]
+}
+
+/// A thread for every [`AXIAL_SAMPLES`] samples of a line.
+pub(super) fn extent(job: &Job) -> Extent {
+    let frame: Frame = job.one("frame");
+    Extent::Threads([frame.samples.div_ceil(AXIAL_SAMPLES), frame.scanlines, 1])
+}
 
 fn job(case: Case, size: Size) -> Job {
     let frame = frame(case, size);
@@ -36,11 +43,18 @@ fn job(case: Case, size: Size) -> Job {
         lateral[401] = f32::INFINITY;
         lateral[801] = f32::NEG_INFINITY;
     }
+    bindings(&frame, &lateral)
+}
+
+/// The kernel's bindings.
+pub(super) fn bindings(frame: &Frame, lateral: &[f32]) -> Job {
     Job {
         inputs: vec![
-            Input::words("frame", &[frame]),
-            Input::floats("lateral", &lateral),
+            Input::words("frame", &[*frame]),
+            Input::floats("rows", bytemuck::cast_slice(&rows(frame))),
+            Input::floats("lateral", lateral),
             Input::output("iq", Element::Float, lateral.len()),
+            Input::output("log_image", Element::Float, lateral.len() / 2),
         ],
         push: Vec::new(),
     }

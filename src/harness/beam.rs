@@ -5,7 +5,7 @@ use std::mem::size_of;
 use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::beam;
-use crate::sim::layout::{Counters, FLAG_VOXEL, Frame, Row};
+use crate::sim::layout::{BEAM_LINES, Counters, FLAG_VOXEL, Frame, Row};
 
 /// Largest magnitude of the random accumulators.
 const ECHO: f64 = 5e6;
@@ -35,7 +35,7 @@ pub const SUBJECT: Subject = Subject {
     },
     extent: |job| {
         let frame: Frame = job.one("frame");
-        Extent::Threads([frame.samples, frame.scanlines, 1])
+        Extent::Threads([frame.samples, frame.scanlines.div_ceil(BEAM_LINES), 1])
     },
     check,
     plant: |job, outputs| {

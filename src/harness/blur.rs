@@ -1,12 +1,12 @@
-//! `blur`: box sums of the converted mask.
+//! `blur`: box sums of the converted mask, down its columns.
 
 use std::mem::size_of;
 
 use super::display;
 use super::inputs::Random;
-use super::{Case, Check, Element, Input, Job, Size, Subject};
+use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::blur;
-use crate::sim::layout::{Frame, Fusion};
+use crate::sim::layout::{BLUR_SUMS, Frame, Fusion};
 
 pub const SUBJECT: Subject = Subject {
     name: "blur",
@@ -17,7 +17,10 @@ pub const SUBJECT: Subject = Subject {
         let pairs = 8 * display::pixels(&job.one("frame"));
         vec![size_of::<Frame>(), size_of::<Fusion>(), pairs, pairs]
     },
-    extent: display::per_pixel,
+    extent: |job| {
+        let [width, height] = blur::dimensions(&job.one("frame"), turned(job));
+        Extent::Threads([width, height.div_ceil(BLUR_SUMS), 1])
+    },
     check,
     plant: |job, outputs| {
         job.edit(outputs, "sums", |sums: &mut [f32]| {
@@ -25,6 +28,11 @@ pub const SUBJECT: Subject = Subject {
         });
     },
 };
+
+/// Whether the source has rows and columns exchanged.
+fn turned(job: &Job) -> bool {
+    job.push.iter().any(|&b| b != 0)
+}
 
 fn job(case: Case, size: Size) -> Job {
     let frame = display::image(case, size);
@@ -44,7 +52,7 @@ fn job(case: Case, size: Size) -> Job {
         source[3 * pixels / 2] = f32::NAN;
         source[pixels / 2] = f32::INFINITY;
     }
-    let down = u32::from(matches!(case, Case::Odd | Case::NotFinite | Case::Random));
+    let turned = u32::from(matches!(case, Case::Odd | Case::NotFinite | Case::Random));
     Job {
         inputs: vec![
             Input::words("frame", &[frame]),
@@ -52,14 +60,14 @@ fn job(case: Case, size: Size) -> Job {
             Input::floats("mask", &source),
             Input::output("sums", Element::Float, 2 * pixels),
         ],
-        push: bytemuck::bytes_of(&down).to_vec(),
+        push: bytemuck::bytes_of(&turned).to_vec(),
     }
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let fusion: Fusion = job.one("fusion");
-    let down = job.push.iter().any(|&b| b != 0);
-    let sums = blur::blur(&job.one("frame"), &fusion, &job.get::<f32>("mask"), down);
+    let mask: Vec<f32> = job.get("mask");
+    let sums = blur::blur(&job.one("frame"), &fusion, &mask, turned(job));
     let got: Vec<f32> = job.after(outputs, "sums");
     let allowed = 6e-8 * f64::from(fusion.blur).powi(2);
     vec![Check::close("sums", &got, sums.as_flattened(), |_| allowed)]

@@ -1,28 +1,19 @@
-//! `detect`: gain, envelope, logarithm.
+//! `detect`: gain, envelope, logarithm, the last step of the kernel `axial`.
 
-use std::mem::size_of;
-
-use super::inputs::{Random, frame, rows, samples};
-use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
+use super::axial;
+use super::inputs::{Random, frame, samples};
+use super::{Case, Check, Job, Size, Subject};
 use crate::reference::detect;
 use crate::sim::layout::{Frame, Row};
 
 pub const SUBJECT: Subject = Subject {
     name: "detect",
-    stems: &["detect"],
+    stems: &["axial"],
     tolerance: "1e-6: an envelope good to 5e-7 is 4e-6 dB, a logarithm near 1 good to 2^-21 is \
                 3e-6 dB, of 60 dB, and 1 minus up to 400 dB / 60 rounds at 4e-7",
     job,
-    sizes: |job| {
-        let frame: Frame = job.one("frame");
-        let rows = size_of::<Row>() * frame.samples as usize;
-        let count = samples(&frame);
-        vec![size_of::<Frame>(), rows, 8 * count, 4 * count]
-    },
-    extent: |job| {
-        let frame: Frame = job.one("frame");
-        Extent::Threads([frame.samples, frame.scanlines, 1])
-    },
+    sizes: axial::sizes,
+    extent: axial::extent,
     check,
     plant: |job, outputs| {
         // A thousandth of the range, a quarter of a grey level.
@@ -34,7 +25,9 @@ pub const SUBJECT: Subject = Subject {
 };
 
 fn job(case: Case, size: Size) -> Job {
-    let frame = frame(case, size);
+    let mut frame = frame(case, size);
+    // The samples as they are.
+    frame.axial_sigma = 0.0;
     let mut random = Random(3);
     // Amplitudes over twice the range.
     let mut value = || {
@@ -57,20 +50,13 @@ fn job(case: Case, size: Size) -> Job {
             to.copy_from_slice(&from);
         }
     }
-    Job {
-        inputs: vec![
-            Input::words("frame", &[frame]),
-            Input::floats("rows", bytemuck::cast_slice(&rows(&frame))),
-            Input::floats("iq", &iq),
-            Input::output("log_image", Element::Float, samples(&frame)),
-        ],
-        push: Vec::new(),
-    }
+    axial::bindings(&frame, &iq)
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame: Frame = job.one("frame");
-    let expected = detect::detect(&frame, &job.get::<Row>("rows"), &job.get::<f32>("iq"));
+    let iq: Vec<f32> = job.after(outputs, "iq");
+    let expected = detect::detect(&frame, &job.get::<Row>("rows"), &iq);
     let got: Vec<f32> = job.after(outputs, "log_image");
     vec![Check::close("log_image", &got, &expected, |_| 1e-6)]
 }

@@ -1,21 +1,29 @@
-//! Twin of `blur`: box sums along one axis of the image.
+//! Twin of `blur`: box sums down the columns of an image.
 
 use crate::sim::layout::{Frame, Fusion};
 
-/// Sums over the box of pairs of values per pixel, along columns where `down`. Beyond the image's
-/// edge its outermost pixels count on.
-pub fn blur(frame: &Frame, fusion: &Fusion, source: &[f32], down: bool) -> Vec<[f64; 2]> {
-    let (width, height) = (i64::from(frame.image_width), i64::from(frame.image_height));
+/// Width and height of an image of the frame; `turned` has rows and columns exchanged.
+pub fn dimensions(frame: &Frame, turned: bool) -> [u32; 2] {
+    let [width, height] = [frame.image_width, frame.image_height];
+    if turned {
+        [height, width]
+    } else {
+        [width, height]
+    }
+}
+
+/// Sums over the box down the columns of an image of pairs of values, with rows and columns exchanged:
+/// index x height + y. Beyond the image's edge its outermost pixels count on.
+pub fn blur(frame: &Frame, fusion: &Fusion, source: &[f32], turned: bool) -> Vec<[f64; 2]> {
+    let [width, height] = dimensions(frame, turned).map(i64::from);
     let (pairs, _) = source.as_chunks::<2>();
     let before = i64::from(fusion.blur) / 2;
     let mut out = Vec::new();
-    for y in 0..height {
-        for x in 0..width {
+    for x in 0..width {
+        for y in 0..height {
             let taps = -before..i64::from(fusion.blur) - before;
-            let values = taps.map(|tap| match down {
-                true => pairs[((y + tap).clamp(0, height - 1) * width + x) as usize],
-                false => pairs[(y * width + (x + tap).clamp(0, width - 1)) as usize],
-            });
+            let values =
+                taps.map(|tap| pairs[((y + tap).clamp(0, height - 1) * width + x) as usize]);
             out.push(values.fold([0.0; 2], |sum, v| {
                 [sum[0] + f64::from(v[0]), sum[1] + f64::from(v[1])]
             }));

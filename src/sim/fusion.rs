@@ -41,8 +41,8 @@ pub(super) struct Fused {
     prescan: Buffer,
     /// Converted mask and weight per pixel.
     mask: Buffer,
-    /// Their sums along rows.
-    across: Buffer,
+    /// Their sums down the columns, column by column.
+    down: Buffer,
     /// Their sums over the whole box.
     sums: Buffer,
     /// Converted grey level per pixel.
@@ -108,7 +108,7 @@ impl Fused {
             constants: new("fusion", size_of::<layout::Fusion>() as u64)?,
             prescan: new("prescan", 8 * samples)?,
             mask: new("converted mask", 8 * pixels)?,
-            across: new("mask sums along rows", 8 * pixels)?,
+            down: new("mask sums down columns", 8 * pixels)?,
             sums: new("mask sums", 8 * pixels)?,
             background: new("background", 4 * pixels)?,
             pixels: new("fused pixels", 4 * pixels)?,
@@ -236,7 +236,7 @@ impl Fused {
             self.bands.record(cmd, &images, size, fusion.levels())?;
             self.bands.change()
         } else {
-            self.blur(cmd, simulated.constants, per_pixel)?;
+            self.blur(cmd, simulated.constants, size)?;
             // The kernel does not read it.
             &self.background
         };
@@ -260,24 +260,24 @@ impl Fused {
         Ok(())
     }
 
-    /// Sums mask and weight over the box.
+    /// Sums mask and weight over the box: down the columns, each time exchanged with the rows.
     fn blur(
         &self,
         cmd: &mut Commands<'_>,
         frame: &Buffer,
-        per_pixel: [u32; 3],
+        [width, height]: [u32; 2],
     ) -> Result<(), GpuError> {
         let buffer = Binding::Buffer;
-        for (down, source, sums) in [
-            (0u32, &self.mask, &self.across),
-            (1, &self.across, &self.sums),
+        for (turned, [width, height], source, sums) in [
+            (0u32, [width, height], &self.mask, &self.down),
+            (1, [height, width], &self.down, &self.sums),
         ] {
             cmd.barrier(Stage::Compute, Stage::Compute);
             cmd.scope("blur");
             cmd.dispatch(
                 &self.kernels.blur,
-                per_pixel,
-                bytemuck::bytes_of(&down),
+                [width, height.div_ceil(layout::BLUR_SUMS), 1],
+                bytemuck::bytes_of(&turned),
                 &[
                     buffer(frame),
                     buffer(&self.constants),

@@ -18,6 +18,13 @@ pub const MAX_PIECES: usize = 64;
 /// Where a piece begins that is none: behind every sample.
 pub const FAR_PIECE: f32 = 1e30;
 
+/// Neighbouring scanlines of one sample that a thread of `beam` makes.
+pub const BEAM_LINES: u32 = 8;
+/// Neighbouring samples of one scanline that a thread of `axial` makes.
+pub const AXIAL_SAMPLES: u32 = 8;
+/// Neighbouring sums of one column that a thread of `blur` makes.
+pub const BLUR_SUMS: u32 = 16;
+
 /// The blurred mask weighs the acquired image.
 pub const BLEND_LINEAR: u32 = 0;
 /// Its smoothstep does.

@@ -171,7 +171,6 @@ impl Simulator {
         }
         passes.beam(&mut cmd)?;
         passes.axial(&mut cmd)?;
-        passes.detect(&mut cmd)?;
         passes.display(&mut cmd)?;
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {

@@ -171,44 +171,33 @@ impl Passes {
             &b.lateral,
             &b.contact,
         ];
-        self.per_sample(cmd, "beam", &self.kernels.beam, &bindings)
+        let threads = [
+            self.frame.samples,
+            self.frame.scanlines.div_ceil(layout::BEAM_LINES),
+        ];
+        self.per_sample(cmd, &self.kernels.beam, threads, &bindings)
     }
 
     pub(super) fn axial(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let b = &self.buffers;
-        self.per_sample(
-            cmd,
-            "axial",
-            &self.kernels.axial,
-            &[&b.frame, &b.lateral, &b.iq],
-        )
-    }
-
-    pub(super) fn detect(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let b = &self.buffers;
-        self.per_sample(
-            cmd,
-            "detect",
-            &self.kernels.detect,
-            &[&b.frame, &b.rows, &b.iq, &b.log_image],
-        )
+        let threads = [
+            self.frame.samples.div_ceil(layout::AXIAL_SAMPLES),
+            self.frame.scanlines,
+        ];
+        let bindings = [&b.frame, &b.rows, &b.lateral, &b.iq, &b.log_image];
+        self.per_sample(cmd, &self.kernels.axial, threads, &bindings)
     }
 
     fn per_sample(
         &self,
         cmd: &mut Commands,
-        name: &str,
         kernel: &Kernel,
+        [x, y]: [u32; 2],
         buffers: &[&Buffer],
     ) -> Result<(), GpuError> {
         let bindings: Vec<Binding> = buffers.iter().map(|b| Binding::Buffer(b)).collect();
-        cmd.scope(name);
-        cmd.dispatch(
-            kernel,
-            [self.frame.samples, self.frame.scanlines, 1],
-            &[],
-            &bindings,
-        )?;
+        cmd.scope(kernel.name());
+        cmd.dispatch(kernel, [x, y, 1], &[], &bindings)?;
         cmd.barrier(Stage::Compute, Stage::Compute);
         Ok(())
     }

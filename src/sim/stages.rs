@@ -145,7 +145,6 @@ pub(super) struct Kernels {
     pub(super) scatter: Kernel,
     pub(super) beam: Kernel,
     pub(super) axial: Kernel,
-    pub(super) detect: Kernel,
     pub(super) display: Kernel,
 }
 
@@ -172,7 +171,6 @@ impl Kernels {
             )?,
             beam: kernel("beam")?,
             axial: kernel("axial")?,
-            detect: kernel("detect")?,
             display: kernel("display")?,
         })
     }

@@ -6,7 +6,7 @@ use bytemuck::Pod;
 use insonify::gpu::{Device, Kernel};
 use insonify::harness::{self, Element, Extent, Input, Job, Role};
 use insonify::probe::Probe;
-use insonify::sim::layout::{Counters, Frame, Row};
+use insonify::sim::layout::{self, Counters, Frame, Row};
 use insonify::sim::shaders::Library;
 
 /// Device and kernels.
@@ -73,30 +73,45 @@ impl Stages {
             input("lateral", &vec![0f32; surface.len()]),
             input("contact", &joined(frame)),
         ];
-        let after = self.run("beam", inputs, [frame.samples, frame.scanlines]);
+        let after = self.run(
+            "beam",
+            inputs,
+            [frame.samples, frame.scanlines.div_ceil(layout::BEAM_LINES)],
+        );
         let counters: Vec<Counters> = values(&after[4]);
         (values(&after[5]), counters[0].saturated)
     }
 
     /// Complex samples through the axial kernel.
     pub fn axial(&self, frame: &Frame, lateral: &[f32]) -> Vec<f32> {
-        let inputs = vec![
-            input("frame", &[*frame]),
-            input("lateral", lateral),
-            input("iq", &vec![0f32; lateral.len()]),
-        ];
-        values(&self.run("axial", inputs, [frame.samples, frame.scanlines])[2])
+        let rows = vec![Row::default(); frame.samples as usize];
+        self.detected(frame, &rows, lateral).0
     }
 
-    /// Log-compressed envelope.
+    /// Log-compressed envelope of samples as they are.
     pub fn detect(&self, frame: &Frame, rows: &[Row], iq: &[f32]) -> Vec<f32> {
+        let sharp = Frame {
+            axial_sigma: 0.0,
+            ..*frame
+        };
+        self.detected(&sharp, rows, iq).1
+    }
+
+    /// Complex samples through the axial kernel, and their log-compressed envelope.
+    fn detected(&self, frame: &Frame, rows: &[Row], lateral: &[f32]) -> (Vec<f32>, Vec<f32>) {
         let inputs = vec![
             input("frame", &[*frame]),
             input("rows", rows),
-            input("iq", iq),
-            input("log image", &vec![0f32; iq.len() / 2]),
+            input("lateral", lateral),
+            input("iq", &vec![0f32; lateral.len()]),
+            input("log image", &vec![0f32; lateral.len() / 2]),
         ];
-        values(&self.run("detect", inputs, [frame.samples, frame.scanlines])[3])
+        let threads = [
+            frame.samples.div_ceil(layout::AXIAL_SAMPLES),
+            frame.scanlines,
+        ];
+        let after = self.run("axial", inputs, threads);
+        (values(&after[3]), values(&after[4]))
     }
 
     /// Pixels.

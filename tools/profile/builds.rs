@@ -2,11 +2,35 @@
 
 use insonify::gpu::{BlasInput, BlasOptions, build_times, refit_times};
 use insonify::scene::shapes;
-use miette::{IntoDiagnostic, Result};
+use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
 use crate::Machine;
-use crate::table::{Table, ms};
+use crate::table::{Table, ms, write_json};
+
+#[derive(clap::Args)]
+pub struct Arguments {
+    /// Subdivisions of the spheres: 20 * 4^n triangles.
+    #[arg(long, value_delimiter = ',', default_value = "4,5,6,7,8", value_parser = clap::value_parser!(u32).range(0..=8))]
+    subdivisions: Vec<u32>,
+}
+
+/// `profile builds`.
+pub fn alone(machine: &Machine, arguments: &Arguments) -> Result<()> {
+    if !machine.device.supports_acceleration_structure() {
+        return Err(miette!(
+            help = "the compute tracer builds its trees on the processor: `profile crossover` times them",
+            "{} builds no acceleration structures",
+            machine.device.name()
+        ));
+    }
+    let rows = run(machine, &arguments.subdivisions)?;
+    write_json(
+        &machine.output,
+        "builds",
+        &json!({ "machine": machine.provenance, "rows": rows }),
+    )
+}
 
 /// Builds and refits of spheres; median of five.
 pub fn run(machine: &Machine, subdivisions: &[u32]) -> Result<Value> {

@@ -43,9 +43,9 @@ const PROBE: [(&str, &str); 6] = [
     ("probe.samples", "2048"),
 ];
 /// The passes of a frame, in its order.
-const STAGES: [&str; 12] = [
-    "update", "origin", "trace", "scatter", "beam", "axial", "detect", "display", "mask",
-    "convert", "blur", "fuse",
+const STAGES: [&str; 11] = [
+    "update", "origin", "trace", "scatter", "beam", "axial", "display", "mask", "convert", "blur",
+    "fuse",
 ];
 /// Voxels along each axis of a volume that is made up.
 const VOXELS: [usize; 3] = [256, 64, 256];
