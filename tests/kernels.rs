@@ -65,6 +65,7 @@ macro_rules! subjects {
 }
 
 subjects!(
+    angles,
     geometry,
     rays,
     interpolate,

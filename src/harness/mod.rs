@@ -4,6 +4,7 @@
 //! against [`crate::reference`] and plants an error that the check must catch. `tools/kernels.rs`
 //! runs them by hand, `tests/kernels.rs` runs all of them.
 
+mod angles;
 mod axial;
 mod beam;
 mod blur;
@@ -222,8 +223,9 @@ pub struct Subject {
     pub plant: fn(&Job, &mut [Vec<u8>]),
 }
 
-/// Every kernel, in the order of a frame after the two that only tests use.
-pub const SUBJECTS: [Subject; 22] = [
+/// Every kernel, in the order of a frame after the three that only tests use.
+pub const SUBJECTS: [Subject; 23] = [
+    angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
     interpolate::SUBJECT,

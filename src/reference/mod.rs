@@ -5,6 +5,7 @@
 
 pub mod accumulator;
 pub mod acoustics;
+pub mod angles;
 pub mod axial;
 pub mod beam;
 pub mod blur;
