@@ -16,6 +16,7 @@ layout(std430, binding = 5) buffer SegmentBuffer { Segment segments[]; };
 layout(std430, binding = 6) buffer CountersBuffer { Counters counters[]; };
 layout(std430, binding = 7) buffer FusionBuffer { Fusion fusions[]; };
 layout(std430, binding = 8) buffer SurveyBuffer { Survey surveys[]; };
+layout(std430, binding = 9) buffer ScanlineBuffer { Scanline scanlines[]; };
 
 void main() {
     frames[0].kind = 0u;
@@ -27,4 +28,5 @@ void main() {
     counters[0].rays = 0u;
     fusions[0].blur = 0u;
     surveys[0].flags = 0u;
+    scanlines[0].x = 0.0;
 }

@@ -24,6 +24,7 @@ layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
 layout(std430, binding = 6) buffer StackBuffer { uint stacks[]; };
 layout(std430, binding = 7) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 8) readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 9) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #include "triangle.glsl"
 

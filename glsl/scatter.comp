@@ -18,6 +18,7 @@ layout(std430, binding = 6) readonly buffer SegmentCountBuffer { uint segment_co
 layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) readonly buffer FieldBuffer { float fields[]; };
+layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 // Whether any instance's tissue deforms; without it the kernel is smaller.
 layout(constant_id = 0) const bool DEFORMING = true;

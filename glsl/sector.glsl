@@ -1,5 +1,6 @@
 // Where a pixel of the image lies among the scanlines. The including kernel declares
 // `readonly buffer FrameBuffer { Frame frame; }` first.
+#include "angles.glsl"
 
 // Column (scanline) and row (axial sample) of the centre of pixel (i, j); false outside the sector.
 bool sector(uint i, uint j, out vec2 column_row) {
@@ -9,7 +10,7 @@ bool sector(uint i, uint j, out vec2 column_row) {
     float across = x / frame.width;    // -1/2 .. 1/2 over the face
     if (frame.kind != KIND_LINEAR) {
         rho = length(vec2(x, z + frame.radius)) - frame.radius;
-        across = atan(x, z + frame.radius) / frame.field_of_view;
+        across = arc(x, z + frame.radius) / frame.field_of_view;
     }
     column_row = vec2((across + 0.5) * float(frame.scanlines) - 0.5, rho / frame.sample_pitch);
     return abs(across) <= 0.5 && rho >= 0.0 && rho < frame.depth;

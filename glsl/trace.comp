@@ -31,6 +31,7 @@ layout(std430, binding = 11) buffer SegmentBuffer { Segment segments[]; };
 layout(std430, binding = 12) buffer SegmentCountBuffer { uint segment_count[]; };
 layout(std430, binding = 13) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 14) readonly buffer FieldBuffer { float fields[]; };
+layout(std430, binding = 15) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 layout(push_constant) uniform Push { uint path_begin; uint path_count; };
 
@@ -59,8 +60,7 @@ bool masks_only = false;
 #include "count.glsl"
 
 uint row_of(float time) {
-    float kappa = frame.speed * time / frame.sample_pitch;
-    return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
+    return sample_at(frame.speed * time / frame.sample_pitch);
 }
 
 // Each of N paths deposits an N-th: rounded alike, faint echoes would vanish as N grows. The dither
@@ -168,9 +168,9 @@ void echo(Path path, uint line, uint n, uint key, uint instance, Surface s, Tiss
     // tracer would choose the phase.
     vec3 p = tissue_point(instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
-    float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
+    vec2 phase = phasor(unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w));
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
-    deposit_surface(line, late, incoherent * vec2(cos(phi), sin(phi)), true, dither);
+    deposit_surface(line, late, incoherent * phase, true, dither);
 }
 
 void main() {

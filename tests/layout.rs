@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use insonify::sim::layout::{
-    Counters, Frame, Fusion, Instance, Row, Segment, Surface, Survey, Tissue,
+    Counters, Frame, Fusion, Instance, Row, Scanline, Segment, Surface, Survey, Tissue,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -23,9 +23,9 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> [Mirror; 9] {
+fn mirrors() -> [Mirror; 10] {
     mirrors!(
-        Frame, Tissue, Surface, Instance, Row, Segment, Counters, Fusion, Survey
+        Frame, Tissue, Surface, Instance, Row, Segment, Counters, Fusion, Survey, Scanline
     )
 }
 

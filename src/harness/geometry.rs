@@ -12,7 +12,11 @@ pub const SUBJECT: Subject = Subject {
     tolerance: "4e-6 of the radius or depth: sine, cosine and arctangent of a GPU are good to a few \
                 1e-7, and the face is sought from a rounded point",
     job,
-    sizes: |job| vec![size_of::<Frame>(), 64 * inputs::lines(&job.one("frame"))],
+    sizes: |job| {
+        let frame: Frame = job.one("frame");
+        let rays = 64 * inputs::lines(&frame);
+        vec![size_of::<Frame>(), rays, inputs::scanlines_size(&frame)]
+    },
     extent: |job| Extent::Threads([inputs::lines(&job.one("frame")) as u32, 1, 1]),
     check,
     plant: |job, outputs| {
@@ -33,6 +37,7 @@ fn job(case: Case, size: Size) -> Job {
         inputs: vec![
             Input::words("frame", &[frame]),
             Input::output("rays", Element::Float, 16 * inputs::lines(&frame)),
+            inputs::scanlines(&frame),
         ],
         push: Vec::new(),
     }

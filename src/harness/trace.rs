@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use super::check::relative_norm;
-use super::inputs::{frame, lines, rows, samples};
+use super::inputs::{frame, lines, rows, samples, scanlines, scanlines_size};
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
@@ -65,6 +65,7 @@ fn sizes(job: &Job) -> Vec<usize> {
         4 * lines(&frame),
         size_of::<Counters>(),
         worlds::field_size(job),
+        scanlines_size(&frame),
     ]);
     sizes
 }
@@ -135,6 +136,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::sum("segment_count", Element::Word, lines(&frame)),
         Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
         fields,
+        scanlines(&frame),
     ]);
     job
 }

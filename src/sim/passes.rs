@@ -81,6 +81,7 @@ impl Passes {
                 Binding::Buffer(&b.stacks),
                 Binding::Buffer(&b.counters),
                 Binding::Buffer(&b.tissues),
+                Binding::Buffer(&b.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
@@ -116,6 +117,7 @@ impl Passes {
                 Binding::Buffer(&b.segment_count),
                 Binding::Buffer(&b.counters),
                 Binding::Buffer(w.fields()),
+                Binding::Buffer(&b.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
@@ -150,6 +152,7 @@ impl Passes {
                 Binding::Buffer(&b.volume_echoes),
                 Binding::Buffer(&b.counters),
                 Binding::Buffer(w.fields()),
+                Binding::Buffer(&b.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
@@ -224,6 +227,7 @@ impl Passes {
         let simulated = Simulated {
             frame: &self.frame,
             constants: &b.frame,
+            scanlines: &b.scanlines,
             tissues: &b.tissues,
             rows: &b.rows,
             stacks: &b.stacks,
