@@ -247,6 +247,7 @@ void main() {
                     uvec4 dither = dither_words(line, n, path.interactions + 32u * path.reflections);
                     deposit_surface(line, path.time, vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0), false, dither);
                 }
+                path.left_instance = NONE;
                 reflect_path(path, normal, SPECULAR, 0.0);
             } else {
                 path.weight = 0.0;
@@ -255,6 +256,11 @@ void main() {
         }
 
         float past = hit.t + clearance(surface_position(hit));
+        if (is_left(path, hit)) {
+            path.t_min = past;
+            path.crossings += 1u;
+            continue;
+        }
         Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
         if ((frame.flags & FLAG_COINCIDENT) != 0u) {
             float from = max(hit.t - clearance(surface_position(hit)), 0.0);
@@ -287,6 +293,7 @@ void main() {
                 // medium begins, and sound goes straight on.
                 emit_segment(path, line, n, before, hit.t);
                 advance(path, hit.t, way, position);
+                leave(path, hit);
                 path.t_min = max(path.t_min, past - hit.t);
                 if (after != before) {
                     path.weight *= passed(t1.impedance, tissues[tissue_of(after)].impedance);
@@ -301,6 +308,7 @@ void main() {
 
         emit_segment(path, line, n, before, hit.t);
         advance(path, hit.t, way, position);
+        leave(path, hit);
         aimed = false;
         path.interactions += 1u;
         interactions += 1u;
