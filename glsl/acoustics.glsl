@@ -1,4 +1,5 @@
 // Interfaces between fluids: refraction by sound speeds, pressure reflection, rough normals.
+#include "angles.glsl"
 
 // Signed pressure reflection coefficient at incidence cos_i from medium 1 into 2 (fluid-fluid).
 // Total reflection gives +1; the true phase of the evanescent case is not modelled.
@@ -40,12 +41,11 @@ vec3 power_cosine(vec3 n, float exponent, vec2 u) {
     vec3 tangent, bitangent;
     basis(n, tangent, bitangent);
     // cos t = u^(1/(s+1)); sin^2 = 1 - exp(-x), by series where 1 - cos^2 would cancel.
-    float x = -2.0 * log(max(u.x, 1.0 / 16777216.0)) / (exponent + 1.0);
+    float x = -2.0 * logarithm(max(u.x, 1.0 / 16777216.0)) / (exponent + 1.0);
     float sin2 = x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x);
     float cos_t = sqrt(1.0 - sin2);
-    float sin_t = sqrt(sin2);
-    float azimuth = 6.283185307 * u.y;
-    return normalize(sin_t * cos(azimuth) * tangent + sin_t * sin(azimuth) * bitangent + cos_t * n);
+    vec2 across = sqrt(sin2) * phasor(u.y);
+    return normalize(across.x * tangent + across.y * bitangent + cos_t * n);
 }
 
 // Micro-normal about n whose reflection leaves on the near side of the geometric normal: pdf

@@ -1,7 +1,11 @@
+#ifndef ANGLES_GLSL
+#define ANGLES_GLSL
 // Sine, cosine and arctangent of sums and products alone, so that every device gives the same.
 // Vulkan lets a device's own sin and cos err by 2^-11, and only within [-pi, pi], and its atan by
 // 4096 units in the last place; sums and products it must round correctly, and `precise` keeps them
 // from being fused. src/reference/angles.rs mirrors every operation and measures the errors.
+
+const float TURNS = 0.1591549431;   // in a radian
 
 // Point of the unit circle at an angle in turns: (cosine, sine), within 2.5e-7, for |turns| up to 2^22.
 vec2 phasor(float turns) {
@@ -29,3 +33,4 @@ float arc(float y, float x) {
 
 // Arcsine of s in [-1, 1], radians, within 5e-7.
 float arcsine(float s) { return arc(s, sqrt(max((1.0 - s) * (1.0 + s), 0.0))); }
+#endif

@@ -1,11 +1,9 @@
 // Complex baseband deposit: an echo at one-way time T carries the phase of the two-way carrier there.
+#include "angles.glsl"
 
 const float FIXED_LIMIT = 1073741824.0; // 2^30
 
-vec2 carrier(float time) {
-    float angle = -6.283185307 * fract(2.0 * frame.frequency * time);
-    return vec2(cos(angle), sin(angle));
-}
+vec2 carrier(float time) { return phasor(-2.0 * frame.frequency * time); }
 
 // What the three samples about the nearest one get of an echo that lies `f` samples, -1/2 to 1/2, behind
 // it: the parabola through them, whose centre is the echo's and whose spread is zero.

@@ -5,6 +5,7 @@
 // beyond 1 it passes by. With xi normal of deviation sigma, sin i' is normal of deviation kappa sigma.
 // Without this a vessel's edge, where a hundredth of the beam is totally reflected, would turn all of
 // it aside.
+#include "angles.glsl"
 
 // Mass of the standard normal distribution below x: Abramowitz and Stegun 7.1.26, within 1e-7.
 float normal_mass(float x) {
@@ -24,8 +25,8 @@ float footprint_reflectance(float z1, float c1, float z2, float c2, float cos_i,
     float beyond = normal_mass((1.0 - centre) / width) - normal_mass((critical - centre) / width)
         + normal_mass((-critical - centre) / width) - normal_mass((-1.0 - centre) / width);
     // Below the critical angle, by s = critical sin(phi): what is steep at the edge becomes smooth.
-    float from = asin(clamp((centre - 4.0 * width) / critical, -1.0, 1.0));
-    float to = asin(clamp((centre + 4.0 * width) / critical, -1.0, 1.0));
+    float from = arcsine(clamp((centre - 4.0 * width) / critical, -1.0, 1.0)) * TURNS;
+    float to = arcsine(clamp((centre + 4.0 * width) / critical, -1.0, 1.0)) * TURNS;
     float sum = 0.0;
     float norm = 0.0;
     // Gauss-Legendre, 8 points.
@@ -33,10 +34,10 @@ float footprint_reflectance(float z1, float c1, float z2, float c2, float cos_i,
     const vec4 WEIGHTS = vec4(0.3626837834, 0.3137066459, 0.2223810345, 0.1012285363);
     for (uint i = 0u; i < 8u; ++i) {
         float node = (i & 1u) == 0u ? NODES[i >> 1u] : -NODES[i >> 1u];
-        float phi = 0.5 * (from + to) + 0.5 * (to - from) * node;
-        float s = critical * sin(phi);
+        vec2 phi = phasor(0.5 * (from + to) + 0.5 * (to - from) * node);
+        float s = critical * phi.y;
         float off = (s - centre) / width;
-        float mass = WEIGHTS[i >> 1u] * cos(phi) * exp(-0.5 * off * off);
+        float mass = WEIGHTS[i >> 1u] * phi.x * exp(-0.5 * off * off);
         float r_s = reflection(z1, c1, z2, c2, sqrt(max(1.0 - s * s, 0.0)));
         sum += mass * r_s * r_s;
         norm += mass;

@@ -12,6 +12,7 @@ layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 // The face is sought from a point `depth` along the ray, looking back: exactly `depth` away, or a
 // miss outside the face's height or for a point.
 layout(std430, binding = 1) buffer RayBuffer { vec4 rays[]; };
+layout(std430, binding = 2) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #include "probe.glsl"
 

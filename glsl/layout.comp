@@ -17,6 +17,7 @@ layout(std430, binding = 6) buffer CountersBuffer { Counters counters[]; };
 layout(std430, binding = 7) buffer FusionBuffer { Fusion fusions[]; };
 layout(std430, binding = 8) buffer SurveyBuffer { Survey surveys[]; };
 layout(std430, binding = 9) buffer InteractionBuffer { Interaction interactions[]; };
+layout(std430, binding = 10) buffer ScanlineBuffer { Scanline scanlines[]; };
 
 void main() {
     frames[0].kind = 0u;
@@ -29,4 +30,5 @@ void main() {
     fusions[0].blur = 0u;
     surveys[0].flags = 0u;
     interactions[0].path = 0u;
+    scanlines[0].x = 0.0;
 }

@@ -25,6 +25,7 @@ layout(std430, binding = 6) readonly buffer FusionBuffer { Fusion fusion; };
 layout(binding = 7) uniform texture3D volume;
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) buffer PrescanBuffer { float prescan[]; };
+layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #define RAY_SKIPS(i) (instances[i].masks == 0u)
 #define RAY_SELECTS true

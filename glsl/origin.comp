@@ -24,6 +24,7 @@ layout(std430, binding = 5) restrict readonly buffer NodeBuffer { uvec4 nodes[];
 layout(std430, binding = 6) restrict buffer StackBuffer { uint stacks[]; };
 layout(std430, binding = 7) restrict buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 8) restrict readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #include "triangle.glsl"
 

@@ -12,6 +12,7 @@ struct Path {
     float time;         // one way, us
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
     uint interactions; uint reflections; uint crossings;
+    uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
     bool branch;
 };
 
@@ -45,6 +46,8 @@ void start(uint line, uint n, out Path path, inout Media media) {
     path.reflections = 0u;
     path.crossings = 0u;
     path.branch = false;
+    path.left_instance = NONE;
+    path.left_primitive = NONE;
     uint at = line * START_WORDS;
     media.count = stacks[at];
     for (uint i = 0u; i < media.count; ++i) media.ids[i] = stacks[at + 1u + i];
@@ -56,6 +59,17 @@ void start(uint line, uint n, out Path path, inout Media media) {
     }
     path.weight = uintBitsToFloat(stacks[at + MAX_STACK + 2u]);
     path.interactions = stacks[at + MAX_STACK + 3u];
+}
+
+// Whether rounding has brought back the triangle that the path starts on, which a straight line meets
+// only once. Where refraction leaves a path nearly along the triangle, no clearance would do.
+bool is_left(Path path, Hit hit) {
+    return hit.instance == path.left_instance && hit.primitive == path.left_primitive;
+}
+
+void leave(inout Path path, Hit hit) {
+    path.left_instance = hit.instance;
+    path.left_primitive = hit.primitive;
 }
 
 void reflect_path(inout Path path, vec3 m, float roughness, float turn) {

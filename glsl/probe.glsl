@@ -1,5 +1,6 @@
 // Transducer geometry in probe space: x lateral, y elevation, z depth, mm; the face's centre is at 0.
-// The including kernel declares `readonly buffer FrameBuffer { Frame frame; }` first.
+// The including kernel declares `readonly buffer FrameBuffer { Frame frame; }` and
+// `readonly buffer ScanlineBuffer { Scanline scanlines[]; }` first.
 
 // Elevation offset of layer e (cell-centred), mm.
 float elevation(uint e) {
@@ -9,26 +10,14 @@ float elevation(uint e) {
 // Start, unit direction and unit lateral axis (in the scanline plane, perpendicular to the ray) of
 // scanline l in layer e.
 void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lateral) {
-    float u = (float(l) + 0.5) / float(frame.scanlines) - 0.5;
-    float y = elevation(e);
-    if (frame.kind == KIND_LINEAR) {
-        origin = vec3(frame.width * u, y, 0.0);
-        direction = vec3(0.0, 0.0, 1.0);
-        lateral = vec3(1.0, 0.0, 0.0);
-        return;
-    }
-    float angle = frame.field_of_view * u;
-    float s = sin(angle);
-    float c = cos(angle);
-    direction = vec3(s, 0.0, c);
-    lateral = vec3(c, 0.0, -s);
-    origin = vec3(0.0, y, 0.0);
-    if (frame.kind == KIND_CONVEX) {
-        // radius (cos - 1) as -2 radius sin^2(angle / 2): no cancellation near the middle.
-        float half_sine = sin(0.5 * angle);
-        origin.x = frame.radius * s;
-        origin.z = -2.0 * frame.radius * half_sine * half_sine;
-    }
+    origin = vec3(scanlines[l].x, elevation(e), scanlines[l].z);
+    direction = vec3(scanlines[l].sine, 0.0, scanlines[l].cosine);
+    lateral = vec3(direction.z, 0.0, -direction.x);
+}
+
+// Axial sample at `kappa` pitches along a line, the nearest end where that lies outside; 0 for NaN.
+uint sample_at(float kappa) {
+    return kappa > 0.0 ? uint(min(kappa, float(frame.samples - 1u))) : 0u;
 }
 
 // Amplitude factor of an echo `off` mm beside the geometric scanline.
@@ -48,7 +37,7 @@ float face_distance(vec3 o, vec3 d) {
     if (frame.kind == KIND_LINEAR) {
         if (d.z >= 0.0) { return -1.0; }
         t = -o.z / d.z;
-        if (abs(o.x + t * d.x) > 0.5 * frame.width) { return -1.0; }
+        if (abs(o.x + t * d.x) > scanlines[frame.scanlines].x) { return -1.0; }
     } else if (frame.kind == KIND_CONVEX) {
         vec2 q = vec2(o.x, o.z + frame.radius);
         vec2 v = vec2(d.x, d.z);
@@ -62,7 +51,8 @@ float face_distance(vec3 o, vec3 d) {
         float c = (distance_to_axis - frame.radius) * (distance_to_axis + frame.radius);
         t = c / (sqrt(discriminant) - b);
         vec2 p = q + t * v;
-        if (abs(atan(p.x, p.y)) > 0.5 * frame.field_of_view) { return -1.0; }
+        // Beside the edge: the sine of the angle between the two is positive.
+        if (abs(p.x) * scanlines[frame.scanlines].cosine > p.y * scanlines[frame.scanlines].sine) { return -1.0; }
     } else {
         return -1.0;
     }

@@ -18,6 +18,7 @@ layout(std430, binding = 6) readonly buffer SegmentCountBuffer { uint segment_co
 layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) readonly buffer FieldBuffer { float fields[]; };
+layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 // Whether any instance's tissue deforms; without it the kernel is smaller.
 layout(constant_id = 0) const bool DEFORMING = true;
@@ -26,7 +27,6 @@ layout(constant_id = 0) const bool DEFORMING = true;
 #include "probe.glsl"
 #include "field.glsl"
 #include "texture.glsl"
-#include "angles.glsl"
 #include "deposit.glsl"
 
 const uint THREADS = 64u;
@@ -103,9 +103,7 @@ float distance_at(Stretch s, float kappa) {
     return (kappa * frame.sample_pitch / frame.speed - s.time) * s.speed;
 }
 
-uint row_at(float kappa) {
-    return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
-}
+uint row_at(float kappa) { return sample_at(kappa); }
 
 // A stretch with a number that is none has no echoes. NaN fails every comparison.
 bool is_finite(Stretch s) {

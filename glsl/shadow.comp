@@ -25,6 +25,7 @@ layout(std430, binding = 6) restrict readonly buffer NodeBuffer { uvec4 nodes[];
 layout(std430, binding = 7) restrict readonly buffer StackBuffer { uint stacks[]; };
 layout(std430, binding = 8) restrict readonly buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 9) restrict buffer PieceBuffer { vec4 pieces[]; };
+layout(std430, binding = 10) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -76,9 +77,8 @@ float pass(inout Path path, Hit hit, Tissue t1, Tissue t2) {
     float width = 0.0;
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
         float kappa = frame.speed * path.time / frame.sample_pitch;
-        uint row = uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
         vec3 along = path.direction + cos_i * n + 0.01 * path.lateral;
-        width = surface_curvature(hit, along) * rows[row].sigma_lateral;
+        width = surface_curvature(hit, along) * rows[sample_at(kappa)].sigma_lateral;
     }
     float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
     bool through = transmit_path(path, n, n_geometric, t1.speed, t2.speed) || width > 0.0;

@@ -74,6 +74,11 @@ struct Frame {
     uint ray_mask;                                                            // ray query: bits of the entries that are shown
 };
 
+// Of a scanline, in probe space: where it starts (mm, elevation aside) and the direction in which it
+// looks, (sine, 0, cosine). Behind the last one stands the face's edge, where another half pitch
+// would end.
+struct Scanline { float x; float z; float sine; float cosine; };
+
 struct Tissue {
     float speed; float impedance; float absorption; float presence;   // mm/us, MRayl, Np/mm at f0, rho
     float mean; float sigma; float texture_depth; float texture_length; // calibrated amplitudes, k, mm

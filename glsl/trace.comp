@@ -37,6 +37,7 @@ layout(std430, binding = 13) restrict buffer CounterBuffer { Counters counters; 
 layout(std430, binding = 14) restrict readonly buffer FieldBuffer { float fields[]; };
 layout(std430, binding = 15) restrict buffer InteractionBuffer { Interaction interactions[]; };
 layout(std430, binding = 16) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
+layout(std430, binding = 17) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 layout(push_constant) uniform Push { uint role; uint path_begin; uint path_count; uint line_begin; uint line_count; };
 
@@ -69,8 +70,7 @@ Media media;
 Media after;
 
 uint row_of(float time) {
-    float kappa = frame.speed * time / frame.sample_pitch;
-    return uint(clamp(floor(kappa), 0.0, float(frame.samples - 1u)));
+    return sample_at(frame.speed * time / frame.sample_pitch);
 }
 
 // Each of N paths deposits an N-th: rounded alike, faint echoes would vanish as N grows. The dither
@@ -205,11 +205,11 @@ void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interf
     // tracer would choose the phase.
     vec3 p = tissue_point(at.instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
-    float phi = 6.283185307 * unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w);
+    vec2 phase = phasor(unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w));
     float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
     echo.waiting = 3u;
     echo.late = late;
-    echo.behind = incoherent * vec2(cos(phi), sin(phi));
+    echo.behind = incoherent * phase;
 }
 
 // The interface at a hit, where the path has arrived.
@@ -269,6 +269,8 @@ void recall(uint slot, out Path path, out Interface at) {
     path.share = 1.0 / float(frame.paths);
     path.probability = 1.0;
     path.reflections = 0u;
+    path.left_instance = NONE;
+    path.left_primitive = NONE;
     path.branch = false;
     at.geometric = interactions[slot].geometric_turn.xyz;
     at.turn = interactions[slot].geometric_turn.w;
@@ -405,10 +407,16 @@ void main() {
                         echo.time = path.time;
                         echo.in_phase = vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0);
                     }
+                    path.left_instance = NONE;
                     reflect_path(path, normal, SPECULAR, 0.0);
                     continue;
                 }
                 close = clearance(surface_position(hit));
+                if (is_left(path, hit)) {
+                    path.t_min = hit.t + close;
+                    path.crossings += 1u;
+                    continue;
+                }
                 if ((frame.flags & FLAG_COINCIDENT) != 0u) {
                     first = hit;
                     pairing = true;
@@ -443,6 +451,7 @@ void main() {
             }
             emit_segment(path, line, n, before, hit.t);
             advance(path, hit.t, way, position);
+            leave(path, hit);
             if (passes) {
                 // The mask begins or ends within a medium: the stretch is cut there. Outside another
                 // medium begins, and sound goes straight on.

@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use insonify::sim::layout::{
-    Counters, Frame, Fusion, Instance, Interaction, Row, Segment, Surface, Survey, Tissue,
+    Counters, Frame, Fusion, Instance, Interaction, Row, Scanline, Segment, Surface, Survey, Tissue,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -23,7 +23,7 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> [Mirror; 10] {
+fn mirrors() -> [Mirror; 11] {
     mirrors!(
         Frame,
         Tissue,
@@ -34,7 +34,8 @@ fn mirrors() -> [Mirror; 10] {
         Counters,
         Fusion,
         Survey,
-        Interaction
+        Interaction,
+        Scanline
     )
 }
 

@@ -1,15 +1,16 @@
-//! One definition of the probe's geometry on the CPU and one in GLSL: the same lines.
+//! The probe's geometry on the CPU, and what kernels make of its table: the same lines.
 
 use glam::DVec3;
 use insonify::gpu::{Binding, BufferKind, Device, Kernel, test_device};
 use insonify::probe::{Kind, Probe};
 use insonify::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED};
 use insonify::sim::shaders::Library;
+use insonify::sim::tables;
 
 /// Epsilons of f32 (1.2e-7) by which a line may differ, relative to the radius, width or, for
-/// directions, 1: half for each rounded operand, and four for the sine and cosine of a GPU, whose
-/// error is absolute.
-const EPSILONS: f64 = 8.0;
+/// directions, 1: half for a rounded entry of the table, and up to three for an elevation, the quotient
+/// of two numbers.
+const EPSILONS: f64 = 4.0;
 
 fn frame(probe: &Probe) -> Frame {
     let mut frame = Frame {
@@ -60,7 +61,17 @@ fn lines(device: &std::sync::Arc<Device>, probe: &Probe) -> Vec<[[f32; 4]; 4]> {
     device
         .upload(&input, bytemuck::bytes_of(&frame(probe)))
         .unwrap();
-    let bindings = [Binding::Buffer(&input), Binding::Buffer(&rays)];
+    let table = tables::scanlines(probe);
+    let table: &[u8] = bytemuck::cast_slice(&table);
+    let scanlines = device
+        .buffer("scanlines", table.len() as u64, BufferKind::Storage)
+        .unwrap();
+    device.upload(&scanlines, table).unwrap();
+    let bindings = [
+        Binding::Buffer(&input),
+        Binding::Buffer(&rays),
+        Binding::Buffer(&scanlines),
+    ];
     device
         .once(|commands| commands.dispatch(&kernel, [count, 1, 1], &[], &bindings))
         .unwrap();

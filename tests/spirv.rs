@@ -32,6 +32,55 @@ fn no_module_is_stale() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
+/// Places of a device's own trigonometry in a module: Sin (13) to Acosh, Atanh and Atan2 (25) of
+/// GLSL.std.450, the only set of extended instructions in use.
+fn trigonometry(words: &[u32]) -> Vec<usize> {
+    const EXTENDED_INSTRUCTION: u32 = 12;
+    let mut found = Vec::new();
+    let mut at = 5;
+    while at < words.len() {
+        let (length, opcode) = (words[at] >> 16, words[at] & 0xffff);
+        if opcode == EXTENDED_INSTRUCTION && (13..=25).contains(&words[at + 4]) {
+            found.push(at);
+        }
+        at += length as usize;
+    }
+    found
+}
+
+#[test]
+fn no_kernel_relies_on_the_trigonometry_of_a_device() {
+    let library = Library::embedded();
+    for stem in library.stems() {
+        let found = trigonometry(library.words(stem));
+        assert!(
+            found.is_empty(),
+            "{stem}: a sine may be 2^-11 off; use glsl/angles.glsl (words {found:?})"
+        );
+    }
+    // Behind a header: x = Floor(y), then Cos(y).
+    let planted = [
+        0,
+        0,
+        0,
+        0,
+        0,
+        6 << 16 | 12,
+        1,
+        2,
+        3,
+        8,
+        4,
+        6 << 16 | 12,
+        1,
+        5,
+        3,
+        14,
+        4,
+    ];
+    assert_eq!(trigonometry(&planted), [11]);
+}
+
 #[test]
 fn every_way_of_being_stale_is_noticed() {
     let dir = tempfile::tempdir().unwrap();

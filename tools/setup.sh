@@ -20,11 +20,17 @@ manual() {
 
 command -v cargo >/dev/null || manual "no Rust toolchain: install one first (rustup, Rust 1.95 or newer)"
 
+# Whether one of these files exists: `ls` would want all.
+any() {
+  local file
+  for file; do [ -e "$file" ] && return; done
+  return 1
+}
 has_library() { ldconfig -p 2>/dev/null | grep -q "$1"; }
 # A driver is a manifest whose library can be loaded; NVIDIA's and Mesa's land in these folders.
 has_driver() {
   [ -n "${VK_DRIVER_FILES:-}${VK_ICD_FILENAMES:-}" ] && return 0
-  ls /etc/vulkan/icd.d/*.json /usr/share/vulkan/icd.d/*.json /usr/local/share/vulkan/icd.d/*.json >/dev/null 2>&1
+  any /etc/vulkan/icd.d/*.json /usr/share/vulkan/icd.d/*.json /usr/local/share/vulkan/icd.d/*.json
 }
 
 want=()
@@ -42,7 +48,7 @@ if [ "$mode" != run ] || [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then
 fi
 if [ "$mode" != run ]; then
   command -v Xvfb >/dev/null || want+=(xvfb)
-  ls /usr/share/vulkan/explicit_layer.d/*validation*.json /etc/vulkan/explicit_layer.d/*validation*.json >/dev/null 2>&1 || want+=(vulkan-validationlayers)
+  any /usr/share/vulkan/explicit_layer.d/*validation*.json /etc/vulkan/explicit_layer.d/*validation*.json || want+=(vulkan-validationlayers)
   command -v spirv-val >/dev/null || want+=(spirv-tools)
   command -v cmake >/dev/null || want+=(cmake)
   command -v c++ >/dev/null || want+=(g++)
@@ -51,7 +57,31 @@ if [ "$mode" != run ]; then
 fi
 driver=
 has_driver || driver=mesa-vulkan-drivers
-[ ${#want[@]} -eq 0 ] && [ -z "$driver" ] && exit 0
+# A second driver shows what the first one forgives: SwiftShader, two files out of Debian's package
+# chromium-common, in target/second-driver, where only the tests look. Nothing is installed.
+second_driver() {
+  local into package=chromium-common
+  into=$(cd "$(dirname "$0")/.." && pwd)/target/second-driver
+  [ -s "$into/vk_swiftshader_icd.json" ] && return
+  if ! command -v apt-get >/dev/null || ! command -v dpkg-deb >/dev/null || ! apt-cache show "$package" >/dev/null 2>&1; then
+    say "no package $package here (Debian has it): tests on a second driver are skipped"
+    return
+  fi
+  say "unpacking SwiftShader, the tests' second driver, from $package into $into"
+  rm -rf "$into"
+  mkdir -p "$into/package"
+  if ! (cd "$into/package" && apt-get download -qq "$package" 2>log && dpkg-deb --fsys-tarfile ./*.deb |
+    tar -x -C "$into" --wildcards --transform='s,.*/,,' '*vk_swiftshader*') || [ ! -s "$into/vk_swiftshader_icd.json" ]; then
+    say "that failed ($(tail -n 1 "$into/package/log")): tests on a second driver are skipped"
+    rm -f "$into/vk_swiftshader_icd.json"
+  fi
+  rm -rf "$into/package"
+}
+
+if [ ${#want[@]} -eq 0 ] && [ -z "$driver" ]; then
+  [ "$mode" = run ] || second_driver
+  exit 0
+fi
 
 . /etc/os-release 2>/dev/null || true
 case " ${ID:-} ${ID_LIKE:-} " in
@@ -97,3 +127,4 @@ if [ -n "$driver" ]; then
   say "no Vulkan driver found: installing Mesa's, among them the software driver lavapipe"
   apt install -y --no-install-recommends "${target[@]}" mesa-vulkan-drivers
 fi
+[ "$mode" = run ] || second_driver

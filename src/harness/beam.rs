@@ -15,7 +15,8 @@ pub const SUBJECT: Subject = Subject {
     name: "beam",
     stems: &["beam"],
     tolerance: "4e-7 of the largest amplitude (accumulators beyond 2^24 lose bits as f32, 33 terms \
-                round at 6e-8 each) and 1e-5 of the noise (logarithm and cosine of a GPU, times 5)",
+                round at 6e-8 each) and 1e-5 of the noise (logarithm and circle within 3e-7, a root within \
+                a few units in the last place, times 5)",
     job,
     sizes: |job| {
         let frame: Frame = job.one("frame");

@@ -9,10 +9,14 @@ use crate::sim::layout::Frame;
 pub const SUBJECT: Subject = Subject {
     name: "geometry",
     stems: &["geometry"],
-    tolerance: "4e-6 of the radius or depth: sine, cosine and arctangent of a GPU are good to a few \
-                1e-7, and the face is sought from a rounded point",
+    tolerance: "directions within 1.2e-7, the table's rounding, normals within 4e-7; 4e-6 \
+                of the radius or depth for places, since the face is sought from a rounded point",
     job,
-    sizes: |job| vec![size_of::<Frame>(), 64 * inputs::lines(&job.one("frame"))],
+    sizes: |job| {
+        let frame: Frame = job.one("frame");
+        let rays = 64 * inputs::lines(&frame);
+        vec![size_of::<Frame>(), rays, inputs::scanlines_size(&frame)]
+    },
     extent: |job| Extent::Threads([inputs::lines(&job.one("frame")) as u32, 1, 1]),
     check,
     plant: |job, outputs| {
@@ -33,6 +37,7 @@ fn job(case: Case, size: Size) -> Job {
         inputs: vec![
             Input::words("frame", &[frame]),
             Input::output("rays", Element::Float, 16 * inputs::lines(&frame)),
+            inputs::scanlines(&frame),
         ],
         push: Vec::new(),
     }
@@ -63,6 +68,10 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let got: Vec<f32> = job.after(outputs, "rays");
     let size = f64::from(frame.radius.max(frame.depth));
     let place = [0, 1, 2, 3, 7];
-    let allowed = |i: usize| 4e-6 * if place.contains(&(i % 16)) { size } else { 1.0 };
+    let allowed = |i: usize| match i % 16 {
+        at if place.contains(&at) => 4e-6 * size,
+        4..12 => 1.2e-7,
+        _ => 4e-7,
+    };
     vec![Check::close("rays", &got, &expected, allowed)]
 }

@@ -2,9 +2,11 @@
 
 use glam::DAffine3;
 
-use super::{Case, Size};
-use crate::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row};
+use super::{Case, Input, Size};
+use crate::reference::geometry;
+use crate::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row, Scanline};
 use crate::sim::placement::rows as matrix_rows;
+use crate::sim::tables;
 
 /// SplitMix64 (Steele, Lea, Flood 2014): unrelated to the generator under test.
 pub struct Random(pub u64);
@@ -121,6 +123,17 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
             }
         })
         .collect()
+}
+
+/// The table of the frame's scanlines.
+pub fn scanlines(frame: &Frame) -> Input {
+    let table = tables::scanlines(&geometry::probe(frame));
+    Input::floats("scanlines", bytemuck::cast_slice(&table))
+}
+
+/// Bytes of it.
+pub fn scanlines_size(frame: &Frame) -> usize {
+    (frame.scanlines as usize + 1) * size_of::<Scanline>()
 }
 
 /// Index l K + k of every sample.

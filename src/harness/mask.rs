@@ -4,7 +4,7 @@ use std::mem::size_of;
 
 use glam::{DAffine3, DVec3};
 
-use super::inputs::{Random, frame, samples};
+use super::inputs::{Random, frame, samples, scanlines, scanlines_size};
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::mask;
@@ -34,6 +34,7 @@ pub const SUBJECT: Subject = Subject {
             4 * texels,
             size_of::<Counters>(),
             8 * samples(&frame),
+            scanlines_size(&frame),
         ]);
         sizes
     },
@@ -97,6 +98,7 @@ fn job(case: Case, size: Size) -> Job {
     inputs.push(Input::sum("counters", Element::Word, counters));
     let prescan = 2 * samples(&frame);
     inputs.push(Input::output("prescan", Element::Float, prescan));
+    inputs.push(scanlines(&frame));
     Job {
         inputs,
         push: Vec::new(),

@@ -2,7 +2,7 @@
 
 use std::mem::size_of;
 
-use super::inputs::{frame, lines};
+use super::inputs::{frame, lines, scanlines, scanlines_size};
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::origin;
@@ -28,6 +28,7 @@ pub const SUBJECT: Subject = Subject {
         let tissues = instances.iter().map(|i| i.tissue).max().unwrap_or(0);
         let tissues = tissues.max(background.background) as usize + 1;
         sizes.extend([stacks, size_of::<Counters>(), tissues * size_of::<Tissue>()]);
+        sizes.push(scanlines_size(&background));
         sizes
     },
     extent: |job| Extent::Threads([lines(&job.one("frame")) as u32, 1, 1]),
@@ -75,6 +76,7 @@ fn job(case: Case, size: Size) -> Job {
         size_of::<Counters>() / 4,
     ));
     inputs.push(Input::words("tissues", &worlds::tissues()));
+    inputs.push(scanlines(&frame));
     Job {
         inputs,
         push: Vec::new(),

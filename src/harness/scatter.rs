@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use super::check::relative_norm;
-use super::inputs::{Random, lines, rows, samples};
+use super::inputs::{Random, lines, rows, samples, scanlines, scanlines_size};
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
 use crate::sim::layout::{self, Counters, FLAG_VOXEL, Frame, Row, Tissue};
@@ -48,6 +48,7 @@ fn sizes(job: &Job) -> Vec<usize> {
         8 * samples(&frame),
         size_of::<Counters>(),
         worlds::field_size(job),
+        scanlines_size(&frame),
     ]
 }
 
@@ -132,6 +133,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::sum("volume_echoes", Element::Integer, 2 * samples(&frame)),
         Input::sum("counters", Element::Word, size_of::<Counters>() / 4),
         words("fields"),
+        scanlines(&frame),
     ];
     job
 }

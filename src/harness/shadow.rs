@@ -2,7 +2,7 @@
 
 use std::mem::size_of;
 
-use super::inputs::{frame, lines, rows};
+use super::inputs::{frame, lines, rows, scanlines, scanlines_size};
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::origin;
@@ -50,6 +50,7 @@ fn sizes(job: &Job) -> Vec<usize> {
         4 * START_WORDS * lines(&frame),
         frame.samples as usize * size_of::<Row>(),
         16 * MAX_PIECES * lines(&frame),
+        scanlines_size(&frame),
     ]);
     sizes
 }
@@ -91,6 +92,7 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("stacks", &origin::pack(&starts)),
         Input::floats("rows", bytemuck::cast_slice(&rows(&frame))),
         Input::output("pieces", Element::Float, 4 * MAX_PIECES * lines(&frame)),
+        scanlines(&frame),
     ]);
     job
 }

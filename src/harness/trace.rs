@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use super::check::relative_norm;
-use super::inputs::{frame, lines, rows, samples};
+use super::inputs::{frame, lines, rows, samples, scanlines, scanlines_size};
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
@@ -68,6 +68,7 @@ fn sizes(job: &Job) -> Vec<usize> {
         worlds::field_size(job),
         size_of::<Interaction>() * rounds(job).interactions() as usize,
         4 * rounds(job).main_paths() as usize,
+        scanlines_size(&frame),
     ]);
     sizes
 }
@@ -151,6 +152,7 @@ fn job(case: Case, size: Size) -> Job {
     job.inputs.extend([
         Input::output("interactions", Element::Word, interactions),
         Input::output("interaction_count", Element::Word, main_paths),
+        scanlines(&frame),
     ]);
     job
 }

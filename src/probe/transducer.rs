@@ -94,8 +94,14 @@ impl Probe {
 
     /// Origin and unit direction of (scanline, layer) in probe space. The face's centre is at 0.
     pub fn ray(&self, l: u32, e: u32) -> (DVec3, DVec3) {
-        let u = (f64::from(l) + 0.5) / f64::from(self.scanlines) - 0.5;
-        let y = self.elevation(e);
+        let across = (f64::from(l) + 0.5) / f64::from(self.scanlines) - 0.5;
+        let (origin, direction) = self.ray_across(across);
+        (origin.with_y(self.elevation(e)), direction)
+    }
+
+    /// Origin and unit direction in the middle of the slice, `u` of the face from its centre: from
+    /// -1/2, its one edge, to 1/2.
+    pub fn ray_across(&self, u: f64) -> (DVec3, DVec3) {
         match self.kind {
             Kind::Convex {
                 radius,
@@ -103,14 +109,14 @@ impl Probe {
             } => {
                 let (sin, cos) = (field_of_view * u).sin_cos();
                 (
-                    DVec3::new(radius * sin, y, radius * cos - radius),
+                    DVec3::new(radius * sin, 0.0, radius * cos - radius),
                     DVec3::new(sin, 0.0, cos),
                 )
             }
-            Kind::Linear { width } => (DVec3::new(width * u, y, 0.0), DVec3::Z),
+            Kind::Linear { width } => (DVec3::new(width * u, 0.0, 0.0), DVec3::Z),
             Kind::Phased { field_of_view } => {
                 let (sin, cos) = (field_of_view * u).sin_cos();
-                (DVec3::new(0.0, y, 0.0), DVec3::new(sin, 0.0, cos))
+                (DVec3::ZERO, DVec3::new(sin, 0.0, cos))
             }
         }
     }

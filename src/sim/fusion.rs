@@ -75,6 +75,7 @@ impl Kernels {
 pub(super) struct Simulated<'a> {
     pub(super) frame: &'a layout::Frame,
     pub(super) constants: &'a Buffer,
+    pub(super) scanlines: &'a Buffer,
     pub(super) tissues: &'a Buffer,
     pub(super) rows: &'a Buffer,
     pub(super) stacks: &'a Buffer,
@@ -207,6 +208,7 @@ impl Fused {
                 Binding::Image(&self.texture.image),
                 buffer(simulated.counters),
                 buffer(&self.prescan),
+                buffer(simulated.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);

@@ -130,6 +130,8 @@ shared! {
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
     }
+    /// Where a scanline starts and looks, in probe space; behind the last one the face's edge.
+    struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }
     /// Acoustic properties at the centre frequency.
     struct Tissue {
         speed: f32, impedance: f32, absorption: f32, presence: f32,

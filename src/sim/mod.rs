@@ -141,6 +141,7 @@ impl Simulator {
     fn upload_tables(&self) -> Result<(), GpuError> {
         let (b, t) = (&self.passes.buffers, &self.tables);
         self.device.upload_many(&[
+            (&b.scanlines, 0, bytemuck::cast_slice(&t.scanlines)),
             (&b.rows, 0, bytemuck::cast_slice(&t.rows)),
             (&b.tissues, 0, bytemuck::cast_slice(&t.tissues)),
             (&b.surfaces, 0, bytemuck::cast_slice(&t.surfaces)),

@@ -81,6 +81,7 @@ impl Passes {
                 Binding::Buffer(&b.stacks),
                 Binding::Buffer(&b.counters),
                 Binding::Buffer(&b.tissues),
+                Binding::Buffer(&b.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
@@ -119,6 +120,7 @@ impl Passes {
                     Binding::Buffer(w.fields()),
                     Binding::Buffer(&b.interactions),
                     Binding::Buffer(&b.interaction_count),
+                    Binding::Buffer(&b.scanlines),
                 ],
             )?;
             cmd.barrier(Stage::Compute, Stage::Compute);
@@ -154,6 +156,7 @@ impl Passes {
                 Binding::Buffer(&b.volume_echoes),
                 Binding::Buffer(&b.counters),
                 Binding::Buffer(w.fields()),
+                Binding::Buffer(&b.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
@@ -217,6 +220,7 @@ impl Passes {
         let simulated = Simulated {
             frame: &self.frame,
             constants: &b.frame,
+            scanlines: &b.scanlines,
             tissues: &b.tissues,
             rows: &b.rows,
             stacks: &b.stacks,

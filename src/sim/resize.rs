@@ -53,6 +53,11 @@ fn holds(b: &Buffers, frame: &layout::Frame, rounds: &Rounds, tables: &Tables) -
     let segments = lines * u64::from(frame.segment_capacity);
     let pixels = u64::from(frame.image_width) * u64::from(frame.image_height);
     [
+        (
+            &b.scanlines,
+            tables.scanlines.len() as u64,
+            size_of::<layout::Scanline>(),
+        ),
         (&b.rows, tables.rows.len() as u64, size_of::<layout::Row>()),
         (
             &b.tissues,

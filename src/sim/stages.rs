@@ -68,6 +68,7 @@ pub(super) fn lines(frame: &layout::Frame) -> u32 {
 /// Everything that is not geometry.
 pub(super) struct Buffers {
     pub(super) frame: Buffer,
+    pub(super) scanlines: Buffer,
     pub(super) rows: Buffer,
     pub(super) tissues: Buffer,
     pub(super) surfaces: Buffer,
@@ -104,6 +105,11 @@ impl Buffers {
         let pixels = u64::from(frame.image_width) * u64::from(frame.image_height);
         Ok(Self {
             frame: new("frame", 1, size_of::<layout::Frame>())?,
+            scanlines: new(
+                "scanlines",
+                tables.scanlines.len() as u64,
+                size_of::<layout::Scanline>(),
+            )?,
             rows: new("rows", u64::from(frame.samples), size_of::<layout::Row>())?,
             tissues: new(
                 "tissues",

@@ -152,6 +152,8 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
 
 /// What does not change from frame to frame, in the device's layout.
 pub struct Tables {
+    /// One per scanline, and the face's edge.
+    pub scanlines: Vec<layout::Scanline>,
     /// One per axial sample.
     pub rows: Vec<layout::Row>,
     /// In the scene's order.
@@ -168,6 +170,7 @@ impl Tables {
     /// The tables of `scene`.
     pub fn new(scene: &Scene) -> Self {
         Self {
+            scanlines: scanlines(&scene.probe),
             rows: rows(scene),
             tissues: tissues(scene),
             surfaces: surfaces(scene),
@@ -175,6 +178,19 @@ impl Tables {
             grey: grey_map(&scene.imaging),
         }
     }
+}
+
+/// Where each scanline starts and looks, and behind the last one the face's edge.
+pub fn scanlines(probe: &Probe) -> Vec<layout::Scanline> {
+    let edge = probe.ray_across(0.5);
+    let rays = (0..probe.scanlines).map(|l| probe.ray(l, 0)).chain([edge]);
+    rays.map(|(origin, direction)| layout::Scanline {
+        x: origin.x as f32,
+        z: origin.z as f32,
+        sine: direction.x as f32,
+        cosine: direction.z as f32,
+    })
+    .collect()
 }
 
 /// One row per axial sample.

@@ -56,6 +56,12 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     array("push", Word, bytemuck::cast_slice(&paths), 1)?;
     let tables = simulator.tables();
     array(
+        "scanlines",
+        Float,
+        bytemuck::cast_slice(&tables.scanlines),
+        words::<layout::Scanline>(),
+    )?;
+    array(
         "rows",
         Float,
         bytemuck::cast_slice(&tables.rows),

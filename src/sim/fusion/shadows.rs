@@ -109,6 +109,7 @@ impl Shadows {
                 buffer(simulated.stacks),
                 buffer(simulated.rows),
                 buffer(&buffers.pieces),
+                buffer(simulated.scanlines),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);

@@ -1,0 +1,135 @@
+//! The same on two Vulkan drivers: kernels against their twins, and pictures of two scenes. The second
+//! driver is the one that `tools/setup.sh` unpacks into `target/second-driver`; where there is none,
+//! these tests say that they are skipped.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use image::GrayImage;
+
+/// Share of a picture's pixels that may differ by more than one grey level between two drivers.
+const APART: f64 = 1e-3;
+
+/// What of a scene's size is enough here; all of it is compared by hand (docs/kernels.md).
+const SIZE: [&str; 2] = ["probe.scanlines=96", "probe.elevation_layers=3"];
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// The manifest of the second driver.
+fn second_driver() -> Option<PathBuf> {
+    let manifest = root().join("target/second-driver/vk_swiftshader_icd.json");
+    if manifest.exists() {
+        return Some(manifest);
+    }
+    println!("skipped: no second driver in target/second-driver (./tools/setup.sh unpacks one)");
+    None
+}
+
+/// A program on the driver of `manifest`, or on the machine's own.
+fn on(manifest: Option<&Path>, program: &str) -> Command {
+    let mut command = Command::new(program);
+    if let Some(manifest) = manifest {
+        command.env_remove("VK_ICD_FILENAMES");
+        command.env("VK_DRIVER_FILES", manifest);
+    }
+    command.arg("--validate");
+    command
+}
+
+fn output_of(command: &mut Command) -> String {
+    let output = command.output().expect("started");
+    let text = [output.stdout, output.stderr].concat();
+    let text = String::from_utf8_lossy(&text).into_owned();
+    assert!(output.status.success(), "{command:?}\n{text}");
+    text
+}
+
+/// The picture of a shipped scene.
+fn picture(manifest: Option<&Path>, scene: &str, folder: &Path, more: &[&str]) -> GrayImage {
+    let file = folder.join("picture.png");
+    let mut command = on(manifest, env!("CARGO_BIN_EXE_insonify"));
+    command.arg("render");
+    command.arg(root().join(format!("scenes/{scene}.toml")));
+    command
+        .args(["--quality", "standard", "--output"])
+        .arg(&file);
+    command.args(SIZE.iter().flat_map(|size| ["--set", size]));
+    command.args(more);
+    output_of(&mut command);
+    image::open(file).expect("a PNG").into_luma8()
+}
+
+/// Share of pixels that differ by more than one grey level.
+fn apart(a: &GrayImage, b: &GrayImage) -> f64 {
+    assert_eq!(a.dimensions(), b.dimensions());
+    let far = |(a, b): (&u8, &u8)| a.abs_diff(*b) > 1;
+    a.iter().zip(b.iter()).filter(|&pair| far(pair)).count() as f64 / a.len() as f64
+}
+
+fn same_picture(scene: &str) {
+    let Some(second) = second_driver() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let first = picture(None, scene, folder.path(), &[]);
+    let second = picture(Some(&second), scene, folder.path(), &[]);
+    let share = apart(&first, &second);
+    println!(
+        "{scene}: {:.4} % of the pixels more than a grey level apart",
+        100.0 * share
+    );
+    assert!(share < APART, "{scene}: {share}");
+}
+
+#[test]
+fn the_phantom_is_the_same_picture_on_both() {
+    same_picture("phantom");
+}
+
+#[test]
+fn the_abdomen_is_the_same_picture_on_both() {
+    same_picture("abdomen");
+}
+
+#[test]
+fn kernels_agree_with_their_twins_on_the_second() {
+    let Some(second) = second_driver() else {
+        return;
+    };
+    let mut command = on(Some(&second), env!("CARGO_BIN_EXE_kernels"));
+    let text = output_of(command.arg("check"));
+    assert!(text.starts_with("SwiftShader"), "{text}");
+    assert!(!text.contains("WRONG"), "{text}");
+}
+
+/// A carrier that is as far off as a device's own sine may be.
+#[cfg(feature = "compile")]
+#[test]
+fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let glsl = folder.path().join("glsl");
+    std::fs::create_dir(&glsl).expect("a folder");
+    for entry in std::fs::read_dir(root().join("glsl")).expect("sources") {
+        let path = entry.expect("readable").path();
+        let name = path.file_name().expect("a file");
+        if name == "scatter.comp" || path.extension().is_some_and(|e| e == "glsl") {
+            std::fs::copy(&path, glsl.join(name)).expect("copied");
+        }
+    }
+    let angles = glsl.join("angles.glsl");
+    let source = std::fs::read_to_string(&angles).expect("readable");
+    let planted = source.replace("return p;", "return p + vec2(0.0, 1.0 / 2048.0);");
+    assert_ne!(planted, source);
+    std::fs::write(&angles, planted).expect("written");
+    let glsl = glsl.to_str().expect("a name");
+    let right = picture(None, "phantom", folder.path(), &[]);
+    let wrong = picture(None, "phantom", folder.path(), &["--glsl", glsl]);
+    let share = apart(&right, &wrong);
+    println!(
+        "planted: {:.2} % of the pixels more than a grey level apart",
+        100.0 * share
+    );
+    assert!(share > APART, "{share}");
+}
