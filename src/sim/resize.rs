@@ -29,6 +29,7 @@ impl Simulator {
         (passes.frame, passes.batches) = (frame, batches);
         self.tables = tables;
         self.settings = Settings::of(scene);
+        self.read_out = super::ReadOut::default();
         self.upload_tables()?;
         Ok(true)
     }
@@ -65,7 +66,7 @@ fn holds(b: &Buffers, frame: &layout::Frame, tables: &Tables) -> bool {
         ),
         (&b.points, tables.points.len() as u64, 16),
         (&b.contact, 2 * u64::from(frame.scanlines) + 1, 4),
-        (&b.stacks, lines * (layout::MAX_STACK as u64 + 1), 4),
+        (&b.stacks, lines * layout::START_WORDS as u64, 4),
         (&b.segments, segments, size_of::<layout::Segment>()),
         (&b.segment_count, lines, 4),
         (&b.iq, samples, 8),
