@@ -46,8 +46,8 @@ pub use model::Model;
 
 use crate::gpu::{Device, DeviceOptions, GpuError};
 use crate::igtl::IgtlError;
+use crate::scene::Scene;
 use crate::scene::animation::Track;
-use crate::scene::{Scene, Simulation};
 use crate::sim::shaders::Library;
 use crate::sim::{SimError, Tracer};
 
@@ -89,7 +89,7 @@ pub struct Listen {
 }
 
 /// See [`Options::prepare`].
-pub type Prepare = Box<dyn Fn(&Device, &mut Simulation) -> Result<Tracer, Refusal>>;
+pub type Prepare = Box<dyn Fn(&Arc<Device>, &mut Scene) -> Result<Tracer, Refusal>>;
 
 /// Why a device does not suit.
 pub type Refusal = Box<dyn std::error::Error + Send + Sync>;

@@ -152,7 +152,7 @@ fn stations(args: &Acquire, scene: &Scene) -> Result<Vec<Station>> {
 
 fn simulate(args: &Acquire, scene: &mut Scene, stations: &[Station]) -> Result<Sequence> {
     let device = args.common.device()?;
-    let tracer = args.common.tracer(&device)?;
+    let tracer = args.common.tracer(&device, scene)?;
     args.common.settle(scene, &device);
     let library = Library::embedded();
     let mut simulator = common::simulator(&device, &library, scene, tracer)?;

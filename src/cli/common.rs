@@ -7,7 +7,7 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, miette};
 
-use insonify::gpu::{AdapterKind, Device, DeviceOptions};
+use insonify::gpu::{AdapterKind, Device, DeviceOptions, cache_folder};
 use insonify::scene::Scene;
 use insonify::scene::file::override_of;
 use insonify::scene::settings::{Machine, Quality, Simulation};
@@ -86,15 +86,17 @@ impl Common {
         DeviceOptions {
             selector: self.device.clone(),
             validate: self.validate,
+            kept_in: cache_folder(),
             ..DeviceOptions::default()
         }
     }
 
-    /// The tracer to use; `auto` says in one line why it falls back.
+    /// The tracer to use for `scene`; `auto` tries the device's ray query on it, and says in one line why
+    /// it falls back.
     ///
     /// # Errors
     /// The device has no ray query.
-    pub fn tracer(&self, device: &Device) -> Result<Tracer> {
+    pub fn tracer(&self, device: &Arc<Device>, scene: &Scene) -> Result<Tracer> {
         let wanted = match self.tracer {
             TracerChoice::Auto => None,
             TracerChoice::RayQuery => Some(Tracer::RayQuery),
@@ -107,7 +109,7 @@ impl Common {
                 device.name()
             ));
         }
-        let (tracer, why) = Tracer::choose(wanted, device);
+        let (tracer, why) = Tracer::choose(wanted, device, &Library::embedded(), scene);
         if let Some(why) = why {
             eprintln!("{why}");
         }

@@ -73,7 +73,7 @@ fn band(text: &str) -> Result<f64, String> {
 pub fn run(args: &Match) -> Result<()> {
     let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
-    let tracer = args.common.tracer(&device)?;
+    let tracer = args.common.tracer(&device, &scene)?;
     args.common.settle(&mut scene, &device);
     let library = Library::embedded();
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;

@@ -79,7 +79,7 @@ fn rate(text: &str) -> Result<f64, String> {
 pub fn run(args: &Render) -> Result<()> {
     let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
-    let tracer = args.common.tracer(&device)?;
+    let tracer = args.common.tracer(&device, &scene)?;
     args.common.settle(&mut scene, &device);
     let mut library = library(args)?;
 

@@ -60,7 +60,7 @@ pub fn run(args: &Serve) -> Result<()> {
     let mut scene = common.scene(&args.scene)?;
     let device = common.device()?;
     common.settle(&mut scene, &device);
-    let tracer = common.tracer(&device)?;
+    let tracer = common.tracer(&device, &scene)?;
     let library = Library::embedded();
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let address = SocketAddr::new(args.igtl_bind, args.igtl_port);

@@ -86,7 +86,7 @@ pub fn run(args: &Sweep) -> Result<()> {
     }
     let files = Files::new(args)?;
     let device = common.device()?;
-    let tracer = common.tracer(&device)?;
+    let tracer = common.tracer(&device, &scene)?;
     common.settle(&mut scene, &device);
     for mask in scene.masks_off_the_image() {
         eprintln!("warning: {}", common::unseen(&scene, mask));

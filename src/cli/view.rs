@@ -78,14 +78,14 @@ pub fn run(args: &View) -> Result<()> {
             port,
         }),
         captures: args.captures.clone(),
-        prepare: Box::new(move |device, simulation| {
+        prepare: Box::new(move |device, scene| {
             let mut common = common.clone();
             // The probe is to be moved, not waited for.
             if device.info().kind == AdapterKind::Cpu {
                 common.quality.get_or_insert(QualityChoice::Draft);
             }
-            common.settle_simulation(simulation, device);
-            Ok(common.tracer(device)?)
+            common.settle_simulation(&mut scene.simulation, device);
+            Ok(common.tracer(device, scene)?)
         }),
     };
     view::run(scene, options).into_diagnostic()

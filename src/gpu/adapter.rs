@@ -7,6 +7,7 @@ use ash::{khr, vk};
 
 use super::error::{GpuError, during};
 use super::instance::{Instance, LOADER_LISTS};
+use super::queues::Plan;
 
 /// Kinds of device, in the order of preference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -65,11 +66,8 @@ pub(crate) struct Adapter {
     pub(crate) physical: vk::PhysicalDevice,
     pub(crate) info: DeviceInfo,
     pub(crate) properties: vk::PhysicalDeviceProperties,
-    pub(crate) queue_family: u32,
-    /// Queues of that family.
-    pub(crate) queue_count: u32,
-    /// 0 where the queue cannot write timestamps.
-    pub(crate) timestamp_bits: u32,
+    pub(crate) families: Vec<vk::QueueFamilyProperties>,
+    pub(crate) driver: vk::DriverId,
     pub(crate) buffer_device_address: bool,
     /// Ray-tracing pipelines: not used, but structures may only be built where they or ray queries
     /// are enabled (VUID-vkGetAccelerationStructureBuildSizesKHR-rayTracingPipeline-03617). Drivers
@@ -108,8 +106,23 @@ fn table(adapters: &[Adapter]) -> String {
     text
 }
 
-/// The device named by `selector` (index, or part of the name in any case), or the best usable one.
-pub(crate) fn choose(instance: &Instance, selector: Option<&str>) -> Result<Adapter, GpuError> {
+/// Whether a family of a device can show pictures where they are to be shown.
+pub(crate) type Presents<'a> = &'a dyn Fn(vk::PhysicalDevice, u32) -> bool;
+
+/// The device named by `selector` (index, or part of the name in any case), or the best usable one; with
+/// the queues to take. With a window those devices come first that can show pictures in it.
+pub(crate) fn choose(
+    instance: &Instance,
+    selector: Option<&str>,
+    presents: Option<Presents<'_>>,
+) -> Result<(Adapter, Plan), GpuError> {
+    let plan = |adapter: &Adapter| match presents {
+        None => Plan::alone(&adapter.families),
+        Some(presents) => {
+            let here = |family| adapter.swapchain && presents(adapter.physical, family);
+            Plan::with_window(&adapter.families, here)
+        }
+    };
     let mut adapters = adapters(instance)?;
     let chosen = match selector {
         Some(selector) => {
@@ -134,10 +147,23 @@ pub(crate) fn choose(instance: &Instance, selector: Option<&str>) -> Result<Adap
         }
         None => (0..adapters.len())
             .filter(|&i| adapters[i].info.usable)
-            .min_by_key(|&i| adapters[i].info.kind),
+            .min_by_key(|&i| {
+                let adapter = &adapters[i];
+                let shows = plan(adapter).is_some();
+                (!shows, rank(adapter.info.kind, adapter.driver))
+            }),
     };
     match chosen {
-        Some(index) => Ok(adapters.swap_remove(index)),
+        Some(index) => {
+            let adapter = adapters.swap_remove(index);
+            match plan(&adapter) {
+                Some(plan) => Ok((adapter, plan)),
+                None => Err(GpuError::Window {
+                    device: adapter.info.name,
+                    reason: "it cannot present to this window".into(),
+                }),
+            }
+        }
         None if adapters.is_empty() => Err(GpuError::NoDevice {
             seen: String::new(),
         }),
@@ -145,6 +171,12 @@ pub(crate) fn choose(instance: &Instance, selector: Option<&str>) -> Result<Adap
             seen: format!(", of these:\n{}", table(&adapters)),
         }),
     }
+}
+
+/// The lower, the better. Dozen, which runs on Direct3D 12, comes last: it calls itself what lies below
+/// it, and does less than the driver beside it.
+fn rank(kind: AdapterKind, driver: vk::DriverId) -> (bool, AdapterKind) {
+    (driver == vk::DriverId::MESA_DOZEN, kind)
 }
 
 fn adapters(instance: &Instance) -> Result<Vec<Adapter>, GpuError> {
@@ -226,8 +258,8 @@ fn probe(
             .raw
             .get_physical_device_queue_family_properties(physical)
     };
-    let family = compute_family(&families);
-    let timestamp_bits = family.map_or(0, |f| families[f as usize].timestamp_valid_bits);
+    let family = Plan::alone(&families).map(|plan| plan.work.family as usize);
+    let timestamp_bits = family.map_or(0, |f| families[f].timestamp_valid_bits);
 
     let mut lacks = Vec::new();
     if !at_least_1_1 {
@@ -259,9 +291,8 @@ fn probe(
             lacks,
         },
         properties,
-        queue_family: family.unwrap_or(0),
-        queue_count: family.map_or(0, |f| families[f as usize].queue_count),
-        timestamp_bits,
+        families,
+        driver: driver.driver_id,
         buffer_device_address,
         ray_tracing_pipeline,
         robust_buffer_access: core.robust_buffer_access == vk::TRUE,
@@ -269,19 +300,6 @@ fn probe(
         swapchain: has(khr::swapchain::NAME),
         portability_subset: has(khr::portability_subset::NAME),
     })
-}
-
-/// A family with graphics if there is one: the window of the same process presents from it, and
-/// it is the one family that every driver runs at full speed.
-fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<u32> {
-    let find = |flags: vk::QueueFlags| {
-        families
-            .iter()
-            .position(|f| f.queue_flags.contains(flags) && f.queue_count > 0)
-    };
-    find(vk::QueueFlags::COMPUTE | vk::QueueFlags::GRAPHICS)
-        .or_else(|| find(vk::QueueFlags::COMPUTE))
-        .map(|index| index as u32)
 }
 
 fn device_extensions(
@@ -340,5 +358,30 @@ fn driver_text(driver: &vk::PhysicalDeviceDriverProperties<'_>, version: u32) ->
         format!("driver version {version:#x}")
     } else {
         format!("{name} {info}").trim_end().to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk::DriverId;
+
+    use super::{AdapterKind, rank};
+
+    #[test]
+    fn a_driver_on_another_programming_interface_comes_last() {
+        let mut devices = [
+            (AdapterKind::Discrete, DriverId::MESA_DOZEN),
+            (AdapterKind::Cpu, DriverId::MESA_LLVMPIPE),
+            (AdapterKind::Integrated, DriverId::INTEL_OPEN_SOURCE_MESA),
+            (AdapterKind::Discrete, DriverId::NVIDIA_PROPRIETARY),
+        ];
+        devices.sort_by_key(|&(kind, driver)| rank(kind, driver));
+        let drivers = devices.map(|(_, driver)| driver);
+        let best = [
+            DriverId::NVIDIA_PROPRIETARY,
+            DriverId::INTEL_OPEN_SOURCE_MESA,
+        ];
+        let worst = [DriverId::MESA_LLVMPIPE, DriverId::MESA_DOZEN];
+        assert_eq!(drivers, [best, worst].concat()[..]);
     }
 }

@@ -214,6 +214,8 @@ impl<'a> Commands<'a> {
             });
         }
         descriptors::check(self.device(), kernel, bindings)?;
+        let pipeline = kernel.pipeline()?;
+        self.slot.first_use(kernel);
         let sets = self.slot.descriptors.allocate(&kernel.0.set_layouts)?;
         descriptors::write(self.device(), kernel, bindings, &sets);
         self.keep(&kernel.0);
@@ -221,9 +223,9 @@ impl<'a> Commands<'a> {
             self.use_binding(kernel, info, binding);
         }
         // Commands without a scope are uploads and the like.
-        let pieces = self.slot.pieces.as_ref().filter(|_| !self.scope.is_empty());
+        let pieces = self.slot.pieces.as_mut().filter(|_| !self.scope.is_empty());
         let Some(pieces) = pieces else {
-            self.bind_and_dispatch(kernel, push, &sets, [[0; 3], groups]);
+            self.bind_and_dispatch((kernel, pipeline), push, &sets, [[0; 3], groups]);
             return Ok(());
         };
         let (boxes, each_ms) = pieces.cut(&self.scope, groups, kernel.counts_groups());
@@ -233,25 +235,25 @@ impl<'a> Commands<'a> {
                 self.slot.cut()?;
                 self.follow();
             }
-            self.bind_and_dispatch(kernel, push, &sets, piece);
+            self.bind_and_dispatch((kernel, pipeline), push, &sets, piece);
         }
         Ok(())
     }
 
     fn bind_and_dispatch(
         &self,
-        kernel: &Kernel,
+        (kernel, pipeline): (&Kernel, vk::Pipeline),
         push: &[u8],
         sets: &[vk::DescriptorSet],
         [base, groups]: Groups,
     ) {
         let (raw, commands) = (&self.slot.device.raw, self.slot.commands);
         // SAFETY: pipeline, layout and sets belong together by reflection; sizes and group counts
-        // were checked; all objects are kept until the submission has finished. Only on a shared
-        // queue, for which pipelines allow it, does a dispatch not begin at group 0.
+        // were checked; all objects are kept until the submission has finished. Pipelines allow
+        // dispatches that do not begin at group 0.
         unsafe {
             let point = vk::PipelineBindPoint::COMPUTE;
-            raw.cmd_bind_pipeline(commands, point, kernel.0.pipeline);
+            raw.cmd_bind_pipeline(commands, point, pipeline);
             if !sets.is_empty() {
                 raw.cmd_bind_descriptor_sets(commands, point, kernel.0.layout, 0, sets, &[]);
             }
@@ -303,6 +305,7 @@ impl<'a> Commands<'a> {
             .image(image.0.handle)
             .old_layout(vk::ImageLayout::UNDEFINED)
             .new_layout(vk::ImageLayout::GENERAL)
+            .dst_access_mask(vk::AccessFlags::TRANSFER_WRITE)
             .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .subresource_range(whole());

@@ -1,16 +1,20 @@
 //! The logical device: features, queue, allocator, object names.
 
 use std::ffi::CString;
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use winit::window::Window;
 
 use super::adapter::{self, Adapter, DeviceInfo};
 use super::error::{GpuError, during};
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
+use super::kept::{self, Kept};
 use super::memory::{MemoryUse, MemoryUseCounter};
-use super::queues::Queues;
+use super::queues::{Place, Plan, Queues};
+use super::surface::Probe;
 
 /// Blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
@@ -25,9 +29,9 @@ pub struct DeviceOptions {
     /// Turns the validation layers on, or fails where they are not installed. The environment
     /// variable `INSONIFY_VALIDATE=1` does the same.
     pub validate: bool,
-    /// Enables what a window needs ([`super::Painter`]), and a second queue for it where there is
-    /// one.
-    pub window: bool,
+    /// Folder in which compiled kernels are kept from one start to the next, such as
+    /// [`super::cache_folder`]; without it only the driver keeps them, if it does.
+    pub kept_in: Option<PathBuf>,
     /// Leaves ray queries off although the device has them; acceleration structures can be built
     /// where it has ray-tracing pipelines.
     pub without_ray_query: bool,
@@ -71,14 +75,14 @@ pub(crate) struct AccelSupport {
 /// An open Vulkan device. Everything made from it keeps it alive.
 pub struct Device {
     pub(crate) raw: ash::Device,
-    pub(crate) queue_family: u32,
     /// Nanoseconds per timestamp tick; 0 where the queue has no timestamps.
     pub(crate) timestamp_period_ns: f64,
+    /// Valid bits of timestamps on all queues; 0 where one has none.
     pub(crate) timestamp_bits: u32,
     pub(crate) accel: Option<AccelSupport>,
     pub(crate) physical: vk::PhysicalDevice,
     pub(crate) memory_use: MemoryUseCounter,
-    pub(crate) pipeline_cache: vk::PipelineCache,
+    pub(crate) kept: Kept,
     ray_query: bool,
     info: DeviceInfo,
     limits: Limits,
@@ -90,27 +94,52 @@ pub struct Device {
 }
 
 impl Device {
-    /// Opens the chosen device with one compute queue, and one for a window if that is wanted.
+    /// Opens the chosen device with one compute queue.
+    ///
+    /// # Errors
+    /// No such device, or none that can be used; what is missing for validation.
     pub fn new(options: &DeviceOptions) -> Result<Arc<Self>, GpuError> {
+        Self::open(options, None)
+    }
+
+    /// Opens the chosen device, or the best one that can show pictures in `window`, with a queue for the
+    /// simulation and one for the window ([`super::Painter`]), which may be the same.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`]; a device that cannot show pictures in this window.
+    pub fn for_window(options: &DeviceOptions, window: &Window) -> Result<Arc<Self>, GpuError> {
+        Self::open(options, Some(window))
+    }
+
+    fn open(options: &DeviceOptions, window: Option<&Window>) -> Result<Arc<Self>, GpuError> {
         let from_environment = std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1");
-        let instance = Instance::new(options.validate || from_environment, options.window)?;
-        let mut adapter = adapter::choose(&instance, options.selector.as_deref())?;
+        // Before the driver makes its folders.
+        let jit_forgotten = kept::llvmpipe_has_nothing();
+        let instance = Instance::new(options.validate || from_environment, window.is_some())?;
+        let probe = window
+            .map(|window| Probe::new(&instance, window))
+            .transpose();
+        let probe = probe.map_err(|reason| GpuError::Window {
+            device: options
+                .selector
+                .clone()
+                .unwrap_or_else(|| "any device".into()),
+            reason,
+        })?;
+        let presents =
+            |physical, family| probe.as_ref().is_some_and(|p| p.presents(physical, family));
+        let presents = window
+            .is_some()
+            .then_some(&presents as adapter::Presents<'_>);
+        let (mut adapter, plan) =
+            adapter::choose(&instance, options.selector.as_deref(), presents)?;
+        drop(probe);
         let without = options.without_acceleration_structures;
         adapter.info.ray_query &= !(options.without_ray_query || without);
         let traces = adapter.info.ray_query || adapter.ray_tracing_pipeline;
         adapter.info.acceleration_structure &= traces && !without;
-        if options.window && !adapter.swapchain {
-            return Err(GpuError::Unsupported {
-                device: adapter.info.name,
-                feature: "way to show pictures in a window (VK_KHR_swapchain)".into(),
-            });
-        }
-        let queue_count = match options.window {
-            true => adapter.queue_count.min(2),
-            false => 1,
-        };
-        let raw = create_device(&instance, &adapter, queue_count, options.window)?;
-        let queues = Queues::new(&raw, adapter.queue_family, queue_count, options.window);
+        let raw = create_device(&instance, &adapter, &plan, window.is_some())?;
+        let queues = Queues::new(&raw, plan, window.is_some());
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
             device: raw.clone(),
@@ -122,17 +151,22 @@ impl Device {
                 HOST_BLOCK_BYTES,
             ),
         });
-        // SAFETY: the device is alive; an empty cache has no precondition.
-        let cache = unsafe { raw.create_pipeline_cache(&Default::default(), None) };
-        let (allocator, pipeline_cache) = match (allocator, cache) {
-            (Ok(allocator), Ok(cache)) => (allocator, cache),
-            (allocator, cache) => {
+        let kept = Kept::new(
+            &raw,
+            &adapter.properties,
+            &adapter.info.name,
+            options.kept_in.as_deref(),
+            jit_forgotten && adapter.driver == vk::DriverId::MESA_LLVMPIPE,
+        );
+        let (allocator, kept) = match (allocator, kept) {
+            (Ok(allocator), Ok(kept)) => (allocator, kept),
+            (allocator, kept) => {
                 drop(allocator);
                 let _changing = LOADER_LISTS.write();
                 // SAFETY: nothing made from the device is left but a cache, which goes first.
                 unsafe {
-                    if let Ok(cache) = cache {
-                        raw.destroy_pipeline_cache(cache, None);
+                    if let Ok(kept) = kept {
+                        kept.destroy();
                     }
                     raw.destroy_device(None);
                 }
@@ -143,14 +177,14 @@ impl Device {
             }
         };
         let limits = &adapter.properties.limits;
+        let bits = |family: u32| adapter.families[family as usize].timestamp_valid_bits;
         Ok(Arc::new(Self {
-            queue_family: adapter.queue_family,
             timestamp_period_ns: f64::from(limits.timestamp_period),
-            timestamp_bits: adapter.timestamp_bits,
+            timestamp_bits: bits(plan.work.family).min(bits(plan.window.family)),
             accel: accel_support(&instance, &raw, &adapter),
             physical: adapter.physical,
             memory_use: MemoryUseCounter::default(),
-            pipeline_cache,
+            kept,
             ray_query: adapter.info.ray_query,
             limits: Limits {
                 max_storage_buffer_bytes: limits.max_storage_buffer_range.into(),
@@ -229,6 +263,17 @@ impl Device {
         self.memory_use.read()
     }
 
+    /// Whether [`Self::remember`] was told this number for this device and driver, at this start or an
+    /// earlier one.
+    pub fn remembers(&self, what: u64) -> bool {
+        self.kept.knows(what)
+    }
+
+    /// Keeps a number for later starts, where anything is kept.
+    pub fn remember(&self, what: u64) {
+        self.kept.learn([what]);
+    }
+
     /// Acceleration-structure functions, or an error naming the device.
     pub(crate) fn require_accel(&self) -> Result<&AccelSupport, GpuError> {
         self.accel.as_ref().ok_or_else(|| GpuError::Unsupported {
@@ -291,7 +336,7 @@ impl Drop for Device {
         unsafe {
             let _ = self.raw.device_wait_idle();
             drop(allocator);
-            self.raw.destroy_pipeline_cache(self.pipeline_cache, None);
+            self.kept.destroy();
             self.raw.destroy_device(None);
         }
     }
@@ -300,13 +345,25 @@ impl Drop for Device {
 fn create_device(
     instance: &Instance,
     adapter: &Adapter,
-    queue_count: u32,
+    plan: &Plan,
     window: bool,
 ) -> Result<ash::Device, GpuError> {
-    let priorities = [1.0; 2];
-    let queues = [vk::DeviceQueueCreateInfo::default()
-        .queue_family_index(adapter.queue_family)
-        .queue_priorities(&priorities[..queue_count as usize])];
+    // The window's picture is not to wait for the simulation's.
+    let priority = |family, index| match window && plan.window == (Place { family, index }) {
+        true => 1.0,
+        false => 0.5,
+    };
+    let families = plan.families();
+    let priorities: Vec<Vec<f32>> = (families.iter())
+        .map(|&(family, count)| (0..count).map(|index| priority(family, index)).collect())
+        .collect();
+    let queues: Vec<_> = (families.iter().zip(&priorities))
+        .map(|(&(family, _), priorities)| {
+            vk::DeviceQueueCreateInfo::default()
+                .queue_family_index(family)
+                .queue_priorities(priorities)
+        })
+        .collect();
     let mut extensions = Vec::new();
     if adapter.portability_subset {
         extensions.push(khr::portability_subset::NAME.as_ptr());

@@ -2,6 +2,7 @@
 
 use std::any::Any;
 use std::sync::Arc;
+use std::time::Instant;
 
 use ash::vk;
 
@@ -10,6 +11,7 @@ use super::commands::Commands;
 use super::descriptors::DescriptorPools;
 use super::device::Device;
 use super::error::{GpuError, during};
+use super::kernel::Kernel;
 use super::memory::{Buffer, BufferKind};
 use super::pieces::Pieces;
 use super::queues::Lane;
@@ -29,8 +31,12 @@ pub(crate) struct Slot {
     pub(crate) descriptors: DescriptorPools,
     pub(crate) timer: Timer,
     pub(crate) hazards: HazardCheck,
-    /// Where the queue is shared.
+    /// Of a frame's slot.
     pub(crate) pieces: Option<Pieces>,
+    /// When the first piece was handed over.
+    began: Option<Instant>,
+    /// Kernels of this submission that have not run on the device before.
+    new_kernels: Vec<u64>,
     lane: Lane,
     /// All command buffers; one more is made as soon as there are as many pieces.
     buffers: Vec<vk::CommandBuffer>,
@@ -58,7 +64,9 @@ impl Slot {
             descriptors: DescriptorPools::new(device),
             timer,
             hazards: HazardCheck::default(),
-            pieces: (lane == Lane::Work && device.queues.are_shared()).then(Pieces::default),
+            pieces: None,
+            began: None,
+            new_kernels: Vec::new(),
             lane,
             buffers: Vec::new(),
             piece_fences: Vec::new(),
@@ -73,7 +81,7 @@ impl Slot {
         };
         let what = || during(format!("creating the command buffer of '{name}'"));
         let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.queue_family)
+            .queue_family_index(device.queues.family(lane))
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the family is the device's own; `Drop` destroys the pool.
         slot.pool = unsafe { device.raw.create_command_pool(&info, None) }.map_err(what())?;
@@ -110,6 +118,8 @@ impl Slot {
         if let Some(pieces) = &mut self.pieces {
             pieces.begin();
         }
+        self.began = None;
+        self.new_kernels.clear();
         self.commands = self.buffers[0];
         let raw = &self.device.raw;
         // SAFETY: the device has finished with the command buffers.
@@ -135,6 +145,7 @@ impl Slot {
     }
 
     fn hand_over(&mut self) -> Result<(), vk::Result> {
+        self.began.get_or_insert_with(Instant::now);
         let (raw, at) = (&self.device.raw, self.handed);
         if at == self.piece_fences.len() {
             // SAFETY: no precondition; `Drop` destroys the fence.
@@ -154,6 +165,7 @@ impl Slot {
         self.handed += 1;
         if let Some(before) = at.checked_sub(1) {
             let before = [self.piece_fences[before]];
+            let _compiling = self.device.kept.patience(self.new_kernels.iter().copied());
             // SAFETY: the fence belongs to a piece that was handed over.
             unsafe { raw.wait_for_fences(&before, true, u64::MAX) }?;
         }
@@ -192,6 +204,7 @@ impl Slot {
             .wait_dst_stage_mask(&stages)
             .command_buffers(&buffers)
             .signal_semaphores(done);
+        self.began.get_or_insert_with(Instant::now);
         let raw = &self.device.raw;
         // SAFETY: the buffer was begun and has not been submitted; the fence is not in use. The
         // guard keeps other threads off the queue.
@@ -214,6 +227,7 @@ impl Slot {
         if !self.pending {
             return Ok(None);
         }
+        let compiling = self.device.kept.patience(self.new_kernels.iter().copied());
         // SAFETY: the fence belongs to the submission under way.
         unsafe {
             self.device
@@ -221,6 +235,8 @@ impl Slot {
                 .wait_for_fences(&[self.fence], true, u64::MAX)
         }
         .map_err(|code| self.failure(code, "waiting for a submission"))?;
+        drop(compiling);
+        self.device.kept.learn(self.new_kernels.drain(..));
         self.pending = false;
         self.wait_for_pieces();
         self.kept.clear();
@@ -229,7 +245,10 @@ impl Slot {
             passes: self.timer.collect()?,
         };
         if let Some(pieces) = &mut self.pieces {
-            pieces.learn(&timings);
+            let took = self
+                .began
+                .map_or(0.0, |began| began.elapsed().as_secs_f64() * 1e3);
+            pieces.learn(&timings, took);
         }
         Ok(Some(timings))
     }
@@ -244,6 +263,14 @@ impl Slot {
             what: what.into(),
             last_pass,
             passes,
+        }
+    }
+
+    /// Notes that the submission runs `kernel`.
+    pub(crate) fn first_use(&mut self, kernel: &Kernel) {
+        let id = kernel.0.id;
+        if self.device.kept.is_new(id) && !self.new_kernels.contains(&id) {
+            self.new_kernels.push(id);
         }
     }
 
@@ -306,11 +333,13 @@ pub struct Frames {
 impl Frames {
     /// Makes the slots; `name` names their Vulkan objects.
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
+        let slot = |index: u32| -> Result<Slot, GpuError> {
+            let mut slot = Slot::new(device, &format!("{name} {index}"), Lane::Work)?;
+            slot.pieces = Some(Pieces::new(device.queues.are_shared()));
+            Ok(slot)
+        };
         Ok(Self {
-            slots: [
-                Slot::new(device, &format!("{name} 0"), Lane::Work)?,
-                Slot::new(device, &format!("{name} 1"), Lane::Work)?,
-            ],
+            slots: [slot(0)?, slot(1)?],
             next: 0,
             finished: Vec::new(),
         })
@@ -338,6 +367,20 @@ impl Frames {
             let slot = &mut self.slots[frame as usize % FRAMES_IN_FLIGHT];
             self.finished.extend(slot.wait()?);
         }
+        Ok(())
+    }
+
+    /// The first bytes of a readback buffer that these frames write ([`Commands::copy`], with a barrier to
+    /// [`super::Stage::Host`]), after all of them.
+    ///
+    /// # Errors
+    /// A lost device; more bytes than there are.
+    pub fn read(&mut self, from: &Buffer, out: &mut [u8]) -> Result<(), GpuError> {
+        assert_eq!(from.kind(), BufferKind::Readback, "'{}'", from.name());
+        from.check_range("read", 0, out.len() as u64)?;
+        self.wait()?;
+        // SAFETY: the frames that write it have been waited for.
+        unsafe { from.read_mapped(out) };
         Ok(())
     }
 

@@ -103,7 +103,8 @@ impl Image {
         if storage {
             usage |= Usage::STORAGE;
         }
-        let info = vk::ImageCreateInfo::default()
+        let sharing = device.queues.sharing();
+        let mut info = vk::ImageCreateInfo::default()
             .image_type(match dim {
                 ImageDim::D2 => vk::ImageType::TYPE_2D,
                 ImageDim::D3 => vk::ImageType::TYPE_3D,
@@ -117,6 +118,12 @@ impl Image {
             .usage(usage)
             .sharing_mode(vk::SharingMode::EXCLUSIVE)
             .initial_layout(vk::ImageLayout::UNDEFINED);
+        // The simulation writes what the window shows.
+        if let Some(families) = &sharing {
+            info = info
+                .sharing_mode(vk::SharingMode::CONCURRENT)
+                .queue_family_indices(families);
+        }
         // SAFETY: extent, format and usage were checked against the device.
         let handle = unsafe { device.raw.create_image(&info, None) }
             .map_err(during(format!("creating the image '{name}'")))?;
@@ -137,6 +144,9 @@ impl Image {
         let image = Self(Arc::new(raw));
         device.once(|commands| {
             commands.make_general(&image);
+            if device.is_validating() {
+                commands.poison_image(&image);
+            }
             Ok(())
         })?;
         Ok(image)

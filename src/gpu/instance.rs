@@ -74,14 +74,42 @@ pub(crate) struct Instance {
     pub(crate) entry: ash::Entry,
 }
 
+/// Where the loader, or MoltenVK itself, lies on macOS beside the folders that the system searches:
+/// bundled with the program, Homebrew on Apple silicon and on Intel, LunarG's package.
+const MACOS_LOADERS: [&str; 6] = [
+    "@executable_path/../Frameworks/libvulkan.1.dylib",
+    "@executable_path/../Frameworks/libMoltenVK.dylib",
+    "libvulkan.1.dylib",
+    "/opt/homebrew/lib/libvulkan.1.dylib",
+    "/usr/local/lib/libvulkan.1.dylib",
+    "libMoltenVK.dylib",
+];
+
+/// The system's Vulkan loader; the error is that of its usual name.
+fn load() -> Result<ash::Entry, ash::LoadingError> {
+    // SAFETY: the loader is the system's Vulkan library; its initialisers have no precondition.
+    let usual = unsafe { ash::Entry::load() };
+    let others: &[&str] = if cfg!(target_os = "macos") {
+        &MACOS_LOADERS
+    } else {
+        &[]
+    };
+    usual.or_else(|error| {
+        // SAFETY: as above.
+        let mut found = others
+            .iter()
+            .filter_map(|path| unsafe { ash::Entry::load_from(path) }.ok());
+        found.next().ok_or(error)
+    })
+}
+
 impl Instance {
     /// Opens the loader and makes an instance; with `validate` also the validation layer with
     /// synchronization validation, which must then be installed; with `window` also what windows
     /// need, as far as it is there.
     pub(crate) fn new(validate: bool, window: bool) -> Result<Self, GpuError> {
         let loader = |reason: String| GpuError::Loader { reason };
-        // SAFETY: the loader is the system's Vulkan library; its initialisers have no precondition.
-        let entry = unsafe { ash::Entry::load() }.map_err(|e| loader(e.to_string()))?;
+        let entry = load().map_err(|e| loader(e.to_string()))?;
         // SAFETY: the entry was loaded successfully.
         let loader_version = unsafe { entry.try_enumerate_instance_version() }
             .map_err(during("asking for the loader's version"))?

@@ -1,7 +1,10 @@
 //! Compute pipelines whose layouts come from their SPIR-V.
+//!
+//! A driver may take seconds for a pipeline. So pipelines are made on rayon's threads while the
+//! caller goes on, or not before they are needed; the first dispatch waits for its own.
 
 use std::ffi::CString;
-use std::sync::Arc;
+use std::sync::{Arc, Once, OnceLock};
 
 use ash::vk;
 
@@ -16,7 +19,11 @@ pub(crate) struct RawKernel {
     /// One per set, empty for numbers that are not used.
     pub(crate) set_layouts: Vec<vk::DescriptorSetLayout>,
     pub(crate) layout: vk::PipelineLayout,
-    pub(crate) pipeline: vk::Pipeline,
+    /// Same for the same SPIR-V and constants.
+    pub(crate) id: u64,
+    /// `Some` but while the kernel is created.
+    pipeline: Option<Arc<Pipeline>>,
+    named: Once,
     device: Arc<Device>,
 }
 
@@ -25,9 +32,28 @@ pub(crate) struct RawKernel {
 pub struct Kernel(pub(crate) Arc<RawKernel>);
 
 impl Kernel {
-    /// Makes a pipeline from a SPIR-V compute module with one entry point. `specialization` gives
-    /// constants by id, each as its 32 bits.
+    /// A kernel from a SPIR-V compute module with one entry point, whose pipeline is made on another
+    /// thread. `specialization` gives constants by id, each as its 32 bits.
+    ///
+    /// # Errors
+    /// A module that does not fit the device. What the driver says of it is told by the first dispatch.
     pub fn new(
+        device: &Arc<Device>,
+        name: &str,
+        spirv: &[u32],
+        specialization: &[(u32, u32)],
+    ) -> Result<Self, GpuError> {
+        let kernel = Self::when_needed(device, name, spirv, specialization)?;
+        kernel.prepare();
+        Ok(kernel)
+    }
+
+    /// As [`Self::new`], but the pipeline is not made before the first dispatch or [`Self::prepare`]:
+    /// for kernels that many scenes do not need.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn when_needed(
         device: &Arc<Device>,
         name: &str,
         spirv: &[u32],
@@ -44,13 +70,52 @@ impl Kernel {
             reflection,
             set_layouts: Vec::new(),
             layout: vk::PipelineLayout::null(),
-            pipeline: vk::Pipeline::null(),
+            id: id(spirv, specialization),
+            pipeline: None,
+            named: Once::new(),
             device: device.clone(),
         };
         kernel.create_layouts()?;
-        kernel.create_pipeline(spirv, specialization)?;
-        device.set_name(kernel.pipeline, name);
+        kernel.pipeline = Some(Arc::new(Pipeline {
+            spirv: spirv.to_vec(),
+            specialization: specialization.to_vec(),
+            // spirq returned the name from a NUL-terminated literal.
+            entry: CString::new(kernel.reflection.entry_point.as_str()).unwrap_or_default(),
+            layout: kernel.layout,
+            cache: device.kept.cache(),
+            raw: device.raw.clone(),
+            made: OnceLock::new(),
+        }));
         Ok(Self(Arc::new(kernel)))
+    }
+
+    /// Has the pipeline made on another thread, if nobody has yet.
+    pub fn prepare(&self) {
+        if let Some(pipeline) = self.0.pipeline.clone() {
+            // Who needs it asks for its result.
+            rayon::spawn(move || {
+                let _ = pipeline.get();
+            });
+        }
+    }
+
+    /// The pipeline; waits where it is still being made, and makes it where nobody does.
+    pub(crate) fn pipeline(&self) -> Result<vk::Pipeline, GpuError> {
+        let kernel = &self.0;
+        let pipeline = kernel.pipeline.as_ref().expect("set at creation");
+        let made = match pipeline.made.get() {
+            Some(made) => *made,
+            None => {
+                let _waiting = kernel.device.kept.patience([kernel.id]);
+                pipeline.get()
+            }
+        };
+        let what = || format!("creating the pipeline of '{}'", kernel.name);
+        let made = made.map_err(|code| during(what())(code))?;
+        kernel
+            .named
+            .call_once(|| kernel.device.set_name(made, &kernel.name));
+        Ok(made)
     }
 
     /// Name given at creation.
@@ -90,6 +155,12 @@ fn check_limits(device: &Device, reflection: &Reflection) -> Result<(), String> 
         return Err(format!(
             "its work group of {size:?} threads does not fit the device's {:?}, {} in all",
             limits.max_group_size, limits.max_group_threads
+        ));
+    }
+    if reflection.shared_bytes > limits.max_shared_bytes {
+        return Err(format!(
+            "its {} bytes of shared memory exceed the device's {}",
+            reflection.shared_bytes, limits.max_shared_bytes
         ));
     }
     if reflection.push_constant_bytes > limits.max_push_constant_bytes {
@@ -152,19 +223,36 @@ impl RawKernel {
             .map_err(during(format!("creating the layout of '{}'", self.name)))?;
         Ok(())
     }
+}
 
-    fn create_pipeline(
-        &mut self,
-        spirv: &[u32],
-        specialization: &[(u32, u32)],
-    ) -> Result<(), GpuError> {
-        let device = &self.device.raw;
-        let info = vk::ShaderModuleCreateInfo::default().code(spirv);
+/// What a pipeline is made of and, once that has happened, the pipeline or the driver's refusal. It
+/// does not hold the device: the kernel does, and ends what is under way before it lets go.
+struct Pipeline {
+    spirv: Vec<u32>,
+    specialization: Vec<(u32, u32)>,
+    entry: CString,
+    layout: vk::PipelineLayout,
+    cache: vk::PipelineCache,
+    raw: ash::Device,
+    made: OnceLock<Result<vk::Pipeline, vk::Result>>,
+}
+
+impl Pipeline {
+    fn get(&self) -> Result<vk::Pipeline, vk::Result> {
+        *self.made.get_or_init(|| self.make())
+    }
+
+    fn make(&self) -> Result<vk::Pipeline, vk::Result> {
+        let info = vk::ShaderModuleCreateInfo::default().code(&self.spirv);
         // SAFETY: the words parsed as SPIR-V; the kernels of this crate are checked by spirv-val.
-        let module = unsafe { device.create_shader_module(&info, None) }
-            .map_err(during(format!("creating the module of '{}'", self.name)))?;
-        let values: Vec<u32> = specialization.iter().map(|&(_, value)| value).collect();
-        let entries: Vec<_> = (specialization.iter().enumerate())
+        // The device is alive: see the structure.
+        let module = unsafe { self.raw.create_shader_module(&info, None) }?;
+        let values: Vec<u32> = self
+            .specialization
+            .iter()
+            .map(|&(_, value)| value)
+            .collect();
+        let entries: Vec<_> = (self.specialization.iter().enumerate())
             .map(|(at, &(id, _))| {
                 vk::SpecializationMapEntry::default()
                     .constant_id(id)
@@ -175,40 +263,46 @@ impl RawKernel {
         let constants = vk::SpecializationInfo::default()
             .map_entries(&entries)
             .data(bytemuck::cast_slice(&values));
-        // spirq returned the name from a NUL-terminated literal.
-        let entry = CString::new(self.reflection.entry_point.as_str()).unwrap_or_default();
         let stage = vk::PipelineShaderStageCreateInfo::default()
             .stage(vk::ShaderStageFlags::COMPUTE)
             .module(module)
-            .name(&entry)
+            .name(&self.entry)
             .specialization_info(&constants);
-        let flags = match self.device.queues.are_shared() {
-            true => vk::PipelineCreateFlags::DISPATCH_BASE,
-            false => vk::PipelineCreateFlags::empty(),
-        };
         let info = vk::ComputePipelineCreateInfo::default()
-            .flags(flags)
+            // A dispatch may be cut into pieces.
+            .flags(vk::PipelineCreateFlags::DISPATCH_BASE)
             .stage(stage)
             .layout(self.layout);
-        // SAFETY: module, layout and constants are alive during the call; the layout was
-        // reflected from the module.
-        let created =
-            unsafe { device.create_compute_pipelines(self.device.pipeline_cache, &[info], None) };
+        // SAFETY: module, layout and constants are alive during the call; the layout was reflected
+        // from the module; the cache synchronises itself.
+        let created = unsafe { self.raw.create_compute_pipelines(self.cache, &[info], None) };
         // SAFETY: a pipeline does not need its module any more.
-        unsafe { device.destroy_shader_module(module, None) };
-        let pipelines = created
-            .map_err(|(_, code)| code)
-            .map_err(during(format!("creating the pipeline of '{}'", self.name)))?;
-        self.pipeline = pipelines[0];
-        Ok(())
+        unsafe { self.raw.destroy_shader_module(module, None) };
+        created.map(|made| made[0]).map_err(|(_, code)| code)
     }
+}
+
+/// The same number for the same SPIR-V and constants, also in another process.
+fn id(spirv: &[u32], specialization: &[(u32, u32)]) -> u64 {
+    let crc = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
+    let mut digest = crc.digest();
+    digest.update(bytemuck::cast_slice(spirv));
+    for &(id, value) in specialization {
+        digest.update(bytemuck::cast_slice(&[id, value]));
+    }
+    digest.finalize()
 }
 
 impl Drop for RawKernel {
     fn drop(&mut self) {
+        // What is being made is waited for, and what is not begun never will be.
+        let made = (self.pipeline.as_ref())
+            .and_then(|p| p.made.get_or_init(|| Err(vk::Result::NOT_READY)).ok());
         // SAFETY: submissions keep the kernels they use alive; null handles are ignored.
         unsafe {
-            self.device.raw.destroy_pipeline(self.pipeline, None);
+            self.device
+                .raw
+                .destroy_pipeline(made.unwrap_or_default(), None);
             self.device.raw.destroy_pipeline_layout(self.layout, None);
             for &layout in &self.set_layouts {
                 self.device.raw.destroy_descriptor_set_layout(layout, None);

@@ -43,6 +43,10 @@ impl MemoryUseCounter {
     }
 }
 
+/// What fresh memory holds while validating: a kernel that reads what nobody wrote then differs from
+/// one that does not. Large as a number, far from 0 as a float, and no valid index.
+pub(crate) const POISON: u32 = 0xcdcd_cdcd;
+
 /// What a buffer is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferKind {
@@ -91,7 +95,9 @@ impl BufferKind {
 
     fn location(self) -> MemoryLocation {
         match self {
-            Self::Upload => MemoryLocation::CpuToGpu,
+            // Copies are read once: host memory does, and leaves alone the little of the device's that
+            // the CPU can write.
+            Self::Upload => MemoryLocation::GpuToCpu,
             Self::Readback => MemoryLocation::GpuToCpu,
             _ => MemoryLocation::GpuOnly,
         }
@@ -221,7 +227,15 @@ impl Buffer {
             .map_err(during(format!("binding memory to the buffer '{name}'")))?;
         raw.memory = Some(memory);
         device.set_name(handle, name);
-        Ok(Self(Arc::new(raw)))
+        let buffer = Self(Arc::new(raw));
+        if kind == BufferKind::Storage && device.is_validating() {
+            // Fresh memory is often zero on one device and never on another.
+            device.once(|commands| {
+                commands.fill(&buffer, POISON);
+                Ok(())
+            })?;
+        }
+        Ok(buffer)
     }
 
     /// Name given at creation.
@@ -318,5 +332,28 @@ impl Device {
         kind: BufferKind,
     ) -> Result<Buffer, GpuError> {
         Buffer::new(self, name, size_bytes, kind)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::BufferKind;
+    use crate::gpu::{Image, ImageDim, ImageFormat, test_device};
+
+    #[test]
+    fn fresh_memory_is_poisoned_while_validating() {
+        let device = test_device();
+        let buffer = device.buffer("fresh", 1000, BufferKind::Storage).unwrap();
+        assert_eq!(device.read_back(&buffer).unwrap(), [0xcd; 1000]);
+        for format in [
+            ImageFormat::R8Unorm,
+            ImageFormat::R16Unorm,
+            ImageFormat::R32Float,
+        ] {
+            let image = Image::new(&device, "fresh", ImageDim::D3, [5, 4, 3], format).unwrap();
+            let bytes = image.read_back().unwrap();
+            assert!(bytes.iter().all(|&b| b == 0xcd), "{format:?}: {bytes:x?}");
+        }
+        assert_eq!(device.validation_messages(), [""; 0]);
     }
 }

@@ -33,7 +33,7 @@ pub(crate) type Target = (vk::RenderPass, vk::Framebuffer, vk::Extent2D);
 impl Overlay {
     pub(crate) fn new(device: &Arc<Device>, pass: vk::RenderPass) -> Result<Self, GpuError> {
         let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.queue_family)
+            .queue_family_index(device.queues.family(Lane::Window))
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the family is the device's own; `Drop` destroys the pool.
         let pool = unsafe { device.raw.create_command_pool(&info, None) }

@@ -1,16 +1,21 @@
-//! A submission in pieces, where the window shares the simulation's queue.
+//! A submission in pieces.
 //!
-//! A queue runs in order, so a window that submits behind a frame of a second waits for a second.
-//! In pieces of a few milliseconds, of which no more than two are ever handed over, it waits for
-//! two of them. How long a dispatch takes is known from the frame before.
+//! A queue runs in order, so a window that shares it and submits behind a frame of a second waits for a
+//! second. In pieces of a few milliseconds, of which no more than two are ever handed over, it waits for
+//! two of them. Where nobody waits the pieces are longer, but no dispatch runs so long that a driver
+//! takes the device for hung (Windows: 2 s). How long a dispatch takes is known from the frame before.
 
 use std::collections::HashMap;
 
 use super::timer::FrameTimings;
 
-/// Longest time on the device that one piece should take, ms: two of them fit into an interface
-/// frame of 1/60 s.
-const PIECE_MS: f64 = 7.0;
+/// Longest time on the device that one piece should take where the window shares the queue, ms: two of
+/// them fit into an interface frame of 1/60 s.
+const SHARED_MS: f64 = 7.0;
+
+/// The same elsewhere, ms: a tenth of what Windows allows, so that a frame that suddenly takes several
+/// times as long as the one before is no loss.
+const ALONE_MS: f64 = 200.0;
 
 /// Pieces of a dispatch that was never timed.
 const UNTIMED: usize = 16;
@@ -19,23 +24,42 @@ const UNTIMED: usize = 16;
 pub(crate) type Groups = [[u32; 3]; 2];
 
 /// How much the piece that is being recorded holds, and what is known of the dispatches to come.
-#[derive(Default)]
 pub(crate) struct Pieces {
+    /// What one piece should take at most, ms.
+    budget_ms: f64,
     /// Mean time of one scope of each name, ms.
     mean_ms: HashMap<String, f64>,
+    /// What the last frame took by the clock, ms, and its dispatches, where the queue has no timestamps.
+    whole: Option<(f64, usize)>,
+    /// Dispatches of this frame.
+    dispatches: usize,
     /// What the commands recorded since the last cut will take, ms.
     load_ms: f64,
 }
 
 impl Pieces {
+    /// `shared`: the window waits behind them.
+    pub(crate) fn new(shared: bool) -> Self {
+        Self {
+            budget_ms: if shared { SHARED_MS } else { ALONE_MS },
+            mean_ms: HashMap::new(),
+            whole: None,
+            dispatches: 0,
+            load_ms: 0.0,
+        }
+    }
+
     /// Starts over.
     pub(crate) fn begin(&mut self) {
         self.load_ms = 0.0;
+        self.dispatches = 0;
     }
 
-    /// Takes over what the last frame took.
-    pub(crate) fn learn(&mut self, timings: &FrameTimings) {
+    /// Takes over what the last frame took: its scopes or, where they were not timed, all of it by the
+    /// clock.
+    pub(crate) fn learn(&mut self, timings: &FrameTimings, wall_ms: f64) {
         self.mean_ms.clear();
+        self.whole = (timings.passes.is_empty()).then_some((wall_ms, self.dispatches.max(1)));
         for (name, _) in &timings.passes {
             let count = timings.passes.iter().filter(|(n, _)| n == name).count();
             let mean = timings.of(name) / count as f64;
@@ -45,20 +69,24 @@ impl Pieces {
 
     /// Cuts a dispatch of `scope` into boxes; `whole` kernels know the number of groups along y and
     /// z and are only cut along x.
-    pub(crate) fn cut(&self, scope: &str, groups: [u32; 3], whole: bool) -> (Vec<Groups>, f64) {
-        let (count, each_ms) = match self.mean_ms.get(scope) {
-            Some(ms) => {
-                let count = (ms / PIECE_MS).ceil().max(1.0);
-                (count as usize, ms / count)
-            }
-            None => (UNTIMED, PIECE_MS),
+    pub(crate) fn cut(&mut self, scope: &str, groups: [u32; 3], whole: bool) -> (Vec<Groups>, f64) {
+        self.dispatches += 1;
+        let pieces = |ms: f64| (ms / self.budget_ms).ceil().max(1.0);
+        let (count, each_ms) = match (self.mean_ms.get(scope), self.whole) {
+            (Some(&ms), _) => (pieces(ms) as usize, ms / pieces(ms)),
+            // Any of the dispatches may be the one that takes all the time.
+            (None, Some((ms, dispatches))) => match pieces(ms) {
+                1.0 => (1, ms / dispatches as f64),
+                count => (count as usize, ms / count),
+            },
+            (None, None) => (UNTIMED, self.budget_ms),
         };
         (cut(groups, count, whole), each_ms)
     }
 
     /// Notes a dispatch of `ms`; whether the commands before it have to go first.
     pub(crate) fn add(&mut self, ms: f64) -> bool {
-        let full = self.load_ms > 0.0 && self.load_ms + ms > PIECE_MS;
+        let full = self.load_ms > 0.0 && self.load_ms + ms > self.budget_ms;
         self.load_ms = if full { ms } else { self.load_ms + ms };
         full
     }
@@ -122,7 +150,7 @@ mod tests {
 
     #[test]
     fn pieces_are_as_long_as_they_may_be() {
-        let mut pieces = Pieces::default();
+        let mut pieces = Pieces::new(true);
         assert_eq!(
             pieces.cut("trace", [64, 1, 1], false).0.len(),
             16,
@@ -133,7 +161,7 @@ mod tests {
             ("trace".into(), 22.0),
             ("beam".into(), 3.0),
         ];
-        pieces.learn(&FrameTimings { frame: 0, passes });
+        pieces.learn(&FrameTimings { frame: 0, passes }, 1e3);
         let (boxes, each) = pieces.cut("trace", [64, 1, 1], false);
         assert_eq!((boxes.len(), each), (3, 7.0));
         assert_eq!(pieces.cut("beam", [64, 1, 1], false).0.len(), 1);
@@ -144,5 +172,42 @@ mod tests {
         );
         assert!(pieces.add(3.0), "until the piece is full");
         assert!(!pieces.add(3.0));
+    }
+
+    #[test]
+    fn without_a_window_pieces_are_longer() {
+        let mut pieces = Pieces::new(false);
+        let passes = vec![("trace".into(), 150.0), ("scatter".into(), 2100.0)];
+        pieces.learn(&FrameTimings { frame: 0, passes }, 1e4);
+        assert_eq!(pieces.cut("trace", [64, 1, 1], false).0.len(), 1);
+        let (boxes, each) = pieces.cut("scatter", [64, 1, 1], false);
+        assert!(
+            boxes.len() >= 11 && each <= 200.0,
+            "{} of {each}",
+            boxes.len()
+        );
+    }
+
+    #[test]
+    fn without_timestamps_the_clock_counts() {
+        let mut pieces = Pieces::new(true);
+        let frame = |pieces: &mut Pieces| -> usize {
+            pieces.begin();
+            let cut = |p: &mut Pieces| p.cut("trace", [64, 1, 1], false).0.len();
+            (0..10).map(|_| cut(pieces)).sum()
+        };
+        assert_eq!(frame(&mut pieces), 160, "untimed");
+        pieces.learn(&FrameTimings::default(), 5.0);
+        assert_eq!(frame(&mut pieces), 10, "a fast device is not cut");
+        let (_, each) = pieces.cut("trace", [64, 1, 1], false);
+        assert!(
+            each < 1.0,
+            "nor are its dispatches submitted one by one: {each}"
+        );
+        pieces.learn(&FrameTimings::default(), 70.0);
+        assert_eq!(
+            pieces.cut("trace", [64, 1, 1], false),
+            (super::cut([64, 1, 1], 10, false), 7.0)
+        );
     }
 }

@@ -13,36 +13,188 @@ pub(crate) enum Lane {
     Window,
 }
 
-/// One queue, or two of the same family: then nothing has to change owners between them.
+/// A queue by its family and its number in it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Place {
+    pub(crate) family: u32,
+    pub(crate) index: u32,
+}
+
+/// Which queue each lane takes; both may be the same.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Plan {
+    pub(crate) work: Place,
+    pub(crate) window: Place,
+}
+
+impl Plan {
+    /// Without a window one queue of a family with compute, with graphics if there is one: every
+    /// driver runs it at full speed. None where no family computes.
+    pub(crate) fn alone(families: &[vk::QueueFamilyProperties]) -> Option<Self> {
+        let (compute, graphics) = (vk::QueueFlags::COMPUTE, vk::QueueFlags::GRAPHICS);
+        let found = find(families, |_, flags| flags.contains(compute | graphics))
+            .or_else(|| find(families, |_, flags| flags.contains(compute)))?;
+        Some(Self {
+            work: found,
+            window: found,
+        })
+    }
+
+    /// With a window: it takes a family with graphics that presents to it, and the simulation a family
+    /// for compute alone, so that neither waits for the other; else a second queue of the window's
+    /// family; else the window's queue. None where no family can show pictures.
+    pub(crate) fn with_window(
+        families: &[vk::QueueFamilyProperties],
+        presents: impl Fn(u32) -> bool,
+    ) -> Option<Self> {
+        let (compute, graphics) = (vk::QueueFlags::COMPUTE, vk::QueueFlags::GRAPHICS);
+        let window = find(families, |family, flags| {
+            flags.contains(compute | graphics) && presents(family)
+        })?;
+        let alone = find(families, |_, flags| {
+            flags.contains(compute) && !flags.contains(graphics)
+        });
+        let second = Place { index: 1, ..window };
+        let several = families[window.family as usize].queue_count > 1;
+        let work = alone.unwrap_or(if several { second } else { window });
+        Some(Self { work, window })
+    }
+
+    /// Queues to make, per family.
+    pub(crate) fn families(&self) -> Vec<(u32, u32)> {
+        match self.work.family == self.window.family {
+            true => vec![(self.work.family, 1 + self.work.index.max(self.window.index))],
+            false => vec![(self.work.family, 1), (self.window.family, 1)],
+        }
+    }
+}
+
+/// The first queue of the first family that `fits`.
+fn find(
+    families: &[vk::QueueFamilyProperties],
+    fits: impl Fn(u32, vk::QueueFlags) -> bool,
+) -> Option<Place> {
+    let mut numbered = (0..).zip(families);
+    let fits =
+        |(i, f): &(u32, &vk::QueueFamilyProperties)| f.queue_count > 0 && fits(*i, f.queue_flags);
+    let (family, _) = numbered.find(fits)?;
+    Some(Place { family, index: 0 })
+}
+
+/// The queues of a plan. Between two families nothing has to change owners: images are shared by both,
+/// and buffers belong to one lane.
 pub(crate) struct Queues {
-    all: Vec<Mutex<vk::Queue>>,
-    window: bool,
+    plan: Plan,
+    work: Mutex<vk::Queue>,
+    /// Where it is another one.
+    window: Option<Mutex<vk::Queue>>,
+    with_window: bool,
 }
 
 impl Queues {
-    /// Takes the first `count` queues of a family.
-    pub(crate) fn new(device: &ash::Device, family: u32, count: u32, window: bool) -> Self {
-        // SAFETY: the device was made with that many queues of the family.
-        let queue = |index| unsafe { device.get_device_queue(family, index) };
+    /// Takes the queues of `plan`, with which `device` was made.
+    pub(crate) fn new(device: &ash::Device, plan: Plan, with_window: bool) -> Self {
+        // SAFETY: the device was made with these queues.
+        let queue = |at: Place| unsafe { device.get_device_queue(at.family, at.index) };
+        let other = plan.window != plan.work;
         Self {
-            all: (0..count).map(|index| Mutex::new(queue(index))).collect(),
-            window,
+            work: Mutex::new(queue(plan.work)),
+            window: other.then(|| Mutex::new(queue(plan.window))),
+            plan,
+            with_window,
         }
     }
 
     /// The queue of `lane`, kept from other threads meanwhile. A handle stays usable after a panic
     /// elsewhere, so poisoning is ignored.
     pub(crate) fn lock(&self, lane: Lane) -> MutexGuard<'_, vk::Queue> {
-        let queue = match lane {
-            Lane::Work => self.all.first(),
-            Lane::Window => self.all.last(),
+        let queue = match (lane, &self.window) {
+            (Lane::Window, Some(window)) => window,
+            _ => &self.work,
         };
-        let queue = queue.expect("a device has at least one queue");
         queue.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The family of a lane's queue.
+    pub(crate) fn family(&self, lane: Lane) -> u32 {
+        match lane {
+            Lane::Work => self.plan.work.family,
+            Lane::Window => self.plan.window.family,
+        }
+    }
+
+    /// The families that use the same images, where these are several.
+    pub(crate) fn sharing(&self) -> Option<[u32; 2]> {
+        let [work, window] = [Lane::Work, Lane::Window].map(|lane| self.family(lane));
+        (work != window).then_some([work, window])
     }
 
     /// Whether the window has to wait behind what the simulation has submitted.
     pub(crate) fn are_shared(&self) -> bool {
-        self.window && self.all.len() == 1
+        self.with_window && self.window.is_none()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ash::vk;
+
+    use super::{Place, Plan};
+
+    const GRAPHICS: vk::QueueFlags = vk::QueueFlags::GRAPHICS;
+    const COMPUTE: vk::QueueFlags = vk::QueueFlags::COMPUTE;
+
+    fn family(queue_flags: vk::QueueFlags, queue_count: u32) -> vk::QueueFamilyProperties {
+        vk::QueueFamilyProperties {
+            queue_flags,
+            queue_count,
+            ..Default::default()
+        }
+    }
+
+    fn at(family: u32, index: u32) -> Place {
+        Place { family, index }
+    }
+
+    #[test]
+    fn the_simulation_has_a_queue_of_its_own_where_there_is_one() {
+        let all = GRAPHICS | COMPUTE | vk::QueueFlags::TRANSFER;
+        let plan = |families: &[_]| Plan::with_window(families, |_| true).unwrap();
+        let amd = [family(all, 1), family(COMPUTE, 4)];
+        let made = plan(&amd);
+        assert_eq!((made.work, made.window), (at(1, 0), at(0, 0)));
+        assert_eq!(made.families(), [(1, 1), (0, 1)]);
+
+        let two = plan(&[family(all, 16)]);
+        assert_eq!((two.work, two.window), (at(0, 1), at(0, 0)));
+        assert_eq!(two.families(), [(0, 2)]);
+
+        let one = plan(&[family(all, 1)]);
+        assert_eq!((one.work, one.window), (at(0, 0), at(0, 0)));
+        assert_eq!(one.families(), [(0, 1)]);
+    }
+
+    #[test]
+    fn the_window_takes_a_family_that_presents() {
+        let all = GRAPHICS | COMPUTE;
+        let families = [family(COMPUTE, 1), family(all, 1), family(all, 1)];
+        let made = Plan::with_window(&families, |family| family == 2).unwrap();
+        assert_eq!((made.work, made.window), (at(0, 0), at(2, 0)));
+        assert_eq!(Plan::with_window(&families, |_| false), None);
+        assert_eq!(Plan::with_window(&families, |family| family == 0), None);
+        let empty = [family(all, 0)];
+        assert_eq!(Plan::with_window(&empty, |_| true), None);
+    }
+
+    #[test]
+    fn without_a_window_one_queue_is_taken() {
+        let all = GRAPHICS | COMPUTE;
+        let alone = |families: &[_]| Plan::alone(families).map(|plan| plan.families());
+        assert_eq!(
+            alone(&[family(COMPUTE, 4), family(all, 2)]),
+            Some(vec![(1, 1)])
+        );
+        assert_eq!(alone(&[family(COMPUTE, 4)]), Some(vec![(0, 1)]));
+        assert_eq!(alone(&[family(GRAPHICS, 4)]), None);
     }
 }

@@ -8,6 +8,8 @@ use spirq::entry_point::ExecutionModel;
 use spirq::ty::{AccessType, DescriptorType, Type};
 use spirq::var::Variable;
 
+use super::workgroup::shared_bytes;
+
 /// First word of every SPIR-V module of this byte order.
 const SPIRV_MAGIC: u32 = 0x0723_0203;
 
@@ -84,6 +86,8 @@ pub(crate) struct Reflection {
     pub(crate) local_size: [u32; 3],
     /// gl_NumWorkGroups is read.
     pub(crate) counts_groups: bool,
+    /// Shared memory of a work group.
+    pub(crate) shared_bytes: u32,
 }
 
 /// Reads a compute module with one entry point; `specialization` gives (id, value as bits).
@@ -139,6 +143,7 @@ pub(crate) fn reflect(words: &[u32], specialization: &[(u32, u32)]) -> Result<Re
         push_constant_bytes,
         local_size: constants.local_size.ok_or("it states no work-group size")?,
         counts_groups: constants.counts_groups,
+        shared_bytes: shared_bytes(words, &constants.value_of)?,
     })
 }
 
@@ -208,6 +213,8 @@ struct Constants {
     ids: Vec<u32>,
     local_size: Option<[u32; 3]>,
     counts_groups: bool,
+    /// By id in the module.
+    value_of: HashMap<u32, u32>,
 }
 
 impl Constants {
@@ -228,7 +235,6 @@ impl Constants {
 
         let mut constants = Self::default();
         let mut spec_id_of = HashMap::new();
-        let mut value_of = HashMap::new();
         let mut size_ids = None;
         let mut size_object = None;
         let mut at = 5; // after the header
@@ -258,7 +264,7 @@ impl Constants {
                     let chosen = spec_id_of.get(&id).and_then(|spec| {
                         specialization.iter().find(|(s, _)| s == spec).map(|s| s.1)
                     });
-                    value_of.insert(id, chosen.unwrap_or(value));
+                    constants.value_of.insert(id, chosen.unwrap_or(value));
                 }
                 (OP_CONSTANT_COMPOSITE | OP_SPEC_CONSTANT_COMPOSITE, &[_, _, id, x, y, z])
                     if size_object == Some(id) =>
@@ -270,7 +276,7 @@ impl Constants {
             at += length;
         }
         if let Some(ids) = size_ids {
-            let size = ids.map(|id| value_of.get(&id).copied().unwrap_or(0));
+            let size = ids.map(|id| constants.value_of.get(&id).copied().unwrap_or(0));
             constants.local_size = Some(size);
         }
         constants

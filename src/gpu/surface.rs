@@ -8,6 +8,63 @@ use winit::window::Window;
 
 use super::device::Device;
 use super::error::{GpuError, during};
+use super::instance::Instance;
+use super::queues::Lane;
+
+/// What of the window system `window` is for `instance`; the caller destroys it, before the window.
+fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, String> {
+    let display = window.display_handle().map_err(|e| e.to_string())?;
+    let handle = window.window_handle().map_err(|e| e.to_string())?;
+    // SAFETY: the handles belong to the window, which outlives the surface.
+    unsafe {
+        ash_window::create_surface(
+            &instance.entry,
+            &instance.raw,
+            display.as_raw(),
+            handle.as_raw(),
+            None,
+        )
+    }
+    .map_err(|code| format!("the window has no Vulkan surface ({code:?})"))
+}
+
+/// Which devices and queue families can show pictures in a window; asked before a device is opened.
+pub(crate) struct Probe<'a> {
+    handle: vk::SurfaceKHR,
+    functions: khr::surface::Instance,
+    _window: &'a Window,
+}
+
+impl<'a> Probe<'a> {
+    /// Drop it before the instance.
+    ///
+    /// # Errors
+    /// What the window system says.
+    pub(crate) fn new(instance: &Instance, window: &'a Window) -> Result<Self, String> {
+        Ok(Self {
+            handle: surface_of(instance, window)?,
+            functions: khr::surface::Instance::new(&instance.entry, &instance.raw),
+            _window: window,
+        })
+    }
+
+    /// Whether `family` of a device of the probe's instance can; a device that does not answer cannot.
+    pub(crate) fn presents(&self, physical: vk::PhysicalDevice, family: u32) -> bool {
+        // SAFETY: surface and device are of one instance, and the device has that family.
+        let answer = unsafe {
+            self.functions
+                .get_physical_device_surface_support(physical, family, self.handle)
+        };
+        answer.unwrap_or(false)
+    }
+}
+
+impl Drop for Probe<'_> {
+    fn drop(&mut self) {
+        // SAFETY: nothing was made of the surface.
+        unsafe { self.functions.destroy_surface(self.handle, None) };
+    }
+}
 
 /// A window's surface; it keeps the window open.
 pub(crate) struct Surface {
@@ -26,22 +83,8 @@ impl Surface {
             device: device.name().into(),
             reason,
         };
-        let display = window
-            .display_handle()
-            .map_err(|e| refused(e.to_string()))?;
-        let handle = window.window_handle().map_err(|e| refused(e.to_string()))?;
         let instance = &device.instance;
-        // SAFETY: the handles belong to the window, which outlives the surface.
-        let surface = unsafe {
-            ash_window::create_surface(
-                &instance.entry,
-                &instance.raw,
-                display.as_raw(),
-                handle.as_raw(),
-                None,
-            )
-        }
-        .map_err(|code| refused(format!("the window has no Vulkan surface ({code:?})")))?;
+        let surface = surface_of(instance, &window).map_err(refused)?;
         let mut made = Self {
             handle: surface,
             functions: khr::surface::Instance::new(&instance.entry, &instance.raw),
@@ -53,7 +96,7 @@ impl Surface {
         let supported = unsafe {
             made.functions.get_physical_device_surface_support(
                 device.physical,
-                device.queue_family,
+                device.queues.family(Lane::Window),
                 surface,
             )
         };
@@ -81,6 +124,21 @@ impl Surface {
         found.copied().ok_or_else(|| GpuError::Window {
             device: self.device.name().into(),
             reason: format!("it shows none of {wanted:?}, but {formats:?}"),
+        })
+    }
+
+    /// The newest picture without tearing where the window system offers that, else one picture after
+    /// the other, which every device has: that waits for the screen, one or two refreshes longer.
+    pub(crate) fn present_mode(&self) -> Result<vk::PresentModeKHR, GpuError> {
+        // SAFETY: the surface is alive.
+        let modes = unsafe {
+            self.functions
+                .get_physical_device_surface_present_modes(self.device.physical, self.handle)
+        }
+        .map_err(during("asking how the window shows pictures"))?;
+        Ok(match modes.contains(&vk::PresentModeKHR::MAILBOX) {
+            true => vk::PresentModeKHR::MAILBOX,
+            false => vk::PresentModeKHR::FIFO,
         })
     }
 

@@ -95,8 +95,7 @@ impl Swapchain {
                 true => opaque,
                 false => vk::CompositeAlphaFlagsKHR::INHERIT,
             })
-            // The one that every device has; it waits for the screen and drops nothing.
-            .present_mode(vk::PresentModeKHR::FIFO)
+            .present_mode(surface.present_mode()?)
             .clipped(true)
             .old_swapchain(old.map_or(vk::SwapchainKHR::null(), |old| old.handle));
         let functions = khr::swapchain::Device::new(&device.instance.raw, &device.raw);

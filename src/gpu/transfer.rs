@@ -8,8 +8,8 @@ use super::barrier::Stage;
 use super::commands::Commands;
 use super::device::Device;
 use super::error::GpuError;
-use super::image::Image;
-use super::memory::{Buffer, BufferKind};
+use super::image::{Image, ImageFormat, whole};
+use super::memory::{Buffer, BufferKind, POISON};
 
 /// Staging memory taken at a time; more bytes go in several submissions.
 const CHUNK_BYTES: u64 = 32 << 20;
@@ -26,6 +26,29 @@ impl Commands<'_> {
                 0,
                 vk::WHOLE_SIZE,
                 value,
+            );
+        }
+    }
+
+    /// Fills a new image, which the commands before have moved to its layout, with [`POISON`].
+    pub(crate) fn poison_image(&mut self, image: &Image) {
+        self.uses(&image.0, image.name(), Stage::Transfer, true, "poison");
+        let texel = match image.format() {
+            ImageFormat::R32Float => f32::from_bits(POISON),
+            _ => f32::from(POISON as u8) / 255.0,
+        };
+        let colour = vk::ClearColorValue {
+            float32: [texel; 4],
+        };
+        let general = vk::ImageLayout::GENERAL;
+        // SAFETY: the image can be copied to, is in GENERAL and kept.
+        unsafe {
+            self.device().raw.cmd_clear_color_image(
+                self.raw(),
+                image.0.handle,
+                general,
+                &colour,
+                &[whole()],
             );
         }
     }

@@ -75,6 +75,14 @@ impl Fields {
         fields
     }
 
+    /// As if nothing deformed.
+    pub fn none(scene: &Scene) -> Self {
+        Self {
+            values: Vec::new(),
+            slots: vec![None; scene.instances.len()],
+        }
+    }
+
     fn append(&mut self, made: &Made) -> Slots {
         let first = self.values.len() as u32;
         let header = made.grid.header();

@@ -11,6 +11,7 @@ pub mod matching;
 pub mod memory;
 mod passes;
 pub mod placement;
+mod read_out;
 mod resize;
 pub mod rounds;
 pub mod shaders;
@@ -31,6 +32,7 @@ use contact::Touch;
 use fusion::{Fused, Tint};
 pub use memory::Memory;
 use passes::{Passes, frame_constants};
+use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
 use stages::{Buffers, Kernels};
@@ -66,6 +68,7 @@ pub struct Simulator {
     /// Once the anatomy was looked at.
     surveyor: Option<Surveyor>,
     tinted_on: Option<(Image, Tint)>,
+    read_out: ReadOut,
     update_time: Duration,
 }
 
@@ -122,6 +125,7 @@ impl Simulator {
             shown_on: None,
             surveyor: None,
             tinted_on: None,
+            read_out: ReadOut::default(),
             update_time: Duration::ZERO,
             passes: Passes {
                 kernels: Kernels::new(device, library, &world, false)?,
@@ -181,6 +185,7 @@ impl Simulator {
             let tinted = passes.tint(&mut cmd, tint)?;
             cmd.copy_to_image(tinted, image)?;
         }
+        self.read_out.record(&mut cmd, passes.pixels(self.fused))?;
         cmd.submit()?;
         Ok(self.frames.take_timings())
     }
@@ -282,16 +287,20 @@ impl Simulator {
     /// # Errors
     /// What Vulkan says.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
-        self.frames.wait()?;
-        let pixels = self.passes.pixels(self.fused);
-        let bytes = self.device.read_back(pixels)?;
-        let size =
-            4 * self.passes.frame.image_width as usize * self.passes.frame.image_height as usize;
-        Ok((
+        let (width, height) = (
             self.passes.frame.image_width,
             self.passes.frame.image_height,
-            bytes[..size].to_vec(),
-        ))
+        );
+        let mut bytes = vec![0; 4 * width as usize * height as usize];
+        match self.read_out.take() {
+            Some(copy) => self.frames.read(copy, &mut bytes)?,
+            None => {
+                self.frames.wait()?;
+                let pixels = self.passes.pixels(self.fused);
+                self.device.read_into(pixels, 0, &mut bytes)?;
+            }
+        }
+        Ok((width, height, bytes))
     }
 
     /// What the user should know of how the scene was uploaded.

@@ -30,6 +30,7 @@ impl Simulator {
         (passes.frame, passes.batches) = (frame, batches);
         self.tables = tables;
         self.settings = Settings::of(scene);
+        self.read_out = super::ReadOut::default();
         self.upload_tables()?;
         Ok(true)
     }

@@ -1,8 +1,14 @@
 //! Which of the two tracers finds the surfaces.
 
 use std::fmt;
+use std::sync::Arc;
 
+use super::shaders::Library;
 use crate::gpu::{AdapterKind, Device};
+use crate::scene::Scene;
+pub use trial::Trial;
+
+mod trial;
 
 /// How rays find surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,12 +22,27 @@ pub enum Tracer {
 impl Tracer {
     /// The wanted tracer; without a wish the device's ray query where it has one in hardware, else
     /// the compute hierarchy, which is two to three times as fast as ray queries that a driver on
-    /// the processor emulates (benches/RESULTS.md); with a line that says why where there are none.
-    pub fn choose(wanted: Option<Self>, device: &Device) -> (Self, Option<String>) {
+    /// the processor emulates (benches/RESULTS.md); with a line that says why where there are none. A
+    /// ray query is tried first on the scene's own rays; where the device keeps anything from one start
+    /// to the next, once per geometry.
+    pub fn choose(
+        wanted: Option<Self>,
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+    ) -> (Self, Option<String>) {
         match wanted {
             Some(tracer) => (tracer, None),
             None if device.info().kind == AdapterKind::Cpu => (Self::Bvh, None),
-            None if device.supports_ray_query() => (Self::RayQuery, None),
+            None if device.supports_ray_query() => match tried(device, library, scene) {
+                Ok(()) => (Self::RayQuery, None),
+                Err(why) => {
+                    let name = device.name();
+                    let why =
+                        format!("tracing with the compute BVH: the ray query of '{name}' {why}");
+                    (Self::Bvh, Some(why))
+                }
+            },
             None => {
                 let why = format!(
                     "tracing with the compute BVH: '{}' has no ray queries",
@@ -38,6 +59,25 @@ impl Tracer {
             Self::RayQuery => "query",
             Self::Bvh => "bvh",
         }
+    }
+}
+
+/// Whether the device's ray query finds what it should; the error completes "the ray query ...".
+fn tried(device: &Arc<Device>, library: &Library, scene: &Scene) -> Result<(), String> {
+    let id = trial::id(library, scene);
+    if device.remembers(id) {
+        return Ok(());
+    }
+    match Trial::run(device, library, scene) {
+        Ok(trial) if trial.passed() => {
+            device.remember(id);
+            Ok(())
+        }
+        Ok(trial) => Err(format!(
+            "meets other surfaces on {} of {} rays; --tracer ray-query takes it all the same",
+            trial.different, trial.rays
+        )),
+        Err(error) => Err(format!("cannot be tried: {error}")),
     }
 }
 

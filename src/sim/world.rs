@@ -71,7 +71,7 @@ impl Kernels {
     /// # Errors
     /// A kernel that the device refuses.
     pub fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
-        let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
+        let kernel = |stem: &str| Kernel::when_needed(device, stem, library.words(stem), &[]);
         Ok(Self {
             interpolate: kernel("interpolate")?,
             refit: kernel("refit")?,
@@ -105,7 +105,8 @@ impl World {
         Self::with_fields(device, kernels, scene, tracer, Fields::build(scene), apart)
     }
 
-    fn with_fields(
+    /// As [`Self::new`], with displacement fields made before.
+    pub(super) fn with_fields(
         device: &Arc<Device>,
         kernels: &Arc<Kernels>,
         scene: &Scene,
@@ -118,6 +119,17 @@ impl World {
             && tracer == Tracer::RayQuery
         {
             return Err(WorldError::Union(node.name.clone()));
+        }
+        // What the first update runs is compiled meanwhile.
+        if scene
+            .instances
+            .iter()
+            .any(|i| i.keyframes.strategy.needs_shared_topology())
+        {
+            kernels.interpolate.prepare();
+            if tracer == Tracer::Bvh {
+                kernels.refit.prepare();
+            }
         }
         let sets = Sets::new(scene, &apart);
         let arrays = Arrays::with_sets(scene, tracer, fields, sets)?;

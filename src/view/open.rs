@@ -112,7 +112,7 @@ impl Open {
         plan: &mut Plan,
     ) -> Result<(Self, ValidationLog), ViewError> {
         let window = session::window(events, &plan.scene.name)?;
-        let device = session::device(&plan.options)?;
+        let device = session::device(&plan.options, &window)?;
         let (options, now) = (&plan.options, Instant::now());
         let scene = plan.scene.clone();
         let file = File::new(options.file.clone(), options.overrides.clone(), &scene);
@@ -181,7 +181,7 @@ impl Open {
         drop((frame, pictured));
         state.tools.lose();
         drop(session);
-        let device = session::device(&plan.options)?;
+        let device = session::device(&plan.options, &window)?;
         // Its texture is gone with the device.
         state.mmode = Default::default();
         state.problem = Some(format!("{error}. It was opened again."));

@@ -1,6 +1,7 @@
 //! A scene that is read while the window goes on.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Instant;
 
@@ -52,7 +53,7 @@ impl Opening {
     pub(super) fn ready(
         &self,
         options: &Options,
-        device: &Device,
+        device: &Arc<Device>,
         now: Instant,
     ) -> Option<Result<Opened, String>> {
         let loaded = self.loaded.try_recv().ok()?;
@@ -77,11 +78,11 @@ pub(super) fn suited(
     mut scene: Scene,
     file: File,
     options: &Options,
-    device: &Device,
+    device: &Arc<Device>,
     seconds: f64,
     now: Instant,
 ) -> Result<Opened, Refusal> {
-    let tracer = (options.prepare)(device, &mut scene.simulation)?;
+    let tracer = (options.prepare)(device, &mut scene)?;
     let model = Model::new(&scene, file, tracer, seconds, now);
     Ok(Opened { scene, model })
 }

@@ -9,7 +9,7 @@ use super::engine::Engine;
 use super::link::Link;
 use super::model::Order;
 use super::{Options, ViewError};
-use crate::gpu::{Device, DeviceOptions, Painter};
+use crate::gpu::{Device, Painter};
 use crate::scene::Scene;
 
 /// There is news of the simulation, or of a device.
@@ -35,11 +35,8 @@ pub(super) fn window(events: &ActiveEventLoop, title: &str) -> Result<Arc<Window
 }
 
 /// The device that was asked for, for a window.
-pub(super) fn device(options: &Options) -> Result<Arc<Device>, ViewError> {
-    Ok(Device::new(&DeviceOptions {
-        window: true,
-        ..options.device.clone()
-    })?)
+pub(super) fn device(options: &Options, window: &Window) -> Result<Arc<Device>, ViewError> {
+    Ok(Device::for_window(&options.device, window)?)
 }
 
 impl Session {

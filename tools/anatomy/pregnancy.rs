@@ -88,8 +88,9 @@ fn sweep(path: &Path) -> Result<Volume, String> {
         println!("{warning}");
     }
     let device = Device::new(&DeviceOptions::default()).map_err(|e| e.to_string())?;
-    let (tracer, _) = Tracer::choose(None, &device);
-    let simulator = Simulator::new(&device, &Library::embedded(), &scene, tracer);
+    let library = Library::embedded();
+    let (tracer, _) = Tracer::choose(None, &device, &library, &scene);
+    let simulator = Simulator::new(&device, &library, &scene, tracer);
     let mut simulator = simulator.map_err(|e| e.to_string())?;
     let (extent, frames) = SWEEP;
     let stations = Sweep::Linear(extent).stations(&scene, frames, 20.0);

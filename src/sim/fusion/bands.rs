@@ -37,7 +37,7 @@ pub(super) struct Images<'a> {
 
 impl Kernels {
     pub(super) fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
-        let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
+        let kernel = |stem: &str| Kernel::when_needed(device, stem, library.words(stem), &[]);
         Ok(Self {
             difference: kernel("difference")?,
             reduce: kernel("reduce")?,

@@ -37,7 +37,7 @@ impl Kernels {
         library: &Library,
         tracer: Tracer,
     ) -> Result<Self, GpuError> {
-        let kernel = |stem: &str| Kernel::new(device, stem, library.words(stem), &[]);
+        let kernel = |stem: &str| Kernel::when_needed(device, stem, library.words(stem), &[]);
         Ok(Self {
             shadow: kernel(&format!("shadow_{}", tracer.suffix()))?,
             darken: kernel("darken")?,

@@ -38,7 +38,7 @@ impl Tinting {
     }
 
     pub(super) fn kernel(device: &Arc<Device>, library: &Library) -> Result<Kernel, GpuError> {
-        Kernel::new(device, "tint", library.words("tint"), &[])
+        Kernel::when_needed(device, "tint", library.words("tint"), &[])
     }
 
     fn fit(&mut self, device: &Arc<Device>) -> Result<(), GpuError> {

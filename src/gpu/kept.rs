@@ -1,0 +1,282 @@
+//! Compiled pipelines, kept in a folder from one start to the next, and word of it where a start has
+//! to compile.
+//!
+//! Drivers keep compiled kernels themselves, but not all, and not everywhere (containers, MoltenVK).
+//! One file per device and driver holds the driver's own pipeline cache and which kernels have run
+//! there before. A file that is broken, or of another device, is no error: its kernels are compiled
+//! again.
+
+use std::collections::BTreeSet;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+use std::time::Duration;
+
+use ash::vk;
+
+/// First bytes of a file; the number counts the format's versions.
+const MAGIC: &[u8] = b"insonify pipelines 1\n";
+
+/// Largest file that is written or read, bytes.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// Files kept at most: one per device and driver version. The oldest go first.
+const MAX_FILES: usize = 8;
+
+/// After so long a wait the user is told what for.
+const PATIENCE: Duration = Duration::from_secs(1);
+
+/// Where this program keeps what it can make again: a folder of its own in the user's cache folder;
+/// none where the system names none.
+pub fn cache_folder() -> Option<PathBuf> {
+    dirs::cache_dir().map(|folder| folder.join("insonify").join("pipelines"))
+}
+
+/// Whether Mesa, which compiles for the processor when a kernel first runs, has nothing from before. It
+/// makes the folder when a device is opened.
+pub(crate) fn llvmpipe_has_nothing() -> bool {
+    let named = |name| std::env::var_os(name).map(PathBuf::from);
+    let folder = named("MESA_SHADER_CACHE_DIR").or_else(dirs::cache_dir);
+    let ours = |entry: fs::DirEntry| {
+        let name = entry.file_name();
+        name.to_string_lossy().starts_with("mesa_shader_cache")
+    };
+    let entries = folder.and_then(|folder| fs::read_dir(folder).ok());
+    !entries.is_some_and(|mut entries| entries.any(|entry| entry.is_ok_and(ours)))
+}
+
+/// The pipeline cache of a device, and what of it is on disk.
+pub(crate) struct Kept {
+    raw: ash::Device,
+    cache: vk::PipelineCache,
+    device: String,
+    /// Nothing is kept without one.
+    file: Option<PathBuf>,
+    /// Kernels that have run on this device with this driver, and what else was to be remembered of
+    /// them.
+    known: Mutex<BTreeSet<u64>>,
+    /// The user knows what takes so long.
+    told: Arc<AtomicBool>,
+}
+
+impl Kept {
+    /// Takes over what `folder` has for a device; `forgotten`: the driver has nothing any more of what
+    /// it compiled before.
+    pub(crate) fn new(
+        raw: &ash::Device,
+        properties: &vk::PhysicalDeviceProperties,
+        device: &str,
+        folder: Option<&Path>,
+        forgotten: bool,
+    ) -> Result<Self, vk::Result> {
+        let file = folder.map(|folder| folder.join(file_name(properties)));
+        let (mut known, mut data) = (BTreeSet::new(), Vec::new());
+        match file.as_ref().map(|file| read(file, properties)) {
+            Some(Ok(Some(content))) => (known, data) = content,
+            Some(Err(problem)) => {
+                let file = file.as_ref().map(|f| f.display().to_string());
+                eprintln!(
+                    "{}: {problem}; its kernels are compiled again",
+                    file.unwrap_or_default()
+                );
+            }
+            Some(Ok(None)) | None => {}
+        }
+        if forgotten {
+            known.clear();
+        }
+        let info = vk::PipelineCacheCreateInfo::default().initial_data(&data);
+        // SAFETY: the data is empty or what this device and driver gave, whole by its check sum.
+        let cache = unsafe { raw.create_pipeline_cache(&info, None) }?;
+        Ok(Self {
+            raw: raw.clone(),
+            cache,
+            device: device.to_owned(),
+            file,
+            known: Mutex::new(known),
+            told: Arc::default(),
+        })
+    }
+
+    pub(crate) fn cache(&self) -> vk::PipelineCache {
+        self.cache
+    }
+
+    /// A set stays usable after a panic elsewhere, so poisoning is ignored.
+    fn known(&self) -> MutexGuard<'_, BTreeSet<u64>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Whether it was learnt.
+    pub(crate) fn knows(&self, what: u64) -> bool {
+        self.known().contains(&what)
+    }
+
+    /// Whether a kernel has never run here before; nobody knows where nothing is kept.
+    pub(crate) fn is_new(&self, kernel: u64) -> bool {
+        self.file.is_some() && !self.known().contains(&kernel)
+    }
+
+    /// Tells the user what takes so long, once, if what is returned is not dropped within a second
+    /// and one of `kernels` is new here.
+    pub(crate) fn patience(&self, kernels: impl IntoIterator<Item = u64>) -> Option<Patience> {
+        let new = kernels.into_iter().any(|kernel| self.is_new(kernel));
+        if !new || self.told.load(Ordering::Relaxed) {
+            return None;
+        }
+        let (done, wait) = mpsc::channel::<()>();
+        let (device, told) = (self.device.clone(), self.told.clone());
+        thread::spawn(move || {
+            let late = wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout);
+            if late && !told.swap(true, Ordering::Relaxed) {
+                eprintln!("compiling kernels for {device}, the first time only");
+            }
+        });
+        Some(Patience { _done: done })
+    }
+
+    /// These kernels have run; what the driver made of them is written if any is new.
+    pub(crate) fn learn(&self, kernels: impl IntoIterator<Item = u64>) {
+        let Some(file) = &self.file else { return };
+        let mut known = self.known();
+        let before = known.len();
+        known.extend(kernels);
+        if known.len() == before {
+            return;
+        }
+        // SAFETY: the cache is alive and synchronises itself.
+        let data = unsafe { self.raw.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
+        if let Err(error) = write(file, &encode(&known, &data)) {
+            eprintln!("compiled kernels are not kept: {}: {error}", file.display());
+        }
+    }
+
+    /// Destroys the cache.
+    ///
+    /// # Safety
+    /// The device is alive and makes no pipelines any more.
+    pub(crate) unsafe fn destroy(&self) {
+        // SAFETY: by the contract above.
+        unsafe { self.raw.destroy_pipeline_cache(self.cache, None) };
+    }
+}
+
+/// Dropped when the wait is over.
+pub(crate) struct Patience {
+    _done: Sender<()>,
+}
+
+/// One name per device, driver and driver version.
+fn file_name(properties: &vk::PhysicalDeviceProperties) -> String {
+    let hex = |bytes: &[u8]| -> String { bytes.iter().map(|b| format!("{b:02x}")).collect() };
+    format!(
+        "{:x}-{:x}-{:x}-{}.bin",
+        properties.vendor_id,
+        properties.device_id,
+        properties.driver_version,
+        hex(&properties.pipeline_cache_uuid)
+    )
+}
+
+/// Known kernels and the driver's data.
+type Content = (BTreeSet<u64>, Vec<u8>);
+
+fn check_sum(bytes: &[u8]) -> u64 {
+    crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(bytes)
+}
+
+/// Magic, check sum of what follows, number of kernels, their ids, the driver's data.
+fn encode(known: &BTreeSet<u64>, data: &[u8]) -> Vec<u8> {
+    let mut rest = (known.len() as u64).to_le_bytes().to_vec();
+    rest.extend(known.iter().flat_map(|id| id.to_le_bytes()));
+    rest.extend(data);
+    let mut out = MAGIC.to_vec();
+    out.extend(check_sum(&rest).to_le_bytes());
+    out.extend(rest);
+    out
+}
+
+/// The content of a file; none where it is broken.
+fn decode(bytes: &[u8]) -> Option<Content> {
+    let (sum, rest) = bytes.strip_prefix(MAGIC)?.split_first_chunk::<8>()?;
+    if check_sum(rest) != u64::from_le_bytes(*sum) {
+        return None;
+    }
+    let (count, rest) = rest.split_first_chunk::<8>()?;
+    let bytes = usize::try_from(u64::from_le_bytes(*count))
+        .ok()?
+        .checked_mul(8)?;
+    let (ids, data) = rest.split_at_checked(bytes)?;
+    let (ids, _) = ids.as_chunks::<8>();
+    let known = ids.iter().map(|id| u64::from_le_bytes(*id)).collect();
+    Some((known, data.to_vec()))
+}
+
+/// Whether a pipeline cache's header names this device: drivers should look themselves, and not all do.
+fn is_of(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
+    let word = |at: usize| {
+        let bytes = data.get(4 * at..4 * at + 4)?;
+        Some(u32::from_le_bytes(bytes.try_into().ok()?))
+    };
+    let version = vk::PipelineCacheHeaderVersion::ONE.as_raw() as u32;
+    data.is_empty()
+        || (word(1) == Some(version)
+            && word(2) == Some(properties.vendor_id)
+            && word(3) == Some(properties.device_id)
+            && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..]))
+}
+
+/// What a file holds for a device; nothing where there is no file, and a problem where it cannot be used.
+fn read(
+    file: &Path,
+    properties: &vk::PhysicalDeviceProperties,
+) -> Result<Option<Content>, &'static str> {
+    let Ok(about) = fs::metadata(file) else {
+        return Ok(None);
+    };
+    if about.len() > MAX_BYTES {
+        return Err("kept kernels of more than 64 MiB are ignored");
+    }
+    let bytes = fs::read(file).map_err(|_| "kept kernels cannot be read")?;
+    let content = decode(&bytes).ok_or("kept kernels are broken")?;
+    match is_of(&content.1, properties) {
+        true => Ok(Some(content)),
+        false => Err("kept kernels are of another device or driver"),
+    }
+}
+
+/// Writes a file as a whole or not at all, whoever else does at the same time.
+fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(std::io::Error::other("more than 64 MiB"));
+    }
+    let folder = file.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)?;
+    let part = file.with_extension(format!("{}.part", std::process::id()));
+    fs::write(&part, bytes)
+        .and_then(|()| fs::rename(&part, file))
+        .inspect_err(|_| drop(fs::remove_file(&part)))?;
+    forget_oldest(folder)
+}
+
+fn forget_oldest(folder: &Path) -> std::io::Result<()> {
+    let mut files: Vec<_> = fs::read_dir(folder)?
+        .filter_map(Result::ok)
+        .filter(|entry| entry.path().extension().is_some_and(|e| e == "bin"))
+        .filter_map(|entry| Some((entry.metadata().ok()?.modified().ok()?, entry.path())))
+        .collect();
+    files.sort();
+    let excess = files.len().saturating_sub(MAX_FILES);
+    // Another process may have been faster.
+    files[..excess]
+        .iter()
+        .for_each(|(_, file)| drop(fs::remove_file(file)));
+    Ok(())
+}
+
+#[cfg(test)]
+#[path = "kept_tests.rs"]
+mod tests;
