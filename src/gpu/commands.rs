@@ -134,6 +134,11 @@ impl<'a> Commands<'a> {
         }
     }
 
+    /// What follows is made whatever happens: see [`super::Frames::abandon_when`].
+    pub fn keep_on(&mut self) {
+        self.slot.abandon = None;
+    }
+
     /// Keeps `object` alive until the submission has finished and, while validating, notes that
     /// `stage` reads or writes it.
     pub(crate) fn uses<T: Send + Sync + 'static>(
@@ -227,6 +232,7 @@ impl<'a> Commands<'a> {
             return Ok(());
         };
         let (boxes, each_ms) = pieces.cut(&self.scope, groups, kernel.counts_groups());
+        self.slot.count_groups(&self.scope, groups);
         for piece in boxes {
             let full = self.slot.pieces.as_mut().is_some_and(|p| p.add(each_ms));
             if full {

@@ -2,7 +2,8 @@
 //!
 //! A queue runs in order, so a window that submits behind a frame of a second waits for a second.
 //! In pieces of a few milliseconds, of which no more than two are ever handed over, it waits for
-//! two of them. How long a dispatch takes is known from the frame before.
+//! two of them. How long a dispatch takes follows from what one of its work groups took in the frame
+//! before, which may have had fewer of them.
 
 use std::collections::HashMap;
 
@@ -21,8 +22,10 @@ pub(crate) type Groups = [[u32; 3]; 2];
 /// How much the piece that is being recorded holds, and what is known of the dispatches to come.
 #[derive(Default)]
 pub(crate) struct Pieces {
-    /// Mean time of one scope of each name, ms.
-    mean_ms: HashMap<String, f64>,
+    /// Mean time of one work group in scopes of each name, ms.
+    group_ms: HashMap<String, f64>,
+    /// Work groups of this frame by scope.
+    groups: HashMap<String, f64>,
     /// What the commands recorded since the last cut will take, ms.
     load_ms: f64,
 }
@@ -31,22 +34,29 @@ impl Pieces {
     /// Starts over.
     pub(crate) fn begin(&mut self) {
         self.load_ms = 0.0;
+        self.groups.clear();
+    }
+
+    /// Notes a dispatch of `scope`.
+    pub(crate) fn count(&mut self, scope: &str, groups: [u32; 3]) {
+        *self.groups.entry(scope.to_owned()).or_default() += product(groups);
     }
 
     /// Takes over what the last frame took.
     pub(crate) fn learn(&mut self, timings: &FrameTimings) {
-        self.mean_ms.clear();
-        for (name, _) in &timings.passes {
-            let count = timings.passes.iter().filter(|(n, _)| n == name).count();
-            let mean = timings.of(name) / count as f64;
-            self.mean_ms.insert(name.clone(), mean);
+        for (name, groups) in &self.groups {
+            let each = timings.of(name) / groups;
+            if each.is_finite() {
+                self.group_ms.insert(name.clone(), each);
+            }
         }
     }
 
     /// Cuts a dispatch of `scope` into boxes; `whole` kernels know the number of groups along y and
     /// z and are only cut along x.
     pub(crate) fn cut(&self, scope: &str, groups: [u32; 3], whole: bool) -> (Vec<Groups>, f64) {
-        let (count, each_ms) = match self.mean_ms.get(scope) {
+        let known = self.group_ms.get(scope);
+        let (count, each_ms) = match known.map(|each| each * product(groups)) {
             Some(ms) => {
                 let count = (ms / PIECE_MS).ceil().max(1.0);
                 (count as usize, ms / count)
@@ -62,6 +72,10 @@ impl Pieces {
         self.load_ms = if full { ms } else { self.load_ms + ms };
         full
     }
+}
+
+fn product(groups: [u32; 3]) -> f64 {
+    groups.map(f64::from).iter().product()
 }
 
 /// About `count` boxes of equal size that fill `groups`, cut along x, and along y where x is spent.
@@ -133,9 +147,14 @@ mod tests {
             ("trace".into(), 22.0),
             ("beam".into(), 3.0),
         ];
+        for (scope, width) in [("trace", 64), ("trace", 64), ("beam", 64)] {
+            pieces.count(scope, [width, 1, 1]);
+        }
         pieces.learn(&FrameTimings { frame: 0, passes });
         let (boxes, each) = pieces.cut("trace", [64, 1, 1], false);
         assert_eq!((boxes.len(), each), (3, 7.0));
+        let (boxes, _) = pieces.cut("trace", [64, 8, 1], false);
+        assert_eq!(boxes.len(), 22, "a frame of eight times as many groups");
         assert_eq!(pieces.cut("beam", [64, 1, 1], false).0.len(), 1);
         pieces.begin();
         assert!(

@@ -48,6 +48,8 @@ pub struct Governor {
     came_from: Option<usize>,
     /// The coarsest level that has failed.
     failed: Option<usize>,
+    /// What frames took at the level before, ms.
+    left: Option<f64>,
 }
 
 impl Governor {
@@ -67,6 +69,7 @@ impl Governor {
             patience: PATIENCE[0],
             came_from: None,
             failed: None,
+            left: None,
         }
     }
 
@@ -104,6 +107,11 @@ impl Governor {
         median(last.copied().collect())
     }
 
+    /// What frames at the present level take, ms; none before there are enough of them.
+    pub fn pace(&self) -> Option<f64> {
+        self.known[self.level].or(self.left)
+    }
+
     /// What a frame of a level is thought to take, ms: what it took, else what follows from two others
     /// that are known, else in proportion to its work. None before the first frame.
     fn expected(&self, level: usize) -> Option<f64> {
@@ -114,7 +122,9 @@ impl Governor {
         let mut known: Vec<(f64, f64)> = self.known_works().collect();
         known.sort_by(|a, b| (a.0 - work).abs().total_cmp(&(b.0 - work).abs()));
         let &(near, ms) = known.first()?;
-        let slope = known.get(1).map(|&(far, other)| (ms - other) / (near - far));
+        let slope = known
+            .get(1)
+            .map(|&(far, other)| (ms - other) / (near - far));
         let slope = slope.filter(|slope| (0.0..=ms / near).contains(slope));
         Some(ms + slope.unwrap_or(ms / near) * (work - near))
     }
@@ -208,6 +218,7 @@ impl Governor {
     }
 
     fn go(&mut self, level: usize) {
+        self.left = self.median();
         self.level = level;
         self.times.clear();
         self.frames = 0;
@@ -245,7 +256,11 @@ mod tests {
     const WORKS: [f64; 8] = [1.0, 0.6, 0.36, 0.22, 0.12, 0.07, 0.04, 0.02];
 
     /// Levels of `count` frames on a device where a frame takes `cost` of level and number.
-    fn run(governor: &mut Governor, count: usize, cost: impl Fn(usize, usize) -> f64) -> Vec<usize> {
+    fn run(
+        governor: &mut Governor,
+        count: usize,
+        cost: impl Fn(usize, usize) -> f64,
+    ) -> Vec<usize> {
         let frame = |index| {
             let level = governor.level();
             governor.finished(level, cost(level, index));
@@ -279,7 +294,10 @@ mod tests {
             let cost = device(whole);
             let last = *levels.last().unwrap();
             assert!(cost(last, 0) <= 66.0 * 1.1, "{whole}: {levels:?}");
-            assert!(last == 0 || cost(last - 1, 0) > 66.0 * 0.75, "{whole}: {levels:?}");
+            assert!(
+                last == 0 || cost(last - 1, 0) > 66.0 * 0.75,
+                "{whole}: {levels:?}"
+            );
             assert!(changes(&levels[30..]) == 0, "{whole}: {levels:?}");
         }
     }
@@ -360,7 +378,10 @@ mod tests {
         assert_eq!(governor.refined(next), Some(0));
         // What the frames at rest took is learned, and the level that was chosen stays.
         governor.finished(0, 300.0);
-        assert_eq!((governor.level(), governor.refined(shown)), (shown, Some(0)));
+        assert_eq!(
+            (governor.level(), governor.refined(shown)),
+            (shown, Some(0))
+        );
     }
 
     #[test]

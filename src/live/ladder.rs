@@ -1,8 +1,12 @@
-//! The levels that a scene can be imaged at, from its own down to about a fiftieth of the work.
+//! The levels that a scene can be imaged at, from its own down to about a twentieth of the work.
+
+use std::fmt;
+
+use serde_json::{Value, json};
 
 use crate::probe::Probe;
-use crate::scene::settings::{Imaging, Simulation};
 use crate::scene::Scene;
+use crate::scene::settings::{Imaging, Simulation};
 
 /// Fewest scanlines that still show a sector.
 const LEAST_SCANLINES: u32 = 48;
@@ -89,13 +93,31 @@ impl Level {
 
     /// Gives a scene these counts.
     pub fn apply(&self, scene: &mut Scene) {
-        scene.probe.scanlines = self.scanlines;
-        scene.probe.elevation_layers = self.layers;
-        scene.probe.samples = self.samples;
-        scene.simulation.paths = self.paths;
-        scene.simulation.max_reflections = self.reflections;
-        scene.simulation.volume_floor = self.volume_floor;
-        scene.imaging.image_height = self.image_height;
+        self.set(&mut scene.probe, &mut scene.simulation, &mut scene.imaging);
+    }
+
+    /// Gives settings these counts.
+    pub fn set(&self, probe: &mut Probe, simulation: &mut Simulation, imaging: &mut Imaging) {
+        probe.scanlines = self.scanlines;
+        probe.elevation_layers = self.layers;
+        probe.samples = self.samples;
+        simulation.paths = self.paths;
+        simulation.max_reflections = self.reflections;
+        simulation.volume_floor = self.volume_floor;
+        imaging.image_height = self.image_height;
+    }
+
+    /// Its counts, as sidecars and `--json` say them.
+    pub fn json(&self) -> Value {
+        json!({
+            "scanlines": self.scanlines,
+            "elevation_layers": self.layers,
+            "samples": self.samples,
+            "paths": self.paths,
+            "max_reflections": self.reflections,
+            "volume_floor_db": self.volume_floor,
+            "image_height": self.image_height,
+        })
     }
 
     /// Work relative to `own`, by a rough count: what stages take of a frame of the scene's own counts,
@@ -108,6 +130,25 @@ impl Level {
         let samples = share(self.scanlines, own.scanlines) * share(self.samples, own.samples);
         let rows = share(self.image_height, own.image_height);
         0.35 * rays + 0.45 * lines + 0.15 * samples + 0.05 * rows * rows
+    }
+}
+
+impl fmt::Display for Level {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            scanlines,
+            layers,
+            samples,
+            paths,
+            reflections,
+            image_height,
+            ..
+        } = self;
+        write!(
+            f,
+            "{scanlines} lines x {layers} layers x {samples} samples, {paths} paths, \
+             {reflections} reflections, {image_height} rows"
+        )
     }
 }
 
@@ -129,12 +170,7 @@ impl Ladder {
         )
     }
 
-    fn new(
-        probe: &Probe,
-        simulation: &Simulation,
-        imaging: &Imaging,
-        keeps_picture: bool,
-    ) -> Self {
+    fn new(probe: &Probe, simulation: &Simulation, imaging: &Imaging, keeps_picture: bool) -> Self {
         let own = Level::of(probe, simulation, imaging);
         let sigma = probe.sigma_axial() * imaging.psf_scale[0];
         let least_samples = (LEAST_SIGMA_SAMPLES * probe.depth / sigma).ceil() as u32;
@@ -227,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn the_last_level_costs_a_fiftieth_where_there_are_layers_to_leave_out() {
+    fn the_last_level_costs_a_twentieth_where_there_are_layers_to_leave_out() {
         let probe = Probe {
             scanlines: 192,
             elevation_layers: 7,
@@ -236,7 +272,7 @@ mod tests {
         };
         let works = ladder(&probe, false).works();
         let last = works.last().copied().unwrap();
-        assert!((1.0 / 80.0..1.0 / 25.0).contains(&last), "{works:?}");
+        assert!((1.0 / 40.0..1.0 / 15.0).contains(&last), "{works:?}");
     }
 
     #[test]
@@ -255,7 +291,12 @@ mod tests {
             ..Probe::abdominal()
         };
         let ladder = ladder(&small, false);
-        assert!(ladder.levels().iter().all(|l| l.scanlines == 32 && l.layers == 1));
+        assert!(
+            ladder
+                .levels()
+                .iter()
+                .all(|l| l.scanlines == 32 && l.layers == 1)
+        );
     }
 
     #[test]

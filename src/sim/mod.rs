@@ -23,8 +23,9 @@ pub mod world;
 use std::sync::Arc;
 use std::time::Duration;
 
-use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Image};
+use crate::gpu::{Abandon, AdapterKind, Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
+use crate::scene::settings::Machine;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use contact::Touch;
 use fusion::{Fused, Tint};
@@ -32,7 +33,7 @@ pub use memory::Memory;
 use passes::{Passes, frame_constants};
 pub use resize::image_size;
 use shaders::Library;
-use stages::{Buffers, Kernels};
+use stages::{Buffers, Kernels, SEGMENT_BUDGET};
 use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
@@ -49,6 +50,14 @@ pub enum SimError {
     World(#[from] world::WorldError),
 }
 
+/// What does the work on a device.
+pub fn machine(device: &Device) -> Machine {
+    match device.info().kind {
+        AdapterKind::Cpu => Machine::Software,
+        _ => Machine::Gpu,
+    }
+}
+
 /// A scene on the device, ready to be imaged frame by frame.
 pub struct Simulator {
     device: Arc<Device>,
@@ -57,6 +66,7 @@ pub struct Simulator {
     coincident: bool,
     settings: Settings,
     tables: Tables,
+    shelf: Shelf,
     counting: bool,
     /// Whether the last frame was mixed with an acquired volume.
     fused: bool,
@@ -66,6 +76,27 @@ pub struct Simulator {
     surveyor: Option<Surveyor>,
     tinted_on: Option<(Image, Tint)>,
     update_time: Duration,
+}
+
+/// Tables of settings that were left, for as long as they may come back: levels of quality take turns.
+#[derive(Default)]
+struct Shelf(Vec<(Settings, Tables)>);
+
+impl Shelf {
+    /// More than levels of quality.
+    const MOST: usize = 12;
+
+    fn take(&mut self, settings: &Settings) -> Option<Tables> {
+        let at = self.0.iter().position(|(made_of, _)| made_of == settings)?;
+        Some(self.0.remove(at).1)
+    }
+
+    fn put(&mut self, settings: Settings, tables: Tables) {
+        if self.0.len() == Self::MOST {
+            self.0.remove(0);
+        }
+        self.0.push((settings, tables));
+    }
 }
 
 /// What the tables on the device were made of.
@@ -106,7 +137,7 @@ impl Simulator {
         let shapers = Arc::new(world::Kernels::new(device, library)?);
         let world = World::new(device, &shapers, scene, tracer)?;
         let coincident = scene.coincident_triangles() > 0;
-        let (frame, batches) = frame_constants(scene, &world, coincident, 0);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0, SEGMENT_BUDGET);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &tables)?;
         let fusion = Fused::new(device, library, scene, &frame, tracer)?;
@@ -116,6 +147,7 @@ impl Simulator {
             coincident,
             settings: Settings::of(scene),
             tables,
+            shelf: Shelf::default(),
             counting: false,
             fused: false,
             shown_on: None,
@@ -130,6 +162,7 @@ impl Simulator {
                 touch: None,
                 world,
                 frame,
+                shown: frame,
                 batches,
             },
         };
@@ -171,6 +204,8 @@ impl Simulator {
         passes.beam(&mut cmd)?;
         passes.axial(&mut cmd)?;
         passes.detect(&mut cmd)?;
+        // The picture before is replaced as a whole.
+        cmd.keep_on();
         passes.display(&mut cmd)?;
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
@@ -181,7 +216,15 @@ impl Simulator {
             cmd.copy_to_image(tinted, image)?;
         }
         cmd.submit()?;
+        passes.shown = passes.frame;
         Ok(self.frames.take_timings())
+    }
+
+    /// Frames and surveys to come are made only as long as nothing newer is wanted: while they are being
+    /// recorded, which where the window shares the queue takes about as long as they do, `wanted_no_longer`
+    /// is asked now and then. They then fail with [`GpuError::Abandoned`], and the picture before stays.
+    pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
+        self.frames.abandon_when(wanted_no_longer);
     }
 
     /// Takes over settings and strategies that the device does not have yet, after the frames in flight.
@@ -190,9 +233,12 @@ impl Simulator {
         if settings != self.settings {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            self.tables = Tables::new(scene);
+            let tables = self.shelf.take(&settings);
+            let tables = tables.unwrap_or_else(|| Tables::new(scene));
+            let left = std::mem::replace(&mut self.tables, tables);
+            let before = std::mem::replace(&mut self.settings, settings);
+            self.shelf.put(before, left);
             self.upload_tables()?;
-            self.settings = settings;
         }
         if !self.passes.world.serves(scene) {
             self.frames.wait()?;
