@@ -21,7 +21,7 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
 }
 
 /// Waits for a sidecar, which is written last, and reads it.
-fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
+pub fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
     let file = folder.join(name);
     let mut found = None;
     desk.wait_for(name, |_| {
