@@ -15,7 +15,7 @@ use super::tools::Tools;
 /// Height of the bar, points.
 pub(super) const HEIGHT: f32 = 36.0;
 /// Room that speed and marks want beside the track, points.
-const WIDE: f32 = 540.0;
+const WIDE: f32 = 440.0;
 /// How fast a loop can be played.
 const SPEEDS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 
@@ -74,13 +74,9 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
         let back = cine.time_between(cursor, last).as_secs_f64();
         // Zero has no sign.
         let text = format!("{} / {}   {:.2} s", cursor + 1, cine.len(), 0.0 - back);
-        let quality = cine.shown().map(|frame| frame.grade.to_string());
         // As wide as it gets, so that the track stands still.
         ui.add_sized(vec2(118.0, 18.0), egui::Label::new(text))
             .on_hover_text("Image of the loop; time before the newest");
-        if let (Some(quality), true) = (quality, is_wide) {
-            ui.colored_label(style::FAINT, quality);
-        }
         track(ui, cine);
     });
 }
