@@ -10,6 +10,7 @@ pub mod acquire;
 pub mod gpu;
 pub mod harness;
 pub mod igtl;
+pub mod live;
 pub mod movie;
 pub mod npy;
 pub mod output;

@@ -7,13 +7,13 @@ use std::time::Instant;
 use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, miette};
 
-use insonify::gpu::{AdapterKind, Device, DeviceOptions, cache_folder};
+use insonify::gpu::{Device, DeviceOptions, cache_folder};
 use insonify::scene::Scene;
 use insonify::scene::file::override_of;
-use insonify::scene::settings::{Machine, Quality, Simulation};
+use insonify::scene::settings::{Quality, Simulation};
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
+use insonify::sim::{self, Simulator, Tracer};
 
 /// Arguments of every command that simulates.
 #[derive(Clone, Debug, clap::Args)]
@@ -189,12 +189,8 @@ fn set_quality(
         QualityChoice::Standard => Quality::Standard,
         QualityChoice::Reference => Quality::Reference,
     };
-    let machine = match device.info().kind {
-        AdapterKind::Cpu => Machine::Software,
-        _ => Machine::Gpu,
-    };
     let by_hand = simulation.clone();
-    simulation.set_quality(quality, machine);
+    simulation.set_quality(quality, sim::machine(device));
     for (key, _) in overrides {
         match key.as_str() {
             "simulation.paths" => simulation.paths = by_hand.paths,

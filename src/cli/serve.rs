@@ -10,11 +10,13 @@ use glam::DAffine3;
 use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common};
+use insonify::gpu::Device;
 use insonify::igtl::{self, Picture, Server, Status, Tracked};
+use insonify::live::{self, Level, Pace};
 use insonify::output;
 use insonify::scene::Scene;
-use insonify::sim::Simulator;
 use insonify::sim::shaders::Library;
+use insonify::sim::{self, Simulator};
 
 /// How long to rest where nothing has changed: a tracker sends 30 to 100 poses a second.
 const REST: Duration = Duration::from_millis(3);
@@ -71,21 +73,32 @@ pub fn run(args: &Serve) -> Result<()> {
         eprintln!("warning: {}", igtl::OPEN);
     }
     output::line(format!("listening at {} (OpenIGTLink)", server.address()));
-    simulate(&mut simulator, &mut scene, &server, args)?;
+    simulate(&mut simulator, &mut scene, &device, &server, args)?;
     common.validated(&device)
 }
 
-/// Makes an image whenever probe or anatomy have moved, and offers it to the clients.
+/// What the last image shows, and how finely.
+struct Shown {
+    state: (DAffine3, Vec<Placed>),
+    level: usize,
+    at: Instant,
+}
+
+/// Makes an image whenever probe or anatomy have moved, at a level of quality that keeps the budget, and
+/// finer ones once they rest; offers them to the clients.
 fn simulate(
     simulator: &mut Simulator,
     scene: &mut Scene,
+    device: &Device,
     server: &Server,
     args: &Serve,
 ) -> Result<()> {
     let began = Instant::now();
     let pause = Duration::from_secs_f64(1.0 / args.fps);
     let mut told = Told::default();
-    let mut shown = None;
+    let mut pace = Pace::new(sim::machine(device));
+    let own = Level::of(&scene.probe, &scene.simulation, &scene.imaging);
+    let mut shown: Option<Shown> = None;
     let mut frames = 0;
     let mut due = began;
     loop {
@@ -94,17 +107,37 @@ fn simulate(
         if let Some(pose) = server.pose().pose() {
             scene.world_from_probe = pose.world_from_probe;
         }
-        let now = Some(state(scene));
-        if now == shown || Instant::now() < due {
+        let now = state(scene);
+        let last = shown.as_ref().filter(|last| last.state == now);
+        let finer = last.filter(|last| last.at.elapsed() >= live::REST);
+        let finer = finer.and_then(|last| pace.refined(last.level));
+        if (last.is_some() && finer.is_none()) || Instant::now() < due {
             thread::sleep(REST);
             continue;
         }
-        due = Instant::now() + pause;
-        shown = now;
-        simulator.frame(scene, frames).into_diagnostic()?;
+        let start = Instant::now();
+        due = start + pause;
+        let level = finer.unwrap_or_else(|| pace.moving(scene));
+        pace.apply(level, scene);
+        // The scene's own image at rest is that of `render`.
+        let noise = match (level, finer) {
+            (0, Some(_)) => 0,
+            _ => frames,
+        };
+        simulator.frame(scene, noise).into_diagnostic()?;
         let (_, _, rgba) = simulator.pixels().into_diagnostic()?;
+        own.apply(scene);
+        // The first frame at all compiles what the driver has put off.
+        if frames > 0 {
+            pace.finished(level, start.elapsed().as_secs_f64() * 1e3);
+        }
         let picture = Picture::new(simulator.constants(), &rgba);
         server.publish(picture, &scene.world_from_probe);
+        shown = Some(Shown {
+            state: now,
+            level,
+            at: Instant::now(),
+        });
         frames += 1;
         if Some(frames) == args.frames {
             return Ok(());

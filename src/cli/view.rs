@@ -6,8 +6,7 @@ use std::sync::Arc;
 
 use miette::{IntoDiagnostic, Result};
 
-use super::common::{Common, QualityChoice};
-use insonify::gpu::AdapterKind;
+use super::common::Common;
 use insonify::scene::animation::Track;
 use insonify::scene::file;
 use insonify::sim::shaders::Library;
@@ -79,11 +78,6 @@ pub fn run(args: &View) -> Result<()> {
         }),
         captures: args.captures.clone(),
         prepare: Box::new(move |device, scene| {
-            let mut common = common.clone();
-            // The probe is to be moved, not waited for.
-            if device.info().kind == AdapterKind::Cpu {
-                common.quality.get_or_insert(QualityChoice::Draft);
-            }
             common.settle_simulation(&mut scene.simulation, device);
             Ok(common.tracer(device, scene)?)
         }),

@@ -134,6 +134,11 @@ impl<'a> Commands<'a> {
         }
     }
 
+    /// What follows is made whatever happens: see [`super::Frames::abandon_when`].
+    pub fn keep_on(&mut self) {
+        self.slot.abandon = None;
+    }
+
     /// Keeps `object` alive until the submission has finished and, while validating, notes that
     /// `stage` reads or writes it.
     pub(crate) fn uses<T: Send + Sync + 'static>(

@@ -59,6 +59,9 @@ pub enum GpuError {
         /// All scopes of the submission in order.
         passes: String,
     },
+    /// What was being made is wanted no longer: see [`super::Frames::abandon_when`].
+    #[error("it was abandoned for something newer")]
+    Abandoned,
     /// Device memory could not be had.
     #[error("no memory for '{name}' ({bytes} bytes): {reason}")]
     Allocation {

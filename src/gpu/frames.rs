@@ -24,6 +24,9 @@ pub const FRAMES_IN_FLIGHT: usize = 2;
 /// Smallest staging buffer, in bytes.
 const MIN_STAGING_BYTES: u64 = 64 << 10;
 
+/// Says whether what is being made is wanted no longer.
+pub type Abandon = Arc<dyn Fn() -> bool + Send + Sync>;
+
 /// Command buffer, fence, descriptors, timer and staging memory of one submission.
 pub(crate) struct Slot {
     pub(crate) device: Arc<Device>,
@@ -37,6 +40,8 @@ pub(crate) struct Slot {
     began: Option<Instant>,
     /// Kernels of this submission that have not run on the device before.
     new_kernels: Vec<u64>,
+    /// Asked between two pieces, while there is a question.
+    pub(crate) abandon: Option<Abandon>,
     lane: Lane,
     /// All command buffers; one more is made as soon as there are as many pieces.
     buffers: Vec<vk::CommandBuffer>,
@@ -67,6 +72,7 @@ impl Slot {
             pieces: None,
             began: None,
             new_kernels: Vec::new(),
+            abandon: None,
             lane,
             buffers: Vec::new(),
             piece_fences: Vec::new(),
@@ -138,10 +144,19 @@ impl Slot {
     }
 
     /// Hands over what is recorded so far and goes on recording, once no more than this piece and
-    /// the one before are under way.
+    /// the one before are under way. Fails where the rest is wanted no longer; what was recorded before
+    /// is on its way all the same.
     pub(crate) fn cut(&mut self) -> Result<(), GpuError> {
         self.hand_over()
-            .map_err(|code| self.failure(code, "submitting a piece of a frame"))
+            .map_err(|code| self.failure(code, "submitting a piece of a frame"))?;
+        match self
+            .abandon
+            .as_ref()
+            .is_some_and(|wanted_no_longer| wanted_no_longer())
+        {
+            true => Err(GpuError::Abandoned),
+            false => Ok(()),
+        }
     }
 
     fn hand_over(&mut self) -> Result<(), vk::Result> {
@@ -328,6 +343,7 @@ pub struct Frames {
     slots: [Slot; FRAMES_IN_FLIGHT],
     next: u64,
     finished: Vec<FrameTimings>,
+    abandon: Option<Abandon>,
 }
 
 impl Frames {
@@ -342,6 +358,7 @@ impl Frames {
             slots: [slot(0)?, slot(1)?],
             next: 0,
             finished: Vec::new(),
+            abandon: None,
         })
     }
 
@@ -357,7 +374,15 @@ impl Frames {
         let slot = &mut self.slots[frame as usize % FRAMES_IN_FLIGHT];
         self.finished.extend(slot.wait()?);
         self.next += 1;
+        slot.abandon.clone_from(&self.abandon);
         Commands::begin(slot, frame)
+    }
+
+    /// From the next [`Self::begin`] on asks between the pieces of a submission whether it is wanted no
+    /// longer; recording then fails with [`GpuError::Abandoned`], and the submission ends with the pieces
+    /// that the queue has. Where the window has a queue of its own there are no pieces, and all is made.
+    pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
+        self.abandon = wanted_no_longer;
     }
 
     /// Waits for every frame under way.

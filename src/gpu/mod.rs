@@ -45,7 +45,7 @@ pub use commands::{Binding, Commands};
 pub use device::{Device, DeviceOptions, Limits, test_device};
 pub use dynamic::{DynamicBlas, DynamicSource};
 pub use error::GpuError;
-pub use frames::{FRAMES_IN_FLIGHT, Frames};
+pub use frames::{Abandon, FRAMES_IN_FLIGHT, Frames};
 pub use image::{AddressMode, Filter, Image, ImageDim, ImageFormat, Sampler};
 pub use instance::ValidationLog;
 pub use kept::cache_folder;

@@ -3,7 +3,8 @@
 //! A queue runs in order, so a window that shares it and submits behind a frame of a second waits for a
 //! second. In pieces of a few milliseconds, of which no more than two are ever handed over, it waits for
 //! two of them. Where nobody waits the pieces are longer, but no dispatch runs so long that a driver
-//! takes the device for hung (Windows: 2 s). How long a dispatch takes is known from the frame before.
+//! takes the device for hung (Windows: 2 s). How long a dispatch takes follows from what one of its work
+//! groups took in the frame before, which may have had fewer of them.
 
 use std::collections::HashMap;
 
@@ -27,8 +28,10 @@ pub(crate) type Groups = [[u32; 3]; 2];
 pub(crate) struct Pieces {
     /// What one piece should take at most, ms.
     budget_ms: f64,
-    /// Mean time of one scope of each name, ms.
-    mean_ms: HashMap<String, f64>,
+    /// Mean time of one work group in scopes of each name, ms.
+    group_ms: HashMap<String, f64>,
+    /// Work groups of this frame by scope.
+    groups: HashMap<String, f64>,
     /// What the last frame took by the clock, ms, and its dispatches, where the queue has no timestamps.
     whole: Option<(f64, usize)>,
     /// Dispatches of this frame.
@@ -42,7 +45,8 @@ impl Pieces {
     pub(crate) fn new(shared: bool) -> Self {
         Self {
             budget_ms: if shared { SHARED_MS } else { ALONE_MS },
-            mean_ms: HashMap::new(),
+            group_ms: HashMap::new(),
+            groups: HashMap::new(),
             whole: None,
             dispatches: 0,
             load_ms: 0.0,
@@ -53,17 +57,18 @@ impl Pieces {
     pub(crate) fn begin(&mut self) {
         self.load_ms = 0.0;
         self.dispatches = 0;
+        self.groups.clear();
     }
 
     /// Takes over what the last frame took: its scopes or, where they were not timed, all of it by the
     /// clock.
     pub(crate) fn learn(&mut self, timings: &FrameTimings, wall_ms: f64) {
-        self.mean_ms.clear();
         self.whole = (timings.passes.is_empty()).then_some((wall_ms, self.dispatches.max(1)));
-        for (name, _) in &timings.passes {
-            let count = timings.passes.iter().filter(|(n, _)| n == name).count();
-            let mean = timings.of(name) / count as f64;
-            self.mean_ms.insert(name.clone(), mean);
+        for (name, groups) in &self.groups {
+            let each = timings.of(name) / groups;
+            if self.whole.is_none() && each.is_finite() {
+                self.group_ms.insert(name.clone(), each);
+            }
         }
     }
 
@@ -71,9 +76,11 @@ impl Pieces {
     /// z and are only cut along x.
     pub(crate) fn cut(&mut self, scope: &str, groups: [u32; 3], whole: bool) -> (Vec<Groups>, f64) {
         self.dispatches += 1;
+        *self.groups.entry(scope.to_owned()).or_default() += product(groups);
         let pieces = |ms: f64| (ms / self.budget_ms).ceil().max(1.0);
-        let (count, each_ms) = match (self.mean_ms.get(scope), self.whole) {
-            (Some(&ms), _) => (pieces(ms) as usize, ms / pieces(ms)),
+        let known = self.group_ms.get(scope).map(|each| each * product(groups));
+        let (count, each_ms) = match (known, self.whole) {
+            (Some(ms), _) => (pieces(ms) as usize, ms / pieces(ms)),
             // Any of the dispatches may be the one that takes all the time.
             (None, Some((ms, dispatches))) => match pieces(ms) {
                 1.0 => (1, ms / dispatches as f64),
@@ -90,6 +97,10 @@ impl Pieces {
         self.load_ms = if full { ms } else { self.load_ms + ms };
         full
     }
+}
+
+fn product(groups: [u32; 3]) -> f64 {
+    groups.map(f64::from).iter().product()
 }
 
 /// About `count` boxes of equal size that fill `groups`, cut along x, and along y where x is spent.
@@ -156,14 +167,20 @@ mod tests {
             16,
             "untimed"
         );
+        pieces.begin();
         let passes = vec![
             ("trace".into(), 20.0),
             ("trace".into(), 22.0),
             ("beam".into(), 3.0),
         ];
+        for scope in ["trace", "trace", "beam"] {
+            pieces.cut(scope, [64, 1, 1], false);
+        }
         pieces.learn(&FrameTimings { frame: 0, passes }, 1e3);
         let (boxes, each) = pieces.cut("trace", [64, 1, 1], false);
         assert_eq!((boxes.len(), each), (3, 7.0));
+        let (boxes, _) = pieces.cut("trace", [64, 8, 1], false);
+        assert_eq!(boxes.len(), 22, "a frame of eight times as many groups");
         assert_eq!(pieces.cut("beam", [64, 1, 1], false).0.len(), 1);
         pieces.begin();
         assert!(
@@ -178,6 +195,9 @@ mod tests {
     fn without_a_window_pieces_are_longer() {
         let mut pieces = Pieces::new(false);
         let passes = vec![("trace".into(), 150.0), ("scatter".into(), 2100.0)];
+        for scope in ["trace", "scatter"] {
+            pieces.cut(scope, [64, 1, 1], false);
+        }
         pieces.learn(&FrameTimings { frame: 0, passes }, 1e4);
         assert_eq!(pieces.cut("trace", [64, 1, 1], false).0.len(), 1);
         let (boxes, each) = pieces.cut("scatter", [64, 1, 1], false);

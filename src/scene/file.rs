@@ -109,6 +109,7 @@ impl Scene {
             &anatomy.instances,
         )?;
         let tracker = tracker::build(&document, file.tracker.as_ref())?;
+        let live = parameters::live(&document, &file.live)?;
         warnings.extend(tissues.unused());
         let name = file.name.unwrap_or_else(|| {
             path.file_stem()
@@ -138,6 +139,7 @@ impl Scene {
             fusion,
             contact,
             tracker,
+            live,
             origins,
         };
         scene.set_time(0.0);

@@ -34,7 +34,7 @@ pub use graph::Graph;
 pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
 pub use origin::{Origin, Origins};
-pub use settings::{Imaging, Simulation};
+pub use settings::{Imaging, Live, Simulation};
 pub use tissue::Tissue;
 pub use tracker::Tracker;
 
@@ -146,6 +146,8 @@ pub struct Scene {
     pub contact: Option<Contact>,
     /// The tracked tool that may move the probe.
     pub tracker: Tracker,
+    /// How it keeps pace while something moves.
+    pub live: Live,
     /// Where its file says all this.
     pub origins: Origins,
 }
@@ -169,6 +171,7 @@ impl Scene {
             fusion: None,
             contact: None,
             tracker: Tracker::default(),
+            live: Live::default(),
             origins: Origins::default(),
         }
     }

@@ -139,6 +139,25 @@ pub struct Imaging {
     pub image_height: u32,
 }
 
+/// How the window and `serve` keep pace.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Live {
+    /// What an image may take while something moves, s; none: what suits the device.
+    pub budget: Option<f64>,
+}
+
+impl Live {
+    /// The budget, ms: 15 images a second where a software driver does the work, 60 on a GPU, unless the
+    /// scene says it.
+    pub fn budget_ms(&self, machine: Machine) -> f64 {
+        let default = match machine {
+            Machine::Software => 0.066,
+            Machine::Gpu => 0.016,
+        };
+        1e3 * self.budget.unwrap_or(default)
+    }
+}
+
 /// How much work a frame is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {

@@ -25,8 +25,9 @@ pub mod world;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::gpu::{Buffer, Device, FrameTimings, Frames, GpuError, Image};
+use crate::gpu::{Abandon, AdapterKind, Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
+use crate::scene::settings::Machine;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use contact::Touch;
 use fusion::{Fused, Tint};
@@ -35,7 +36,7 @@ use passes::{Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
-use stages::{Buffers, Kernels};
+use stages::{Buffers, Kernels, SEGMENT_BUDGET};
 use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
@@ -52,6 +53,14 @@ pub enum SimError {
     World(#[from] world::WorldError),
 }
 
+/// What does the work on a device.
+pub fn machine(device: &Device) -> Machine {
+    match device.info().kind {
+        AdapterKind::Cpu => Machine::Software,
+        _ => Machine::Gpu,
+    }
+}
+
 /// A scene on the device, ready to be imaged frame by frame.
 pub struct Simulator {
     device: Arc<Device>,
@@ -60,6 +69,7 @@ pub struct Simulator {
     coincident: bool,
     settings: Settings,
     tables: Tables,
+    shelf: Shelf,
     counting: bool,
     /// Whether the last frame was mixed with an acquired volume.
     fused: bool,
@@ -70,6 +80,27 @@ pub struct Simulator {
     tinted_on: Option<(Image, Tint)>,
     read_out: ReadOut,
     update_time: Duration,
+}
+
+/// Tables of settings that were left, for as long as they may come back: levels of quality take turns.
+#[derive(Default)]
+struct Shelf(Vec<(Settings, Tables)>);
+
+impl Shelf {
+    /// More than levels of quality.
+    const MOST: usize = 12;
+
+    fn take(&mut self, settings: &Settings) -> Option<Tables> {
+        let at = self.0.iter().position(|(made_of, _)| made_of == settings)?;
+        Some(self.0.remove(at).1)
+    }
+
+    fn put(&mut self, settings: Settings, tables: Tables) {
+        if self.0.len() == Self::MOST {
+            self.0.remove(0);
+        }
+        self.0.push((settings, tables));
+    }
 }
 
 /// What the tables on the device were made of.
@@ -110,7 +141,7 @@ impl Simulator {
         let shapers = Arc::new(world::Kernels::new(device, library)?);
         let world = World::new(device, &shapers, scene, tracer)?;
         let coincident = scene.coincident_triangles() > 0;
-        let (frame, batches) = frame_constants(scene, &world, coincident, 0);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0, SEGMENT_BUDGET);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &batches.rounds, &tables)?;
         let fusion = Fused::new(device, library, scene, &frame, tracer)?;
@@ -120,6 +151,7 @@ impl Simulator {
             coincident,
             settings: Settings::of(scene),
             tables,
+            shelf: Shelf::default(),
             counting: false,
             fused: false,
             shown_on: None,
@@ -135,6 +167,7 @@ impl Simulator {
                 touch: None,
                 world,
                 frame,
+                shown: frame,
                 batches,
             },
         };
@@ -176,6 +209,8 @@ impl Simulator {
         }
         passes.beam(&mut cmd)?;
         passes.axial(&mut cmd)?;
+        // The picture before is replaced as a whole.
+        cmd.keep_on();
         passes.display(&mut cmd)?;
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
@@ -187,7 +222,15 @@ impl Simulator {
         }
         self.read_out.record(&mut cmd, passes.pixels(self.fused))?;
         cmd.submit()?;
+        passes.shown = passes.frame;
         Ok(self.frames.take_timings())
+    }
+
+    /// Frames and surveys to come are made only as long as nothing newer is wanted: while they are being
+    /// recorded, which where the window shares the queue takes about as long as they do, `wanted_no_longer`
+    /// is asked now and then. They then fail with [`GpuError::Abandoned`], and the picture before stays.
+    pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
+        self.frames.abandon_when(wanted_no_longer);
     }
 
     /// Takes over settings, strategies and placements that the device does not have yet, after the
@@ -197,9 +240,12 @@ impl Simulator {
         if settings != self.settings {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            self.tables = Tables::new(scene);
+            let tables = self.shelf.take(&settings);
+            let tables = tables.unwrap_or_else(|| Tables::new(scene));
+            let left = std::mem::replace(&mut self.tables, tables);
+            let before = std::mem::replace(&mut self.settings, settings);
+            self.shelf.put(before, left);
             self.upload_tables()?;
-            self.settings = settings;
         }
         if self.passes.world.serves(scene) {
             return Ok(Duration::ZERO);

@@ -20,6 +20,8 @@ pub(super) struct Passes {
     pub(super) touch: Option<Touch>,
     pub(super) world: World,
     pub(super) frame: layout::Frame,
+    /// Those of the picture that there is.
+    pub(super) shown: layout::Frame,
     pub(super) batches: Batches,
 }
 
@@ -35,7 +37,9 @@ impl Passes {
         cmd.scope("update");
         let began = Instant::now();
         self.world.update(cmd, scene)?;
-        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index);
+        // A frame of fewer lines than the buffers were made for must not want more segments.
+        let room = self.buffers.segments.size();
+        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, room);
         cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
             fusion.update(cmd, scene)?;
@@ -257,12 +261,13 @@ impl Passes {
     }
 }
 
-/// The frame's constants, with what only the world and the buffers' sizes decide.
+/// The frame's constants, with what only the world and the room for segments decide.
 pub(super) fn frame_constants(
     scene: &Scene,
     world: &World,
     coincident: bool,
     index: u32,
+    segment_bytes: u64,
 ) -> (layout::Frame, Batches) {
     let mut frame = tables::frame(scene, index);
     if coincident {
@@ -273,7 +278,7 @@ pub(super) fn frame_constants(
     if ambiguous {
         frame.flags |= layout::FLAG_SLOTS;
     }
-    let batches = Batches::new(&frame);
+    let batches = Batches::new(&frame, segment_bytes);
     frame.segment_capacity = batches.capacity;
     (frame, batches)
 }

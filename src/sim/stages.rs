@@ -10,7 +10,7 @@ use super::world::World;
 use crate::gpu::{Buffer, BufferKind, Device, GpuError, Kernel};
 
 /// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
-const SEGMENT_BUDGET: u64 = 96 << 20;
+pub(super) const SEGMENT_BUDGET: u64 = 96 << 20;
 
 /// How the paths of a frame are dealt out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,11 +27,11 @@ impl Batches {
     /// Capacity from the sampling scheme. A path of B interactions has at most B + 1 segments; one of
     /// the main-path scheme also those of its branches, three times as many, most of which end under
     /// the volume floor: what does not fit is counted and reported.
-    pub(super) fn new(frame: &layout::Frame) -> Self {
+    pub(super) fn new(frame: &layout::Frame, segment_bytes: u64) -> Self {
         let branches = frame.sampling == layout::SAMPLING_MAIN_PATH;
         let per_path = (frame.max_interactions + 1) * if branches { 4 } else { 1 };
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
-        let affordable = u32::try_from(SEGMENT_BUDGET / line_bytes.max(1)).unwrap_or(u32::MAX);
+        let affordable = u32::try_from(segment_bytes / line_bytes.max(1)).unwrap_or(u32::MAX);
         if one_speaks_for_all(frame) {
             return Self {
                 capacity: per_path.min(affordable.max(1)),

@@ -160,12 +160,13 @@ impl Simulator {
             self.frames.wait()?;
             [surveyor.looks, surveyor.picture] = buffers(&self.device, sight)?;
         }
+        // It stays where the picture is abandoned.
+        let surveyor = self.surveyor.insert(surveyor);
         let mut cmd = self.frames.begin()?;
         cmd.scope("survey");
         surveyor.record(&mut cmd, sight, passes, self.fused)?;
         cmd.copy_to_image(&surveyor.picture, image)?;
         cmd.submit()?;
-        self.surveyor = Some(surveyor);
         self.frames.wait()?;
         Ok(self.frames.take_timings().pop().unwrap_or_default())
     }
@@ -180,8 +181,9 @@ impl Surveyor {
         fused: bool,
     ) -> Result<(), GpuError> {
         let (frame, world) = (&passes.buffers.frame, &passes.world);
-        let constants = sight.constants(&passes.frame);
-        cmd.write(frame, 0, bytemuck::bytes_of(&passes.frame))?;
+        // The last frame may have been abandoned.
+        let constants = sight.constants(&passes.shown);
+        cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;
         cmd.write(&self.constants, 0, bytemuck::bytes_of(&constants))?;
         if !sight.looks.is_empty() {
             cmd.write(&self.looks, 0, bytemuck::cast_slice(&sight.looks))?;

@@ -84,16 +84,22 @@ impl Place {
 }
 
 /// Draws everything around the picture, into what is left of the window.
-pub(super) fn show(ui: &mut Ui, frame: Option<&Frame>, model: &Model) -> Option<Place> {
+///
+/// `preparing` is said where there is no picture yet.
+pub(super) fn show(
+    ui: &mut Ui,
+    frame: Option<&Frame>,
+    model: &Model,
+    preparing: &str,
+) -> Option<Place> {
     let area = ui.max_rect();
     let painter = ui.painter_at(area);
     let Some(frame) = frame else {
         let font = FontId::proportional(16.0);
-        let text = "Preparing the simulation";
         painter.text(
             area.center(),
             Align2::CENTER_CENTER,
-            text,
+            preparing,
             font,
             style::FAINT,
         );
@@ -143,7 +149,10 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
         FontId::proportional(15.0),
         colour,
     );
-    let mut line = format!("{:.1} frames/s", 1e3 / frame.wall_ms.max(1e-3));
+    let mut line = frame.grade.to_string();
+    if let (Some(ms), false) = (frame.grade.pace_ms, model.frozen) {
+        line = format!("{line}   {:.1} frames/s", 1e3 / ms.max(1e-3));
+    }
     if model.animated {
         line = format!("{:.2} s   {line}", frame.seconds);
     }

@@ -10,7 +10,7 @@ use std::thread::JoinHandle;
 
 use serde_json::{Map, Value};
 
-use self::files::{Claim, grey_png};
+use self::files::{Claim, grey_png, scaled};
 use super::engine::Frame;
 use crate::gpu::{GpuError, Shot};
 use crate::movie::{Movie, MovieError};
@@ -165,17 +165,21 @@ impl Captures {
                 Format::Gif => Some(Movie::new(&target)?),
                 Format::Sequence => None,
             };
+            let extents = clip.frames.iter().map(|(frame, _)| frame.image.extent());
+            let [width, height, _] = extents.max().unwrap_or_default();
             for (index, (frame, end)) in clip.frames.into_iter().enumerate() {
                 if progress.is_cancelled() {
                     return Ok(None);
                 }
                 let rgba = frame.image.read_back()?;
-                let [width, height, _] = frame.image.extent();
+                let [across, down, _] = frame.image.extent();
+                let rgba = scaled(rgba, [across, down], [width, height]);
+                let pitch = frame.sector.pitch * f64::from(down) / f64::from(height);
                 match &mut movie {
                     Some(movie) => movie.add(width, height, &rgba, end)?,
                     None => {
                         let file = target.join(format!("{index:04}.png"));
-                        let picture = grey_png([width, height], &rgba, frame.sector.pitch, None);
+                        let picture = grey_png([width, height], &rgba, pitch, None);
                         files::write_new(&file, &picture)?;
                     }
                 }

@@ -1,8 +1,9 @@
 //! The simulation on its own thread: it takes the newest order and hands over finished pictures.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use glam::DAffine3;
 
@@ -10,6 +11,7 @@ use super::link::Link;
 use super::look::{Look, Pictured};
 use super::model::{Order, Settings};
 use crate::gpu::{Device, FrameTimings, Image, MemoryUse};
+use crate::live::Grade;
 use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::sim::contact::Touch;
@@ -75,6 +77,8 @@ pub struct Frame {
     pub contact: Option<Touch>,
     /// Time of the scene, s.
     pub seconds: f64,
+    /// How finely it was made.
+    pub grade: Grade,
     /// [`Order::revision`] of what it shows.
     pub revision: u64,
     /// When what it shows was decided: the input that moved the probe, or, while time passes, the
@@ -96,8 +100,9 @@ pub struct Frame {
     pub image_bytes: u64,
 }
 
-/// Longest time for which moving the eye of the 3D view may put off the next image while time passes.
-const PUT_OFF: Duration = Duration::from_millis(300);
+/// While images are due, pictures of the 3D view are made only after so many times what the last one took:
+/// a quarter of the time is theirs.
+const PUT_OFF: u32 = 3;
 
 /// What the simulation has to say.
 pub enum News {
@@ -106,6 +111,8 @@ pub enum News {
     Frame(Box<Frame>, Option<Pixels>),
     /// A picture of the anatomy.
     Survey(Box<Pictured>),
+    /// What is done before there is a picture.
+    Preparing(&'static str),
     /// An order could not be carried out; the next one may.
     Refused(String),
     /// The scene that was to be opened is there: pictures from now on are of it.
@@ -129,27 +136,41 @@ struct State {
     stop: bool,
     /// The last picture is to be sent once more.
     resend: bool,
+    /// When an order was given last, or the eye of the 3D view moved.
+    touched: Instant,
     news: Vec<News>,
 }
 
 /// What there is to do next.
 enum Job {
-    /// An image, and the anatomy with it.
+    /// An image.
     Image(Order),
     Open(Box<Scene>, Order),
-    /// Only the anatomy, from another side.
+    /// The last image once more, at a finer level.
+    Refined(usize),
+    /// Only the anatomy.
     Survey,
 }
 
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
+    /// There is something newer to do than what was made at rest and is under way.
+    newer: AtomicBool,
 }
 
 impl Shared {
     /// The lists stay whole after a panic of the other thread, so poisoning is ignored.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// There is something to do that does not wait for what is made at rest.
+    fn interrupt(&self, mut state: MutexGuard<'_, State>) {
+        state.touched = Instant::now();
+        drop(state);
+        self.newer.store(true, Ordering::Release);
+        self.changed.notify_all();
     }
 }
 
@@ -179,9 +200,11 @@ impl Engine {
                 looks_new: false,
                 stop: false,
                 resend: false,
+                touched: Instant::now(),
                 news: Vec::new(),
             }),
             changed: Condvar::new(),
+            newer: AtomicBool::new(false),
         });
         let wake = Box::new(wake);
         let worker = Worker::new(device, library, scene, link, shared.clone(), wake);
@@ -200,16 +223,14 @@ impl Engine {
         let mut state = self.shared.lock();
         state.order = Some(order);
         state.frozen = frozen;
-        drop(state);
-        self.shared.changed.notify_all();
+        self.shared.interrupt(state);
     }
 
     /// Goes on with another scene, if the device can hold it beside the one before.
     pub fn open(&self, scene: Scene, order: Order) {
         let mut state = self.shared.lock();
         state.opening = Some((Box::new(scene), order));
-        drop(state);
-        self.shared.changed.notify_all();
+        self.shared.interrupt(state);
     }
 
     /// Sends the last picture to the clients of the link once more.
@@ -221,10 +242,14 @@ impl Engine {
     /// How the anatomy is to be pictured from now on, frozen or not; with nothing it is not.
     pub fn look(&self, look: Option<Look>) {
         let mut state = self.shared.lock();
+        let camera = |look: &Option<Look>| look.as_ref().map(|look| look.camera);
+        let moved = camera(&look) != camera(&state.look);
         state.looks_new = look.is_some();
         state.look = look;
-        drop(state);
-        self.shared.changed.notify_all();
+        match moved {
+            true => self.shared.interrupt(state),
+            false => self.shared.changed.notify_all(),
+        }
     }
 
     /// What has come since the last call, oldest first.
@@ -235,8 +260,9 @@ impl Engine {
 
 impl Drop for Engine {
     fn drop(&mut self) {
-        self.shared.lock().stop = true;
-        self.shared.changed.notify_all();
+        let mut state = self.shared.lock();
+        state.stop = true;
+        self.shared.interrupt(state);
         if let Some(thread) = self.thread.take() {
             // A panic of the thread has been printed by itself.
             let _ = thread.join();

@@ -95,7 +95,7 @@ pub(super) fn show(
         if alone {
             return None;
         }
-        let place = bmode::show(ui, frame, model);
+        let place = bmode::show(ui, frame, model, state.preparing);
         let sheet = &mut state.tools.sheet;
         if let (Some(place), Some(frame)) = (&place, frame) {
             calipers::show(ui, sheet, place, frame);

@@ -20,11 +20,10 @@ use super::state::State;
 use super::timing;
 use super::tools::Tools;
 use super::{Model, Options, ViewError, keys, style, survey};
-use crate::gpu::{AdapterKind, Device, ValidationLog};
+use crate::gpu::{Device, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
-use crate::scene::settings::Machine;
-use crate::sim::SimError;
+use crate::sim::{self, SimError};
 
 mod paint;
 mod scenes;
@@ -122,10 +121,7 @@ impl Open {
             model.await_replay(Kept::loaded(track, inputs::name(&file)), now);
         }
         plan.scene = scene;
-        let machine = match device.info().kind {
-            AdapterKind::Cpu => Machine::Software,
-            _ => Machine::Gpu,
-        };
+        let machine = sim::machine(&device);
         let (link, bell) = (plan.link.clone(), Bell::new(plan.proxy.clone()));
         let inputs = Inputs::new(link, bell, plan.scene.tracker.clone(), plan.options.listen)?;
         if let Some(address) = inputs.address() {
@@ -146,6 +142,7 @@ impl Open {
             heap: device.info().memory_bytes,
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
+            preparing: "Opening the device",
             tools: plan.tools(&device),
             inputs,
             quit: false,
@@ -241,7 +238,7 @@ impl Open {
                         self.model.film(&frame, &pixels);
                     }
                     self.state.tools.record((*frame).clone());
-                    self.state.survey.pace(frame.wall_ms);
+                    self.state.survey.pace(frame.grade.budget_ms);
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;
@@ -251,6 +248,7 @@ impl Open {
                     self.state.survey.learn(&pictured);
                     self.pictured = Some(*pictured);
                 }
+                News::Preparing(what) => self.state.preparing = what,
                 News::Refused(problem) => self.state.problem = Some(problem),
                 News::Opened => self.adopt(plan),
                 News::NotOpened(problem) => self.refuse(problem),

@@ -8,11 +8,16 @@ use crate::gpu::{Device, GpuError, Image, ImageDim, ImageFormat};
 /// frame. What a loop of images has let go beyond that is given back.
 const SPARE: usize = 2;
 
-/// Images of one size. Those that the window still shows or keeps, or that a submission of its
+/// Sizes of which images are kept that nobody reads: levels of quality take turns.
+const SIZES: usize = 3;
+
+/// Images. Those that the window still shows or keeps, or that a submission of its
 /// reads, are left alone, so that neither waits for the other.
 pub(super) struct Ring {
     name: &'static str,
     images: Vec<Image>,
+    /// Sizes of the last images, the newest last.
+    sizes: Vec<[u32; 3]>,
     device: Arc<Device>,
 }
 
@@ -21,6 +26,7 @@ impl Ring {
         Self {
             name,
             images: Vec::new(),
+            sizes: Vec::new(),
             device: device.clone(),
         }
     }
@@ -33,14 +39,25 @@ impl Ring {
     /// An image of `width` by `height` that nobody reads.
     pub(super) fn free(&mut self, [width, height]: [u32; 2]) -> Result<Image, GpuError> {
         let extent = [width, height, 1];
-        self.images.retain(|image| image.extent() == extent);
-        let mut spare = 0;
+        self.sizes.retain(|size| *size != extent);
+        self.sizes.push(extent);
+        if self.sizes.len() > SIZES {
+            self.sizes.remove(0);
+        }
+        let mut spare = [0; SIZES];
+        let sizes = &self.sizes;
         self.images.retain(|image| {
-            let unread = image.is_unshared();
-            spare += usize::from(unread);
-            !unread || spare <= SPARE
+            if !image.is_unshared() {
+                return true;
+            }
+            let size = sizes.iter().position(|size| *size == image.extent());
+            size.is_some_and(|size| {
+                spare[size] += 1;
+                spare[size] <= SPARE
+            })
         });
-        if let Some(image) = self.images.iter().find(|image| image.is_unshared()) {
+        let fits = |image: &&Image| image.extent() == extent && image.is_unshared();
+        if let Some(image) = self.images.iter().find(fits) {
             return Ok(image.clone());
         }
         let (dim, format) = (ImageDim::D2, ImageFormat::Rgba8Unorm);
@@ -98,9 +115,20 @@ mod tests {
             device.upload_image(&other, &[9; 256]).unwrap();
         }
         assert_eq!(device.read_back_image(&held).unwrap(), [7; 256]);
-        // Another size is another set of images; what is held stays as it is.
+        // Other sizes are other sets of images; what is held stays as it is.
+        let [small, smaller] = [[4, 4], [2, 2]].map(|size| ring.free(size).unwrap());
+        drop((small, smaller));
+        let before = ring.images.len();
         ring.free([4, 4]).unwrap();
-        assert_eq!(ring.images.len(), 1);
+        assert_eq!(ring.images.len(), before, "it was kept");
+        for size in [[5, 5], [6, 6], [7, 7]] {
+            ring.free(size).unwrap();
+        }
+        assert_eq!(
+            ring.images.len(),
+            4,
+            "what is held, and the last three sizes"
+        );
         assert_eq!(held.extent(), [8, 8, 1]);
     }
 }

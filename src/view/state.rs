@@ -37,6 +37,8 @@ pub(super) struct State {
     pub(super) files: Files,
     /// What went wrong last, until it goes right again.
     pub(super) problem: Option<String>,
+    /// What is done before there is a picture.
+    pub(super) preparing: &'static str,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,
     /// What moves the probe.

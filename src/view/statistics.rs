@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use serde_json::{Map, Value, json};
 
+use crate::live::Grade;
 use crate::statistics::Statistics;
 
 /// Pictures that are remembered.
@@ -22,6 +23,8 @@ pub(super) struct Sample {
     pub(super) strategy: String,
     /// From input to the screen.
     pub(super) latency: f64,
+    /// How finely it was made; none in tests of what does not look at it.
+    pub(super) grade: Option<Grade>,
 }
 
 /// The last pictures.
@@ -59,6 +62,54 @@ impl Times {
         self.interface.iter().copied().collect()
     }
 
+    /// One value of each picture that was made while something moved; of all where none was.
+    pub(super) fn live(&self, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
+        let moving = self.samples.iter().filter(|sample| !sample.is_refined());
+        let values: Vec<f64> = moving.map(&value).collect();
+        match values.is_empty() {
+            true => self.of(value),
+            false => values,
+        }
+    }
+
+    /// From the last input to the scene's own quality, ms, of each time that everything came to rest.
+    pub(super) fn settled(&self) -> Vec<f64> {
+        let own = |s: &&Sample| s.is_refined() && s.grade.as_ref().is_some_and(Grade::is_full);
+        self.samples.iter().filter(own).map(|s| s.latency).collect()
+    }
+
+    /// The level in force, and the levels that the last pictures had, each with its counts and times.
+    fn levels(&self) -> Value {
+        let grades = || self.samples.iter().filter_map(|s| s.grade.as_ref());
+        let Some(last) = grades().next_back() else {
+            return Value::Null;
+        };
+        let mut seen: Vec<&Grade> = Vec::new();
+        for grade in grades() {
+            if !seen.iter().any(|other| other.counts == grade.counts) {
+                seen.push(grade);
+            }
+        }
+        seen.sort_by_key(|grade| grade.level);
+        let levels = seen.into_iter().map(|grade| {
+            let with = |s: &&Sample| s.grade.as_ref().is_some_and(|g| g.counts == grade.counts);
+            let times = self.samples.iter().filter(with).map(|s| s.wall);
+            let found = Statistics::of(times.clone());
+            json!({
+                "level": grade.level,
+                "counts": grade.counts.json(),
+                "frames": times.count(),
+                "frame_ms": { "median": found.median, "p99": found.p99 },
+            })
+        });
+        json!({
+            "budget_ms": last.budget_ms,
+            "level": last.level,
+            "of": last.levels - 1,
+            "levels": levels.collect::<Vec<_>>(),
+        })
+    }
+
     /// Everything as median and 99th percentile, ms.
     pub(super) fn report(&self) -> Value {
         let both = |values: &[f64]| {
@@ -73,9 +124,11 @@ impl Times {
             "frames": self.samples.len(),
             "stages_ms": stages.collect::<Map<_, _>>(),
             "device_ms": both(&self.of(Sample::device)),
-            "frame_ms": both(&self.of(|s| s.wall)),
+            "frame_ms": both(&self.live(|s| s.wall)),
             "structures_ms": both(&self.of(|s| s.update)),
-            "latency_ms": both(&self.of(|s| s.latency)),
+            "latency_ms": both(&self.live(|s| s.latency)),
+            "settled_ms": both(&self.settled()),
+            "live": self.levels(),
             "survey_ms": both(&self.survey()),
             "interface_ms": both(&self.interface()),
         })
@@ -119,6 +172,11 @@ impl Sample {
     pub(super) fn stage(&self, name: &str) -> Option<f64> {
         let named = self.stages.iter().filter(|(stage, _)| stage == name);
         named.map(|(_, ms)| *ms).reduce(|a, b| a + b)
+    }
+
+    /// It was made at rest.
+    fn is_refined(&self) -> bool {
+        self.grade.as_ref().is_some_and(|grade| grade.at_rest)
     }
 
     /// All stages.

@@ -18,8 +18,8 @@ const LEAST: f32 = 240.0;
 const NOTCH: f64 = 50.0;
 /// A picture may take this long while the eye moves, ms; else it is made coarser.
 const SWIFT: f64 = 60.0;
-/// Share of an image's time that a picture may take while probe or anatomy move.
-const SHARE: f64 = 0.15;
+/// Share of an image's budget that a picture may take while probe or anatomy move.
+const SHARE: f64 = 0.2;
 /// Least pixels of the picture for each of the panel's, along an edge.
 const COARSEST: f64 = 0.25;
 /// Everything is at rest when nothing has moved for this long.
@@ -33,8 +33,8 @@ pub(super) struct State {
     tissues: bool,
     /// Until when something counts as moving: the eye, or probe and anatomy.
     moving: [Option<Instant>; 2],
-    /// What the last image took, ms.
-    image_ms: f64,
+    /// What an image may take while something moves, ms.
+    budget_ms: f64,
     /// Revision of the model that was seen last.
     revision: u64,
     /// What a pixel of the last pictures took on the device, ms.
@@ -49,7 +49,7 @@ impl Default for State {
             open: true,
             tissues: false,
             moving: [None; 2],
-            image_ms: 0.0,
+            budget_ms: SWIFT,
             revision: 0,
             pixel_ms: 0.0,
             hold: hold::State::default(),
@@ -64,9 +64,9 @@ impl State {
         self.pixel_ms = pictured.ms / (width * height);
     }
 
-    /// Notes what an image took, ms.
-    pub(super) fn pace(&mut self, image_ms: f64) {
-        self.image_ms = image_ms;
+    /// Notes what an image may take while something moves, ms.
+    pub(super) fn pace(&mut self, budget_ms: f64) {
+        self.budget_ms = budget_ms;
     }
 
     /// Pixels of the picture for each of the panel's, along an edge: fewer while something moves
@@ -75,8 +75,8 @@ impl State {
         let moves = |until: Option<Instant>| until.is_some_and(|until| now < until);
         let ms = pixels * self.pixel_ms;
         let (budget, fine) = match self.moving.map(moves) {
-            [true, _] => (SWIFT, SWIFT / 4.0),
-            [false, true] => (SWIFT.max(SHARE * self.image_ms), SWIFT / 4.0),
+            [true, false] => (SWIFT, SWIFT / 4.0),
+            [_, true] => (SHARE * self.budget_ms, SHARE * self.budget_ms / 4.0),
             [false, false] => (f64::INFINITY, 4.0 * SWIFT),
         };
         if ms > 0.0 && 4.0 * ms < fine {
@@ -252,7 +252,7 @@ mod tests {
             let state = State {
                 moving: moving.map(|moves| moves.then_some(now + REST)),
                 pixel_ms: ms / 1e5,
-                image_ms: 2000.0,
+                budget_ms: 100.0,
                 ..State::default()
             };
             state.detail(1e5, now)
@@ -266,10 +266,11 @@ mod tests {
         assert_eq!(detail(eye, 100.0), 0.5);
         assert_eq!(detail(eye, 50.0), 1.0);
         assert_eq!(detail(eye, 1.0), 2.0);
-        assert_eq!(detail([true; 2], 500.0), 1.0 / 3.0);
-        // A seventh of an image's two seconds.
-        assert_eq!(detail(anatomy, 250.0), 1.0);
-        assert_eq!(detail(anatomy, 500.0), 0.5);
+        // A fifth of an image's 100 ms, whether the eye moves or not.
+        assert_eq!(detail([true; 2], 60.0), 0.5);
+        assert_eq!(detail(anatomy, 20.0), 1.0);
+        assert_eq!(detail(anatomy, 60.0), 0.5);
+        assert_eq!(detail(anatomy, 500.0), COARSEST);
     }
 
     #[test]

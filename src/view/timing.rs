@@ -88,7 +88,7 @@ pub(super) fn show(
             ui.vertical(|ui| {
                 ui.set_width(TOTALS);
                 ui.strong("Frames and latency, ms");
-                totals(ui, times, state);
+                totals(ui, times, frame, state);
             });
             ui.separator();
             ui.vertical(|ui| {
@@ -146,8 +146,8 @@ fn stages(ui: &mut Ui, times: &Times) {
     });
 }
 
-fn totals(ui: &mut Ui, times: &Times, state: &State) {
-    let wall = times.of(|s| s.wall);
+fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
+    let wall = times.live(|s| s.wall);
     let device = times.of(Sample::device);
     egui::Grid::new("totals")
         .num_columns(3)
@@ -168,7 +168,12 @@ fn totals(ui: &mut Ui, times: &Times, state: &State) {
                 (
                     "latency",
                     "From the input, or the reading of the clock, to the image handed to the screen",
-                    &times.of(|s| s.latency),
+                    &times.live(|s| s.latency),
+                ),
+                (
+                    "to full quality",
+                    "From the last input to the image at the scene's own quality",
+                    &times.settled(),
                 ),
                 (
                     "3D view",
@@ -191,6 +196,11 @@ fn totals(ui: &mut Ui, times: &Times, state: &State) {
     if !wall.is_empty() {
         let median = Statistics::of(wall).median;
         ui.label(format!("{:.1} frames per second", 1e3 / median));
+    }
+    if let Some(grade) = frame.map(|frame| &frame.grade) {
+        let text = format!("{grade}, budget {:.0} ms", grade.budget_ms);
+        ui.add(egui::Label::new(text).truncate())
+            .on_hover_text(grade.counts.to_string());
     }
     let device = egui::RichText::new(&state.device)
         .color(style::FAINT)

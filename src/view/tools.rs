@@ -31,8 +31,8 @@ enum Wanted {
 
 /// State of the tools.
 pub(super) struct Tools {
-    /// The images last finished, all of one size and place in the probe's space: another depth begins
-    /// another loop, as on a scanner.
+    /// The images last finished, all of one place in the probe's space: another depth begins another loop,
+    /// as on a scanner. What was made finer at rest is in the place of what it was made of.
     pub(super) cine: Cine<Frame>,
     /// Measurements and texts.
     pub(super) sheet: Sheet,
@@ -81,14 +81,19 @@ impl Tools {
     /// Keeps a finished image.
     pub(super) fn record(&mut self, frame: Frame) {
         let is_like = |last: &Frame| {
-            last.sector == frame.sector && last.image.extent() == frame.image.extent()
+            let field = |frame: &Frame| (frame.probe.kind, frame.probe.depth);
+            let height = |frame: &Frame| frame.settings.imaging.image_height;
+            field(last) == field(&frame) && height(last) == height(&frame)
         };
         if self.cine.newest().is_some_and(|last| !is_like(last)) {
             self.cine.clear();
         }
         let tinted = frame.tinted.as_ref().map_or(0, Image::bytes);
         let (bytes, at) = (frame.image.bytes() + tinted, frame.finished);
-        self.cine.push(frame, bytes, at);
+        match frame.grade.at_rest && !self.cine.is_empty() {
+            true => self.cine.replace_newest(frame, bytes),
+            false => self.cine.push(frame, bytes, at),
+        }
     }
 
     /// The image to be shown now. Live it is the newest; frozen, the one that was chosen or that plays.
@@ -181,8 +186,13 @@ impl Tools {
                 "time_s": frame.seconds,
                 "shown_until_s": end,
                 "pose": sidecar::pose(&frame.pose),
+                "quality": frame.grade.json(),
             }));
-            if last.is_none_or(|last| !Arc::ptr_eq(&last.settings, &frame.settings)) {
+            let same = |last: &Frame| {
+                Arc::ptr_eq(&last.settings, &frame.settings)
+                    && last.grade.counts == frame.grade.counts
+            };
+            if !last.is_some_and(same) {
                 // Where the probe was is said of each frame.
                 let mut settings = settings(model, frame, None);
                 settings.insert("from_frame".into(), index.into());
@@ -192,7 +202,7 @@ impl Tools {
             frames.push((frame.clone(), end));
         }
         let mut sidecar = self.about(model, shown);
-        for key in ["time_s", "pose"] {
+        for key in ["time_s", "pose", "quality"] {
             sidecar.shift_remove(key);
         }
         sidecar.insert("speed".into(), self.cine.speed().into());
@@ -221,6 +231,7 @@ impl Tools {
             "image": sidecar::image(&area),
             "time_s": frame.seconds,
             "pose": sidecar::pose(&frame.pose),
+            "quality": frame.grade.json(),
         });
         match said {
             Value::Object(map) => map,
@@ -251,8 +262,15 @@ impl Tools {
 /// What of the scene file is to be replaced to get a frame again, as `--set` takes it, and the settings in
 /// full.
 fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
-    let settings = &frame.settings;
-    let set = model.entries(settings, pose).into_iter();
+    // Those of the level that it was made at: they give this very image.
+    let mut settings = (*frame.settings).clone();
+    let counts = &frame.grade.counts;
+    counts.set(
+        &mut settings.probe,
+        &mut settings.simulation,
+        &mut settings.imaging,
+    );
+    let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
     let all = output::settings(&settings.probe, &settings.simulation, &settings.imaging);
     let said = [

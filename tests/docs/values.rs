@@ -76,7 +76,12 @@ pub fn settings(scene: &Scene) -> String {
     let (instances, graph) = (&scene.instances, &scene.graph);
     write!(out, "{instances:?}{graph:?}{:?}{sizes:?}", scene.wires).expect("memory");
     let (volume, fusion, tracker) = (&scene.volume, &scene.fusion, &scene.tracker);
-    write!(out, "{volume:?}{fusion:?}{tracker:?}{:?}", scene.contact).expect("memory");
+    write!(
+        out,
+        "{volume:?}{fusion:?}{tracker:?}{:?}{:?}",
+        scene.contact, scene.live
+    )
+    .expect("memory");
     out
 }
 

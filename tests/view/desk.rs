@@ -220,20 +220,17 @@ impl Desk {
 
     /// Waits until a part has not changed for half a second.
     pub fn settle(&mut self, part: [u16; 4]) -> Vec<u8> {
-        let (mut last, mut since) = (self.grab(part), Instant::now());
-        self.wait_for("the window to come to rest", |desk| {
-            let now = desk.grab(part);
-            if now != last {
-                (last, since) = (now, Instant::now());
-            }
-            since.elapsed() > Duration::from_millis(500)
-        });
-        self.grab(part)
+        self.quiet(part, Duration::from_millis(500))
     }
 
     /// Waits until a part stays as it is because the program has nothing left to do: on a slow device
     /// what comes last, as the finest picture of the anatomy, may be seconds away.
     pub fn rest(&mut self, part: [u16; 4]) -> Vec<u8> {
+        self.quiet(part, Duration::from_secs(1))
+    }
+
+    /// The image comes back at the scene's own quality once all is at rest: until then the program works.
+    fn quiet(&mut self, part: [u16; 4], time: Duration) -> Vec<u8> {
         let mut last = (self.grab(part), self.processor_time());
         let mut since = Instant::now();
         self.wait_for("the program to come to rest", |desk| {
@@ -243,7 +240,7 @@ impl Desk {
             if worked || now.0 != last.0 {
                 (last, since) = (now, Instant::now());
             }
-            since.elapsed() > Duration::from_secs(1)
+            since.elapsed() > time
         });
         last.0
     }

@@ -7,6 +7,7 @@
 mod client;
 mod contact;
 mod desk;
+mod live;
 mod mmode;
 mod panels;
 mod robust;

@@ -21,7 +21,7 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
 }
 
 /// Waits for a sidecar, which is written last, and reads it.
-fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
+pub fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
     let file = folder.join(name);
     let mut found = None;
     desk.wait_for(name, |_| {
@@ -88,7 +88,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     let scene = captures.join("scene.toml");
     std::fs::write(&scene, SCENE).expect("written");
     let status = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
-        .args(["render", "--quality", "draft", "-o"])
+        .args(["render", "-o"])
         .args([&rendered, &scene])
         .stdout(std::process::Stdio::null())
         .status()
@@ -97,6 +97,10 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     let rendered = image::open(rendered).expect("a picture");
     assert!(saved == rendered, "the pixels differ");
     assert_eq!(still["file"], "cyst-and-wires-0001.png");
+    assert_eq!(
+        still["quality"]["level"], 0,
+        "at rest it is the scene's own"
+    );
     assert_eq!(still["image"]["height"], 400);
     // 400 pixels of so many mm are the depth of the probe, give or take the last.
     let pitch = still["image"]["pixel_pitch_mm"].as_f64().expect("a number");

@@ -1,10 +1,10 @@
-//! The tables `simulation` and `imaging`.
+//! The tables `simulation`, `imaging` and `live`.
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::{ImagingTable, SimulationTable};
+use super::schema::{ImagingTable, LiveTable, SimulationTable};
 use super::within;
-use crate::scene::{Imaging, Simulation};
+use crate::scene::{Imaging, Live, Simulation};
 
 /// Copies the keys that are present: plain ones, then quantities.
 macro_rules! overlay {
@@ -137,4 +137,12 @@ pub(super) fn imaging(document: &Document<'_>, table: ImagingTable) -> Result<Im
         )?;
     }
     Ok(out)
+}
+
+pub(super) fn live(document: &Document<'_>, table: &LiveTable) -> Result<Live, SceneError> {
+    let budget = table.budget.map(|budget| budget.0);
+    if let Some(budget) = budget {
+        within(document, "live.budget", budget, 0.001, 10.0, "s")?;
+    }
+    Ok(Live { budget })
 }

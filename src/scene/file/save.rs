@@ -69,6 +69,7 @@ fn check(source: &Source) -> Result<(), SceneError> {
     let (probe, _) = probe::build(&document, &file.probe)?;
     parameters::simulation(&document, file.simulation, probe.frequency)?;
     parameters::imaging(&document, file.imaging)?;
+    parameters::live(&document, &file.live)?;
     Tissues::new(&document, &file.tissues)?;
     Ok(())
 }

@@ -32,6 +32,8 @@ pub struct File {
     pub contact: Option<ContactTable>,
     pub tracker: Option<TrackerTable>,
     #[serde(default)]
+    pub live: LiveTable,
+    #[serde(default)]
     pub sweep: SweepTable,
     #[serde(default)]
     pub group: Vec<GroupTable>,
@@ -188,6 +190,12 @@ pub struct SweepTable {
     pub surface_gain: Option<Vec<Level>>,
     pub roughness_scale: Option<Vec<f64>>,
     pub thickness_scale: Option<Vec<f64>>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LiveTable {
+    pub budget: Option<Duration>,
 }
 
 #[derive(Debug, Deserialize)]

@@ -144,6 +144,15 @@ pub(super) fn colour_png([width, height]: [u32; 2], rgba: &[u8]) -> Vec<u8> {
     out.into_inner()
 }
 
+/// RGBA pixels of one size in another: all pictures of a clip have that of its finest.
+pub(super) fn scaled(rgba: Vec<u8>, [width, height]: [u32; 2], to: [u32; 2]) -> Vec<u8> {
+    if [width, height] == to {
+        return rgba;
+    }
+    let image = image::RgbaImage::from_raw(width, height, rgba).expect("four bytes each");
+    image::imageops::resize(&image, to[0], to[1], image::imageops::FilterType::Triangle).into_raw()
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;

@@ -3,10 +3,26 @@
 use egui::{ComboBox, Ui};
 
 use super::controls::{choice, count, grid, number, number_or, switch};
-use crate::scene::settings::Quality;
+use crate::scene::settings::{Live, Quality};
 use crate::sim::Tracer;
 use crate::view::model::Settings;
 use crate::view::state::State;
+
+/// What an image may take while something moves, which the scene may leave to the device.
+fn budget(ui: &mut Ui, live: &mut Live) {
+    let by_device = (0.0, "device's");
+    let mut seconds = live.budget.unwrap_or(by_device.0);
+    let usual = 0.01..=0.2;
+    number_or(
+        ui,
+        "live.budget",
+        "Image in",
+        &mut seconds,
+        usual,
+        by_device,
+    );
+    live.budget = (seconds != by_device.0).then_some(seconds);
+}
 
 pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice: f64) {
     ui.horizontal(|ui| {
@@ -38,6 +54,7 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice:
                 }
             });
         ui.end_row();
+        budget(ui, &mut settings.live);
         let mut density = settings.simulation.density_scale;
         let s = &mut settings.simulation;
         count(ui, "simulation.paths", "Paths", &mut s.paths, 1..=128);

@@ -1,27 +1,47 @@
 //! What the simulation's thread does.
 
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, PoisonError};
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
 use super::{Frame, Job, News, PUT_OFF, Pixels, Sector, Shared};
-use crate::gpu::{Device, GpuError};
-use crate::probe::Probe;
+use crate::gpu::{Abandon, Device, GpuError};
+use crate::live::{self, Pace};
 use crate::scene::Scene;
 use crate::sim::shaders::Library;
-use crate::sim::{SimError, Simulator, Tracer, image_size};
+use crate::sim::{self, SimError, Simulator, Tracer, image_size};
 use crate::view::link::{Broadcast, Link};
 use crate::view::look::Pictured;
 use crate::view::model::{Order, Settings};
 use crate::view::ring::Ring;
 
-/// What the device holds the results of.
+/// Part of the budget that is the image's where the anatomy is looked at, too.
+const IMAGE_SHARE: f64 = 0.8;
+
+/// What is waited for before the first picture.
+const UPLOADING: &str = "Building structures of the anatomy, compiling kernels";
+const FIRST: &str = "Making the first picture";
+
+/// The picture that was made last, and what it left on the device.
 struct Imaged {
-    probe: Probe,
+    order: Order,
+    /// How many orders were carried out before.
+    index: u32,
     pose: DAffine3,
-    ended: Instant,
-    took: Duration,
+    seconds: f64,
+    level: usize,
+}
+
+/// What an image is to be made of.
+struct Taken {
+    order: Order,
+    index: u32,
+    pose: DAffine3,
+    seconds: f64,
+    /// Level of the ladder, where it is not left to the pace.
+    level: Option<usize>,
 }
 
 /// What the thread works with.
@@ -37,8 +57,14 @@ pub(super) struct Worker {
     fitted: Option<Arc<Settings>>,
     /// The moment that the last picture shows.
     imaged: Instant,
-    /// What it left on the device.
+    /// What was carried out last, or failed to be.
+    last: Option<Order>,
+    /// What the last picture left on the device.
     left: Option<Imaged>,
+    /// Which counts the next picture has.
+    pace: Pace,
+    /// When the last picture of the anatomy was finished, and what it took.
+    surveyed: (Instant, Duration),
     wake: Box<dyn Fn() + Send>,
 }
 
@@ -51,6 +77,7 @@ impl Worker {
         shared: Arc<Shared>,
         wake: Box<dyn Fn() + Send>,
     ) -> Self {
+        let machine = sim::machine(device);
         Self {
             shared,
             ring: Ring::new(device, "B-mode"),
@@ -61,7 +88,10 @@ impl Worker {
             scene,
             fitted: None,
             imaged: Instant::now(),
+            last: None,
             left: None,
+            pace: Pace::new(machine),
+            surveyed: (Instant::now(), Duration::ZERO),
             wake,
         }
     }
@@ -69,17 +99,31 @@ impl Worker {
     /// Carries out what is ordered until it is stopped, or the device is lost.
     pub(super) fn run(mut self) {
         let mut simulator = None;
-        let mut last: Option<Order> = None;
         let mut index = 0;
-        while let Some(job) = self.next(last.as_ref()) {
-            let order = match job {
-                Job::Survey => None,
-                Job::Image(order) => Some(order),
+        while let Some(job) = self.next() {
+            let taken = match job {
+                Job::Survey => {
+                    if !self.look(&mut simulator) {
+                        return;
+                    }
+                    continue;
+                }
+                Job::Image(order) => self.taken(order, index),
+                Job::Refined(level) => match &self.left {
+                    Some(left) => Taken {
+                        order: left.order.clone(),
+                        index: left.index,
+                        pose: left.pose,
+                        seconds: left.seconds,
+                        level: Some(level),
+                    },
+                    None => continue,
+                },
                 Job::Open(scene, order) => match self.open(*scene, &order) {
                     Ok(opened) => {
                         simulator = Some(opened);
                         self.tell(News::Opened);
-                        Some(order)
+                        self.taken(order, index)
                     }
                     Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
                         return self.tell(News::Failed(error));
@@ -90,24 +134,57 @@ impl Worker {
                     }
                 },
             };
-            if let Some(order) = order {
-                let frame = self.carry_out(&mut simulator, &order, index);
-                index += 1;
-                last = Some(order);
-                let told = frame.map(|(frame, pixels)| News::Frame(Box::new(frame), pixels));
-                if !self.report(told, simulator.is_none()) {
-                    return;
-                }
+            index += u32::from(taken.level.is_none());
+            let frame = self.carry_out(&mut simulator, &taken);
+            match (&frame, &mut self.left) {
+                (Err(SimError::Gpu(GpuError::Abandoned)), _) => continue,
+                // What cannot be refined stays as it is.
+                (Err(_), Some(left)) => left.level = 0,
+                _ => {}
             }
-            let Some((simulator, _)) = &mut simulator else {
-                continue;
-            };
-            if let Some(pictured) = self.picture(simulator).transpose() {
+            if taken.level.is_none() {
+                self.last = Some(taken.order);
+            }
+            let told = frame.map(|(frame, pixels)| News::Frame(Box::new(frame), pixels));
+            if !self.report(told, simulator.is_none()) {
+                return;
+            }
+        }
+    }
+
+    /// Pictures the anatomy; whether there will be more.
+    fn look(&mut self, simulator: &mut Option<(Simulator, Tracer)>) -> bool {
+        self.shared.lock().looks_new = false;
+        let Some((simulator, _)) = simulator else {
+            return true;
+        };
+        let began = Instant::now();
+        let pictured = self.picture(simulator).transpose();
+        self.surveyed = (Instant::now(), began.elapsed());
+        match pictured {
+            // It is still to be made, after what is newer.
+            Some(Err(SimError::Gpu(GpuError::Abandoned))) => {
+                let mut state = self.shared.lock();
+                state.looks_new = state.look.is_some();
+                true
+            }
+            Some(pictured) => {
                 let told = pictured.map(|pictured| News::Survey(Box::new(pictured)));
-                if !self.report(told, false) {
-                    return;
-                }
+                self.report(told, false)
             }
+            None => true,
+        }
+    }
+
+    /// What there is to make of an order now.
+    fn taken(&self, order: Order, index: u32) -> Taken {
+        let now = Instant::now();
+        Taken {
+            pose: order.pose(now),
+            seconds: order.clock.at(now),
+            order,
+            index,
+            level: None,
         }
     }
 
@@ -135,10 +212,11 @@ impl Worker {
     }
 
     /// The newest order once there is one, or the last one again while it looks different by itself;
-    /// nothing at the end. A new look at the anatomy goes first for as long as the last image took.
-    fn next(&self, last: Option<&Order>) -> Option<Job> {
+    /// at rest the last image at a finer level; nothing at the end. Pictures of the anatomy come between.
+    fn next(&self) -> Option<Job> {
         let mut state = self.shared.lock();
         loop {
+            self.shared.newer.store(false, Ordering::Release);
             if state.stop {
                 return None;
             }
@@ -152,19 +230,32 @@ impl Worker {
                 state = self.shared.lock();
                 continue;
             }
-            let running = last.filter(|last| last.runs(self.imaged));
+            let left = self.left.as_ref();
+            let running = (self.last.as_ref()).filter(|last| last.runs(self.imaged));
             let due = !state.frozen && (state.order.is_some() || running.is_some());
-            if let (Some(left), true) = (&self.left, state.looks_new)
-                && (!due || left.ended.elapsed() < left.took.min(PUT_OFF))
-            {
+            let finer = left.and_then(|left| self.pace.refined(left.level));
+            let finer = finer.filter(|_| !due);
+            let quiet = state.touched.max(self.imaged).elapsed();
+            if let Some(level) = finer.filter(|_| quiet >= live::REST) {
+                return Some(Job::Refined(level));
+            }
+            let (ended, took) = self.surveyed;
+            let turn = !due || ended.elapsed() >= PUT_OFF * took;
+            if state.looks_new && left.is_some() && turn {
                 return Some(Job::Survey);
             }
             if due {
                 let again = || running.expect("due without an order").again(Instant::now());
                 return Some(Job::Image(state.order.take().unwrap_or_else(again)));
             }
-            let changed = self.shared.changed.wait(state);
-            state = changed.unwrap_or_else(PoisonError::into_inner);
+            let changed = &self.shared.changed;
+            state = match finer {
+                Some(_) => {
+                    let waited = changed.wait_timeout(state, live::REST - quiet);
+                    waited.unwrap_or_else(PoisonError::into_inner).0
+                }
+                None => changed.wait(state).unwrap_or_else(PoisonError::into_inner),
+            };
         }
     }
 
@@ -177,6 +268,7 @@ impl Worker {
         self.scene = scene;
         self.fitted = None;
         self.left = None;
+        self.pace.forget();
         let mut state = self.shared.lock();
         // What was ordered of the scene before means nothing here.
         state.order = None;
@@ -187,58 +279,83 @@ impl Worker {
 
     /// The anatomy of the last image as it is looked at now, if it is.
     fn picture(&mut self, simulator: &mut Simulator) -> Result<Option<Pictured>, SimError> {
-        let mut state = self.shared.lock();
-        state.looks_new = false;
-        let (Some(look), Some(left)) = (state.look.clone(), &self.left) else {
+        let look = self.shared.lock().look.clone();
+        let (Some(look), Some(left)) = (look, &self.left) else {
             return Ok(None);
         };
-        drop(state);
         // The window may still look at the scene before.
         if look.sight.looks.len() != self.scene.instances.len() {
             return Ok(None);
         }
         let image = self.pictures.free(look.sight.size)?;
+        simulator.abandon_when(Some(self.newer()));
         let timings = simulator.survey(&self.library, &look.sight, &image)?;
         Ok(Some(Pictured {
             image,
             look,
-            probe: left.probe.clone(),
+            probe: left.order.settings.probe.clone(),
             pose: left.pose,
             ms: timings.total_ms(),
         }))
     }
 
-    fn carry_out(
+    /// Whether there is something newer to do than what was begun last.
+    fn newer(&self) -> Abandon {
+        let shared = self.shared.clone();
+        Arc::new(move || shared.newer.load(Ordering::Acquire))
+    }
+
+    /// Uploads the scene where it is not there, and makes room for its own counts.
+    fn prepare<'s>(
         &mut self,
-        simulator: &mut Option<(Simulator, Tracer)>,
-        order: &Order,
-        index: u32,
-    ) -> Result<(Frame, Option<Pixels>), SimError> {
-        let began = Instant::now();
-        let seconds = order.clock.at(began);
-        order.settings.apply(&mut self.scene);
-        let pose = order.pose(began);
-        self.scene.world_from_probe = pose;
-        self.imaged = began;
-        self.scene.set_time(seconds);
-        let (scene, library, tracer) = (&self.scene, &self.library, order.settings.tracer);
+        simulator: &'s mut Option<(Simulator, Tracer)>,
+        settings: &Settings,
+    ) -> Result<(&'s mut Simulator, Arc<Settings>), SimError> {
+        let tracer = settings.tracer;
         if simulator.as_ref().is_none_or(|(_, made)| *made != tracer) {
             // The old one first, so that there is room for the new one.
             *simulator = None;
-            *simulator = Some((
-                Simulator::new(&self.device, library, scene, tracer)?,
-                tracer,
-            ));
+            self.tell(News::Preparing(UPLOADING));
+            let made = Simulator::new(&self.device, &self.library, &self.scene, tracer)?;
+            self.tell(News::Preparing(FIRST));
+            *simulator = Some((made, tracer));
         }
         let (simulator, _) = simulator.as_mut().expect("just made");
-        let settings = match &self.fitted {
-            Some(fitted) if **fitted == order.settings => fitted.clone(),
+        let fitted = match &self.fitted {
+            Some(fitted) if **fitted == *settings => fitted.clone(),
             _ => {
-                simulator.fit(library, scene)?;
-                let settings = Arc::new(order.settings.clone());
-                self.fitted.insert(settings).clone()
+                simulator.fit(&self.library, &self.scene)?;
+                self.fitted.insert(Arc::new(settings.clone())).clone()
             }
         };
+        Ok((simulator, fitted))
+    }
+
+    fn carry_out(
+        &mut self,
+        simulator: &mut Option<(Simulator, Tracer)>,
+        taken: &Taken,
+    ) -> Result<(Frame, Option<Pixels>), SimError> {
+        let began = Instant::now();
+        let (order, pose, seconds) = (&taken.order, taken.pose, taken.seconds);
+        order.settings.apply(&mut self.scene);
+        self.scene.world_from_probe = pose;
+        self.imaged = began;
+        self.scene.set_time(seconds);
+        // Tables and buffers of the scene's own are made once; their time is not that of a frame.
+        let (simulator, settings) = self.prepare(simulator, &order.settings)?;
+        let prepared = began.elapsed();
+        let looked_at = self.shared.lock().look.is_some();
+        self.pace.share(if looked_at { IMAGE_SHARE } else { 1.0 });
+        let at_rest = taken.level.is_some();
+        let level = match taken.level {
+            Some(level) => level,
+            None => self.pace.moving(&self.scene),
+        };
+        self.pace.apply(level, &mut self.scene);
+        // What was begun because something moves is finished, or there would be no picture at all.
+        simulator.abandon_when(at_rest.then(|| self.newer()));
+        let scene = &self.scene;
         let image = self.ring.free(image_size(scene))?;
         simulator.show_on(Some(image.clone()));
         let tinted = match order.tint.filter(|_| scene.shows_volume()) {
@@ -246,10 +363,23 @@ impl Worker {
             None => None,
         };
         simulator.tint_on(tinted.clone());
-        simulator.frame(scene, index)?;
-        let timings = simulator.wait()?.pop().unwrap_or_default();
+        // The scene's own picture is that of `render`, with the noise of its first frame.
+        let index = if level == 0 && at_rest {
+            0
+        } else {
+            taken.index
+        };
+        let submitted = simulator.frame(scene, index);
         simulator.show_on(None);
         simulator.tint_on(None);
+        submitted?;
+        let timings = simulator.wait()?.pop().unwrap_or_default();
+        let wall = began.elapsed();
+        // The first frame at all compiles what the driver has put off.
+        if self.left.is_some() {
+            self.pace
+                .finished(level, (wall - prepared).as_secs_f64() * 1e3);
+        }
         let pixels = match order.reads_back {
             true => {
                 let (width, height, rgba) = simulator.pixels()?;
@@ -259,11 +389,15 @@ impl Worker {
             false => None,
         };
         self.left = Some(Imaged {
-            probe: scene.probe.clone(),
+            order: order.clone(),
+            index: taken.index,
             pose,
-            ended: Instant::now(),
-            took: began.elapsed(),
+            seconds,
+            level,
         });
+        let mut state = self.shared.lock();
+        state.looks_new = state.look.is_some();
+        drop(state);
         let constants = simulator.constants();
         let rgba = pixels.as_ref().map(|pixels| pixels.rgba.as_slice());
         self.broadcast.offer(&image, rgba, constants, pose)?;
@@ -275,7 +409,8 @@ impl Worker {
             },
             image,
             tinted: tinted.map(|(image, _)| image),
-            probe: scene.probe.clone(),
+            probe: order.settings.probe.clone(),
+            grade: self.pace.grade(level, scene, at_rest),
             settings,
             pose,
             contact: simulator.contact(),
@@ -284,7 +419,7 @@ impl Worker {
             at: order.at,
             timings,
             finished: Instant::now(),
-            wall_ms: began.elapsed().as_secs_f64() * 1e3,
+            wall_ms: wall.as_secs_f64() * 1e3,
             update_ms: simulator.update_time().as_secs_f64() * 1e3,
             memory: self.device.memory(),
             scene_memory: simulator.memory(),

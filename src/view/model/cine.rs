@@ -68,11 +68,26 @@ impl<T> Cine<T> {
             self.cursor = self.last();
         }
         while self.frames.len() > 1 && self.is_too_large() {
-            let dropped = self.frames.pop_front().expect("more than one");
-            self.bytes -= dropped.bytes;
-            self.cursor = self.cursor.saturating_sub(1);
-            self.marks = self.marks.map(|mark| mark.saturating_sub(1));
+            self.drop_oldest();
         }
+    }
+
+    /// Puts a frame of so many bytes in the place of the newest: the same once more, but finer.
+    pub fn replace_newest(&mut self, frame: T, bytes: u64) {
+        if let Some(newest) = self.frames.back_mut() {
+            self.bytes = self.bytes - newest.bytes + bytes;
+            (newest.frame, newest.bytes) = (frame, bytes);
+        }
+        while self.frames.len() > 1 && self.is_too_large() {
+            self.drop_oldest();
+        }
+    }
+
+    fn drop_oldest(&mut self) {
+        let dropped = self.frames.pop_front().expect("more than one");
+        self.bytes -= dropped.bytes;
+        self.cursor = self.cursor.saturating_sub(1);
+        self.marks = self.marks.map(|mark| mark.saturating_sub(1));
     }
 
     fn is_too_large(&self) -> bool {

@@ -8,7 +8,7 @@ use toml_edit::Key;
 use super::Settings;
 use crate::probe::{Kind, Probe};
 use crate::scene::file::Entry;
-use crate::scene::{Fusion, Imaging, Origin, Origins, Simulation, Surface, Tissue};
+use crate::scene::{Fusion, Imaging, Live, Origin, Origins, Simulation, Surface, Tissue};
 use crate::view::catalogue;
 
 /// Relative difference below which two lattices are the same: each has been multiplied by frequencies
@@ -31,6 +31,7 @@ pub(super) fn changes(
     ));
     out.extend(cell(from, to, lattice));
     out.extend(differing(imaging(&from.imaging), imaging(&to.imaging)));
+    out.extend(differing(live(&from.live), live(&to.live)));
     if let (Some(from), Some(to)) = (&from.fusion, &to.fusion) {
         out.extend(differing(fusion(from), fusion(to)));
     }
@@ -283,6 +284,15 @@ fn imaging(i: &Imaging) -> Vec<Entry> {
         ("imaging.psf_scale".into(), list(psf_scale)),
         whole("imaging.image_height", *image_height),
     ]
+}
+
+fn live(l: &Live) -> Vec<Entry> {
+    let Live { budget } = l;
+    let path = "live.budget";
+    vec![match budget {
+        Some(budget) => number(path, path, *budget),
+        None => (path.into(), None),
+    }]
 }
 
 fn fusion(f: &Fusion) -> Vec<Entry> {

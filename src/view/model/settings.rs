@@ -1,7 +1,7 @@
 //! What the console sets: everything of a scene but its geometry.
 
 use crate::probe::Probe;
-use crate::scene::{Fusion, Imaging, Scene, Simulation, Strategy, Surface, Tissue};
+use crate::scene::{Fusion, Imaging, Live, Scene, Simulation, Strategy, Surface, Tissue};
 use crate::sim::Tracer;
 use crate::view::catalogue;
 
@@ -22,6 +22,8 @@ pub struct Settings {
     pub strategies: Vec<Option<Strategy>>,
     /// How an acquired volume is shown around what is simulated.
     pub fusion: Option<Fusion>,
+    /// How images keep pace while something moves.
+    pub live: Live,
     /// How rays find surfaces.
     pub tracer: Tracer,
 }
@@ -40,6 +42,7 @@ impl Settings {
             surfaces: scene.instances.iter().map(|i| i.surface).collect(),
             strategies: scene.instances.iter().map(strategy).collect(),
             fusion: scene.fusion.clone(),
+            live: scene.live.clone(),
             tracer,
         }
     }
@@ -70,6 +73,7 @@ impl Settings {
         scene.imaging.clone_from(&self.imaging);
         scene.tissues.clone_from(&self.tissues);
         scene.fusion.clone_from(&self.fusion);
+        scene.live.clone_from(&self.live);
         let instances = scene.instances.iter_mut();
         for ((instance, surface), strategy) in instances.zip(&self.surfaces).zip(&self.strategies) {
             instance.surface = *surface;

@@ -4,11 +4,15 @@ use std::time::{Duration, Instant};
 
 use super::Open;
 use crate::gpu::{GpuError, Interface, Painted, Placed, Shot};
+use crate::view::engine::Frame;
 use crate::view::layout::{self, Places};
 use crate::view::statistics::{Sample, Times};
 use crate::view::timing::costs;
 use crate::view::tools::cropped;
 use crate::view::{keys, real};
+
+/// Pictures of an animation after which its window is pictured.
+const SETTLED: usize = 24;
 
 impl Open {
     /// One picture of the window; with its pixels where they are wanted and there is an image.
@@ -51,7 +55,12 @@ impl Open {
             .collect();
         let size = self.window.inner_size();
         let looked = self.pictured.as_ref().map(|pictured| &pictured.look);
-        let shot = shot && image.is_some() && looked == self.look.as_ref();
+        // What goes on by itself is never at rest: its first pictures have found their quality.
+        let settled = |frame: &Frame| match self.model.clock.runs() {
+            true => times.samples().len() >= SETTLED,
+            false => frame.grade.is_full(),
+        };
+        let shot = shot && shown.as_ref().is_some_and(settled) && looked == self.look.as_ref();
         let interface = Interface {
             pixels_per_point: scale,
             primitives: &primitives,
@@ -121,6 +130,7 @@ impl Open {
                 update: frame.update_ms,
                 strategy: costs::strategies(&frame.settings.strategies),
                 latency: frame.at.elapsed().as_secs_f64() * 1e3,
+                grade: Some(frame.grade.clone()),
             });
         }
     }

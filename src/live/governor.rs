@@ -1,0 +1,397 @@
+//! Which level the next frame is made at.
+
+use std::collections::VecDeque;
+
+/// Frames whose median counts: one that something else has delayed changes nothing.
+const COUNTED: usize = 3;
+/// A level is left for a coarser one when it takes this many times the budget.
+const OVER: f64 = 1.1;
+/// A finer one is taken when it is thought to take no more than this part of the budget.
+const UNDER: f64 = 0.8;
+/// So many budgets it may take were its cost in proportion to its work, whatever else is thought.
+const BOLD: f64 = 3.0;
+/// A finer level whose first frame takes so many budgets is left at once.
+const FAILED: f64 = 2.0;
+/// Frames before a level that has failed is tried again, at first and at most: each failure doubles
+/// them.
+const PATIENCE: [u32; 2] = [30, 1920];
+/// Frames of which the slowest says what a finer level would take: more than those of a heartbeat.
+const REMEMBERED: usize = 60;
+/// At rest a level that takes up to so many budgets comes next at once.
+const SWIFT: f64 = 6.0;
+/// At rest a level on the way takes at most so many budgets, and so many times what is shown.
+const ON_THE_WAY: [f64; 2] = [3.0, 1.5];
+
+/// Chooses a level, from the times that frames took. What is chosen depends on nothing else: the same
+/// times give the same levels.
+///
+/// A frame slower than the budget, by the median of three, leads to a level that is thought to keep it. A
+/// finer level is taken only where it is thought to keep the budget with a fifth to spare, judged by the
+/// slowest of the last frames, so that a scene whose cost beats stays at one level. One that turns out not
+/// to keep it is tried again after a while, each time twice as long.
+#[derive(Clone, Debug)]
+pub struct Governor {
+    /// What a frame may take, ms.
+    budget: f64,
+    /// What the levels are guessed to cost relative to each other.
+    works: Vec<f64>,
+    /// What a frame of each took, ms, as it would be now: where the present level becomes slower, so do
+    /// all.
+    known: Vec<Option<f64>>,
+    level: usize,
+    /// Times at this level, ms, newest last.
+    times: VecDeque<f64>,
+    /// Frames at this level.
+    frames: u32,
+    patience: u32,
+    /// The level that was left for this one, because this one is finer.
+    came_from: Option<usize>,
+    /// The coarsest level that has failed.
+    failed: Option<usize>,
+    /// What frames took at the level before, ms.
+    left: Option<f64>,
+}
+
+impl Governor {
+    /// Begins at the coarsest of levels that cost `works` relative to each other, the finest first.
+    ///
+    /// # Panics
+    /// Without any level.
+    pub fn new(budget: f64, works: Vec<f64>) -> Self {
+        assert!(!works.is_empty(), "no level to choose");
+        Self {
+            budget,
+            level: works.len() - 1,
+            known: vec![None; works.len()],
+            works,
+            times: VecDeque::new(),
+            frames: 0,
+            patience: PATIENCE[0],
+            came_from: None,
+            failed: None,
+            left: None,
+        }
+    }
+
+    /// The level of the next frame while something moves; 0 is the finest.
+    pub fn level(&self) -> usize {
+        self.level
+    }
+
+    /// What a frame may take, ms.
+    pub fn budget(&self) -> f64 {
+        self.budget
+    }
+
+    /// Sets it. What was learned of the levels stays.
+    pub fn set_budget(&mut self, budget: f64) {
+        self.budget = budget;
+    }
+
+    /// Goes on with other levels; with the same ones nothing changes. The device stays as fast as it was.
+    pub fn adopt(&mut self, works: Vec<f64>) {
+        if works == self.works {
+            return;
+        }
+        let speed = self.median().map(|ms| ms / self.works[self.level]);
+        *self = Self::new(self.budget, works);
+        let fits = |work: f64| speed.is_some_and(|speed| speed * work <= UNDER * self.budget);
+        if let Some(level) = self.works.iter().position(|&work| fits(work)) {
+            self.level = level;
+        }
+    }
+
+    /// Median of the last frames at the present level, ms; none before the first.
+    pub fn median(&self) -> Option<f64> {
+        let last = self.times.iter().rev().take(COUNTED);
+        median(last.copied().collect())
+    }
+
+    /// What frames at the present level take, ms; none before there are enough of them.
+    pub fn pace(&self) -> Option<f64> {
+        self.known[self.level].or(self.left)
+    }
+
+    /// What a frame of a level is thought to take, ms: what it took, else what follows from two others
+    /// that are known, else in proportion to its work. None before the first frame.
+    fn expected(&self, level: usize) -> Option<f64> {
+        if let Some(known) = self.known[level] {
+            return Some(known);
+        }
+        let work = self.works[level];
+        let mut known: Vec<(f64, f64)> = self.known_works().collect();
+        known.sort_by(|a, b| (a.0 - work).abs().total_cmp(&(b.0 - work).abs()));
+        let &(near, ms) = known.first()?;
+        let slope = known
+            .get(1)
+            .map(|&(far, other)| (ms - other) / (near - far));
+        let slope = slope.filter(|slope| (0.0..=ms / near).contains(slope));
+        Some(ms + slope.unwrap_or(ms / near) * (work - near))
+    }
+
+    fn known_works(&self) -> impl Iterator<Item = (f64, f64)> {
+        let works = self.works.iter().copied().zip(&self.known);
+        works.filter_map(|(work, known)| Some((work, (*known)?)))
+    }
+
+    /// Learns what a frame took that was made at `level`, ms, and chooses the next level.
+    pub fn finished(&mut self, level: usize, ms: f64) {
+        if level != self.level {
+            // Made at rest. Of levels of a ladder before there is nothing to learn.
+            if let Some(known) = self.known.get_mut(level) {
+                *known = Some(ms);
+            }
+            return;
+        }
+        if self.times.len() == REMEMBERED {
+            self.times.pop_front();
+        }
+        self.times.push_back(ms);
+        self.frames += 1;
+        if self.came_from.is_some() && ms > FAILED * self.budget {
+            self.known[self.level] = Some(ms);
+            return self.coarser();
+        }
+        // One frame may be delayed, two are not.
+        let Some(now) = self.median().filter(|_| self.times.len() >= COUNTED) else {
+            return;
+        };
+        if let Some(before) = self.known[self.level].filter(|_| self.times.len() > COUNTED) {
+            for known in self.known.iter_mut().flatten() {
+                *known *= now / before;
+            }
+        }
+        self.known[self.level] = Some(now);
+        if now > OVER * self.budget {
+            self.coarser();
+        } else {
+            self.finer();
+        }
+    }
+
+    fn coarser(&mut self) {
+        let last = self.works.len() - 1;
+        if self.level == last {
+            return;
+        }
+        if let Some(before) = self.came_from {
+            self.failed = Some(self.level);
+            self.patience = (2 * self.patience).min(PATIENCE[1]);
+            return self.go(before);
+        }
+        let fits = |&level: &usize| {
+            let expected = self.expected(level);
+            expected.is_none_or(|ms| ms <= UNDER * self.budget)
+        };
+        let next = (self.level + 1..last).find(fits).unwrap_or(last);
+        self.go(next);
+    }
+
+    fn finer(&mut self) {
+        if self.frames >= self.patience {
+            self.came_from = None;
+            if let Some(failed) = self.failed.take() {
+                self.known[failed] = None;
+            }
+        }
+        let Some(now) = self.median() else { return };
+        let slowest = self.slowest() / now;
+        let in_proportion = now / self.works[self.level];
+        let fits = |&level: &usize| {
+            let expected = self.expected(level).unwrap_or(f64::INFINITY);
+            slowest * expected <= UNDER * self.budget
+                && in_proportion * self.works[level] <= BOLD * self.budget
+        };
+        let least = self.failed.map_or(0, |failed| failed + 1);
+        if let Some(next) = (least..self.level).find(fits) {
+            let before = self.level;
+            self.go(next);
+            self.came_from = Some(before);
+        }
+    }
+
+    /// Largest median of the frames that are remembered.
+    fn slowest(&self) -> f64 {
+        let times: Vec<f64> = self.times.iter().copied().collect();
+        let medians = times.windows(COUNTED).filter_map(|w| median(w.to_vec()));
+        medians.fold(0.0, f64::max)
+    }
+
+    fn go(&mut self, level: usize) {
+        self.left = self.median();
+        self.level = level;
+        self.times.clear();
+        self.frames = 0;
+        self.came_from = None;
+    }
+
+    /// What to make at rest of what is shown at level `shown`: the scene's own where that is thought to
+    /// come soon, else one level on the way, if it is much finer; nothing where the scene's own is shown.
+    pub fn refined(&self, shown: usize) -> Option<usize> {
+        if shown == 0 {
+            return None;
+        }
+        let expected = |level| self.expected(level).unwrap_or(f64::INFINITY);
+        if expected(0) <= SWIFT * self.budget {
+            return Some(0);
+        }
+        let [budgets, times] = ON_THE_WAY;
+        let on_the_way = |&level: &usize| {
+            let ms = expected(level);
+            ms <= budgets * self.budget && ms >= times * expected(shown)
+        };
+        Some((1..shown).find(on_the_way).unwrap_or(0))
+    }
+}
+
+fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Governor;
+
+    const WORKS: [f64; 8] = [1.0, 0.6, 0.36, 0.22, 0.12, 0.07, 0.04, 0.02];
+
+    /// Levels of `count` frames on a device where a frame takes `cost` of level and number.
+    fn run(
+        governor: &mut Governor,
+        count: usize,
+        cost: impl Fn(usize, usize) -> f64,
+    ) -> Vec<usize> {
+        let frame = |index| {
+            let level = governor.level();
+            governor.finished(level, cost(level, index));
+            level
+        };
+        (0..count).map(frame).collect()
+    }
+
+    fn changes(levels: &[usize]) -> usize {
+        levels.windows(2).filter(|w| w[0] != w[1]).count()
+    }
+
+    /// What a device takes that makes the scene's own frame in `whole` ms, 2 of them whatever the level.
+    fn device(whole: f64) -> impl Fn(usize, usize) -> f64 {
+        move |level, _| 2.0 + (whole - 2.0) * WORKS[level]
+    }
+
+    #[test]
+    fn a_fast_device_shows_the_scenes_own_after_few_frames() {
+        let mut governor = Governor::new(16.0, WORKS.to_vec());
+        let levels = run(&mut governor, 60, device(5.0));
+        assert_eq!(levels[0], 7, "it begins with the cheapest");
+        assert!(levels[20..].iter().all(|&level| level == 0), "{levels:?}");
+    }
+
+    #[test]
+    fn a_slow_device_keeps_the_budget_and_wastes_none_of_it() {
+        for whole in [100.0, 300.0, 1000.0, 2500.0] {
+            let mut governor = Governor::new(66.0, WORKS.to_vec());
+            let levels = run(&mut governor, 200, device(whole));
+            let cost = device(whole);
+            let last = *levels.last().unwrap();
+            assert!(cost(last, 0) <= 66.0 * 1.1, "{whole}: {levels:?}");
+            assert!(
+                last == 0 || cost(last - 1, 0) > 66.0 * 0.75,
+                "{whole}: {levels:?}"
+            );
+            assert!(changes(&levels[30..]) == 0, "{whole}: {levels:?}");
+        }
+    }
+
+    #[test]
+    fn a_device_too_slow_for_every_level_stays_at_the_last() {
+        let mut governor = Governor::new(16.0, WORKS.to_vec());
+        let levels = run(&mut governor, 100, device(8000.0));
+        assert!(levels.iter().all(|&level| level == 7));
+    }
+
+    #[test]
+    fn one_frame_that_was_delayed_changes_nothing_and_a_lasting_load_does_at_once() {
+        let mut governor = Governor::new(66.0, WORKS.to_vec());
+        let settled = *run(&mut governor, 100, device(300.0)).last().unwrap();
+        let cost = device(300.0);
+        let spike = |level, index| if index == 50 { 900.0 } else { cost(level, 0) };
+        let levels = run(&mut governor, 100, spike);
+        assert_eq!(changes(&levels), 0, "{levels:?}");
+        let levels = run(&mut governor, 20, |level, _| 3.0 * cost(level, 0));
+        let left = levels.iter().position(|&level| level > settled);
+        assert!(left.is_some_and(|at| at <= 3), "{levels:?}");
+        assert!(3.0 * cost(governor.level(), 0) <= 66.0 * 1.1);
+        // The load is gone: it comes back, once.
+        let levels = run(&mut governor, 400, device(300.0));
+        assert_eq!(*levels.last().unwrap(), settled);
+        assert_eq!(changes(&levels), 1, "{levels:?}");
+    }
+
+    #[test]
+    fn a_scene_whose_cost_beats_does_not_pump() {
+        for whole in [150.0, 300.0, 420.0, 600.0, 1000.0] {
+            let mut governor = Governor::new(66.0, WORKS.to_vec());
+            let cost = device(whole);
+            let beat = |level, index: usize| {
+                cost(level, 0) * (1.0 + 0.3 * (index as f64 * std::f64::consts::TAU / 20.0).sin())
+            };
+            run(&mut governor, 150, beat);
+            let levels = run(&mut governor, 600, beat);
+            assert!(changes(&levels) <= 2, "{whole}: {levels:?}");
+        }
+    }
+
+    #[test]
+    fn an_attempt_that_fails_is_repeated_less_and_less_often() {
+        // The guess is wrong: level 2 costs as much as the scene's own.
+        let mut governor = Governor::new(66.0, WORKS.to_vec());
+        let real = [300.0, 299.0, 298.0, 25.0, 15.0, 10.0, 6.0, 4.0];
+        let levels = run(&mut governor, 1000, |level, _| real[level]);
+        let tried = |frames: &[usize]| frames.iter().filter(|&&level| level < 3).count();
+        assert!((1..=8).contains(&tried(&levels)), "{levels:?}");
+        assert!(tried(&levels[500..]) <= 1, "one frame each");
+        assert_eq!(governor.level(), 3);
+    }
+
+    #[test]
+    fn while_the_window_is_hidden_nothing_is_forgotten() {
+        let mut governor = Governor::new(66.0, WORKS.to_vec());
+        let settled = *run(&mut governor, 100, device(300.0)).last().unwrap();
+        // No frames are made; the first one afterwards comes late.
+        governor.finished(governor.level(), 5000.0);
+        let levels = run(&mut governor, 50, device(300.0));
+        assert!(levels.iter().all(|&level| level == settled), "{levels:?}");
+    }
+
+    #[test]
+    fn at_rest_the_scenes_own_comes_soon_and_nothing_after_it() {
+        let mut governor = Governor::new(66.0, WORKS.to_vec());
+        run(&mut governor, 100, device(300.0));
+        assert_eq!(governor.refined(governor.level()), Some(0));
+        assert_eq!(governor.refined(0), None);
+
+        let mut governor = Governor::new(66.0, WORKS.to_vec());
+        run(&mut governor, 100, device(2500.0));
+        let shown = governor.level();
+        let next = governor.refined(shown).unwrap();
+        assert!(next > 0 && next < shown, "{next} of {shown}");
+        assert_eq!(governor.refined(next), Some(0));
+        // What the frames at rest took is learned, and the level that was chosen stays.
+        governor.finished(0, 300.0);
+        assert_eq!(
+            (governor.level(), governor.refined(shown)),
+            (shown, Some(0))
+        );
+    }
+
+    #[test]
+    fn another_ladder_begins_where_the_device_is_known_to_be_fast_enough() {
+        let mut governor = Governor::new(66.0, WORKS.to_vec());
+        run(&mut governor, 100, device(300.0));
+        let settled = governor.level();
+        governor.adopt(WORKS.to_vec());
+        assert_eq!(governor.level(), settled, "the same levels");
+        governor.adopt(vec![1.0, 0.5, 0.1, 0.05]);
+        assert_eq!(governor.level(), 2);
+    }
+}
