@@ -58,8 +58,10 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     Walk walk = walk_of(along, across, up);
     float high = reach + miss + 0.51 * h * dot(abs(up), vec3(1.0));
     float wide = width + miss + 0.51 * h * dot(abs(across), vec3(1.0));
-    float far = half_length + miss + 0.51 * h * dot(abs(along), vec3(1.0))
-        + (wide + high * abs(walk.slant)) * abs(walk.along.y / walk.across.y) + high * abs(along[walk.c] * walk.inverse_c);
+    // Along the beam, of what is within the slab's middle plane.
+    float deep = half_length + miss + 0.51 * h * dot(abs(along), vec3(1.0)) + high * abs(along[walk.c] * walk.inverse_c);
+    float far = deep + (wide + high * abs(walk.slant)) * abs(walk.along.y / walk.across.y);
+    float row_slope = 1.0 / at_least(walk.along.y, 1e-4);
 
     vec3 nearest = floor(middle / h);
     vec3 rest = fma(-nearest, vec3(h), middle);
@@ -69,27 +71,40 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     if (depth > 0.0) {
         strength *= 1.0 + depth * tissue_texture(middle / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
     }
-    ivec3 step_c = unit_step(walk.c);
+    ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
     float planes = far / abs(walk.step);
     ivec2 plane = cells_between(vec2(-planes, planes), rest[walk.a], h);
     uvec3 count = uvec3(0u);
     for (int i = plane.x; i < plane.y; ++i) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
-        ivec2 row_range = rows_between(walk, da, wide, high, rest[walk.b], h);
-        for (int j = row_range.x; j < row_range.y; ++j) {
-            vec2 at_row = vec2(da, (float(j) + 0.5) * h - rest[walk.b]);
-            ivec2 column = columns_between(walk, at_row, wide, high, rest[walk.c], h);
-            ivec3 at = i * unit_step(walk.a) + j * unit_step(walk.b) + column.x * step_c;
-            for (int k = column.x; k < column.y; ++k) {
-                count.x += 1u;
+        // Of the plane's rows those within the piece's ends.
+        vec2 within = (vec2(-deep, deep) - walk.along.x * da) * row_slope;
+        float half_range = (wide + abs(walk.slant) * high) / abs(walk.across.y);
+        vec2 ends = vec2(max(walk.drift * da - half_range, min(within.x, within.y)), min(walk.drift * da + half_range, max(within.x, within.y)));
+        ivec2 row_range = cells_between(ends, rest[walk.b], h);
+        int j = row_range.x - 1;
+        ivec2 column = ivec2(0);
+        // Threads that run together look each for its next scatterer; then all have one.
+        while (j < row_range.y) {
+            bool found = false;
+            vec3 rel = vec3(0.0);
+            float signed_strength = strength;
+            while (!found && j < row_range.y) {
+                if (column.x >= column.y) {
+                    j += 1;
+                    column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), wide, high, rest[walk.c], h);
+                }
+                ivec3 at = i * step_a + j * step_b + column.x * step_c;
+                bool counts = column.x < column.y && j < row_range.y;
+                column.x += 1;
+                count.x += uint(counts);
                 uvec3 bits = pcg3d(uvec3(base + at) + lattice.key);
-                vec3 rel = (vec3(at) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h - rest;
-                at += step_c;
-                vec3 about = vec3(dot(rel, along), dot(rel, across), dot(rel, up));
-                if (!present(lattice, bits) || any(greaterThan(abs(about), vec3(half_length, width, reach) + miss))) continue;
-                float signed_strength = (bits.z & 1u) == 0u ? strength : -strength;
-                count.yz += hear(s, displaced(f, middle + rel) - s.o, signed_strength, number, x, drowned);
+                rel = (vec3(at) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h - rest;
+                vec3 about = abs(vec3(dot(rel, along), dot(rel, across), dot(rel, up)));
+                signed_strength = (bits.z & 1u) == 0u ? strength : -strength;
+                found = counts && present(lattice, bits) && all(lessThanEqual(about, vec3(half_length, width, reach) + miss));
             }
+            if (found) count.yz += hear(s, displaced(f, middle + rel) - s.o, signed_strength, number, x, drowned);
         }
     }
     return count;

@@ -34,13 +34,14 @@ const float POINT_SHIFT = 0.01234;   // of a layer's pitch
 const float LOG2_E = 1.44269504;
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
-const uint PIECES = SCATTER_BIN / SCATTER_SLOT;   // of a bin, in which deformed tissue is searched
-const int SLOTS_BESIDE = BESIDE * int(PIECES);
+const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // of a bin
+const int SLOTS_BESIDE = BESIDE * int(SLOTS);
+const uint PIECES = SCATTER_BIN / SCATTER_PIECE;  // of a bin, in deformed tissue
 const float LEVEL_UNIT = 65536.0;         // of the integers by which levels are compared
 const int SILENT = -0x40000000;
 
 shared int echoes[2u * SCATTER_WINDOW];
-shared int loudest[(BINS + 2u * uint(BESIDE)) * PIECES];   // per slot, of all segments of the scanline; also beside the window
+shared int loudest[(BINS + 2u * uint(BESIDE)) * SLOTS];   // per slot, of all segments of the scanline; also beside the window
 shared uint work_end[THREADS];
 shared uint shared_candidates;
 shared uint shared_deposits;
@@ -278,8 +279,8 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     // What something else is louder than all along the bin, as far as the stretch reaches.
     vec2 reached = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)) / float(SCATTER_SLOT), -1e6, 1e6);
     int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
-    int slot = max(int(floor(reached.x)), bin * int(PIECES));
-    int last_slot = min(min(int(floor(reached.y)), bin * int(PIECES) + int(PIECES) - 1), int((frame.samples - 1u) / SCATTER_SLOT));
+    int slot = max(int(floor(reached.x)), bin * int(SLOTS));
+    int last_slot = min(min(int(floor(reached.y)), bin * int(SLOTS) + int(SLOTS) - 1), int((frame.samples - 1u) / SCATTER_SLOT));
     int over = 0x7fffffff;
     for (; slot <= last_slot; ++slot) over = min(over, loudest[slot - window]);
     float drowned = 2.0 * max(max(float(over) / LEVEL_UNIT, black) - level, 0.0);
@@ -288,8 +289,8 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     uint end = begin + SCATTER_BIN;
     bool field = deforms(s);
     if (field) {
-        begin += uint(piece) * SCATTER_SLOT;
-        end = begin + SCATTER_SLOT;
+        begin += uint(piece) * SCATTER_PIECE;
+        end = begin + SCATTER_PIECE;
     }
     vec2 x = vec2(distance_at(s, float(begin)), distance_at(s, float(end)));
     // Before the first sample and behind the last there is no other bin.
@@ -402,7 +403,7 @@ void main() {
     uint chunks = gl_NumWorkGroups.y;
 
     for (uint i = thread; i < 2u * SCATTER_WINDOW; i += THREADS) echoes[i] = 0;
-    for (uint i = thread; i < (BINS + 2u * uint(BESIDE)) * PIECES; i += THREADS) loudest[i] = SILENT;
+    for (uint i = thread; i < (BINS + 2u * uint(BESIDE)) * SLOTS; i += THREADS) loudest[i] = SILENT;
     if (thread == 0u) { shared_candidates = 0u; shared_deposits = 0u; }
     barrier();
 
@@ -414,7 +415,7 @@ void main() {
             Stretch s = world_stretch(line * frame.segment_capacity + i);
             ivec2 filled = sounds(s) ? slots_of(s) : ivec2(0, -1);
             int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
-            int last = min(filled.y, window + int(BINS * PIECES) + 2 * SLOTS_BESIDE - 1);
+            int last = min(filled.y, window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
             for (int slot = max(filled.x, window); slot <= last; ++slot) {
                 float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
                 atomicMax(loudest[slot - window], int(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));

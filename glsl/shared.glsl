@@ -48,6 +48,7 @@ const float ALL_LEVELS = -1000.0;
 const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gathers
 const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one stretch
 const uint SCATTER_SLOT = 16u;      // samples over which stretches are held against each other
+const uint SCATTER_PIECE = 32u;     // samples in which deformed tissue is searched at once
 const float UNHEARD = 3.3219281;    // log2(10): 20 dB under black nothing is summed
 
 const uint KIND_CONVEX = 0u;

@@ -10,7 +10,7 @@ use super::texture::{factor, voxel};
 use super::world::World;
 use super::{Accumulator, Segment};
 use crate::sim::layout::{
-    FLAG_VOXEL, LATTICE_LEVELS, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
+    FLAG_VOXEL, LATTICE_LEVELS, Row, SCATTER_BIN, SCATTER_PIECE, SCATTER_SLOT, Tissue, UNHEARD,
 };
 
 /// Points are seen this many lateral sigmas off the axis.
@@ -409,16 +409,16 @@ impl<'a> Tube<'a> {
         let h = level.edge;
         let reach = f64::from(self.world.frame.elevation_reach);
         for bin in self.bins(out) {
-            for piece in 0..SCATTER_BIN / SCATTER_SLOT {
-                let begin = bin * SCATTER_BIN + piece * SCATTER_SLOT;
-                let ends = [begin, begin + SCATTER_SLOT].map(|k| self.distance(f64::from(k)));
+            for piece in 0..SCATTER_BIN / SCATTER_PIECE {
+                let begin = bin * SCATTER_BIN + piece * SCATTER_PIECE;
+                let ends = [begin, begin + SCATTER_PIECE].map(|k| self.distance(f64::from(k)));
                 // Before the first sample and behind the last there is no other piece.
                 let first = if begin == 0 {
                     f64::NEG_INFINITY
                 } else {
                     ends[0]
                 };
-                let last = if begin + SCATTER_SLOT >= self.world.frame.samples {
+                let last = if begin + SCATTER_PIECE >= self.world.frame.samples {
                     f64::INFINITY
                 } else {
                     ends[1]

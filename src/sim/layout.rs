@@ -49,6 +49,8 @@ pub const ALL_LEVELS: f32 = -1000.0;
 pub const SCATTER_WINDOW: u32 = 1024;
 /// Samples in which a thread of it walks one stretch.
 pub const SCATTER_BIN: u32 = 64;
+/// Samples in which deformed tissue is searched at once.
+pub const SCATTER_PIECE: u32 = 32;
 /// Samples over which stretches are held against each other.
 pub const SCATTER_SLOT: u32 = 16;
 /// log2(10): 20 dB under black nothing is summed.
