@@ -5,11 +5,11 @@ const float FIXED_LIMIT = 1073741824.0; // 2^30
 
 vec2 carrier(float time) { return phasor(-2.0 * frame.frequency * time); }
 
-// What the three samples about the nearest one get of an echo that lies `f` samples, -1/2 to 1/2, behind
-// it: the parabola through them, whose centre is the echo's and whose spread is zero.
-vec3 deposit_shares(float f) {
-    float square = f * f;
-    return vec3(0.5 * (square - f), 1.0 - square, 0.5 * (square + f));
+// What four samples get of an echo that lies `f` behind the second of them, 0 to 1: the cubic through
+// them. Their centre is the echo's; they neither widen it nor make it lean.
+vec4 deposit_shares(float f) {
+    float behind = 1.0 - f, ahead = 2.0 - f;
+    return vec4(-f * behind * ahead, 3.0 * (1.0 + f) * behind * ahead, 3.0 * (1.0 + f) * f * ahead, -(1.0 + f) * f * behind) * (1.0 / 6.0);
 }
 
 // `dither` in [0, 1): 0.5 rounds to the nearest; uniform ones keep the mean of what is less than a unit.

@@ -32,6 +32,7 @@ layout(constant_id = 0) const bool DEFORMING = true;
 const uint THREADS = 64u;
 const float POINT_SHIFT = 0.01234;   // of a layer's pitch
 const float LOG2_E = 1.44269504;
+const float SHAPE_SPAN = 0.6;             // mm of depth to either side by which the beam's change is known
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
 const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // of a bin
@@ -187,8 +188,10 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     vec3 nearest = floor(middle / h);
     vec3 rest = fma(-nearest, vec3(h), middle);
     ivec3 base = ivec3(nearest);
-    vec2 planes = (x - x_middle) / walk.step;
-    ivec2 plane = cells_between(vec2(min(planes.x, planes.y), max(planes.x, planes.y)), rest[walk.a], h);
+    // From the stretch's own origin: bins that share an end then share out the planes alike.
+    vec2 ends = clamp(ceil((s.o[walk.a] + x / walk.step) / h - 0.5), -1e6, 1e6);
+    ivec2 plane = ivec2(min(ends.x, ends.y), max(ends.x, ends.y)) - base[walk.a];
+    plane.y = min(plane.y, plane.x + 1024);
 
     float depth = tissues[s.tissue].texture_depth;
     float per_mm = samples_per_mm(s);
@@ -197,6 +200,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     turns_middle -= floor(turns_middle);
     float turns_per_mm = 2.0 * frame.frequency / s.speed;
     float reach = frame.elevation_reach;
+    uint span = max(uint(SHAPE_SPAN / frame.sample_pitch), 1u);
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
 
     uvec3 count = uvec3(0u);
@@ -211,11 +215,12 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float x_plane = x_middle + ahead;
         float sigma_l = rows[row].sigma_lateral, sigma_e = rows[row].sigma_elevation;
 
-        // Over the plane the beam's shape and the gain change linearly, from samples on both sides.
-        uint below = row - min(row, 16u), above = min(row + 16u, frame.samples - 1u);
+        // Over the plane the beam's shape and the gain change as a parabola, through samples on both sides.
+        uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
-        vec3 here = beam_shape(row);
-        vec3 slope = (beam_shape(above) - beam_shape(below)) * run;
+        vec3 here = beam_shape(row), shape_below = beam_shape(below), shape_above = beam_shape(above);
+        vec3 slope = (shape_above - shape_below) * run;
+        vec3 bend = above - below == 2u * span ? (shape_above + shape_below - 2.0 * here) * (2.0 * run * run) : vec3(0.0);
         // A row holds for its whole sample: its numbers are those of the sample's middle.
         float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
 
@@ -223,8 +228,8 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         if (depth > 0.0) {
             strength *= 1.0 + depth * tissue_texture((s.o + x_plane * s.d) / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
         }
-        float falling = slope.z - s.absorption * LOG2_E;
-        float constant = here.z - slope.z * row_ahead - s.absorption * LOG2_E * x_middle;
+        float falling = s.absorption * LOG2_E;
+        float constant = here.z - s.absorption * LOG2_E * x_middle;
 
         ivec2 row_range = rows_between(walk, da, width, reach, rest[walk.b], h);
         // Rows and their cells in one loop: threads that run together all have a cell nearly every time.
@@ -247,8 +252,8 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             float across = dot(rel, s.e_l);
             float up = s.layer_y + dot(rel, s.e_e);
             float off_row = dx - row_ahead;
-            float exponent = constant + falling * dx - (here.x + slope.x * off_row) * across * across
-                - (here.y + slope.y * off_row) * up * up;
+            vec3 change = off_row * (slope + off_row * bend);
+            float exponent = constant + change.z - falling * dx - (here.x + change.x) * across * across - (here.y + change.y) * up * up;
             vec2 v = strength * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v = (bits.z & 1u) == 0u ? v : -v;
             count.y += 1u;
@@ -369,10 +374,10 @@ uint march_point(Stretch s, vec4 point) {
     float e = (s.layer_y + rho_e) / sigma_e;
     vec2 q = s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, sigma_l, sigma_e)
         * frame.volume_scale * carrier(time);
-    vec3 shares = deposit_shares(at - floor(at + 0.5));
-    int slot = slot_of(at) - 1;
+    vec4 shares = deposit_shares(at - floor(at));
+    int slot = slot_of(floor(at)) - 1;
     uint saturated = 0u;
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 4; ++i) {
         uint k = uint(clamp(slot + i + int(window_begin), 0, int(frame.samples) - 1));
         saturated += deposit_at(slot + i, q * (shares[i] * rows[k].point_gain));
     }

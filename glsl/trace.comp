@@ -83,12 +83,12 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uve
     uint l = line % frame.scanlines;
     float y = elevation(line / frame.scanlines);
     float kappa = frame.speed * time / frame.sample_pitch;
-    float nearest = floor(kappa + 0.5);
-    vec3 shares = deposit_shares(kappa - nearest);
+    float before = floor(kappa);
+    vec4 shares = deposit_shares(kappa - before);
     vec2 q = carrier(time);
     q = vec2(amplitude.x * q.x - amplitude.y * q.y, amplitude.x * q.y + amplitude.y * q.x);
-    for (int i = 0; i < 3; ++i) {
-        float at = nearest + float(i - 1);
+    for (int i = 0; i < 4; ++i) {
+        float at = before + float(i - 1);
         if (!(at >= 0.0 && at < float(frame.samples))) continue;
         uint k = uint(at);
         float sigma = rows[k].sigma_elevation;

@@ -117,11 +117,12 @@ mod tests {
         let mut job = (subject.job)(Case::Odd, Size::Small);
         let dir = tempfile::tempdir().unwrap();
         let empty = read(dir.path(), subject, &mut job).unwrap_err();
-        assert!(empty.contains("frame, lateral, iq"), "{empty}");
+        assert!(empty.contains("frame, rows, lateral, iq"), "{empty}");
         let path = dir.path().join("lateral.npy");
-        let words = job.inputs[1].bytes.len() / 4;
+        let at = job.index("lateral");
+        let words = job.inputs[at].bytes.len() / 4;
         for (words, fits) in [(words, true), (words - 2, false)] {
-            let lateral = &job.inputs[1].bytes[..4 * words];
+            let lateral = &job.inputs[at].bytes[..4 * words];
             npy::write(&path, Element::Float, &[words], lateral).unwrap();
             match read(dir.path(), subject, &mut job) {
                 Ok(found) => assert!(fits && found == ["lateral"], "{found:?}"),

@@ -52,7 +52,8 @@ pub const SUBJECT: Subject = Subject {
 fn job(case: Case, size: Size) -> Job {
     let mut frame = frame(case, size);
     if case == Case::NotFinite {
-        frame.world_from_probe[0][1] = f32::NAN;
+        // Not what the rays' elevation, a constant 0, is multiplied by: a compiler may leave that out.
+        frame.world_from_probe[0][2] = f32::NAN;
     }
     if case == Case::Modes {
         frame.flags |= FLAG_COINCIDENT;

@@ -25,12 +25,18 @@ pub struct Accumulator {
 }
 
 /// Rounding to the nearest unit.
-pub const NEAREST: [f64; 6] = [0.5; 6];
+pub const NEAREST: [f64; 8] = [0.5; 8];
 
-/// What the three samples about the nearest one get of an echo that lies `f` samples, -1/2 to 1/2, behind
-/// it: the parabola through them. Their centre is the echo's, and their spread is zero.
-fn shares(f: f64) -> [f64; 3] {
-    [(f * f - f) / 2.0, 1.0 - f * f, (f * f + f) / 2.0]
+/// What four samples get of an echo that lies `f` behind the second of them, 0 to 1: the cubic through
+/// them. Their centre is the echo's; they neither widen it nor make it lean.
+fn shares(f: f64) -> [f64; 4] {
+    let (behind, ahead) = (1.0 - f, 2.0 - f);
+    [
+        -f * behind * ahead / 6.0,
+        (1.0 + f) * behind * ahead / 2.0,
+        (1.0 + f) * f * ahead / 2.0,
+        -(1.0 + f) * f * behind / 6.0,
+    ]
 }
 
 /// Fixed point as the device rounds it; also whether it was clamped.
@@ -66,7 +72,7 @@ impl Accumulator {
     }
 
     /// Adds one echo of `amplitude` at one-way time `time` (us) on scanline `l`, turned by `phase` (rad)
-    /// beyond the carrier and shared by three samples; `gain` is per sample and includes the
+    /// beyond the carrier and shared by four samples; `gain` is per sample and includes the
     /// fixed-point scale. `dither` is added before rounding down: real and imaginary part of the first
     /// sample, then of the next ones. Echoes at no finite time are lost.
     pub fn deposit(
@@ -76,16 +82,16 @@ impl Accumulator {
         amplitude: f64,
         phase: f64,
         gain: impl Fn(usize) -> f64,
-        dither: [f64; 6],
+        dither: [f64; 8],
     ) {
         let kappa = self.kappa(time);
         if !kappa.is_finite() {
             return;
         }
         let angle = phase + self.angle(time);
-        let nearest = (kappa + 0.5).floor();
-        for (i, share) in shares(kappa - nearest).into_iter().enumerate() {
-            let k = nearest as i64 + i as i64 - 1;
+        let before = kappa.floor();
+        for (i, share) in shares(kappa - before).into_iter().enumerate() {
+            let k = before as i64 + i as i64 - 1;
             self.add(
                 l,
                 k,
@@ -165,12 +171,10 @@ mod tests {
         for &(l, kappa, amplitude) in echoes {
             let time = kappa * 0.25 / 1.5;
             let angle = -2.0 * TAU * 5.0 * time;
-            // Lagrange's parabola through the three samples about the nearest.
-            let middle = kappa.round();
-            for k in [middle - 1.0, middle, middle + 1.0] {
-                let others = [middle - 1.0, middle, middle + 1.0]
-                    .into_iter()
-                    .filter(|&o| o != k);
+            // Lagrange's cubic through the four samples about it.
+            let four = [-1.0, 0.0, 1.0, 2.0].map(|i| kappa.floor() + i);
+            for k in four {
+                let others = four.into_iter().filter(|&o| o != k);
                 let share: f64 = others.map(|o| (kappa - o) / (k - o)).product();
                 if (0.0..8.0).contains(&k) {
                     let at = 2 * (8 * l + k as usize);
@@ -212,22 +216,27 @@ mod tests {
         );
         assert_eq!(
             sum.deposits.iter().sum::<u32>(),
-            10,
-            "samples -1 and 8 are outside"
+            13,
+            "samples -1, 8 and 9 are outside"
         );
     }
 
-    // Three points on a parabola reproduce any parabola: sum, centre and spread of the shares are exact.
+    // Four points on a cubic reproduce any cubic: all moments up to the third are the echo's own.
     #[test]
-    fn shares_keep_an_echo_s_centre_and_do_not_widen_it() {
-        for f in [-0.5, -0.3, 0.0, 0.1, 0.49] {
-            let [before, at, behind] = shares(f);
-            assert!((before + at + behind - 1.0).abs() < 1e-15);
-            assert!((behind - before - f).abs() < 1e-15);
-            let spread = before * (f + 1.0).powi(2) + at * f * f + behind * (f - 1.0).powi(2);
-            assert!(spread.abs() < 1e-15, "{f}: {spread}");
-            // The linear split, which this replaces, has f (1 - f).
-            assert!(f <= 0.0 || (1.0 - f) * f * f + f * (1.0 - f).powi(2) > 0.05);
+    fn shares_keep_an_echo_s_centre_and_neither_widen_it_nor_make_it_lean() {
+        for f in [0.0, 0.1, 0.3, 0.5, 0.99] {
+            let moment = |n: i32| -> f64 {
+                let places = [-1.0, 0.0, 1.0, 2.0].into_iter();
+                places
+                    .zip(shares(f))
+                    .map(|(k, s)| s * (k - f).powi(n))
+                    .sum()
+            };
+            assert!((moment(0) - 1.0).abs() < 1e-14);
+            assert!((1..4).all(|n| moment(n).abs() < 1e-14), "{f}");
+            // The linear split widens by f (1 - f).
+            let linear: f64 = (1.0 - f) * f * f + f * (1.0 - f).powi(2);
+            assert!(!(0.05..0.95).contains(&f) || linear > 0.05);
         }
     }
 

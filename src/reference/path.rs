@@ -60,7 +60,7 @@ impl Path {
     }
 
     /// What is added before rounding down: per sample of a deposit, real and imaginary part.
-    pub(super) fn dither(&self, frame: &Frame) -> [f64; 6] {
+    pub(super) fn dither(&self, frame: &Frame) -> [f64; 8] {
         let words = pcg4d([self.line, self.n, self.key(), frame.seed ^ 0x51ed_270b]);
         std::array::from_fn(|i| {
             let word = words[i / 2];

@@ -156,6 +156,11 @@ impl Walk {
     }
 }
 
+/// 1 / sigma^2 of the beam across and up.
+fn falling(row: &Row) -> [f64; 2] {
+    [row.sigma_lateral, row.sigma_elevation].map(|sigma| f64::from(sigma).powi(-2))
+}
+
 /// Indices whose cells, of edge `h`, have their middles in `low <= x < high`.
 fn cells([low, high]: [f64; 2], h: f64) -> std::ops::Range<i64> {
     let first = |x: f64| (x / h - 0.5).ceil() as i64;
@@ -298,23 +303,35 @@ impl<'a> Tube<'a> {
         cut * f64::from(row.sigma_lateral) * (1.0 - height * height).max(0.0).sqrt()
     }
 
-    /// Echo of something of `amplitude`, all but absorption and beam, at `from` the tube's origin.
-    fn echo(&self, from: DVec3, amplitude: f64, out: &mut Accumulator) {
+    /// Echo of something of `amplitude`, all but absorption and `beam`, at `from` the tube's origin.
+    fn echo(&self, from: DVec3, amplitude: f64, beam: f64, out: &mut Accumulator) {
         let x = from.dot(self.direction);
-        let row = self.row(x, out);
         let scale = f64::from(self.world.frame.volume_scale);
-        let amplitude = amplitude * self.absorbed(x) * self.beam(from, row);
+        let amplitude = amplitude * self.absorbed(x) * beam;
         out.deposit_nearest(self.scanline, self.time(x), amplitude, |k| {
             f64::from(self.world.rows[k].volume_gain) * scale
         });
     }
 
-    /// The beam's two-way amplitude off its axis.
+    /// The beam's two-way amplitude off its axis, as wide as a row says.
     fn beam(&self, from: DVec3, row: &Row) -> f64 {
-        let across = from.dot(self.lateral) / f64::from(row.sigma_lateral);
-        let height = self.layer_offset + from.dot(self.elevation);
-        let up = height / f64::from(row.sigma_elevation);
-        (-0.5 * (across * across + up * up)).exp()
+        self.beam_of(from, falling(row))
+    }
+
+    /// The same by 1 / sigma^2 across and up.
+    fn beam_of(&self, from: DVec3, [lateral, elevation]: [f64; 2]) -> f64 {
+        let across = from.dot(self.lateral);
+        let up = self.layer_offset + from.dot(self.elevation);
+        (-0.5 * (across * across * lateral + up * up * elevation)).exp()
+    }
+
+    /// 1 / sigma^2 at distance `x`: a row's is that of its sample's middle, and between two linear.
+    fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
+        let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, (self.world.rows.len() - 1) as f64);
+        let (low, part) = (at.floor() as usize, at.fract());
+        let high = (low + 1).min(self.world.rows.len() - 1);
+        let [a, b] = [low, high].map(|k| falling(&self.world.rows[k]));
+        std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
     }
 
     /// All lattices that sound somewhere along the tube.
@@ -388,8 +405,10 @@ impl<'a> Tube<'a> {
                         continue;
                     };
                     let from = (cell.as_dvec3() + s.offset) * h - o;
-                    if (0.0..self.segment.length).contains(&from.dot(self.direction)) {
-                        self.echo(from, strength * s.amplitude, out);
+                    let x = from.dot(self.direction);
+                    if (0.0..self.segment.length).contains(&x) {
+                        let beam = self.beam_of(from, self.between_rows(x, out));
+                        self.echo(from, strength * s.amplitude, beam, out);
                     }
                 }
             }
@@ -462,7 +481,7 @@ impl<'a> Tube<'a> {
                             }
                             let power = self.power(number, x, bin, loudest, out);
                             let strength = self.weight(x, row) * power.sqrt() * texture;
-                            self.echo(from, strength * s.amplitude, out);
+                            self.echo(from, strength * s.amplitude, self.beam(from, row), out);
                         }
                     }
                 }
