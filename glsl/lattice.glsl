@@ -110,10 +110,10 @@ ivec2 rows_between(Walk walk, float da, float width, float reach, float rest, fl
 }
 
 // Of those in one row the cells that do.
-ivec2 columns_between(Walk walk, vec2 at, float width, float reach, float rest, float h) {
+ivec2 columns_between(Walk walk, vec2 at, float width, vec2 slab, float rest, float h) {
     float across = dot(walk.across, at);
     vec2 up = (vec2(-width, width) - across) / walk.slant;
-    vec2 both = vec2(max(min(up.x, up.y), -reach), min(max(up.x, up.y), reach)) * walk.inverse_c;
+    vec2 both = vec2(max(min(up.x, up.y), slab.x), min(max(up.x, up.y), slab.y)) * walk.inverse_c;
     if (walk.inverse_c < 0.0) both = both.yx;
     return cells_between(both - dot(walk.tilt, at), rest, h);
 }

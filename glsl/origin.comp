@@ -128,7 +128,7 @@ void main() {
     // A path that is aimed elsewhere has a way of its own.
     bool masked = (frame.flags & FLAG_MASKED) != 0u && frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
     float mask_t = 0.0, travelled = 0.0, weight = 1.0;
-    uint interactions = 0u, rays = 0u;
+    uint interactions = 0u;
     // Whether a mask is ahead; then what encloses the start; then the way to the mask, straight on as
     // long as nothing is heard. One loop for all: the walk through the hierarchy is in the kernel once.
     wanted = masked ? MASKS : AROUND;
@@ -142,7 +142,6 @@ void main() {
     while (true) {
         Hit hit = closest_hit(o, d, pairing ? max(first.t - close, 0.0) : t_min,
             pairing ? first.t + close : (wanted == ALL ? frame.depth : 1e9), pairing ? first.instance : NONE);
-        rays += 1u;
         if (wanted == MASKS) {
             // Outside of all masks, and none is ahead.
             if (hit.instance == NONE) { weight = 0.0; done = true; }
@@ -206,7 +205,6 @@ void main() {
         }
         if (done) {
             // Inside the loop: naga loses values that a loop carries when they are used after it.
-            atomicAdd(counters.rays, rays);
             report_counts();
             write_start(line, media, travelled, weight, interactions);
             break;

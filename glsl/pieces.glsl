@@ -12,7 +12,8 @@ vec3 bounded(vec3 v) { return v * min(1.0, MOST_SQUEEZED * inversesqrt(max(dot(v
 uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowned) {
     float along = dot(rel, s.d);
     float up = dot(rel, s.e_e);
-    if (!(along >= x.x && along < x.y && up >= -frame.elevation_reach && up < frame.elevation_reach)) return uvec2(0u);
+    vec2 slab = slab_of();
+    if (!(along >= x.x && along < x.y && up >= slab.x && up < slab.y)) return uvec2(0u);
     float kappa = kappa_at(s, along);
     uint row = row_at(kappa);
     float across = dot(rel, s.e_l);
@@ -42,7 +43,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     vec3 middle = p + undeform(jacobian, back);
     float width = 1.1 * max(half_width(s, row_at(kappa_at(s, x.x))), half_width(s, row_at(kappa_at(s, x.y))));
     if (!(width > 0.0)) return uvec3(0u);
-    float reach = frame.elevation_reach;
+    float reach = slab_of().y;
 
     // How far tissue at the corners is from where the affine map puts it; half as much again for what is between.
     vec3 d = bounded(undeform(jacobian, s.d)), el = bounded(undeform(jacobian, s.e_l)), ee = bounded(undeform(jacobian, s.e_e));
@@ -92,7 +93,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
             while (!found && j < row_range.y) {
                 if (column.x >= column.y) {
                     j += 1;
-                    column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), wide, high, rest[walk.c], h);
+                    column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), wide, vec2(-high, high), rest[walk.c], h);
                 }
                 ivec3 at = i * step_a + j * step_b + column.x * step_c;
                 bool counts = column.x < column.y && j < row_range.y;

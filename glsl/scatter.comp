@@ -153,6 +153,10 @@ float level_in(Stretch s, int bin) {
     return level_at(s, clamp(distance_at(s, float(bin) * float(SCATTER_BIN) + 0.5 * float(SCATTER_BIN)), 0.0, s.extent));
 }
 
+// The slab of a layer about its middle, mm. Layers meet off the round numbers at which cells have their
+// middles: rounding must not give one to two layers, or to none.
+vec2 slab_of() { return (vec2(-1.0, 1.0) + 2.0 * POINT_SHIFT) * frame.elevation_reach; }
+
 #include "lattice.glsl"
 
 // Adds to a sample of the window; 1 where the sum could not hold it.
@@ -199,7 +203,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     float turns_middle = 2.0 * frame.frequency * (s.time + x_middle / s.speed);
     turns_middle -= floor(turns_middle);
     float turns_per_mm = 2.0 * frame.frequency / s.speed;
-    float reach = frame.elevation_reach;
+    vec2 slab = slab_of();
     uint span = max(uint(SHAPE_SPAN / frame.sample_pitch), 1u);
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
 
@@ -231,14 +235,14 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float falling = s.absorption * LOG2_E;
         float constant = here.z - s.absorption * LOG2_E * x_middle;
 
-        ivec2 row_range = rows_between(walk, da, width, reach, rest[walk.b], h);
+        ivec2 row_range = rows_between(walk, da, width, slab.y, rest[walk.b], h);
         // Rows and their cells in one loop: threads that run together all have a cell nearly every time.
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);
         while (j < row_range.y) {
             if (column.x >= column.y) {
                 j += 1;
-                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), width, reach, rest[walk.c], h);
+                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), width, slab, rest[walk.c], h);
             }
             ivec3 at = i * step_a + j * step_b + column.x * step_c;
             bool counts = column.x < column.y && j < row_range.y;

@@ -25,6 +25,7 @@ samples = 1600
 paths = 1
 max_reflections = 0
 cell = "0.1 mm"
+scatterers_per_resolution_cell = 0
 [imaging]
 image_height = 300
 gain = 16 # loud

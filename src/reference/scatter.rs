@@ -252,16 +252,17 @@ impl<'a> Tube<'a> {
     }
 
     /// The bins that it passes.
-    fn bins(&self, out: &Accumulator) -> std::ops::RangeInclusive<u32> {
+    fn bins(&self, out: &Accumulator) -> std::ops::Range<u32> {
         let end = self.segment.length;
         let passed = out.kappa(self.time(end)) > 0.0
             && out.kappa(self.segment.time) < f64::from(self.world.frame.samples);
         let first = self.bin(0.0, out);
-        if passed {
-            first..=self.bin(end, out)
+        let last = if passed {
+            self.bin(end, out) + 1
         } else {
-            1..=0
-        }
+            first
+        };
+        first..last
     }
 
     /// The slots that it fills.
@@ -291,6 +292,13 @@ impl<'a> Tube<'a> {
         let over = loudest[first..=last.min(loudest.len() - 1)].iter().copied();
         let above = over.fold(f64::INFINITY, f64::min).max(black) - level;
         (level >= black - f64::from(UNHEARD)).then(|| 2.0 * above.max(0.0))
+    }
+
+    /// The slab of a layer about its middle, mm: layers meet off the round numbers at which cells have their
+    /// middles.
+    fn slab(&self) -> [f64; 2] {
+        let reach = f64::from(self.world.frame.elevation_reach);
+        [-1.0, 1.0].map(|side| (side + 2.0 * POINT_SHIFT) * reach)
     }
 
     /// Half the beam's width at `row`, mm: an ellipse in the plane of width and height, of which the
@@ -325,13 +333,21 @@ impl<'a> Tube<'a> {
         (-0.5 * (across * across * lateral + up * up * elevation)).exp()
     }
 
-    /// 1 / sigma^2 at distance `x`: a row's is that of its sample's middle, and between two linear.
+    /// 1 / sigma^2 at distance `x`: a row's is that of its sample's middle, and between them lies the parabola
+    /// through the nearest three.
     fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
-        let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, (self.world.rows.len() - 1) as f64);
-        let (low, part) = (at.floor() as usize, at.fract());
-        let high = (low + 1).min(self.world.rows.len() - 1);
-        let [a, b] = [low, high].map(|k| falling(&self.world.rows[k]));
-        std::array::from_fn(|i| a[i] + part * (b[i] - a[i]))
+        let last = self.world.rows.len() - 1;
+        let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, last as f64);
+        let middle =
+            (at.round() as usize).clamp(1.min(last), last.saturating_sub(1).max(1.min(last)));
+        let off = at - middle as f64;
+        let [before, here, behind] = [middle.saturating_sub(1), middle, (middle + 1).min(last)]
+            .map(|k| falling(&self.world.rows[k]));
+        std::array::from_fn(|i| {
+            let slope = (behind[i] - before[i]) / 2.0;
+            let bend = (behind[i] + before[i]) / 2.0 - here[i];
+            here[i] + off * (slope + off * bend)
+        })
     }
 
     /// All lattices that sound somewhere along the tube.
@@ -378,7 +394,7 @@ impl<'a> Tube<'a> {
             let x = step * da;
             let on = x.clamp(0.0, self.segment.length);
             let bins = self.bins(out);
-            let bin = self.bin(on, out).clamp(*bins.start(), *bins.end());
+            let bin = self.bin(on, out).clamp(bins.start, bins.end - 1);
             let power = self.power(number, x, bin, loudest, out);
             if power == 0.0 {
                 continue;
@@ -392,8 +408,8 @@ impl<'a> Tube<'a> {
             for j in cells([row_middle - farthest, row_middle + farthest], h) {
                 let db = (j as f64 + 0.5) * h - o[b];
                 let middle = o[c] - walk.tilt.dot(DVec2::new(da, db));
-                let half = reach / self.elevation[c].abs();
-                for k in cells([middle - half, middle + half], h) {
+                let slab = self.slab().map(|up| middle + up / self.elevation[c]);
+                for k in cells([slab[0].min(slab[1]), slab[0].max(slab[1])], h) {
                     let up = ((k as f64 + 0.5) * h - middle) * self.elevation[c];
                     let across = walk.across.dot(DVec2::new(da, db)) + walk.slant * up;
                     if across.abs() > width {
@@ -454,7 +470,7 @@ impl<'a> Tube<'a> {
                 }
                 let middle = self.origin + x0.midpoint(x1) * self.direction;
                 let rows = [x0, x1].map(|x| self.half_width(self.row(x, out)));
-                let half = [1.1 * rows[0].max(rows[1]), reach];
+                let half = [1.1 * rows[0].max(rows[1]), 1.1 * reach];
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
                 let texture = factor(self.tissue, deformed.field.reference(middle));
@@ -476,7 +492,10 @@ impl<'a> Tube<'a> {
                             }
                             let row = self.row(x, out);
                             let across = from.dot(self.lateral).abs() <= self.half_width(row);
-                            if !across || !(-reach..reach).contains(&from.dot(self.elevation)) {
+                            if !across
+                                || !(self.slab()[0]..self.slab()[1])
+                                    .contains(&from.dot(self.elevation))
+                            {
                                 continue;
                             }
                             let power = self.power(number, x, bin, loudest, out);

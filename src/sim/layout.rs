@@ -54,7 +54,7 @@ pub const SCATTER_PIECE: u32 = 32;
 /// Samples over which stretches are held against each other.
 pub const SCATTER_SLOT: u32 = 16;
 /// log2(10): 20 dB under black nothing is summed.
-pub const UNHEARD: f32 = 3.321_928_1;
+pub const UNHEARD: f32 = std::f32::consts::LOG2_10;
 /// Paths that echo and choose one way at every surface.
 pub const ROLE_WHOLE: u32 = 0;
 /// Main paths, which write their interactions down.
