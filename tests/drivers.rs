@@ -105,7 +105,7 @@ fn kernels_agree_with_their_twins_on_the_second() {
     assert!(!text.contains("WRONG"), "{text}");
 }
 
-/// A carrier that is as far off as a device's own sine may be.
+/// Angles of pixels that are as far off as a device's own sine may be.
 #[cfg(feature = "compile")]
 #[test]
 fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {
@@ -115,13 +115,16 @@ fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {
     for entry in std::fs::read_dir(root().join("glsl")).expect("sources") {
         let path = entry.expect("readable").path();
         let name = path.file_name().expect("a file");
-        if name == "scatter.comp" || path.extension().is_some_and(|e| e == "glsl") {
+        if name == "display.comp" || path.extension().is_some_and(|e| e == "glsl") {
             std::fs::copy(&path, glsl.join(name)).expect("copied");
         }
     }
     let angles = glsl.join("angles.glsl");
     let source = std::fs::read_to_string(&angles).expect("readable");
-    let planted = source.replace("return p;", "return p + vec2(0.0, 1.0 / 2048.0);");
+    let planted = source.replace(
+        "return y < 0.0 ? -angle : angle;",
+        "return (y < 0.0 ? -angle : angle) + 1.0 / 2048.0;",
+    );
     assert_ne!(planted, source);
     std::fs::write(&angles, planted).expect("written");
     let glsl = glsl.to_str().expect("a name");
