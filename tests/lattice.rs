@@ -191,7 +191,8 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
     let depths = [15.0, 45.0];
     let mut bench = Bench::new(&scene);
     let calibration = Calibration::new(&scene);
-    let mean = |sigma: &dyn Fn(f64) -> f64, d: f64| {
+    type Width<'a> = &'a dyn Fn(f64) -> f64;
+    let mean = |sigma: Width, d: f64| {
         let at = |i: u32| depths[0] + (f64::from(i) + 0.5) / 30.0 * (depths[1] - depths[0]);
         (0..30)
             .map(|i| (-d * d / (4.0 * sigma(at(i)).powi(2))).exp())
@@ -200,7 +201,7 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
     };
     let lateral = |z: f64| calibration.sigma_lateral(z);
     let elevation = |z: f64| calibration.sigma_elevation(z);
-    let ways: [(&str, DVec3, &dyn Fn(f64) -> f64); 2] = [
+    let ways: [(&str, DVec3, Width); 2] = [
         ("laterally", DVec3::X, &lateral),
         ("across the slice", DVec3::Y, &elevation),
     ];
