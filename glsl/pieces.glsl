@@ -24,7 +24,7 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     float exponent = shape.z - s.absorption * LOG2_E * along - shape.x * across * across - shape.y * up * up;
     float turns = 2.0 * frame.frequency * (s.time + along / s.speed);
     strength *= sqrt(power) * thinning(s, along, rows[row].sigma_lateral, rows[row].sigma_elevation);
-    return uvec2(1u, deposit_at(slot_of(kappa), strength * exp2(exponent) * phasor(-turns)));
+    return uvec2(1u, deposit_near(kappa, strength * exp2(exponent) * phasor(-turns)));
 }
 
 // Scatterers of one lattice of deformed tissue between two distances. Cells are found where the piece lies

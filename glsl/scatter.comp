@@ -1,3 +1,4 @@
+// variants: rigid deforming(DEFORMING_TISSUE)
 #version 460
 // Echoes of scatterers and point targets along the segments of one scanline. One workgroup owns one
 // (scanline, chunk of its segments, window of samples) and gathers in shared memory, so that global
@@ -17,11 +18,16 @@ layout(std430, binding = 5) readonly buffer SegmentBuffer { Segment segments[]; 
 layout(std430, binding = 6) readonly buffer SegmentCountBuffer { uint segment_count[]; };
 layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 9) readonly buffer FieldBuffer { float fields[]; };
-layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 9) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 10) readonly buffer FieldBuffer { float fields[]; };   // of the deforming one
 
-// Whether any instance's tissue deforms; without it the kernel is smaller.
-layout(constant_id = 0) const bool DEFORMING = true;
+// Whether any instance's tissue deforms. Two modules: not every driver drops what a specialization
+// constant switches off, and the half for deformed tissue is the larger one.
+#ifdef DEFORMING_TISSUE
+const bool DEFORMING = true;
+#else
+const bool DEFORMING = false;
+#endif
 
 #include "transform.glsl"
 #include "probe.glsl"
@@ -169,6 +175,25 @@ uint deposit_at(int slot, vec2 v) {
     return max(abs(v.x), abs(v.y)) < FIXED_LIMIT ? 0u : 1u;
 }
 
+// A scatterer's echo at the sample nearest to it. About halfway between two samples each gets a share: of
+// what rounding does to a place, little is then seen. 1 for each sample that could not hold it.
+uint deposit_near(float kappa, vec2 v) {
+    float before = floor(clamp(kappa, -1e6, 1e9));
+    float share = clamp(0.5 - (kappa - before - 0.5) / SAMPLE_BLEND, 0.0, 1.0);
+    int slot = int(before) - int(window_begin);
+    if (share == 0.0) {
+        slot += 1;
+        share = 1.0;
+    }
+    // A loop: where no thread of a group has a second share, no device spends time on it.
+    uint saturated = 0u;
+    for (int i = 0; i < 2 && share > 0.0; ++i) {
+        saturated += deposit_at(slot + i, share * v);
+        share = 1.0 - share;
+    }
+    return saturated;
+}
+
 // Half the beam's width at a row, mm: an ellipse in the plane of width and height, of which the
 // layer's edge nearest to the middle counts.
 float half_width(Stretch s, uint row) {
@@ -176,8 +201,6 @@ float half_width(Stretch s, uint row) {
     float height = nearest / (frame.lateral_cut * rows[row].sigma_elevation);
     return frame.lateral_cut * rows[row].sigma_lateral * sqrt(max(1.0 - height * height, 0.0));
 }
-
-int slot_of(float kappa) { return int(clamp(floor(kappa + 0.5), -1e6, 1e9)) - int(window_begin); }
 
 // Scatterers of one lattice near a stretch, plane by plane. x: the distances at which planes are crossed
 // that belong to this work. A cell counts when its middle is within the beam's width, taken where the
@@ -261,7 +284,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             vec2 v = strength * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
             v = (bits.z & 1u) == 0u ? v : -v;
             count.y += 1u;
-            count.z += deposit_at(slot_of(kappa_middle + dx * per_mm), v);
+            count.z += deposit_near(kappa_middle + dx * per_mm, v);
         }
     }
     return count;
@@ -352,10 +375,8 @@ uvec3 march_sample(Stretch s, int k) {
         * thinning(s, x, rows[row].sigma_lateral, sigma_e)
         * (tissues[s.tissue].mean + tissues[s.tissue].sigma * gaussian(bits.w));
     float kappa = float(k) + unit(bits.x) - 0.5;
-    int slot = slot_of(kappa);
     vec2 q = amplitude * frame.volume_scale * carrier(kappa * frame.sample_pitch / frame.speed);
-    float gain = rows[min(uint(max(slot, 0)) + window_begin, frame.samples - 1u)].volume_gain;
-    return uvec3(1u, 1u, deposit_at(slot, q * gain));
+    return uvec3(1u, 1u, deposit_near(kappa, q * rows[row_at(kappa + 0.5)].volume_gain));
 }
 
 // One point target: 1 for each sample that could not hold it.
@@ -379,7 +400,7 @@ uint march_point(Stretch s, vec4 point) {
     vec2 q = s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, sigma_l, sigma_e)
         * frame.volume_scale * carrier(time);
     vec4 shares = deposit_shares(at - floor(at));
-    int slot = slot_of(floor(at)) - 1;
+    int slot = int(clamp(floor(at), -1e6, 1e9)) - 1 - int(window_begin);
     uint saturated = 0u;
     for (int i = 0; i < 4; ++i) {
         uint k = uint(clamp(slot + i + int(window_begin), 0, int(frame.samples) - 1));

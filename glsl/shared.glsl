@@ -49,6 +49,7 @@ const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gat
 const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one stretch
 const uint SCATTER_SLOT = 16u;      // samples over which stretches are held against each other
 const uint SCATTER_PIECE = 32u;     // samples in which deformed tissue is searched at once
+const float SAMPLE_BLEND = 0.0625;  // of a sample: about halfway between two, both get a share of a scatterer
 const float UNHEARD = 3.3219281;    // log2(10): 20 dB under black nothing is summed
 
 const uint KIND_CONVEX = 0u;

@@ -227,7 +227,7 @@ pub struct Subject {
 }
 
 /// Every kernel, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 23] = [
+pub const SUBJECTS: [Subject; 24] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -235,7 +235,8 @@ pub const SUBJECTS: [Subject; 23] = [
     refit::SUBJECT,
     origin::SUBJECT,
     trace::SUBJECT,
-    scatter::SUBJECT,
+    scatter::RIGID,
+    scatter::DEFORMING,
     beam::SUBJECT,
     axial::SUBJECT,
     detect::SUBJECT,

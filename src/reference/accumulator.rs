@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::sim::layout::Frame;
+use crate::sim::layout::{Frame, SAMPLE_BLEND};
 
 /// Fixed-point values are clamped to this magnitude.
 const LIMIT: f64 = (1u32 << 30) as f64;
@@ -103,8 +103,9 @@ impl Accumulator {
         }
     }
 
-    /// Adds one echo to the nearest sample alone, with the phase of its own time: of many, which lie
-    /// anywhere between samples, the sum is as fine as the pulse.
+    /// Adds one echo to the nearest sample, with the phase of its own time: of many, which lie anywhere
+    /// between samples, the sum is as fine as the pulse. Within [`SAMPLE_BLEND`] about the middle between
+    /// two samples each gets a share: what rounding does to a place then changes little.
     pub fn deposit_nearest(
         &mut self,
         l: u32,
@@ -114,8 +115,15 @@ impl Accumulator {
     ) {
         let kappa = self.kappa(time);
         if kappa.is_finite() {
-            let k = (kappa + 0.5).floor() as i64;
-            self.add(l, k, amplitude, self.angle(time), &gain, [0.5; 2]);
+            let before = kappa.floor();
+            let beyond = (kappa - before - 0.5) / f64::from(SAMPLE_BLEND);
+            let first = (0.5 - beyond).clamp(0.0, 1.0);
+            for (k, share) in [(before, first), (before + 1.0, 1.0 - first)] {
+                if share > 0.0 {
+                    let angle = self.angle(time);
+                    self.add(l, k as i64, share * amplitude, angle, &gain, [0.5; 2]);
+                }
+            }
         }
     }
 
@@ -249,6 +257,14 @@ mod tests {
         assert!((a.exact[4] - 3.0 * angle.cos()).abs() < 1e-12);
         assert!((a.exact[5] - 3.0 * angle.sin()).abs() < 1e-12);
         assert_eq!(a.deposits.iter().sum::<u32>(), 1);
+        // From one sample to the next its share goes without a step.
+        let blend = f64::from(SAMPLE_BLEND);
+        for (off, later) in [(-0.51, 0.0), (-0.25, 0.25), (0.0, 0.5), (0.25, 0.75), (0.51, 1.0)] {
+            let mut a = Accumulator::new(&frame());
+            a.deposit_nearest(0, (2.5 + off * blend) * 0.25 / 1.5, 1.0, |_| 1.0);
+            let [first, second] = [4, 6].map(|at| a.exact[at].hypot(a.exact[at + 1]));
+            assert!((first + later - 1.0).abs() < 1e-12 && (second - later).abs() < 1e-12);
+        }
     }
 
     #[test]

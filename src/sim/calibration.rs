@@ -7,6 +7,7 @@ mod headroom;
 
 use std::f64::consts::{LN_10, PI, TAU};
 
+use super::layout::SAMPLE_BLEND;
 use super::special::{erf, sinc};
 use crate::scene::settings::{Sampling, ScatterMode};
 use crate::scene::{Scene, Tissue};
@@ -240,9 +241,12 @@ impl<'a> Calibration<'a> {
     }
 
     /// int u^2 over the continuous position of an echo, u the axial kernel about the sample nearest to it,
-    /// at integer lag `m` between two echoes; samples.
+    /// at integer lag `m` between two echoes; samples. Two that share an echo by a and 1 - a, a anything from
+    /// 0 to 1, keep 2/3 of its energy and 1/3 of that of neighbours.
     fn axial_energy(&self, m: usize) -> f64 {
-        autocorrelation(&self.axial_taps, m)
+        let at = |m| autocorrelation(&self.axial_taps, m);
+        let shared = if m == 0 { at(0) - at(1) } else { 0.0 };
+        at(m) - f64::from(SAMPLE_BLEND) / 3.0 * shared
     }
 
     fn speckle_target(&self) -> f64 {

@@ -53,6 +53,8 @@ pub const SCATTER_BIN: u32 = 64;
 pub const SCATTER_PIECE: u32 = 32;
 /// Samples over which stretches are held against each other.
 pub const SCATTER_SLOT: u32 = 16;
+/// Of a sample: about halfway between two samples, both get a share of a scatterer's echo.
+pub const SAMPLE_BLEND: f32 = 0.0625;
 /// log2(10): 20 dB under black nothing is summed.
 pub const UNHEARD: f32 = std::f32::consts::LOG2_10;
 /// Paths that echo and choose one way at every surface.

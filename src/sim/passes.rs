@@ -140,6 +140,22 @@ impl Passes {
             .paths_with_segments(&self.frame)
             .div_ceil(8)
             .clamp(1, 16);
+        let bindings = [
+            &b.frame,
+            &b.tissues,
+            w.instances(),
+            &b.rows,
+            &b.points,
+            &b.segments,
+            &b.segment_count,
+            &b.volume_echoes,
+            &b.counters,
+            &b.scanlines,
+            w.fields(),
+        ]
+        .map(Binding::Buffer);
+        // The last one is the deforming kernel's alone.
+        let bound = bindings.len() - usize::from(!w.deforms());
         cmd.scope("scatter");
         cmd.dispatch_groups(
             &self.kernels.scatter,
@@ -149,19 +165,7 @@ impl Passes {
                 self.frame.samples.div_ceil(layout::SCATTER_WINDOW),
             ],
             &[],
-            &[
-                Binding::Buffer(&b.frame),
-                Binding::Buffer(&b.tissues),
-                Binding::Buffer(w.instances()),
-                Binding::Buffer(&b.rows),
-                Binding::Buffer(&b.points),
-                Binding::Buffer(&b.segments),
-                Binding::Buffer(&b.segment_count),
-                Binding::Buffer(&b.volume_echoes),
-                Binding::Buffer(&b.counters),
-                Binding::Buffer(w.fields()),
-                Binding::Buffer(&b.scanlines),
-            ],
+            &bindings[..bound],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);
         Ok(())

@@ -169,12 +169,10 @@ impl Kernels {
         Ok(Self {
             origin: kernel(&format!("origin_{suffix}"))?,
             trace: kernel(&format!("trace_{suffix}"))?,
-            scatter: Kernel::new(
-                device,
-                "scatter",
-                library.words("scatter"),
-                &[(0, u32::from(world.deforms()))],
-            )?,
+            scatter: kernel(match world.deforms() {
+                true => "scatter_deforming",
+                false => "scatter_rigid",
+            })?,
             beam: kernel("beam")?,
             axial: kernel("axial")?,
             display: kernel("display")?,
