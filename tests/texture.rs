@@ -305,8 +305,8 @@ fn heard(scene: &Scene) -> f64 {
     f64::from(simulator.counters().expect("counters").deposits)
 }
 
-/// Scatterers in the beams between two depths: their cross-section is the lateral cut's, the cells of
-/// the lattice hold one each.
+/// Scatterers in the beams between two depths: their cross-section is the lateral cut's; so many cells of
+/// the lattice hold one as make the tissue's speckle by amplitudes of one modulus.
 fn in_the_beams(scene: &Scene, [from, to]: [f64; 2]) -> f64 {
     const STEPS: u32 = 1000;
     let calibration = Calibration::new(scene);
@@ -315,7 +315,8 @@ fn in_the_beams(scene: &Scene, [from, to]: [f64; 2]) -> f64 {
     let widths = depths.map(|z| 2.0 * LATERAL_CUT * calibration.sigma_lateral(z));
     let area = widths.sum::<f64>() * step;
     let height = 2.0 * calibration.elevation_reach();
-    f64::from(scene.probe.scanlines) * area * height / scene.simulation.cell.powi(3)
+    let cells = f64::from(scene.probe.scanlines) * area * height / scene.simulation.cell.powi(3);
+    cells * calibration.scatterer_density(&scene.tissues[0])
 }
 
 // A deformation makes scatterers as much denser as it makes the volume smaller. Each line hears some
@@ -332,7 +333,9 @@ fn no_scatterer_of_deformed_tissue_is_lost_or_doubled() {
     );
     for (name, map) in [("rigid", rigid), ("squeezed", squeeze), ("sheared", shear)] {
         let about = DVec3::new(0.0, 0.0, 24.0);
-        let scene = scene(|p| map * (p - about) + about);
+        let mut scene = scene(|p| map * (p - about) + about);
+        // Every cell's scatterer: none thinned.
+        scene.simulation.scatterers_per_resolution_cell = 0.0;
         let half = 20.0 * map.z_axis.z;
         let inside = in_the_beams(&scene, [24.0 - half, 24.0 + half]) / map.determinant();
         let ratio = heard(&scene) / inside;
