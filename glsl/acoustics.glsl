@@ -26,7 +26,7 @@ bool refraction(vec3 d, vec3 n, float c1, float c2, out vec3 transmitted) {
 
 // Orthonormal frame about n (Duff et al., JCGT 6(1), 2017).
 void basis(vec3 n, out vec3 tangent, out vec3 bitangent) {
-    float s = n.z >= 0.0 ? 1.0 : -1.0;
+    float s = mix(-1.0, 1.0, n.z >= 0.0);
     float a = -1.0 / (s + n.z);
     float b = n.x * n.y * a;
     tangent = vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x);
@@ -42,7 +42,7 @@ vec3 power_cosine(vec3 n, float exponent, vec2 u) {
     basis(n, tangent, bitangent);
     // cos t = u^(1/(s+1)); sin^2 = 1 - exp(-x), by series where 1 - cos^2 would cancel.
     float x = -2.0 * logarithm(max(u.x, 1.0 / 16777216.0)) / (exponent + 1.0);
-    float sin2 = x < 0.01 ? x * (1.0 - x * (0.5 - x / 6.0)) : 1.0 - exp(-x);
+    float sin2 = mix(1.0 - exp(-x), x * (1.0 - x * (0.5 - x / 6.0)), x < 0.01);
     float cos_t = sqrt(1.0 - sin2);
     vec2 across = sqrt(sin2) * phasor(u.y);
     return normalize(across.x * tangent + across.y * bitangent + cos_t * n);

@@ -11,8 +11,8 @@ const float TURNS = 0.1591549431;   // in a radian
 vec2 phasor(float turns) {
     // At most half a turn; from a quarter on, the sine is that of what is missing to half a turn.
     precise float t = turns - floor(turns + 0.5);
-    precise float half_turn = t < 0.0 ? -0.5 : 0.5;
-    precise vec2 z = vec2(0.25 - abs(t), abs(t) > 0.25 ? half_turn - t : t);
+    precise float half_turn = mix(0.5, -0.5, t < 0.0);
+    precise vec2 z = vec2(0.25 - abs(t), mix(t, half_turn - t, abs(t) > 0.25));
     precise vec2 w = z * z;
     precise vec2 p = z * (6.283185005 + w * (-41.34165573 + w * (81.60100555 + w * (-76.54978180 + w * 39.53670502))));
     return p;
@@ -22,13 +22,13 @@ vec2 phasor(float turns) {
 float arc(float y, float x) {
     float a = abs(x), b = abs(y);
     float longer = max(a, b);
-    precise float z = longer > 0.0 ? min(a, b) / longer : 0.0;
+    precise float z = mix(0.0, min(a, b) / longer, longer > 0.0);
     precise float w = z * z;
     precise float angle = z * (0.9999993443 + w * (-0.3332985938 + w * (0.1994656622 + w * (-0.1390862912
         + w * (0.09642197192 + w * (-0.05591232330 + w * (0.02186295576 - w * 0.004054566845)))))));
-    if (b > a) angle = 1.570796327 - angle;
-    if (x < 0.0) angle = 3.141592654 - angle;
-    return y < 0.0 ? -angle : angle;
+    angle = mix(angle, 1.570796327 - angle, b > a);
+    angle = mix(angle, 3.141592654 - angle, x < 0.0);
+    return mix(angle, -angle, y < 0.0);
 }
 
 // Arcsine of s in [-1, 1], radians, within 5e-7.

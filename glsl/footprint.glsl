@@ -13,7 +13,7 @@ float normal_mass(float x) {
     float t = 1.0 / (1.0 + 0.3275911 * z);
     float tail = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))));
     tail *= 0.5 * exp(-z * z);
-    return x < 0.0 ? tail : 1.0 - tail;
+    return mix(1.0 - tail, tail, x < 0.0);
 }
 
 // Mean intensity reflectance; `width` is kappa sigma.
@@ -33,7 +33,7 @@ float footprint_reflectance(float z1, float c1, float z2, float c2, float cos_i,
     const vec4 NODES = vec4(0.1834346425, 0.5255324099, 0.7966664774, 0.9602898565);
     const vec4 WEIGHTS = vec4(0.3626837834, 0.3137066459, 0.2223810345, 0.1012285363);
     for (uint i = 0u; i < 8u; ++i) {
-        float node = (i & 1u) == 0u ? NODES[i >> 1u] : -NODES[i >> 1u];
+        float node = mix(-NODES[i >> 1u], NODES[i >> 1u], (i & 1u) == 0u);
         vec2 phi = phasor(0.5 * (from + to) + 0.5 * (to - from) * node);
         float s = critical * phi.y;
         float off = (s - centre) / width;
@@ -43,5 +43,5 @@ float footprint_reflectance(float z1, float c1, float z2, float c2, float cos_i,
         norm += mass;
     }
     float within = normal_mass((critical - centre) / width) - normal_mass((-critical - centre) / width);
-    return clamp(beyond + (norm > 0.0 ? max(within, 0.0) * sum / norm : 0.0), 0.0, 1.0);
+    return clamp(beyond + mix(0.0, max(within, 0.0) * sum / norm, norm > 0.0), 0.0, 1.0);
 }

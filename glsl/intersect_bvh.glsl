@@ -68,10 +68,9 @@ uint bvh_children(BvhRay ray, uint meta, uvec3 lo, uvec3 hi, vec3 scale, vec3 ne
     uint inner = (((meta & (meta << 1u)) & 0x10101010u) >> 4u) * 0xffu;
     uint place = (meta ^ (ray.octant & inner)) & 0x1f1f1f1fu;
     uint bits = (meta >> 5u) & 0x07070707u;
-    return (met.x ? (bits & 0xffu) << (place & 0xffu) : 0u)
-        | (met.y ? ((bits >> 8u) & 0xffu) << ((place >> 8u) & 0xffu) : 0u)
-        | (met.z ? ((bits >> 16u) & 0xffu) << ((place >> 16u) & 0xffu) : 0u)
-        | (met.w ? (bits >> 24u) << (place >> 24u) : 0u);
+    uvec4 children = ((uvec4(bits) >> uvec4(0u, 8u, 16u, 24u)) & 0xffu) << ((uvec4(place) >> uvec4(0u, 8u, 16u, 24u)) & 0xffu);
+    children = mix(uvec4(0u), children, met);
+    return children.x | children.y | children.z | children.w;
 }
 
 // Whether rays pass by what is found in a structure that instances share.

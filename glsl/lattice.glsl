@@ -63,13 +63,13 @@ struct Walk {
 };
 
 // Keeps away from zero, where a field squeezes tissue to nothing.
-float at_least(float v, float least) { return v < 0.0 ? min(v, -least) : max(v, least); }
+float at_least(float v, float least) { return mix(max(v, least), min(v, -least), v < 0.0); }
 
 // The three directions of the beam in the lattice's space: covectors, where tissue is deformed.
 Walk walk_of(vec3 d, vec3 lateral, vec3 up) {
     Walk w;
     vec3 size = abs(up);
-    w.c = size.x >= size.y && size.x >= size.z ? 0u : (size.y >= size.z ? 1u : 2u);
+    w.c = mix(mix(2u, 1u, size.y >= size.z), 0u, size.x >= max(size.y, size.z));
     w.a = (w.c + 1u) % 3u;
     w.b = (w.c + 2u) % 3u;
     w.inverse_c = 1.0 / at_least(up[w.c], 0.2);

@@ -102,7 +102,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
                 uvec3 bits = pcg3d(uvec3(base + at) + lattice.key);
                 rel = (vec3(at) + vec3(unit(bits.x), unit(bits.y), unit(bits.z))) * h - rest;
                 vec3 about = abs(vec3(dot(rel, along), dot(rel, across), dot(rel, up)));
-                signed_strength = (bits.z & 1u) == 0u ? strength : -strength;
+                signed_strength = mix(-strength, strength, (bits.z & 1u) == 0u);
                 found = counts && present(lattice, bits) && all(lessThanEqual(about, vec3(half_length, width, reach) + miss));
             }
             if (found) count.yz += hear(s, displaced(f, middle + rel) - s.o, signed_strength, number, x, drowned);

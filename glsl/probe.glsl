@@ -17,7 +17,7 @@ void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lat
 
 // Axial sample at `kappa` pitches along a line, the nearest end where that lies outside; 0 for NaN.
 uint sample_at(float kappa) {
-    return kappa > 0.0 ? uint(min(kappa, float(frame.samples - 1u))) : 0u;
+    return uint(clamp(mix(0.0, kappa, kappa > 0.0), 0.0, float(frame.samples - 1u)));
 }
 
 // Amplitude factor of an echo `off` mm beside the geometric scanline.

@@ -65,10 +65,10 @@ uint owen(uint x, uint seed) {
     return bitfieldReverse(laine_karras(bitfieldReverse(x), seed));
 }
 
-// As path_random, but over the paths x and y are the first two dimensions of a Sobol sequence, Owen
+// Instead of the first two words of path_random: over the paths they are the first two dimensions of a Sobol sequence, Owen
 // scrambled, its order shuffled so that the decisions of one path know nothing of each other (Burley,
 // JCGT 9(4), 2020): the first 2^k paths cover the unit square evenly.
-uvec4 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
+uvec2 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
     uvec4 key = pcg4d(uvec4(0x9e3779b9u, bounce, purpose, seed));
     uint index = owen(path, key.x);
     uint second = 0u;
@@ -77,11 +77,12 @@ uvec4 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
         if ((i & 1u) != 0u) second ^= direction;
         direction ^= direction >> 1u;
     }
-    uvec4 bits = path_random(path, bounce, purpose, seed);
-    return uvec4(owen(bitfieldReverse(index), key.y), owen(second, key.z), bits.z, bits.w);
+    return uvec2(owen(bitfieldReverse(index), key.y), owen(second, key.z));
 }
 
 // The words of a path as the frame draws them.
 uvec4 path_draw(uint path, uint bounce, uint purpose, uint seed, bool sobol) {
-    return sobol ? path_sobol(path, bounce, purpose, seed) : path_random(path, bounce, purpose, seed);
+    uvec4 bits = path_random(path, bounce, purpose, seed);
+    if (sobol) bits.xy = path_sobol(path, bounce, purpose, seed);
+    return bits;
 }

@@ -172,7 +172,7 @@ uint deposit_at(int slot, vec2 v) {
         atomicAdd(echoes[2 * slot], int(floor(held.x + 0.5)));
         atomicAdd(echoes[2 * slot + 1], int(floor(held.y + 0.5)));
     }
-    return max(abs(v.x), abs(v.y)) < FIXED_LIMIT ? 0u : 1u;
+    return uint(!(max(abs(v.x), abs(v.y)) < FIXED_LIMIT));
 }
 
 // A scatterer's echo at the sample nearest to it. About halfway between two samples each gets a share: of
@@ -247,7 +247,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float run = per_mm / max(float(above - below), 1.0);
         vec3 here = beam_shape(row), shape_below = beam_shape(below), shape_above = beam_shape(above);
         vec3 slope = (shape_above - shape_below) * run;
-        vec3 bend = above - below == 2u * span ? (shape_above + shape_below - 2.0 * here) * (2.0 * run * run) : vec3(0.0);
+        vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
         // A row holds for its whole sample: its numbers are those of the sample's middle.
         float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
 
@@ -282,7 +282,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
             vec3 change = off_row * (slope + off_row * bend);
             float exponent = constant + change.z - falling * dx - (here.x + change.x) * across * across - (here.y + change.y) * up * up;
             vec2 v = strength * exp2(exponent) * phasor(-(turns_middle + dx * turns_per_mm));
-            v = (bits.z & 1u) == 0u ? v : -v;
+            v *= mix(-1.0, 1.0, (bits.z & 1u) == 0u);
             count.y += 1u;
             count.z += deposit_near(kappa_middle + dx * per_mm, v);
         }
@@ -328,7 +328,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     // Before the first sample and behind the last there is no other bin.
     bool first = begin == 0u || bin == passed.x && (!field || x.x <= 0.0);
     bool last = end >= frame.samples || bin == passed.y && (!field || x.y >= s.extent);
-    x = vec2(first ? 0.0 : max(x.x, 0.0), last ? s.extent : min(x.y, s.extent));
+    x = vec2(mix(max(x.x, 0.0), 0.0, first), mix(min(x.y, s.extent), s.extent, last));
     if (!(x.y > x.x)) return uvec3(0u);
 
     // Levels that some plane may need.
@@ -347,7 +347,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
         } else {
             // Planes crossed beyond the ends have scatterers before them.
             float margin = plane_margin(s, x, number);
-            count += march_planes(s, number, vec2(x.x - (first ? margin : 0.0), x.y + (last ? margin : 0.0)), drowned);
+            count += march_planes(s, number, x + margin * mix(vec2(0.0), vec2(-1.0, 1.0), bvec2(first, last)), drowned);
         }
     }
     return count;

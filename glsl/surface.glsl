@@ -4,7 +4,7 @@
 // overflows nor vanishes for triangles of any size.
 vec3 surface_normalize(vec3 v) {
     float size = max(max(abs(v.x), abs(v.y)), abs(v.z));
-    return size > 0.0 ? normalize(v / size) : vec3(0.0);
+    return mix(vec3(0.0), normalize(v / size), bvec3(size > 0.0));
 }
 
 vec3 surface_vertex(uint index) {

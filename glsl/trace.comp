@@ -124,8 +124,8 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
         return;
     }
     uint at = line * frame.segment_capacity + slot;
-    float weight = whole ? path.weight : path.weight * path.share;
-    float share = whole ? 1.0 : max(1.0, path.probability / path.share);
+    float weight = path.weight * mix(path.share, 1.0, whole);
+    float share = mix(max(1.0, path.probability / path.share), 1.0, whole);
     segments[at].origin_length = vec4(path.origin, extent);
     segments[at].direction_time = vec4(path.direction, path.time);
     segments[at].lateral_weight = vec4(path.lateral, weight);
@@ -329,8 +329,8 @@ void main() {
     for (uint guard = 0u;; ++guard) {
         while (echo.waiting != 0u) {
             bool behind = (echo.waiting & 1u) == 0u;
-            echo.waiting &= behind ? 0u : 2u;
-            deposit_surface(line, behind ? echo.late : echo.time, behind ? echo.behind : echo.in_phase, behind,
+            echo.waiting &= mix(2u, 0u, behind);
+            deposit_surface(line, mix(echo.time, echo.late, behind), mix(echo.in_phase, echo.behind, bvec2(behind)), behind,
                 dither_words(line, n, echo.key));
         }
         bool alive = going && path.interactions < frame.max_interactions && path.crossings < limit
@@ -371,8 +371,8 @@ void main() {
             bool bounces = at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections;
 
             masks_only = !heard && !aimed && !bounces && !pairing;
-            Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.t - close, 0.0) : path.t_min,
-                pairing ? first.t + close : t_end, pairing ? first.instance : NONE);
+            Hit hit = closest_hit(path.origin, path.direction, mix(path.t_min, max(first.t - close, 0.0), pairing),
+                mix(t_end, first.t + close, pairing), mix(NONE, first.instance, pairing));
             rays += 1u;
             if (masks_only) {
                 // Nothing more is heard of what flies past all masks.
@@ -497,7 +497,7 @@ void main() {
                 float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
                 if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
                 reflects = choice < at.reflectance;
-                path.probability *= reflects ? at.reflectance : 1.0 - at.reflectance;
+                path.probability *= mix(1.0 - at.reflectance, at.reflectance, reflects);
                 going = can_reflect || !reflects;
             }
         }
@@ -507,10 +507,10 @@ void main() {
             continue;
         }
         // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
-        bool through = transmit_path(path, rough && rough_through ? m : at.shading, at.geometric, tissues[at.before].speed,
+        bool through = transmit_path(path, mix(at.shading, m, bvec3(rough && rough_through)), at.geometric, tissues[at.before].speed,
             tissues[at.behind].speed) || at.curved;
         if (role == ROLE_MAIN) {
-            path.weight = through && at.reflectance < 1.0 ? path.weight * (1.0 - at.reflectance) : 0.0;
+            path.weight *= mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
         } else if (!through) {
             atomicAdd(counters.paths_lost, 1u);
             path.weight = 0.0;

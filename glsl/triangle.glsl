@@ -20,12 +20,12 @@ struct TriangleHit {
 };
 
 vec3 sheared_permute(vec3 v, uint axis) {
-    return axis == 0u ? v.yzx : (axis == 1u ? v.zxy : v);
+    return mix(mix(v, v.zxy, bvec3(axis == 1u)), v.yzx, bvec3(axis == 0u));
 }
 
 ShearedRay sheared_ray(vec3 origin, vec3 direction) {
     vec3 size = abs(direction);
-    uint axis = size.x > size.y ? (size.x > size.z ? 0u : 2u) : (size.y > size.z ? 1u : 2u);
+    uint axis = mix(mix(2u, 1u, size.y > size.z), mix(2u, 0u, size.x > size.z), size.x > size.y);
     vec3 d = sheared_permute(direction, axis);
     precise vec3 shear = vec3(d.x / d.z, d.y / d.z, 1.0 / d.z);
     return ShearedRay(origin, shear, axis);

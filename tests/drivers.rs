@@ -122,8 +122,8 @@ fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {
     let angles = glsl.join("angles.glsl");
     let source = std::fs::read_to_string(&angles).expect("readable");
     let planted = source.replace(
-        "return y < 0.0 ? -angle : angle;",
-        "return (y < 0.0 ? -angle : angle) + 1.0 / 2048.0;",
+        "return mix(angle, -angle, y < 0.0);",
+        "return mix(angle, -angle, y < 0.0) + 1.0 / 2048.0;",
     );
     assert_ne!(planted, source);
     std::fs::write(&angles, planted).expect("written");
