@@ -42,6 +42,7 @@ const float SHAPE_SPAN = 0.6;             // mm of depth to either side by which
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
 const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // of a bin
+const float SLOT_MARGIN = 0.5 / float(SCATTER_SLOT);
 const int SLOTS_BESIDE = BESIDE * int(SLOTS);
 const uint PIECES = SCATTER_BIN / SCATTER_PIECE;  // of a bin, in deformed tissue
 const float LEVEL_UNIT = 65536.0;         // of the integers by which levels are compared
@@ -148,10 +149,11 @@ ivec2 bins_of(Stretch s) {
     return ivec2(row_at(begin) / SCATTER_BIN, row_at(end) / SCATTER_BIN);
 }
 
-// First and last slot that a stretch fills.
+// First and last slot that a stretch fills, but for half a sample at either end: where the recording ends
+// stretches end too, and rounding must not decide.
 ivec2 slots_of(Stretch s) {
     vec2 ends = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)), vec2(0.0), vec2(float(frame.samples))) / float(SCATTER_SLOT);
-    return ivec2(int(ceil(ends.x)), int(floor(ends.y)) - 1);
+    return ivec2(int(ceil(ends.x - SLOT_MARGIN)), int(floor(ends.y + SLOT_MARGIN)) - 1);
 }
 
 // Level where a stretch is held against the others of a bin.

@@ -298,7 +298,13 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
             .expect("the program starts")
     };
     for name in [
-        "origin", "trace", "scatter_rigid", "beam", "axial", "detect", "display",
+        "origin",
+        "trace",
+        "scatter_rigid",
+        "beam",
+        "axial",
+        "detect",
+        "display",
     ] {
         let out = kernels(name);
         let said = text(&out.stdout) + &text(&out.stderr);

@@ -259,7 +259,13 @@ mod tests {
         assert_eq!(a.deposits.iter().sum::<u32>(), 1);
         // From one sample to the next its share goes without a step.
         let blend = f64::from(SAMPLE_BLEND);
-        for (off, later) in [(-0.51, 0.0), (-0.25, 0.25), (0.0, 0.5), (0.25, 0.75), (0.51, 1.0)] {
+        for (off, later) in [
+            (-0.51, 0.0),
+            (-0.25, 0.25),
+            (0.0, 0.5),
+            (0.25, 0.75),
+            (0.51, 1.0),
+        ] {
             let mut a = Accumulator::new(&frame());
             a.deposit_nearest(0, (2.5 + off * blend) * 0.25 / 1.5, 1.0, |_| 1.0);
             let [first, second] = [4, 6].map(|at| a.exact[at].hypot(a.exact[at + 1]));

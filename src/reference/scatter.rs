@@ -265,11 +265,12 @@ impl<'a> Tube<'a> {
         first..last
     }
 
-    /// The slots that it fills.
+    /// The slots that it fills, but for half a sample at either end.
     fn filled(&self, out: &Accumulator) -> std::ops::Range<u32> {
         let samples = f64::from(self.world.frame.samples);
         let at = |x: f64| out.kappa(self.time(x)).clamp(0.0, samples) / f64::from(SCATTER_SLOT);
-        at(0.0).ceil() as u32..at(self.segment.length).floor() as u32
+        let margin = 0.5 / f64::from(SCATTER_SLOT);
+        (at(0.0) - margin).ceil() as u32..(at(self.segment.length) + margin).floor() as u32
     }
 
     /// The place in a bin at which it is held against the others there.
