@@ -26,14 +26,15 @@ fn open(timeout: &str, more: &[&str]) -> Option<(Desk, SocketAddr)> {
     Some((desk, address))
 }
 
-/// The first image that arrives with the pose `matrix`.
+/// The first image at the scene's own quality, 400 pixels high, that arrives with the pose `matrix`:
+/// what is sent while something moves may be smaller.
 fn image_at(client: &mut Client, matrix: [f32; 12]) -> insonify::igtl::image::Image {
     loop {
         let pose = client.receive_kind("TRANSFORM");
         let Content::Image(image) = client.receive_kind("IMAGE").content else {
             panic!("no image")
         };
-        if pose.content == Content::Transform(matrix) {
+        if pose.content == Content::Transform(matrix) && image.size[1] == 400 {
             return *image;
         }
     }
@@ -49,7 +50,7 @@ fn a_tracker_moves_the_probe_and_sees_what_the_window_shows() {
     let mut client = Client::at(address);
     let home = shift(0.0, 0.0, 0.0);
     let seen = image_at(&mut client, home);
-    assert_eq!((seen.size[1], seen.components), (400, 1));
+    assert_eq!(seen.components, 1);
     assert_eq!(
         difference(&desk.grab(IMAGE), &still),
         0.0,
