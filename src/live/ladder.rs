@@ -1,4 +1,4 @@
-//! The levels that a scene can be imaged at, from its own down to about a twentieth of the work.
+//! The levels that a scene can be imaged at, from its own down to about a thirtieth of the work.
 
 use std::fmt;
 
@@ -9,13 +9,15 @@ use crate::scene::Scene;
 use crate::scene::settings::{Imaging, Simulation};
 
 /// Fewest scanlines that still show a sector.
-const LEAST_SCANLINES: u32 = 48;
+const LEAST_SCANLINES: u32 = 32;
 /// Fewest rows of pixels.
 const LEAST_HEIGHT: u32 = 240;
 /// Fewest samples of the pulse's axial sigma: below, a surface between two samples would lose height.
 const LEAST_SIGMA_SAMPLES: f64 = 1.0;
 /// From the second step on branches that are weaker than this, dB, carry no speckle.
 const FLOOR: f64 = -40.0;
+/// Fewest scatterers per resolution cell: with fewer, speckle would no longer be fully developed.
+const LEAST_SCATTERERS: f64 = 4.0;
 
 /// What one step down leaves of the scene's own counts.
 struct Step {
@@ -23,23 +25,20 @@ struct Step {
     layers: f64,
     samples: f64,
     paths: f64,
+    scatterers: f64,
     reflections: u32,
     height: f64,
 }
 
-const fn step(
-    scanlines: f64,
-    layers: f64,
-    samples: f64,
-    paths: f64,
-    reflections: u32,
-    height: f64,
-) -> Step {
+/// Counts in the order of [`Step`]: scanlines, layers, samples, paths, scatterers, and height of the picture.
+const fn step(shares: [f64; 6], reflections: u32) -> Step {
+    let [scanlines, layers, samples, paths, scatterers, height] = shares;
     Step {
         scanlines,
         layers,
         samples,
         paths,
+        scatterers,
         reflections,
         height,
     }
@@ -47,14 +46,15 @@ const fn step(
 
 /// Each about two thirds of the work of the one before. Paths and layers go first: they cost most and
 /// show least.
-const STEPS: [Step; 7] = [
-    step(1.0, 0.75, 1.0, 0.5, 3, 1.0),
-    step(1.0, 0.5, 0.75, 0.5, 2, 1.0),
-    step(0.75, 0.5, 0.75, 0.25, 2, 1.0),
-    step(0.75, 0.2, 0.6, 0.25, 1, 0.75),
-    step(0.5, 0.2, 0.5, 0.125, 1, 0.75),
-    step(0.375, 0.2, 0.4, 0.125, 1, 0.5),
-    step(0.25, 0.2, 0.25, 0.125, 1, 0.5),
+const STEPS: [Step; 8] = [
+    step([1.0, 0.75, 1.0, 0.5, 0.75, 1.0], 3),
+    step([1.0, 0.5, 0.75, 0.5, 0.6, 1.0], 2),
+    step([0.75, 0.5, 0.75, 0.25, 0.5, 1.0], 2),
+    step([0.75, 0.2, 0.6, 0.25, 0.5, 0.75], 1),
+    step([0.5, 0.2, 0.5, 0.125, 0.5, 0.75], 1),
+    step([0.375, 0.2, 0.4, 0.125, 0.5, 0.5], 1),
+    step([0.25, 0.2, 0.25, 0.125, 0.5, 0.5], 1),
+    step([1.0 / 6.0, 0.2, 0.25, 0.125, 0.5, 0.4], 1),
 ];
 
 /// The counts of one level.
@@ -69,6 +69,8 @@ pub struct Level {
     pub samples: u32,
     /// Paths of a line.
     pub paths: u32,
+    /// Scatterers per resolution cell; 0 is all there are.
+    pub scatterers: f64,
     /// Most reflections of a path.
     pub reflections: u32,
     /// Weakest branch that carries speckle, dB.
@@ -85,6 +87,7 @@ impl Level {
             layers: probe.elevation_layers,
             samples: probe.samples,
             paths: simulation.paths,
+            scatterers: simulation.scatterers_per_resolution_cell,
             reflections: simulation.max_reflections,
             volume_floor: simulation.volume_floor,
             image_height: imaging.image_height,
@@ -102,6 +105,7 @@ impl Level {
         probe.elevation_layers = self.layers;
         probe.samples = self.samples;
         simulation.paths = self.paths;
+        simulation.scatterers_per_resolution_cell = self.scatterers;
         simulation.max_reflections = self.reflections;
         simulation.volume_floor = self.volume_floor;
         imaging.image_height = self.image_height;
@@ -114,6 +118,7 @@ impl Level {
             "elevation_layers": self.layers,
             "samples": self.samples,
             "paths": self.paths,
+            "scatterers_per_resolution_cell": self.scatterers,
             "max_reflections": self.reflections,
             "volume_floor_db": self.volume_floor,
             "image_height": self.image_height,
@@ -129,7 +134,13 @@ impl Level {
         let rays = lines * share(self.paths + 3, own.paths + 3);
         let samples = share(self.scanlines, own.scanlines) * share(self.samples, own.samples);
         let rows = share(self.image_height, own.image_height);
-        0.35 * rays + 0.45 * lines + 0.15 * samples + 0.05 * rows * rows
+        let scatterers = match own.scatterers {
+            all if all <= 0.0 => 1.0,
+            most => self.scatterers / most,
+        };
+        // Layers share the slice's scatterers among them.
+        let speckle = share(self.scanlines, own.scanlines) * scatterers;
+        0.5 * rays + 0.35 * speckle + 0.1 * samples + 0.05 * rows * rows
     }
 }
 
@@ -140,6 +151,7 @@ impl fmt::Display for Level {
             layers,
             samples,
             paths,
+            scatterers,
             reflections,
             image_height,
             ..
@@ -147,7 +159,7 @@ impl fmt::Display for Level {
         write!(
             f,
             "{scanlines} lines x {layers} layers x {samples} samples, {paths} paths, \
-             {reflections} reflections, {image_height} rows"
+             {scatterers} scatterers, {reflections} reflections, {image_height} rows"
         )
     }
 }
@@ -183,6 +195,10 @@ impl Ladder {
             layers: odd(own.layers, step.layers),
             samples: part(own.samples, step.samples, least_samples),
             paths: part(own.paths, step.paths, 1),
+            // All of them stay all.
+            scatterers: (own.scatterers * step.scatterers)
+                .max(LEAST_SCATTERERS)
+                .min(own.scatterers),
             reflections: own.reflections.min(step.reflections),
             volume_floor: match index {
                 0 => own.volume_floor,
@@ -257,6 +273,7 @@ mod tests {
                 let pairs = counts(fine).into_iter().zip(counts(coarse));
                 assert!(pairs.into_iter().all(|(a, b)| a >= b && b > 0), "{name}");
                 assert!(coarse.volume_floor >= fine.volume_floor, "{name}");
+                assert!(coarse.scatterers <= fine.scatterers, "{name}");
                 assert!(works[1] < works[0], "{name}: {works:?}");
             }
         }

@@ -100,9 +100,9 @@ pub struct Frame {
     pub image_bytes: u64,
 }
 
-/// While images are due, pictures of the 3D view are made only after so many times what the last one took:
-/// a quarter of the time is theirs.
-const PUT_OFF: u32 = 3;
+/// While something moves, pictures of the 3D view are made only after so many times what the last one took:
+/// a seventh of the time is theirs.
+const PUT_OFF: u32 = 6;
 
 /// What the simulation has to say.
 pub enum News {
@@ -148,8 +148,10 @@ enum Job {
     Open(Box<Scene>, Order),
     /// The last image once more, at a finer level.
     Refined(usize),
-    /// Only the anatomy.
-    Survey,
+    /// Only the anatomy, while something moves or at rest.
+    Survey {
+        moving: bool,
+    },
 }
 
 struct Shared {

@@ -2,7 +2,7 @@
 //! to the window.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
@@ -28,6 +28,10 @@ use crate::sim::{self, SimError};
 mod paint;
 mod scenes;
 
+/// While an image is being made, what events change is drawn with it, or after so many times what a drawing
+/// takes: on a slow device the time is the simulation's.
+const PUT_OFF: u32 = 8;
+
 /// A window with its simulation, and what the user has made of them.
 pub(super) struct Open {
     /// The picture last finished; before the session, so that its device is still there.
@@ -47,6 +51,10 @@ pub(super) struct Open {
     pictures_ms: Vec<f64>,
     /// When the last input arrived.
     touched: Instant,
+    /// When the window was drawn last, and how long that took.
+    painted: (Instant, Duration),
+    /// An image has been ordered and has not come yet.
+    awaited: bool,
     /// When the interface wants to be drawn again.
     again: Option<Instant>,
     input: egui_winit::State,
@@ -213,6 +221,8 @@ impl Open {
             fresh: false,
             pictures_ms: Vec::new(),
             touched: Instant::now(),
+            painted: (Instant::now(), Duration::ZERO),
+            awaited: false,
             again: None,
             input,
             window,
@@ -230,6 +240,7 @@ impl Open {
         for news in self.session.engine.news() {
             match news {
                 News::Frame(frame, pixels) => {
+                    self.awaited = false;
                     self.model.follow(Instant::now());
                     if self.frame.is_none() {
                         self.model.begin_replay(Instant::now());
@@ -249,7 +260,10 @@ impl Open {
                     self.pictured = Some(*pictured);
                 }
                 News::Preparing(what) => self.state.preparing = what,
-                News::Refused(problem) => self.state.problem = Some(problem),
+                News::Refused(problem) => {
+                    self.awaited = false;
+                    self.state.problem = Some(problem);
+                }
                 News::Opened => self.adopt(plan),
                 News::NotOpened(problem) => self.refuse(problem),
                 News::Failed(error) => failed = Err(error),
@@ -282,7 +296,18 @@ impl Open {
         let response = self.input.on_window_event(&self.window, event);
         if response.repaint {
             self.touched = now;
+            self.draw_soon(now);
+        }
+    }
+
+    /// Draws what an event has changed: now, or with the image that is being made where that comes soon.
+    fn draw_soon(&mut self, now: Instant) {
+        let (began, took) = self.painted;
+        let at = began + PUT_OFF * took;
+        if at <= now || !self.awaited {
             self.window.request_redraw();
+        } else {
+            self.again = Some(self.again.map_or(at, |again| again.min(at)));
         }
     }
 
@@ -293,6 +318,7 @@ impl Open {
             self.told = self.model.revision();
             let (order, frozen) = (self.model.order(), self.model.frozen);
             self.session.engine.order(order, frozen);
+            self.awaited = !frozen;
         }
     }
 

@@ -21,7 +21,7 @@ const SWIFT: f64 = 60.0;
 /// Share of an image's budget that a picture may take while probe or anatomy move.
 const SHARE: f64 = 0.2;
 /// Least pixels of the picture for each of the panel's, along an edge.
-const COARSEST: f64 = 0.25;
+const COARSEST: f64 = 0.2;
 /// Everything is at rest when nothing has moved for this long.
 const REST: Duration = Duration::from_millis(160);
 
@@ -82,7 +82,7 @@ impl State {
         if ms > 0.0 && 4.0 * ms < fine {
             return 2.0;
         }
-        let steps = [1.0, 0.5, 1.0 / 3.0];
+        let steps = [1.0, 0.5, 1.0 / 3.0, 0.25];
         let quick = |detail: &f64| ms * detail * detail <= budget;
         steps.into_iter().find(quick).unwrap_or(COARSEST)
     }

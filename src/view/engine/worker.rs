@@ -102,8 +102,8 @@ impl Worker {
         let mut index = 0;
         while let Some(job) = self.next() {
             let taken = match job {
-                Job::Survey => {
-                    if !self.look(&mut simulator) {
+                Job::Survey { moving } => {
+                    if !self.look(&mut simulator, moving) {
                         return;
                     }
                     continue;
@@ -152,13 +152,15 @@ impl Worker {
         }
     }
 
-    /// Pictures the anatomy; whether there will be more.
-    fn look(&mut self, simulator: &mut Option<(Simulator, Tracer)>) -> bool {
+    /// Pictures the anatomy; whether there will be more. What is begun because something moves is finished, or
+    /// there would be no picture at all.
+    fn look(&mut self, simulator: &mut Option<(Simulator, Tracer)>, moving: bool) -> bool {
         self.shared.lock().looks_new = false;
         let Some((simulator, _)) = simulator else {
             return true;
         };
         let began = Instant::now();
+        simulator.abandon_when((!moving).then(|| self.newer()));
         let pictured = self.picture(simulator).transpose();
         self.surveyed = (Instant::now(), began.elapsed());
         match pictured {
@@ -235,23 +237,32 @@ impl Worker {
             let due = !state.frozen && (state.order.is_some() || running.is_some());
             let finer = left.and_then(|left| self.pace.refined(left.level));
             let finer = finer.filter(|_| !due);
-            let quiet = state.touched.max(self.imaged).elapsed();
+            let touched = state.touched.elapsed();
+            let quiet = touched.min(self.imaged.elapsed());
             if let Some(level) = finer.filter(|_| quiet >= live::REST) {
                 return Some(Job::Refined(level));
             }
+            // While something moves the next order is about to come: what is begun before would be in its way.
+            let moving = due || touched < live::REST;
             let (ended, took) = self.surveyed;
-            let turn = !due || ended.elapsed() >= PUT_OFF * took;
-            if state.looks_new && left.is_some() && turn {
-                return Some(Job::Survey);
+            let looks = state.looks_new && left.is_some();
+            let put_off = match moving {
+                true => (PUT_OFF * took).saturating_sub(ended.elapsed()),
+                false => Duration::ZERO,
+            };
+            if looks && put_off.is_zero() {
+                return Some(Job::Survey { moving });
             }
             if due {
                 let again = || running.expect("due without an order").again(Instant::now());
                 return Some(Job::Image(state.order.take().unwrap_or_else(again)));
             }
             let changed = &self.shared.changed;
-            state = match finer {
-                Some(_) => {
-                    let waited = changed.wait_timeout(state, live::REST - quiet);
+            let rest = finer.map(|_| live::REST - quiet);
+            let look = looks.then(|| put_off.min(live::REST.saturating_sub(touched)));
+            state = match rest.into_iter().chain(look).min() {
+                Some(time) => {
+                    let waited = changed.wait_timeout(state, time);
                     waited.unwrap_or_else(PoisonError::into_inner).0
                 }
                 None => changed.wait(state).unwrap_or_else(PoisonError::into_inner),
@@ -288,7 +299,6 @@ impl Worker {
             return Ok(None);
         }
         let image = self.pictures.free(look.sight.size)?;
-        simulator.abandon_when(Some(self.newer()));
         let timings = simulator.survey(&self.library, &look.sight, &image)?;
         Ok(Some(Pictured {
             image,

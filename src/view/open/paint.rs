@@ -21,6 +21,7 @@ impl Open {
         times: &mut Times,
         shot: bool,
     ) -> Result<Option<Shot>, GpuError> {
+        let began = Instant::now();
         let input = self.input.take_egui_input(&self.window);
         let context = self.input.egui_ctx().clone();
         let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
@@ -80,6 +81,7 @@ impl Open {
             cropped(picture, [r.left(), r.top(), r.right(), r.bottom()])
         });
         tools.save(&self.model, around);
+        self.painted = (began, began.elapsed());
         self.schedule(&output);
         match painted {
             Painted::Shown(picture) => {
@@ -107,14 +109,12 @@ impl Open {
     fn schedule(&mut self, output: &egui::FullOutput) {
         let root = output.viewport_output.get(&egui::ViewportId::ROOT);
         let delay = root.map_or(Duration::MAX, |root| root.repaint_delay);
-        self.again = match delay {
-            Duration::ZERO => {
-                self.window.request_redraw();
-                None
-            }
-            // Beyond what an instant can hold: never.
-            delay => Instant::now().checked_add(delay),
-        };
+        let now = Instant::now();
+        // Beyond what an instant can hold: never.
+        self.again = now.checked_add(delay).filter(|_| !delay.is_zero());
+        if delay.is_zero() {
+            self.draw_soon(now);
+        }
     }
 
     /// Notes that the picture has been handed to the screen.
