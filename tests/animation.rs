@@ -78,6 +78,11 @@ fn every_strategy_shows_the_same_image() {
                     Strategy::Interpolate => {
                         differing(&found, &expected[i]).saturating_sub(found.len() / 1000)
                     }
+                    // Which of an edge's two triangles a ray along it meets is a matter of the tree where their
+                    // distances differ by rounding: a pixel of 100,000 may be another grey.
+                    Strategy::Refit => {
+                        differing(&found, &expected[i]).saturating_sub(found.len() / 100_000)
+                    }
                     _ => differing(&found, &expected[i]),
                 };
                 assert!(

@@ -56,11 +56,11 @@ pub enum TracerChoice {
 /// `--quality`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum QualityChoice {
-    /// A first look. Software driver: 2 paths, lattice 4/3 as coarse. GPU: 8 paths.
+    /// A first look. Software driver: 2 paths, 5 scatterers per resolution cell. GPU: 8 paths, 8 scatterers.
     Draft,
-    /// Software driver: 8 paths, one lattice cell per layer. GPU: 32 paths, two cells.
+    /// Software driver: 8 paths, 8 scatterers per resolution cell. GPU: 32 paths, 16 scatterers.
     Standard,
-    /// A proof, on any device: 128 paths, lattice 2/3 as coarse, the whole slice.
+    /// A proof, on any device: 128 paths, lattice cells 2/3 as long, no scatterer left out.
     Reference,
 }
 
