@@ -218,7 +218,7 @@ impl Desk {
             .collect()
     }
 
-    /// Waits until a part has not changed for half a second.
+    /// Waits until a part has not changed for half a second and the program has nothing left to do.
     pub fn settle(&mut self, part: [u16; 4]) -> Vec<u8> {
         self.quiet(part, Duration::from_millis(500))
     }
@@ -227,6 +227,19 @@ impl Desk {
     /// what comes last, as the finest picture of the anatomy, may be seconds away.
     pub fn rest(&mut self, part: [u16; 4]) -> Vec<u8> {
         self.quiet(part, Duration::from_secs(1))
+    }
+
+    /// Waits until a part has not changed for half a second, also while a cursor blinks in a field of text:
+    /// then the program never rests.
+    pub fn still(&mut self, part: [u16; 4]) {
+        let (mut last, mut since) = (self.grab(part), Instant::now());
+        self.wait_for("a part to stay as it is", |desk| {
+            let now = desk.grab(part);
+            if now != last {
+                (last, since) = (now, Instant::now());
+            }
+            since.elapsed() > Duration::from_millis(500)
+        });
     }
 
     /// The image comes back at the scene's own quality once all is at rest: until then the program works.

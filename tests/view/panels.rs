@@ -357,9 +357,9 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
         pixels.chunks_exact(3).filter(orange).count() > 50
     };
     desk.hold_control(Key::Letter('o'));
-    desk.settle(IMAGE);
+    desk.still(IMAGE);
     desk.click(row("wrong"));
-    desk.settle(IMAGE);
+    desk.still(IMAGE);
     desk.click(take);
     desk.wait_for("what is wrong with the file", |d| warned(d));
     desk.click(row("preset"));
@@ -372,9 +372,9 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
     desk.wait_for("the settings before", |d| d.grab(IMAGE) == before);
 
     desk.hold_control(Key::Letter('o'));
-    desk.settle(IMAGE);
+    desk.still(IMAGE);
     desk.click(row("water"));
-    desk.settle(IMAGE);
+    desk.still(IMAGE);
     desk.click(open);
     desk.wait_for("another scene", |d| brightness(&d.grab(IMAGE)) < 5.0);
     desk.quit();

@@ -327,7 +327,7 @@ fn measures_the_phantom(scale: f64) {
     // A text; its letters are keys of the console and others, which do nothing meanwhile.
     desk.press(Key::Letter('n'));
     desk.drag(at(-60.0, 78.0), at(-45.0, 110.0));
-    desk.settle(picture);
+    desk.still(picture);
     for letter in "cyst".chars() {
         desk.press(Key::Letter(letter));
     }
