@@ -102,11 +102,11 @@ ivec2 cells_between(vec2 ends, float rest, float h) {
     return ivec2(int(at.x), int(min(at.y, at.x + 1024.0)));
 }
 
-// Cells of the plane at `da` whose middles may lie within `width` of the axis and `reach` of the slab's
+// Where along b in the plane at `da` lies what may be within `width` of the axis and `reach` of the slab's
 // middle plane.
-ivec2 rows_between(Walk walk, float da, float width, float reach, float rest, float h) {
+vec2 row_ends(Walk walk, float da, float width, float reach) {
     float half_range = (width + abs(walk.slant) * reach) / abs(walk.across.y);
-    return cells_between(walk.drift * da + vec2(-half_range, half_range), rest, h);
+    return walk.drift * da + vec2(-half_range, half_range);
 }
 
 // Of those in one row the cells that do.

@@ -80,8 +80,8 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
         // Of the plane's rows those within the piece's ends.
         vec2 within = (vec2(-deep, deep) - walk.along.x * da) * row_slope;
-        float half_range = (wide + abs(walk.slant) * high) / abs(walk.across.y);
-        vec2 ends = vec2(max(walk.drift * da - half_range, min(within.x, within.y)), min(walk.drift * da + half_range, max(within.x, within.y)));
+        vec2 ends = row_ends(walk, da, wide, high);
+        ends = vec2(max(ends.x, min(within.x, within.y)), min(ends.y, max(within.x, within.y)));
         ivec2 row_range = cells_between(ends, rest[walk.b], h);
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);

@@ -260,7 +260,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float falling = s.absorption * LOG2_E;
         float constant = here.z - s.absorption * LOG2_E * x_middle;
 
-        ivec2 row_range = rows_between(walk, da, width, slab.y, rest[walk.b], h);
+        ivec2 row_range = cells_between(row_ends(walk, da, width, slab.y), rest[walk.b], h);
         // Rows and their cells in one loop: threads that run together all have a cell nearly every time.
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);

@@ -77,7 +77,7 @@ pub fn run(args: &Serve) -> Result<()> {
     common.validated(&device)
 }
 
-/// What the last image shows, and how finely.
+/// The last image: the state that it shows, and its level of quality.
 struct Shown {
     state: (DAffine3, Vec<Placed>),
     level: usize,

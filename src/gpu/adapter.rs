@@ -106,7 +106,7 @@ fn table(adapters: &[Adapter]) -> String {
     text
 }
 
-/// Whether a family of a device can show pictures where they are to be shown.
+/// Test of a device and one of its queue families: true where it can present to the window.
 pub(crate) type Presents<'a> = &'a dyn Fn(vk::PhysicalDevice, u32) -> bool;
 
 /// The device named by `selector` (index, or part of the name in any case), or the best usable one; with

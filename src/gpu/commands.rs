@@ -134,7 +134,7 @@ impl<'a> Commands<'a> {
         }
     }
 
-    /// What follows is made whatever happens: see [`super::Frames::abandon_when`].
+    /// Ends the asking whether the submission is still wanted, for all that is recorded from here on: see [`super::Frames::abandon_when`].
     pub fn keep_on(&mut self) {
         self.slot.abandon = None;
     }

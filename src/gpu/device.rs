@@ -263,8 +263,8 @@ impl Device {
         self.memory_use.read()
     }
 
-    /// Whether [`Self::remember`] was told this number for this device and driver, at this start or an
-    /// earlier one.
+    /// True for a number that [`Self::remember`] was given for this device and driver, at this start or
+    /// an earlier one.
     pub fn remembers(&self, what: u64) -> bool {
         self.kept.knows(what)
     }

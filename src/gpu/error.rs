@@ -59,7 +59,7 @@ pub enum GpuError {
         /// All scopes of the submission in order.
         passes: String,
     },
-    /// What was being made is wanted no longer: see [`super::Frames::abandon_when`].
+    /// The submission was given up because its result is not wanted any more: see [`super::Frames::abandon_when`].
     #[error("it was abandoned for something newer")]
     Abandoned,
     /// Device memory could not be had.

@@ -74,7 +74,7 @@ pub(crate) struct Instance {
     pub(crate) entry: ash::Entry,
 }
 
-/// Where the loader, or MoltenVK itself, lies on macOS beside the folders that the system searches:
+/// Paths of the loader, or of MoltenVK itself, on macOS, beside the folders that the system searches:
 /// bundled with the program, Homebrew on Apple silicon and on Intel, LunarG's package.
 const MACOS_LOADERS: [&str; 6] = [
     "@executable_path/../Frameworks/libvulkan.1.dylib",

@@ -2,45 +2,13 @@
 
 use std::mem::size_of;
 
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::inputs::Random;
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::Owned;
-use crate::sim::layout::NONE;
-
-/// As in `rays.comp`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct Ray {
-    origin: [f32; 3],
-    t_min: f32,
-    direction: [f32; 3],
-    t_max: f32,
-    skip: u32,
-    mask: u32,
-    slots: u32,
-    unused: u32,
-}
-
-/// As in `rays.comp`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct Hit {
-    position: [f32; 3],
-    t: f32,
-    geometric: [f32; 3],
-    u: f32,
-    shading: [f32; 3],
-    v: f32,
-    instance: u32,
-    primitive: u32,
-    node_visits: u32,
-    triangle_tests: u32,
-    counts: [u32; 4],
-}
+use crate::sim::layout::{NONE, Ray, RayHit};
 
 /// Crossings closer together than this, mm, may change places in single precision; so may a
 /// crossing and an end of the ray.
@@ -56,13 +24,13 @@ pub const SUBJECT: Subject = Subject {
     sizes: |job| {
         let rays = job.get::<Ray>("rays").len();
         let mut sizes = worlds::sizes(job);
-        sizes.extend([0, rays * size_of::<Hit>()]);
+        sizes.extend([0, rays * size_of::<RayHit>()]);
         sizes
     },
     extent: |job| Extent::Threads([job.get::<Ray>("rays").len() as u32, 1, 1]),
     check,
     plant: |job, outputs| {
-        job.edit(outputs, "hits", |hits: &mut [Hit]| {
+        job.edit(outputs, "hits", |hits: &mut [RayHit]| {
             let hit = hits.iter_mut().find(|h| h.instance != NONE);
             hit.expect("some ray hits").instance ^= 1;
         });
@@ -110,7 +78,7 @@ fn job(case: Case, size: Size) -> Job {
     }
     let mut inputs = worlds::world(case).inputs();
     inputs.push(Input::words("rays", &rays));
-    let words = count * size_of::<Hit>() / 4;
+    let words = count * size_of::<RayHit>() / 4;
     inputs.push(Input::output("hits", Element::Word, words));
     Job {
         inputs,
@@ -130,7 +98,7 @@ struct Worst {
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let owned = worlds::owned(job);
-    let hits: Vec<Hit> = job.after(outputs, "hits");
+    let hits: Vec<RayHit> = job.after(outputs, "hits");
     let rays: Vec<Ray> = job.get("rays");
     let mut worst = Worst::default();
     for (ray, hit) in rays.iter().zip(&hits) {
@@ -150,7 +118,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-fn compare(owned: &Owned, ray: &Ray, hit: &Hit, worst: &mut Worst) {
+fn compare(owned: &Owned, ray: &Ray, hit: &RayHit, worst: &mut Worst) {
     let widen = |v: [f32; 3]| DVec3::from(v.map(f64::from));
     let (o, d) = (widen(ray.origin), widen(ray.direction));
     let (t_min, t_max) = (f64::from(ray.t_min), f64::from(ray.t_max));

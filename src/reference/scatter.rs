@@ -493,10 +493,8 @@ impl<'a> Tube<'a> {
                             }
                             let row = self.row(x, out);
                             let across = from.dot(self.lateral).abs() <= self.half_width(row);
-                            if !across
-                                || !(self.slab()[0]..self.slab()[1])
-                                    .contains(&from.dot(self.elevation))
-                            {
+                            let [low, high] = self.slab();
+                            if !across || !(low..high).contains(&from.dot(self.elevation)) {
                                 continue;
                             }
                             let power = self.power(number, x, bin, loudest, out);

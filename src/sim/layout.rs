@@ -235,3 +235,53 @@ pub struct RefitLevel {
     /// How many there are.
     pub count: u32,
 }
+
+/// A ray of `rays`, which intersects a list of them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Ray {
+    /// Start, mm.
+    pub origin: [f32; 3],
+    /// Where it begins to meet surfaces.
+    pub t_min: f32,
+    /// Not necessarily a unit vector.
+    pub direction: [f32; 3],
+    /// Where it ends.
+    pub t_max: f32,
+    /// Instance that it does not meet; [`NONE`]: it meets all.
+    pub skip: u32,
+    /// Ray query: bits of the entries that are shown.
+    pub mask: u32,
+    /// Ray query: 1 where rows choose among their entries.
+    pub slots: u32,
+    /// Nothing.
+    pub unused: u32,
+}
+
+/// The first surface that a ray of `rays` meets.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct RayHit {
+    /// Place from the barycentric coordinates, mm.
+    pub position: [f32; 3],
+    /// Place along the ray.
+    pub t: f32,
+    /// Outward normal of the triangle.
+    pub geometric: [f32; 3],
+    /// First barycentric coordinate.
+    pub u: f32,
+    /// Outward normal between the vertices' own.
+    pub shading: [f32; 3],
+    /// Second barycentric coordinate.
+    pub v: f32,
+    /// Whose surface it is; [`NONE`]: the ray meets nothing.
+    pub instance: u32,
+    /// Number of the triangle.
+    pub primitive: u32,
+    /// Nodes visited, where they are counted.
+    pub node_visits: u32,
+    /// Triangles tested, where they are counted.
+    pub triangle_tests: u32,
+    /// Counts of the top level and of false intersections, in the order of [`Counters`].
+    pub counts: [u32; 4],
+}

@@ -5,7 +5,6 @@
 
 use std::sync::Arc;
 
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::Tracer;
@@ -13,7 +12,7 @@ use crate::gpu::{Binding, BufferKind, Device, GpuError, Kernel};
 use crate::scene::Scene;
 use crate::sim::SimError;
 use crate::sim::fields::Fields;
-use crate::sim::layout::NONE;
+use crate::sim::layout::{NONE, Ray, RayHit};
 use crate::sim::shaders::Library;
 use crate::sim::world::{Kernels, World};
 
@@ -27,35 +26,6 @@ const MARGIN: f32 = 1e-3;
 const DIFFERENT: usize = 3;
 /// How far a new ray begins from the surface that it leaves, over the largest coordinate (glsl/path.glsl).
 const CLEARANCE: f32 = 4e-6;
-
-/// As in `rays.comp`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct Ray {
-    origin: [f32; 3],
-    t_min: f32,
-    direction: [f32; 3],
-    t_max: f32,
-    skip: u32,
-    mask: u32,
-    slots: u32,
-    unused: u32,
-}
-
-/// As in `rays.comp`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Pod, Zeroable)]
-struct Hit {
-    position: [f32; 3],
-    t: f32,
-    geometric: [f32; 3],
-    u: f32,
-    shading: [f32; 3],
-    v: f32,
-    instance: u32,
-    primitive: u32,
-    counts: [u32; 6],
-}
 
 /// Rays that were compared, and how many met another surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -79,7 +49,7 @@ impl Trial {
         let mut rays = first_rays(scene);
         for _ in 0..BOUNCES {
             let (mine, theirs) = (own.trace(device, &rays)?, query.trace(device, &rays)?);
-            let different = |(a, b): &(&Hit, &Hit)| !agree(a, b);
+            let different = |(a, b): &(&RayHit, &RayHit)| !agree(a, b);
             trial.different += mine.iter().zip(&theirs).filter(different).count();
             trial.rays += rays.len();
             rays = next_rays(&rays, &mine);
@@ -134,7 +104,7 @@ impl Bench {
         Ok(Self { kernel, world })
     }
 
-    fn trace(&self, device: &Arc<Device>, rays: &[Ray]) -> Result<Vec<Hit>, GpuError> {
+    fn trace(&self, device: &Arc<Device>, rays: &[Ray]) -> Result<Vec<RayHit>, GpuError> {
         let (mask, slots) = self.world.ray_mask();
         let slots = slots.into();
         let rays: Vec<Ray> = rays
@@ -147,7 +117,7 @@ impl Bench {
             .collect();
         let bytes = bytemuck::cast_slice(&rays);
         let list = device.buffer("trial rays", bytes.len() as u64, BufferKind::Storage)?;
-        let size = size_of::<Hit>() * rays.len();
+        let size = size_of::<RayHit>() * rays.len();
         let hits = device.buffer("trial hits", size as u64, BufferKind::Storage)?;
         device.upload(&list, bytes)?;
         let mut bindings = self.world.bindings().to_vec();
@@ -160,7 +130,7 @@ impl Bench {
 }
 
 /// Both met nothing, or the same surface at the same place, or two that lie there together.
-fn agree(a: &Hit, b: &Hit) -> bool {
+fn agree(a: &RayHit, b: &RayHit) -> bool {
     match (a.instance, b.instance) {
         (NONE, NONE) => true,
         (NONE, _) | (_, NONE) => false,
@@ -200,8 +170,8 @@ fn ray(origin: [f32; 3], direction: DVec3, t_min: f32) -> Ray {
 }
 
 /// From each surface straight on, or mirrored by it, in turn.
-fn next_rays(rays: &[Ray], hits: &[Hit]) -> Vec<Ray> {
-    let hit = |(_, hit): &(&Ray, &Hit)| hit.instance != NONE;
+fn next_rays(rays: &[Ray], hits: &[RayHit]) -> Vec<Ray> {
+    let hit = |(_, hit): &(&Ray, &RayHit)| hit.instance != NONE;
     (rays.iter().zip(hits).filter(hit).enumerate())
         .map(|(i, (before, hit))| {
             let widen = |v: [f32; 3]| DVec3::from(v.map(f64::from));

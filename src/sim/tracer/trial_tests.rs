@@ -2,17 +2,17 @@
 
 use bytemuck::Zeroable;
 
-use super::{Hit, Trial, agree, id};
+use super::{RayHit, Trial, agree, id};
 use crate::gpu::test_device;
 use crate::scene::Scene;
 use crate::sim::layout::NONE;
 use crate::sim::shaders::Library;
 
-fn hit(instance: u32, t: f32) -> Hit {
-    Hit {
+fn hit(instance: u32, t: f32) -> RayHit {
+    RayHit {
         instance,
         t,
-        ..Hit::zeroed()
+        ..RayHit::zeroed()
     }
 }
 
