@@ -3,6 +3,8 @@
 // includes shared.glsl. A field is a header (origin, nodes per mm, nodes per axis) and a displacement
 // per node, x running fastest; between nodes it is trilinear, outside the nearest point's.
 
+#include "numbers.glsl"
+
 struct Field { vec3 origin; vec3 scale; vec3 last; uint values; };
 
 // Where the field of an instance begins; NONE where its tissue does not deform.
@@ -28,9 +30,9 @@ vec3 displacement(Field f, vec3 p, out mat3 gradient) {
     vec3 on = clamp(at, vec3(0.0), f.last);
     vec3 cell = min(floor(on), f.last - 1.0);
     vec3 t = on - cell;
-    uint row = uint(f.last.x) + 1u;
-    uint slice = row * (uint(f.last.y) + 1u);
-    uint node = f.values + uint(cell.x) + row * uint(cell.y) + slice * uint(cell.z);
+    uint row = uint(whole(f.last.x)) + 1u;
+    uint slice = row * (uint(whole(f.last.y)) + 1u);
+    uint node = f.values + uint(whole(cell.x)) + row * uint(whole(cell.y)) + slice * uint(whole(cell.z));
     vec3 a = field_vector(node), b = field_vector(node + 1u);
     vec3 c = field_vector(node + row), d = field_vector(node + row + 1u);
     vec3 e = field_vector(node + slice), g = field_vector(node + slice + 1u);

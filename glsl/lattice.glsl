@@ -7,6 +7,7 @@ const float EDGES[3] = float[3](1.0, 1.259921, 1.5874011);
 // One level of a tissue's lattices.
 struct Lattice {
     float edge;            // mm
+    float inverse_edge;
     uint presence;         // cells of 65536 that hold a scatterer
     float amplitude;
     uvec3 key;
@@ -21,6 +22,7 @@ Lattice lattice_of(uint tissue, int number) {
     float presence = min(tissues[tissue].density * volume, 1.0);
     Lattice lattice;
     lattice.edge = lattice_edge(number);
+    lattice.inverse_edge = 1.0 / lattice.edge;
     lattice.presence = max(uint(presence * 65536.0 + 0.5), 1u);
     lattice.amplitude = tissues[tissue].amplitude * sqrt(volume / presence);
     lattice.key = pcg4d(uvec4(tissues[tissue].seed, uint(number), 0u, 0u)).xyz;
@@ -57,7 +59,9 @@ struct Walk {
     vec2 along; vec2 across;   // per mm of a and b within the slab's middle plane: along the beam, and across
     vec2 tilt;                 // what c falls by per mm of a and b within that plane
     float inverse_c;           // of the slab's normal
+    float inverse_across;      // of across.y, without its sign
     float slant;               // what lies 1 mm above the slab's middle plane, along c, lies this much across
+    float inverse_slant;
     float drift;               // of the axis, mm of b per mm of a
     float step;                // along the axis per mm of a
 };
@@ -87,7 +91,9 @@ Walk walk_of(vec3 d, vec3 lateral, vec3 up) {
     w.across = vec2(across.x, at_least(across.y, 0.25));
     w.along = along;
     w.tilt = tilt;
+    w.inverse_across = 1.0 / abs(w.across.y);
     w.slant = at_least(lateral[w.c] * w.inverse_c, 1e-4);
+    w.inverse_slant = 1.0 / w.slant;
     w.drift = -w.across.x / w.across.y;
     w.step = at_least(w.along.x + w.along.y * w.drift, 0.2);
     return w;
@@ -97,23 +103,24 @@ ivec3 unit_step(uint axis) { return ivec3(equal(uvec3(axis), uvec3(0u, 1u, 2u)))
 
 // Cells, of edge h, whose middles lie in `ends` about `rest`: the first, and the first behind. At most
 // 1024: whatever a spoiled number says, the walk ends.
-ivec2 cells_between(vec2 ends, float rest, float h) {
-    vec2 at = clamp(ceil((ends + rest) / h - 0.5), -1e6, 1e6);
-    return ivec2(int(at.x), int(min(at.y, at.x + 1024.0)));
+ivec2 cells_between(vec2 ends, float rest, float inverse_h) {
+    vec2 at = clamp(ceil((ends + rest) * inverse_h - 0.5), -1e6, 1e6);
+    int first = whole(at.x);
+    return ivec2(first, first + min(whole(clamp(at.y - at.x, 0.0, 1024.0)), 1024));
 }
 
 // Where along b in the plane at `da` lies what may be within `width` of the axis and `reach` of the slab's
 // middle plane.
 vec2 row_ends(Walk walk, float da, float width, float reach) {
-    float half_range = (width + abs(walk.slant) * reach) / abs(walk.across.y);
+    float half_range = (width + abs(walk.slant) * reach) * walk.inverse_across;
     return walk.drift * da + vec2(-half_range, half_range);
 }
 
 // Of those in one row the cells that do.
-ivec2 columns_between(Walk walk, vec2 at, float width, vec2 slab, float rest, float h) {
+ivec2 columns_between(Walk walk, vec2 at, float width, vec2 slab, float rest, float inverse_h) {
     float across = dot(walk.across, at);
-    vec2 up = (vec2(-width, width) - across) / walk.slant;
+    vec2 up = (vec2(-width, width) - across) * walk.inverse_slant;
     vec2 both = vec2(max(min(up.x, up.y), slab.x), min(max(up.x, up.y), slab.y)) * walk.inverse_c;
     if (walk.inverse_c < 0.0) both = both.yx;
-    return cells_between(both - dot(walk.tilt, at), rest, h);
+    return cells_between(both - dot(walk.tilt, at), rest, inverse_h);
 }

@@ -1,2 +1,9 @@
+#ifndef NUMBERS_GLSL
+#define NUMBERS_GLSL
 // By its bits: a compiler that assumes finite numbers may drop isnan().
 bool not_a_number(float x) { return (floatBitsToUint(x) & 0x7fffffffu) > 0x7f800000u; }
+
+// A float that is a whole number below 2^22 in size, as an integer. Drivers without a GPU convert one
+// thread's number after the other; sums they make of all together.
+int whole(float x) { return floatBitsToInt(x + 12582912.0) - 0x4b400000; }
+#endif

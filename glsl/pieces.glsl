@@ -32,7 +32,7 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
 // is then heard where it is, by the piece that holds it.
 uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
-    float h = lattice.edge;
+    float h = lattice.edge, inverse_h = lattice.inverse_edge;
     Field f = load_field(field_of(s.instance));
     float half_length = 0.5 * (x.y - x.x);
     vec3 here = s.o + (x.x + half_length) * s.d;
@@ -64,7 +64,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     float far = deep + (wide + high * abs(walk.slant)) * abs(walk.along.y / walk.across.y);
     float row_slope = 1.0 / at_least(walk.along.y, 1e-4);
 
-    vec3 nearest = floor(middle / h);
+    vec3 nearest = floor(middle * inverse_h);
     vec3 rest = fma(-nearest, vec3(h), middle);
     ivec3 base = ivec3(nearest);
     float strength = lattice.amplitude * s.weight * frame.volume_scale;
@@ -74,7 +74,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     }
     ivec3 step_a = unit_step(walk.a), step_b = unit_step(walk.b), step_c = unit_step(walk.c);
     float planes = far / abs(walk.step);
-    ivec2 plane = cells_between(vec2(-planes, planes), rest[walk.a], h);
+    ivec2 plane = cells_between(vec2(-planes, planes), rest[walk.a], inverse_h);
     uvec3 count = uvec3(0u);
     for (int i = plane.x; i < plane.y; ++i) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
@@ -82,7 +82,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
         vec2 within = (vec2(-deep, deep) - walk.along.x * da) * row_slope;
         vec2 ends = row_ends(walk, da, wide, high);
         ends = vec2(max(ends.x, min(within.x, within.y)), min(ends.y, max(within.x, within.y)));
-        ivec2 row_range = cells_between(ends, rest[walk.b], h);
+        ivec2 row_range = cells_between(ends, rest[walk.b], inverse_h);
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);
         // Threads that run together look each for its next scatterer; then all have one.
@@ -93,7 +93,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
             while (!found && j < row_range.y) {
                 if (column.x >= column.y) {
                     j += 1;
-                    column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), wide, vec2(-high, high), rest[walk.c], h);
+                    column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), wide, vec2(-high, high), rest[walk.c], inverse_h);
                 }
                 ivec3 at = i * step_a + j * step_b + column.x * step_c;
                 bool counts = column.x < column.y && j < row_range.y;

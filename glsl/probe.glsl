@@ -1,3 +1,4 @@
+#include "numbers.glsl"
 // Transducer geometry in probe space: x lateral, y elevation, z depth, mm; the face's centre is at 0.
 // The including kernel declares `readonly buffer FrameBuffer { Frame frame; }` and
 // `readonly buffer ScanlineBuffer { Scanline scanlines[]; }` first.
@@ -17,7 +18,7 @@ void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lat
 
 // Axial sample at `kappa` pitches along a line, the nearest end where that lies outside; 0 for NaN.
 uint sample_at(float kappa) {
-    return uint(clamp(mix(0.0, kappa, kappa > 0.0), 0.0, float(frame.samples - 1u)));
+    return uint(whole(floor(clamp(mix(0.0, kappa, kappa > 0.0), 0.0, float(frame.samples - 1u)))));
 }
 
 // Amplitude factor of an echo `off` mm beside the geometric scanline.

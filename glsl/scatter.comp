@@ -6,6 +6,7 @@
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "random.glsl"
+#include "numbers.glsl"
 
 layout(local_size_x = 64) in;
 
@@ -153,7 +154,7 @@ ivec2 bins_of(Stretch s) {
 // stretches end too, and rounding must not decide.
 ivec2 slots_of(Stretch s) {
     vec2 ends = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)), vec2(0.0), vec2(float(frame.samples))) / float(SCATTER_SLOT);
-    return ivec2(int(ceil(ends.x - SLOT_MARGIN)), int(floor(ends.y + SLOT_MARGIN)) - 1);
+    return ivec2(whole(ceil(ends.x - SLOT_MARGIN)), whole(floor(ends.y + SLOT_MARGIN)) - 1);
 }
 
 // Level where a stretch is held against the others of a bin.
@@ -171,8 +172,12 @@ vec2 slab_of() { return (vec2(-1.0, 1.0) + 2.0 * POINT_SHIFT) * frame.elevation_
 uint deposit_at(int slot, vec2 v) {
     if (slot >= 0 && slot < int(min(SCATTER_WINDOW, frame.samples - window_begin))) {
         vec2 held = clamp(v, vec2(-FIXED_LIMIT), vec2(FIXED_LIMIT));
-        atomicAdd(echoes[2 * slot], int(floor(held.x + 0.5)));
-        atomicAdd(echoes[2 * slot + 1], int(floor(held.y + 0.5)));
+        // Each in two halves that are small.
+        held = floor(held + 0.5);
+        vec2 high = floor(held * (1.0 / 65536.0));
+        vec2 low = held - 65536.0 * high;
+        atomicAdd(echoes[2 * slot], (whole(high.x) << 16) + whole(low.x));
+        atomicAdd(echoes[2 * slot + 1], (whole(high.y) << 16) + whole(low.y));
     }
     return uint(!(max(abs(v.x), abs(v.y)) < FIXED_LIMIT));
 }
@@ -180,9 +185,9 @@ uint deposit_at(int slot, vec2 v) {
 // A scatterer's echo at the sample nearest to it. About halfway between two samples each gets a share: of
 // what rounding does to a place, little is then seen. 1 for each sample that could not hold it.
 uint deposit_near(float kappa, vec2 v) {
-    float before = floor(clamp(kappa, -1e6, 1e9));
+    float before = floor(clamp(kappa, -1e6, 1e6));
     float share = clamp(0.5 - (kappa - before - 0.5) / SAMPLE_BLEND, 0.0, 1.0);
-    int slot = int(before) - int(window_begin);
+    int slot = whole(before) - int(window_begin);
     if (share == 0.0) {
         slot += 1;
         share = 1.0;
@@ -210,11 +215,11 @@ float half_width(Stretch s, uint row) {
 uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
-    float h = lattice.edge;
+    float h = lattice.edge, inverse_h = lattice.inverse_edge;
     // The lattice about the middle: what is summed below is small.
     float x_middle = clamp(0.5 * (x.x + x.y), 0.0, s.extent);
     vec3 middle = s.o + x_middle * s.d;
-    vec3 nearest = floor(middle / h);
+    vec3 nearest = floor(middle * inverse_h);
     vec3 rest = fma(-nearest, vec3(h), middle);
     ivec3 base = ivec3(nearest);
     // From the stretch's own origin: bins that share an end then share out the planes alike.
@@ -260,14 +265,14 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float falling = s.absorption * LOG2_E;
         float constant = here.z - s.absorption * LOG2_E * x_middle;
 
-        ivec2 row_range = cells_between(row_ends(walk, da, width, slab.y), rest[walk.b], h);
+        ivec2 row_range = cells_between(row_ends(walk, da, width, slab.y), rest[walk.b], inverse_h);
         // Rows and their cells in one loop: threads that run together all have a cell nearly every time.
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);
         while (j < row_range.y) {
             if (column.x >= column.y) {
                 j += 1;
-                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), width, slab, rest[walk.c], h);
+                column = columns_between(walk, vec2(da, (float(j) + 0.5) * h - rest[walk.b]), width, slab, rest[walk.c], inverse_h);
             }
             ivec3 at = i * step_a + j * step_b + column.x * step_c;
             bool counts = column.x < column.y && j < row_range.y;
@@ -313,8 +318,8 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     // What something else is louder than all along the bin, as far as the stretch reaches.
     vec2 reached = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)) / float(SCATTER_SLOT), -1e6, 1e6);
     int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
-    int slot = max(int(floor(reached.x)), bin * int(SLOTS));
-    int last_slot = min(min(int(floor(reached.y)), bin * int(SLOTS) + int(SLOTS) - 1), int((frame.samples - 1u) / SCATTER_SLOT));
+    int slot = max(whole(floor(reached.x)), bin * int(SLOTS));
+    int last_slot = min(min(whole(floor(reached.y)), bin * int(SLOTS) + int(SLOTS) - 1), int((frame.samples - 1u) / SCATTER_SLOT));
     int over = 0x7fffffff;
     for (; slot <= last_slot; ++slot) over = min(over, loudest[slot - window]);
     float drowned = 2.0 * max(max(float(over) / LEVEL_UNIT, black) - level, 0.0);
@@ -340,8 +345,8 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }
-    int number = int(floor(max(lowest - 0.1, 0.0)));
-    int coarsest = int(floor(min(highest + 0.1 + LEVEL_FADE, float(LATTICE_LEVELS))));
+    int number = whole(floor(max(lowest - 0.1, 0.0)));
+    int coarsest = whole(floor(min(highest + 0.1 + LEVEL_FADE, float(LATTICE_LEVELS))));
     uvec3 count = uvec3(0u);
     for (; number <= coarsest; ++number) {
         if (field) {
@@ -409,6 +414,17 @@ uint march_point(Stretch s, vec4 point) {
         saturated += deposit_at(slot + i, q * (shares[i] * rows[k].point_gain));
     }
     return saturated;
+}
+
+// Whether the stretch may have a point target of a sphere. The beam is widest at an end of what it passes.
+bool passes_sphere(Stretch s, vec4 sphere) {
+    vec3 rel = sphere.xyz - s.o;
+    float x = dot(rel, s.d);
+    float r = sphere.w;
+    uvec2 ends = uvec2(row_at(kappa_at(s, x - r)), row_at(kappa_at(s, x + r)));
+    float width = 4.0 * max(rows[ends.x].sigma_lateral, rows[ends.y].sigma_lateral);
+    return x >= -r && x < s.extent + r && abs(dot(rel, s.e_l)) <= width + r
+        && abs(dot(rel, s.e_e)) <= (0.5 + POINT_SHIFT) * frame.slice_thickness / float(frame.layers) + r;
 }
 
 // First item of work and number of items: samples, or bins (of deformed tissue: pieces of them) of the
@@ -489,8 +505,12 @@ void main() {
             }
             for (uint i = 0u; i < size && frame.points > 0u; ++i) {
                 Stretch w = world_stretch(from + (batch + i) * chunks);
-                uint end = is_finite(w) ? frame.points : 0u;
-                for (uint p = thread; p < end; p += THREADS) count.z += march_point(w, points[p]);
+                uint groups = is_finite(w) ? (frame.points + POINT_GROUP - 1u) / POINT_GROUP : 0u;
+                for (uint g = thread; g < groups; g += THREADS) {
+                    if (!passes_sphere(w, points[frame.points + g])) continue;
+                    uint end = min((g + 1u) * POINT_GROUP, frame.points);
+                    for (uint p = g * POINT_GROUP; p < end; ++p) count.z += march_point(w, points[p]);
+                }
             }
             barrier();
         }

@@ -50,6 +50,7 @@ const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one
 const uint SCATTER_SLOT = 16u;      // samples over which stretches are held against each other
 const uint SCATTER_PIECE = 32u;     // samples in which deformed tissue is searched at once
 const float SAMPLE_BLEND = 0.0625;  // of a sample: about halfway between two, both get a share of a scatterer
+const uint POINT_GROUP = 8u;        // point targets that share a bounding sphere
 const float UNHEARD = 3.3219281;    // log2(10): 20 dB under black nothing is summed
 
 const uint KIND_CONVEX = 0u;
@@ -181,5 +182,6 @@ struct Counters {
     uint instances_reached;            // leaves of the top level that a ray came to
     uint false_unions;                 // F1: of those, the ray misses the bounds of what is shown
     uint false_boxes;                  // F2: it meets them, but no triangle
-    uint unused0;
+    uint taken_even; uint taken_odd;   // pieces of work that the workers of trace took, in every other dispatch
+    uint unused0; uint unused1; uint unused2;
 };

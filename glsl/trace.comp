@@ -13,7 +13,8 @@
 #include "shared.glsl"
 #include "random.glsl"
 
-// x runs over lines, y over paths; in the second dispatch y over interactions, z over ECHO_BLOCKs of paths.
+// Workers, each of which takes piece after piece of what is to be done: a path of a line, in the second
+// dispatch an interaction and an ECHO_BLOCK of paths. Those that run together are thus all at work.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
@@ -39,7 +40,12 @@ layout(std430, binding = 15) restrict buffer InteractionBuffer { Interaction int
 layout(std430, binding = 16) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
 layout(std430, binding = 17) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
-layout(push_constant) uniform Push { uint role; uint path_begin; uint path_count; uint line_begin; uint line_count; };
+layout(push_constant) uniform Push {
+    uint role; uint path_begin; uint path_count; uint line_begin; uint line_count;
+    uint pieces;      // of work; lines first
+    uint most;        // pieces that one worker takes
+    uint turn;        // which of two counters they are taken by; the other one is for the next dispatch
+};
 
 // Whether everything but masks is transparent to rays.
 bool masks_only = false;
@@ -285,37 +291,48 @@ void recall(uint slot, out Path path, out Interface at) {
     for (uint i = 0u; i < media.count; ++i) media.ids[i] = interactions[slot].media[i];
 }
 
-void main() {
-    uint row = gl_GlobalInvocationID.x;
-    uint line = line_begin + row;
-    if (row >= line_count) return;
-    uint next = path_begin + gl_GlobalInvocationID.y, last = next + 1u;
-    uint main_path = row * path_count + gl_GlobalInvocationID.y;
-    uint slot = main_path * frame.max_interactions;
-    if (role == ROLE_BRANCHES) {
-        if (gl_GlobalInvocationID.y >= path_count * frame.max_interactions) return;
-        main_path = row * path_count + gl_GlobalInvocationID.y / frame.max_interactions;
-        if (gl_GlobalInvocationID.y % frame.max_interactions >= interaction_count[main_path]) return;
-        slot = row * path_count * frame.max_interactions + gl_GlobalInvocationID.y;
-        next = interactions[slot].path;
+// Paths of a piece of work; false: there is no such interaction.
+bool take(uint piece, out uint line, out uint next, out uint last, out uint main_path, out uint slot) {
+    uint row = piece % line_count;
+    uint at = piece / line_count;
+    line = line_begin + row;
+    if (role != ROLE_BRANCHES) {
+        next = path_begin + at;
         last = next + 1u;
-        if (paths_are_alike()) {
-            next = ECHO_BLOCK * gl_GlobalInvocationID.z;
-            last = min(next + ECHO_BLOCK, frame.paths);
-        }
-    } else if (gl_GlobalInvocationID.y >= path_count) {
-        return;
+        main_path = row * path_count + at;
+        slot = main_path * frame.max_interactions;
+        return true;
     }
+    uint slots = path_count * frame.max_interactions;
+    uint block = at / slots;
+    at -= block * slots;
+    main_path = row * path_count + at / frame.max_interactions;
+    slot = row * slots + at;
+    if (at % frame.max_interactions >= interaction_count[main_path]) return false;
+    next = interactions[slot].path;
+    last = next + 1u;
+    if (paths_are_alike()) {
+        next = ECHO_BLOCK * block;
+        last = min(next + ECHO_BLOCK, frame.paths);
+    }
+    return true;
+}
 
+void main() {
+    if (gl_GlobalInvocationID.x == 0u) {
+        if (turn == 0u) counters.taken_odd = 0u; else counters.taken_even = 0u;
+    }
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     uint rays = 0u, met = 0u, written = 0u;
     // Main paths that this one stands for.
     uint copies = role == ROLE_MAIN && paths_are_alike() ? frame.paths : 1u;
+    // The piece of work: paths from `next` on of a line; a main path, and where its interactions are.
+    uint line = 0u, next = 0u, last = 0u, main_path = NONE, slot = 0u;
     Path path;
     Echo echo;
     echo.waiting = 0u;
-    uint n = next;
+    uint n = 0u;
     bool going = false;
     // Whether a mask is known to lie ahead of a path that is outside of all.
     bool aimed = false;
@@ -324,8 +341,7 @@ void main() {
     Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
     float close = 0.0;
 
-    // A crossing takes three rays at most.
-    uint guards = 4u * limit * (last - next + 1u);
+    uint guards = 0u, quota = most;
     for (uint guard = 0u;; ++guard) {
         while (echo.waiting != 0u) {
             bool behind = (echo.waiting & 1u) == 0u;
@@ -339,12 +355,26 @@ void main() {
         Interface at;
         if (!alive || guard == guards) {
             if (next >= last || guard == guards) {
-                // Inside the loop: naga loses values that a loop carries when they are used after it.
-                if (rays > 0u) atomicAdd(counters.rays, rays);
-                report_counts();
-                if (met > 0u) atomicAdd(counters.interactions, met);
-                if (role == ROLE_MAIN) interaction_count[main_path] = written;
-                break;
+                if (role == ROLE_MAIN && main_path != NONE) interaction_count[main_path] = written;
+                bool found = false;
+                while (quota > 0u && !found) {
+                    quota -= 1u;
+                    uint piece = turn == 0u ? atomicAdd(counters.taken_even, 1u) : atomicAdd(counters.taken_odd, 1u);
+                    if (piece >= pieces) break;
+                    found = take(piece, line, next, last, main_path, slot);
+                }
+                if (!found) {
+                    // Inside the loop: naga loses values that a loop carries when they are used after it.
+                    if (rays > 0u) atomicAdd(counters.rays, rays);
+                    report_counts();
+                    if (met > 0u) atomicAdd(counters.interactions, met);
+                    break;
+                }
+                written = 0u;
+                pairing = false;
+                // A crossing takes three rays at most.
+                guard = 0u;
+                guards = 4u * limit * (last - next + 1u);
             }
             n = next;
             next += 1u;

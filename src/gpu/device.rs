@@ -213,6 +213,17 @@ impl Device {
         &self.info
     }
 
+    /// Threads that it runs at once, about: where a dispatch has fewer, part of the device is idle. Vulkan
+    /// does not say; the largest GPUs have room for a quarter of a million, drivers without a GPU run one
+    /// work group per core.
+    pub fn threads_at_once(&self) -> u32 {
+        let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
+        match self.info.kind {
+            super::AdapterKind::Cpu => 512 * cores,
+            _ => 1 << 18,
+        }
+    }
+
     /// Name given by the driver.
     pub fn name(&self) -> &str {
         &self.info.name

@@ -60,7 +60,7 @@ pub fn run(
             }
             Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
                 let push = bytemuck::cast_slice(&round.push);
-                commands.dispatch(kernel, round.threads, push, &bindings)?;
+                commands.dispatch(kernel, [round.workers, 1, 1], push, &bindings)?;
                 commands.barrier(Stage::Compute, Stage::Compute);
                 Ok(())
             }),

@@ -7,6 +7,7 @@ use super::inputs::{Random, lines, rows, samples, scanlines, scanlines_size};
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject, trace, worlds};
 use crate::reference::{Segment, origin, scatter};
 use crate::sim::layout::{self, Counters, FLAG_VOXEL, Frame, Row, Tissue};
+use crate::sim::tables::with_spheres;
 
 /// Work groups that share a scanline's segments.
 const CHUNKS: u32 = 2;
@@ -52,7 +53,7 @@ fn sizes(job: &Job) -> Vec<usize> {
         tissues.unwrap_or(0) * size_of::<Tissue>(),
         0,
         frame.samples as usize * size_of::<Row>(),
-        16 * frame.points as usize,
+        16 * with_spheres(vec![[0.0; 4]; frame.points as usize]).len(),
         lines(&frame) * frame.segment_capacity as usize * size_of::<layout::Segment>(),
         4 * lines(&frame),
         8 * samples(&frame),
@@ -124,18 +125,17 @@ fn stiff(mut job: Job) -> Job {
 fn job_of(mut job: Job, case: Case) -> Job {
     let mut frame: Frame = job.one("frame");
     let mut random = Random(9);
-    let points: Vec<[f32; 4]> = (0..if case == Case::Empty { 0 } else { 40 })
-        .map(|_| {
+    // Little wires: most stretches are far from most of them.
+    let wires = if case == Case::Empty { 0 } else { 10 };
+    let points: Vec<[f32; 4]> = (0..wires)
+        .flat_map(|_| {
             let mut within = |low, high| random.within(low, high) as f32;
-            [
-                within(-15.0, 15.0),
-                within(-3.0, 3.0),
-                within(2.0, 58.0),
-                within(0.5, 2.0),
-            ]
+            let [x, z] = [within(-15.0, 15.0), within(2.0, 58.0)];
+            [(); 4].map(|()| [x, within(-3.0, 3.0), z, within(0.5, 2.0)])
         })
         .collect();
     frame.points = points.len() as u32;
+    let points = with_spheres(points);
     if case == Case::Odd {
         frame.flags |= FLAG_VOXEL;
     }

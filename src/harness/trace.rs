@@ -14,6 +14,9 @@ use crate::sim::layout::{
 };
 use crate::sim::rounds::Rounds;
 
+/// So few that each takes several pieces of work.
+const WORKERS: u32 = 64;
+
 pub const SUBJECT: Subject = Subject {
     name: "trace",
     stems: &["trace_bvh", "trace_count", "trace_query"],
@@ -27,7 +30,7 @@ pub const SUBJECT: Subject = Subject {
     extent: |job| {
         let frame: Frame = job.one("frame");
         let [begin, count]: [u32; 2] = bytemuck::pod_read_unaligned(&job.push);
-        Extent::Rounds(Rounds::new(&frame, count).of(&frame, begin..begin + count))
+        Extent::Rounds(Rounds::new(&frame, count).of(&frame, begin..begin + count, WORKERS, &mut 0))
     },
     check,
     plant: |job, outputs| {

@@ -228,11 +228,9 @@ pub fn owned(job: &Job) -> Owned {
     }
     let frame = optional::<Frame>(job, "frame").first().copied();
     let frame = frame.unwrap_or_default();
+    // Without the spheres around them. `trace` binds none and only asks whether there are any.
     let mut points = optional(job, "points");
-    if points.is_empty() {
-        // `trace` binds none and only asks whether there are any.
-        points.resize(frame.points as usize, [0.0; 4]);
-    }
+    points.resize(frame.points as usize, [0.0; 4]);
     Owned {
         frame,
         rows: optional(job, "rows"),

@@ -33,10 +33,10 @@ const MESH: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ploc_search_distance: PlocSearchDistance::Medium,
     search_depth_threshold: 3,
-    reinsertion_batch_ratio: 0.05,
+    reinsertion_batch_ratio: 1.0,
     post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
     sort_precision: SortPrecision::U64,
-    max_prims_per_leaf: 3,
+    max_prims_per_leaf: 2,
     collapse_traversal_cost: 1.0,
 };
 

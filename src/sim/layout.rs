@@ -55,6 +55,8 @@ pub const SCATTER_PIECE: u32 = 32;
 pub const SCATTER_SLOT: u32 = 16;
 /// Of a sample: about halfway between two samples, both get a share of a scatterer's echo.
 pub const SAMPLE_BLEND: f32 = 0.0625;
+/// Point targets that share a bounding sphere.
+pub const POINT_GROUP: u32 = 8;
 /// log2(10): 20 dB under black nothing is summed.
 pub const UNHEARD: f32 = std::f32::consts::LOG2_10;
 /// Paths that echo and choose one way at every surface.
@@ -203,7 +205,8 @@ shared! {
         saturated: u32, segments_dropped: u32, stack_overflow: u32, paths_lost: u32,
         rays: u32, interactions: u32, segments: u32, candidates: u32,
         deposits: u32, node_visits: u32, triangle_tests: u32, top_visits: u32,
-        instances_reached: u32, false_unions: u32, false_boxes: u32, unused0: u32,
+        instances_reached: u32, false_unions: u32, false_boxes: u32, taken_even: u32,
+        taken_odd: u32, unused0: u32, unused1: u32, unused2: u32,
     }
 }
 

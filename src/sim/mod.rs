@@ -169,6 +169,7 @@ impl Simulator {
                 frame,
                 shown: frame,
                 batches,
+                at_once: device.threads_at_once(),
             },
         };
         simulator.upload_tables()?;
@@ -203,8 +204,9 @@ impl Simulator {
         passes.touch(&mut cmd, scene)?;
         passes.clear(&mut cmd);
         passes.origin(&mut cmd)?;
+        let mut turn = 0;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
-            passes.trace(&mut cmd, begin)?;
+            passes.trace(&mut cmd, begin, &mut turn)?;
             passes.scatter(&mut cmd)?;
         }
         passes.beam(&mut cmd)?;

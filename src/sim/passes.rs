@@ -23,6 +23,8 @@ pub(super) struct Passes {
     /// Those of the picture that there is.
     pub(super) shown: layout::Frame,
     pub(super) batches: Batches,
+    /// Threads that the device runs at once, about.
+    pub(super) at_once: u32,
 }
 
 impl Passes {
@@ -92,7 +94,13 @@ impl Passes {
         Ok(())
     }
 
-    pub(super) fn trace(&self, cmd: &mut Commands, path_begin: u32) -> Result<(), GpuError> {
+    /// Traces a batch of paths; `turn` as in [`super::rounds::Rounds::of`].
+    pub(super) fn trace(
+        &self,
+        cmd: &mut Commands,
+        path_begin: u32,
+        turn: &mut u32,
+    ) -> Result<(), GpuError> {
         let (b, w) = (&self.buffers, &self.world);
         if path_begin > 0 {
             cmd.barrier(Stage::Compute, Stage::Transfer);
@@ -101,10 +109,15 @@ impl Passes {
         }
         let path_end = self.frame.paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
-        for round in self.batches.rounds.of(&self.frame, path_begin..path_end) {
+        let paths = path_begin..path_end;
+        for round in self
+            .batches
+            .rounds
+            .of(&self.frame, paths, self.at_once, turn)
+        {
             cmd.dispatch(
                 &self.kernels.trace,
-                round.threads,
+                [round.workers, 1, 1],
                 bytemuck::cast_slice(&round.push),
                 &[
                     Binding::Buffer(&b.frame),

@@ -38,13 +38,18 @@ fn path_bytes(frame: &Frame) -> u64 {
     u64::from(slots(frame)) * size_of::<Interaction>() as u64
 }
 
+/// Pieces of work that a worker does, one after the other, where there are enough of them.
+const PIECES: u32 = 8;
+
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
-    /// Push constants: role, first path, paths, first line, lines.
-    pub push: [u32; 5],
-    /// Threads per axis.
-    pub threads: [u32; 3],
+    /// Push constants: role, first path, paths, first line, lines; pieces of work, how many of them a
+    /// worker may take, and by which of two counters.
+    pub push: [u32; 8],
+    /// Threads. Each takes piece after piece, so that of those that run together none waits for another's
+    /// longer path.
+    pub workers: u32,
 }
 
 /// How many lines and main paths of each are traced together.
@@ -85,16 +90,23 @@ impl Rounds {
         self.main_paths() * u64::from(self.slots)
     }
 
-    /// The dispatches that trace `paths` of all lines, in order, each after the one before.
-    pub fn of(&self, frame: &Frame, paths: Range<u32>) -> Vec<Round> {
+    /// The dispatches that trace `paths` of all lines, in order, each after the one before, on a device
+    /// that runs about `at_once` threads at once. `turn`: which of the frame's two counters the first of
+    /// them uses, and then the next one to come.
+    pub fn of(&self, frame: &Frame, paths: Range<u32>, at_once: u32, turn: &mut u32) -> Vec<Round> {
         let all = frame.scanlines * frame.layers;
         let (begin, count) = (paths.start, paths.len() as u32);
-        let round = |role, count, line, lines, y, z| Round {
-            push: [role, begin, count, line, lines],
-            threads: [lines, y, z],
+        let mut round = |role, count, line, lines: u32, per_line: u32| {
+            let pieces = lines * per_line;
+            let workers = pieces.min(at_once.max(pieces / PIECES));
+            // Twice its share: others' pieces may be larger. Those that begin later then find none.
+            let most = 2 * pieces.div_ceil(workers);
+            let push = [role, begin, count, line, lines, pieces, most, *turn];
+            *turn ^= 1;
+            Round { push, workers }
         };
         if self.mains == 0 {
-            return vec![round(ROLE_WHOLE, count, 0, all, count, 1)];
+            return vec![round(ROLE_WHOLE, count, 0, all, count)];
         }
         let (mains, blocks) = match one_speaks_for_all(frame) {
             true => (1, count.div_ceil(ECHO_BLOCK)),
@@ -103,9 +115,9 @@ impl Rounds {
         let mut rounds = Vec::new();
         for first in (0..all).step_by(self.lines as usize) {
             let lines = self.lines.min(all - first);
-            rounds.push(round(ROLE_MAIN, mains, first, lines, mains, 1));
-            let met = mains * self.slots;
-            rounds.push(round(ROLE_BRANCHES, mains, first, lines, met, blocks));
+            rounds.push(round(ROLE_MAIN, mains, first, lines, mains));
+            let met = mains * self.slots * blocks;
+            rounds.push(round(ROLE_BRANCHES, mains, first, lines, met));
         }
         rounds
     }
@@ -135,7 +147,8 @@ mod tests {
             for line in &mut taken[first..first + round.push[4] as usize] {
                 *line += 1;
             }
-            assert_eq!(round.threads[0], round.push[4]);
+            assert_eq!(round.push[5] % round.push[4], 0);
+            assert!(round.workers * round.push[6] >= round.push[5]);
         }
         taken
     }
@@ -148,14 +161,17 @@ mod tests {
             let paths = frame.paths.min(most_paths(&frame));
             let rounds = Rounds::new(&frame, paths);
             assert!(rounds.interactions() * size_of::<Interaction>() as u64 <= INTERACTION_BUDGET);
-            let taken = rounds.of(&frame, 0..paths);
+            let taken = rounds.of(&frame, 0..paths, 5000, &mut 0);
             for role in [ROLE_MAIN, ROLE_BRANCHES] {
                 assert_eq!(lines(&taken, role), [1; 192 * 7]);
             }
+            assert!(taken.iter().all(|r| r.workers.div_ceil(64) <= MOST_GROUPS));
+            // Each dispatch leaves the other counter at zero for the next one.
             assert!(
                 taken
                     .iter()
-                    .all(|r| r.threads[1..].iter().all(|&n| n <= MOST_GROUPS))
+                    .zip([0, 1].into_iter().cycle())
+                    .all(|(r, turn)| r.push[7] == turn)
             );
             // Main paths are there before their branches.
             let roles: Vec<u32> = taken.iter().map(|r| r.push[0]).collect();
@@ -165,17 +181,17 @@ mod tests {
 
     #[test]
     fn one_main_path_stands_for_all_that_are_alike() {
-        let threads = |frame: &Frame| {
-            let rounds = Rounds::new(frame, 40).of(frame, 0..40);
-            rounds.iter().map(|r| r.threads).collect::<Vec<_>>()
+        let pieces = |frame: &Frame| {
+            let rounds = Rounds::new(frame, 40).of(frame, 0..40, 5000, &mut 0);
+            rounds.iter().map(|r| r.push[5]).collect::<Vec<_>>()
         };
         let mut frame = frame(40, 32);
-        assert_eq!(threads(&frame), [[1344, 1, 1], [1344, 32, 5]]);
+        assert_eq!(pieces(&frame), [1344, 1344 * 32 * 5]);
         frame.flags = FLAG_ROUGH_TRANSMISSION;
-        let own = threads(&frame);
-        assert_eq!(own[0][1..], [40, 1]);
-        assert_eq!(own[1][1..], [40 * 32, 1]);
+        let own = pieces(&frame);
+        assert_eq!(own[1], 32 * own[0]);
+        assert_eq!(own[0] % 40, 0);
         frame.sampling = SAMPLING_PLAIN;
-        assert_eq!(threads(&frame), [[1344, 40, 1]]);
+        assert_eq!(pieces(&frame), [1344 * 40]);
     }
 }

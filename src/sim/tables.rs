@@ -160,7 +160,7 @@ pub struct Tables {
     pub tissues: Vec<layout::Tissue>,
     /// Two per instance.
     pub surfaces: Vec<layout::Surface>,
-    /// World position, mm, and amplitude.
+    /// World position, mm, and amplitude; then the spheres of [`with_spheres`].
     pub points: Vec<[f32; 4]>,
     /// Grey level of each of 256 values.
     pub grey: Vec<u32>,
@@ -174,7 +174,7 @@ impl Tables {
             rows: rows(scene),
             tissues: tissues(scene),
             surfaces: surfaces(scene),
-            points: points(scene),
+            points: with_spheres(points(scene)),
             grey: grey_map(&scene.imaging),
         }
     }
@@ -317,6 +317,24 @@ pub fn points(scene: &Scene) -> Vec<[f32; 4]> {
                 .map(|[x, y, z]| [x, y, z, wire.amplitude].map(|v| v as f32))
         })
         .collect()
+}
+
+/// Point targets and, behind them, a sphere around each [`layout::POINT_GROUP`] of them: centre and radius,
+/// mm. What is far from the sphere is far from all of them.
+pub fn with_spheres(mut points: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
+    let spheres: Vec<[f32; 4]> = (points.chunks(layout::POINT_GROUP as usize))
+        .map(|group| {
+            let places = group.iter().map(|&[x, y, z, _]| glam::Vec3::new(x, y, z));
+            let [low, high] = [glam::Vec3::min, glam::Vec3::max]
+                .map(|of| places.clone().reduce(of).expect("not empty"));
+            let centre = 0.5 * (low + high);
+            let radius = places.map(|p| p.distance(centre)).fold(0.0, f32::max);
+            // More than rounding takes off.
+            centre.extend(1.001 * radius + 1e-3).to_array()
+        })
+        .collect();
+    points.extend(spheres);
+    points
 }
 
 /// Grey level of each of 256 log-compressed values: 255 v^gamma.
