@@ -1,5 +1,5 @@
 // Displacement fields: the tissue point P of the reference shape is at P + v(P) now, both in texture
-// space. The includer declares instances[] and `float fields[]`, three floats per vector, and
+// space. The includer declares instances[] and `vec4 fields[]`, a vector each, and
 // includes shared.glsl. A field is a header (origin, nodes per mm, nodes per axis) and a displacement
 // per node, x running fastest; between nodes it is trilinear, outside the nearest point's.
 
@@ -13,7 +13,7 @@ uint field_of(uint instance) {
     return instances[instance].field;
 }
 
-vec3 field_vector(uint i) { return vec3(fields[3u * i], fields[3u * i + 1u], fields[3u * i + 2u]); }
+vec3 field_vector(uint i) { return fields[i].xyz; }
 
 Field load_field(uint at) {
     Field f;

@@ -9,7 +9,7 @@ layout(push_constant) uniform Push {
     uint count;        // vectors
     uint target;       // first vector written; overlaps no source that is read, or is that source
     uint unit;         // 1: results are brought to length 1
-    uint unused0;
+    uint stride;       // floats from one vector to the next: 3, or 4 of which the last stays as it is
     uvec4 sources;     // first vector of each keyframe
     vec4 weights;      // a keyframe of weight 0 is not read
 } push;
@@ -18,7 +18,7 @@ layout(std430, binding = 0) buffer Values { float values[]; };
 
 vec3 part(uint source, float weight, uint i) {
     if (weight == 0.0) return vec3(0.0);
-    uint at = 3u * (source + i);
+    uint at = push.stride * (source + i);
     return weight * vec3(values[at], values[at + 1u], values[at + 2u]);
 }
 
@@ -32,7 +32,7 @@ void main() {
         float size = max(max(abs(v.x), abs(v.y)), abs(v.z));
         if (size > 0.0) v = normalize(v / size);
     }
-    uint at = 3u * (push.target + i);
+    uint at = push.stride * (push.target + i);
     values[at] = v.x;
     values[at + 1u] = v.y;
     values[at + 2u] = v.z;

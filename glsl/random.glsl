@@ -71,13 +71,15 @@ uint owen(uint x, uint seed) {
 uvec2 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
     uvec4 key = pcg4d(uvec4(0x9e3779b9u, bounce, purpose, seed));
     uint index = owen(path, key.x);
-    uint second = 0u;
-    uint direction = 0x80000000u;
-    for (uint i = index; i != 0u; i >>= 1u) {
-        if ((i & 1u) != 0u) second ^= direction;
-        direction ^= direction >> 1u;
-    }
-    return uvec2(owen(bitfieldReverse(index), key.y), owen(second, key.z));
+    // Bits of the two dimensions, lowest first: those of the index, and their sums by Pascal's triangle modulo 2,
+    // which is a product of five sparse matrices.
+    uint second = index;
+    second ^= second >> 16u;
+    second ^= second >> 8u & 0x00ff00ffu;
+    second ^= second >> 4u & 0x0f0f0f0fu;
+    second ^= second >> 2u & 0x33333333u;
+    second ^= second >> 1u & 0x55555555u;
+    return uvec2(bitfieldReverse(laine_karras(index, key.y)), bitfieldReverse(laine_karras(second, key.z)));
 }
 
 // The words of a path as the frame draws them.

@@ -20,7 +20,7 @@ layout(std430, binding = 6) readonly buffer SegmentCountBuffer { uint segment_co
 layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
-layout(std430, binding = 10) readonly buffer FieldBuffer { float fields[]; };   // of the deforming one
+layout(std430, binding = 10) readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
 
 // Whether any instance's tissue deforms. Two modules: not every driver drops what a specialization
 // constant switches off, and the half for deformed tissue is the larger one.

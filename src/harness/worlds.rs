@@ -8,7 +8,7 @@ use super::{Case, Input, Job};
 use crate::reference::Owned;
 use crate::scene::{Mesh, shapes};
 use crate::sim::bvh::{MeshBvh, Placed, SceneBvh};
-use crate::sim::fields::HEADER;
+use crate::sim::fields::{HEADER, padded};
 use crate::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use crate::sim::placement;
 
@@ -73,7 +73,7 @@ impl Builder {
 
     /// Displacement fields of the instances.
     pub fn field_input(&self) -> Input {
-        Input::floats("fields", self.fields.as_flattened())
+        Input::floats("fields", padded(&self.fields).as_flattened())
     }
 
     /// The five bindings instances, vertices, normals, triangles, nodes.
@@ -241,20 +241,29 @@ pub fn owned(job: &Job) -> Owned {
         normals: optional(job, "normals"),
         triangles: optional(job, "triangles"),
         points,
-        fields: optional(job, "fields"),
+        fields: fields(job),
     }
+}
+
+/// The displacement fields of a job, in vectors.
+fn fields(job: &Job) -> Vec<[f32; 3]> {
+    let Some(input) = job.inputs.iter().find(|i| i.name == "fields") else {
+        return Vec::new();
+    };
+    let padded: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&input.bytes);
+    padded.iter().map(|&[x, y, z, _]| [x, y, z]).collect()
 }
 
 /// Bytes of the displacement fields that the instances of `job` refer to.
 pub fn field_size(job: &Job) -> usize {
-    let fields: Vec<[f32; 3]> = job.get("fields");
+    let fields = fields(job);
     let instances: Vec<Instance> = job.get("instances");
     let used = instances.iter().filter(|i| i.field != NONE).map(|i| {
         let header = i.field as usize + HEADER as usize;
         let nodes = fields.get(header - 1).map_or(0.0, |n| n[0] * n[1] * n[2]);
         header + nodes as usize
     });
-    12 * used.max().unwrap_or(0)
+    16 * used.max().unwrap_or(0)
 }
 
 /// Bytes of the five bindings of [`Builder::inputs`] as they are in `job`: a dump brings its own.

@@ -7,7 +7,7 @@ use crate::sim::layout::Interpolation;
 /// The `count` vectors that the kernel writes from `target` on.
 pub fn interpolate(push: &Interpolation, values: &[f32]) -> Vec<DVec3> {
     let at = |vector: u32| {
-        let at = 3 * vector as usize;
+        let at = (push.stride * vector) as usize;
         DVec3::new(
             values[at].into(),
             values[at + 1].into(),
@@ -39,6 +39,7 @@ mod tests {
             count: 1,
             sources: [0, 2, 1, 1],
             weights: [0.75, 0.25, 0.0, 0.0],
+            stride: 3,
             ..Interpolation::default()
         };
         assert_eq!(

@@ -9,7 +9,7 @@
 //! exact; a membrane alone would flatten them next to the surfaces, as nothing holds it outside.
 //!
 //! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::values`] as `fields`
-//! (three floats per vector) and writes [`Fields::offset`] into `field` of every instance's row
+//! ([`padded`]: four floats per vector, which a device reads at once) and writes [`Fields::offset`] into `field` of every instance's row
 //! whenever keyframes or settings have changed. Each instance has one field more, that of the shape
 //! between keyframes, which is overwritten: before a frame, [`Fields::blend`] says with what.
 
@@ -101,11 +101,10 @@ impl Fields {
     }
 
     /// What the kernels bind: a buffer is never empty.
-    pub fn bytes(&self) -> &[u8] {
-        if self.is_empty() {
-            &[0; 12]
-        } else {
-            bytemuck::cast_slice(&self.values)
+    pub fn padded(&self) -> Vec<[f32; 4]> {
+        match self.is_empty() {
+            true => vec![[0.0; 4]],
+            false => padded(&self.values),
         }
     }
 
@@ -140,6 +139,11 @@ impl Fields {
             count: slots.stride - HEADER,
         })
     }
+}
+
+/// Vectors with a fourth float, which means nothing.
+pub fn padded(vectors: &[[f32; 3]]) -> Vec<[f32; 4]> {
+    vectors.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
 }
 
 /// Fields of one instance.

@@ -211,7 +211,7 @@ shared! {
 }
 
 /// Push constants of `interpolate`: how vectors between keyframes are made. All places are counted
-/// in vectors of three floats from the beginning of the buffer.
+/// in vectors from the beginning of the buffer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Interpolation {
@@ -221,8 +221,8 @@ pub struct Interpolation {
     pub target: u32,
     /// 1: they are brought to length 1, as normals are.
     pub unit: u32,
-    /// Nothing.
-    pub unused: u32,
+    /// Floats from one vector to the next: 3, or 4 of which the last stays as it is.
+    pub stride: u32,
     /// Where the keyframes begin.
     pub sources: [u32; 4],
     /// Weight of each; one of weight 0 is not read.

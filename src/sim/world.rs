@@ -139,7 +139,11 @@ impl World {
             vertex_count: arrays.vertices.len() as u32,
             normals: upload(device, "normals", bytemuck::cast_slice(&arrays.normals))?,
             triangles: upload(device, "triangles", bytemuck::cast_slice(&arrays.triangles))?,
-            fields: upload(device, "fields", arrays.fields.bytes())?,
+            fields: upload(
+                device,
+                "fields",
+                bytemuck::cast_slice(&arrays.fields.padded()),
+            )?,
         };
         let mut world = Self {
             tracer,
@@ -278,7 +282,7 @@ impl World {
         &self.geometry.triangles
     }
 
-    /// Displacement fields of deforming tissue: three floats per vector.
+    /// Displacement fields of deforming tissue: four floats per vector.
     pub fn fields(&self) -> &Buffer {
         &self.geometry.fields
     }

@@ -178,6 +178,7 @@ fn frames_in_flight_refit_one_structure() {
             target: 2 * count,
             sources: [0, count, 0, 0],
             weights: [1.0 - blend, *blend, 0.0, 0.0],
+            stride: 3,
             ..Interpolation::default()
         };
         let mut commands = frames.begin().unwrap();

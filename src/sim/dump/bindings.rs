@@ -96,7 +96,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         3,
     )?;
     array("nodes", Word, bytemuck::cast_slice(nodes), 20)?;
-    array("fields", Float, &fields, 3)?;
+    array("fields", Float, &fields, 4)?;
 
     let (lines, samples) = (lines(&frame) as usize, frame.samples as usize);
     let samples = frame.scanlines as usize * samples;

@@ -154,6 +154,7 @@ impl Refit {
                     target: blend.target,
                     sources: blend.sources.map(|(at, _)| at),
                     weights: blend.sources.map(|(_, weight)| weight as f32),
+                    stride: 4,
                     ..Interpolation::default()
                 };
                 commands.dispatch(
@@ -218,7 +219,7 @@ fn interpolation(
         unit,
         sources: [source(keyframe(instance)); 4],
         weights: [1.0, 0.0, 0.0, 0.0],
-        ..Interpolation::default()
+        stride: 3,
     };
     if keyframes.strategy == Strategy::Interpolate {
         push.sources = keyframes.blend.map(|(k, _)| source(k));
