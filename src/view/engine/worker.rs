@@ -55,7 +55,7 @@ pub(super) struct Worker {
     scene: Scene,
     /// Settings that the simulator's buffers are known to hold.
     fitted: Option<Arc<Settings>>,
-    /// The moment that the last picture shows.
+    /// When the last picture was begun that something new called for; finer ones of it come at once.
     imaged: Instant,
     /// What was carried out last, or failed to be.
     last: Option<Order>,
@@ -350,14 +350,16 @@ impl Worker {
         let (order, pose, seconds) = (&taken.order, taken.pose, taken.seconds);
         order.settings.apply(&mut self.scene);
         self.scene.world_from_probe = pose;
-        self.imaged = began;
+        let at_rest = taken.level.is_some();
+        if !at_rest {
+            self.imaged = began;
+        }
         self.scene.set_time(seconds);
         // Tables and buffers of the scene's own are made once; their time is not that of a frame.
         let (simulator, settings) = self.prepare(simulator, &order.settings)?;
         let prepared = began.elapsed();
         let looked_at = self.shared.lock().look.is_some();
         self.pace.share(if looked_at { IMAGE_SHARE } else { 1.0 });
-        let at_rest = taken.level.is_some();
         let level = match taken.level {
             Some(level) => level,
             None => self.pace.moving(&self.scene),
