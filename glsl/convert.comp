@@ -2,6 +2,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
+#include "numbers.glsl"
 
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
@@ -15,8 +16,8 @@ vec2 pair(uint column, uint row) { return prescan[column * frame.samples + row];
 
 vec2 bilinear(vec2 at) {
     vec2 p = clamp(at, vec2(0.0), vec2(float(frame.scanlines - 1u), float(frame.samples - 1u)));
-    uint c0 = uint(p.x);
-    uint r0 = uint(p.y);
+    uint c0 = uint(whole(floor(p.x)));
+    uint r0 = uint(whole(floor(p.y)));
     uint c1 = min(c0 + 1u, frame.scanlines - 1u);
     uint r1 = min(r0 + 1u, frame.samples - 1u);
     float f = p.x - float(c0);

@@ -15,8 +15,8 @@ layout(std430, binding = 3) restrict buffer PixelBuffer { uint pixels[]; };
 float bilinear(float column, float row) {
     float c = clamp(column, 0.0, float(frame.scanlines - 1u));
     float r = clamp(row, 0.0, float(frame.samples - 1u));
-    uint c0 = uint(c);
-    uint r0 = uint(r);
+    uint c0 = uint(whole(floor(c)));
+    uint r0 = uint(whole(floor(r)));
     uint c1 = min(c0 + 1u, frame.scanlines - 1u);
     uint r1 = min(r0 + 1u, frame.samples - 1u);
     float near = mix(log_image[c0 * frame.samples + r0], log_image[c1 * frame.samples + r0], c - float(c0));
@@ -32,7 +32,7 @@ void main() {
     uint pixel = 0u;
     if (sector(i, j, at)) {
         float v = bilinear(at.x, at.y);
-        uint level = not_a_number(v) ? 0u : uint(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0));
+        uint level = not_a_number(v) ? 0u : uint(whole(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0)));
         pixel = 0xff000000u | (grey[level] * 0x010101u);
     }
     pixels[j * frame.image_width + i] = pixel;

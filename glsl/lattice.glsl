@@ -47,12 +47,6 @@ float level_power(float wanted, int number) {
     return min(clamp((above + LEVEL_FADE) / LEVEL_FADE, 0.0, 1.0), clamp((1.0 - above) / LEVEL_FADE, 0.0, 1.0));
 }
 
-// Two-way beam at a row: by how much it falls per mm^2 across and up, and the gain; all log2.
-vec3 beam_shape(uint row) {
-    float l = rows[row].sigma_lateral, e = rows[row].sigma_elevation;
-    return vec3(0.72134752 / (l * l), 0.72134752 / (e * e), log2(rows[row].volume_gain));
-}
-
 // How a lattice is walked under a beam: axis a along it, b across, c through the slab of the layer.
 struct Walk {
     uint a; uint b; uint c;

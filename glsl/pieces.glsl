@@ -17,13 +17,13 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     float kappa = kappa_at(s, along);
     uint row = row_at(kappa);
     float across = dot(rel, s.e_l);
-    if (abs(across) > half_width(s, row)) return uvec2(0u);
-    float power = level_power(wanted_level(s.tissue, rows[row].lattice_level, drowned), number);
-    vec3 shape = beam_shape(row);
+    vec4 shape = rows[row].shape;
+    if (abs(across) > half_width(s, shape)) return uvec2(0u);
+    float power = level_power(wanted_level(s.tissue, shape.w, drowned), number);
     up += s.layer_y;
     float exponent = shape.z - s.absorption * LOG2_E * along - shape.x * across * across - shape.y * up * up;
     float turns = 2.0 * frame.frequency * (s.time + along / s.speed);
-    strength *= sqrt(power) * thinning(s, along, rows[row].sigma_lateral, rows[row].sigma_elevation);
+    strength *= sqrt(power) * thinning(s, along, shape);
     return uvec2(1u, deposit_near(kappa, strength * exp2(exponent) * phasor(-turns)));
 }
 
@@ -41,7 +41,8 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     vec3 back = here - p - displacement(f, p, jacobian);
     jacobian += mat3(1.0);
     vec3 middle = p + undeform(jacobian, back);
-    float width = 1.1 * max(half_width(s, row_at(kappa_at(s, x.x))), half_width(s, row_at(kappa_at(s, x.y))));
+    vec2 widths = end_widths(s, x);
+    float width = 1.1 * max(widths.x, widths.y);
     if (!(width > 0.0)) return uvec3(0u);
     float reach = slab_of().y;
 

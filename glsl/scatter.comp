@@ -39,6 +39,7 @@ const bool DEFORMING = false;
 const uint THREADS = 64u;
 const float POINT_SHIFT = 0.01234;   // of a layer's pitch
 const float LOG2_E = 1.44269504;
+const float INVERSE_FALL = 1.38629436;    // of a beam's fall: its deviation squared is 1 over the two
 const float SHAPE_SPAN = 0.6;             // mm of depth to either side by which the beam's change is known
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
@@ -127,19 +128,20 @@ bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
 bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
 
 // What a rough reflection spreads over many resolution cells averages down; what lies off the
-// scanline is heard less.
-float thinning(Stretch s, float x, float sigma_l, float sigma_e) {
+// scanline is heard less. `shape`: of the row.
+float thinning(Stretch s, float x, vec4 shape) {
     float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
     float beam = beam_weight(s.off.x + x * s.off.y);
     if (variance <= 0.0) return beam;
-    float cells = sqrt((1.0 + variance / (sigma_l * sigma_l)) * (1.0 + variance / (sigma_e * sigma_e)));
+    vec2 widened = 1.0 + variance * INVERSE_FALL * shape.xy;
+    float cells = sqrt(widened.x * widened.y);
     return beam * min(1.0, sqrt(s.share / cells));
 }
 
 // How loud its speckle is at distance x: one-way weight times echogenicity, log2.
 float level_at(Stretch s, float x) {
     uint row = row_at(kappa_at(s, x));
-    float weight = s.weight * thinning(s, x, rows[row].sigma_lateral, rows[row].sigma_elevation);
+    float weight = s.weight * thinning(s, x, rows[row].shape);
     return log2(weight) - s.absorption * LOG2_E * x + tissues[s.tissue].level;
 }
 
@@ -203,10 +205,10 @@ uint deposit_near(float kappa, vec2 v) {
 
 // Half the beam's width at a row, mm: an ellipse in the plane of width and height, of which the
 // layer's edge nearest to the middle counts.
-float half_width(Stretch s, uint row) {
+float half_width(Stretch s, vec4 shape) {
     float nearest = max(abs(s.layer_y) - frame.elevation_reach, 0.0);
-    float height = nearest / (frame.lateral_cut * rows[row].sigma_elevation);
-    return frame.lateral_cut * rows[row].sigma_lateral * sqrt(max(1.0 - height * height, 0.0));
+    float height = nearest / frame.lateral_cut;
+    return frame.lateral_cut * sqrt(max(1.0 - INVERSE_FALL * shape.y * height * height, 0.0) / (INVERSE_FALL * shape.x));
 }
 
 // Scatterers of one lattice near a stretch, plane by plane. x: the distances at which planes are crossed
@@ -242,23 +244,23 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
         float ahead = walk.step * da;         // of the middle, where the axis crosses the plane
         uint row = row_at(kappa_middle + ahead * per_mm);
-        float wanted = wanted_level(s.tissue, rows[row].lattice_level, drowned);
+        vec4 shape = rows[row].shape;
+        float wanted = wanted_level(s.tissue, shape.w, drowned);
         float power = level_power(wanted, number);
-        float width = half_width(s, row);
+        float width = half_width(s, shape);
         if (!(power > 0.0) || !(width > 0.0)) continue;
         float x_plane = x_middle + ahead;
-        float sigma_l = rows[row].sigma_lateral, sigma_e = rows[row].sigma_elevation;
 
         // Over the plane the beam's shape and the gain change as a parabola, through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
-        vec3 here = beam_shape(row), shape_below = beam_shape(below), shape_above = beam_shape(above);
+        vec3 here = shape.xyz, shape_below = rows[below].shape.xyz, shape_above = rows[above].shape.xyz;
         vec3 slope = (shape_above - shape_below) * run;
         vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
         // A row holds for its whole sample: its numbers are those of the sample's middle.
         float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
 
-        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, sigma_l, sigma_e) * frame.volume_scale;
+        float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, shape) * frame.volume_scale;
         if (depth > 0.0) {
             strength *= 1.0 + depth * tissue_texture((s.o + x_plane * s.d) / tissues[s.tissue].texture_length, tissues[s.tissue].seed);
         }
@@ -297,10 +299,16 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     return count;
 }
 
+// Half the beam's width at both ends of a piece.
+vec2 end_widths(Stretch s, vec2 x) {
+    return vec2(half_width(s, rows[row_at(kappa_at(s, x.x))].shape), half_width(s, rows[row_at(kappa_at(s, x.y))].shape));
+}
+
 // How far ahead of the crossing of its plane a cell's scatterer can be.
 float plane_margin(Stretch s, vec2 x, int number) {
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
-    float width = max(half_width(s, row_at(kappa_at(s, x.x))), half_width(s, row_at(kappa_at(s, x.y))));
+    vec2 widths = end_widths(s, x);
+    float width = max(widths.x, widths.y);
     return 0.51 * lattice_edge(number) * (abs(s.d.x) + abs(s.d.y) + abs(s.d.z))
         + (1.2 * width + frame.elevation_reach * abs(walk.slant)) * abs(walk.along.y / walk.across.y)
         + frame.elevation_reach * abs(s.d[walk.c] * walk.inverse_c);
@@ -341,7 +349,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     // Levels that some plane may need.
     float lowest = 1e9, highest = -1e9;
     for (int i = 0; i < 3; ++i) {
-        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, 0.5 * float(i))))].lattice_level, drowned);
+        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, 0.5 * float(i))))].shape.w, drowned);
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }
@@ -379,7 +387,7 @@ uvec3 march_sample(Stretch s, int k) {
         factor += tissues[s.tissue].texture_depth * tissue_texture(p / tissues[s.tissue].texture_length, seed);
     }
     float amplitude = s.weight * factor * exp(-0.5 * e * e - s.absorption * x)
-        * thinning(s, x, rows[row].sigma_lateral, sigma_e)
+        * thinning(s, x, rows[row].shape)
         * (tissues[s.tissue].mean + tissues[s.tissue].sigma * gaussian(bits.w));
     float kappa = float(k) + unit(bits.x) - 0.5;
     vec2 q = amplitude * frame.volume_scale * carrier(kappa * frame.sample_pitch / frame.speed);
@@ -404,7 +412,7 @@ uint march_point(Stretch s, vec4 point) {
     float l = rho_l / sigma_l;
     if (abs(l) > 4.0) return 0u;
     float e = (s.layer_y + rho_e) / sigma_e;
-    vec2 q = s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, sigma_l, sigma_e)
+    vec2 q = s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, rows[row].shape)
         * frame.volume_scale * carrier(time);
     vec4 shares = deposit_shares(at - floor(at));
     int slot = int(clamp(floor(at), -1e6, 1e9)) - 1 - int(window_begin);

@@ -112,6 +112,9 @@ struct Instance {
 
 // Per axial sample k, at depth k * sample_pitch.
 struct Row {
+    vec4 shape;                                   // the two-way beam as scatterers hear it, log2: by how much it falls per mm^2
+                                                  // across and up, and the gain; and the level of the lattice that is as dense
+                                                  // as speckle needs, below ALL_LEVELS the finest. Read at once
     float sigma_lateral; float sigma_elevation;   // two-way widths, mm
     float volume_gain; float point_gain;          // applied to scatterers and points at deposit
     float surface_gain;                           // elevation normalisation and compensation at deposit
@@ -121,8 +124,8 @@ struct Row {
     float compensation;                           // linear, attenuation compensation of a weight at this depth
     float incoherent_gain;                        // keeps incoherent surface echoes at their energy through the averages
     float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
-    float lattice_level;                          // of the lattice that is as dense as speckle needs; below ALL_LEVELS: the finest
     float black;                                  // one-way weight times echogenicity that shows as black, log2
+    float unused0; float unused1; float unused2;
 };
 
 // A straight stretch of a path inside one medium.

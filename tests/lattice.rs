@@ -137,7 +137,7 @@ fn no_seam_shows_where_one_lattice_takes_over_from_another() {
     let rows = tables::rows(&scene);
     let count = 32;
     let levels: Vec<f64> = (0..count)
-        .map(|i| f64::from(rows[(2 * i + 1) * rows.len() / (2 * count)].lattice_level))
+        .map(|i| f64::from(rows[(2 * i + 1) * rows.len() / (2 * count)].shape[3]))
         .collect();
     let changes = levels
         .windows(2)

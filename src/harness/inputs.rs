@@ -105,10 +105,14 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
     (0..frame.samples)
         .map(|k| {
             let depth = k as f32 * frame.sample_pitch;
+            let sigmas = [0.4 + 0.01 * depth, 0.9 + 0.005 * depth];
+            let gain = 1.0 + 0.01 * depth;
+            let level = 0.5 + 0.05 * depth;
             Row {
-                sigma_lateral: 0.4 + 0.01 * depth,
-                sigma_elevation: 0.9 + 0.005 * depth,
-                volume_gain: 1.0 + 0.01 * depth,
+                shape: tables::beam_shape(sigmas.map(f64::from), gain.into(), level.into()),
+                sigma_lateral: sigmas[0],
+                sigma_elevation: sigmas[1],
+                volume_gain: gain,
                 point_gain: 0.8,
                 surface_gain: 1.2 - 0.005 * depth,
                 incoherent_gain: 1.5 + 0.01 * depth,
@@ -118,8 +122,8 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 tgc: 1.0 + 0.1 * depth,
                 compensation: 1.0 + 0.02 * depth,
                 receive_reach: 0.5 + 0.3 * depth,
-                lattice_level: 0.5 + 0.05 * depth,
                 black: -12.0 + 0.02 * depth,
+                ..Row::default()
             }
         })
         .collect()

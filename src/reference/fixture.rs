@@ -4,6 +4,7 @@ use glam::{DAffine3, DVec3};
 
 pub use super::Owned as Fixture;
 use crate::sim::layout::{ALL_LEVELS, Frame, Instance, NONE, Row, Rows, Surface, Tissue};
+use crate::sim::tables::beam_shape;
 
 pub fn rows_of(m: &DAffine3) -> Rows {
     std::array::from_fn(|i| {
@@ -34,6 +35,7 @@ impl Fixture {
         let identity = rows_of(&DAffine3::IDENTITY);
         let samples = 400;
         let row = Row {
+            shape: beam_shape([0.4, 0.6], 1.0, ALL_LEVELS.into()),
             sigma_lateral: 0.4,
             sigma_elevation: 0.6,
             volume_gain: 1.0,
@@ -41,7 +43,6 @@ impl Fixture {
             surface_gain: 1.0,
             incoherent_gain: 1.0,
             compensation: 1.0,
-            lattice_level: ALL_LEVELS,
             black: ALL_LEVELS,
             ..Row::default()
         };

@@ -293,7 +293,7 @@ fn every_level_is_as_bright_as_the_finest() {
     let expected = expected_power(&fixture);
     for level in [0.0, 0.9, 1.5, 2.85, 4.0] {
         for row in &mut fixture.rows {
-            row.lattice_level = level;
+            row.shape[3] = level;
         }
         let mut got = 0.0;
         for seed in 0..4 {
@@ -310,7 +310,7 @@ fn every_level_is_as_bright_as_the_finest() {
 fn what_is_drowned_is_as_bright_with_fewer_scatterers() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0), tissue(1.5, 1.5, 0.0)]);
     for row in &mut fixture.rows {
-        row.lattice_level = 0.0;
+        row.shape[3] = 0.0;
     }
     fixture.tissues[1].presence = 1.0;
     fixture.tissues[1].amplitude = 0.0;

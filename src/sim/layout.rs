@@ -43,7 +43,7 @@ pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
 pub const LATTICE_LEVELS: u32 = 24;
 /// Part of a level over which the next one takes over.
 pub const LEVEL_FADE: f32 = 0.25;
-/// A row whose `lattice_level` is not above this asks for the finest lattice, whatever drowns it.
+/// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice, whatever drowns it.
 pub const ALL_LEVELS: f32 = -1000.0;
 /// Samples that one workgroup of `scatter` gathers.
 pub const SCATTER_WINDOW: u32 = 1024;
@@ -161,11 +161,12 @@ shared! {
     }
     /// What one axial sample needs to know.
     struct Row {
+        shape: [f32; 4],
         sigma_lateral: f32, sigma_elevation: f32,
         volume_gain: f32, point_gain: f32, surface_gain: f32,
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
-        lattice_level: f32, black: f32,
+        black: f32, unused0: f32, unused1: f32, unused2: f32,
     }
     /// A straight stretch of a path inside one medium.
     struct Segment {

@@ -193,6 +193,13 @@ pub fn scanlines(probe: &Probe) -> Vec<layout::Scanline> {
     .collect()
 }
 
+/// `shape` of a row: of a beam with these deviations across and up, mm, and this gain, the log2 of its fall per
+/// mm^2 and of the gain; the lattice level stands behind them.
+pub fn beam_shape(sigmas: [f64; 2], gain: f64, level: f64) -> [f32; 4] {
+    let [across, up] = sigmas.map(|s| 0.5 * std::f64::consts::LOG2_E / (s * s));
+    [across, up, gain.log2(), level].map(|v| v as f32)
+}
+
 /// One row per axial sample.
 pub fn rows(scene: &Scene) -> Vec<layout::Row> {
     let calibration = Calibration::new(scene);
@@ -204,10 +211,17 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
             let compensation = amplitude(calibration.compensation_db(z));
             let surface = amplitude(calibration.surface_compensation_db(z));
             let weights = calibration.elevation_weights(z);
+            let [lateral, elevation] =
+                [calibration.sigma_lateral(z), calibration.sigma_elevation(z)];
+            let gain = calibration.speckle_gain(z) * compensation;
+            let level = calibration
+                .lattice_level(z)
+                .max(f64::from(layout::ALL_LEVELS));
             layout::Row {
-                sigma_lateral: calibration.sigma_lateral(z) as f32,
-                sigma_elevation: calibration.sigma_elevation(z) as f32,
-                volume_gain: (calibration.speckle_gain(z) * compensation) as f32,
+                shape: beam_shape([lateral, elevation], gain, level),
+                sigma_lateral: lateral as f32,
+                sigma_elevation: elevation as f32,
+                volume_gain: gain as f32,
                 point_gain: (calibration.point_gain(z) * compensation) as f32,
                 surface_gain: (calibration.surface_level() * surface / weights) as f32,
                 volume_undo: (volume_scale * compensation).recip() as f32,
@@ -217,10 +231,8 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 compensation: compensation as f32,
                 incoherent_gain: calibration.incoherent_gain(z) as f32,
                 receive_reach: reach(scene, scene.probe.receive_aperture(z)) as f32,
-                lattice_level: calibration
-                    .lattice_level(z)
-                    .max(f64::from(layout::ALL_LEVELS)) as f32,
                 black: calibration.black(z).max(f64::from(layout::ALL_LEVELS)) as f32,
+                ..layout::Row::default()
             }
         })
         .collect()
