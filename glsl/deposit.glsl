@@ -1,5 +1,6 @@
 // Complex baseband deposit: an echo at one-way time T carries the phase of the two-way carrier there.
 #include "angles.glsl"
+#include "numbers.glsl"
 
 const float FIXED_LIMIT = 1073741824.0; // 2^30
 
@@ -19,5 +20,5 @@ int to_fixed(float value, float scale, float dither) {
         atomicAdd(counters.saturated, 1u);
         v = v > 0.0 ? FIXED_LIMIT : (v < 0.0 ? -FIXED_LIMIT : 0.0);
     }
-    return int(floor(v + dither));
+    return whole_large(floor(v + dither));
 }

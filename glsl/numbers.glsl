@@ -6,4 +6,10 @@ bool not_a_number(float x) { return (floatBitsToUint(x) & 0x7fffffffu) > 0x7f800
 // A float that is a whole number below 2^22 in size, as an integer. Drivers without a GPU convert one
 // thread's number after the other; sums they make of all together.
 int whole(float x) { return floatBitsToInt(x + 12582912.0) - 0x4b400000; }
+
+// The same of one below 2^31, in two halves that are small.
+int whole_large(float x) {
+    float high = floor(x * (1.0 / 65536.0));
+    return (whole(high) << 16) + whole(x - 65536.0 * high);
+}
 #endif

@@ -174,12 +174,8 @@ vec2 slab_of() { return (vec2(-1.0, 1.0) + 2.0 * POINT_SHIFT) * frame.elevation_
 uint deposit_at(int slot, vec2 v) {
     if (slot >= 0 && slot < int(min(SCATTER_WINDOW, frame.samples - window_begin))) {
         vec2 held = clamp(v, vec2(-FIXED_LIMIT), vec2(FIXED_LIMIT));
-        // Each in two halves that are small.
-        held = floor(held + 0.5);
-        vec2 high = floor(held * (1.0 / 65536.0));
-        vec2 low = held - 65536.0 * high;
-        atomicAdd(echoes[2 * slot], (whole(high.x) << 16) + whole(low.x));
-        atomicAdd(echoes[2 * slot + 1], (whole(high.y) << 16) + whole(low.y));
+        atomicAdd(echoes[2 * slot], whole_large(floor(held.x + 0.5)));
+        atomicAdd(echoes[2 * slot + 1], whole_large(floor(held.y + 0.5)));
     }
     return uint(!(max(abs(v.x), abs(v.y)) < FIXED_LIMIT));
 }
@@ -474,7 +470,7 @@ void main() {
             int last = min(filled.y, window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
             for (int slot = max(filled.x, window); slot <= last; ++slot) {
                 float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
-                atomicMax(loudest[slot - window], int(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
+                atomicMax(loudest[slot - window], whole_large(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
             }
         }
     }

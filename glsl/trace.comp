@@ -96,7 +96,7 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uve
     for (int i = 0; i < 4; ++i) {
         float at = before + float(i - 1);
         if (!(at >= 0.0 && at < float(frame.samples))) continue;
-        uint k = uint(at);
+        uint k = uint(whole(at));
         float sigma = rows[k].sigma_elevation;
         float gain = rows[k].surface_gain * exp(-0.5 * y * y / (sigma * sigma));
         if (incoherent) gain *= rows[k].incoherent_gain;

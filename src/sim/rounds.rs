@@ -38,6 +38,9 @@ fn path_bytes(frame: &Frame) -> u64 {
     u64::from(slots(frame)) * size_of::<Interaction>() as u64
 }
 
+/// Threads of a work group of `trace`.
+const GROUP: u32 = 64;
+
 /// Pieces of work that a worker does, one after the other, where there are enough of them.
 const PIECES: u32 = 8;
 
@@ -98,7 +101,8 @@ impl Rounds {
         let (begin, count) = (paths.start, paths.len() as u32);
         let mut round = |role, count, line, lines: u32, per_line: u32| {
             let pieces = lines * per_line;
-            let workers = pieces.min(at_once.max(pieces / PIECES));
+            let workers = at_once.max(pieces / PIECES);
+            let workers = workers.min(pieces).clamp(1, GROUP * MOST_GROUPS);
             // Twice its share: others' pieces may be larger. Those that begin later then find none.
             let most = 2 * pieces.div_ceil(workers);
             let push = [role, begin, count, line, lines, pieces, most, *turn];
@@ -165,7 +169,11 @@ mod tests {
             for role in [ROLE_MAIN, ROLE_BRANCHES] {
                 assert_eq!(lines(&taken, role), [1; 192 * 7]);
             }
-            assert!(taken.iter().all(|r| r.workers.div_ceil(64) <= MOST_GROUPS));
+            let most = |rounds: &[Round]| rounds.iter().map(|r| r.workers).max();
+            assert!(most(&taken) <= Some(GROUP * MOST_GROUPS));
+            // Where one main path stands for all, a batch has them all.
+            let all = Rounds::new(&frame, frame.paths).of(&frame, 0..frame.paths, 5000, &mut 0);
+            assert!(most(&all) <= Some(GROUP * MOST_GROUPS));
             // Each dispatch leaves the other counter at zero for the next one.
             assert!(
                 taken

@@ -88,21 +88,17 @@ impl App {
 
     /// Goes on with a new device where it was lost; ends where that does not help.
     fn fail(&mut self, events: &ActiveEventLoop, error: ViewError) {
-        let lost = matches!(
-            error,
-            ViewError::Gpu(GpuError::DeviceLost { .. })
-                | ViewError::Sim(SimError::Gpu(GpuError::DeviceLost { .. }))
-        );
+        let lost = is_lost(&error);
         let again = self.lost.is_some_and(|at| at.elapsed() < PATIENCE);
-        let error = match lost && again {
-            true => ViewError::LostAgain(Box::new(error)),
+        let error = match again {
+            true => lost_again(error),
             false => error,
         };
         match self.open.take() {
             Some(open) if lost && !again => {
                 self.lost = Some(Instant::now());
                 let opened = open.again(&self.plan, &error);
-                self.adopt(events, opened);
+                self.adopt(events, opened.map_err(lost_again));
             }
             _ => {
                 self.failure = Some(error);
@@ -181,5 +177,22 @@ impl ApplicationHandler<Wake> for App {
             Some(at) => ControlFlow::WaitUntil(at),
             None => ControlFlow::Wait,
         });
+    }
+}
+
+/// Whether the device is gone.
+fn is_lost(error: &ViewError) -> bool {
+    matches!(
+        error,
+        ViewError::Gpu(GpuError::DeviceLost { .. })
+            | ViewError::Sim(SimError::Gpu(GpuError::DeviceLost { .. }))
+    )
+}
+
+/// An error that follows the loss of a device: with a remedy where it is another loss.
+fn lost_again(error: ViewError) -> ViewError {
+    match is_lost(&error) {
+        true => ViewError::LostAgain(Box::new(error)),
+        false => error,
     }
 }

@@ -102,7 +102,7 @@ pub struct Frame {
 
 /// While something moves, pictures of the 3D view are made only after so many times what the last one took:
 /// a seventh of the time is theirs.
-const PUT_OFF: u32 = 6;
+const SURVEY_PUT_OFF: u32 = 6;
 
 /// What the simulation has to say.
 pub enum News {

@@ -30,7 +30,7 @@ mod scenes;
 
 /// While an image is being made, what events change is drawn with it, or after so many times what a drawing
 /// takes: on a slow device the time is the simulation's.
-const PUT_OFF: u32 = 8;
+const DRAWING_PUT_OFF: u32 = 8;
 
 /// A window with its simulation, and what the user has made of them.
 pub(super) struct Open {
@@ -303,7 +303,7 @@ impl Open {
     /// Draws what an event has changed: now, or with the image that is being made where that comes soon.
     fn draw_soon(&mut self, now: Instant) {
         let (began, took) = self.painted;
-        let at = began + PUT_OFF * took;
+        let at = began + DRAWING_PUT_OFF * took;
         if at <= now || !self.awaited {
             self.window.request_redraw();
         } else {

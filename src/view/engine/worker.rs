@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::{Frame, Job, News, PUT_OFF, Pixels, Sector, Shared};
+use super::{Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared};
 use crate::gpu::{Abandon, Device, GpuError};
 use crate::live::{self, Pace};
 use crate::scene::Scene;
@@ -247,7 +247,7 @@ impl Worker {
             let (ended, took) = self.surveyed;
             let looks = state.looks_new && left.is_some();
             let put_off = match moving {
-                true => (PUT_OFF * took).saturating_sub(ended.elapsed()),
+                true => (SURVEY_PUT_OFF * took).saturating_sub(ended.elapsed()),
                 false => Duration::ZERO,
             };
             if looks && put_off.is_zero() {
