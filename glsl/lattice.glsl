@@ -95,7 +95,7 @@ Walk walk_of(vec3 d, vec3 lateral, vec3 up) {
 
 ivec3 unit_step(uint axis) { return ivec3(equal(uvec3(axis), uvec3(0u, 1u, 2u))); }
 
-// Cells, of edge h, whose middles lie in `ends` about `rest`: the first, and the first behind. At most
+// Cells, of edge 1 / inverse_h, whose middles lie in `ends` about `rest`: the first, and the first behind. At most
 // 1024: whatever a spoiled number says, the walk ends.
 ivec2 cells_between(vec2 ends, float rest, float inverse_h) {
     vec2 at = clamp(ceil((ends + rest) * inverse_h - 0.5), -1e6, 1e6);

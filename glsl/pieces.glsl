@@ -41,8 +41,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     vec3 back = here - p - displacement(f, p, jacobian);
     jacobian += mat3(1.0);
     vec3 middle = p + undeform(jacobian, back);
-    vec2 widths = end_widths(s, x);
-    float width = 1.1 * max(widths.x, widths.y);
+    float width = 1.1 * end_width(s, x);
     if (!(width > 0.0)) return uvec3(0u);
     float reach = slab_of().y;
 

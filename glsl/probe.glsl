@@ -1,7 +1,8 @@
-#include "numbers.glsl"
 // Transducer geometry in probe space: x lateral, y elevation, z depth, mm; the face's centre is at 0.
 // The including kernel declares `readonly buffer FrameBuffer { Frame frame; }` and
 // `readonly buffer ScanlineBuffer { Scanline scanlines[]; }` first.
+
+#include "numbers.glsl"
 
 // Elevation offset of layer e (cell-centred), mm.
 float elevation(uint e) {

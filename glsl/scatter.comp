@@ -295,16 +295,15 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     return count;
 }
 
-// Half the beam's width at both ends of a piece.
-vec2 end_widths(Stretch s, vec2 x) {
-    return vec2(half_width(s, rows[row_at(kappa_at(s, x.x))].shape), half_width(s, rows[row_at(kappa_at(s, x.y))].shape));
+// Half the beam's width at the wider end of a piece.
+float end_width(Stretch s, vec2 x) {
+    return max(half_width(s, rows[row_at(kappa_at(s, x.x))].shape), half_width(s, rows[row_at(kappa_at(s, x.y))].shape));
 }
 
 // How far ahead of the crossing of its plane a cell's scatterer can be.
 float plane_margin(Stretch s, vec2 x, int number) {
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
-    vec2 widths = end_widths(s, x);
-    float width = max(widths.x, widths.y);
+    float width = end_width(s, x);
     return 0.51 * lattice_edge(number) * (abs(s.d.x) + abs(s.d.y) + abs(s.d.z))
         + (1.2 * width + frame.elevation_reach * abs(walk.slant)) * abs(walk.along.y / walk.across.y)
         + frame.elevation_reach * abs(s.d[walk.c] * walk.inverse_c);

@@ -319,6 +319,7 @@ bool take(uint piece, out uint line, out uint next, out uint last, out uint main
 }
 
 void main() {
+    // The next dispatch begins with nothing taken.
     if (gl_GlobalInvocationID.x == 0u) {
         if (turn == 0u) counters.taken_odd = 0u; else counters.taken_even = 0u;
     }

@@ -8,7 +8,7 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use winit::window::Window;
 
-use super::adapter::{self, Adapter, DeviceInfo};
+use super::adapter::{self, Adapter, AdapterKind, DeviceInfo};
 use super::error::{GpuError, during};
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::kept::{self, Kept};
@@ -214,12 +214,12 @@ impl Device {
     }
 
     /// Threads that it runs at once, about: where a dispatch has fewer, part of the device is idle. Vulkan
-    /// does not say; the largest GPUs have room for a quarter of a million, drivers without a GPU run one
-    /// work group per core.
+    /// does not say; the largest GPUs have room for a quarter of a million. Drivers without a GPU run one
+    /// work group per core: a few for each, so that all cores end at about the same time.
     pub fn threads_at_once(&self) -> u32 {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
         match self.info.kind {
-            super::AdapterKind::Cpu => 512 * cores,
+            AdapterKind::Cpu => 512 * cores,
             _ => 1 << 18,
         }
     }

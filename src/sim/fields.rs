@@ -8,9 +8,9 @@
 //! membrane's energy, and is harmonic where there is no surface. Homogeneous strain and rotation are
 //! exact; a membrane alone would flatten them next to the surfaces, as nothing holds it outside.
 //!
-//! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::values`] as `fields`
-//! ([`padded`]: four floats per vector, which a device reads at once) and writes [`Fields::offset`] into `field` of every instance's row
-//! whenever keyframes or settings have changed. Each instance has one field more, that of the shape
+//! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::padded`] as `fields` (four
+//! floats per vector, which a device reads at once) and writes [`Fields::offset`] into `field` of every
+//! instance's row whenever keyframes or settings have changed. Each instance has one field more, that of the shape
 //! between keyframes, which is overwritten: before a frame, [`Fields::blend`] says with what.
 
 mod grid;

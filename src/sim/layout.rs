@@ -43,7 +43,8 @@ pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
 pub const LATTICE_LEVELS: u32 = 24;
 /// Part of a level over which the next one takes over.
 pub const LEVEL_FADE: f32 = 0.25;
-/// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice, whatever drowns it.
+/// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice,
+/// whatever drowns it.
 pub const ALL_LEVELS: f32 = -1000.0;
 /// Samples that one workgroup of `scatter` gathers.
 pub const SCATTER_WINDOW: u32 = 1024;
@@ -246,11 +247,11 @@ pub struct RefitLevel {
 pub struct Ray {
     /// Start, mm.
     pub origin: [f32; 3],
-    /// Where it begins to meet surfaces.
+    /// Distance from which on it meets surfaces, in lengths of the direction.
     pub t_min: f32,
     /// Not necessarily a unit vector.
     pub direction: [f32; 3],
-    /// Where it ends.
+    /// Distance at which it ends, in the same lengths.
     pub t_max: f32,
     /// Instance that it does not meet; [`NONE`]: it meets all.
     pub skip: u32,
@@ -268,7 +269,7 @@ pub struct Ray {
 pub struct RayHit {
     /// Place from the barycentric coordinates, mm.
     pub position: [f32; 3],
-    /// Place along the ray.
+    /// Distance along the ray, in lengths of its direction.
     pub t: f32,
     /// Outward normal of the triangle.
     pub geometric: [f32; 3],

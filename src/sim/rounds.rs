@@ -38,8 +38,8 @@ fn path_bytes(frame: &Frame) -> u64 {
     u64::from(slots(frame)) * size_of::<Interaction>() as u64
 }
 
-/// Threads of a work group of `trace`.
-const GROUP: u32 = 64;
+/// Threads of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan promises.
+const MOST_WORKERS: u32 = 1 << 20;
 
 /// Pieces of work that a worker does, one after the other, where there are enough of them.
 const PIECES: u32 = 8;
@@ -102,7 +102,7 @@ impl Rounds {
         let mut round = |role, count, line, lines: u32, per_line: u32| {
             let pieces = lines * per_line;
             let workers = at_once.max(pieces / PIECES);
-            let workers = workers.min(pieces).clamp(1, GROUP * MOST_GROUPS);
+            let workers = workers.min(pieces).clamp(1, MOST_WORKERS);
             // Twice its share: others' pieces may be larger. Those that begin later then find none.
             let most = 2 * pieces.div_ceil(workers);
             let push = [role, begin, count, line, lines, pieces, most, *turn];
@@ -170,10 +170,10 @@ mod tests {
                 assert_eq!(lines(&taken, role), [1; 192 * 7]);
             }
             let most = |rounds: &[Round]| rounds.iter().map(|r| r.workers).max();
-            assert!(most(&taken) <= Some(GROUP * MOST_GROUPS));
+            assert!(most(&taken) <= Some(64 * MOST_GROUPS));
             // Where one main path stands for all, a batch has them all.
             let all = Rounds::new(&frame, frame.paths).of(&frame, 0..frame.paths, 5000, &mut 0);
-            assert!(most(&all) <= Some(GROUP * MOST_GROUPS));
+            assert!(most(&all) <= Some(64 * MOST_GROUPS));
             // Each dispatch leaves the other counter at zero for the next one.
             assert!(
                 taken

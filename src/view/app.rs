@@ -180,7 +180,7 @@ impl ApplicationHandler<Wake> for App {
     }
 }
 
-/// Whether the device is gone.
+/// True for an error that says that the device is gone.
 fn is_lost(error: &ViewError) -> bool {
     matches!(
         error,

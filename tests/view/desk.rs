@@ -220,36 +220,30 @@ impl Desk {
 
     /// Waits until a part has not changed for half a second and the program has nothing left to do.
     pub fn settle(&mut self, part: [u16; 4]) -> Vec<u8> {
-        self.quiet(part, Duration::from_millis(500))
+        self.quiet(part, Duration::from_millis(500), true)
     }
 
     /// Waits until a part stays as it is because the program has nothing left to do: on a slow device
     /// what comes last, as the finest picture of the anatomy, may be seconds away.
     pub fn rest(&mut self, part: [u16; 4]) -> Vec<u8> {
-        self.quiet(part, Duration::from_secs(1))
+        self.quiet(part, Duration::from_secs(1), true)
     }
 
     /// Waits until a part has not changed for half a second, also while a cursor blinks in a field of text:
     /// then the program never rests.
     pub fn still(&mut self, part: [u16; 4]) {
-        let (mut last, mut since) = (self.grab(part), Instant::now());
-        self.wait_for("a part to stay as it is", |desk| {
-            let now = desk.grab(part);
-            if now != last {
-                (last, since) = (now, Instant::now());
-            }
-            since.elapsed() > Duration::from_millis(500)
-        });
+        self.quiet(part, Duration::from_millis(500), false);
     }
 
     /// The image comes back at the scene's own quality once all is at rest: until then the program works.
-    fn quiet(&mut self, part: [u16; 4], time: Duration) -> Vec<u8> {
+    /// `works`: whether that counts, beside the part itself.
+    fn quiet(&mut self, part: [u16; 4], time: Duration, works: bool) -> Vec<u8> {
         let mut last = (self.grab(part), self.processor_time());
         let mut since = Instant::now();
         self.wait_for("the program to come to rest", |desk| {
             let now = (desk.grab(part), desk.processor_time());
             // A tick of the clock that counts.
-            let worked = now.1 - last.1 > Duration::from_millis(10);
+            let worked = works && now.1 - last.1 > Duration::from_millis(10);
             if worked || now.0 != last.0 {
                 (last, since) = (now, Instant::now());
             }
