@@ -1,8 +1,9 @@
 // Lattices of scatterers, as coarse as speckle allows, and how a beam walks them; src/reference/lattice.rs
 // says why. The includer declares tissues[], rows[] and frame and includes random.glsl.
 
-// A cell's edge on three levels in a row, of which each has twice the volume of the one before.
-const float EDGES[3] = float[3](1.0, 1.259921, 1.5874011);
+// A cell's edge on six levels in a row, and its volume on two: two levels on the volume has doubled.
+const float EDGES[6] = float[6](1.0, 1.122462, 1.259921, 1.4142135, 1.5874011, 1.7817974);
+const float VOLUMES[2] = float[2](1.0, 1.4142135);
 
 // One level of a tissue's lattices.
 struct Lattice {
@@ -14,11 +15,11 @@ struct Lattice {
 };
 
 float lattice_edge(int number) {
-    return frame.cell * EDGES[number % 3] * float(1u << uint(number / 3));
+    return frame.cell * EDGES[number % 6] * float(1u << uint(number / 6));
 }
 
 Lattice lattice_of(uint tissue, int number) {
-    float volume = float(1u << uint(number));
+    float volume = VOLUMES[number % 2] * float(1u << uint(number / 2));
     float presence = min(tissues[tissue].density * volume, 1.0);
     Lattice lattice;
     lattice.edge = lattice_edge(number);
@@ -33,12 +34,12 @@ bool present(Lattice lattice, uvec3 bits) {
     return (((bits.x & 255u) << 8u) | (bits.y & 255u)) < lattice.presence;
 }
 
-// Which lattice a piece of tissue needs: `wanted` of the axial row, or what still holds eight cells for
-// each of the tissue's own scatterers; coarser by what drowns it.
+// Which lattice a piece of tissue needs, a number between levels: `wanted` of the axial row, or what still holds
+// eight cells for each of the tissue's own scatterers; coarser by what drowns it. All three are log2 of volumes.
 float wanted_level(uint tissue, float wanted, float drowned) {
     if (wanted <= ALL_LEVELS) return 0.0;
     float own = -log2(8.0 * tissues[tissue].density);
-    return clamp(max(wanted, own) + drowned, 0.0, float(LATTICE_LEVELS));
+    return clamp(LEVELS_PER_OCTAVE * (max(wanted, own) + drowned), 0.0, float(LATTICE_LEVELS));
 }
 
 // Share of the power that a level carries where `wanted` is needed.

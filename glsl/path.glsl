@@ -13,11 +13,20 @@ struct Path {
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
     uint interactions; uint reflections; uint crossings;
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
+    float survival;     // chance that it had to be followed; its weight is over that
     bool branch;
 };
 
 uvec4 draw(uint n, uint key, uint purpose) {
     return path_draw(n, key, purpose, frame.seed, (frame.flags & FLAG_SOBOL) != 0u);
+}
+
+// Numbers that belong to one line's interaction: what neighbouring lines must not do alike.
+const uint PURPOSE_DITHER = 0x51ed270bu;
+const uint PURPOSE_SURVIVAL = 0x2545f491u;
+
+uvec4 line_random(uint line, uint n, uint key, uint purpose) {
+    return pcg4d(uvec4(line, n, key, frame.seed ^ purpose));
 }
 
 float clearance(vec3 p) {
@@ -46,6 +55,7 @@ void start(uint line, uint n, out Path path, inout Media media) {
     path.reflections = 0u;
     path.crossings = 0u;
     path.branch = false;
+    path.survival = 1.0;
     path.left_instance = NONE;
     path.left_primitive = NONE;
     uint at = line * START_WORDS;

@@ -20,6 +20,7 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     vec4 shape = rows[row].shape;
     if (abs(across) > half_width(s, shape)) return uvec2(0u);
     float power = level_power(wanted_level(s.tissue, shape.w, drowned), number);
+    if (!(power > 0.0)) return uvec2(0u);
     up += s.layer_y;
     float exponent = shape.z - s.absorption * LOG2_E * along - shape.x * across * across - shape.y * up * up;
     float turns = 2.0 * frame.frequency * (s.time + along / s.speed);

@@ -10,17 +10,17 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
-layout(std430, binding = 1) readonly buffer TissueBuffer { Tissue tissues[]; };
-layout(std430, binding = 2) readonly buffer InstanceBuffer { Instance instances[]; };
-layout(std430, binding = 3) readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 4) readonly buffer PointBuffer { vec4 points[]; };
-layout(std430, binding = 5) readonly buffer SegmentBuffer { Segment segments[]; };
-layout(std430, binding = 6) readonly buffer SegmentCountBuffer { uint segment_count[]; };
-layout(std430, binding = 7) buffer VolumeEchoBuffer { int volume_echoes[]; };
-layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 9) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
-layout(std430, binding = 10) readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
+layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
+layout(std430, binding = 1) restrict readonly buffer TissueBuffer { Tissue tissues[]; };
+layout(std430, binding = 2) restrict readonly buffer InstanceBuffer { Instance instances[]; };
+layout(std430, binding = 3) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 4) restrict readonly buffer PointBuffer { vec4 points[]; };
+layout(std430, binding = 5) restrict readonly buffer SegmentBuffer { Segment segments[]; };
+layout(std430, binding = 6) restrict readonly buffer SegmentCountBuffer { uint segment_count[]; };
+layout(std430, binding = 7) restrict buffer VolumeEchoBuffer { int volume_echoes[]; };
+layout(std430, binding = 8) restrict buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 10) restrict readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
 
 // Whether any instance's tissue deforms. Two modules: not every driver drops what a specialization
 // constant switches off, and the half for deformed tissue is the larger one.
@@ -348,8 +348,8 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }
-    int number = whole(floor(max(lowest - 0.1, 0.0)));
-    int coarsest = whole(floor(min(highest + 0.1 + LEVEL_FADE, float(LATTICE_LEVELS))));
+    int number = whole(floor(max(lowest - 0.05, 0.0)));
+    int coarsest = whole(floor(min(highest + 0.05 + LEVEL_FADE, float(LATTICE_LEVELS))));
     uvec3 count = uvec3(0u);
     for (; number <= coarsest; ++number) {
         if (field) {

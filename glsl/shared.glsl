@@ -24,6 +24,7 @@ const uint SAMPLING_SHARED_PRIMARY = 2u;
 const uint ROLE_WHOLE = 0u;         // they echo, and at every surface choose one way
 const uint ROLE_MAIN = 1u;          // they go through every surface and write down its interaction
 const uint ROLE_BRANCHES = 2u;      // they echo at what was written down and follow what is reflected there
+const float LEAST_SURVIVAL = 0.03125; // of the faint branches no smaller part is followed
 const uint ECHO_BLOCK = 8u;         // paths that one thread takes one after the other at an interaction
 
 const uint FLAG_ROUGH_TRANSMISSION = 1u;
@@ -41,9 +42,10 @@ const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
 const uint BLEND_MULTIBAND = 2u;
 
-// Lattices of scatterers: each level has cells of twice the volume of the one before.
-const uint LATTICE_LEVELS = 24u;
-const float LEVEL_FADE = 0.25;      // part of a level over which the next one takes over
+// Lattices of scatterers: two levels on cells have twice the volume.
+const uint LATTICE_LEVELS = 48u;
+const float LEVELS_PER_OCTAVE = 2.0;
+const float LEVEL_FADE = 0.15;      // part of a level over which the next one takes over
 const float ALL_LEVELS = -1000.0;
 const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gathers
 const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one stretch
@@ -75,6 +77,8 @@ struct Frame {
     float beam_width;                                                         // mm, sigma of the beam weight; 0: none
     float emission_lobe;                                                      // exponent of the cosine; 0: none
     uint ray_mask;                                                            // ray query: bits of the entries that are shown
+    float branch_floor;                                                       // amplitude below which branches are followed by chance
+    float unused0; float unused1; float unused2;
 };
 
 // Of a scanline, in probe space: where it starts (mm, elevation aside) and the direction in which it

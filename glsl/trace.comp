@@ -79,12 +79,7 @@ uint row_of(float time) {
     return sample_at(frame.speed * time / frame.sample_pitch);
 }
 
-// Each of N paths deposits an N-th: rounded alike, faint echoes would vanish as N grows. The dither
-// belongs to the interaction.
-uvec4 dither_words(uint line, uint n, uint key) {
-    return pcg4d(uvec4(line, n, key, frame.seed ^ 0x51ed270bu));
-}
-
+// `dither`: each of N paths deposits an N-th; rounded alike, faint echoes would vanish as N grows.
 void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uvec4 dither) {
     uint l = line % frame.scanlines;
     float y = elevation(line / frame.scanlines);
@@ -123,15 +118,16 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
     if (!is_heard(media)) return;
     uint tissue = tissue_of(instance);
     if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
-    if (path.branch && path.weight * rows[row_of(path.time)].compensation < frame.volume_floor) return;
+    if (path.branch && path.weight * path.survival * rows[row_of(path.time)].compensation < frame.volume_floor) return;
     uint slot = atomicAdd(segment_count[line], 1u);
     if (slot >= frame.segment_capacity) {
         atomicAdd(counters.segments_dropped, 1u);
         return;
     }
     uint at = line * frame.segment_capacity + slot;
-    float weight = path.weight * mix(path.share, 1.0, whole);
-    float share = mix(max(1.0, path.probability / path.share), 1.0, whole);
+    // Speckle adds in power.
+    float weight = path.weight * sqrt(path.survival) * mix(path.share, 1.0, whole);
+    float share = mix(max(1.0, path.probability / (path.survival * path.share)), 1.0, whole);
     segments[at].origin_length = vec4(path.origin, extent);
     segments[at].direction_time = vec4(path.direction, path.time);
     segments[at].lateral_weight = vec4(path.lateral, weight);
@@ -278,6 +274,7 @@ void recall(uint slot, out Path path, out Interface at) {
     path.left_instance = NONE;
     path.left_primitive = NONE;
     path.branch = false;
+    path.survival = 1.0;
     at.geometric = interactions[slot].geometric_turn.xyz;
     at.turn = interactions[slot].geometric_turn.w;
     at.shading = interactions[slot].shading.xyz;
@@ -348,10 +345,10 @@ void main() {
             bool behind = (echo.waiting & 1u) == 0u;
             echo.waiting &= mix(2u, 0u, behind);
             deposit_surface(line, mix(echo.time, echo.late, behind), mix(echo.in_phase, echo.behind, bvec2(behind)), behind,
-                dither_words(line, n, echo.key));
+                line_random(line, n, echo.key, PURPOSE_DITHER));
         }
         bool alive = going && path.interactions < frame.max_interactions && path.crossings < limit
-            && path.weight >= frame.min_weight && path.time < time_end;
+            && path.weight * path.survival >= frame.min_weight && path.time < time_end;
         bool recalled = false;
         Interface at;
         if (!alive || guard == guards) {
@@ -519,10 +516,14 @@ void main() {
             bool can_reflect = rough && path.reflections < frame.max_reflections;
             if (recalled) {
                 float wanted = clamp(ceil(float(frame.paths) * at.reflectance), 1.0, float(frame.paths));
-                reflects = can_reflect && float(n) < wanted;
+                // The fainter a branch, the rarer it is followed, and counts for as many.
+                float level = path.weight * at.reflectance * rows[row_of(path.time)].compensation;
+                path.survival = level < frame.branch_floor ? max(level / frame.branch_floor, LEAST_SURVIVAL) : 1.0;
+                reflects = can_reflect && float(n) < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
                 going = reflects;
                 path.branch = true;
-                path.weight *= at.reflectance;
+                path.weight *= at.reflectance / path.survival;
+                path.probability = path.survival;
                 path.share = 1.0 / wanted;
             } else {
                 float choice = unit(draw(n, key, PURPOSE_CHOICE).x);

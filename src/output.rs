@@ -21,6 +21,7 @@ pub fn settings(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Va
             "scatterer_cells_per_mm3": simulation.cell.powi(-3),
             "scatterers_per_resolution_cell": simulation.scatterers_per_resolution_cell,
             "volume_floor_db": simulation.volume_floor,
+            "branch_floor_db": simulation.branch_floor,
         },
         "probe": format!("{probe:?}"),
         "simulation": format!("{simulation:?}"),

@@ -199,6 +199,7 @@ fn set_quality(
                 simulation.scatterers_per_resolution_cell = by_hand.scatterers_per_resolution_cell
             }
             "simulation.volume_floor" => simulation.volume_floor = by_hand.volume_floor,
+            "simulation.branch_floor" => simulation.branch_floor = by_hand.branch_floor,
             _ => {}
         }
     }

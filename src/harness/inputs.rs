@@ -77,6 +77,7 @@ pub fn frame(case: Case, size: Size) -> Frame {
         max_reflections: 3,
         min_weight: 1e-4,
         volume_floor: 1e-6,
+        branch_floor: 0.02,
         seed: 0x5eed,
         origin_jitter: 0.05,
         emission_lobe: 3000.0,

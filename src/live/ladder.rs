@@ -16,6 +16,8 @@ const LEAST_HEIGHT: u32 = 240;
 const LEAST_SIGMA_SAMPLES: f64 = 1.0;
 /// From the second step on branches that are weaker than this, dB, carry no speckle.
 const FLOOR: f64 = -40.0;
+/// And weaker than this, dB, are followed by chance.
+const BRANCH_FLOOR: f64 = -30.0;
 /// Fewest scatterers per resolution cell: with fewer, speckle would no longer be fully developed.
 const LEAST_SCATTERERS: f64 = 4.0;
 
@@ -75,6 +77,8 @@ pub struct Level {
     pub reflections: u32,
     /// Weakest branch that carries speckle, dB.
     pub volume_floor: f64,
+    /// Branches fainter than this are followed by chance, dB.
+    pub branch_floor: f64,
     /// Rows of the picture.
     pub image_height: u32,
 }
@@ -90,6 +94,7 @@ impl Level {
             scatterers: simulation.scatterers_per_resolution_cell,
             reflections: simulation.max_reflections,
             volume_floor: simulation.volume_floor,
+            branch_floor: simulation.branch_floor,
             image_height: imaging.image_height,
         }
     }
@@ -108,6 +113,7 @@ impl Level {
         simulation.scatterers_per_resolution_cell = self.scatterers;
         simulation.max_reflections = self.reflections;
         simulation.volume_floor = self.volume_floor;
+        simulation.branch_floor = self.branch_floor;
         imaging.image_height = self.image_height;
     }
 
@@ -121,6 +127,7 @@ impl Level {
             "scatterers_per_resolution_cell": self.scatterers,
             "max_reflections": self.reflections,
             "volume_floor_db": self.volume_floor,
+            "branch_floor_db": self.branch_floor,
             "image_height": self.image_height,
         })
     }
@@ -204,6 +211,10 @@ impl Ladder {
                 0 => own.volume_floor,
                 _ => own.volume_floor.max(FLOOR),
             },
+            branch_floor: match index {
+                0 => own.branch_floor,
+                _ => own.branch_floor.max(BRANCH_FLOOR),
+            },
             image_height: match keeps_picture {
                 true => own.image_height,
                 false => part(own.image_height, step.height, LEAST_HEIGHT),
@@ -273,6 +284,7 @@ mod tests {
                 let pairs = counts(fine).into_iter().zip(counts(coarse));
                 assert!(pairs.into_iter().all(|(a, b)| a >= b && b > 0), "{name}");
                 assert!(coarse.volume_floor >= fine.volume_floor, "{name}");
+                assert!(coarse.branch_floor >= fine.branch_floor, "{name}");
                 assert!(coarse.scatterers <= fine.scatterers, "{name}");
                 assert!(works[1] < works[0], "{name}: {works:?}");
             }

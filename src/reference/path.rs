@@ -9,6 +9,10 @@ use super::random::pcg4d;
 use super::stack::Stack;
 use crate::sim::layout::Frame;
 
+const PURPOSE_DITHER: u32 = 0x51ed_270b;
+/// Whether a faint branch is followed.
+pub(super) const PURPOSE_SURVIVAL: u32 = 0x2545_f491;
+
 /// Whether a path was split and how it goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
@@ -42,6 +46,8 @@ pub(super) struct Path {
     pub(super) interactions: u32,
     pub(super) reflections: u32,
     pub(super) spread: [f64; 3],
+    /// Chance that it had to be followed; its weight is over that.
+    pub(super) survival: f64,
     pub(super) stack: Stack,
     pub(super) t_min: f64,
 }
@@ -61,7 +67,7 @@ impl Path {
 
     /// What is added before rounding down: per sample of a deposit, real and imaginary part.
     pub(super) fn dither(&self, frame: &Frame) -> [f64; 8] {
-        let words = pcg4d([self.line, self.n, self.key(), frame.seed ^ 0x51ed_270b]);
+        let words = self.line_random(frame, PURPOSE_DITHER);
         std::array::from_fn(|i| {
             let word = words[i / 2];
             let half = if i % 2 == 0 {
@@ -71,6 +77,11 @@ impl Path {
             };
             f64::from(half) / 65_536.0
         })
+    }
+
+    /// Numbers that belong to the line's interaction just reached: what neighbouring lines must not do alike.
+    pub(super) fn line_random(&self, frame: &Frame, purpose: u32) -> [u32; 4] {
+        pcg4d([self.line, self.n, self.key(), frame.seed ^ purpose])
     }
 
     /// Scanline and layer.

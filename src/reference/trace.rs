@@ -4,14 +4,14 @@ use glam::{DAffine3, DVec3};
 
 use super::geometry::{face, world_line};
 use super::interface::{self, Interface};
-use super::path::{Path, Role, reflect, step, widen};
+use super::path::{PURPOSE_SURVIVAL, Path, Role, reflect, step, widen};
 use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
 use super::stack::Stack;
 use super::way::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use crate::sim::layout::{
-    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, SAMPLING_MAIN_PATH,
+    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, LEAST_SURVIVAL, SAMPLING_MAIN_PATH,
     SAMPLING_SHARED_PRIMARY,
 };
 
@@ -101,6 +101,7 @@ impl Tracer<'_> {
             interactions: begin.interactions,
             reflections: 0,
             spread: [jitter * jitter, 0.0, fan],
+            survival: 1.0,
             stack: begin.media.clone(),
             t_min,
         }
@@ -205,7 +206,7 @@ impl Tracer<'_> {
 
     fn ended(&self, path: &Path) -> bool {
         path.interactions >= self.world.frame.max_interactions
-            || path.weight < f64::from(self.world.frame.min_weight)
+            || path.weight * path.survival < f64::from(self.world.frame.min_weight)
             || path.time >= self.end()
     }
 
@@ -273,7 +274,18 @@ impl Tracer<'_> {
         if f64::from(main.n) >= branches {
             return;
         }
-        path.weight *= big_r;
+        // The fainter a branch, the rarer it is followed, and counts for as many.
+        let row = &self.world.rows[self.out.surface.sample(path.time)];
+        let level = path.weight * big_r * f64::from(row.compensation);
+        let floor = f64::from(frame.branch_floor);
+        if level < floor {
+            path.survival = (level / floor).max(f64::from(LEAST_SURVIVAL));
+        }
+        if unit(path.line_random(frame, PURPOSE_SURVIVAL)[0]) >= path.survival {
+            return;
+        }
+        path.weight *= big_r / path.survival;
+        path.probability = path.survival;
         path.share = 1.0 / branches;
         reflect(&mut path, echo.reflected, echo.normal);
         widen(&mut path, interface.roughness, interface.turn);
@@ -330,7 +342,8 @@ impl Tracer<'_> {
     /// Whether the volume echoes of a branch would be drowned.
     fn is_faint(&self, path: &Path) -> bool {
         let row = &self.world.rows[self.out.surface.sample(path.time)];
-        path.weight * f64::from(row.compensation) < f64::from(self.world.frame.volume_floor)
+        path.weight * path.survival * f64::from(row.compensation)
+            < f64::from(self.world.frame.volume_floor)
     }
 
     /// Keeps the stretch of `length` ahead of the path, if scatterers or points can lie there.
@@ -354,7 +367,8 @@ impl Tracer<'_> {
             _ if !alike => own_share(path),
             Role::Single if !unsplit => own_share(path),
             _ if path.n != 0 => return,
-            _ => (path.weight, 1.0),
+            // Speckle adds in power.
+            _ => (path.weight * path.survival.sqrt(), 1.0),
         };
         self.out.segments[path.line as usize].push(Segment {
             origin: path.origin,
@@ -376,8 +390,8 @@ impl Tracer<'_> {
 /// Weight and share of a path that speaks for itself only.
 fn own_share(path: &Path) -> (f64, f64) {
     (
-        path.weight * path.share,
-        (path.probability / path.share).max(1.0),
+        path.weight * path.survival.sqrt() * path.share,
+        (path.probability / (path.survival * path.share)).max(1.0),
     )
 }
 

@@ -125,13 +125,18 @@ fn slab() -> Fixture {
 
 /// Complex sum around depth z mm, with the carrier's phase removed.
 fn echo(fixture: &Fixture, out: &Traced, z: f64) -> f64 {
+    echo_of(fixture, &out.surface.exact, z)
+}
+
+/// The same of one line's samples.
+fn echo_of(fixture: &Fixture, samples: &[f64], z: f64) -> f64 {
     let pitch = f64::from(fixture.frame.sample_pitch);
     let k = (z / pitch).round() as usize;
     let turns = 2.0 * f64::from(fixture.frame.frequency) * z / f64::from(fixture.frame.speed);
     let (sin, cos) = (-std::f64::consts::TAU * turns).sin_cos();
     let range = 2 * (k - 2)..2 * (k + 3);
     let (mut re, mut im) = (0.0, 0.0);
-    for v in out.surface.exact[range].chunks(2) {
+    for v in samples[range].chunks(2) {
         re += v[0];
         im += v[1];
     }
@@ -320,6 +325,50 @@ fn the_face_ends_reflected_paths_or_sends_them_back() {
     // N = 1: W = R after the wall, all of it back from the face, then r at the wall.
     let expected = 0.25 * 0.5;
     assert!((echo(&fixture, &back, z) - expected).abs() < 1e-9);
+}
+
+// A branch of level 1/4 under a floor of 1 is followed on a quarter of the lines. Of n = 4000 lines the means of
+// what it carries have a relative deviation of sqrt(3 / n); 4 of those.
+#[test]
+fn faint_branches_are_followed_by_chance_and_keep_level_and_power() {
+    let mut fixture = slab();
+    fixture.frame.flags |= FLAG_FACE_REFLECTION;
+    (fixture.frame.scanlines, fixture.frame.width) = (4000, 100.0);
+    fixture.frame.branch_floor = 1.0;
+    let out = run(&fixture);
+    let lines = f64::from(fixture.frame.scanlines);
+    let bound = 4.0 * (3.0 / lines).sqrt();
+    // Back from the first wall, which is half of the way that the face's echo takes.
+    let upwards = |s: &&Segment| s.direction.z < 0.0 && (s.time - 10.0 / 1.5).abs() < 1e-6;
+    let found: Vec<f64> = (out.segments.iter().flatten().filter(upwards))
+        .map(|s| s.weight)
+        .collect();
+    assert!((found.len() as f64 / (0.25 * lines) - 1.0).abs() < bound);
+    let power =
+        |scale: f64| found.iter().map(|w| (w * scale).powi(2)).sum::<f64>() / lines / 0.0625;
+    assert!((power(1.0) - 1.0).abs() < bound, "{}", power(1.0));
+    let samples = 2 * fixture.frame.samples as usize;
+    let echoes = out
+        .surface
+        .exact
+        .chunks(samples)
+        .map(|line| echo_of(&fixture, line, 20.0));
+    let mean = echoes.sum::<f64>() / lines;
+    assert!((mean / 0.25 - 1.0).abs() < bound, "{mean}");
+    // Planted: louder by the whole chance, as echoes in phase are; not louder at all.
+    assert!(power(2.0) > 1.0 + bound && power(0.5) < 1.0 - bound);
+    // However faint: one of 32.
+    fixture.frame.branch_floor = 1e9;
+    let rare = run(&fixture)
+        .segments
+        .iter()
+        .flatten()
+        .filter(upwards)
+        .count();
+    assert!(
+        (rare as f64 / (lines / 32.0) - 1.0).abs() < 4.0 * (31.0 / lines).sqrt(),
+        "{rare}"
+    );
 }
 
 #[test]

@@ -100,6 +100,9 @@ pub struct Simulation {
     /// Reflected paths whose attenuation-compensated weight falls below this level, dB, carry no
     /// volume echoes: they would lie under the display's floor.
     pub volume_floor: f64,
+    /// Reflected paths that begin below this level, dB, attenuation made up for, are followed by chance, the
+    /// rarer the fainter, and count for as many. Minus infinity: all are followed.
+    pub branch_floor: f64,
     /// Speckle level, dB relative to the calibration (liver 45 dB under a perfect mirror).
     pub speckle_gain: f64,
     /// Level of all surface echoes, dB.
@@ -198,17 +201,18 @@ impl Simulation {
 
     /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
     pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
-        let (paths, cell, scatterers, volume_floor) = match (quality, machine) {
-            (Quality::Draft, Machine::Software) => (2, 1.0, 5.0, -50.0),
+        let (paths, cell, scatterers, volume_floor, branch_floor) = match (quality, machine) {
+            (Quality::Draft, Machine::Software) => (2, 1.0, 5.0, -50.0, -30.0),
             (Quality::Standard, Machine::Software) | (Quality::Draft, Machine::Gpu) => {
-                (8, 1.0, 8.0, -50.0)
+                (8, 1.0, 8.0, -50.0, -35.0)
             }
-            (Quality::Standard, Machine::Gpu) => (32, 1.0, 16.0, -60.0),
-            (Quality::Reference, _) => (128, 2.0 / 3.0, 0.0, -80.0),
+            (Quality::Standard, Machine::Gpu) => (32, 1.0, 16.0, -60.0, -45.0),
+            (Quality::Reference, _) => (128, 2.0 / 3.0, 0.0, -80.0, f64::NEG_INFINITY),
         };
         self.paths = paths;
         self.scatterers_per_resolution_cell = scatterers;
         self.volume_floor = volume_floor;
+        self.branch_floor = branch_floor;
         // A voxel's edge is a look, not a cost: there is one lookup per sample whatever its size.
         if self.scatter_mode == ScatterMode::Lattice {
             self.cell *= cell;
@@ -237,6 +241,7 @@ impl Default for Simulation {
             scatterers_per_resolution_cell: 8.0,
             texture_space: TextureSpace::Tissue,
             volume_floor: -50.0,
+            branch_floor: -35.0,
             speckle_gain: 0.0,
             surface_gain: 0.0,
             density_scale: 1.0,

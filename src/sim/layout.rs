@@ -39,10 +39,12 @@ pub const SAMPLING_PLAIN: u32 = 1;
 /// Paths that part at the first interaction.
 pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
 
-/// Number of the coarsest lattice of scatterers; each has cells of twice the volume of the one before.
-pub const LATTICE_LEVELS: u32 = 24;
+/// Number of the coarsest lattice of scatterers.
+pub const LATTICE_LEVELS: u32 = 48;
+/// Lattices after which cells have twice the volume.
+pub const LEVELS_PER_OCTAVE: f32 = 2.0;
 /// Part of a level over which the next one takes over.
-pub const LEVEL_FADE: f32 = 0.25;
+pub const LEVEL_FADE: f32 = 0.15;
 /// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice,
 /// whatever drowns it.
 pub const ALL_LEVELS: f32 = -1000.0;
@@ -66,6 +68,8 @@ pub const ROLE_WHOLE: u32 = 0;
 pub const ROLE_MAIN: u32 = 1;
 /// Echoes at the interactions written down, and what is reflected there.
 pub const ROLE_BRANCHES: u32 = 2;
+/// Of the faint branches no smaller part is followed.
+pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
 /// Paths that one thread takes one after the other at an interaction.
 pub const ECHO_BLOCK: u32 = 8;
 
@@ -136,6 +140,7 @@ shared! {
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
+        branch_floor: f32, unused0: f32, unused1: f32, unused2: f32,
     }
     /// Where a scanline starts and looks, in probe space; behind the last one the face's edge.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }

@@ -99,6 +99,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         max_reflections: simulation.max_reflections,
         min_weight: (simulation.min_weight as f32).max(LEAST_WEIGHT),
         volume_floor: amplitude(simulation.volume_floor) as f32,
+        branch_floor: amplitude(simulation.branch_floor) as f32,
         flags: flag(
             simulation.rough_transmission,
             layout::FLAG_ROUGH_TRANSMISSION,

@@ -34,7 +34,7 @@ pub(super) fn simulation(
         paths, sampling, sequence, max_interactions, max_reflections, min_weight, coherence,
         rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, scatterers_per_resolution_cell,
         texture_space, density_scale, roughness_scale, thickness_scale, seed;
-        origin_jitter, beam_width, cell, volume_floor, speckle_gain, surface_gain);
+        origin_jitter, beam_width, cell, volume_floor, branch_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
         ("paths", f64::from(out.paths), (1.0, 65_535.0), ""),
         (
@@ -61,6 +61,7 @@ pub(super) fn simulation(
             "",
         ),
         ("volume_floor", out.volume_floor, LEVEL, "dB"),
+        ("branch_floor", out.branch_floor, LEVEL, "dB"),
         ("speckle_gain", out.speckle_gain, LEVEL, "dB"),
         ("surface_gain", out.surface_gain, LEVEL, "dB"),
         ("density_scale", out.density_scale, DENSITY, ""),

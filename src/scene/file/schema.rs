@@ -126,6 +126,7 @@ pub struct SimulationTable {
     pub scatterers_per_resolution_cell: Option<f64>,
     pub texture_space: Option<TextureSpace>,
     pub volume_floor: Option<Level>,
+    pub branch_floor: Option<Level>,
     pub speckle_gain: Option<Level>,
     pub surface_gain: Option<Level>,
     pub density_scale: Option<f64>,

@@ -5,6 +5,7 @@ use std::f64::consts::TAU;
 use super::{Calibration, amplitude};
 use crate::scene::Tissue;
 use crate::scene::settings::ScatterMode;
+use crate::sim::layout::LEVELS_PER_OCTAVE;
 use crate::sim::tables::{wire_points, wire_spacing};
 
 /// Fixed-point accumulators stay below this magnitude; i32 has one more bit.
@@ -25,8 +26,9 @@ impl Calibration<'_> {
     /// scatterers, as much as its weight is less.
     fn loudest(&self, z: f64) -> (f64, f64) {
         let voxel = self.scene.simulation.scatter_mode == ScatterMode::Voxel;
-        // Of the next level where it takes over; half a level is less than a factor of 1.5.
-        let thinned = self.lattice_level(z).max(0.0) + 1.0;
+        // Of the next level where it takes over.
+        let step = 1.0 / f64::from(LEVELS_PER_OCTAVE);
+        let thinned = self.lattice_level(z).max(0.0) + step;
         let over = |(a, p): (f64, f64), tissue: &Tissue| {
             let (mean, sigma) = self.scatterer_amplitudes(tissue);
             if sigma == 0.0 {

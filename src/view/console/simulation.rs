@@ -152,6 +152,15 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice:
                 -100.0..=0.0,
                 none,
             );
+            let floor = &mut s.branch_floor;
+            number_or(
+                ui,
+                "simulation.branch_floor",
+                "Branch floor",
+                floor,
+                -100.0..=0.0,
+                none,
+            );
             let rough = &mut s.rough_transmission;
             switch(
                 ui,

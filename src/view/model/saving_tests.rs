@@ -152,6 +152,7 @@ const CHANGES: &[(&str, Change)] = &[
     ("simulation.scatterers_per_resolution_cell", |s, v| s.simulation.scatterers_per_resolution_cell = v("simulation.scatterers_per_resolution_cell")),
     ("simulation.texture_space", |s, _| s.simulation.texture_space = TextureSpace::World),
     ("simulation.volume_floor", |s, v| s.simulation.volume_floor = v("simulation.volume_floor")),
+    ("simulation.branch_floor", |s, v| s.simulation.branch_floor = v("simulation.branch_floor")),
     ("simulation.speckle_gain", |s, v| s.simulation.speckle_gain = v("simulation.speckle_gain")),
     ("simulation.surface_gain", |s, v| s.simulation.surface_gain = v("simulation.surface_gain")),
     ("simulation.density_scale", |s, v| s.set_density_scale(v("simulation.density_scale"))),
