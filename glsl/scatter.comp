@@ -419,15 +419,18 @@ uint march_point(Stretch s, vec4 point) {
     return saturated;
 }
 
-// Whether the stretch may have a point target of a sphere. The beam is widest at an end of what it passes.
+// Whether the stretch may have a point target of a sphere in the window. The beam is widest at an end of what it passes.
 bool passes_sphere(Stretch s, vec4 sphere) {
     vec3 rel = sphere.xyz - s.o;
     float x = dot(rel, s.d);
     float r = sphere.w;
+    // A point sounds in four samples about its own.
+    vec2 kappa = vec2(kappa_at(s, x - r) - 3.0, kappa_at(s, x + r) + 3.0) - float(window_begin);
+    if (!(x >= -r && x < s.extent + r && kappa.y >= 0.0 && kappa.x <= float(SCATTER_WINDOW)
+        && abs(dot(rel, s.e_e)) <= (0.5 + POINT_SHIFT) * frame.slice_thickness / float(frame.layers) + r)) return false;
     uvec2 ends = uvec2(row_at(kappa_at(s, x - r)), row_at(kappa_at(s, x + r)));
     float width = 4.0 * max(rows[ends.x].sigma_lateral, rows[ends.y].sigma_lateral);
-    return x >= -r && x < s.extent + r && abs(dot(rel, s.e_l)) <= width + r
-        && abs(dot(rel, s.e_e)) <= (0.5 + POINT_SHIFT) * frame.slice_thickness / float(frame.layers) + r;
+    return abs(dot(rel, s.e_l)) <= width + r;
 }
 
 // First item of work and number of items: samples, or bins (of deformed tissue: pieces of them) of the
@@ -462,12 +465,14 @@ void main() {
     for (uint layer = 0u; layer < frame.layers && !voxel; ++layer) {
         uint line = layer * frame.scanlines + scanline;
         uint available = min(segment_count[line], frame.segment_capacity);
-        for (uint i = thread; i < available; i += THREADS) {
+        // Where there are few, several threads share a stretch.
+        uint sharing = THREADS / clamp(available, 1u, THREADS);
+        for (uint i = thread / sharing; i < available; i += THREADS / sharing) {
             Stretch s = world_stretch(line * frame.segment_capacity + i);
             ivec2 filled = sounds(s) ? slots_of(s) : ivec2(0, -1);
             int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
             int last = min(filled.y, window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
-            for (int slot = max(filled.x, window); slot <= last; ++slot) {
+            for (int slot = max(filled.x, window) + int(thread % sharing); slot <= last; slot += int(sharing)) {
                 float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
                 atomicMax(loudest[slot - window], whole_large(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
             }
