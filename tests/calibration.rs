@@ -4,6 +4,8 @@
 #[path = "common/signal.rs"]
 mod signal;
 
+use std::f64::consts::SQRT_2;
+
 use glam::DAffine3;
 use insonify::probe::{Kind, Probe};
 use insonify::scene::settings::ScatterMode;
@@ -84,6 +86,23 @@ fn decibel(ratio: f64) -> f64 {
 /// Mean power of n exponential draws has relative standard error 1/sqrt(n); four of them, in dB.
 fn tolerance(realisations: u32) -> f64 {
     4.0 * 10.0 / std::f64::consts::LN_10 / f64::from(realisations).sqrt()
+}
+
+// Steps of half an octave: no fewer than wanted, and no more than the square root of 2 times as many.
+#[test]
+fn a_resolution_cell_holds_as_many_scatterers_as_are_wanted_at_every_depth() {
+    let mut scene = scene(Probe::abdominal());
+    scene.simulation.cell = 0.1;
+    let tissue = scene.tissues[0].clone();
+    let count = |scene: &Scene, z| Calibration::new(scene).scatterers_at(&tissue, z);
+    for i in 1..16 {
+        let z = 10.0 * f64::from(i);
+        scene.simulation.scatterers_per_resolution_cell = 8.0;
+        let thinned = count(&scene, z);
+        assert!((8.0..=8.0 * SQRT_2).contains(&thinned), "{z} mm: {thinned}");
+        scene.simulation.scatterers_per_resolution_cell = 0.0;
+        assert!(count(&scene, z) > 8.0 * SQRT_2, "all there are");
+    }
 }
 
 #[test]

@@ -13,7 +13,9 @@ use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
 use insonify::movie::Movie;
 use insonify::output;
+use insonify::scene::settings::ScatterMode;
 use insonify::scene::{Scene, file};
+use insonify::sim::calibration::Calibration;
 use insonify::sim::dump;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
@@ -126,6 +128,7 @@ pub fn run(args: &Render) -> Result<()> {
                 "segments_dropped": counters.segments_dropped, "stack_overflow": counters.stack_overflow,
                 "paths_lost": counters.paths_lost,
             },
+            "scatterers_per_resolution_cell": scatterers(&scene),
             "steps_per_ray": steps,
             "contact": contact.map(|touch| json!({
                 "share": touch.share, "depth_mm": touch.depth,
@@ -139,6 +142,24 @@ pub fn run(args: &Render) -> Result<()> {
             .wrap_err_with(|| format!("writing {}", file.display()))?;
     }
     args.common.validated(&device)
+}
+
+/// Scatterers per resolution cell over depth, of the tissue that has most; none in voxel mode.
+fn scatterers(scene: &Scene) -> Option<Vec<Value>> {
+    if scene.simulation.scatter_mode == ScatterMode::Voxel {
+        return None;
+    }
+    let calibration = Calibration::new(scene);
+    let most = |z| {
+        let counts = scene
+            .tissues
+            .iter()
+            .map(|t| calibration.scatterers_at(t, z));
+        counts.fold(0.0, f64::max)
+    };
+    let depth = |eighth: u32| scene.probe.depth * f64::from(eighth) / 8.0;
+    let row = |z| json!({ "depth_mm": z, "scatterers": most(z) });
+    Some((0..=8).map(depth).map(row).collect())
 }
 
 /// What the rays of one more frame come to, per ray.

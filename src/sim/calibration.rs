@@ -7,7 +7,7 @@ mod headroom;
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-use super::layout::SAMPLE_BLEND;
+use super::layout::{LEVELS_PER_OCTAVE, SAMPLE_BLEND};
 use super::special::{erf, sinc};
 use crate::scene::settings::{Sampling, ScatterMode};
 use crate::scene::{Scene, Tissue};
@@ -233,6 +233,20 @@ impl<'a> Calibration<'a> {
         let rho = tissue.density_of_scatterers * self.scene.simulation.thinning();
         let square = tissue.mean_over_sigma.powi(2);
         rho * (1.0 + square).powi(2) / (square * square + 6.0 * square + 3.0)
+    }
+
+    /// Scatterers of `tissue` in a resolution cell at depth `z`, where nothing drowns it and one lattice sounds alone.
+    pub fn scatterers_at(&self, tissue: &Tissue, z: f64) -> f64 {
+        let density = self.scatterer_density(tissue);
+        let steps = f64::from(LEVELS_PER_OCTAVE);
+        let octaves = match self.lattice_level(z) {
+            f64::NEG_INFINITY => 0.0,
+            // As long as eight cells hold one of a sparse tissue's own.
+            thinned => thinned.max(-(8.0 * density).log2()).max(0.0),
+        };
+        let volume = ((steps * octaves).floor() / steps).exp2();
+        let cells = self.resolution_cell(z) / self.scene.simulation.cell.powi(3);
+        cells * density.min(1.0 / volume)
     }
 
     /// RMS of a lattice cell of `tissue`, without its low-frequency texture, whose power is 1 + k^2.
