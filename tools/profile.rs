@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
-use insonify::gpu::{Device, DeviceOptions, prepare_process};
+use insonify::gpu::{Device, DeviceOptions};
 use insonify::output;
 use insonify::sim::Tracer;
 use insonify::sim::shaders::Library;
@@ -89,7 +89,6 @@ struct Machine {
 }
 
 fn main() -> Result<ExitCode> {
-    prepare_process();
     let arguments = Arguments::parse();
     let device = Device::new(&DeviceOptions {
         selector: arguments.device.clone(),

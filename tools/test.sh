@@ -11,8 +11,6 @@ if [ "${1:-}" = --long ]; then
 fi
 ./tools/setup.sh
 export INSONIFY_VALIDATE=1
-# As the program itself has it: kernels compile in a third of the time (src/gpu/process.rs).
-export LP_NATIVE_VECTOR_WIDTH=${LP_NATIVE_VECTOR_WIDTH:-128}
 [ -e ../shared/data ] || echo "skipped: no shared data (tests on real meshes)"
 if [ ${#long[@]} -eq 0 ]; then
   cargo test --features anatomy "$@"
