@@ -32,7 +32,7 @@ void main() {
     uint pixel = 0u;
     if (sector(i, j, at)) {
         float v = bilinear(at.x, at.y);
-        uint level = not_a_number(v) ? 0u : uint(whole(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0)));
+        uint level = grey_level(v);
         pixel = 0xff000000u | (grey[level] * 0x010101u);
     }
     pixels[j * frame.image_width + i] = pixel;

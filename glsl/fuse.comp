@@ -31,7 +31,7 @@ void main() {
             if (fusion.blend == BLEND_SMOOTH) { m = m * m * (3.0 - 2.0 * m); }
             v = m * background[at] + (1.0 - m) * (float(pixel & 0xffu) / 255.0);
         }
-        uint level = not_a_number(v) ? 0u : uint(whole(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0)));
+        uint level = grey_level(v);
         pixel = 0xff000000u | (level * 0x010101u);
     }
     fused[at] = pixel;

@@ -35,7 +35,7 @@ bool present(Lattice lattice, uvec3 bits) {
 }
 
 // Which lattice a piece of tissue needs, a number between levels: `wanted` of the axial row, or what still holds
-// eight cells for each of the tissue's own scatterers; coarser by what drowns it. All three are log2 of volumes.
+// eight cells for each of the tissue's own scatterers; coarser by `drowned`. Both are log2 of volumes, in cells of the finest.
 float wanted_level(uint tissue, float wanted, float drowned) {
     if (wanted <= ALL_LEVELS) return 0.0;
     float own = -log2(8.0 * tissues[tissue].density);

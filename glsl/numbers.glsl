@@ -12,4 +12,7 @@ int whole_large(float x) {
     float high = floor(x * (1.0 / 65536.0));
     return (whole(high) << 16) + whole(x - 65536.0 * high);
 }
+
+// Grey level of a value from 0 to 1, of 256; 0 for NaN.
+uint grey_level(float v) { return not_a_number(v) ? 0u : uint(whole(clamp(floor(v * 255.0 + 0.5), 0.0, 255.0))); }
 #endif

@@ -341,7 +341,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     x = vec2(mix(max(x.x, 0.0), 0.0, first), mix(min(x.y, s.extent), s.extent, last));
     if (!(x.y > x.x)) return uvec3(0u);
 
-    // Levels that some plane may need.
+    // Levels that some plane may need; between the three rows that are asked it is a twentieth of one at most.
     float lowest = 1e9, highest = -1e9;
     for (int i = 0; i < 3; ++i) {
         float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, 0.5 * float(i))))].shape.w, drowned);

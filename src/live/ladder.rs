@@ -16,7 +16,7 @@ const LEAST_HEIGHT: u32 = 240;
 const LEAST_SIGMA_SAMPLES: f64 = 1.0;
 /// From the second step on branches that are weaker than this, dB, carry no speckle.
 const FLOOR: f64 = -40.0;
-/// And weaker than this, dB, are followed by chance.
+/// From the second step on branches that begin weaker than this, dB, are followed by chance.
 const BRANCH_FLOOR: f64 = -30.0;
 /// Fewest scatterers per resolution cell: with fewer, speckle would no longer be fully developed.
 const LEAST_SCATTERERS: f64 = 4.0;
@@ -197,6 +197,10 @@ impl Ladder {
             let left = (f64::from(count) * share).round() as u32;
             left.max(least).min(count)
         };
+        let raised = |index: usize, own: f64, floor: f64| match index {
+            0 => own,
+            _ => own.max(floor),
+        };
         let below = |(index, step): (usize, &Step)| Level {
             scanlines: part(own.scanlines, step.scanlines, LEAST_SCANLINES),
             layers: odd(own.layers, step.layers),
@@ -207,14 +211,8 @@ impl Ladder {
                 .max(LEAST_SCATTERERS)
                 .min(own.scatterers),
             reflections: own.reflections.min(step.reflections),
-            volume_floor: match index {
-                0 => own.volume_floor,
-                _ => own.volume_floor.max(FLOOR),
-            },
-            branch_floor: match index {
-                0 => own.branch_floor,
-                _ => own.branch_floor.max(BRANCH_FLOOR),
-            },
+            volume_floor: raised(index, own.volume_floor, FLOOR),
+            branch_floor: raised(index, own.branch_floor, BRANCH_FLOOR),
             image_height: match keeps_picture {
                 true => own.image_height,
                 false => part(own.image_height, step.height, LEAST_HEIGHT),

@@ -7,8 +7,9 @@ use glam::{DVec3, I64Vec3};
 use super::random::{pcg3d, pcg4d, unit};
 use crate::sim::layout::{ALL_LEVELS, LATTICE_LEVELS, LEVEL_FADE, LEVELS_PER_OCTAVE, Tissue};
 
-/// Cell edges of six levels in a row, sixth roots of 1, 2, 4, 8, 16 and 32, and volumes of two.
+/// Cell edges of six levels in a row: sixth roots of 1, 2, 4, 8, 16 and 32.
 const EDGES: [f32; 6] = [1.0, 1.122_462, 1.259_921, SQRT_2, 1.587_401_1, 1.781_797_4];
+/// Cell volumes of two levels in a row.
 const VOLUMES: [f32; 2] = [1.0, SQRT_2];
 
 /// The scatterer of one cell.

@@ -9,8 +9,9 @@ use super::random::pcg4d;
 use super::stack::Stack;
 use crate::sim::layout::Frame;
 
+/// Purpose of the numbers that are added to an echo before it is rounded down.
 const PURPOSE_DITHER: u32 = 0x51ed_270b;
-/// Whether a faint branch is followed.
+/// Purpose of the number that decides whether a faint branch is followed.
 pub(super) const PURPOSE_SURVIVAL: u32 = 0x2545_f491;
 
 /// Whether a path was split and how it goes on.
