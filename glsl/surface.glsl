@@ -38,6 +38,12 @@ vec3 surface_geometric_normal(Hit hit) {
     return surface_to_world(hit.instance, surface_normalize(cross(b - a, c - a)));
 }
 
+// Both: what they read is read once.
+void surface_met(Hit hit, out vec3 position, out vec3 normal) {
+    position = surface_position(hit);
+    normal = surface_geometric_normal(hit);
+}
+
 // Unit outward normal interpolated from the vertices, world space; the zero vector where they cancel.
 vec3 surface_shading_normal(Hit hit) {
     uint a = 3u * triangles[3u * hit.primitive];

@@ -40,8 +40,12 @@ layout(std430, binding = 15) restrict buffer InteractionBuffer { Interaction int
 layout(std430, binding = 16) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
 layout(std430, binding = 17) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
+// What its paths are for. A variable: naga knows no operations on specialization constants.
+layout(constant_id = 0) const uint ROLE = ROLE_WHOLE;
+uint role = ROLE;
+
 layout(push_constant) uniform Push {
-    uint role; uint path_begin; uint path_count; uint line_begin; uint line_count;
+    uint path_begin; uint path_count; uint line_begin; uint line_count;
     uint pieces;      // of work; lines first
     uint most;        // pieces that one worker takes
     uint turn;        // which of two counters they are taken by; the other one is for the next dispatch
@@ -214,13 +218,13 @@ void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interf
     echo.behind = incoherent * phase;
 }
 
-// The interface at a hit, where the path has arrived.
-void meet(out Interface at, Hit hit, bool entering, inout Path path, uint before, uint behind) {
+// The interface at a hit, where the path has arrived; `normal`: outward, of the triangle.
+void meet(out Interface at, Hit hit, vec3 normal, bool entering, inout Path path, uint before, uint behind) {
     at.instance = hit.instance;
     at.surface = entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside;
     at.before = before;
     at.behind = behind;
-    at.geometric = surface_geometric_normal(hit);
+    at.geometric = normal;
     at.shading = surface_shading_normal(hit);
     if (!entering) { at.geometric = -at.geometric; at.shading = -at.shading; }
     if (!(dot(path.direction, at.shading) < 0.0)) at.shading = at.geometric;
@@ -337,6 +341,7 @@ void main() {
     // The first of two surfaces that coincide was found; the ray looks for the other.
     bool pairing = false;
     Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
+    vec3 first_position = vec3(0.0), first_normal = vec3(0.0);
     float close = 0.0;
 
     uint guards = 0u, quota = most;
@@ -408,10 +413,17 @@ void main() {
                 aimed = true;
                 continue;
             }
+            vec3 position = vec3(0.0), normal = vec3(0.0);
+            if (hit.instance != NONE) surface_met(hit, position, normal);
             Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+            vec3 other_position = vec3(0.0), other_normal = vec3(0.0);
             if (pairing) {
                 other = hit;
+                other_position = position;
+                other_normal = normal;
                 hit = first;
+                position = first_position;
+                normal = first_normal;
                 pairing = false;
             } else {
                 aimed = !heard;
@@ -426,8 +438,8 @@ void main() {
                     advance(path, t_end, way, end);
                     path.interactions += 1u;
                     met += 1u;
-                    vec3 normal = world_vector(face_normal(probe_point(end)));
-                    float cos_face = dot(path.direction, normal);
+                    vec3 face_side = world_vector(face_normal(probe_point(end)));
+                    float cos_face = dot(path.direction, face_side);
                     float retro = path.weight * path.share * beam_weight(off_axis(line, end));
                     if (cos_face < 0.0 && heard) {
                         echo.waiting = 1u;
@@ -436,10 +448,10 @@ void main() {
                         echo.in_phase = vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0);
                     }
                     path.left_instance = NONE;
-                    reflect_path(path, normal, SPECULAR, 0.0);
+                    reflect_path(path, face_side, SPECULAR, 0.0);
                     continue;
                 }
-                close = clearance(surface_position(hit));
+                close = clearance(position);
                 if (is_left(path, hit)) {
                     path.t_min = hit.t + close;
                     path.crossings += 1u;
@@ -447,6 +459,8 @@ void main() {
                 }
                 if ((frame.flags & FLAG_COINCIDENT) != 0u) {
                     first = hit;
+                    first_position = position;
+                    first_normal = normal;
                     pairing = true;
                     continue;
                 }
@@ -458,14 +472,17 @@ void main() {
                 Hit found = hit;
                 hit = other;
                 other = found;
+                position = other_position;
+                vec3 found_normal = normal;
+                normal = other_normal;
+                other_normal = found_normal;
             }
-            vec3 position = surface_position(hit);
-            bool entering = dot(path.direction, surface_geometric_normal(hit)) < 0.0;
+            bool entering = dot(path.direction, normal) < 0.0;
             copy_media(after, media);
-            if (!cross_interface(after, hit.instance, entering)) atomicAdd(counters.stack_overflow, copies);
-            if (other.instance != NONE
-                && !cross_interface(after, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0)) {
-                atomicAdd(counters.stack_overflow, copies);
+            // A loop: every copy of the call takes drivers time to compile.
+            [[dont_unroll]] for (uint i = 0u; i < (other.instance == NONE ? 1u : 2u); ++i) {
+                bool enters = i == 0u ? entering : dot(path.direction, other_normal) < 0.0;
+                if (!cross_interface(after, i == 0u ? hit.instance : other.instance, enters)) atomicAdd(counters.stack_overflow, copies);
             }
             uint behind = current_instance(after);
             path.crossings += 1u;
@@ -493,7 +510,7 @@ void main() {
             }
             aimed = false;
             path.interactions += 1u;
-            meet(at, hit, entering, path, tissue_of(before), tissue_of(behind));
+            meet(at, hit, normal, entering, path, tissue_of(before), tissue_of(behind));
             if (role == ROLE_MAIN) {
                 write_down(slot + written, path, n, at);
                 written += 1u;

@@ -5,5 +5,6 @@ use std::process::ExitCode;
 mod cli;
 
 fn main() -> ExitCode {
+    insonify::gpu::prepare_process();
     cli::run()
 }

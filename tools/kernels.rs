@@ -7,7 +7,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use insonify::gpu::{Device, DeviceOptions, Kernel};
+use insonify::gpu::{Device, DeviceOptions, Kernel, prepare_process};
 use insonify::harness::{self, Case, SUBJECTS, Size, Subject, dump};
 use insonify::output;
 use insonify::sim::shaders::Library;
@@ -60,6 +60,7 @@ enum Extent {
 }
 
 fn main() -> Result<ExitCode> {
+    prepare_process();
     let arguments = Arguments::parse();
     let library = Library::embedded();
     if let Command::List = arguments.command {

@@ -16,7 +16,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{Parser, Subcommand};
-use insonify::gpu::{Device, DeviceOptions};
+use insonify::gpu::{Device, DeviceOptions, prepare_process};
 use insonify::output;
 use insonify::sim::Tracer;
 use insonify::sim::shaders::Library;
@@ -89,6 +89,7 @@ struct Machine {
 }
 
 fn main() -> Result<ExitCode> {
+    prepare_process();
     let arguments = Arguments::parse();
     let device = Device::new(&DeviceOptions {
         selector: arguments.device.clone(),

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::Parser;
-use insonify::gpu::{Device, DeviceOptions};
+use insonify::gpu::{Device, DeviceOptions, prepare_process};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
 #[path = "common/provenance.rs"]
@@ -32,6 +32,7 @@ struct Arguments {
 }
 
 fn main() -> Result<ExitCode> {
+    prepare_process();
     let arguments = Arguments::parse();
     let mut checks = rows::all();
     let rows: Vec<&str> = checks.iter().map(|c| c.row).collect();

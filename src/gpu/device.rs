@@ -84,6 +84,8 @@ pub struct Device {
     pub(crate) memory_use: MemoryUseCounter,
     pub(crate) kept: Kept,
     ray_query: bool,
+    /// Mesa's driver for the processor.
+    jit: bool,
     info: DeviceInfo,
     limits: Limits,
     debug: Option<ext::debug_utils::Device>,
@@ -151,12 +153,13 @@ impl Device {
                 HOST_BLOCK_BYTES,
             ),
         });
+        let jit = adapter.driver == vk::DriverId::MESA_LLVMPIPE;
         let kept = Kept::new(
             &raw,
             &adapter.properties,
             &adapter.info.name,
             options.kept_in.as_deref(),
-            jit_forgotten && adapter.driver == vk::DriverId::MESA_LLVMPIPE,
+            jit_forgotten && jit,
         );
         let (allocator, kept) = match (allocator, kept) {
             (Ok(allocator), Ok(kept)) => (allocator, kept),
@@ -186,6 +189,7 @@ impl Device {
             memory_use: MemoryUseCounter::default(),
             kept,
             ray_query: adapter.info.ray_query,
+            jit,
             limits: Limits {
                 max_storage_buffer_bytes: limits.max_storage_buffer_range.into(),
                 max_uniform_buffer_bytes: limits.max_uniform_buffer_range.into(),
@@ -278,6 +282,11 @@ impl Device {
     /// an earlier one.
     pub fn remembers(&self, what: u64) -> bool {
         self.kept.knows(what)
+    }
+
+    /// Whether the driver compiles a kernel only when it first runs, and then keeps it for every device.
+    pub(crate) fn compiles_late(&self) -> bool {
+        self.jit && !kept::llvmpipe_has_nothing()
     }
 
     /// Keeps a number for later starts, where anything is kept.

@@ -35,6 +35,11 @@ pub fn cache_folder() -> Option<PathBuf> {
     dirs::cache_dir().map(|folder| folder.join("insonify").join("pipelines"))
 }
 
+/// Where Mesa keeps what it compiles for this program: see [`super::prepare_process`].
+pub(crate) fn mesa_folder() -> Option<PathBuf> {
+    dirs::cache_dir().map(|folder| folder.join("insonify").join("mesa"))
+}
+
 /// Whether Mesa, which compiles for the processor when a kernel first runs, has nothing from before. It
 /// makes the folder when a device is opened.
 pub(crate) fn llvmpipe_has_nothing() -> bool {

@@ -1,16 +1,28 @@
 //! Compute pipelines whose layouts come from their SPIR-V.
 //!
-//! A driver may take seconds for a pipeline. So pipelines are made on rayon's threads while the
+//! A driver may take seconds for a pipeline. So pipelines are made on threads of their own while the
 //! caller goes on, or not before they are needed; the first dispatch waits for its own.
 
 use std::ffi::CString;
-use std::sync::{Arc, Once, OnceLock};
+use std::sync::{Arc, LazyLock, Once, OnceLock};
 
 use ash::vk;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use super::ahead;
 use super::device::Device;
 use super::error::{GpuError, during};
 use super::reflect::{BindingInfo, BindingKind, Reflection, reflect};
+
+/// Larger modules are worth a device of their own to be compiled on, words.
+const LARGE: usize = 1024;
+
+/// Makes pipelines, as many at once as there are processors, in the order of asking. Not on rayon's own
+/// threads: scenes are loaded with those meanwhile.
+static MAKERS: LazyLock<ThreadPool> = LazyLock::new(|| {
+    let threads = ThreadPoolBuilder::new().thread_name(|at| format!("pipelines {at}"));
+    threads.build().expect("threads for pipelines")
+});
 
 /// The Vulkan objects behind [`Kernel`].
 pub(crate) struct RawKernel {
@@ -76,7 +88,9 @@ impl Kernel {
             device: device.clone(),
         };
         kernel.create_layouts()?;
+        let ahead = device.compiles_late() && device.kept.is_new(kernel.id) && spirv.len() > LARGE;
         kernel.pipeline = Some(Arc::new(Pipeline {
+            ahead: ahead.then(|| [device.name().to_owned(), name.to_owned()]),
             spirv: spirv.to_vec(),
             specialization: specialization.to_vec(),
             // spirq returned the name from a NUL-terminated literal.
@@ -89,11 +103,21 @@ impl Kernel {
         Ok(Self(Arc::new(kernel)))
     }
 
+    /// The same module with other constants, as by [`Self::when_needed`].
+    ///
+    /// # Errors
+    /// Constants that the module does not have, or that do not fit the device.
+    pub fn specialized(&self, specialization: &[(u32, u32)]) -> Result<Self, GpuError> {
+        let pipeline = self.0.pipeline.as_ref().expect("set at creation");
+        let name = self.name();
+        Self::when_needed(&self.0.device, name, &pipeline.spirv, specialization)
+    }
+
     /// Has the pipeline made on another thread, if nobody has yet.
     pub fn prepare(&self) {
         if let Some(pipeline) = self.0.pipeline.clone() {
             // Who needs it asks for its result.
-            rayon::spawn(move || {
+            MAKERS.spawn_fifo(move || {
                 let _ = pipeline.get();
             });
         }
@@ -228,6 +252,8 @@ impl RawKernel {
 /// What a pipeline is made of and, once that has happened, the pipeline or the driver's refusal. It
 /// does not hold the device: the kernel does, and ends what is under way before it lets go.
 struct Pipeline {
+    /// Names of the device and the kernel, where it is first to be compiled on another one.
+    ahead: Option<[String; 2]>,
     spirv: Vec<u32>,
     specialization: Vec<(u32, u32)>,
     entry: CString,
@@ -243,6 +269,10 @@ impl Pipeline {
     }
 
     fn make(&self) -> Result<vk::Pipeline, vk::Result> {
+        if let Some([device, kernel]) = &self.ahead {
+            // What fails there is told here, by the driver of the device in use.
+            let _ = ahead::compile(device, kernel, &self.spirv, &self.specialization);
+        }
         let info = vk::ShaderModuleCreateInfo::default().code(&self.spirv);
         // SAFETY: the words parsed as SPIR-V; the kernels of this crate are checked by spirv-val.
         // The device is alive: see the structure.

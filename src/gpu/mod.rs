@@ -11,6 +11,7 @@
 
 mod accel;
 mod adapter;
+mod ahead;
 mod barrier;
 mod blas;
 mod build_times;
@@ -28,6 +29,7 @@ mod memory;
 mod overlay;
 mod painter;
 mod pieces;
+mod process;
 mod queues;
 mod reflect;
 mod surface;
@@ -52,6 +54,7 @@ pub use kept::cache_folder;
 pub use kernel::Kernel;
 pub use memory::{Buffer, BufferKind, MemoryUse};
 pub use painter::{Interface, Painted, Painter, Placed, Shot};
+pub use process::prepare_process;
 pub use reflect::{BindingInfo, BindingKind};
 pub use timer::FrameTimings;
 pub use tlas::{Tlas, TlasInstance};

@@ -59,8 +59,9 @@ pub fn run(
                 commands.dispatch_groups(kernel, *groups, &job.push, &bindings)
             }
             Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
+                let kernel = kernel.specialized(&round.constants())?;
                 let push = bytemuck::cast_slice(&round.push);
-                commands.dispatch(kernel, [round.workers, 1, 1], push, &bindings)?;
+                commands.dispatch(&kernel, [round.workers, 1, 1], push, &bindings)?;
                 commands.barrier(Stage::Compute, Stage::Compute);
                 Ok(())
             }),

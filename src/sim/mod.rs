@@ -160,7 +160,7 @@ impl Simulator {
             read_out: ReadOut::default(),
             update_time: Duration::ZERO,
             passes: Passes {
-                kernels: Kernels::new(device, library, &world, false)?,
+                kernels: Kernels::new(device, library, &frame, &world, false)?,
                 buffers,
                 fusion,
                 skins: contact::Skins::default(),
@@ -266,7 +266,13 @@ impl Simulator {
         self.frames.wait()?;
         let shapers = world::Kernels::new(&self.device, library)?;
         let world = &self.passes.world;
-        let kernels = Kernels::new(&self.device, library, world, self.counting)?;
+        let kernels = Kernels::new(
+            &self.device,
+            library,
+            &self.passes.frame,
+            world,
+            self.counting,
+        )?;
         if let Some(fusion) = &mut self.passes.fusion {
             fusion.reload(&self.device, library, world.tracer())?;
         }

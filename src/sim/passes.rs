@@ -116,7 +116,7 @@ impl Passes {
             .of(&self.frame, paths, self.at_once, turn)
         {
             cmd.dispatch(
-                &self.kernels.trace,
+                &self.kernels.trace[round.role as usize],
                 [round.workers, 1, 1],
                 bytemuck::cast_slice(&round.push),
                 &[

@@ -44,12 +44,28 @@ const MOST_WORKERS: u32 = 1 << 20;
 /// Pieces of work that a worker does, one after the other, where there are enough of them.
 const PIECES: u32 = 8;
 
+/// What dispatches of a frame are for: the roles of [`Round::role`].
+pub(super) fn roles(frame: &Frame) -> &'static [u32] {
+    match frame.sampling {
+        SAMPLING_MAIN_PATH => &[ROLE_MAIN, ROLE_BRANCHES],
+        _ => &[ROLE_WHOLE],
+    }
+}
+
+/// Specialization constants of the kernel for a role, by id.
+pub(super) fn constants(role: u32) -> [(u32, u32); 1] {
+    [(0, role)]
+}
+
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
-    /// Push constants: role, first path, paths, first line, lines; pieces of work, how many of them a
-    /// worker may take, and by which of two counters.
-    pub push: [u32; 8],
+    /// What its paths are for, to which the kernel is specialized: [`ROLE_WHOLE`], [`ROLE_MAIN`] or
+    /// [`ROLE_BRANCHES`].
+    pub role: u32,
+    /// Push constants: first path, paths, first line, lines; pieces of work, how many of them a worker
+    /// may take, and by which of two counters.
+    pub push: [u32; 7],
     /// Threads. Each takes piece after piece, so that of those that run together none waits for another's
     /// longer path.
     pub workers: u32,
@@ -62,6 +78,13 @@ pub struct Rounds {
     /// Main paths of a line; none where paths choose at every surface.
     mains: u32,
     slots: u32,
+}
+
+impl Round {
+    /// The kernel's specialization constants, by id.
+    pub fn constants(&self) -> [(u32, u32); 1] {
+        constants(self.role)
+    }
 }
 
 impl Rounds {
@@ -105,9 +128,13 @@ impl Rounds {
             let workers = workers.min(pieces).clamp(1, MOST_WORKERS);
             // Twice its share: others' pieces may be larger. Those that begin later then find none.
             let most = 2 * pieces.div_ceil(workers);
-            let push = [role, begin, count, line, lines, pieces, most, *turn];
+            let push = [begin, count, line, lines, pieces, most, *turn];
             *turn ^= 1;
-            Round { push, workers }
+            Round {
+                role,
+                push,
+                workers,
+            }
         };
         if self.mains == 0 {
             return vec![round(ROLE_WHOLE, count, 0, all, count)];
@@ -146,13 +173,13 @@ mod tests {
     /// How often the rounds of `role` take each line.
     fn lines(rounds: &[Round], role: u32) -> Vec<u32> {
         let mut taken = vec![0; 192 * 7];
-        for round in rounds.iter().filter(|r| r.push[0] == role) {
-            let first = round.push[3] as usize;
-            for line in &mut taken[first..first + round.push[4] as usize] {
+        for round in rounds.iter().filter(|r| r.role == role) {
+            let first = round.push[2] as usize;
+            for line in &mut taken[first..first + round.push[3] as usize] {
                 *line += 1;
             }
-            assert_eq!(round.push[5] % round.push[4], 0);
-            assert!(round.workers * round.push[6] >= round.push[5]);
+            assert_eq!(round.push[4] % round.push[3], 0);
+            assert!(round.workers * round.push[5] >= round.push[4]);
         }
         taken
     }
@@ -179,10 +206,10 @@ mod tests {
                 taken
                     .iter()
                     .zip([0, 1].into_iter().cycle())
-                    .all(|(r, turn)| r.push[7] == turn)
+                    .all(|(r, turn)| r.push[6] == turn)
             );
             // Main paths are there before their branches.
-            let roles: Vec<u32> = taken.iter().map(|r| r.push[0]).collect();
+            let roles: Vec<u32> = taken.iter().map(|r| r.role).collect();
             assert!(roles.chunks(2).all(|r| r == [ROLE_MAIN, ROLE_BRANCHES]));
         }
     }
@@ -191,7 +218,7 @@ mod tests {
     fn one_main_path_stands_for_all_that_are_alike() {
         let pieces = |frame: &Frame| {
             let rounds = Rounds::new(frame, 40).of(frame, 0..40, 5000, &mut 0);
-            rounds.iter().map(|r| r.push[5]).collect::<Vec<_>>()
+            rounds.iter().map(|r| r.push[4]).collect::<Vec<_>>()
         };
         let mut frame = frame(40, 32);
         assert_eq!(pieces(&frame), [1344, 1344 * 32 * 5]);

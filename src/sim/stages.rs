@@ -147,7 +147,8 @@ impl Buffers {
 /// The kernels of a frame.
 pub(super) struct Kernels {
     pub(super) origin: Kernel,
-    pub(super) trace: Kernel,
+    /// By role: [`rounds::Round::role`].
+    pub(super) trace: [Kernel; 3],
     pub(super) scatter: Kernel,
     pub(super) beam: Kernel,
     pub(super) axial: Kernel,
@@ -158,6 +159,7 @@ impl Kernels {
     pub(super) fn new(
         device: &Arc<Device>,
         library: &Library,
+        frame: &layout::Frame,
         world: &World,
         counting: bool,
     ) -> Result<Self, GpuError> {
@@ -166,9 +168,27 @@ impl Kernels {
             true => "count",
             false => world.tracer().suffix(),
         };
+        let trace = format!("trace_{suffix}");
+        let role = |role| {
+            Kernel::when_needed(
+                device,
+                &trace,
+                library.words(&trace),
+                &rounds::constants(role),
+            )
+        };
+        let trace = [
+            role(layout::ROLE_WHOLE)?,
+            role(layout::ROLE_MAIN)?,
+            role(layout::ROLE_BRANCHES)?,
+        ];
+        // What takes longest is begun first.
+        for &role in rounds::roles(frame) {
+            trace[role as usize].prepare();
+        }
         Ok(Self {
             origin: kernel(&format!("origin_{suffix}"))?,
-            trace: kernel(&format!("trace_{suffix}"))?,
+            trace,
             scatter: kernel(match world.deforms() {
                 true => "scatter_deforming",
                 false => "scatter_rigid",

@@ -79,13 +79,22 @@ fn a_zoomed_interface_keeps_its_clicks() {
     desk.press(Key::Letter('v'));
     let part = [60, 150, 500, 400];
     let before = desk.settle(part);
+    // The word above the image.
+    let state = [600, 0, 176, 50];
+    let live = desk.grab(state);
     let button = (1280 - 504 + 45, 18);
     desk.click(button);
+    desk.wait_for("the word that it is frozen", |d| {
+        difference(&d.grab(state), &live) > 1.0
+    });
     desk.press(Key::Right);
     desk.press(Key::Right);
     std::thread::sleep(Duration::from_millis(500));
     assert!(difference(&desk.grab(part), &before) < 0.5, "frozen");
     desk.click(button);
+    desk.wait_for("the word that it is live", |d| {
+        difference(&d.grab(state), &live) < 0.5
+    });
     desk.wait_for("the image to follow", |d| {
         difference(&d.grab(part), &before) > 2.0
     });
