@@ -52,7 +52,9 @@ const int SILENT = -0x40000000;
 
 shared int echoes[2u * SCATTER_WINDOW];
 shared int loudest[(BINS + 2u * uint(BESIDE)) * SLOTS];   // per slot, of all segments of the scanline; also beside the window
-shared uint work_end[THREADS];
+shared uint line_end[MAX_ELEVATION_LAYERS];   // stretches of the scanline's lines up to that of each layer
+shared uint work_at[THREADS];       // of some stretches: where they are, and
+shared uint work_end[THREADS];      // how many items of work they and those before them have
 shared uint shared_candidates;
 shared uint shared_deposits;
 
@@ -433,6 +435,14 @@ bool passes_sphere(Stretch s, vec4 sphere) {
     return abs(dot(rel, s.e_l)) <= width + r;
 }
 
+// Where stretch i of those of all the scanline's lines is.
+uint stretch_at(uint scanline, uint i) {
+    uint layer = 0u;
+    while (i >= line_end[layer]) layer += 1u;
+    uint before = layer == 0u ? 0u : line_end[layer - 1u];
+    return (layer * frame.scanlines + scanline) * frame.segment_capacity + i - before;
+}
+
 // First item of work and number of items: samples, or bins (of deformed tissue: pieces of them) of the
 // window, and of those beside it.
 ivec2 work_of(Stretch s, bool voxel) {
@@ -458,73 +468,75 @@ void main() {
 
     for (uint i = thread; i < 2u * SCATTER_WINDOW; i += THREADS) echoes[i] = 0;
     for (uint i = thread; i < (BINS + 2u * uint(BESIDE)) * SLOTS; i += THREADS) loudest[i] = SILENT;
-    if (thread == 0u) { shared_candidates = 0u; shared_deposits = 0u; }
+    for (uint i = thread; i < frame.layers; i += THREADS) {
+        line_end[i] = min(segment_count[i * frame.scanlines + scanline], frame.segment_capacity);
+    }
     barrier();
+    if (thread == 0u) {
+        shared_candidates = 0u;
+        shared_deposits = 0u;
+        for (uint i = 1u; i < frame.layers; ++i) line_end[i] += line_end[i - 1u];
+    }
+    barrier();
+    uint available = line_end[frame.layers - 1u];
 
-    // What drowns what: the loudest stretch in each bin, of all layers.
-    for (uint layer = 0u; layer < frame.layers && !voxel; ++layer) {
-        uint line = layer * frame.scanlines + scanline;
-        uint available = min(segment_count[line], frame.segment_capacity);
-        // Where there are few, several threads share a stretch.
-        uint sharing = THREADS / clamp(available, 1u, THREADS);
-        for (uint i = thread / sharing; i < available; i += THREADS / sharing) {
-            Stretch s = world_stretch(line * frame.segment_capacity + i);
-            ivec2 filled = sounds(s) ? slots_of(s) : ivec2(0, -1);
-            int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
-            int last = min(filled.y, window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
-            for (int slot = max(filled.x, window) + int(thread % sharing); slot <= last; slot += int(sharing)) {
-                float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
-                atomicMax(loudest[slot - window], whole_large(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
-            }
+    // What drowns what: the loudest stretch in each slot, of all layers.
+    // Where there are few, several threads share a stretch.
+    uint sharing = THREADS / clamp(available, 1u, THREADS);
+    for (uint i = thread / sharing; i < available && !voxel; i += THREADS / sharing) {
+        Stretch s = world_stretch(stretch_at(scanline, i));
+        ivec2 filled = sounds(s) ? slots_of(s) : ivec2(0, -1);
+        int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
+        int last = min(filled.y, window + int(BINS * SLOTS) + 2 * SLOTS_BESIDE - 1);
+        for (int slot = max(filled.x, window) + int(thread % sharing); slot <= last; slot += int(sharing)) {
+            float level = level_at(s, distance_at(s, (float(slot) + 0.5) * float(SCATTER_SLOT)));
+            atomicMax(loudest[slot - window], whole_large(clamp(floor(level * LEVEL_UNIT), float(SILENT), 1e9)));
         }
     }
     barrier();
 
-    for (uint layer = 0u; layer < frame.layers; ++layer) {
+    uint mine = gl_WorkGroupID.y < available ? (available - gl_WorkGroupID.y + chunks - 1u) / chunks : 0u;
+    if (thread == 0u && gl_WorkGroupID.z == 0u && mine > 0u) atomicAdd(counters.segments, mine);
+    for (uint batch = 0u; batch < mine; batch += THREADS) {
         uvec3 count = uvec3(0u);
-        uint line = layer * frame.scanlines + scanline;
-        uint available = min(segment_count[line], frame.segment_capacity);
-        uint mine = gl_WorkGroupID.y < available ? (available - gl_WorkGroupID.y + chunks - 1u) / chunks : 0u;
-        uint from = line * frame.segment_capacity + gl_WorkGroupID.y;
-        if (thread == 0u && gl_WorkGroupID.z == 0u && mine > 0u) atomicAdd(counters.segments, mine);
-        for (uint batch = 0u; batch < mine; batch += THREADS) {
-            uint size = min(THREADS, mine - batch);
-            if (thread < size) {
-                Stretch s = world_stretch(from + (batch + thread) * chunks);
-                work_end[thread] = sounds(s) ? uint(max(work_of(s, voxel).y, 0)) : 0u;
+        uint size = min(THREADS, mine - batch);
+        if (thread < size) {
+            uint at = stretch_at(scanline, gl_WorkGroupID.y + (batch + thread) * chunks);
+            Stretch s = world_stretch(at);
+            work_at[thread] = at;
+            work_end[thread] = sounds(s) ? uint(max(work_of(s, voxel).y, 0)) : 0u;
+        }
+        barrier();
+        if (thread == 0u) {
+            for (uint i = 1u; i < size; ++i) work_end[i] += work_end[i - 1u];
+        }
+        barrier();
+        uint total = work_end[size - 1u];
+        uint owner = 0u;
+        for (uint item = thread; item < total; item += THREADS) {
+            while (item >= work_end[owner]) owner += 1u;
+            Stretch s = texture_stretch(work_at[owner]);
+            int index = work_of(s, voxel).x + int(item - (owner == 0u ? 0u : work_end[owner - 1u]));
+            if (voxel) {
+                count += march_sample(s, index);
+            } else {
+                int items = deforms(s) ? int(PIECES) : 1;
+                count += march_bin(s, index / items, index % items);
             }
-            barrier();
-            if (thread == 0u) {
-                for (uint i = 1u; i < size; ++i) work_end[i] += work_end[i - 1u];
+        }
+        for (uint i = 0u; i < size && frame.points > 0u; ++i) {
+            Stretch w = world_stretch(work_at[i]);
+            uint groups = is_finite(w) ? (frame.points + POINT_GROUP - 1u) / POINT_GROUP : 0u;
+            for (uint g = thread; g < groups; g += THREADS) {
+                if (!passes_sphere(w, points[frame.points + g])) continue;
+                uint end = min((g + 1u) * POINT_GROUP, frame.points);
+                for (uint p = g * POINT_GROUP; p < end; ++p) count.z += march_point(w, points[p]);
             }
-            barrier();
-            uint total = work_end[size - 1u];
-            uint owner = 0u;
-            for (uint item = thread; item < total; item += THREADS) {
-                while (item >= work_end[owner]) owner += 1u;
-                Stretch s = texture_stretch(from + (batch + owner) * chunks);
-                int index = work_of(s, voxel).x + int(item - (owner == 0u ? 0u : work_end[owner - 1u]));
-                if (voxel) {
-                    count += march_sample(s, index);
-                } else {
-                    int items = deforms(s) ? int(PIECES) : 1;
-                    count += march_bin(s, index / items, index % items);
-                }
-            }
-            for (uint i = 0u; i < size && frame.points > 0u; ++i) {
-                Stretch w = world_stretch(from + (batch + i) * chunks);
-                uint groups = is_finite(w) ? (frame.points + POINT_GROUP - 1u) / POINT_GROUP : 0u;
-                for (uint g = thread; g < groups; g += THREADS) {
-                    if (!passes_sphere(w, points[frame.points + g])) continue;
-                    uint end = min((g + 1u) * POINT_GROUP, frame.points);
-                    for (uint p = g * POINT_GROUP; p < end; ++p) count.z += march_point(w, points[p]);
-                }
-            }
-            barrier();
         }
         // Here: naga loses values that two loops carry when they are used after both.
         if (count.x > 0u) { atomicAdd(shared_candidates, count.x); atomicAdd(shared_deposits, count.y); }
         if (count.z > 0u) atomicAdd(counters.saturated, count.z);
+        barrier();
     }
     barrier();
 

@@ -9,6 +9,7 @@ const uint MAX_STACK = 16u;         // media that may enclose one point
 // What origin leaves of a line: number of media, media; distance (mm) and weight at which its paths
 // begin, as bits of floats, and the interactions up to there.
 const uint START_WORDS = MAX_STACK + 4u;
+const uint MAX_ELEVATION_LAYERS = 64u;        // elevation layers
 const uint MAX_PIECES = 64u;        // of the level of what is transmitted along a line
 const float FAR_PIECE = 1e30;       // begins behind every sample: there are no more
 // Outputs of a thread, which share what it reads.

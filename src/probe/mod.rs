@@ -4,4 +4,4 @@ pub mod beam;
 pub mod face;
 pub mod transducer;
 
-pub use transducer::{Kind, Probe};
+pub use transducer::{Kind, MAX_ELEVATION_LAYERS, Probe};

@@ -2,6 +2,9 @@
 
 use glam::DVec3;
 
+/// Most elevation layers: `scatter` counts the stretches of each (`MAX_ELEVATION_LAYERS` of glsl/shared.glsl).
+pub const MAX_ELEVATION_LAYERS: u32 = 64;
+
 /// Arrangement of the scanlines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Kind {

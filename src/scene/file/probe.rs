@@ -9,7 +9,7 @@ use super::error::SceneError;
 use super::parameters::overlay;
 use super::schema::{KindName, PoseTable, ProbeTable};
 use super::within;
-use crate::probe::{Kind, Probe};
+use crate::probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
 use crate::scene::suggest;
 
 /// Lateral and depth axes nearer to parallel than this (sine) define no image plane.
@@ -37,7 +37,7 @@ pub(super) fn build(
         (
             "elevation_layers",
             f64::from(out.elevation_layers),
-            (1.0, 64.0),
+            (1.0, f64::from(MAX_ELEVATION_LAYERS)),
             "",
         ),
         ("samples", f64::from(out.samples), (16.0, 65_536.0), ""),
