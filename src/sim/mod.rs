@@ -258,6 +258,11 @@ impl Simulator {
         Ok(began.elapsed())
     }
 
+    /// Whether the first frame waits for the driver's compiler: its kernels have never run here.
+    pub fn compiles(&self) -> bool {
+        self.passes.kernels.scatter.is_new()
+    }
+
     /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
     ///
     /// # Errors

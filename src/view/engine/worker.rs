@@ -23,6 +23,7 @@ const IMAGE_SHARE: f64 = 0.8;
 /// What is waited for before the first picture.
 const UPLOADING: &str = "Building structures of the anatomy, compiling kernels";
 const FIRST: &str = "Making the first picture";
+const COMPILING: &str = "Compiling kernels for this device, the first time only";
 
 /// The picture that was made last, and what it left on the device.
 struct Imaged {
@@ -327,7 +328,10 @@ impl Worker {
             *simulator = None;
             self.tell(News::Preparing(UPLOADING));
             let made = Simulator::new(&self.device, &self.library, &self.scene, tracer)?;
-            self.tell(News::Preparing(FIRST));
+            self.tell(News::Preparing(match made.compiles() {
+                true => COMPILING,
+                false => FIRST,
+            }));
             *simulator = Some((made, tracer));
         }
         let (simulator, _) = simulator.as_mut().expect("just made");
