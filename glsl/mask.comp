@@ -26,6 +26,7 @@ layout(binding = 7) uniform texture3D volume;
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) buffer PrescanBuffer { float prescan[]; };
 layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 11) readonly buffer TissueBuffer { Tissue tissues[]; };
 
 #define RAY_SKIPS(i) (instances[i].masks == 0u)
 #define RAY_SELECTS true
@@ -45,6 +46,9 @@ const uint MAX_CROSSINGS = 64u;
 
 // Distances at which the scanline goes into a masking instance; negative where it comes out.
 shared float crossings[MAX_CROSSINGS];
+shared uint crossed[MAX_CROSSINGS];       // which
+shared float depths[MAX_CROSSINGS];       // mm at the probe's speed at which the sound that is there echoes,
+shared float rates[MAX_CROSSINGS + 1u];   // and mm of distance per mm of that depth: up to there, and behind the last
 shared uint crossing_count;
 // Masking instances around the scanline's start: those that it leaves more often than it enters.
 shared int enclosing;
@@ -53,6 +57,7 @@ void note_crossing(Hit hit, vec3 d) {
     bool entering = dot(d, surface_geometric_normal(hit)) < 0.0;
     if (crossing_count < MAX_CROSSINGS) {
         crossings[crossing_count] = entering ? hit.t : -hit.t;
+        crossed[crossing_count] = hit.instance;
         crossing_count += 1u;
         enclosing += entering ? -1 : 1;
     } else {
@@ -81,6 +86,48 @@ void cross_masks(vec3 o, vec3 d) {
     }
 }
 
+// Whether `instance` is around the scanline behind its first `passed` crossings: it then comes out more often
+// than it goes in. Last: the crossing by which it went in, 1 for the first; 0 where it was around the start.
+bool is_around(uint instance, uint passed, out uint entered) {
+    int net = 0;
+    entered = 0u;
+    for (uint i = 0u; i < crossing_count; ++i) {
+        if (crossed[i] != instance) continue;
+        bool enters = crossings[i] > 0.0;
+        if (i >= passed) net += enters ? -1 : 1;
+        else if (enters) entered = i + 1u;
+    }
+    return net > 0;
+}
+
+// Distance per depth behind the first `passed` crossings: by the speed of the masking instance of the highest
+// priority there, of equals the one entered last.
+float rate_behind(uint passed) {
+    if (fusion.mask_speed == MASK_SPEED_PROBE) return 1.0;
+    uint best = NONE, best_entered = 0u;
+    for (uint i = passed; i < crossing_count; ++i) {
+        uint entered;
+        if (!is_around(crossed[i], passed, entered)) continue;
+        int ahead = best == NONE ? 1 : instances[crossed[i]].priority - instances[best].priority;
+        if (ahead > 0 || ahead == 0 && entered > best_entered) {
+            best = crossed[i];
+            best_entered = entered;
+        }
+    }
+    return best == NONE ? 1.0 : tissues[instances[best].tissue].speed / frame.speed;
+}
+
+void time_crossings() {
+    float distance = 0.0, depth = 0.0;
+    for (uint i = 0u; i <= crossing_count; ++i) {
+        rates[i] = rate_behind(i);
+        if (i == crossing_count) break;
+        depth += (abs(crossings[i]) - distance) / rates[i];
+        distance = abs(crossings[i]);
+        depths[i] = depth;
+    }
+}
+
 // By hand: the filters of many devices know only 256 places between two texels.
 float acquired(vec3 voxel) {
     vec3 size = vec3(float(fusion.size_x), float(fusion.size_y), float(fusion.size_z));
@@ -106,15 +153,20 @@ void main() {
     o.y = 0.0;
     o = world_point(o);
     d = world_vector(d);
-    if (gl_LocalInvocationID.x == 0u) cross_masks(o, d);
+    if (gl_LocalInvocationID.x == 0u) {
+        cross_masks(o, d);
+        time_crossings();
+    }
     barrier();
     vec3 start = apply_point(fusion.voxel_from_world, o);
     vec3 along = apply_vector(fusion.voxel_from_world, d);
     for (uint k = gl_LocalInvocationID.x; k < frame.samples; k += 64u) {
-        float t = float(k) * frame.sample_pitch;
+        float depth = float(k) * frame.sample_pitch;
         int around = enclosing;
-        for (uint i = 0u; i < crossing_count; ++i) {
-            if (abs(crossings[i]) <= t) around += crossings[i] > 0.0 ? 1 : -1;
+        float t = rates[0] * depth;
+        for (uint i = 0u; i < crossing_count && depths[i] <= depth; ++i) {
+            around += crossings[i] > 0.0 ? 1 : -1;
+            t = abs(crossings[i]) + rates[i + 1u] * (depth - depths[i]);
         }
         uint at = 2u * (line * frame.samples + k);
         prescan[at] = around > 0 ? 0.0 : 1.0;

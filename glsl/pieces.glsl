@@ -68,7 +68,9 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     vec3 nearest = floor(middle * inverse_h);
     vec3 rest = fma(-nearest, vec3(h), middle);
     ivec3 base = ivec3(nearest);
-    float strength = lattice.amplitude * s.weight * frame.volume_scale;
+    // Squeezed tissue echoes as before, though its scatterers lie closer.
+    float growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
+    float strength = lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
     float depth = tissues[s.tissue].texture_depth;
     if (depth > 0.0) {
         strength *= 1.0 + depth * tissue_texture(middle / tissues[s.tissue].texture_length, tissues[s.tissue].seed);

@@ -40,6 +40,7 @@ const uint THREADS = 64u;
 const float POINT_SHIFT = 0.01234;   // of a layer's pitch
 const float LOG2_E = 1.44269504;
 const float INVERSE_FALL = 1.38629436;    // of a beam's fall: its deviation squared is 1 over the two
+const float LEVEL_SPAN = 3.0;             // mm of depth between rows that are asked for the level they need
 const float SHAPE_SPAN = 0.6;             // mm of depth to either side by which the beam's change is known
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
@@ -343,10 +344,11 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     x = vec2(mix(max(x.x, 0.0), 0.0, first), mix(min(x.y, s.extent), s.extent, last));
     if (!(x.y > x.x)) return uvec3(0u);
 
-    // Levels that some plane may need; between the three rows that are asked it is a twentieth of one at most.
+    // Levels that some plane may need; between the rows that are asked it is a twentieth of one at most.
     float lowest = 1e9, highest = -1e9;
-    for (int i = 0; i < 3; ++i) {
-        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, 0.5 * float(i))))].shape.w, drowned);
+    int spans = clamp(whole(ceil(min((x.y - x.x) / LEVEL_SPAN, 64.0))), 2, 64);
+    for (int i = 0; i <= spans; ++i) {
+        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))].shape.w, drowned);
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }

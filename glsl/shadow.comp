@@ -68,9 +68,9 @@ void middle(uint line, out Path path, inout Media media) {
 }
 
 // Sends the path through; the part of its intensity that is reflected, 1 where nothing gets through.
-float pass(inout Path path, Hit hit, Tissue t1, Tissue t2) {
-    vec3 n_geometric = surface_geometric_normal(hit);
-    vec3 n = surface_shading_normal(hit);
+float pass(inout Path path, Met here, Tissue t1, Tissue t2) {
+    vec3 n_geometric = here.normal;
+    vec3 n = surface_shading_normal(here.hit);
     if (dot(path.direction, n_geometric) >= 0.0) { n_geometric = -n_geometric; n = -n; }
     if (!(dot(path.direction, n) < 0.0)) n = n_geometric;
     float cos_i = -dot(path.direction, n);
@@ -78,7 +78,7 @@ float pass(inout Path path, Hit hit, Tissue t1, Tissue t2) {
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
         float kappa = frame.speed * path.time / frame.sample_pitch;
         vec3 along = path.direction + cos_i * n + 0.01 * path.lateral;
-        width = surface_curvature(hit, along) * rows[sample_at(kappa)].sigma_lateral;
+        width = surface_curvature(here.hit, along) * rows[sample_at(kappa)].sigma_lateral;
     }
     float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
     bool through = transmit_path(path, n, n_geometric, t1.speed, t2.speed) || width > 0.0;
@@ -102,7 +102,7 @@ void main() {
     bool lost = path.weight <= 0.0;
     // The first of two surfaces that coincide was found; the ray looks for the other.
     bool pairing = false;
-    Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
+    Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
     float close = 0.0;
     uint crossing = 0u;
     while (true) {
@@ -125,38 +125,37 @@ void main() {
         }
         float t_end = (time_end - path.time) * way.speed;
         // Nothing is met by a ray without room.
-        Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.t - close, 0.0) : path.t_min,
-            pairing ? first.t + close : (ends ? -1.0 : t_end), pairing ? first.instance : NONE);
-        Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
+        Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.hit.t - close, 0.0) : path.t_min,
+            pairing ? first.hit.t + close : (ends ? -1.0 : t_end), pairing ? first.hit.instance : NONE);
+        Met here = surface_met(hit);
+        Met other = Met(Hit(hit.t, NONE, NONE, 0.0, 0.0), vec3(0.0), vec3(0.0));
         if (pairing) {
-            other = hit;
-            hit = first;
+            other = here;
+            here = first;
             pairing = false;
         } else if (hit.instance == NONE) {
             // What nothing follows holds to the end of the line.
             pieces[next] = vec4(FAR_PIECE, 0.0, 0.0, 0.0);
             break;
         } else {
-            close = clearance(surface_position(hit));
+            close = clearance(here.position);
             if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-                first = hit;
+                first = here;
                 pairing = true;
                 continue;
             }
         }
         crossing += 1u;
-        float past = hit.t + close;
-        if (other.instance != NONE) past = max(past, other.t + close);
-        if (other.instance < hit.instance) {
-            Hit found = hit;
-            hit = other;
+        float past = here.hit.t + close;
+        if (other.hit.instance != NONE) past = max(past, other.hit.t + close);
+        if (other.hit.instance < here.hit.instance) {
+            Met found = here;
+            here = other;
             other = found;
         }
         copy_media(after, media);
-        cross_interface(after, hit.instance, dot(path.direction, surface_geometric_normal(hit)) < 0.0);
-        if (other.instance != NONE) {
-            cross_interface(after, other.instance, dot(path.direction, surface_geometric_normal(other)) < 0.0);
-        }
+        cross_interface(after, here.hit.instance, dot(path.direction, here.normal) < 0.0);
+        if (other.hit.instance != NONE) cross_interface(after, other.hit.instance, dot(path.direction, other.normal) < 0.0);
         bool heard_after = is_heard(after);
         bool same = current_instance(after) == current_instance(media);
         if (same && heard == heard_after) {
@@ -164,13 +163,13 @@ void main() {
             copy_media(media, after);
             continue;
         }
-        advance(path, hit.t, way, surface_position(hit));
-        level -= excess * hit.t;
+        advance(path, here.hit.t, way, here.position);
+        level -= excess * here.hit.t;
         fresh = heard || heard_after;
         if (same || !fresh) {
-            path.t_min = max(path.t_min, past - hit.t);
+            path.t_min = max(path.t_min, past - here.hit.t);
         } else {
-            float reflected = pass(path, hit, t1, medium(after));
+            float reflected = pass(path, here, t1, medium(after));
             lost = reflected >= 1.0;
             level = lost ? DARK : level + log(max(1.0 - reflected, NOTHING));
         }

@@ -9,7 +9,7 @@ const uint MAX_STACK = 16u;         // media that may enclose one point
 // What origin leaves of a line: number of media, media; distance (mm) and weight at which its paths
 // begin, as bits of floats, and the interactions up to there.
 const uint START_WORDS = MAX_STACK + 4u;
-const uint MAX_ELEVATION_LAYERS = 64u;        // elevation layers
+const uint MAX_ELEVATION_LAYERS = 64u;
 const uint MAX_PIECES = 64u;        // of the level of what is transmitted along a line
 const float FAR_PIECE = 1e30;       // begins behind every sample: there are no more
 // Outputs of a thread, which share what it reads.
@@ -42,6 +42,8 @@ const uint FLAG_MASKED = 512u;      // only what a masking instance encloses is 
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
 const uint BLEND_MULTIBAND = 2u;
+const uint MASK_SPEED_PROBE = 0u;      // of samples on their way through masks
+const uint MASK_SPEED_ENCLOSING = 1u;
 
 // Lattices of scatterers: two levels on cells have twice the volume.
 const uint LATTICE_LEVELS = 48u;
@@ -51,6 +53,7 @@ const float ALL_LEVELS = -1000.0;
 const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gathers
 const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one stretch
 const uint SCATTER_SLOT = 16u;      // samples over which stretches are held against each other
+const float LEAST_GROWTH = 0.05;    // of tissue's volume; a coarse field may say less, or more than 1 over it
 const uint SCATTER_PIECE = 32u;     // samples in which deformed tissue is searched at once
 const float SAMPLE_BLEND = 0.0625;  // of a sample: about halfway between two, both get a share of a scatterer
 const uint POINT_GROUP = 8u;        // point targets that share a bounding sphere
@@ -162,7 +165,7 @@ struct Fusion {
     uint size_x; uint size_y; uint size_z;        // texels
     uint blur;                                    // pixels of the box by which the mask is blurred, at least 1
     float slope; float intercept;                 // texel to grey level 0..1
-    uint blend; uint unused0;                     // BLEND_*
+    uint blend; uint mask_speed;                  // BLEND_*, MASK_SPEED_*
 };
 
 const uint SURVEY_CUT = 1u;         // what lies before the image plane is cut away

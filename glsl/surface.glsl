@@ -38,10 +38,16 @@ vec3 surface_geometric_normal(Hit hit) {
     return surface_to_world(hit.instance, surface_normalize(cross(b - a, c - a)));
 }
 
-// Both: what they read is read once.
-void surface_met(Hit hit, out vec3 position, out vec3 normal) {
-    position = surface_position(hit);
-    normal = surface_geometric_normal(hit);
+// A hit, and the triangle there: world position, mm, and unit outward normal, both zero where there is no hit.
+struct Met { Hit hit; vec3 position; vec3 normal; };
+
+Met surface_met(Hit hit) {
+    Met met = Met(hit, vec3(0.0), vec3(0.0));
+    if (hit.instance != NONE) {
+        met.position = surface_position(hit);
+        met.normal = surface_geometric_normal(hit);
+    }
+    return met;
 }
 
 // Unit outward normal interpolated from the vertices, world space; the zero vector where they cancel.

@@ -218,13 +218,14 @@ void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interf
     echo.behind = incoherent * phase;
 }
 
-// The interface at a hit, where the path has arrived; `normal`: outward, of the triangle.
-void meet(out Interface at, Hit hit, vec3 normal, bool entering, inout Path path, uint before, uint behind) {
+// The interface where the path has arrived.
+void meet(out Interface at, Met here, bool entering, inout Path path, uint before, uint behind) {
+    Hit hit = here.hit;
     at.instance = hit.instance;
     at.surface = entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside;
     at.before = before;
     at.behind = behind;
-    at.geometric = normal;
+    at.geometric = here.normal;
     at.shading = surface_shading_normal(hit);
     if (!entering) { at.geometric = -at.geometric; at.shading = -at.shading; }
     if (!(dot(path.direction, at.shading) < 0.0)) at.shading = at.geometric;
@@ -340,8 +341,7 @@ void main() {
     bool aimed = false;
     // The first of two surfaces that coincide was found; the ray looks for the other.
     bool pairing = false;
-    Hit first = Hit(0.0, NONE, NONE, 0.0, 0.0);
-    vec3 first_position = vec3(0.0), first_normal = vec3(0.0);
+    Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
     float close = 0.0;
 
     uint guards = 0u, quota = most;
@@ -404,8 +404,8 @@ void main() {
             bool bounces = at_face && (frame.flags & FLAG_FACE_REFLECTION) != 0u && path.reflections < frame.max_reflections;
 
             masks_only = !heard && !aimed && !bounces && !pairing;
-            Hit hit = closest_hit(path.origin, path.direction, mix(path.t_min, max(first.t - close, 0.0), pairing),
-                mix(t_end, first.t + close, pairing), mix(NONE, first.instance, pairing));
+            Hit hit = closest_hit(path.origin, path.direction, mix(path.t_min, max(first.hit.t - close, 0.0), pairing),
+                mix(t_end, first.hit.t + close, pairing), mix(NONE, first.hit.instance, pairing));
             rays += 1u;
             if (masks_only) {
                 // Nothing more is heard of what flies past all masks.
@@ -413,17 +413,11 @@ void main() {
                 aimed = true;
                 continue;
             }
-            vec3 position = vec3(0.0), normal = vec3(0.0);
-            if (hit.instance != NONE) surface_met(hit, position, normal);
-            Hit other = Hit(hit.t, NONE, NONE, 0.0, 0.0);
-            vec3 other_position = vec3(0.0), other_normal = vec3(0.0);
+            Met here = surface_met(hit);
+            Met other = Met(Hit(hit.t, NONE, NONE, 0.0, 0.0), vec3(0.0), vec3(0.0));
             if (pairing) {
-                other = hit;
-                other_position = position;
-                other_normal = normal;
-                hit = first;
-                position = first_position;
-                normal = first_normal;
+                other = here;
+                here = first;
                 pairing = false;
             } else {
                 aimed = !heard;
@@ -451,38 +445,32 @@ void main() {
                     reflect_path(path, face_side, SPECULAR, 0.0);
                     continue;
                 }
-                close = clearance(position);
+                close = clearance(here.position);
                 if (is_left(path, hit)) {
                     path.t_min = hit.t + close;
                     path.crossings += 1u;
                     continue;
                 }
                 if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-                    first = hit;
-                    first_position = position;
-                    first_normal = normal;
+                    first = here;
                     pairing = true;
                     continue;
                 }
             }
-            float past = hit.t + close;
-            if (other.instance != NONE) past = max(past, other.t + close);
+            float past = here.hit.t + close;
+            if (other.hit.instance != NONE) past = max(past, other.hit.t + close);
             // Rounding chooses which of the two is found first; it must not choose whose echo it is.
-            if (other.instance < hit.instance) {
-                Hit found = hit;
-                hit = other;
+            if (other.hit.instance < here.hit.instance) {
+                Met found = here;
+                here = other;
                 other = found;
-                position = other_position;
-                vec3 found_normal = normal;
-                normal = other_normal;
-                other_normal = found_normal;
             }
-            bool entering = dot(path.direction, normal) < 0.0;
+            bool entering = dot(path.direction, here.normal) < 0.0;
             copy_media(after, media);
             // A loop: every copy of the call takes drivers time to compile.
-            [[dont_unroll]] for (uint i = 0u; i < (other.instance == NONE ? 1u : 2u); ++i) {
-                bool enters = i == 0u ? entering : dot(path.direction, other_normal) < 0.0;
-                if (!cross_interface(after, i == 0u ? hit.instance : other.instance, enters)) atomicAdd(counters.stack_overflow, copies);
+            [[dont_unroll]] for (uint i = 0u; i < (other.hit.instance == NONE ? 1u : 2u); ++i) {
+                bool enters = i == 0u ? entering : dot(path.direction, other.normal) < 0.0;
+                if (!cross_interface(after, i == 0u ? here.hit.instance : other.hit.instance, enters)) atomicAdd(counters.stack_overflow, copies);
             }
             uint behind = current_instance(after);
             path.crossings += 1u;
@@ -494,13 +482,13 @@ void main() {
                 copy_media(media, after);
                 continue;
             }
-            emit_segment(path, line, n, before, hit.t);
-            advance(path, hit.t, way, position);
-            leave(path, hit);
+            emit_segment(path, line, n, before, here.hit.t);
+            advance(path, here.hit.t, way, here.position);
+            leave(path, here.hit);
             if (passes) {
                 // The mask begins or ends within a medium: the stretch is cut there. Outside another
                 // medium begins, and sound goes straight on.
-                path.t_min = max(path.t_min, past - hit.t);
+                path.t_min = max(path.t_min, past - here.hit.t);
                 if (behind != before) {
                     path.weight *= passed(tissues[tissue_of(before)].impedance, tissues[tissue_of(behind)].impedance);
                     path.interactions += 1u;
@@ -510,7 +498,7 @@ void main() {
             }
             aimed = false;
             path.interactions += 1u;
-            meet(at, hit, normal, entering, path, tissue_of(before), tissue_of(behind));
+            meet(at, here, entering, path, tissue_of(before), tissue_of(behind));
             if (role == ROLE_MAIN) {
                 write_down(slot + written, path, n, at);
                 written += 1u;

@@ -10,9 +10,12 @@ mod common;
 mod images;
 mod info;
 mod matching;
+mod order;
 mod reconstruct;
+mod register;
 mod render;
 mod serve;
+mod study;
 mod sweep;
 mod view;
 
@@ -36,10 +39,14 @@ enum Command {
     Match(Box<matching::Match>),
     /// Reconstruct a volume from tracked frames
     Reconstruct(Box<reconstruct::Reconstruct>),
+    /// Place the acquired volume, or the model in it, by a surface that was segmented in the volume
+    Register(Box<register::Register>),
     /// Render a scene to a B-mode image
     Render(Box<render::Render>),
     /// Simulate without a window: a tracker moves the probe, viewers receive the images
     Serve(Box<serve::Serve>),
+    /// Make a user study of realism (form and key), or tables of what was answered
+    Study(study::Study),
     /// Render a scene many times, one parameter at a time, onto one labelled sheet
     Sweep(Box<sweep::Sweep>),
     /// Open a window: the live image, the probe under the keyboard, every setting
@@ -54,8 +61,10 @@ pub fn run() -> ExitCode {
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
         Command::Match(args) => matching::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Register(args) => register::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
+        Command::Study(study) => study::run(&study).map(|()| ExitCode::SUCCESS),
         Command::Sweep(sweep) => sweep::run(&sweep).map(|()| ExitCode::SUCCESS),
         Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
     };

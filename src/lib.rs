@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 pub mod acquire;
+pub mod files;
 pub mod gpu;
 pub mod harness;
 pub mod igtl;
@@ -17,9 +18,11 @@ pub mod output;
 pub mod plot;
 pub mod probe;
 pub mod reference;
+pub mod register;
 pub mod scene;
 pub mod sheet;
 pub mod sim;
 pub mod statistics;
+pub mod study;
 pub mod view;
 pub mod volume;

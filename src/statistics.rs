@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+pub mod ranks;
+
 /// Order statistics by nearest rank; NaN of nothing.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Statistics {

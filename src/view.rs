@@ -20,6 +20,7 @@ mod link;
 pub mod look;
 mod mmode;
 pub mod model;
+mod notes;
 mod notice;
 mod open;
 mod opening;

@@ -26,7 +26,7 @@ fn small(name: &str) -> Scene {
 }
 
 fn strategies(tracer: Tracer) -> impl Iterator<Item = Strategy> {
-    let has = move |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Union;
+    let has = move |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Selector;
     Strategy::ALL.into_iter().filter(has)
 }
 
@@ -170,16 +170,16 @@ fn between_keyframes_the_device_moves_vertices_as_the_host_does() {
     assert!(messages.is_empty(), "{messages:#?}");
 }
 
-/// The ray query has no union box; the message says what to take instead.
+/// The ray query has no node with a union box; the message says what to take instead.
 #[test]
-fn the_ray_query_refuses_a_union_box() {
+fn the_ray_query_refuses_a_selector_node() {
     let device = test_device();
     let mut scene = small("limbs.toml");
-    choose(&mut scene, Strategy::Union, 0.0);
+    choose(&mut scene, Strategy::Selector, 0.0);
     let refused = Simulator::new(&device, &Library::embedded(), &scene, Tracer::RayQuery);
     let message = refused.err().expect("refused").to_string();
     assert!(
-        message.contains("`union`") && message.contains("`mask`"),
+        message.contains("`selector`") && message.contains("`mask`"),
         "{message}"
     );
 }

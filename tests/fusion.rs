@@ -9,7 +9,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 use insonify::gpu::{Device, Image, ImageDim, ImageFormat, Kernel, test_device};
 use insonify::harness::{self, Case, SUBJECTS, Size};
-use insonify::scene::{Acquired, Scene, SceneError};
+use insonify::scene::{Acquired, Scene, SceneError, Strategy, shapes};
 use insonify::sim::dump;
 use insonify::sim::fusion::Tint;
 use insonify::sim::shaders::Library;
@@ -224,6 +224,106 @@ fn only_what_the_mask_encloses_is_heard_and_it_is_what_it_was() {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
+/// A mask whose keyframes are balls of 5 and 8 mm, swayed by up to 4 mm to the side and 3 mm down.
+const MOVING: &str = r#"
+[[transform]]
+name = "sway"
+translate = [0.7, 0.2, 20.3]
+motion = { kind = "sine", period = 4, translate = [4, 0, 3] }
+[[selector]]
+name = "beat"
+parent = "sway"
+period = 2
+strategy = "STRATEGY"
+[[mesh]]
+name = "sac"
+parent = "beat"
+tissue = "denser"
+keyframes = ["small.obj", "large.obj"]
+[volume]
+file = "volume.mha"
+[fusion]
+mask = ["sac"]
+"#;
+const RADII: [f64; 2] = [5.0, 8.0];
+
+/// Samples of the mask on the wrong side of the ball that `seconds` show, but for one beside its surface; and samples inside.
+fn wrong_of_ball(scene: &Scene, prescan: &[f32], seconds: f64) -> (usize, usize) {
+    let sway = (std::f64::consts::TAU * seconds / 4.0).sin();
+    let centre = DVec3::new(0.7 + 4.0 * sway, 0.2, 20.3 + 3.0 * sway);
+    let radius = RADII[(seconds / 1.0) as usize % 2];
+    let (samples, pitch) = (scene.probe.samples, scene.probe.sample_pitch());
+    let (mut wrong, mut inside) = (0, 0);
+    for l in 0..scene.probe.scanlines {
+        let (mut o, d) = scene.probe.ray(l, 0);
+        o.y = 0.0;
+        for k in 0..samples {
+            let t = f64::from(k) * pitch;
+            let within = |t: f64| (o + t * d).distance(centre) < radius;
+            let found = prescan[2 * (l * samples + k) as usize] == 0.0;
+            inside += usize::from(found);
+            wrong += usize::from(![t - pitch, t, t + pitch].map(within).contains(&found));
+        }
+    }
+    (wrong, inside)
+}
+
+#[test]
+fn a_mask_follows_its_transform_and_its_selector_by_every_strategy() {
+    let device = test_device();
+    let library = Library::embedded();
+    let obj = |radius: f64| {
+        let ball = shapes::sphere(radius, 4);
+        let vertices = ball
+            .positions
+            .iter()
+            .map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+        let face = |t: &[u32; 3]| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+        let faces = ball.triangles.iter().map(face);
+        vertices.chain(faces).collect::<String>()
+    };
+    for strategy in Strategy::ALL {
+        let folder = tempfile::tempdir().expect("a folder");
+        write(
+            folder.path(),
+            &MOVING.replace("STRATEGY", &strategy.to_string()),
+        );
+        for (name, radius) in [("small", RADII[0]), ("large", RADII[1])] {
+            std::fs::write(folder.path().join(format!("{name}.obj")), obj(radius))
+                .expect("written");
+        }
+        let (mut scene, _) = Scene::load(&folder.path().join("scene.toml"), &[]).expect("sound");
+        for tracer in [Tracer::Bvh, Tracer::RayQuery] {
+            if (strategy, tracer) == (Strategy::Selector, Tracer::RayQuery) {
+                continue;
+            }
+            scene.set_time(0.0);
+            let mut simulator =
+                Simulator::new(&device, &library, &scene, tracer).expect("a simulator");
+            // Keyframes as they are, in the middle of their turns and at their begin: between them some strategies blend.
+            let times = [0.0, 1.0, 2.0, 3.0, 5.0];
+            for (i, seconds) in times.into_iter().enumerate() {
+                scene.set_time(seconds);
+                simulator.frame(&scene, 0).expect("a frame");
+                let steps = simulator.fusion_steps().expect("read").expect("fused");
+                let (wrong, inside) = wrong_of_ball(&scene, &steps.prescan, seconds);
+                // Triangles of a sphere of 5120 lie up to a thousandth of the radius inside.
+                assert!(
+                    wrong == 0 && inside > 1000,
+                    "{strategy}, {tracer}, {seconds} s: {wrong} of {inside}"
+                );
+                let other = times[(i + 1) % times.len()];
+                let (planted, _) = wrong_of_ball(&scene, &steps.prescan, other);
+                assert!(
+                    planted > 500,
+                    "{strategy}, {tracer}: the ball of {other} s is another: {planted}"
+                );
+            }
+        }
+    }
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
+}
+
 #[test]
 fn masks_off_the_image_are_found() {
     let off = |place: &str| {
@@ -344,6 +444,7 @@ fn a_volume_beyond_the_devices_limit_is_averaged_with_a_warning() {
         voxels: Arc::new(Voxels::F32(voxels.collect())),
         world_from_voxel: DAffine3::from_translation(DVec3::new(-30.0, -30.0, -30.0))
             * DAffine3::from_scale(DVec3::new(pitch, 60.0, 90.0)),
+        world_from_lps: DAffine3::IDENTITY,
         black: 0.0,
         white: 1.0,
     });

@@ -61,7 +61,7 @@ profile() { # NAME LIMIT ARGUMENT...
 }
 
 scenes=(scenes/phantom.toml scenes/abdomen.toml scenes/heart.toml scenes/fetus.toml scenes/pregnancy.toml scenes/limbs.toml)
-paper=(paper --fusion scenes/fetus.toml --fetus scenes/fetus.toml --heart scenes/heart.toml)
+paper=(paper --fetus scenes/pregnancy.toml --heart scenes/heart.toml)
 part device 10 "$programs/insonify" info
 if [ $quick = 1 ]; then
   small=(--set probe.scanlines=48 --set probe.elevation_layers=3 --set probe.samples=1024)

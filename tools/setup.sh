@@ -78,8 +78,27 @@ second_driver() {
   rm -rf "$into/package"
 }
 
+# The form of a user study is filled in by a browser. Ubuntu's package is a snap, which needs a daemon.
+browser() {
+  command -v chromedriver >/dev/null && return
+  if ! command -v apt-get >/dev/null || ! grep -qs '^ID=debian' /etc/os-release; then
+    say "no chromium with chromedriver here: tests in a browser are skipped"
+    return
+  fi
+  say "installing chromium and chromium-driver, in which tests fill in a form"
+  local as=()
+  [ "$(id -u)" = 0 ] || as=(sudo -n)
+  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
+    chromium chromium-driver >/dev/null 2>&1 || say "that failed: tests in a browser are skipped"
+}
+tests_only() {
+  [ "$mode" = run ] && return
+  second_driver
+  browser
+}
+
 if [ ${#want[@]} -eq 0 ] && [ -z "$driver" ]; then
-  [ "$mode" = run ] || second_driver
+  tests_only
   exit 0
 fi
 
@@ -127,4 +146,4 @@ if [ -n "$driver" ]; then
   say "no Vulkan driver found: installing Mesa's, among them the software driver lavapipe"
   apt install -y --no-install-recommends "${target[@]}" mesa-vulkan-drivers
 fi
-[ "$mode" = run ] || second_driver
+tests_only

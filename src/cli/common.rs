@@ -9,7 +9,7 @@ use miette::{IntoDiagnostic, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, cache_folder};
 use insonify::scene::Scene;
-use insonify::scene::file::override_of;
+use insonify::scene::file::{self, override_of};
 use insonify::scene::settings::{Quality, Simulation};
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
@@ -34,6 +34,10 @@ pub struct Common {
     /// Vulkan device: part of its name, or its index in `insonify info`.
     #[arg(long)]
     pub device: Option<String>,
+    /// The paper's way where the scene's differs: sampling, surfaces, scatterers, fusion, selector nodes
+    /// (docs/paper.md). What --set gives stays.
+    #[arg(long)]
+    pub paper: bool,
     /// Overrides an entry of the scene file, e.g. --set simulation.paths=32 --set probe.depth="80 mm".
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = override_of)]
     pub overrides: Vec<(String, String)>,
@@ -64,7 +68,8 @@ pub enum QualityChoice {
     Reference,
 }
 
-fn seconds(text: &str) -> Result<f64, String> {
+/// A time on the command line, s.
+pub fn seconds(text: &str) -> Result<f64, String> {
     insonify::scene::file::seconds(text)
 }
 
@@ -98,6 +103,8 @@ impl Common {
     /// The device has no ray query.
     pub fn tracer(&self, device: &Arc<Device>, scene: &Scene) -> Result<Tracer> {
         let wanted = match self.tracer {
+            // Its selector nodes are the compute tracer's.
+            TracerChoice::Auto if self.paper => Some(Tracer::Bvh),
             TracerChoice::Auto => None,
             TracerChoice::RayQuery => Some(Tracer::RayQuery),
             TracerChoice::Bvh => Some(Tracer::Bvh),
@@ -116,12 +123,19 @@ impl Common {
         Ok(tracer)
     }
 
+    /// What of the scene file at `path` is overridden: by `--paper`, and by `--set` after that.
+    pub fn overrides(&self, path: &Path) -> Vec<(String, String)> {
+        let selectors = self.tracer != TracerChoice::RayQuery;
+        let of_paper = self.paper.then(|| file::paper(path, selectors));
+        [of_paper.unwrap_or_default(), self.overrides.clone()].concat()
+    }
+
     /// Loads a scene with the overrides, and says on standard error what it warns of.
     ///
     /// # Errors
     /// What is wrong with the file.
     pub fn scene(&self, path: &Path) -> Result<Scene> {
-        let (scene, warnings) = Scene::load(path, &self.overrides)?;
+        let (scene, warnings) = Scene::load(path, &self.overrides(path))?;
         for warning in &warnings {
             eprintln!("{warning}");
         }

@@ -11,12 +11,11 @@ use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common};
-use order::order;
+use super::order::order;
 use pictures::{Picture, Studio};
 use record::Record;
 
-mod order;
-mod pictures;
+pub(super) mod pictures;
 mod record;
 
 /// Arguments of `insonify sweep`.
@@ -72,7 +71,8 @@ impl fmt::Display for Show {
 /// Everything that the user or the device can get wrong, said once.
 pub fn run(args: &Sweep) -> Result<()> {
     let common = &args.common;
-    let (mut scene, variants, warnings) = Scene::load_sweep(&args.scene, &common.overrides)?;
+    let (mut scene, variants, warnings) =
+        Scene::load_sweep(&args.scene, &common.overrides(&args.scene))?;
     for warning in &warnings {
         eprintln!("{warning}");
     }
@@ -142,7 +142,10 @@ impl Files {
 
 /// Writes sheet, table and single images.
 fn write(args: &Sweep, scene: &Scene, pictures: &[Picture], files: &Files) -> Result<()> {
-    let order = order(pictures.len(), args.shuffle);
+    let order = match args.shuffle {
+        Some(seed) => order(pictures.len(), seed, 0),
+        None => (0..pictures.len()).collect(),
+    };
     let blind = args.shuffle.is_some();
     let shown: Vec<&Picture> = order.iter().map(|&i| &pictures[i]).collect();
     let mut tiles: Vec<Tile<'_>> = (1..)

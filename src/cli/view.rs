@@ -63,7 +63,7 @@ pub fn run(args: &View) -> Result<()> {
     let common = args.common.clone();
     let options = Options {
         file: args.scene.clone(),
-        overrides: common.overrides.clone(),
+        overrides: common.overrides(&args.scene),
         // Both tracers: the console exchanges them.
         device: common.device_options(),
         library: Arc::new(Library::embedded()),

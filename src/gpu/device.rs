@@ -223,7 +223,7 @@ impl Device {
     pub fn threads_at_once(&self) -> u32 {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
         match self.info.kind {
-            AdapterKind::Cpu => 512 * cores,
+            AdapterKind::Cpu => 256 * cores,
             _ => 1 << 18,
         }
     }
@@ -284,7 +284,7 @@ impl Device {
         self.kept.knows(what)
     }
 
-    /// Whether the driver compiles a kernel only when it first runs, and then keeps it for every device.
+    /// True for a driver that compiles a kernel only when it first runs, and then keeps it for every device.
     pub(crate) fn compiles_late(&self) -> bool {
         self.jit && !kept::llvmpipe_has_nothing()
     }

@@ -35,7 +35,8 @@ pub fn cache_folder() -> Option<PathBuf> {
     dirs::cache_dir().map(|folder| folder.join("insonify").join("pipelines"))
 }
 
-/// Where Mesa keeps what it compiles for this program: see [`super::prepare_process`].
+/// The folder for what Mesa compiles for this program, see [`super::prepare_process`]; none where the system
+/// names no cache folder.
 pub(crate) fn mesa_folder() -> Option<PathBuf> {
     dirs::cache_dir().map(|folder| folder.join("insonify").join("mesa"))
 }

@@ -142,8 +142,8 @@ impl Kernel {
         Ok(made)
     }
 
-    /// Whether it has never run on this device and driver, where that is kept: the first run waits for the
-    /// driver's compiler.
+    /// True for a kernel that has never run on this device and driver, where that is kept: its first run waits
+    /// for the driver's compiler.
     pub fn is_new(&self) -> bool {
         self.0.device.kept.is_new(self.0.id)
     }

@@ -8,7 +8,10 @@ use super::inputs::{Random, frame, samples, scanlines, scanlines_size};
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::mask;
-use crate::sim::layout::{Counters, FLAG_COINCIDENT, Frame, Fusion, Instance};
+use crate::sim::layout::{
+    Counters, FLAG_COINCIDENT, Frame, Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE,
+    Tissue,
+};
 use crate::sim::placement;
 
 /// Distance from a crossing, mm, within which a sample may be on either side.
@@ -27,6 +30,9 @@ pub const SUBJECT: Subject = Subject {
         let frame: Frame = job.one("frame");
         let fusion: Fusion = job.one("fusion");
         let texels = fusion.size_x as usize * fusion.size_y as usize * fusion.size_z as usize;
+        let instances: Vec<Instance> = job.get("instances");
+        let tissues = instances.iter().map(|i| i.tissue as usize + 1).max();
+        let tissues = tissues.unwrap_or(1);
         let mut sizes = vec![size_of::<Frame>()];
         sizes.extend(worlds::sizes(job));
         sizes.extend([
@@ -35,6 +41,7 @@ pub const SUBJECT: Subject = Subject {
             size_of::<Counters>(),
             8 * samples(&frame),
             scanlines_size(&frame),
+            tissues * size_of::<Tissue>(),
         ]);
         sizes
     },
@@ -87,6 +94,10 @@ fn job(case: Case, size: Size) -> Job {
         blur: 32,
         slope: 1.25,
         intercept: -0.125,
+        mask_speed: match case {
+            Case::Modes => MASK_SPEED_PROBE,
+            _ => MASK_SPEED_ENCLOSING,
+        },
         ..Fusion::default()
     };
     let texels = (size_x * size_y * size_z) as usize;
@@ -100,6 +111,7 @@ fn job(case: Case, size: Size) -> Job {
     let prescan = 2 * samples(&frame);
     inputs.push(Input::output("prescan", Element::Float, prescan));
     inputs.push(scanlines(&frame));
+    inputs.push(Input::words("tissues", &worlds::tissues()));
     Job {
         inputs,
         push: Vec::new(),
@@ -112,16 +124,17 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let fusion: Fusion = job.one("fusion");
     let texels: Vec<f32> = job.get("acquired");
     let got: Vec<[f32; 2]> = job.after(outputs, "prescan");
-    let lines = mask::crossings(&world);
-    let places = mask::places(&frame, &fusion);
+    let lines = mask::crossings(&world, &fusion);
+    let places = mask::places(&frame, &fusion, &lines);
     let mut wrong = 0;
     let mut near = 0;
     for (i, &[found, _]) in got.iter().enumerate() {
         let line = &lines[i / frame.samples as usize];
-        let t = mask::distance(&frame, i as u32 % frame.samples);
-        let either = line.along.iter().any(|c| (c.0 - t).abs() < EDGE);
+        let depth = mask::depth(&frame, i as u32 % frame.samples);
+        let either = line.along.iter().any(|c| (c.depth - depth).abs() < EDGE);
         near += usize::from(either);
-        let right = f64::from(found) == line.mask(t) || (either && (found == 0.0 || found == 1.0));
+        let right =
+            f64::from(found) == line.mask(depth) || (either && (found == 0.0 || found == 1.0));
         wrong += usize::from(!right);
     }
     let size = DVec3::new(

@@ -1,6 +1,6 @@
 //! One dispatch of one kernel.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::{Extent, Job};
@@ -9,6 +9,7 @@ use crate::gpu::{
     ImageDim, ImageFormat, Kernel, Stage, Tlas, TlasInstance,
 };
 use crate::sim::layout::{Fusion, Instance};
+use crate::sim::rounds::Round;
 
 /// What a run left behind.
 pub struct Outcome {
@@ -51,6 +52,10 @@ pub fn run(
             _ => Binding::Buffer(&buffers[info.binding as usize]),
         })
         .collect();
+    let by_role = match extent {
+        Extent::Rounds(rounds) => specialized(kernel, rounds)?,
+        _ => BTreeMap::new(),
+    };
     let (_, timings) = device.once_timed(|commands| {
         commands.scope(kernel.name());
         match extent {
@@ -59,9 +64,13 @@ pub fn run(
                 commands.dispatch_groups(kernel, *groups, &job.push, &bindings)
             }
             Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
-                let kernel = kernel.specialized(&round.constants())?;
                 let push = bytemuck::cast_slice(&round.push);
-                commands.dispatch(&kernel, [round.workers, 1, 1], push, &bindings)?;
+                commands.dispatch(
+                    &by_role[&round.role],
+                    [round.workers, 1, 1],
+                    push,
+                    &bindings,
+                )?;
                 commands.barrier(Stage::Compute, Stage::Compute);
                 Ok(())
             }),
@@ -78,6 +87,13 @@ pub fn run(
         outputs,
         milliseconds,
     })
+}
+
+/// The kernel for each role that some round has.
+fn specialized(kernel: &Kernel, rounds: &[Round]) -> Result<BTreeMap<u32, Kernel>, GpuError> {
+    let roles: BTreeSet<u32> = rounds.iter().map(|round| round.role).collect();
+    let made = |role| Ok((role, kernel.specialized(&Round::constants(role))?));
+    roles.into_iter().map(made).collect()
 }
 
 /// The floats of binding `at` as an image.

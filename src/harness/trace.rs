@@ -14,7 +14,7 @@ use crate::sim::layout::{
 };
 use crate::sim::rounds::Rounds;
 
-/// So few that each takes several pieces of work.
+/// So few that each takes several pieces of work, and that there are several groups of lines.
 const WORKERS: u32 = 64;
 
 pub const SUBJECT: Subject = Subject {
@@ -30,7 +30,7 @@ pub const SUBJECT: Subject = Subject {
     extent: |job| {
         let frame: Frame = job.one("frame");
         let [begin, count]: [u32; 2] = bytemuck::pod_read_unaligned(&job.push);
-        Extent::Rounds(Rounds::new(&frame, count).of(&frame, begin..begin + count, WORKERS, &mut 0))
+        Extent::Rounds(Rounds::new(&frame, count, WORKERS).of(&frame, begin..begin + count, &mut 0))
     },
     check,
     plant: |job, outputs| {
@@ -78,7 +78,7 @@ fn sizes(job: &Job) -> Vec<usize> {
 
 fn rounds(job: &Job) -> Rounds {
     let [_, count]: [u32; 2] = bytemuck::pod_read_unaligned(&job.push);
-    Rounds::new(&job.one("frame"), count)
+    Rounds::new(&job.one("frame"), count, WORKERS)
 }
 
 /// Frame, tissues, surfaces, the world's five bindings, and its fields.

@@ -85,6 +85,13 @@ impl<'a> Field<'a> {
         found
     }
 
+    /// How many times its volume at rest the tissue around the reference point `p` takes now.
+    pub fn growth(&self, p: DVec3) -> f64 {
+        (DMat3::IDENTITY + self.with_gradient(p).1)
+            .determinant()
+            .abs()
+    }
+
     /// Distance of nodes along x, mm.
     pub fn spacing(&self) -> f64 {
         self.scale.x.recip()

@@ -4,24 +4,47 @@
 use glam::DVec3;
 
 use super::geometry::{line, world_line};
-use super::world::{World, affine};
-use crate::sim::layout::{Frame, Fusion};
+use super::world::{Crossing, World, affine};
+use crate::sim::layout::{Frame, Fusion, MASK_SPEED_PROBE};
 
-/// Crossings of one scanline with the masking instances, by distance.
+/// Crossings of one scanline with the masking instances, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Crossings {
     /// Masking instances around the start.
     pub enclosing: i32,
-    /// Distance, mm, and whether the scanline goes in.
-    pub along: Vec<(f64, bool)>,
+    /// Those that it meets.
+    pub along: Vec<Met>,
+    /// Distance per depth before the first.
+    rate: f64,
+}
+
+/// A crossing. Depths are mm at the probe's speed: where the sound that is there echoes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Met {
+    /// Distance, mm.
+    pub distance: f64,
+    /// Depth, mm.
+    pub depth: f64,
+    /// Whether the scanline goes in.
+    pub entry: bool,
+    /// Distance per depth behind it.
+    rate: f64,
 }
 
 impl Crossings {
-    /// Mask at distance `t`, mm: 1 outside all instances.
-    pub fn mask(&self, t: f64) -> f64 {
-        let before = self.along.iter().filter(|c| c.0 <= t);
-        let net: i32 = before.map(|c| if c.1 { 1 } else { -1 }).sum();
+    /// Mask at a depth, mm: 1 outside all instances.
+    pub fn mask(&self, depth: f64) -> f64 {
+        let before = self.along.iter().filter(|met| met.depth <= depth);
+        let net: i32 = before.map(|met| if met.entry { 1 } else { -1 }).sum();
         if self.enclosing + net > 0 { 0.0 } else { 1.0 }
+    }
+
+    /// Distance along the scanline, mm, of a depth.
+    fn distance(&self, depth: f64) -> f64 {
+        match self.along.iter().rfind(|met| met.depth <= depth) {
+            Some(met) => met.distance + met.rate * (depth - met.depth),
+            None => self.rate * depth,
+        }
     }
 }
 
@@ -37,37 +60,81 @@ fn middle(frame: &Frame, l: u32) -> (DVec3, DVec3) {
 }
 
 /// The crossings of each scanline. What it leaves more often than it enters encloses its start.
-pub fn crossings(world: &World) -> Vec<Crossings> {
+pub fn crossings(world: &World, fusion: &Fusion) -> Vec<Crossings> {
     let masks = |instance: u32| world.instances[instance as usize].masks != 0;
     (0..world.frame.scanlines)
         .map(|l| {
             let (origin, direction) = middle(world.frame, l);
-            let all = world.crossings(origin, direction, [0.0, f64::INFINITY]);
-            let along: Vec<_> = all
-                .iter()
-                .filter(|c| masks(c.instance))
-                .map(|c| (c.t, c.entry))
-                .collect();
+            let mut all = world.crossings(origin, direction, [0.0, f64::INFINITY]);
+            all.retain(|c| masks(c.instance));
+            let rate = |passed: usize| match fusion.mask_speed {
+                MASK_SPEED_PROBE => 1.0,
+                _ => rate_behind(world, &all, passed),
+            };
+            let (mut distance, mut depth) = (0.0, 0.0);
+            let along = all.iter().enumerate().map(|(i, crossing)| {
+                depth += (crossing.t - distance) / rate(i);
+                distance = crossing.t;
+                Met {
+                    distance,
+                    depth,
+                    entry: crossing.entry,
+                    rate: rate(i + 1),
+                }
+            });
             Crossings {
-                enclosing: along.iter().map(|c| if c.1 { -1 } else { 1 }).sum(),
-                along,
+                along: along.collect(),
+                enclosing: -all.iter().map(sign).sum::<i32>(),
+                rate: rate(0),
             }
         })
         .collect()
 }
 
-/// Distance of sample `k` along its scanline, mm.
-pub fn distance(frame: &Frame, k: u32) -> f64 {
+fn sign(crossing: &Crossing) -> i32 {
+    if crossing.entry { 1 } else { -1 }
+}
+
+/// Distance per depth behind the first `passed` crossings: the speed of the masking instance around, of the highest
+/// priority, of equals the one entered last; over the probe's.
+fn rate_behind(world: &World, all: &[Crossing], passed: usize) -> f64 {
+    let around = all[passed..].iter().filter(|candidate| {
+        let own = all[passed..]
+            .iter()
+            .filter(|c| c.instance == candidate.instance);
+        own.map(sign).sum::<i32>() < 0
+    });
+    let rank = |c: &&Crossing| {
+        let enters = |other: &Crossing| other.instance == c.instance && other.entry;
+        let entered = all[..passed].iter().rposition(enters).map_or(0, |i| i + 1);
+        (world.instances[c.instance as usize].priority, entered)
+    };
+    // Of several that are alike the first: the one left first.
+    let best = around.reduce(|best, next| {
+        if rank(&next) > rank(&best) {
+            next
+        } else {
+            best
+        }
+    });
+    best.map_or(1.0, |crossing| {
+        let tissue = world.instances[crossing.instance as usize].tissue;
+        f64::from(world.tissues[tissue as usize].speed) / f64::from(world.frame.speed)
+    })
+}
+
+/// Depth of sample `k`, mm at the probe's speed.
+pub fn depth(frame: &Frame, k: u32) -> f64 {
     f64::from(k) * f64::from(frame.sample_pitch)
 }
 
 /// Place of sample k of scanline l in the volume, in texels: [L][K].
-pub fn places(frame: &Frame, fusion: &Fusion) -> Vec<DVec3> {
+pub fn places(frame: &Frame, fusion: &Fusion, lines: &[Crossings]) -> Vec<DVec3> {
     let voxel_from_world = affine(&fusion.voxel_from_world);
     let mut out = Vec::new();
-    for l in 0..frame.scanlines {
+    for (l, line) in (0..frame.scanlines).zip(lines) {
         let (origin, direction) = middle(frame, l);
-        let at = |k| origin + distance(frame, k) * direction;
+        let at = |k| origin + line.distance(depth(frame, k)) * direction;
         out.extend((0..frame.samples).map(|k| voxel_from_world.transform_point3(at(k))));
     }
     out

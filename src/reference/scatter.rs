@@ -10,7 +10,8 @@ use super::texture::{factor, voxel};
 use super::world::World;
 use super::{Accumulator, Segment};
 use crate::sim::layout::{
-    FLAG_VOXEL, LATTICE_LEVELS, Row, SCATTER_BIN, SCATTER_PIECE, SCATTER_SLOT, Tissue, UNHEARD,
+    FLAG_VOXEL, LATTICE_LEVELS, LEAST_GROWTH, Row, SCATTER_BIN, SCATTER_PIECE, SCATTER_SLOT,
+    Tissue, UNHEARD,
 };
 
 /// Points are seen this many lateral sigmas off the axis.
@@ -474,7 +475,12 @@ impl<'a> Tube<'a> {
                 let half = [1.1 * rows[0].max(rows[1]), 1.1 * reach];
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
-                let texture = factor(self.tissue, deformed.field.reference(middle));
+                let reference = deformed.field.reference(middle);
+                // Squeezed tissue echoes as before, though its scatterers lie closer.
+                let least = f64::from(LEAST_GROWTH);
+                let growth = deformed.field.growth(reference);
+                let texture =
+                    factor(self.tissue, reference) * growth.clamp(least, least.recip()).sqrt();
                 let (low, high) = self.bounds([x0, x1], half);
                 let low = ((low + back - spread) / h).floor().as_i64vec3();
                 let high = ((high + back + spread) / h).floor().as_i64vec3();

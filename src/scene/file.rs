@@ -13,6 +13,7 @@ mod fusion;
 mod graph;
 mod motion;
 mod nodes;
+mod paper;
 mod parameters;
 mod placing;
 mod playing;
@@ -21,6 +22,7 @@ mod probe;
 mod save;
 mod schema;
 mod shelf;
+mod study;
 mod sweep;
 mod tissues;
 mod tracker;
@@ -28,8 +30,10 @@ mod trajectory;
 mod units;
 
 pub use error::SceneError;
+pub use paper::paper;
 pub use preset::{Preset, load_preset};
-pub use save::{Entry, save};
+pub use save::{Entry, Note, save, save_with};
+pub use study::{Plan, Question, Scenario, Slice};
 pub use trajectory::load_trajectory;
 
 use document::{Document, Source};

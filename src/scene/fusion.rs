@@ -21,6 +21,8 @@ pub struct Acquired {
     pub voxels: Arc<Voxels>,
     /// Voxel indices (integers at voxel centres) to the world, mm.
     pub world_from_voxel: DAffine3,
+    /// The volume's own frame, LPS in mm, to the world: its placement.
+    pub world_from_lps: DAffine3,
     /// Stored value that is shown black, at grey level 0.
     pub black: f64,
     /// Stored value that is shown white, at grey level 1; not equal to `black`.
@@ -87,6 +89,28 @@ impl Blend {
     }
 }
 
+/// How fast the scanlines' samples go through the masking meshes, where mask and volume are looked up.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaskSpeed {
+    /// As the sound does: at the speed of the tissue that the masking mesh encloses (the paper). The mask's far border
+    /// lies where its surface echoes.
+    #[default]
+    Enclosing,
+    /// At the probe's speed, as around them: the volume is shown undistorted.
+    Probe,
+}
+
+impl MaskSpeed {
+    /// What scene files call it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Enclosing => "enclosing",
+            Self::Probe => "probe",
+        }
+    }
+}
+
 /// On-the-fly fusion of the acquired volume with the simulation.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fusion {
@@ -98,6 +122,8 @@ pub struct Fusion {
     pub blur: u32,
     /// How the two images meet.
     pub blend: Blend,
+    /// How fast samples go through the masks.
+    pub mask_speed: MaskSpeed,
     /// Whether the anatomy inside the mask throws its shadow into the acquired volume.
     pub background_shadows: bool,
 }

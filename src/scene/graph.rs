@@ -1,7 +1,7 @@
 //! The scene graph: groups, transforms and selectors over meshes, and its evaluation at a time into
 //! the flat list of instances that a frame depends on.
 
-use glam::DAffine3;
+use glam::{DAffine3, DMat3, DVec3};
 
 use super::animation::{Motion, Sequence};
 use super::{Instance, Scene, Strategy};
@@ -63,6 +63,19 @@ pub struct Carrier {
     pub within: Vec<DAffine3>,
     /// Whether a selector shows it at some times only.
     pub switched: bool,
+}
+
+/// A mesh or transform of a scene file, whose placement can be set there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// The kind of its table: `mesh` or `transform`.
+    pub kind: &'static str,
+    /// World from its parent, at the time asked for.
+    pub world_from_parent: DAffine3,
+    /// The placement.
+    pub rest: DAffine3,
+    /// Instances that it carries: indices into [`Scene::instances`].
+    pub instances: Vec<usize>,
 }
 
 /// A node at a time.
@@ -130,6 +143,34 @@ impl Graph {
         carriers
     }
 
+    /// World from object of each of `count` instances at rest, for those whose placements squeeze or stretch them as
+    /// time passes: where a motion scales, or turns what a placement above it scales unevenly. None for the others,
+    /// whose tissue moves as a rigid body.
+    pub fn rests(&self, count: usize) -> Vec<Option<DAffine3>> {
+        /// Placement at rest, whether it scales unevenly, and whether time squeezes.
+        type Rest = (DAffine3, bool, bool);
+        let mut of_nodes: Vec<Rest> = Vec::with_capacity(self.nodes.len());
+        let mut rests = vec![None; count];
+        for node in &self.nodes {
+            let above = node.parent.map(|parent| of_nodes[parent]);
+            let (mut world, mut uneven, mut squeezes) = above.unwrap_or_default();
+            match &node.kind {
+                NodeKind::Transform { rest, motion } => {
+                    world *= *rest * motion.rest();
+                    uneven |= !is_even(rest);
+                    squeezes |= motion.scales() || uneven && *motion != Motion::Still;
+                    uneven |= !is_even(&motion.rest());
+                }
+                NodeKind::Mesh { instance, rest } => {
+                    rests[*instance] = squeezes.then_some(world * *rest);
+                }
+                NodeKind::Group | NodeKind::Selector(_) => {}
+            }
+            of_nodes.push((world, uneven, squeezes));
+        }
+        rests
+    }
+
     /// What has to hold for an instance to be shown: selectors, by node, and the choice of each.
     pub(super) fn conditions(&self, instance: usize) -> Vec<(usize, usize)> {
         let is_it =
@@ -143,6 +184,33 @@ impl Graph {
         out
     }
 
+    /// The world from what is below `node` at `seconds`; the world itself without one.
+    fn world_from(&self, mut node: Option<usize>, seconds: f64) -> DAffine3 {
+        let mut out = DAffine3::IDENTITY;
+        while let Some(below) = node.map(|i| &self.nodes[i]) {
+            if let NodeKind::Transform { rest, motion } = &below.kind {
+                out = *rest * motion.at(seconds) * out;
+            }
+            node = below.parent;
+        }
+        out
+    }
+
+    /// The instances at `node` and below it.
+    fn instances_of(&self, node: usize) -> Vec<usize> {
+        let mut within = vec![false; self.nodes.len()];
+        let mut out = Vec::new();
+        for (i, n) in self.nodes.iter().enumerate() {
+            within[i] = i == node || n.parent.is_some_and(|parent| within[parent]);
+            if let NodeKind::Mesh { instance, .. } = n.kind
+                && within[i]
+            {
+                out.push(instance);
+            }
+        }
+        out
+    }
+
     /// The selector, by node, that switches an instance's keyframes.
     pub(super) fn switch_of(&self, instance: usize) -> Option<usize> {
         let is_it =
@@ -151,6 +219,14 @@ impl Graph {
         let parent = node.parent?;
         matches!(self.nodes[parent].kind, NodeKind::Selector(_)).then_some(parent)
     }
+}
+
+/// Whether a placement scales alike in all directions.
+pub fn is_even(placement: &DAffine3) -> bool {
+    let m = placement.matrix3;
+    let gram = m.transpose() * m;
+    let size = gram.x_axis.x;
+    gram.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(size)), 1e-9 * size)
 }
 
 /// Takes the present keyframe, or the place between keyframes.
@@ -169,6 +245,34 @@ fn choose(instance: &mut Instance, sequence: &Sequence, seconds: f64) {
 }
 
 impl Scene {
+    /// The mesh or transform called `name`, at `seconds`; none where nothing that has a placement is
+    /// called so.
+    pub fn placed(&self, name: &str, seconds: f64) -> Option<Placed> {
+        let named = self.origins.instances.iter().enumerate();
+        let own: Vec<_> = named
+            .filter(|(_, o)| o.mesh == name)
+            .map(|(i, _)| i)
+            .collect();
+        let node = self.graph.nodes.iter().position(|n| n.name == name);
+        let kind = if own.is_empty() { "transform" } else { "mesh" };
+        let (parent, rest, instances) = match node.map(|i| (i, &self.graph.nodes[i])) {
+            Some((i, node)) => match node.kind {
+                NodeKind::Transform { rest, .. } | NodeKind::Mesh { rest, .. } => {
+                    (node.parent, rest, self.graph.instances_of(i))
+                }
+                NodeKind::Group | NodeKind::Selector(_) => return None,
+            },
+            // A mesh without a parent is in no graph.
+            None => (None, self.instances[*own.first()?].world_from_object, own),
+        };
+        Some(Placed {
+            kind,
+            world_from_parent: self.graph.world_from(parent, seconds),
+            rest,
+            instances,
+        })
+    }
+
     /// Moves everything to where it is at `seconds`: placements, what selectors show, and shapes.
     /// Any time, in any order. The scene stays as it is where nothing moves.
     pub fn set_time(&mut self, seconds: f64) {

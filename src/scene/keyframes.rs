@@ -12,18 +12,18 @@ use super::{Mesh, Scene};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Strategy {
-    /// Every keyframe's structure is built once; the top level is rebuilt over the one that is shown
-    /// (Starkov et al. 2019, section II-B, with the tight box of an exchanged node).
+    /// Node exchange (Starkov et al. 2019, section II-B): every keyframe's structure is built once, and the top level is
+    /// rebuilt over the one that is shown, with its own tight box.
     #[default]
-    Selector,
-    /// As `selector`, but the top level is refitted. The compute tracer, whose top level is made on
+    Exchange,
+    /// As `exchange`, but the top level is refitted. The compute tracer, whose top level is made on
     /// the host, keeps its tree and recomputes its boxes.
     Update,
     /// Every keyframe is in the top level at all times, and rays pass by all but one: nothing is built.
     Mask,
-    /// Selector node of Starkov et al. 2019: one entry in the top level with the box around all
-    /// keyframes, whose child is exchanged: nothing is built. Compute tracer only.
-    Union,
+    /// Selector node (the same section): one entry in the top level with the union of all keyframes' boxes, whose
+    /// child is swapped: nothing is built. Compute tracer only.
+    Selector,
     /// The keyframe's geometry is uploaded and its structure built, fast, when it is shown.
     Rebuild,
     /// As `rebuild`, from geometry that has stayed on the device.
@@ -37,10 +37,10 @@ pub enum Strategy {
 impl Strategy {
     /// All of them, in the order in which tables list them.
     pub const ALL: [Self; 8] = [
-        Self::Selector,
+        Self::Exchange,
         Self::Update,
         Self::Mask,
-        Self::Union,
+        Self::Selector,
         Self::Rebuild,
         Self::Cached,
         Self::Refit,
@@ -56,10 +56,10 @@ impl Strategy {
 impl fmt::Display for Strategy {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Selector => "selector",
+            Self::Exchange => "exchange",
             Self::Update => "update",
             Self::Mask => "mask",
-            Self::Union => "union",
+            Self::Selector => "selector",
             Self::Rebuild => "rebuild",
             Self::Cached => "cached",
             Self::Refit => "refit",

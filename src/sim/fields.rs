@@ -8,6 +8,9 @@
 //! membrane's energy, and is harmonic where there is no surface. Homogeneous strain and rotation are
 //! exact; a membrane alone would flatten them next to the surfaces, as nothing holds it outside.
 //!
+//! Tissue that placements squeeze or stretch as time passes (a palpated artery below a transform that scales) has a
+//! field as well: one cell, as the map is affine, over the shape at rest; or what its keyframes' field becomes by it.
+//!
 //! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::padded`] as `fields` (four
 //! floats per vector, which a device reads at once) and writes [`Fields::offset`] into `field` of every
 //! instance's row whenever keyframes or settings have changed. Each instance has one field more, that of the shape
@@ -15,6 +18,8 @@
 
 mod grid;
 mod solve;
+
+use std::ops::Range;
 
 use glam::{DAffine3, DVec3};
 use rayon::prelude::*;
@@ -36,14 +41,18 @@ pub struct Fields {
     pub values: Vec<[f32; 3]>,
     /// Per instance of the scene.
     slots: Vec<Option<Slots>>,
+    /// Per instance: its placement at rest, where time squeezes it.
+    rests: Vec<Option<DAffine3>>,
 }
 
 /// The fields of one instance, one after the other.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Slots {
+    /// Of keyframe 0; `blended` where keyframes have none.
     first: u32,
     stride: u32,
-    /// For what lies between keyframes, whichever strategy shows it: strategies are exchanged live.
+    /// For what lies between keyframes, whichever strategy shows it: strategies are exchanged live; and for what
+    /// placements squeeze.
     blended: u32,
 }
 
@@ -61,17 +70,23 @@ pub struct Blend {
 
 impl Fields {
     /// Fields of every instance that has keyframes of shared topology, from the vertices of all
-    /// instances of its group, which must keep their places relative to each other. Others have none.
+    /// instances of its group, which must keep their places relative to each other, and of those that placements
+    /// squeeze. Others have none.
     pub fn build(scene: &Scene) -> Self {
+        let rests = scene.graph.rests(scene.instances.len());
         let made: Vec<Option<Made>> = (0..scene.instances.len())
             .into_par_iter()
-            .map(|i| make(scene, i))
+            .map(|i| make(scene, i, &rests))
             .collect();
-        let mut fields = Self::default();
+        let mut fields = Self {
+            rests,
+            ..Self::default()
+        };
         for made in made {
             let slots = made.map(|made| fields.append(&made));
             fields.slots.push(slots);
         }
+        fields.follow(scene);
         fields
     }
 
@@ -80,6 +95,7 @@ impl Fields {
         Self {
             values: Vec::new(),
             slots: vec![None; scene.instances.len()],
+            rests: vec![None; scene.instances.len()],
         }
     }
 
@@ -92,10 +108,14 @@ impl Fields {
         }
         let blended = self.values.len() as u32;
         self.values.extend(header);
-        self.values.extend_from_slice(&made.keyframes[0]);
+        let nodes = made.grid.nodes();
+        match made.keyframes.first() {
+            Some(displacements) => self.values.extend_from_slice(displacements),
+            None => self.values.resize(self.values.len() + nodes, [0.0; 3]),
+        }
         Slots {
             first,
-            stride: HEADER + made.grid.nodes() as u32,
+            stride: HEADER + nodes as u32,
             blended,
         }
     }
@@ -121,15 +141,18 @@ impl Fields {
         }
         let keyframes = &scene.instances[i].keyframes;
         self.slots[i].map_or(NONE, |slots| match keyframes.strategy {
+            _ if self.rests[i].is_some() => slots.blended,
             Strategy::Interpolate => slots.blended,
             _ => slots.first + keyframes.nearest() as u32 * slots.stride,
         })
     }
 
-    /// How the field of instance `i` is made before a frame; none where keyframes are shown as they are.
+    /// How the device makes the field of instance `i` before a frame; none where keyframes are shown as they are, and
+    /// where [`Self::follow`] makes it.
     pub fn blend(&self, scene: &Scene, i: usize) -> Option<Blend> {
         let keyframes = &scene.instances[i].keyframes;
-        let slots = self.slots[i].filter(|_| keyframes.strategy == Strategy::Interpolate)?;
+        let between = keyframes.strategy == Strategy::Interpolate && self.rests[i].is_none();
+        let slots = self.slots[i].filter(|_| between)?;
         let at = |keyframe: usize| slots.first + keyframe as u32 * slots.stride + HEADER;
         Some(Blend {
             sources: keyframes
@@ -139,6 +162,58 @@ impl Fields {
             count: slots.stride - HEADER,
         })
     }
+}
+
+impl Fields {
+    /// Brings the fields of what placements squeeze to where these are now. Returns the vectors of [`Self::values`]
+    /// that have changed.
+    pub fn follow(&mut self, scene: &Scene) -> Vec<Range<usize>> {
+        let mut changed = Vec::new();
+        for (i, instance) in scene.instances.iter().enumerate() {
+            let (Some(rest), Some(slots)) = (&self.rests[i], self.slots[i]) else {
+                continue;
+            };
+            let at = slots.blended as usize;
+            let range = at + HEADER as usize..at + slots.stride as usize;
+            let now = self.squeezed(instance, rest, slots);
+            if self.values[range.clone()] != now {
+                self.values[range.clone()].copy_from_slice(&now);
+                changed.push(range);
+            }
+        }
+        changed
+    }
+
+    /// Present displacements, at the nodes, of an instance that placements squeeze: those of its keyframes, and then
+    /// the affine map from its texture space at rest to the present one.
+    fn squeezed(&self, instance: &Instance, rest: &DAffine3, slots: Slots) -> Vec<[f32; 3]> {
+        let placed = &instance.world_from_object;
+        let map = texture_from_object(placed) * texture_from_object(rest).inverse();
+        let keyframes = &instance.keyframes;
+        let weights = match keyframes.strategy {
+            _ if slots.first == slots.blended => Vec::new(),
+            Strategy::Interpolate => keyframes.blend.to_vec(),
+            _ => vec![(keyframes.nearest(), 1.0)],
+        };
+        let grid = Grid::from_header(&self.values[slots.blended as usize..]);
+        let node = |number: usize| {
+            let at = grid.place(grid.node(number));
+            let moved: DVec3 = (weights.iter())
+                .map(|&(keyframe, weight)| {
+                    let first = slots.first as usize + keyframe * slots.stride as usize;
+                    let v = self.values[first + HEADER as usize + number];
+                    weight * DVec3::from(v.map(f64::from))
+                })
+                .sum();
+            (map.transform_point3(at + moved) - at).as_vec3().to_array()
+        };
+        (0..grid.nodes()).map(node).collect()
+    }
+}
+
+/// Texture space is the object's but for a rigid movement.
+fn texture_from_object(world_from_object: &DAffine3) -> DAffine3 {
+    rigid(world_from_object).inverse() * *world_from_object
 }
 
 /// Vectors with a fourth float, which means nothing.
@@ -163,18 +238,30 @@ fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>>
     (others.iter().all(same) && others.iter().any(moves)).then_some(meshes)
 }
 
-fn make(scene: &Scene, index: usize) -> Option<Made> {
+fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made> {
     let instance = &scene.instances[index];
-    let own = keyframes(scene, instance)?;
-    let texture_from_world = rigid(&instance.world_from_object).inverse();
-    let patch = |placed: &Instance, meshes| Patch {
-        meshes,
-        texture_from_object: texture_from_world * placed.world_from_object,
+    let rest = |i: usize| rests[i].unwrap_or(scene.instances[i].world_from_object);
+    let texture_from_world = rigid(&rest(index)).inverse();
+    let vertices = |mesh: &Mesh| {
+        let texture: DAffine3 = texture_from_world * rest(index);
+        let place = move |&p: &[f32; 3]| texture.transform_point3(DVec3::from(p.map(f64::from)));
+        mesh.positions.iter().map(place).collect::<Vec<_>>()
     };
-    let grid = Grid::around(own[0].positions.iter().map(|&p| {
-        let texture: DAffine3 = texture_from_world * instance.world_from_object;
-        texture.transform_point3(DVec3::from(p.map(f64::from)))
-    }));
+    let Some(own) = keyframes(scene, instance) else {
+        // Of shapes that are exchanged for others, all.
+        rests[index]?;
+        let shown = instance.keyframes.meshes.iter().chain([&instance.mesh]);
+        let all = shown.flat_map(|&mesh| vertices(&scene.meshes[mesh]));
+        return Some(Made {
+            grid: Grid::one_cell(all),
+            keyframes: Vec::new(),
+        });
+    };
+    let patch = |i: usize, meshes| Patch {
+        meshes,
+        texture_from_object: texture_from_world * rest(i),
+    };
+    let grid = Grid::around(vertices(own[0]).into_iter());
     let count = own.len();
     let group = instance.keyframes.group;
     let others = scene
@@ -185,10 +272,10 @@ fn make(scene: &Scene, index: usize) -> Option<Made> {
             *other != index && group.is_some() && placed.keyframes.group == group
         });
     let mut patches: Vec<Patch<'_>> = others
-        .filter_map(|(_, placed)| Some(patch(placed, keyframes(scene, placed)?)))
+        .filter_map(|(i, placed)| Some(patch(i, keyframes(scene, placed)?)))
         .filter(|patch| patch.meshes.len() == count)
         .collect();
-    patches.push(patch(instance, own));
+    patches.push(patch(index, own));
     let solver = Solver::new(&grid, &patches);
     let keyframes = (0..count)
         .into_par_iter()

@@ -9,7 +9,7 @@ use super::shaders::Library;
 use super::tracer::Tracer;
 use super::world::World;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
-use crate::scene::fusion::Blend;
+use crate::scene::fusion::{Blend, MaskSpeed};
 use crate::scene::{Acquired, Fusion, Scene};
 use bands::{Bands, Images};
 use shadows::Shadows;
@@ -160,7 +160,10 @@ impl Fused {
                 Blend::Smooth => layout::BLEND_SMOOTH,
                 Blend::Multiband => layout::BLEND_MULTIBAND,
             },
-            unused0: 0,
+            mask_speed: match fusion.mask_speed {
+                MaskSpeed::Enclosing => layout::MASK_SPEED_ENCLOSING,
+                MaskSpeed::Probe => layout::MASK_SPEED_PROBE,
+            },
         }
     }
 
@@ -209,6 +212,7 @@ impl Fused {
                 buffer(simulated.counters),
                 buffer(&self.prescan),
                 buffer(simulated.scanlines),
+                buffer(simulated.tissues),
             ],
         )?;
         cmd.barrier(Stage::Compute, Stage::Compute);

@@ -31,6 +31,10 @@ pub const BLEND_LINEAR: u32 = 0;
 pub const BLEND_SMOOTH: u32 = 1;
 /// A pyramid of the mask weighs those of the images.
 pub const BLEND_MULTIBAND: u32 = 2;
+/// Samples go through masks at the probe's speed.
+pub const MASK_SPEED_PROBE: u32 = 0;
+/// At that of the tissue which the masking mesh encloses.
+pub const MASK_SPEED_ENCLOSING: u32 = 1;
 
 /// The transmitted path always continues, reflected branches are spawned.
 pub const SAMPLING_MAIN_PATH: u32 = 0;
@@ -54,6 +58,8 @@ pub const SCATTER_WINDOW: u32 = 1024;
 pub const SCATTER_BIN: u32 = 64;
 /// Samples in which deformed tissue is searched at once.
 pub const SCATTER_PIECE: u32 = 32;
+/// Share of its volume to which tissue can be squeezed; to 1 over it, it can be stretched. A coarse field may say more.
+pub const LEAST_GROWTH: f32 = 0.05;
 /// Samples over which stretches are held against each other.
 pub const SCATTER_SLOT: u32 = 16;
 /// Of a sample: about halfway between two samples, both get a share of a scatterer's echo.
@@ -199,7 +205,7 @@ shared! {
     struct Fusion {
         voxel_from_world: Rows,
         size_x: u32, size_y: u32, size_z: u32, blur: u32,
-        slope: f32, intercept: f32, blend: u32, unused0: u32,
+        slope: f32, intercept: f32, blend: u32, mask_speed: u32,
     }
     /// How the anatomy is looked at from outside.
     struct Survey {

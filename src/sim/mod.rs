@@ -36,7 +36,7 @@ use passes::{Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
-use stages::{Buffers, Kernels, SEGMENT_BUDGET};
+use stages::{Buffers, Kernels, Room};
 use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
@@ -141,7 +141,8 @@ impl Simulator {
         let shapers = Arc::new(world::Kernels::new(device, library)?);
         let world = World::new(device, &shapers, scene, tracer)?;
         let coincident = scene.coincident_triangles() > 0;
-        let (frame, batches) = frame_constants(scene, &world, coincident, 0, SEGMENT_BUDGET);
+        let room = Room::of(device);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &batches.rounds, &tables)?;
         let fusion = Fused::new(device, library, scene, &frame, tracer)?;
@@ -160,7 +161,7 @@ impl Simulator {
             read_out: ReadOut::default(),
             update_time: Duration::ZERO,
             passes: Passes {
-                kernels: Kernels::new(device, library, &frame, &world, false)?,
+                kernels: Kernels::new(device, library, &batches.rounds, &world, false)?,
                 buffers,
                 fusion,
                 skins: contact::Skins::default(),
@@ -169,7 +170,6 @@ impl Simulator {
                 frame,
                 shown: frame,
                 batches,
-                at_once: device.threads_at_once(),
             },
         };
         simulator.upload_tables()?;
@@ -258,7 +258,7 @@ impl Simulator {
         Ok(began.elapsed())
     }
 
-    /// Whether the first frame waits for the driver's compiler: its kernels have never run here.
+    /// True where the first frame will wait for the driver's compiler: its kernels have never run here.
     pub fn compiles(&self) -> bool {
         self.passes.kernels.scatter.is_new()
     }
@@ -274,7 +274,7 @@ impl Simulator {
         let kernels = Kernels::new(
             &self.device,
             library,
-            &self.passes.frame,
+            &self.passes.batches.rounds,
             world,
             self.counting,
         )?;

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use super::contact::{self, Coupling, Skins, Touch};
 use super::fusion::{Fused, Simulated, Tint};
-use super::stages::{Batches, Buffers, Kernels, lines};
+use super::stages::{Batches, Buffers, Kernels, Room, lines};
 use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
 use crate::scene::Scene;
@@ -23,8 +23,6 @@ pub(super) struct Passes {
     /// Those of the picture that there is.
     pub(super) shown: layout::Frame,
     pub(super) batches: Batches,
-    /// Threads that the device runs at once, about.
-    pub(super) at_once: u32,
 }
 
 impl Passes {
@@ -40,8 +38,11 @@ impl Passes {
         let began = Instant::now();
         self.world.update(cmd, scene)?;
         // A frame of fewer lines than the buffers were made for must not want more segments.
-        let room = self.buffers.segments.size();
-        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, room);
+        let room = Room {
+            segments: self.buffers.segments.size(),
+            at_once: self.batches.rounds.at_once,
+        };
+        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, &room);
         cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
             fusion.update(cmd, scene)?;
@@ -110,11 +111,7 @@ impl Passes {
         let path_end = self.frame.paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
         let paths = path_begin..path_end;
-        for round in self
-            .batches
-            .rounds
-            .of(&self.frame, paths, self.at_once, turn)
-        {
+        for round in self.batches.rounds.of(&self.frame, paths, turn) {
             cmd.dispatch(
                 &self.kernels.trace[round.role as usize],
                 [round.workers, 1, 1],
@@ -284,7 +281,7 @@ pub(super) fn frame_constants(
     world: &World,
     coincident: bool,
     index: u32,
-    segment_bytes: u64,
+    room: &Room,
 ) -> (layout::Frame, Batches) {
     let mut frame = tables::frame(scene, index);
     if coincident {
@@ -295,7 +292,7 @@ pub(super) fn frame_constants(
     if ambiguous {
         frame.flags |= layout::FLAG_SLOTS;
     }
-    let batches = Batches::new(&frame, segment_bytes);
+    let batches = Batches::new(&frame, room);
     frame.segment_capacity = batches.capacity;
     (frame, batches)
 }

@@ -3,7 +3,7 @@
 use super::passes::frame_constants;
 use super::rounds::Rounds;
 use super::shaders::Library;
-use super::stages::{Buffers, SEGMENT_BUDGET, lines};
+use super::stages::{Buffers, Room, lines};
 use super::{Fused, Settings, SimError, Simulator, Tables, layout};
 use crate::gpu::Image;
 use crate::scene::Scene;
@@ -17,7 +17,8 @@ impl Simulator {
     /// Device out of memory, a buffer over the device's limit; the simulator then stays as it was.
     pub fn fit(&mut self, library: &Library, scene: &Scene) -> Result<bool, SimError> {
         let world = &self.passes.world;
-        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, SEGMENT_BUDGET);
+        let room = Room::of(&self.device);
+        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, &room);
         let tables = Tables::new(scene);
         if holds(&self.passes.buffers, &frame, &batches.rounds, &tables) {
             return Ok(false);

@@ -38,30 +38,16 @@ fn path_bytes(frame: &Frame) -> u64 {
     u64::from(slots(frame)) * size_of::<Interaction>() as u64
 }
 
-/// Threads of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan promises.
+/// Most threads of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan promises.
 const MOST_WORKERS: u32 = 1 << 20;
 
 /// Pieces of work that a worker does, one after the other, where there are enough of them.
 const PIECES: u32 = 8;
 
-/// What dispatches of a frame are for: the roles of [`Round::role`].
-pub(super) fn roles(frame: &Frame) -> &'static [u32] {
-    match frame.sampling {
-        SAMPLING_MAIN_PATH => &[ROLE_MAIN, ROLE_BRANCHES],
-        _ => &[ROLE_WHOLE],
-    }
-}
-
-/// Specialization constants of the kernel for a role, by id.
-pub(super) fn constants(role: u32) -> [(u32, u32); 1] {
-    [(0, role)]
-}
-
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
-    /// What its paths are for, to which the kernel is specialized: [`ROLE_WHOLE`], [`ROLE_MAIN`] or
-    /// [`ROLE_BRANCHES`].
+    /// [`ROLE_WHOLE`], [`ROLE_MAIN`] or [`ROLE_BRANCHES`]: what its paths are for.
     pub role: u32,
     /// Push constants: first path, paths, first line, lines; pieces of work, how many of them a worker
     /// may take, and by which of two counters.
@@ -71,6 +57,13 @@ pub struct Round {
     pub workers: u32,
 }
 
+impl Round {
+    /// Specialization constants, by id, that make `trace` a kernel for one role.
+    pub fn constants(role: u32) -> [(u32, u32); 1] {
+        [(0, role)]
+    }
+}
+
 /// How many lines and main paths of each are traced together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
@@ -78,18 +71,15 @@ pub struct Rounds {
     /// Main paths of a line; none where paths choose at every surface.
     mains: u32,
     slots: u32,
-}
-
-impl Round {
-    /// The kernel's specialization constants, by id.
-    pub fn constants(&self) -> [(u32, u32); 1] {
-        constants(self.role)
-    }
+    /// Threads that the device runs at once, about.
+    pub(super) at_once: u32,
 }
 
 impl Rounds {
-    /// For batches of up to `paths` paths of each line.
-    pub fn new(frame: &Frame, paths: u32) -> Self {
+    /// For batches of up to `paths` paths of each line, on a device that runs about `at_once` threads at
+    /// once: no more lines are traced together than give each of them a main path, so that a device with few
+    /// holds few interactions.
+    pub fn new(frame: &Frame, paths: u32, at_once: u32) -> Self {
         let lines = frame.scanlines * frame.layers;
         let mains = match frame.sampling {
             layout::SAMPLING_MAIN_PATH if one_speaks_for_all(frame) => 1,
@@ -99,10 +89,22 @@ impl Rounds {
         let line_bytes = path_bytes(frame) * u64::from(mains);
         let affordable = INTERACTION_BUDGET.checked_div(line_bytes);
         let affordable = affordable.map_or(u32::MAX, |n| u32::try_from(n).unwrap_or(u32::MAX));
+        let useful = at_once.checked_div(mains).unwrap_or(u32::MAX);
+        let together = affordable.min(useful).clamp(1, lines.max(1));
         Self {
-            lines: affordable.clamp(1, lines.max(1)),
+            // Groups of one size.
+            lines: lines.div_ceil(lines.div_ceil(together).max(1)).max(1),
             mains,
             slots: slots(frame),
+            at_once,
+        }
+    }
+
+    /// Roles of the dispatches to come.
+    pub fn roles(&self) -> &'static [u32] {
+        match self.mains {
+            0 => &[ROLE_WHOLE],
+            _ => &[ROLE_MAIN, ROLE_BRANCHES],
         }
     }
 
@@ -116,15 +118,14 @@ impl Rounds {
         self.main_paths() * u64::from(self.slots)
     }
 
-    /// The dispatches that trace `paths` of all lines, in order, each after the one before, on a device
-    /// that runs about `at_once` threads at once. `turn`: which of the frame's two counters the first of
-    /// them uses, and then the next one to come.
-    pub fn of(&self, frame: &Frame, paths: Range<u32>, at_once: u32, turn: &mut u32) -> Vec<Round> {
+    /// The dispatches that trace `paths` of all lines, in order, each after the one before. `turn`: which
+    /// of the frame's two counters the first of them uses, and then the next one to come.
+    pub fn of(&self, frame: &Frame, paths: Range<u32>, turn: &mut u32) -> Vec<Round> {
         let all = frame.scanlines * frame.layers;
         let (begin, count) = (paths.start, paths.len() as u32);
         let mut round = |role, count, line, lines: u32, per_line: u32| {
             let pieces = lines * per_line;
-            let workers = at_once.max(pieces / PIECES);
+            let workers = self.at_once.max(pieces / PIECES);
             let workers = workers.min(pieces).clamp(1, MOST_WORKERS);
             // Twice its share: others' pieces may be larger. Those that begin later then find none.
             let most = 2 * pieces.div_ceil(workers);
@@ -190,16 +191,17 @@ mod tests {
         own.flags = FLAG_ROUGH_TRANSMISSION;
         for frame in [frame(8, 32), frame(100_000, 256), own] {
             let paths = frame.paths.min(most_paths(&frame));
-            let rounds = Rounds::new(&frame, paths);
+            let rounds = Rounds::new(&frame, paths, 1 << 18);
             assert!(rounds.interactions() * size_of::<Interaction>() as u64 <= INTERACTION_BUDGET);
-            let taken = rounds.of(&frame, 0..paths, 5000, &mut 0);
+            let taken = rounds.of(&frame, 0..paths, &mut 0);
             for role in [ROLE_MAIN, ROLE_BRANCHES] {
                 assert_eq!(lines(&taken, role), [1; 192 * 7]);
             }
             let most = |rounds: &[Round]| rounds.iter().map(|r| r.workers).max();
             assert!(most(&taken) <= Some(64 * MOST_GROUPS));
             // Where one main path stands for all, a batch has them all.
-            let all = Rounds::new(&frame, frame.paths).of(&frame, 0..frame.paths, 5000, &mut 0);
+            let all = Rounds::new(&frame, frame.paths, 1 << 18);
+            let all = all.of(&frame, 0..frame.paths, &mut 0);
             assert!(most(&all) <= Some(64 * MOST_GROUPS));
             // Each dispatch leaves the other counter at zero for the next one.
             assert!(
@@ -217,7 +219,7 @@ mod tests {
     #[test]
     fn one_main_path_stands_for_all_that_are_alike() {
         let pieces = |frame: &Frame| {
-            let rounds = Rounds::new(frame, 40).of(frame, 0..40, 5000, &mut 0);
+            let rounds = Rounds::new(frame, 40, 1 << 18).of(frame, 0..40, &mut 0);
             rounds.iter().map(|r| r.push[4]).collect::<Vec<_>>()
         };
         let mut frame = frame(40, 32);
@@ -228,5 +230,19 @@ mod tests {
         assert_eq!(own[0] % 40, 0);
         frame.sampling = SAMPLING_PLAIN;
         assert_eq!(pieces(&frame), [1344 * 40]);
+    }
+
+    #[test]
+    fn a_device_of_few_threads_traces_groups_of_lines_one_after_the_other() {
+        let frame = frame(8, 32);
+        let few = Rounds::new(&frame, 8, 512);
+        assert_eq!(few.main_paths(), 448);
+        let taken = few.of(&frame, 0..8, &mut 0);
+        assert_eq!(taken.len(), 6);
+        for role in [ROLE_MAIN, ROLE_BRANCHES] {
+            assert_eq!(lines(&taken, role), [1; 192 * 7]);
+        }
+        // A device of no threads is none; it still gets a line.
+        assert_eq!(Rounds::new(&frame, 8, 0).main_paths(), 1);
     }
 }

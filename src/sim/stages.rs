@@ -3,14 +3,33 @@
 use std::sync::Arc;
 
 use super::layout;
-use super::rounds::{self, Rounds, one_speaks_for_all};
+use super::rounds::{self, Round, Rounds, one_speaks_for_all};
 use super::shaders::Library;
 use super::tables::Tables;
 use super::world::World;
 use crate::gpu::{Buffer, BufferKind, Device, GpuError, Kernel};
 
 /// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
-pub(super) const SEGMENT_BUDGET: u64 = 96 << 20;
+const SEGMENT_BUDGET: u64 = 96 << 20;
+
+/// Segments and threads that a frame may have of a device.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room {
+    /// For segments, bytes.
+    pub(super) segments: u64,
+    /// Threads that the device runs at once, about.
+    pub(super) at_once: u32,
+}
+
+impl Room {
+    /// On a device where no buffers have been made yet.
+    pub(super) fn of(device: &Device) -> Self {
+        Self {
+            segments: SEGMENT_BUDGET,
+            at_once: device.threads_at_once(),
+        }
+    }
+}
 
 /// How the paths of a frame are dealt out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,16 +46,16 @@ impl Batches {
     /// Capacity from the sampling scheme. A path of B interactions has at most B + 1 segments; one of
     /// the main-path scheme also those of its branches, three times as many, most of which end under
     /// the volume floor: what does not fit is counted and reported.
-    pub(super) fn new(frame: &layout::Frame, segment_bytes: u64) -> Self {
+    pub(super) fn new(frame: &layout::Frame, room: &Room) -> Self {
         let branches = frame.sampling == layout::SAMPLING_MAIN_PATH;
         let per_path = (frame.max_interactions + 1) * if branches { 4 } else { 1 };
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
-        let affordable = u32::try_from(segment_bytes / line_bytes.max(1)).unwrap_or(u32::MAX);
+        let affordable = u32::try_from(room.segments / line_bytes.max(1)).unwrap_or(u32::MAX);
         if one_speaks_for_all(frame) {
             return Self {
                 capacity: per_path.min(affordable.max(1)),
                 paths: frame.paths,
-                rounds: Rounds::new(frame, frame.paths),
+                rounds: Rounds::new(frame, frame.paths, room.at_once),
             };
         }
         let most = (affordable / per_path).min(rounds::most_paths(frame));
@@ -44,7 +63,7 @@ impl Batches {
         Self {
             capacity: paths * per_path,
             paths,
-            rounds: Rounds::new(frame, paths),
+            rounds: Rounds::new(frame, paths, room.at_once),
         }
     }
 }
@@ -78,6 +97,8 @@ pub(super) struct Buffers {
     pub(super) stacks: Buffer,
     pub(super) segments: Buffer,
     pub(super) segment_count: Buffer,
+    /// Of main paths, while they are traced. The memory is that of `lateral`: what `beam` leaves is not
+    /// there before, and they are not needed any more.
     pub(super) interactions: Buffer,
     pub(super) interaction_count: Buffer,
     pub(super) surface_echoes: Buffer,
@@ -103,6 +124,8 @@ impl Buffers {
         let lines = u64::from(lines(frame));
         let segments = lines * u64::from(frame.segment_capacity);
         let pixels = u64::from(frame.image_width) * u64::from(frame.image_height);
+        let interactions = rounds.interactions() * size_of::<layout::Interaction>() as u64;
+        let lateral = new("lateral, interactions", interactions.max(8 * samples), 1)?;
         Ok(Self {
             frame: new("frame", 1, size_of::<layout::Frame>())?,
             scanlines: new(
@@ -127,15 +150,11 @@ impl Buffers {
             stacks: new("media stacks", lines * layout::START_WORDS as u64, 4)?,
             segments: new("segments", segments, size_of::<layout::Segment>())?,
             segment_count: new("segment count", lines, 4)?,
-            interactions: new(
-                "interactions",
-                rounds.interactions(),
-                size_of::<layout::Interaction>(),
-            )?,
+            interactions: lateral.clone(),
             interaction_count: new("interaction count", rounds.main_paths(), 4)?,
             surface_echoes: new("surface echoes", samples, 8)?,
             volume_echoes: new("volume echoes", samples, 8)?,
-            lateral: new("lateral", samples, 8)?,
+            lateral,
             iq: new("iq", samples, 8)?,
             log_image: new("log image", samples, 4)?,
             pixels: new("pixels", pixels, 4)?,
@@ -147,7 +166,7 @@ impl Buffers {
 /// The kernels of a frame.
 pub(super) struct Kernels {
     pub(super) origin: Kernel,
-    /// By role: [`rounds::Round::role`].
+    /// By role: [`Round::role`].
     pub(super) trace: [Kernel; 3],
     pub(super) scatter: Kernel,
     pub(super) beam: Kernel,
@@ -159,7 +178,7 @@ impl Kernels {
     pub(super) fn new(
         device: &Arc<Device>,
         library: &Library,
-        frame: &layout::Frame,
+        rounds: &Rounds,
         world: &World,
         counting: bool,
     ) -> Result<Self, GpuError> {
@@ -174,7 +193,7 @@ impl Kernels {
                 device,
                 &trace,
                 library.words(&trace),
-                &rounds::constants(role),
+                &Round::constants(role),
             )
         };
         let trace = [
@@ -183,7 +202,7 @@ impl Kernels {
             role(layout::ROLE_BRANCHES)?,
         ];
         // What takes longest is begun first.
-        for &role in rounds::roles(frame) {
+        for &role in rounds.roles() {
             trace[role as usize].prepare();
         }
         Ok(Self {

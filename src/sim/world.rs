@@ -10,7 +10,7 @@ mod top;
 use std::sync::Arc;
 
 use super::bvh::BvhError;
-use super::fields::Fields;
+use super::fields::{Fields, padded};
 use super::layout;
 use super::memory::Memory;
 use super::shaders::Library;
@@ -35,10 +35,10 @@ pub enum WorldError {
     Bvh(#[from] BvhError),
     /// A node that only the compute tracer has.
     #[error(
-        "`{0}`: the strategy `union` is a node of the compute tracer: \
-         take --tracer bvh, or the strategy `mask`, which builds nothing either"
+        "`{0}`: the strategy `selector`, a node with the union of its children's boxes, is one of the compute tracer: \
+         take --tracer bvh, or the strategy `mask`, which builds nothing either, or `exchange`"
     )]
-    Union(String),
+    Selector(String),
 }
 
 /// The anatomy on the device.
@@ -114,11 +114,11 @@ impl World {
         fields: Fields,
         apart: Vec<bool>,
     ) -> Result<Self, WorldError> {
-        let union = |i: &&crate::scene::Instance| i.keyframes.strategy == Strategy::Union;
-        if let Some(node) = scene.instances.iter().find(union)
+        let selector = |i: &&crate::scene::Instance| i.keyframes.strategy == Strategy::Selector;
+        if let Some(node) = scene.instances.iter().find(selector)
             && tracer == Tracer::RayQuery
         {
-            return Err(WorldError::Union(node.name.clone()));
+            return Err(WorldError::Selector(node.name.clone()));
         }
         // What the first update runs is compiled meanwhile.
         if scene
@@ -251,10 +251,17 @@ impl World {
             commands.write(&self.geometry.instances, 0, bytemuck::cast_slice(&rows))?;
             self.rows = rows;
         }
-        if reshaped || placed || rewritten {
+        let squeezed = self.fields.follow(scene);
+        for range in &squeezed {
+            let vectors = padded(&self.fields.values[range.clone()]);
+            let at = (size_of::<[f32; 4]>() * range.start) as u64;
+            commands.write(&self.geometry.fields, at, bytemuck::cast_slice(&vectors))?;
+        }
+        let changed = reshaped || placed || rewritten || !squeezed.is_empty();
+        if changed {
             commands.barrier(Stage::Transfer, Stage::Compute);
         }
-        Ok(reshaped || placed || rewritten)
+        Ok(changed)
     }
 
     /// How rays find surfaces here.

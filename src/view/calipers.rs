@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use egui::{
-    Align2, Area, Color32, Event, FontId, Grid, Id, Key, Order, Painter, PointerButton, Pos2, Rect,
+    Align2, Area, Color32, Event, FontId, Grid, Id, Key, Painter, PointerButton, Pos2, Rect,
     RichText, Sense, Shape, Stroke, TextEdit, TextWrapMode, Ui, vec2,
 };
 use glam::DVec2;
@@ -12,8 +12,8 @@ use glam::DVec2;
 use super::bmode::Place;
 use super::engine::Frame;
 use super::model::calipers::{Caliper, Kind, Reading};
-use super::model::sheet::{Note, Sheet, Tool, What};
-use super::{keys, style};
+use super::model::sheet::{Sheet, Tool, What};
+use super::{keys, notes, style};
 
 /// How near the pointer has to be to take a point, points.
 const REACH: f32 = 9.0;
@@ -43,7 +43,7 @@ pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame)
                 letter(&painter, at, mark.letter, colour);
             }
             What::Note(note) if sheet.editing() != Some(index) => {
-                write(&painter, place, note, colour);
+                notes::write(&painter, place, note, colour);
             }
             What::Note(_) => {}
         }
@@ -53,7 +53,7 @@ pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame)
         painter.circle_stroke(at, REACH, Stroke::new(1.0, style::TEXT));
     }
     draft(&painter, sheet, place);
-    editor(ui, sheet, place);
+    notes::editor(ui, sheet, place);
 }
 
 /// Marks are told apart by letter and colour.
@@ -61,7 +61,7 @@ fn colour(letter: char) -> Color32 {
     COLOURS[(u32::from(letter) - u32::from('A')) as usize % COLOURS.len()]
 }
 
-fn to_screen(place: &Place, point: DVec2) -> Pos2 {
+pub(super) fn to_screen(place: &Place, point: DVec2) -> Pos2 {
     place.at(point.x, point.y)
 }
 
@@ -156,7 +156,7 @@ fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
             points.iter().for_each(|&p| cross(painter, p, colour));
             dots(painter, &points, colour);
         }
-        Tool::Note if points[0] != end => arrow(painter, end, points[0], colour),
+        Tool::Note if points[0] != end => notes::arrow(painter, end, points[0], colour),
         Tool::Note => {}
     }
 }
@@ -226,7 +226,7 @@ fn laid_out(painter: &Painter, text: &str, colour: Color32) -> Arc<egui::Galley>
 }
 
 /// A text on a dark ground.
-fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
+pub(super) fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
     let galley = laid_out(painter, text, colour);
     let room = Align2::LEFT_CENTER.anchor_size(at, galley.size());
     painter.rect_filled(
@@ -235,50 +235,6 @@ fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
         Color32::from_black_alpha(170),
     );
     painter.galley(room.min, galley, colour);
-}
-
-fn arrow(painter: &Painter, from: Pos2, tip: Pos2, colour: Color32) {
-    let way = (tip - from).normalized();
-    let side = way.rot90();
-    let line = Stroke::new(1.4, colour);
-    painter.line_segment([from, tip], line);
-    for side in [side, -side] {
-        painter.line_segment([tip, tip - 9.0 * way + 4.0 * side], line);
-    }
-}
-
-fn write(painter: &Painter, place: &Place, note: &Note, colour: Color32) {
-    let at = to_screen(place, note.at);
-    if let Some(tip) = note.arrow {
-        arrow(painter, at, to_screen(place, tip), colour);
-    }
-    label(painter, at, &note.text, colour);
-}
-
-/// The field in which a note is typed; Enter or a click elsewhere keeps it.
-fn editor(ui: &Ui, sheet: &mut Sheet, place: &Place) {
-    let Some(index) = sheet.editing() else { return };
-    let What::Note(note) = &sheet.marks()[index].what else {
-        return;
-    };
-    let (mut text, at) = (note.text.clone(), to_screen(place, note.at));
-    Area::new(Id::new(("note", index)))
-        .order(Order::Foreground)
-        .fixed_pos(at - vec2(4.0, 11.0))
-        .show(ui.ctx(), |ui| {
-            let field = TextEdit::singleline(&mut text)
-                .desired_width(150.0)
-                .hint_text("text, Enter");
-            let response = ui.add(field);
-            if response.lost_focus() {
-                return true;
-            }
-            response.request_focus();
-            sheet.set_text(index, text);
-            false
-        })
-        .inner
-        .then(|| sheet.stop_editing());
 }
 
 /// What a measurement says, a line each.

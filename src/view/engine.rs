@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
@@ -104,6 +104,11 @@ pub struct Frame {
 /// a seventh of the time is theirs.
 const SURVEY_PUT_OFF: u32 = 6;
 
+/// Longest wait of the next image for the window to draw the last one, where they share a queue: neither then slows
+/// the other, and what has happened meanwhile is in the image. A window that takes longer is not waited for until
+/// it draws again.
+const WINDOW_PATIENCE: Duration = Duration::from_millis(40);
+
 /// What the simulation has to say.
 pub enum News {
     /// A picture; its pixels, where [`Order::reads_back`]. They are not the frame's, of which the loop
@@ -138,6 +143,8 @@ struct State {
     resend: bool,
     /// When an order was given last, or the eye of the 3D view moved.
     touched: Instant,
+    /// Since when the window has an image that it has not drawn, where drawing it is to come first.
+    undrawn: Option<Instant>,
     news: Vec<News>,
 }
 
@@ -203,6 +210,7 @@ impl Engine {
                 stop: false,
                 resend: false,
                 touched: Instant::now(),
+                undrawn: None,
                 news: Vec::new(),
             }),
             changed: Condvar::new(),
@@ -252,6 +260,12 @@ impl Engine {
             true => self.shared.interrupt(state),
             false => self.shared.changed.notify_all(),
         }
+    }
+
+    /// The window has drawn what it had.
+    pub(super) fn drawn(&self) {
+        self.shared.lock().undrawn = None;
+        self.shared.changed.notify_all();
     }
 
     /// What has come since the last call, oldest first.

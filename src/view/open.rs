@@ -25,6 +25,7 @@ use crate::output;
 use crate::scene::Scene;
 use crate::sim::{self, SimError};
 
+mod gestures;
 mod paint;
 mod scenes;
 
@@ -235,9 +236,10 @@ impl Open {
     /// Takes over what simulation and devices have to say; an error after which nothing more will
     /// come.
     pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), SimError> {
-        let mut failed = Ok(());
+        let (mut failed, mut pictures_only) = (Ok(()), true);
         self.receive(plan);
         for news in self.session.engine.news() {
+            pictures_only &= matches!(news, News::Survey(_));
             match news {
                 News::Frame(frame, pixels) => {
                     self.awaited = false;
@@ -272,7 +274,10 @@ impl Open {
         self.look();
         // Not left to the next drawing, which a window that is hidden may never see.
         self.tell();
-        self.window.request_redraw();
+        match pictures_only {
+            true => self.draw_soon(Instant::now()),
+            false => self.window.request_redraw(),
+        }
         failed
     }
 

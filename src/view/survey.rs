@@ -22,6 +22,8 @@ const SWIFT: f64 = 60.0;
 const SHARE: f64 = 0.2;
 /// Least pixels of the picture for each of the panel's, along an edge.
 const COARSEST: f64 = 0.2;
+/// Factor by which what pictures take varies for no reason that would last.
+const STEADY: f64 = 1.5;
 /// Everything is at rest when nothing has moved for this long.
 const REST: Duration = Duration::from_millis(160);
 
@@ -37,7 +39,7 @@ pub(super) struct State {
     budget_ms: f64,
     /// Revision of the model that was seen last.
     revision: u64,
-    /// What a pixel of the last pictures took on the device, ms.
+    /// Time that a pixel is thought to take on the device, ms.
     pixel_ms: f64,
     /// The probe in the pointer's hand.
     hold: hold::State,
@@ -61,7 +63,16 @@ impl State {
     /// Learns from a finished picture.
     pub(super) fn learn(&mut self, pictured: &Pictured) {
         let [width, height] = pictured.look.sight.size.map(f64::from);
-        self.pixel_ms = pictured.ms / (width * height);
+        self.took(pictured.ms / (width * height));
+    }
+
+    /// Notes what a pixel took, ms. Only where that is far from what was thought: at rest pictures would else
+    /// come again and again, now fine, now finer.
+    fn took(&mut self, pixel_ms: f64) {
+        let near = self.pixel_ms / STEADY..self.pixel_ms * STEADY;
+        if !near.contains(&pixel_ms) {
+            self.pixel_ms = pixel_ms;
+        }
     }
 
     /// Notes what an image may take while something moves, ms.
@@ -271,6 +282,20 @@ mod tests {
         assert_eq!(detail(anatomy, 20.0), 1.0);
         assert_eq!(detail(anatomy, 60.0), 0.5);
         assert_eq!(detail(anatomy, 500.0), COARSEST);
+    }
+
+    #[test]
+    fn at_rest_a_picture_stays_as_fine_as_it_is() {
+        let now = Instant::now();
+        let mut state = State::default();
+        // About 60 ms, from which on pictures at rest have four times the pixels.
+        let details = [59.0, 62.0, 55.0, 70.0, 59.0].map(|ms| {
+            state.took(ms / 1e5);
+            state.detail(1e5, now)
+        });
+        assert_eq!(details, [2.0; 5]);
+        state.took(200.0 / 1e5);
+        assert_eq!(state.detail(1e5, now), 1.0);
     }
 
     #[test]

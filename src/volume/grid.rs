@@ -21,7 +21,7 @@ pub enum Frame {
 
 impl Frame {
     /// Signs that turn a point of this frame into LPS.
-    fn lps_signs(self) -> DVec3 {
+    pub fn lps_signs(self) -> DVec3 {
         match self {
             Self::Lps | Self::Unstated => DVec3::ONE,
             Self::Ras => DVec3::new(-1.0, -1.0, 1.0),

@@ -97,7 +97,7 @@ pub fn show(scene: &mut Scene, k: usize) {
 }
 
 pub fn strategies(tracer: Tracer) -> impl Iterator<Item = Strategy> {
-    let has = move |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Union;
+    let has = move |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Selector;
     Strategy::ALL.into_iter().filter(has)
 }
 
@@ -140,7 +140,7 @@ pub fn union_box(spread: f64, rig: impl Fn(&Scene) -> Rig) -> UnionBox {
     scene.meshes.push(moved);
     scene.instances[0].keyframes = Keyframes {
         meshes: vec![0, 1],
-        strategy: Strategy::Union,
+        strategy: Strategy::Selector,
         ..Keyframes::default()
     };
     let (child, mut outer) = (scene.meshes[0].bounds(), scene.meshes[0].bounds());

@@ -40,7 +40,7 @@ fn every_strategy_finds_the_keyframe_that_is_shown() {
 /// The comparison must see a keyframe that is not the one shown.
 #[test]
 fn a_stale_keyframe_is_noticed() {
-    let mut scene = beating(Strategy::Selector);
+    let mut scene = beating(Strategy::Exchange);
     let rig = Rig::new(&scene, Tracer::Bvh);
     show(&mut scene, 3);
     let still = scene.still();

@@ -4,14 +4,14 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::scene::fusion::{Acquired, Blend, Fusion, Surroundings};
+use insonify::scene::fusion::{Acquired, Blend, Fusion, MaskSpeed, Surroundings};
 use insonify::scene::{Scene, shapes};
 use insonify::sim::fusion::Steps;
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
-use crate::scenes::{add_body, add_sphere, linear, silent, tissue};
+use crate::scenes::{add_body, add_box, add_sphere, linear, silent, tissue};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
@@ -59,6 +59,7 @@ fn volume(size: [usize; 3], world_from_voxel: DAffine3, value: impl Fn(DVec3) ->
         size,
         voxels: Arc::new(Voxels::F32(values)),
         world_from_voxel,
+        world_from_lps: DAffine3::IDENTITY,
         black: 0.0,
         white: 1.0,
     }
@@ -71,6 +72,7 @@ fn mask(scene: &mut Scene, count: usize, blend: Blend) {
         surroundings: Surroundings::Volume,
         blur: 32,
         blend,
+        mask_speed: MaskSpeed::Enclosing,
         background_shadows: false,
     });
 }
@@ -636,6 +638,91 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
                 3276.0,
                 0.0,
             );
+        }
+    }
+    out
+}
+
+/// T30.
+pub fn both_borders_of_a_mask_lie_where_its_surface_echoes() -> Check {
+    Check {
+        row: "T30",
+        name: "both_borders_of_a_mask_lie_where_its_surface_echoes",
+        claim: "Of a masking slab of fat from 20 to 60 mm the mask begins at 20 mm and ends at 20 + 40 (1540 / 1450) \
+            mm, where both faces echo, within a sample; the volume shows on both sides and in it what is at the place \
+            that the sound has reached, behind it 40 (1540 / 1450 - 1) = 2.48 mm nearer than its depth, within 2e-6. At the probe's \
+            speed the mask ends at 60 mm and the volume is where the depth says.",
+        planted: "The probe's speed in the mask, said to be that of fat.",
+        run: far_border,
+    }
+}
+
+fn far_border(bench: &Bench, physics: Physics) -> Outcome {
+    let mut out = Outcome::default();
+    let (speed, fat, top, chord) = (1.54, 1.45, 20.0, 40.0);
+    let mut scene = linear(16, 16.0, silent(speed, 1.63, 0.0));
+    scene.probe.depth = 90.0;
+    scene.probe.samples = 1800;
+    scene.imaging.image_height = 120;
+    let place = DAffine3::from_translation(DVec3::new(3.1, 5.3, top));
+    add_box(
+        &mut scene,
+        [200.0, 200.0, chord],
+        silent(fat, 1.34, 0.0),
+        place,
+    );
+    mask(&mut scene, 1, Blend::Linear);
+    let to_world = DAffine3::from_translation(DVec3::new(-100.0, -100.0, -20.0))
+        * DAffine3::from_scale(DVec3::new(200.0, 200.0, 200.0));
+    let level = |z: f64| (z + 20.0) / 200.0;
+    scene.volume = Some(volume([2, 2, 2], to_world, |p| level(p.z)));
+    let pitch = scene.probe.sample_pitch();
+    for (said, rate) in [(MaskSpeed::Enclosing, fat / speed), (MaskSpeed::Probe, 1.0)] {
+        let fusion = scene.fusion.as_mut().expect("masked");
+        fusion.mask_speed = match physics {
+            Physics::Right => said,
+            Physics::Planted => MaskSpeed::Probe,
+        };
+        for tracer in TRACERS {
+            let mut simulator = simulator(bench, &scene, tracer);
+            let got = shoot(&mut simulator, &scene);
+            let [surface, _] = simulator.echoes().expect("read back");
+            let samples = scene.probe.samples as usize;
+            let line = 8;
+            let prescan = &got.steps.prescan[2 * line * samples..][..2 * samples];
+            let inside: Vec<usize> = (0..samples).filter(|k| prescan[2 * k] == 0.0).collect();
+            let ends = [inside[0], inside[inside.len() - 1] + 1].map(|k| k as f64);
+            let far = top + chord / rate;
+            for (what, found, expected) in [("near", ends[0], top), ("far", ends[1], far)] {
+                let name = format!("{tracer}, {}: {what} border, sample", said.name());
+                out.compare(name, found, expected / pitch, 1.0);
+            }
+            if said == MaskSpeed::Enclosing {
+                let echoes = &surface[2 * line * samples..][..2 * samples];
+                let size = |k: usize| f64::from(echoes[2 * k]).hypot(f64::from(echoes[2 * k + 1]));
+                let behind = (far / pitch) as usize;
+                let window = behind - 60..(behind + 60).min(samples);
+                let sum: f64 = window.clone().map(size).sum();
+                let centre = window.map(|k| k as f64 * size(k)).sum::<f64>() / sum;
+                let name =
+                    format!("{tracer}: the far face echoes where the mask ends, samples off");
+                out.compare(name, centre - ends[1], 0.0, 1.0);
+            }
+            let mut worst = 0.0_f64;
+            for k in 0..samples {
+                let depth = k as f64 * pitch;
+                let through = (depth.min(far) - top).max(0.0);
+                let z = depth - through * (1.0 - rate);
+                // Beside a border rounding chooses the side.
+                if [top, far].iter().all(|b| (depth - b).abs() > pitch) {
+                    worst = worst.max((f64::from(prescan[2 * k + 1]) - level(z)).abs());
+                }
+            }
+            let name = format!(
+                "{tracer}, {}: largest error of the volume's level",
+                said.name()
+            );
+            out.compare(name, worst, 0.0, 2e-6);
         }
     }
     out

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use insonify::scene::fusion::{Acquired, Blend, Fusion, Surroundings};
+use insonify::scene::fusion::{Acquired, Blend, Fusion, MaskSpeed, Surroundings};
 use insonify::scene::{Scene, Tissue};
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
@@ -52,6 +52,7 @@ fn scene(host: Tissue, slab: Tissue) -> Scene {
         voxels: Arc::new(Voxels::F32(vec![LEVEL; 8])),
         world_from_voxel: DAffine3::from_translation(DVec3::splat(-300.0))
             * DAffine3::from_scale(DVec3::splat(600.0)),
+        world_from_lps: DAffine3::IDENTITY,
         black: 0.0,
         white: 1.0,
     });
@@ -60,6 +61,7 @@ fn scene(host: Tissue, slab: Tissue) -> Scene {
         surroundings: Surroundings::Volume,
         blur: 32,
         blend: Blend::Linear,
+        mask_speed: MaskSpeed::Enclosing,
         background_shadows: true,
     });
     scene

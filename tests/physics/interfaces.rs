@@ -105,7 +105,7 @@ fn incidences() -> impl Iterator<Item = (f64, [f64; 2], [f64; 2], f64)> {
 }
 
 /// 4 Z1 Z2 cos i cos t / (Z2 cos i + Z1 cos t)^2, 0 at total reflection.
-fn fresnel([c1, z1]: [f64; 2], [c2, z2]: [f64; 2], incidence: f64) -> f64 {
+pub fn fresnel([c1, z1]: [f64; 2], [c2, z2]: [f64; 2], incidence: f64) -> f64 {
     let sine = c2 / c1 * incidence.sin();
     if sine >= 1.0 {
         return 0.0;

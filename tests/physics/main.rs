@@ -40,6 +40,7 @@ mod shadow;
 #[path = "../common/signal.rs"]
 mod signal;
 mod speckle;
+mod squeeze;
 mod stages;
 #[cfg(test)]
 mod sweep;

@@ -10,7 +10,7 @@ use x11rb::protocol::xproto::{self, ConnectionExt as _, ImageFormat, InputFocus}
 use x11rb::rust_connection::RustConnection;
 
 /// Longest wait for anything: a debug build on a busy machine takes its time to upload a scene.
-const PATIENCE: Duration = Duration::from_secs(90);
+const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Keys that the tests press.
 #[derive(Clone, Copy)]
@@ -236,20 +236,41 @@ impl Desk {
     }
 
     /// The image comes back at the scene's own quality once all is at rest: until then the program works.
-    /// `works`: whether that counts, beside the part itself.
+    /// `works`: whether that counts for the whole of the time, or only at its end. A program that is kept
+    /// from the processor has work to do although it uses no time: its threads' states tell.
     fn quiet(&mut self, part: [u16; 4], time: Duration, works: bool) -> Vec<u8> {
-        let mut last = (self.grab(part), self.processor_time());
-        let mut since = Instant::now();
+        // Shorter than between two drawings of a blinking cursor.
+        const REST: Duration = Duration::from_millis(200);
+        let (mut last, mut spent) = (self.grab(part), self.processor_time());
+        let (mut since, mut rested) = (Instant::now(), Instant::now());
         self.wait_for("the program to come to rest", |desk| {
-            let now = (desk.grab(part), desk.processor_time());
+            let (now, spends) = (desk.grab(part), desk.processor_time());
             // A tick of the clock that counts.
-            let worked = works && now.1 - last.1 > Duration::from_millis(10);
-            if worked || now.0 != last.0 {
+            let worked = spends - spent > Duration::from_millis(10) || desk.at_work();
+            if worked {
+                (spent, rested) = (spends, Instant::now());
+            }
+            if now != last || (works && worked) {
                 (last, since) = (now, Instant::now());
             }
-            since.elapsed() > time
+            since.elapsed() > time && rested.elapsed() > REST
         });
-        last.0
+        last
+    }
+
+    /// Whether a thread of the program runs or waits for a processor or a disk (proc(5), state).
+    fn at_work(&self) -> bool {
+        let tasks = std::fs::read_dir(format!("/proc/{}/task", self.program.id()));
+        let mut tasks = tasks.expect("the program runs").flatten();
+        tasks.any(|task| {
+            // A thread may have ended meanwhile.
+            let text = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
+            let state = text
+                .rsplit(')')
+                .next()
+                .and_then(|rest| rest.trim_start().chars().next());
+            matches!(state, Some('R' | 'D'))
+        })
     }
 
     /// Waits until something is so.

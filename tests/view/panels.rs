@@ -124,7 +124,10 @@ fn close_all(desk: &mut Desk) {
     // Those that are open at the start: the later first, so that the other keeps its place.
     let before = sections(desk);
     desk.click((LEFT + 40, before[1]));
-    std::thread::sleep(Duration::from_millis(300));
+    desk.wait_for("the later to close", |d| {
+        let now = sections(d);
+        now.len() > 2 && now[2] - now[1] < 30
+    });
     desk.click((LEFT + 40, before[0]));
     desk.wait_for("the sections to close", |d| {
         let rows = sections(d);
@@ -356,10 +359,21 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
         let orange = |p: &&[u8]| p[0] > 150 && p[1] > 100 && p[2] < 100;
         pixels.chunks_exact(3).filter(orange).count() > 50
     };
-    desk.hold_control(Key::Letter('o'));
-    desk.still(IMAGE);
-    desk.click(row("wrong"));
-    desk.still(IMAGE);
+    let choose = |desk: &mut Desk, name: &str| {
+        let closed = desk.grab(IMAGE);
+        desk.hold_control(Key::Letter('o'));
+        desk.wait_for("the dialog", |d| difference(&d.grab(IMAGE), &closed) > 5.0);
+        desk.still(IMAGE);
+        let at = row(name);
+        let line = [at.0 - 20, at.1 - 8, 100, 16];
+        let plain = desk.grab(line);
+        desk.click(at);
+        desk.wait_for("the row to be chosen", |d| {
+            difference(&d.grab(line), &plain) > 1.0
+        });
+        desk.still(IMAGE);
+    };
+    choose(&mut desk, "wrong");
     desk.click(take);
     desk.wait_for("what is wrong with the file", |d| warned(d));
     desk.click(row("preset"));
@@ -371,10 +385,7 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
     desk.hold_control(Key::Letter('z'));
     desk.wait_for("the settings before", |d| d.grab(IMAGE) == before);
 
-    desk.hold_control(Key::Letter('o'));
-    desk.still(IMAGE);
-    desk.click(row("water"));
-    desk.still(IMAGE);
+    choose(&mut desk, "water");
     desk.click(open);
     desk.wait_for("another scene", |d| brightness(&d.grab(IMAGE)) < 5.0);
     desk.quit();

@@ -54,7 +54,9 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
     out += DECIDUAL;
     out += FETAL;
     out.push('\n');
-    out += &contents(|name| Some(if name == "sac" { CHORION } else { "" }.to_owned()));
+    out += &contents(None, |name| {
+        Some(if name == "sac" { CHORION } else { "" }.to_owned())
+    });
     out.truncate(out.trim_end().len());
     let path = output.join("fetus.toml");
     output::write(&path, &(out + "\n"))?;
@@ -66,9 +68,10 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
 pub const CHORION: &str = "surface_gain = \"6 dB\" # chorion: a membrane of its own\n";
 
 /// The nodes and meshes of a scene: the fetus, and of its surroundings those for which `around` has
-/// the last lines of their entry.
-pub fn contents(around: impl Fn(&str) -> Option<String>) -> String {
-    let mut out = transforms();
+/// the last lines of their entry. All of them belong to the node `carrier`, or to the world.
+pub fn contents(carrier: Option<&str>, around: impl Fn(&str) -> Option<String>) -> String {
+    let mut out = transforms(carrier);
+    let carried = carrier.map_or(String::new(), |node| format!("parent = \"{node}\"\n"));
     out +=
         "# In rising priority: where two overlap, the later one wins. So joints need no seams.\n";
     let entry = |name: &str, tissue: &str, priority: usize, [parent, last]: [&str; 2]| {
@@ -80,7 +83,7 @@ pub fn contents(around: impl Fn(&str) -> Option<String>) -> String {
     let outer = outer.iter().filter_map(|p| Some((p, around(p.name)?)));
     let mut first = 0;
     for (part, last) in outer {
-        out += &entry(part.name, part.tissue, first, ["", &last]);
+        out += &entry(part.name, part.tissue, first, [&carried, &last]);
         first += 1;
     }
     for (i, (node, part)) in fetus::parts().iter().enumerate() {
@@ -88,7 +91,7 @@ pub fn contents(around: impl Fn(&str) -> Option<String>) -> String {
         out += &entry(part.name, part.tissue, first + i, [&parent, ""]);
         if part.name == "cord-vessels" {
             // Over the cord's end and under all else.
-            out += &entry(inner.name, inner.tissue, first + i, ["", ""]);
+            out += &entry(inner.name, inner.tissue, first + i, [&carried, ""]);
         }
     }
     out
@@ -136,7 +139,7 @@ fn transform(name: &str, parent: Option<&str>, at: Vec3, rest: &str, motion: &st
 }
 
 /// The nodes: the body, and on it the head, arms with forearms, legs with shanks.
-fn transforms() -> String {
+fn transforms(carrier: Option<&str>) -> String {
     let tilt = Quat::from_rotation_y(TILT.to_radians());
     let (axis, angle) = tilt.to_axis_angle();
     let rest = format!(
@@ -155,7 +158,7 @@ fn transforms() -> String {
     let quick = "duration = \"1.6 s\", pause = \"0.7 s\"";
     let shift = "translate = [1.5, 0.6, 1.5], ";
     let body = shift.to_owned() + &turn("[0, 1, 0]", 7, 1, slow);
-    let mut out = transform("fetus", None, womb::SAC + REST, &rest, &body);
+    let mut out = transform("fetus", carrier, womb::SAC + REST, &rest, &body);
     let nod = turn("[0, 1, 0]", 7, 2, slow);
     out += &transform("nod", Some("fetus"), NECK, "", &nod);
     for (i, (upper, lower, side, limb)) in LIMBS.into_iter().enumerate() {

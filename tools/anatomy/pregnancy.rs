@@ -131,14 +131,14 @@ tgc_sliders = [0, 0, 0, -1, -3, -5, -7, -9]
 /// The scene with the volume.
 fn fused(command: &str) -> String {
     let head = head("Fetus in an acquired pelvis", "mother", MATCH);
-    let contents = fetus_scene::contents(|name| match name {
+    let contents = fetus_scene::contents(Some("breathing"), |name| match name {
         "sac" => Some(CHORION.to_owned()),
         "decidua" => Some(format!("surface_gain = \"{} dB\"\n", pelvis::faint(name))),
         _ => None,
     });
     let out = format!(
         "# Fusion: a moving fetus of eleven weeks in a volume of a pelvis, made by\n#   {command}\n\
-         # {}\n{ABOUT}{head}{FUSION}{DECIDUAL}{FETAL}\n{contents}",
+         # {}\n{ABOUT}{head}{FUSION}{DECIDUAL}{FETAL}{BREATHING}\n{contents}",
         fetus::biometry()
     );
     out.trim_end().to_owned() + "\n"
@@ -174,6 +174,14 @@ speed = "1540 m/s"
 attenuation = "0.68 dB/cm/MHz"
 source = "mean of fat, muscle and uterus by their thickness in front of the sac"
 
+"#;
+
+/// What moves the mask.
+const BREATHING: &str = r#"
+# The mother breathes: the sac, and the mask with it, is carried along a little.
+[[transform]]
+name = "breathing"
+motion = { kind = "sine", period = "4 s", translate = [1.2, 0, 0.5] }
 "#;
 
 /// Tissues of the pelvis alone.

@@ -101,7 +101,7 @@ fn show(scene: &mut Scene, k: usize) {
 }
 
 fn strategies(tracer: Tracer) -> Vec<Strategy> {
-    let has = |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Union;
+    let has = |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Selector;
     // Between keyframes there is nothing to compare with the others.
     let same = |s: &Strategy| *s != Strategy::Interpolate;
     Strategy::ALL.into_iter().filter(has).filter(same).collect()
@@ -167,7 +167,7 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
     let mut rows = Vec::new();
     for &subdivisions in &arguments.subdivisions {
         let scene = |s| limb(subdivisions, 20.0, s);
-        let triangles = triangles(&scene(Strategy::Selector)?);
+        let triangles = triangles(&scene(Strategy::Exchange)?);
         for (curve, &strategy) in curves.iter_mut().zip(&strategies) {
             // One at a time: eight keyframes of a million triangles by eight strategies do not fit.
             let found = samples(machine, tracer, &[strategy], scene, arguments.frames)?;
@@ -210,10 +210,10 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
 /// Where rebuilding begins to pay: a whole frame's structures and trace by distance.
 fn sweep(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Value> {
     let lasting = match tracer {
-        Tracer::Bvh => Strategy::Union,
+        Tracer::Bvh => Strategy::Selector,
         Tracer::RayQuery => Strategy::Mask,
     };
-    let compared = [lasting, Strategy::Selector, Strategy::Rebuild];
+    let compared = [lasting, Strategy::Exchange, Strategy::Rebuild];
     let mut table = Table::new(
         format!("Distance between keyframes, {tracer}: structures and trace, ms"),
         &[
@@ -222,7 +222,7 @@ fn sweep(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Val
             "SA(child)/SA(union)",
             "F1/ray",
             "kept ms",
-            "selector ms",
+            "exchange ms",
             "rebuild ms",
         ],
     );
@@ -258,7 +258,7 @@ fn sweep(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Val
             rows.push(json!({
                 "triangles": triangles, "distance_mm": distance, "area_ratio": ratio,
                 "false_unions_per_ray": false_unions,
-                lasting.to_string(): costs[0], "selector": costs[1], "rebuild": costs[2],
+                lasting.to_string(): costs[0], "exchange": costs[1], "rebuild": costs[2],
             }));
         }
         let labelled = compared.iter().zip(lines);

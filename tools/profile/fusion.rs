@@ -1,37 +1,17 @@
 //! Table I of the paper: the whole scene simulated, against its fusion with an acquired volume, of
 //! which only what the mask encloses is simulated.
 
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::path::Path;
 
-use glam::{DAffine3, DVec3};
 use insonify::output;
-use insonify::probe::Probe;
-use insonify::scene::fusion::{Blend, Fusion, Surroundings};
-use insonify::scene::{Acquired, Scene};
+use insonify::scene::Scene;
 use insonify::sim::{Tracer, layout::Counters};
-use insonify::volume::Voxels;
 use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
 use crate::Machine;
 use crate::measure::{Rig, Statistics};
 use crate::table::{Table, ms};
-
-#[derive(clap::Args)]
-pub struct Options {
-    /// Scene of Table I, imaged by the paper's probe [default: the shipped scenes/fetus.toml]. Where it
-    /// has no [fusion], a volume is made up around the mesh that --mask names. The paper's had 929
-    /// thousand triangles: `anatomy -- fetus --triangles 930000 -o DIR` makes as many.
-    #[arg(long, value_name = "SCENE")]
-    fusion: Option<PathBuf>,
-    /// Mesh that masks the volume, where the scene of Table I does not say.
-    #[arg(long, default_value = "sac")]
-    mask: String,
-    /// Frames of Table I, simulated and fused.
-    #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u32).range(1..=10_000))]
-    pub frames: u32,
-}
 
 /// The paper's imaging parameters; only it says nothing of the probe's place.
 const PROBE: [(&str, &str); 6] = [
@@ -47,74 +27,28 @@ const STAGES: [&str; 11] = [
     "update", "origin", "trace", "scatter", "beam", "axial", "display", "mask", "convert", "blur",
     "fuse",
 ];
-/// Voxels along each axis of a volume that is made up.
-const VOXELS: [usize; 3] = [256, 64, 256];
-
 /// The same scene in two ways.
 pub struct Scenes {
     simulated: Scene,
-    fused: Scene,
+    pub fused: Scene,
 }
 
 impl Scenes {
-    pub fn load(arguments: &Options, overrides: &[(String, String)]) -> Result<Self> {
-        let shipped = || Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/fetus.toml");
-        let file = arguments.fusion.clone().unwrap_or_else(shipped);
+    /// The scene in `file`, which shows an acquired volume, imaged by the paper's probe from where its own is.
+    pub fn load(file: &Path, overrides: &[(String, String)]) -> Result<Self> {
         let probe = PROBE.map(|(key, value)| (key.to_owned(), value.to_owned()));
-        let all = [&probe[..], overrides].concat();
-        let (mut fused, _) = Scene::load(&file, &all)?;
+        let (fused, _) = Scene::load(file, &[&probe[..], overrides].concat())?;
         if fused.fusion.is_none() || fused.volume.is_none() {
-            let mask = fused
-                .instances
-                .iter()
-                .position(|i| i.name == arguments.mask);
-            let mask = mask.ok_or_else(|| {
-                miette!(
-                    help = "name one of its closed meshes with --mask",
-                    "{} has no [fusion] and no mesh `{}`",
-                    file.display(),
-                    arguments.mask
-                )
-            })?;
-            fused.volume = Some(made_up(&fused.probe, &fused.world_from_probe));
-            fused.fusion = Some(Fusion {
-                masks: vec![mask],
-                surroundings: Surroundings::Volume,
-                blur: 32,
-                blend: Blend::Linear,
-                background_shadows: false,
-            });
+            return Err(miette!(
+                help = "give it [volume] and [fusion], as scenes/pregnancy.toml has them",
+                "{} shows no acquired volume",
+                file.display()
+            ));
         }
         let mut simulated = fused.clone();
         simulated.volume = None;
         simulated.fusion = None;
         Ok(Self { simulated, fused })
-    }
-}
-
-/// Noise in a box around the image: what it shows is of no matter to what it costs.
-fn made_up(probe: &Probe, world_from_probe: &DAffine3) -> Acquired {
-    let size = DVec3::new(
-        2.0 * probe.depth,
-        2.0 * probe.slice_thickness,
-        1.2 * probe.depth,
-    );
-    let spacing = size / DVec3::from(VOXELS.map(|n| n as f64));
-    let corner = DVec3::new(-size.x / 2.0, -size.y / 2.0, -0.1 * probe.depth);
-    // Knuth's multiplicative hash.
-    let noise = |i: u32| (i.wrapping_mul(2_654_435_761) >> 24) as u8;
-    Acquired {
-        size: VOXELS,
-        voxels: Arc::new(Voxels::U8(
-            (0..VOXELS.iter().product::<usize>() as u32)
-                .map(noise)
-                .collect(),
-        )),
-        world_from_voxel: *world_from_probe
-            * DAffine3::from_translation(corner)
-            * DAffine3::from_scale(spacing),
-        black: 0.0,
-        white: 255.0,
     }
 }
 

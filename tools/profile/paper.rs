@@ -17,43 +17,60 @@ use crate::table::{Table, ms, write_json};
 
 #[derive(clap::Args)]
 pub struct Arguments {
-    #[command(flatten)]
-    fusion: fusion::Options,
     /// One of the tables alone.
     #[arg(long, value_enum)]
     only: Option<Which>,
-    /// Scene of Table II, with transform nodes [default: the shipped scenes/fetus.toml].
-    #[arg(long)]
+    /// Scene of Tables I and II, with an acquired volume and transform nodes, imaged by the paper's probe [default: the
+    /// shipped scenes/pregnancy.toml]. The paper's had 929 and 934 thousand triangles: `anatomy -- fetus --triangles
+    /// 930000 -o DIR` and `anatomy -- pregnancy -o DIR` make as many.
+    #[arg(long, value_name = "SCENE")]
     fetus: Option<PathBuf>,
     /// Scene of Table III, with a selector [default: the shipped scenes/heart.toml].
-    #[arg(long)]
+    #[arg(long, value_name = "SCENE")]
     heart: Option<PathBuf>,
-    /// Strategy of the selector.
-    #[arg(long, default_value = "selector", value_parser = strategy)]
-    strategy: Strategy,
-    /// Poses of Table II.
-    #[arg(long, default_value_t = 24)]
-    poses: u32,
-    /// How often each pose and keyframe is measured.
-    #[arg(long, default_value_t = 3)]
-    rounds: u32,
+    /// Few frames, of 96 scanlines and 3 layers.
+    #[arg(long)]
+    quick: bool,
+    /// Frames of Table I, simulated and fused [default: 5; 2 with --quick].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    frames: Option<u32>,
+    /// Poses of Table II [default: 24; 6 with --quick].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    poses: Option<u32>,
+    /// How often each pose and keyframe is measured [default: 3; 1 with --quick].
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    rounds: Option<u32>,
     /// Overrides an entry of all scene files, e.g. --set probe.scanlines=64.
     #[arg(long = "set", value_name = "PATH=VALUE", value_parser = insonify::scene::file::override_of)]
     overrides: Vec<(String, String)>,
-    /// Writes the medians: {"tables": {"I": {"simulated_ms", "fused_ms"}, "II": {...}, "III": {...}}}.
+    /// Writes the figures: {"tables": {"I": {"simulated_ms", "fused_ms"}, "II": {...}, "III": {...}}}.
     #[arg(long, value_name = "FILE")]
     json: Option<PathBuf>,
 }
 
-fn strategy(text: &str) -> Result<Strategy, String> {
-    let found = Strategy::ALL.into_iter().find(|s| s.to_string() == text);
-    found.ok_or_else(|| {
-        let all: Vec<_> = Strategy::ALL.iter().map(Strategy::to_string).collect();
-        format!(
-            "there is no strategy '{text}'; there are {}",
-            all.join(", ")
-        )
-    })
+/// What `--quick` images with.
+const QUICK: [(&str, &str); 2] = [("probe.scanlines", "96"), ("probe.elevation_layers", "3")];
+
+/// How much is measured.
+struct Plan {
+    frames: u32,
+    poses: u32,
+    rounds: u32,
+    overrides: Vec<(String, String)>,
+}
+
+impl Arguments {
+    fn plan(&self) -> Plan {
+        let [frames, poses, rounds] = if self.quick { [2, 6, 1] } else { [5, 24, 3] };
+        let smaller = QUICK.map(|(key, value)| (key.to_owned(), value.to_owned()));
+        let own = if self.quick { &smaller[..] } else { &[] };
+        Plan {
+            frames: self.frames.unwrap_or(frames),
+            poses: self.poses.unwrap_or(poses),
+            rounds: self.rounds.unwrap_or(rounds),
+            overrides: [own, &self.overrides[..]].concat(),
+        }
+    }
 }
 
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -73,81 +90,109 @@ enum Which {
 struct Pair {
     first: f64,
     second: f64,
+    /// Deviations over the keyframes, where there are some.
+    deviations: Option<[f64; 2]>,
     triangles: usize,
 }
 
-/// Two ways, what they are called in JSON, and what the paper says: thousand triangles and ms.
+/// Two ways, what they are called in JSON, and what the paper says: thousand triangles, ms, and their deviations.
 struct Entry {
     number: &'static str,
-    what: &'static str,
+    what: String,
     keys: [&'static str; 2],
     pair: Pair,
-    paper: [f64; 3],
+    paper: Paper,
 }
 
+#[derive(Clone, Copy)]
+struct Paper {
+    triangles: f64,
+    ms: [f64; 2],
+    deviations: Option<[f64; 2]>,
+}
+
+const TABLE_II: Paper = Paper {
+    triangles: 934.0,
+    ms: [85.6, 87.7],
+    deviations: None,
+};
+/// The deviation is that of the static hearts.
+const TABLE_III: Paper = Paper {
+    triangles: 7.3,
+    ms: [65.0, 64.1],
+    deviations: Some([0.63, f64::NAN]),
+};
+
 pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
-    let shipped = |name: &str| {
-        Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("scenes")
-            .join(name)
-    };
-    let load = |given: &Option<PathBuf>, name| {
-        let file = given.clone().unwrap_or_else(|| shipped(name));
-        Scene::load(&file, &arguments.overrides).map(|(scene, _)| scene)
-    };
+    let plan = arguments.plan();
     let wanted = |table: Which| arguments.only.is_none_or(|only| only == table);
-    let scenes = match wanted(Which::One) {
-        true => Some(fusion::Scenes::load(
-            &arguments.fusion,
-            &arguments.overrides,
-        )?),
-        false => None,
+    let file = |given: &Option<PathBuf>, name: &str| {
+        let shipped = || {
+            let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+            scenes.join(name)
+        };
+        given.clone().unwrap_or_else(shipped)
     };
-    let fetus = match wanted(Which::Two) {
-        true => Some(load(&arguments.fetus, "fetus.toml")?),
+    let fetus = match wanted(Which::One) || wanted(Which::Two) {
+        true => {
+            let file = file(&arguments.fetus, "pregnancy.toml");
+            Some(fusion::Scenes::load(&file, &plan.overrides)?)
+        }
         false => None,
     };
     let heart = match wanted(Which::Three) {
-        true => Some(load(&arguments.heart, "heart.toml")?),
+        true => Some(Scene::load(&file(&arguments.heart, "heart.toml"), &plan.overrides)?.0),
         false => None,
     };
     let mut all = Vec::new();
     for &tracer in &machine.tracers {
         let mut entries = Vec::new();
         let mut details = Value::Null;
-        if let Some(scenes) = &scenes {
-            let one = fusion::run(machine, scenes, tracer, arguments.fusion.frames)?;
+        if let Some(scenes) = fetus.as_ref().filter(|_| wanted(Which::One)) {
+            let one = fusion::run(machine, scenes, tracer, plan.frames)?;
             details = one.details;
             entries.push(Entry {
                 number: "I",
-                what: "simulated / fused",
+                what: "simulated / fused".into(),
                 keys: ["simulated_ms", "fused_ms"],
                 pair: Pair {
                     first: one.simulated,
                     second: one.fused,
+                    deviations: None,
                     triangles: one.triangles,
                 },
-                paper: [929.0, fusion::PAPER[0], fusion::PAPER[1]],
+                paper: Paper {
+                    triangles: 929.0,
+                    ms: fusion::PAPER,
+                    deviations: None,
+                },
             });
         }
-        // The paper's with fusion, here without.
-        if let Some(fetus) = &fetus {
+        if let Some(scenes) = fetus.as_ref().filter(|_| wanted(Which::Two)) {
             entries.push(Entry {
                 number: "II",
-                what: "static / transform nodes",
+                what: "static / transform nodes, both fused".into(),
                 keys: ["static_ms", "transform_ms"],
-                pair: transform(machine, fetus, tracer, arguments)?,
-                paper: [934.0, 85.6, 87.7],
+                pair: transform(machine, &scenes.fused, tracer, &plan)?,
+                paper: TABLE_II,
             });
         }
         if let Some(heart) = &heart {
-            entries.push(Entry {
-                number: "III",
-                what: "static / selector node",
-                keys: ["static_ms", "selector_ms"],
-                pair: selector(machine, heart, tracer, arguments)?,
-                paper: [7.3, 65.0, 64.1],
-            });
+            // Vulkan nests no more structures: by ray query all keyframes are in the top level, under masks.
+            let selector = match tracer {
+                Tracer::Bvh => (Strategy::Selector, "selector node (union box)", "III"),
+                Tracer::RayQuery => (Strategy::Mask, "masked keyframes", "III (mask)"),
+            };
+            let exchange = (Strategy::Exchange, "node exchange", "III (exchange)");
+            for (strategy, name, number) in [selector, exchange] {
+                entries.push(Entry {
+                    number,
+                    what: format!("static / {name}"),
+                    keys: ["static_ms", "animated_ms"],
+                    pair: keyframed(machine, heart, tracer, strategy, &plan)?,
+                    paper: TABLE_III,
+                });
+            }
         }
         report(machine, tracer, &entries)?;
         let tables: serde_json::Map<String, Value> = entries.iter().map(json_of).collect();
@@ -174,13 +219,24 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
 
 fn json_of(entry: &Entry) -> (String, Value) {
     let [first, second] = entry.keys;
-    let values = json!({ first: entry.pair.first, second: entry.pair.second });
+    let Pair {
+        first: a,
+        second: b,
+        deviations,
+        triangles,
+    } = entry.pair;
+    let mut values = json!({ first: a, second: b, "triangles": triangles });
+    if let Some(deviations) = deviations {
+        values["deviations_ms"] = json!(deviations);
+    }
     (entry.number.to_owned(), values)
 }
 
 fn report(machine: &Machine, tracer: Tracer, entries: &[Entry]) -> Result<()> {
     let mut table = Table::new(
-        format!("{tracer}: median ms per frame, the two ways in turns"),
+        format!(
+            "{tracer}: median ms per frame, the two ways in turns; III: mean and deviation over the keyframes"
+        ),
         &[
             "table",
             "ways",
@@ -188,44 +244,53 @@ fn report(machine: &Machine, tracer: Tracer, entries: &[Entry]) -> Result<()> {
             "first ms",
             "second ms",
             "difference",
+            "frames/s",
             "paper: triangles",
             "first ms",
             "second ms",
             "difference",
+            "frames/s",
         ],
     );
-    let change = |a: f64, b: f64| format!("{:+.1} %", 100.0 * (b / a - 1.0));
     for entry in entries {
-        let (pair, paper) = (&entry.pair, entry.paper);
-        table.add(vec![
+        let (pair, paper) = (&entry.pair, &entry.paper);
+        let ours = [pair.first, pair.second];
+        let mut row = vec![
             entry.number.into(),
-            entry.what.into(),
+            entry.what.clone(),
             format!("{:.1}", pair.triangles as f64 / 1e3),
-            ms(pair.first),
-            ms(pair.second),
-            change(pair.first, pair.second),
-            format!("{}", paper[0]),
-            ms(paper[1]),
-            ms(paper[2]),
-            change(paper[1], paper[2]),
-        ]);
+        ];
+        row.extend(figures(ours, pair.deviations));
+        row.push(format!("{}", paper.triangles));
+        row.extend(figures(paper.ms, paper.deviations));
+        table.add(row);
     }
     table.print();
     table.csv(&machine.output, &format!("paper-{tracer}"))
 }
 
+/// Both times, by how much the second is longer, and the frames per second that both are.
+fn figures(times: [f64; 2], deviations: Option<[f64; 2]>) -> [String; 4] {
+    let shown = |i: usize| match deviations.map(|d| d[i]).filter(|d| d.is_finite()) {
+        Some(deviation) => format!("{} ± {}", ms(times[i]), ms(deviation)),
+        None => ms(times[i]),
+    };
+    let [first, second] = times;
+    [
+        shown(0),
+        shown(1),
+        format!("{:+.1} %", 100.0 * (second / first - 1.0)),
+        format!("{:.1} / {:.1}", 1e3 / first, 1e3 / second),
+    ]
+}
+
 /// Table II: every pose imaged when it has just been taken, and again while nothing moves.
-fn transform(
-    machine: &Machine,
-    scene: &Scene,
-    tracer: Tracer,
-    arguments: &Arguments,
-) -> Result<Pair> {
+fn transform(machine: &Machine, scene: &Scene, tracer: Tracer, plan: &Plan) -> Result<Pair> {
     let mut rig = Rig::new(machine, scene.clone(), tracer)?;
     rig.frame()?;
     let (mut still, mut animated) = (Vec::new(), Vec::new());
-    for round in 0..arguments.rounds {
-        for pose in 0..arguments.poses {
+    for round in 0..plan.rounds {
+        for pose in 0..plan.poses {
             // Half a second apart: unlike poses.
             let seconds = 0.5 * f64::from(pose);
             let moved = |rig: &mut Rig| rig.frame_at(seconds);
@@ -244,26 +309,24 @@ fn transform(
     Ok(Pair {
         first: Statistics::of(still).median,
         second: Statistics::of(animated).median,
+        deviations: None,
         triangles: scene.triangles(),
     })
 }
 
-/// Table III: the beating heart against hearts that stand still, one in each keyframe, with the tight
-/// box of the strategy `selector`; medians over the rounds, averaged over the keyframes as in the paper.
-fn selector(
+/// Table III: the beating heart by `strategy` against hearts that stand still, one in each keyframe, which have its
+/// tight box; medians over the rounds, then mean and deviation over the keyframes as in the paper.
+fn keyframed(
     machine: &Machine,
     scene: &Scene,
     tracer: Tracer,
-    arguments: &Arguments,
+    strategy: Strategy,
+    plan: &Plan,
 ) -> Result<Pair> {
-    let beating = by(scene, arguments.strategy);
-    let mut still = by(scene, Strategy::Selector);
-    let count = beating
-        .instances
-        .iter()
-        .map(|i| i.keyframes.meshes.len())
-        .max()
-        .unwrap_or(0);
+    let beating = by(scene, strategy);
+    let mut still = by(scene, Strategy::Exchange);
+    let keyframes = beating.instances.iter().map(|i| i.keyframes.meshes.len());
+    let count = keyframes.max().unwrap_or(0);
     let step = period(scene).unwrap_or(1.0) / count as f64;
     let times: Vec<f64> = (0..count).map(|k| (k as f64 + 0.5) * step).collect();
     let mut stills = Vec::new();
@@ -277,22 +340,31 @@ fn selector(
         still.frame()?;
     }
     let mut found = vec![[Vec::new(), Vec::new()]; count];
-    for _ in 0..arguments.rounds {
+    for round in 0..plan.rounds {
         for (k, &seconds) in times.iter().enumerate() {
-            found[k][0].push(stills[k].frame()?.frame);
-            found[k][1].push(rig.frame_at(seconds)?.frame);
+            // Now the one first, now the other.
+            for way in [round % 2, 1 - round % 2] {
+                let sample = match way {
+                    0 => stills[k].frame()?,
+                    _ => rig.frame_at(seconds)?,
+                };
+                found[k][way as usize].push(sample.frame);
+            }
         }
     }
-    let part = |i: usize| {
-        mean(
-            found
-                .iter()
-                .map(|f| Statistics::of(f[i].iter().copied()).median),
-        )
+    let of = |way: usize| -> [f64; 2] {
+        let median = |times: &[Vec<f64>; 2]| Statistics::of(times[way].iter().copied()).median;
+        let medians: Vec<f64> = found.iter().map(median).collect();
+        let middle = mean(medians.iter().copied());
+        let squares = medians.iter().map(|m| (m - middle).powi(2));
+        let degrees = (count.max(2) - 1) as f64;
+        [middle, (squares.sum::<f64>() / degrees).sqrt()]
     };
+    let ([first, a], [second, b]) = (of(0), of(1));
     Ok(Pair {
-        first: part(0),
-        second: part(1),
+        first,
+        second,
+        deviations: Some([a, b]),
         triangles: scene.triangles(),
     })
 }

@@ -36,7 +36,8 @@ pub fn possible(scene: &Scene, tracer: Tracer) -> Vec<Strategy> {
         .filter(|i| !i.keyframes.meshes.is_empty());
     let shared = keyframed.all(|i| scene.shares_topology(i));
     let can = |s: &Strategy| {
-        (shared || !s.needs_shared_topology()) && (*s != Strategy::Union || tracer == Tracer::Bvh)
+        (shared || !s.needs_shared_topology())
+            && (*s != Strategy::Selector || tracer == Tracer::Bvh)
     };
     Strategy::ALL.into_iter().filter(can).collect()
 }

@@ -254,6 +254,11 @@ impl Studio {
         Ok(pictures)
     }
 
+    /// One frame, 8-bit grey, 0 beside the sector; what it lost is told with `name`.
+    pub fn image(&mut self, scene: &Scene, name: &str) -> Result<GrayImage> {
+        Ok(self.shoot(scene, name)?.whole().0)
+    }
+
     /// Simulates one frame; what it lost is told with `name`.
     fn shoot(&mut self, scene: &Scene, name: &str) -> Result<Frame> {
         self.simulator.frame(scene, 0).into_diagnostic()?;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::clock::Clock;
 use super::fetal::Fetal;
@@ -45,7 +45,7 @@ pub enum Motion {
     /// Not at all.
     #[default]
     Still,
-    /// To and fro: shift and angle follow the sine of the phase.
+    /// To and fro: shift and angle follow the sine of the phase, and factors are to its power.
     Sine {
         /// Full oscillations.
         clock: Clock,
@@ -53,6 +53,8 @@ pub enum Motion {
         translation: DVec3,
         /// Amplitude of the rotation.
         turn: Turn,
+        /// Largest factors along the axes, about the centre of the rotation; where the sine is -1, it is 1 over them.
+        scale: DVec3,
     },
     /// About an axis at constant speed, and whatever lies off the axis on a circle around it.
     Orbit {
@@ -77,6 +79,25 @@ pub enum Motion {
 }
 
 impl Motion {
+    /// The placement that counts as rest: tissue is as squeezed as it is there where nothing squeezes it.
+    pub fn rest(&self) -> DAffine3 {
+        match self {
+            Self::Track { rest, .. } => rest.matrix(),
+            Self::Still | Self::Sine { .. } | Self::Orbit { .. } | Self::Fetal(_) => {
+                DAffine3::IDENTITY
+            }
+        }
+    }
+
+    /// Whether what it moves changes its size or proportions.
+    pub fn scales(&self) -> bool {
+        match self {
+            Self::Sine { scale, .. } => *scale != DVec3::ONE,
+            Self::Track { rest, track, .. } => track.scales(rest.scale),
+            Self::Still | Self::Orbit { .. } | Self::Fetal(_) => false,
+        }
+    }
+
     /// Where the node at rest is moved to at `seconds`.
     pub fn at(&self, seconds: f64) -> DAffine3 {
         match self {
@@ -85,9 +106,11 @@ impl Motion {
                 clock,
                 translation,
                 turn,
+                scale,
             } => {
                 let sine = (TAU * clock.fraction(seconds)).sin();
-                DAffine3::from_translation(*translation * sine) * turn.by(sine)
+                let moved = DAffine3::from_translation(*translation * sine) * turn.by(sine);
+                moved * scaled(scale.map(|factor| factor.powf(sine)), turn.centre)
             }
             Self::Orbit { clock, turn } => turn.by(clock.fraction(seconds)),
             Self::Fetal(fetal) => fetal.at(seconds),
@@ -101,6 +124,14 @@ impl Motion {
                 track.at(*rest, time).matrix()
             }
         }
+    }
+}
+
+/// Factors along the axes, about a point.
+fn scaled(factors: DVec3, centre: DVec3) -> DAffine3 {
+    DAffine3 {
+        matrix3: DMat3::from_diagonal(factors),
+        translation: centre - factors * centre,
     }
 }
 
@@ -134,6 +165,7 @@ mod tests {
                 axis: DVec3::X,
                 angle: 0.4,
             },
+            scale: DVec3::ONE,
         };
         for i in 0..50 {
             let t = f64::from(i) * 0.17;
@@ -151,6 +183,25 @@ mod tests {
                 DVec3::new(0.0, 5.0 + 2.0 * cos, 2.0 * sin) + shift,
             );
         }
+    }
+
+    #[test]
+    fn factors_are_to_the_power_of_the_sine_about_the_centre() {
+        let factors = DVec3::new(1.25, 0.5, 1.0);
+        let motion = Motion::Sine {
+            clock: clock(4.0),
+            translation: DVec3::ZERO,
+            turn: Turn {
+                centre: DVec3::new(10.0, 0.0, -2.0),
+                ..Turn::default()
+            },
+            scale: factors,
+        };
+        let point = DVec3::new(12.0, 4.0, -1.0);
+        for (t, x, y) in [(0.0, 12.0, 4.0), (1.0, 12.5, 2.0), (3.0, 11.6, 8.0)] {
+            close(motion.at(t).transform_point3(point), DVec3::new(x, y, -1.0));
+        }
+        assert!(motion.scales() && !Motion::Still.scales());
     }
 
     #[test]

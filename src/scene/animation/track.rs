@@ -283,6 +283,14 @@ impl Track {
         }
     }
 
+    /// Whether the factors are anything but `rest` at some time.
+    pub fn scales(&self, rest: DVec3) -> bool {
+        let differs = |c: &Channel<DVec3>| {
+            c.curve == Curve::CubicSpline || c.keys().any(|factors| factors != rest)
+        };
+        self.scale.as_ref().is_some_and(differs)
+    }
+
     /// Times of all keyframes, s, channel by channel.
     pub fn times(&self) -> impl Iterator<Item = f64> {
         let all = [

@@ -31,11 +31,10 @@ pub fn describe(
         Surroundings::None => "nothing",
         Surroundings::Scatterers => "the scene's own scatterers",
     };
-    // Its name in scene files.
-    let blend = format!("{:?}", fusion.blend).to_lowercase();
+    let (blur, blend) = (fusion.blur, fusion.blend.name());
+    let speed = fusion.mask_speed.name();
     lines.push(format!(
-        "fusion: around the masks {around}; over {} pixels, blend {blend}",
-        fusion.blur
+        "fusion: around the masks {around}; over {blur} pixels, blend {blend}; mask speed {speed}"
     ));
     let off = scene.masks_off_the_image();
     for &mask in &fusion.masks {
@@ -141,7 +140,7 @@ mod tests {
              box (10.000, 1.500, 1.000) to (20.000, 5.500, 13.000) mm",
             "  shown from -7 (black) to 52 (white)",
             "  0.0 MB on the device",
-            "fusion: around the masks the volume; over 9 pixels, blend smooth",
+            "fusion: around the masks the volume; over 9 pixels, blend smooth; mask speed enclosing",
             "  mask ball: 0.519 ml, on the image",
         ] {
             assert!(text.lines().any(|l| l == line), "{line}\nin\n{text}");

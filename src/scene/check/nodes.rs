@@ -82,7 +82,7 @@ fn shaped(scene: &Scene, instance: &Instance) -> String {
         false => "of different triangles",
     };
     let follows = match keyframes.strategy {
-        Strategy::Selector => String::new(),
+        Strategy::Exchange => String::new(),
         strategy => format!(", strategy {strategy}"),
     };
     format!(": {} keyframes {topology}{follows}", keyframes.meshes.len())

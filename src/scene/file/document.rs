@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use serde::Deserialize;
+use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
@@ -137,13 +137,18 @@ impl Source {
 }
 
 impl Document<'_> {
-    /// The file as the schema understands it.
+    /// A scene file as the schema understands it.
     pub fn parse(&self) -> Result<File, SceneError> {
+        self.parse_as()
+    }
+
+    /// The file as `T` understands it.
+    pub fn parse_as<T: DeserializeOwned>(&self) -> Result<T, SceneError> {
         let root = Spanned::new(0..self.source.text.len(), self.root.clone());
         let deserializer = toml::de::Deserializer::from(root);
         let mut track = serde_path_to_error::Track::new();
         let tracked = serde_path_to_error::Deserializer::new(deserializer, &mut track);
-        File::deserialize(tracked).map_err(|e| {
+        T::deserialize(tracked).map_err(|e| {
             let path: Vec<_> = track.path().iter().map(segment).collect();
             let names: Vec<_> = path.iter().map(String::as_str).collect();
             let span = e.span().unwrap_or_else(|| self.span(&names));

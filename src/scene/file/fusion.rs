@@ -31,7 +31,7 @@ pub(super) fn volume(
         )
     })?;
     warnings.extend(found);
-    let place = (table.translate, table.rotate.as_ref(), table.scale);
+    let place = (table.translate, table.rotate.as_ref(), table.factors());
     let world_from_lps = placement(document, "volume", place)?;
     // All that is stored of a byte; of other types only the range in use says what is white.
     let range = match &volume.voxels {
@@ -61,6 +61,7 @@ pub(super) fn volume(
     Ok(Acquired {
         size: volume.size,
         world_from_voxel: world_from_lps * volume.world_from_voxel,
+        world_from_lps,
         voxels: Arc::new(volume.voxels),
         black,
         white,
@@ -119,6 +120,7 @@ pub(super) fn fusion(
         surroundings,
         blur,
         blend: table.blend.unwrap_or(Blend::Linear),
+        mask_speed: table.mask_speed.unwrap_or_default(),
         background_shadows: table.background_shadows.unwrap_or(false),
     }))
 }

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use super::anatomy::Anatomy;
 use super::document::Document;
@@ -210,7 +210,7 @@ impl Family<'_> {
                     entry.name
                 );
                 let remedy =
-                    "use `selector`, or export all keyframes from one mesh, vertex by vertex";
+                    "use `exchange`, or export all keyframes from one mesh, vertex by vertex";
                 return fail(&at, message, remedy);
             }
         }
@@ -224,7 +224,7 @@ impl Family<'_> {
                 return fail(
                     &format!("{path}.strategy"),
                     format!("`{strategy}` moves the vertices of keyframes, and `{name}` has none"),
-                    "use `selector`, or a mesh with `keyframes`",
+                    "use `exchange`, or a mesh with `keyframes`",
                 );
             }
             (None, count) | (Some((count, _)), 0) => count,
@@ -293,10 +293,12 @@ impl Family<'_> {
 
     /// Fails where a placement with all parents is too large, too small or too far.
     fn sensible(&self, e: usize, rest: DAffine3) -> Result<(), SceneError> {
-        // Scales are the same along all axes.
-        let scale = rest.matrix3.x_axis.length();
+        let m = &rest.matrix3;
+        let sizes = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+        let wrong = |size: &f64| !(SCALES.0..=SCALES.1).contains(size);
+        let scale = sizes.into_iter().find(wrong).unwrap_or(1.0);
         let far = rest.translation.abs().max_element();
-        let (cause, limits) = match ((SCALES.0..=SCALES.1).contains(&scale), far <= FAR) {
+        let (cause, limits) = match (!wrong(&scale), far <= FAR) {
             (true, true) => return Ok(()),
             (false, _) => (
                 format!("is scaled by {scale:.3e}"),

@@ -128,13 +128,13 @@ fn mistakes_of_selectors_are_placed() {
         );
     }
     f(
-        &(with("unoin") + &beating("x", "a b")),
+        &(with("selectro") + &beating("x", "a b")),
         (4, 12),
-        "unknown variant `unoin`",
-        "`union`",
+        "unknown variant `selectro`",
+        "`selector`",
     );
     assert!(
-        case.load(&(with("union") + &beating("x", "a odd")), &[])
+        case.load(&(with("selector") + &beating("x", "a odd")), &[])
             .is_ok()
     );
     f(
@@ -224,7 +224,7 @@ fn mistakes_of_motions_are_placed() {
     f(
         "kind = \"sine\"",
         "\"sine",
-        "needs `translate` or `rotate`",
+        "needs `translate`, `rotate` or `scale`",
         "add",
     );
     f(
@@ -279,8 +279,26 @@ fn mistakes_of_motions_are_placed() {
     f(
         "kind = \"sine\", period = 1, translate = [1, 0, 0], centre = [1, 0, 0]",
         "[1, 0, 0]",
-        "`centre` is that of `rotate`",
-        "add `rotate`",
+        "`centre` is that of `rotate` or `scale`",
+        "add one of them",
+    );
+    f(
+        "kind = \"sine\", period = 1, scale = [1, 0.2, 1]",
+        "[1, 0.2, 1]",
+        "scale is 0.2",
+        "between 0.4 and 2.5",
+    );
+    f(
+        "kind = \"sine\", period = 1, scale = [1, 1]",
+        "[1, 1]",
+        "invalid length 2",
+        "",
+    );
+    f(
+        "kind = \"orbit\", period = 1, rotate = { axis = [0, 0, 1], angle = \"1 rad\" }, scale = 2",
+        "2",
+        "`scale` does not belong",
+        "",
     );
     f(
         "kind = \"file\", file = \"gone.csv\"",

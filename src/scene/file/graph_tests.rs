@@ -115,7 +115,7 @@ fn a_strategy_is_set_from_outside() {
         let keyframes = &scene.instances[0].keyframes;
         (keyframes.strategy, keyframes.blend[0])
     };
-    assert_eq!(strategy(&[]), (Strategy::Selector, (1, 1.0)));
+    assert_eq!(strategy(&[]), (Strategy::Exchange, (1, 1.0)));
     let (set, (keyframe, weight)) = strategy(&[("selector.beat.strategy", "interpolate")]);
     assert_eq!((set, keyframe), (Strategy::Interpolate, 1));
     assert!((weight - 0.5).abs() < 1e-9);
@@ -203,4 +203,39 @@ fn every_motion_is_read() {
         scene.graph.nodes[0].kind,
         NodeKind::Transform { .. }
     ));
+}
+
+#[test]
+fn placements_and_motions_scale_each_axis() {
+    let case = case();
+    write(
+        &case,
+        "pulse.csv",
+        "time_s,sx,sy,sz\n0,1,1,1\n1,1.2,1,0.8\n2,1,1,1\n",
+    );
+    let text = "[[transform]]\nname = \"flat\"\nscale = [1, 2, 0.5]\n\
+         [[transform]]\nname = \"pulse\"\nparent = \"flat\"\nmotion = { kind = \"file\", file = \"pulse.csv\" }\n\
+         [[transform]]\nname = \"palpated\"\n\
+         motion = { kind = \"sine\", period = 4, scale = [1, 1, 0.5], centre = [0, 0, 10] }\n"
+        .to_owned()
+        + &mesh("a", "parent = \"pulse\"\nfile = \"cube.obj\"\nscale = [3, 1, 1]")
+        + &mesh("b", "parent = \"palpated\"\nfile = \"cube.obj\"");
+    let (mut scene, warnings) = case.load(&text, &[]).expect("sound");
+    assert!(warnings.is_empty(), "{warnings:?}");
+    for (t, a, b) in [
+        (0.0, [3.0, 2.0, 0.5], [1.0, 1.0, 1.0]),
+        (1.0, [3.6, 2.0, 0.4], [1.0, 1.0, 5.5]),
+        (3.0, [3.6, 2.0, 0.4], [1.0, 1.0, -8.0]),
+    ] {
+        scene.set_time(t);
+        for (name, expected) in [("a", a), ("b", b)] {
+            let corner = named(&scene, name)
+                .world_from_object
+                .transform_point3(DVec3::ONE);
+            assert!(
+                corner.distance(expected.into()) < 1e-12,
+                "{name} at {t} s: {corner}"
+            );
+        }
+    }
 }

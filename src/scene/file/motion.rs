@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::placing::{shift, turn};
+use super::placing::{factors, shift, turn};
 use super::schema::{BetweenRows, MotionKind, MotionTable, Rotation};
 use super::units::{Duration, Rate};
 use super::{trajectory, within};
@@ -14,6 +14,9 @@ use crate::scene::animation::{Clock, Curve, Fetal, Loop, Motion, Trs, Turn};
 const PERIODS: (f64, f64) = (1e-6, 86_400.0);
 /// Updates per second: from one a day to more than any frame rate.
 const RATES: (f64, f64) = (1e-5, 1e6);
+/// Factors by which tissue is squeezed or stretched: half and twice is more than tissue bears, and as far as its
+/// scatterers are found (`docs/kernels.md`, Deformed tissue).
+pub(super) const SQUEEZE: (f64, f64) = (0.4, 2.5);
 /// A burst of general movements and the pause after it where the file does not say, s: lively enough
 /// for a short clip. Fetuses of 8 to 19 weeks rest for up to 13 minutes (de Vries, Visser and Prechtl
 /// 1985, Early Human Development 12, 99-120).
@@ -71,6 +74,7 @@ pub(super) fn motion(
                 clock: clock(document, path, parts.period()?, settings)?,
                 translation: parts.translation()?,
                 turn: parts.turn(table.rotate.as_ref())?,
+                scale: factors(document, &format!("{path}.scale"), table.scale, SQUEEZE)?,
             }
         }
         MotionKind::Orbit => {
@@ -133,12 +137,13 @@ pub(super) fn motion(
 /// Refuses keys of another kind of motion.
 fn fit(document: &Document<'_>, table: &MotionTable, path: &str) -> Result<(), SceneError> {
     use MotionKind::{Fetal, File, Orbit, Sine};
-    let keys: [(&str, bool, &[MotionKind]); 11] = [
+    let keys: [(&str, bool, &[MotionKind]); 12] = [
         ("period", table.period.is_some(), &[Sine, Orbit]),
         ("phase", table.phase.is_some(), &[Sine, Orbit, File]),
         ("loop", table.mode.is_some(), &[Sine, Orbit, File]),
         ("translate", table.translate.is_some(), &[Sine, Fetal]),
         ("rotate", table.rotate.is_some(), &[Sine, Orbit, Fetal]),
+        ("scale", table.scale.is_some(), &[Sine]),
         ("centre", table.centre.is_some(), &[Sine, Orbit, Fetal]),
         ("seed", table.seed.is_some(), &[Fetal]),
         ("duration", table.duration.is_some(), &[Fetal]),
@@ -183,8 +188,12 @@ impl Parts<'_> {
 
     /// Something has to be moved by.
     fn moves(&self) -> Result<(), SceneError> {
-        match self.table.translate.is_some() || self.table.rotate.is_some() {
+        let table = self.table;
+        match table.translate.is_some() || table.rotate.is_some() || table.scale.is_some() {
             true => Ok(()),
+            false if table.kind == MotionKind::Sine => {
+                self.need("translate`, `rotate` or `scale", None)
+            }
             false => self.need("translate` or `rotate", None),
         }
     }
@@ -203,11 +212,11 @@ impl Parts<'_> {
             (out.axis, out.angle) = turn(self.document, &at("rotate"), rotate)?;
         }
         if let Some(centre) = self.table.centre {
-            if rotate.is_none() {
+            if rotate.is_none() && self.table.scale.is_none() {
                 return Err(self.document.fail(
                     &at("centre"),
-                    "`centre` is that of `rotate`, which is not given",
-                    "add `rotate` or remove `centre`",
+                    "`centre` is that of `rotate` or `scale`, and neither is given",
+                    "add one of them or remove `centre`",
                 ));
             }
             out.centre = shift(self.document, &at("centre"), centre)?;

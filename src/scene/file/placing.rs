@@ -4,7 +4,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::Rotation;
+use super::schema::{Factors, Rotation};
 use super::units::Length;
 use super::within;
 
@@ -12,10 +12,9 @@ use super::within;
 pub(super) fn placement(
     document: &Document<'_>,
     path: &str,
-    (translate, rotate, scale): (Option<[Length; 3]>, Option<&Rotation>, Option<f64>),
+    (translate, rotate, scale): (Option<[Length; 3]>, Option<&Rotation>, Option<Factors>),
 ) -> Result<DAffine3, SceneError> {
-    let scale = scale.unwrap_or(1.0);
-    within(document, &format!("{path}.scale"), scale, 1e-6, 1e6, "")?;
+    let scale = factors(document, &format!("{path}.scale"), scale, (1e-6, 1e6))?;
     let rotation = match rotate {
         Some(rotation) => {
             let (axis, angle) = turn(document, &format!("{path}.rotate"), rotation)?;
@@ -28,7 +27,7 @@ pub(super) fn placement(
         None => DVec3::ZERO,
     };
     Ok(DAffine3::from_scale_rotation_translation(
-        DVec3::splat(scale),
+        scale,
         rotation,
         translation,
     ))
@@ -48,6 +47,20 @@ pub(super) fn turn(
     let angle = rotation.angle.0;
     within(document, &format!("{path}.angle"), angle, -1e3, 1e3, "rad")?;
     Ok((axis, angle))
+}
+
+/// Factors along the axes, each within `range`; 1 where none are given.
+pub(super) fn factors(
+    document: &Document<'_>,
+    path: &str,
+    given: Option<Factors>,
+    range: (f64, f64),
+) -> Result<DVec3, SceneError> {
+    let Factors(factors) = given.unwrap_or(Factors([1.0; 3]));
+    for factor in factors {
+        within(document, path, factor, range.0, range.1, "")?;
+    }
+    Ok(factors.into())
 }
 
 /// A vector, mm.

@@ -61,7 +61,7 @@ pub(super) fn build(
         within(document, &format!("probe.{key}"), value, least, most, unit)?;
     }
     let pose = match &table.pose {
-        Some(pose) => place(document, pose)?,
+        Some(pose) => place(document, "probe.pose", pose)?,
         None => DAffine3::IDENTITY,
     };
     Ok((out, pose))
@@ -132,35 +132,44 @@ fn kind(document: &Document<'_>, table: &ProbeTable, preset: Kind) -> Result<Kin
     })
 }
 
-/// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it.
-fn place(document: &Document<'_>, pose: &PoseTable) -> Result<DAffine3, SceneError> {
-    let unit = |path: &str, v: [f64; 3]| {
-        DVec3::from(v).try_normalize().ok_or_else(|| {
-            document.fail(
-                path,
-                "this direction has no length",
-                "give a vector such as [0, 0, 1]",
-            )
-        })
+/// The pose that the table at `path` describes.
+pub(super) fn place(
+    document: &Document<'_>,
+    path: &str,
+    pose: &PoseTable,
+) -> Result<DAffine3, SceneError> {
+    let position = DVec3::from(pose.position.map(|q| q.0));
+    look(position, pose.direction.into(), pose.lateral.into()).map_err(|fault| {
+        let [key, message, remedy] = fault;
+        document.fail(&format!("{path}.{key}"), message, remedy)
+    })
+}
+
+/// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it; or which
+/// of them is at fault, why, and what to do.
+pub(super) fn look(
+    position: DVec3,
+    direction: DVec3,
+    lateral: DVec3,
+) -> Result<DAffine3, [&'static str; 3]> {
+    let unit = |key, v: DVec3| {
+        let remedy = "give a vector such as [0, 0, 1]";
+        v.try_normalize()
+            .ok_or([key, "this direction has no length", remedy])
     };
-    let z = unit("probe.pose.direction", pose.direction)?;
-    let lateral = unit("probe.pose.lateral", pose.lateral)?;
+    let z = unit("direction", direction)?;
+    let lateral = unit("lateral", lateral)?;
     let across = lateral - z * lateral.dot(z);
     if across.length() < PARALLEL {
-        return Err(document.fail(
-            "probe.pose.lateral",
+        return Err([
+            "lateral",
             "lateral is parallel to direction: they span no image plane",
             "choose a lateral axis across the direction",
-        ));
+        ]);
     }
     let x = across.normalize();
-    let position = DVec3::from(pose.position.map(|q| q.0));
     if !position.is_finite() {
-        return Err(document.fail(
-            "probe.pose.position",
-            "the position is not finite",
-            "give lengths",
-        ));
+        return Err(["position", "the position is not finite", "give lengths"]);
     }
     Ok(DAffine3::from_mat3_translation(
         DMat3::from_cols(x, z.cross(x), z),

@@ -1,16 +1,17 @@
 //! Settings written back into a scene file: its comments, its order and all that is not set stay as
 //! they are.
 
-use std::io::Write as _;
 use std::path::{Component, Path, PathBuf};
 
 use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
-use toml_edit::{DocumentMut, Item, Key, KeyMut, Table, TableLike, Value};
+use toml_edit::{DocumentMut, InlineTable, Item, Key, KeyMut, Table, TableLike, Value};
 
 use super::document::Source;
 use super::error::SceneError;
+use super::placing::placement;
 use super::tissues::Tissues;
 use super::{parameters, probe};
+use crate::files;
 use crate::scene::suggest;
 
 /// What is wrong with a setting, and what to do about it.
@@ -20,6 +21,10 @@ type Misfit = (String, String);
 /// the key is to go. Names with dots stand in quotes, as in TOML: `mesh."a.b".roughness`.
 pub type Entry = (String, Option<String>);
 
+/// A comment above the key at a path: the path, and one line of text. It takes the place of comments there
+/// that begin with the same word.
+pub type Note = (String, String);
+
 /// Writes the scene file `from` to `to` (which may be the same) with `settings` in place. What they
 /// replace keeps its comments. In another folder the files that the scene names are named from there.
 /// `to` is replaced at once, when all is written: no failure leaves half a file.
@@ -28,6 +33,19 @@ pub type Entry = (String, Option<String>);
 /// A file that cannot be read or written, a path that does not fit the file, a value that the key does
 /// not take. `to` is then as it was.
 pub fn save(from: &Path, to: &Path, settings: &[Entry]) -> Result<(), SceneError> {
+    save_with(from, to, settings, &[])
+}
+
+/// As [`save`], with `notes` above their keys.
+///
+/// # Errors
+/// As there; the key of a note that is not in the file.
+pub fn save_with(
+    from: &Path,
+    to: &Path,
+    settings: &[Entry],
+    notes: &[Note],
+) -> Result<(), SceneError> {
     let misfit = |(message, remedy): Misfit| SceneError::file(from, message, &remedy);
     let source = Source::read(from, &[])?;
     // Its own error would have no remedy.
@@ -41,6 +59,11 @@ pub fn save(from: &Path, to: &Path, settings: &[Entry]) -> Result<(), SceneError
         let segments: Vec<_> = segments.iter().map(String::as_str).collect();
         let value = value.as_deref().map(parsed);
         into_table(document.as_table_mut(), &segments, value).map_err(misfit)?;
+    }
+    for (path, text) in notes {
+        let segments = segments(path);
+        let segments: Vec<_> = segments.iter().map(String::as_str).collect();
+        note(document.as_table_mut(), &segments, text).map_err(misfit)?;
     }
     let folder = |path: &Path| {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
@@ -56,7 +79,7 @@ pub fn save(from: &Path, to: &Path, settings: &[Entry]) -> Result<(), SceneError
     }
     let text = document.to_string();
     check(&Source::of(to, text.clone()))?;
-    replace_file(to, &text).map_err(|e| {
+    files::replace(to, text.as_bytes()).map_err(|e| {
         let remedy = "check that the folder can be written to and has room";
         SceneError::file(to, format!("cannot be written: {e}"), remedy)
     })
@@ -71,6 +94,18 @@ fn check(source: &Source) -> Result<(), SceneError> {
     parameters::imaging(&document, file.imaging)?;
     parameters::live(&document, &file.live)?;
     Tissues::new(&document, &file.tissues)?;
+    if let Some(t) = &file.volume {
+        let place = (t.translate, t.rotate.as_ref(), t.factors());
+        placement(&document, "volume", place)?;
+    }
+    for (i, t) in file.transform.iter().enumerate() {
+        let path = format!("transform.{i}");
+        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
+    }
+    for (i, t) in file.mesh.iter().enumerate() {
+        let path = format!("mesh.{i}");
+        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
+    }
     Ok(())
 }
 
@@ -94,6 +129,12 @@ fn into_table(
 ) -> Result<(), Misfit> {
     let (first, rest) = path.split_first().expect("a path has a part");
     if rest.is_empty() {
+        let old = table.get_mut(first);
+        if let (Some(old), Some(Value::InlineTable(new))) = (old, &value)
+            && let Some(old) = old.as_table_like_mut()
+        {
+            return replace_table(old, new);
+        }
         let old = table.get_mut(first).and_then(Item::as_value_mut);
         match (old, value) {
             (Some(old), Some(value)) => replace_value(old, value),
@@ -195,6 +236,52 @@ fn replace_value(old: &mut Value, new: Value) {
     }
 }
 
+/// Puts the entries of `new` in the place of those of `old`, key by key.
+fn replace_table(old: &mut dyn TableLike, new: &InlineTable) -> Result<(), Misfit> {
+    let gone = old.iter().map(|(key, _)| key.to_owned());
+    let gone: Vec<_> = gone.filter(|key| !new.contains_key(key)).collect();
+    for key in gone {
+        old.remove(&key);
+    }
+    for (key, value) in new {
+        into_table(old, &[key], Some(value.clone()))?;
+    }
+    Ok(())
+}
+
+/// Writes a comment above the key at `path`, or above the inline table that holds it, where no comment
+/// fits.
+fn note(table: &mut dyn TableLike, path: &[&str], text: &str) -> Result<(), Misfit> {
+    let (first, rest) = path.split_first().expect("a path has a part");
+    match (table.get_mut(first), rest) {
+        (None, _) => return Err(whole(first)),
+        (Some(Item::Table(inner)), [_, ..]) => return note(inner, rest, text),
+        (Some(Item::ArrayOfTables(tables)), [name, _, ..]) => {
+            let names: Vec<_> = tables.iter().map(|t| name_of(t)).collect();
+            let index = element(first, name, &names)?;
+            let table = tables.get_mut(index).expect("one of them");
+            return note(table, &rest[1..], text);
+        }
+        _ => {}
+    }
+    let mut key = table.key_mut(first).expect("it has a value");
+    let decor = key.leaf_decor_mut();
+    let before = decor.prefix().and_then(|p| p.as_str()).unwrap_or_default();
+    let (lines, indent) = match before.rsplit_once('\n') {
+        Some((lines, indent)) => (lines.split('\n').collect(), indent),
+        None => (Vec::new(), before),
+    };
+    let word = text.split_whitespace().next().unwrap_or_default();
+    let same = |line: &str| {
+        let comment = line.trim_start().strip_prefix('#');
+        comment.is_some_and(|c| c.split_whitespace().next() == Some(word))
+    };
+    let kept = lines.iter().filter(|l| !same(l));
+    let kept: String = kept.map(|l| format!("{l}\n")).collect();
+    decor.set_prefix(format!("{kept}{indent}# {text}\n{indent}"));
+    Ok(())
+}
+
 /// Names the files of a scene from another folder.
 struct Moved {
     old: PathBuf,
@@ -246,27 +333,6 @@ impl Moved {
         let down = theirs.map(|c| c.as_os_str().to_string_lossy().into_owned());
         up.chain(down).collect::<Vec<_>>().join("/")
     }
-}
-
-/// Writes beside `path`, then takes its place.
-fn replace_file(path: &Path, text: &str) -> std::io::Result<()> {
-    // A link stays one.
-    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let beside = path.with_file_name(format!(".{name}.{}", std::process::id()));
-    let written = || {
-        let mut file = std::fs::File::create_new(&beside)?;
-        file.write_all(text.as_bytes())?;
-        if let Ok(before) = std::fs::metadata(&path) {
-            file.set_permissions(before.permissions())?;
-        }
-        file.sync_all()?;
-        std::fs::rename(&beside, &path)
-    };
-    written().inspect_err(|_| {
-        // What is left of it helps nobody; the first error is the one to tell.
-        let _ = std::fs::remove_file(&beside);
-    })
 }
 
 #[cfg(test)]

@@ -193,3 +193,103 @@ fn links_and_permissions_stay() {
     let text = std::fs::read_to_string(case.path()).expect("there");
     assert!(text.contains("gain = 5 # loud"), "{text}");
 }
+
+const PLACED: &str = r#"# A box.
+[[mesh]]
+name = "a"
+tissue = "fat"
+file = "cube.obj"
+
+[[transform]]
+name = "b"
+    # By eye.
+    # registered long ago
+    translate = [1, 2, 3] # mm
+rotate = { axis = [0, 0, 1], angle = "3 deg" } # a little
+"#;
+
+fn noted(text: &str, set: &[(&str, &str)], note: (&str, &str)) -> Result<String, SceneError> {
+    let case = Case::new();
+    std::fs::write(case.path(), text).expect("written");
+    let notes = [(note.0.to_owned(), note.1.to_owned())];
+    save_with(&case.path(), &case.path(), &settings(set), &notes)?;
+    Ok(std::fs::read_to_string(case.path()).expect("there"))
+}
+
+#[test]
+fn a_note_stands_above_its_key_and_replaces_its_like() {
+    let turn = "{ axis = [1, 0, 0], angle = \"4 deg\" }";
+    let set = [("transform.b.rotate", turn), ("mesh.a.scale", "2")];
+    let text = noted(PLACED, &set, ("transform.b.translate", "registered: well"));
+    let expected = PLACED
+        .replace(
+            "    # registered long ago\n",
+            "    # registered long ago\n    # registered: well\n",
+        )
+        .replace(
+            "[0, 0, 1], angle = \"3 deg\"",
+            "[1, 0, 0], angle = \"4 deg\"",
+        )
+        .replace("cube.obj\"\n", "cube.obj\"\nscale = 2\n");
+    assert_eq!(text.expect("saved"), expected);
+    let text = noted(PLACED, &[], ("transform.b.translate", "registered anew"));
+    let expected = PLACED.replace("registered long ago", "registered anew");
+    assert_eq!(text.expect("saved"), expected);
+    let set = [("mesh.a.translate", "[1, 0, 0]")];
+    let text = noted(PLACED, &set, ("mesh.a.translate", "registered"));
+    let expected = PLACED.replace(
+        "cube.obj\"\n",
+        "cube.obj\"\n# registered\ntranslate = [1, 0, 0]\n",
+    );
+    assert_eq!(text.expect("saved"), expected);
+    // Into an inline table no comment fits.
+    let inline = "# Keyed.\ntracker = { device = \"a\" }\n";
+    let text = noted(
+        inline,
+        &[("tracker.device", "b")],
+        ("tracker.device", "registered"),
+    );
+    let expected = "# Keyed.\n# registered\ntracker = { device = \"b\" }\n";
+    assert_eq!(text.expect("saved"), expected);
+    let error = noted(PLACED, &[], ("transform.b.scale", "registered")).expect_err("no such key");
+    assert!(error.message.contains("`scale`"), "{error}");
+}
+
+#[test]
+fn a_table_is_replaced_key_by_key_in_any_spelling() {
+    let head = "[[transform]]\nname = \"b\"\n";
+    let turn = "{ axis = [1, 0, 0], angle = \"4 deg\" }";
+    for (before, after) in [
+        ("", "rotate = { axis = [1, 0, 0], angle = \"4 deg\" }\n"),
+        (
+            "rotate.axis = [0, 1, 0] # up\nrotate.angle = \"9 deg\"\n",
+            "rotate.axis = [1, 0, 0] # up\nrotate.angle = \"4 deg\"\n",
+        ),
+        (
+            "\n[transform.rotate]\n# up\naxis = [0, 1, 0]\nangle = \"9 deg\" # little\n",
+            "\n[transform.rotate]\n# up\naxis = [1, 0, 0]\nangle = \"4 deg\" # little\n",
+        ),
+    ] {
+        let set = [
+            ("transform.b.rotate", turn),
+            ("transform.b.translate", "[1, 0, 0]"),
+        ];
+        let text = noted(
+            &format!("{head}{before}"),
+            &set,
+            ("transform.b.translate", "seen"),
+        );
+        let text = text.expect("saved");
+        let moved = "# seen\ntranslate = [1, 0, 0]\n";
+        assert_eq!(
+            text.replacen(moved, "", 1),
+            format!("{head}{after}"),
+            "{text}"
+        );
+        let case = Case::new();
+        case.load(&text, &[]).expect("sound");
+    }
+    let far = [("transform.b.translate", "[1, 0, 1e9]")];
+    let error = noted(PLACED, &far, ("transform.b.translate", "seen")).expect_err("too far");
+    assert!(error.message.contains("translate is 1000000000"), "{error}");
+}

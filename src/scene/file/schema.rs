@@ -4,13 +4,14 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 use serde::Deserialize;
-use serde::de::{Deserializer, Error, Visitor};
+use serde::de::value::SeqAccessDeserializer;
+use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 
 use super::units::{
     Angle, Attenuation, Density, Duration, Frequency, Impedance, Length, Level, Rate, Speed,
 };
 use crate::scene::animation::{Interpolation, Loop};
-use crate::scene::fusion::{Blend, Surroundings};
+use crate::scene::fusion::{Blend, MaskSpeed, Surroundings};
 use crate::scene::keyframes::Strategy;
 use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::tracker::Axes;
@@ -160,6 +161,13 @@ pub struct VolumeTable {
     pub white: Option<f64>,
 }
 
+impl VolumeTable {
+    /// A volume keeps its proportions.
+    pub fn factors(&self) -> Option<Factors> {
+        self.scale.map(|factor| Factors([factor; 3]))
+    }
+}
+
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FusionTable {
@@ -167,6 +175,7 @@ pub struct FusionTable {
     pub surroundings: Option<Surroundings>,
     pub blur: Option<u32>,
     pub blend: Option<Blend>,
+    pub mask_speed: Option<MaskSpeed>,
     pub background_shadows: Option<bool>,
 }
 
@@ -231,7 +240,7 @@ pub struct TransformTable {
     pub parent: Option<String>,
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
-    pub scale: Option<f64>,
+    pub scale: Option<Factors>,
     pub motion: Option<MotionTable>,
 }
 
@@ -260,6 +269,7 @@ pub struct MotionTable {
     pub rate: Option<Rate>,
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
+    pub scale: Option<Factors>,
     pub centre: Option<[Length; 3]>,
     pub seed: Option<u32>,
     pub duration: Option<Duration>,
@@ -307,7 +317,7 @@ pub struct MeshTable {
     pub priority: i32,
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
-    pub scale: Option<f64>,
+    pub scale: Option<Factors>,
     pub roughness: Option<f64>,
     pub thickness: Option<Length>,
     pub specularity: Option<f64>,
@@ -316,6 +326,42 @@ pub struct MeshTable {
     pub inside: SurfaceTable,
     #[serde(default)]
     pub cap_openings: bool,
+}
+
+/// Factors along x, y and z: three, or one for all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Factors(pub [f64; 3]);
+
+impl<'de> Deserialize<'de> for Factors {
+    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
+        struct OneOrThree;
+
+        impl<'de> Visitor<'de> for OneOrThree {
+            type Value = Factors;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a number or 3 numbers: along x, y and z")
+            }
+
+            fn visit_f64<E: Error>(self, factor: f64) -> Result<Self::Value, E> {
+                Ok(Factors([factor; 3]))
+            }
+
+            fn visit_i64<E: Error>(self, factor: i64) -> Result<Self::Value, E> {
+                self.visit_f64(factor as f64)
+            }
+
+            fn visit_u64<E: Error>(self, factor: u64) -> Result<Self::Value, E> {
+                self.visit_f64(factor as f64)
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
+                <[f64; 3]>::deserialize(SeqAccessDeserializer::new(list)).map(Factors)
+            }
+        }
+
+        deserializer.deserialize_any(OneOrThree)
+    }
 }
 
 /// Which animation of a file.

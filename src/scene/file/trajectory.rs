@@ -1,4 +1,4 @@
-//! Trajectory files: time, position and rotation, row by row as CSV or column by column as TOML.
+//! Trajectory files: time, position, rotation and scale, row by row as CSV or column by column as TOML.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -8,6 +8,7 @@ use glam::{DQuat, DVec3};
 use toml::Spanned;
 
 use super::error::SceneError;
+use super::motion::SQUEEZE;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
 use crate::scene::suggest;
 
@@ -19,7 +20,9 @@ const MAX_ROWS: usize = 200_000;
 const FAR: f64 = 1e5;
 
 /// The columns that there can be.
-const NAMES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
+const NAMES: [&str; 11] = [
+    "time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "sx", "sy", "sz",
+];
 
 /// One column with the places of its values in the text, bytes.
 struct Column {
@@ -47,15 +50,23 @@ pub(super) fn text(path: &Path) -> Result<String, String> {
     std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"))
 }
 
-/// The samples of the trajectory file at `path`, linear between them: TOML by its extension, else CSV,
-/// of the columns `time_s`, `x_mm`, `y_mm`, `z_mm` (mm) and `qw`, `qx`, `qy`, `qz` (a quaternion).
+/// The samples of the probe's trajectory in the file at `path`, linear between them: TOML by its extension, else
+/// CSV, of the columns `time_s`, `x_mm`, `y_mm`, `z_mm` (mm) and `qw`, `qx`, `qy`, `qz` (a quaternion).
 ///
 /// # Errors
 /// A file that cannot be read, or the first mistake with its place in it.
 pub fn load_trajectory(path: &Path) -> Result<Track, SceneError> {
     let text = text(path)
         .map_err(|cause| SceneError::file(path, cause, "check the path of the trajectory"))?;
-    parse(path, &text, Curve::Linear)
+    let track = parse(path, &text, Curve::Linear)?;
+    match track.scale {
+        None => Ok(track),
+        Some(_) => Err(SceneError::file(
+            path,
+            "a probe keeps its size, and there are columns sx, sy, sz".to_owned(),
+            "remove them, or give the file to the motion of a transform",
+        )),
+    }
 }
 
 /// The samples of `text`, TOML by the extension of `path`, else CSV.
@@ -223,11 +234,12 @@ impl Table<'_> {
             let remedy = "add a row of numbers";
             return Err(self.fail(0..0, "the trajectory has no rows".to_owned(), remedy));
         }
-        if positions.is_none() && rotations.is_none() {
+        let factors = self.together(["sx", "sy", "sz"])?;
+        if positions.is_none() && rotations.is_none() && factors.is_none() {
             return Err(self.fail(
                 0..0,
-                "the trajectory has neither positions nor rotations".to_owned(),
-                "add x_mm, y_mm, z_mm or qw, qx, qy, qz",
+                "the trajectory has neither positions nor rotations nor factors".to_owned(),
+                "add x_mm, y_mm, z_mm or qw, qx, qy, qz or sx, sy, sz",
             ));
         }
         let rows = time.values.len();
@@ -247,6 +259,16 @@ impl Table<'_> {
                 return Err(self.fail(at, message, "give numbers, positions up to 100000 mm"));
             }
         }
+        for column in factors.into_iter().flatten() {
+            let (least, most) = SQUEEZE;
+            let outside = |v: &f64| !(least..=most).contains(v);
+            if let Some(row) = column.values.iter().position(outside) {
+                let at = column.places[row].clone();
+                let message = format!("the factor is {}", column.values[row]);
+                let remedy = format!("tissue can be squeezed to {least} and stretched to {most}");
+                return Err(self.fail(at, message, &remedy));
+            }
+        }
         let refused = |e: TrackError| self.refused(&e, time, rotations);
         let times = || time.values.clone();
         let mut track = Track::default();
@@ -262,6 +284,11 @@ impl Table<'_> {
             });
             let channel = Channel::rotations(times(), values.collect(), curve);
             track.rotation = Some(channel.map_err(refused)?);
+        }
+        if let Some([x, y, z]) = factors {
+            let values = (0..rows).map(|i| DVec3::new(x.values[i], y.values[i], z.values[i]));
+            let channel = Channel::new(times(), values.collect(), curve);
+            track.scale = Some(channel.map_err(refused)?);
         }
         Ok(track)
     }

@@ -201,3 +201,51 @@ fn topology_is_shared_where_triangles_and_vertex_counts_agree() {
         assert_eq!(scene.shares_topology(&scene.instances[0]), shared);
     }
 }
+
+#[test]
+fn only_what_time_squeezes_has_a_shape_at_rest() {
+    let clock = Clock {
+        period: 4.0,
+        ..Clock::default()
+    };
+    let sine = |scale: DVec3, angle: f64| Motion::Sine {
+        clock,
+        translation: DVec3::X,
+        turn: Turn {
+            angle,
+            ..Turn::default()
+        },
+        scale,
+    };
+    let transform = |rest, motion| NodeKind::Transform { rest, motion };
+    let even = DAffine3::from_scale(DVec3::splat(2.0)) * DAffine3::from_rotation_x(0.3);
+    let uneven = DAffine3::from_scale(DVec3::new(1.0, 2.0, 1.0));
+    let inner = DAffine3::from_translation(DVec3::Y);
+    let cases = [
+        (even, sine(DVec3::ONE, 0.5), false),
+        (even, Motion::Still, false),
+        (uneven, Motion::Still, false),
+        (uneven, sine(DVec3::ONE, 0.5), true),
+        (even, sine(DVec3::new(1.0, 0.8, 1.0), 0.0), true),
+        (even, sine(DVec3::splat(1.1), 0.0), true),
+    ];
+    for (case, (rest, motion, squeezes)) in cases.into_iter().enumerate() {
+        let graph = Graph {
+            nodes: vec![
+                node(None, None, transform(rest, motion)),
+                node(Some(0), None, mesh(1, inner)),
+            ],
+        };
+        let expected = squeezes.then_some(rest * inner);
+        assert_eq!(graph.rests(3), [None, expected, None], "{case}");
+    }
+    // What turns above an uneven shape keeps its form.
+    let graph = Graph {
+        nodes: vec![
+            node(None, None, transform(even, sine(DVec3::ONE, 0.5))),
+            node(Some(0), None, transform(uneven, Motion::Still)),
+            node(Some(1), None, mesh(0, inner)),
+        ],
+    };
+    assert_eq!(graph.rests(1), [None]);
+}

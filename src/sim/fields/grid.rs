@@ -5,6 +5,13 @@ use glam::{DVec3, UVec3};
 /// Nodes along the longest axis.
 const LONGEST: f64 = 24.0;
 
+/// Smallest and largest coordinates of some points; the origin twice where there is none.
+fn ends(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    let both = points.map(|p| (p, p));
+    let ends = both.reduce(|(low, high), (p, _)| (low.min(p), high.max(p)));
+    ends.unwrap_or_default()
+}
+
 /// Nodes at `origin + spacing * (i, j, k)`, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid {
@@ -19,9 +26,7 @@ pub struct Grid {
 impl Grid {
     /// The grid around `points` with one cell to spare on each side.
     pub fn around(points: impl Iterator<Item = DVec3>) -> Self {
-        let (low, high) = points.fold((DVec3::MAX, DVec3::MIN), |(low, high), p| {
-            (low.min(p), high.max(p))
-        });
+        let (low, high) = ends(points);
         let extent = high - low;
         let spacing = (extent.max_element() / (LONGEST - 3.0)).max(1e-3);
         // Rounded up: the centre stays where it is.
@@ -30,6 +35,27 @@ impl Grid {
             origin: (low + high - cells * spacing) / 2.0,
             spacing,
             size: cells.as_uvec3() + 1,
+        }
+    }
+
+    /// One cell, a cube, around `points`: enough for an affine map.
+    pub fn one_cell(points: impl Iterator<Item = DVec3>) -> Self {
+        let (low, high) = ends(points);
+        let edge = (1.001 * (high - low).max_element()).max(1e-3);
+        Self {
+            origin: (low + high - edge) / 2.0,
+            spacing: edge,
+            size: UVec3::splat(2),
+        }
+    }
+
+    /// The grid that [`Self::header`] told of, as far as single precision keeps it.
+    pub fn from_header(vectors: &[[f32; 3]]) -> Self {
+        let [origin, scale, size] = std::array::from_fn(|i| DVec3::from(vectors[i].map(f64::from)));
+        Self {
+            origin,
+            spacing: scale.x.recip(),
+            size: size.as_uvec3(),
         }
     }
 

@@ -5,6 +5,7 @@ fn acquired(size: [usize; 3], voxels: Voxels) -> Acquired {
         size,
         voxels: Arc::new(voxels),
         world_from_voxel: DAffine3::IDENTITY,
+        world_from_lps: DAffine3::IDENTITY,
         black: 0.0,
         white: 1.0,
     }

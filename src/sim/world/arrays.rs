@@ -52,7 +52,7 @@ pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
         let need = match keyframes.strategy {
             _ if sets.of(i).is_some() => Need::Vertices,
             _ if keyframes.meshes.is_empty() => Need::Structure,
-            Strategy::Selector | Strategy::Update | Strategy::Mask | Strategy::Union => {
+            Strategy::Exchange | Strategy::Update | Strategy::Mask | Strategy::Selector => {
                 Need::Structure
             }
             Strategy::Cached => Need::Geometry,

@@ -117,7 +117,7 @@ pub(super) fn entries(
                 let first = all.filter(|(k, m)| !keyframes.meshes[..*k].contains(m));
                 entries.extend(first.filter_map(|(k, &m)| mesh(m, by_mask(k))));
             }
-            (Strategy::Union, None) => {
+            (Strategy::Selector, None) => {
                 let one = [instance.mesh];
                 let all = match keyframes.meshes.is_empty() {
                     true => &one[..],

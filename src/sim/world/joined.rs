@@ -90,7 +90,7 @@ impl Sets {
                 .iter()
                 .all(|&m| uses[m] == 1 && !scene.meshes[m].triangles.is_empty());
             let together = keyframes.meshes.is_empty() || keyframes.group.is_some();
-            let selected = keyframes.strategy == Strategy::Selector;
+            let selected = keyframes.strategy == Strategy::Exchange;
             let loose = apart.get(i).copied().unwrap_or(false);
             let carrier = &carriers[i];
             if !own || !together || !selected || loose || carrier.switched {

@@ -72,7 +72,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
             let shares = meshes().all(|mesh| mesh.shares_topology);
             ui.horizontal(|ui| {
                 let possible = |s: &Strategy| match s {
-                    Strategy::Union => tracer == Tracer::Bvh,
+                    Strategy::Selector => tracer == Tracer::Bvh,
                     s => shares || !s.needs_shared_topology(),
                 };
                 words(ui, &format!("strategy {index}"), strategy, entry, possible);

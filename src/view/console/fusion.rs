@@ -20,6 +20,12 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
         );
         count(ui, "fusion.blur", "Blur", &mut fusion.blur, 1..=128);
         choice(ui, "fusion.blend", "Blend", &mut fusion.blend);
+        choice(
+            ui,
+            "fusion.mask_speed",
+            "Mask speed",
+            &mut fusion.mask_speed,
+        );
         switch(
             ui,
             "fusion.background_shadows",

@@ -1,12 +1,12 @@
 //! What the simulation's thread does.
 
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, PoisonError};
+use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::{Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared};
+use super::{Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared, State, WINDOW_PATIENCE};
 use crate::gpu::{Abandon, Device, GpuError};
 use crate::live::{self, Pace};
 use crate::scene::Scene;
@@ -210,7 +210,12 @@ impl Worker {
     }
 
     fn tell(&self, news: News) {
-        self.shared.lock().news.push(news);
+        let mut state = self.shared.lock();
+        if matches!(news, News::Frame(..)) && self.device.queues.are_shared() {
+            state.undrawn.get_or_insert_with(Instant::now);
+        }
+        state.news.push(news);
+        drop(state);
         (self.wake)();
     }
 
@@ -231,6 +236,11 @@ impl Worker {
                 // What is wrong with the device will be told by the next frame.
                 let _ = self.broadcast.again();
                 state = self.shared.lock();
+                continue;
+            }
+            let undrawn = state.undrawn.map(|since| since.elapsed());
+            if let Some(late) = undrawn.filter(|late| *late < WINDOW_PATIENCE) {
+                state = self.wait(state, Some(WINDOW_PATIENCE - late));
                 continue;
             }
             let left = self.left.as_ref();
@@ -258,16 +268,25 @@ impl Worker {
                 let again = || running.expect("due without an order").again(Instant::now());
                 return Some(Job::Image(state.order.take().unwrap_or_else(again)));
             }
-            let changed = &self.shared.changed;
             let rest = finer.map(|_| live::REST - quiet);
             let look = looks.then(|| put_off.min(live::REST.saturating_sub(touched)));
-            state = match rest.into_iter().chain(look).min() {
-                Some(time) => {
-                    let waited = changed.wait_timeout(state, time);
-                    waited.unwrap_or_else(PoisonError::into_inner).0
-                }
-                None => changed.wait(state).unwrap_or_else(PoisonError::into_inner),
-            };
+            state = self.wait(state, rest.into_iter().chain(look).min());
+        }
+    }
+
+    /// Waits until something has changed, for so long at most.
+    fn wait<'s>(
+        &'s self,
+        state: MutexGuard<'s, State>,
+        most: Option<Duration>,
+    ) -> MutexGuard<'s, State> {
+        let changed = &self.shared.changed;
+        match most {
+            Some(time) => {
+                let waited = changed.wait_timeout(state, time);
+                waited.unwrap_or_else(PoisonError::into_inner).0
+            }
+            None => changed.wait(state).unwrap_or_else(PoisonError::into_inner),
         }
     }
 

@@ -303,12 +303,14 @@ fn fusion(f: &Fusion) -> Vec<Entry> {
         surroundings,
         blur,
         blend,
+        mask_speed,
         background_shadows,
     } = f;
     vec![
         word("fusion.surroundings", surroundings),
         whole("fusion.blur", *blur),
         word("fusion.blend", blend),
+        word("fusion.mask_speed", mask_speed),
         switched("fusion.background_shadows", *background_shadows),
     ]
 }

@@ -3,7 +3,7 @@ use std::time::Instant;
 
 use super::{File, Model};
 use crate::probe::{Kind, Probe};
-use crate::scene::fusion::{Blend, Surroundings};
+use crate::scene::fusion::{Blend, MaskSpeed, Surroundings};
 use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::{Scene, Strategy};
 use crate::sim::Tracer;
@@ -172,6 +172,7 @@ const CHANGES: &[(&str, Change)] = &[
     ("fusion.surroundings", |s, _| s.fusion.as_mut().unwrap().surroundings = Surroundings::Scatterers),
     ("fusion.blur", |s, v| s.fusion.as_mut().unwrap().blur = v("fusion.blur") as u32),
     ("fusion.blend", |s, _| s.fusion.as_mut().unwrap().blend = Blend::Multiband),
+    ("fusion.mask_speed", |s, _| s.fusion.as_mut().unwrap().mask_speed = MaskSpeed::Probe),
     ("fusion.background_shadows", |s, _| s.fusion.as_mut().unwrap().background_shadows ^= true),
     ("tissues.NAME.speed", |s, v| s.tissues[2].speed = v("tissues.NAME.speed")),
     ("tissues.NAME.density", |s, v| s.tissues[1].density = v("tissues.NAME.density")),

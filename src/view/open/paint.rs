@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use super::Open;
+use super::{Open, gestures};
 use crate::gpu::{GpuError, Interface, Painted, Placed, Shot};
 use crate::view::engine::Frame;
 use crate::view::layout::{self, Places};
@@ -27,12 +27,15 @@ impl Open {
         let (model, state, touched) = (&mut self.model, &mut self.state, self.touched);
         let pictured = self.pictured.as_ref();
         let (mut shown, mut places) = (None, Places::default());
-        let mut output = context.run_ui(input, |ui| {
-            keys::apply(ui.ctx(), model, state, touched);
-            shown = state.tools.shown(model, ui.ctx());
-            let pictures = (shown.as_ref(), pictured);
-            places = layout::show(ui, model, state, times, pictures, touched);
-        });
+        let mut output = egui::FullOutput::default();
+        for input in gestures::passes(input) {
+            output.append(context.run_ui(input, |ui| {
+                keys::apply(ui.ctx(), model, state, touched);
+                shown = state.tools.shown(model, ui.ctx());
+                let pictures = (shown.as_ref(), pictured);
+                places = layout::show(ui, model, state, times, pictures, touched);
+            }));
+        }
         self.tell();
         self.point(&places, output.pixels_per_point);
         self.entitle();
@@ -72,6 +75,7 @@ impl Open {
         let tools = &mut self.state.tools;
         let marked = tools.wants_shot() && painter.can_be_read();
         let painted = painter.paint(size, &placed, interface, shot || marked)?;
+        self.session.engine.drawn();
         let picture = match &painted {
             Painted::Shown(picture) => picture.as_ref().filter(|_| marked),
             Painted::Skipped => None,

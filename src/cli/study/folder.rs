@@ -1,0 +1,176 @@
+//! The folder of a study: what was begun in it, and the images that are there already.
+
+use std::path::{Path, PathBuf};
+
+use insonify::files;
+use insonify::scene::file::Plan;
+use insonify::study::key::crc32;
+use miette::{Context, IntoDiagnostic, Result, miette};
+use serde_json::{Value, json};
+
+use super::super::common::Common;
+
+/// Where everything of a study lies. Only [`Folder::form`] is handed to assessors.
+pub struct Folder {
+    root: PathBuf,
+    /// Digits of the numbers of cases and of images.
+    digits: [usize; 2],
+}
+
+impl Folder {
+    /// A folder for so many cases of at most so many images.
+    pub fn new(root: &Path, cases: usize, images: usize) -> Self {
+        Self {
+            root: root.to_owned(),
+            digits: [cases, images].map(|n| n.to_string().len().max(2)),
+        }
+    }
+
+    /// What is handed to assessors, with the images one by one.
+    pub fn form(&self) -> PathBuf {
+        self.root.join("form")
+    }
+
+    /// Says what each image is.
+    pub fn key(&self) -> PathBuf {
+        self.root.join("key.csv")
+    }
+
+    fn settings(&self) -> PathBuf {
+        self.root.join("settings.json")
+    }
+
+    /// File of an image, within [`Folder::form`], slashes between: `cases/03/17.png`.
+    pub fn image(&self, case: usize, image: usize) -> String {
+        let [cases, images] = self.digits;
+        format!("cases/{case:0cases$}/{image:0images$}.png")
+    }
+
+    /// The bytes of an image that is there.
+    pub fn made(&self, case: usize, image: usize) -> Result<Option<Vec<u8>>> {
+        let path = self.form().join(self.image(case, image));
+        match std::fs::read(&path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(e)
+                .into_diagnostic()
+                .wrap_err_with(|| format!("reading {}", path.display())),
+        }
+    }
+
+    /// Makes the folder and notes `settings` in it; or, to resume, holds them against those that it was
+    /// begun with and removes what a killed run was writing.
+    pub fn begin(&self, settings: &Value, resume: bool) -> Result<()> {
+        let root = self.root.display();
+        let fail = |cause: String, remedy: &str| Err(miette!(help = remedy, "{cause}"));
+        let before = std::fs::read_to_string(self.settings()).ok();
+        // A run that was killed at once leaves the settings half written.
+        let is_ours = |name: &str| name.starts_with(".settings.json.");
+        let is_empty = std::fs::read_dir(&self.root).map_or(true, |all| {
+            let mut names = all.flatten().map(|entry| entry.file_name());
+            names.all(|name| is_ours(&name.to_string_lossy()))
+        });
+        match before {
+            None if !is_empty => {
+                return fail(
+                    format!("{root} holds files, and no study that was begun"),
+                    "name a new folder",
+                );
+            }
+            Some(_) if !resume => {
+                return fail(
+                    format!("{root} holds a study already"),
+                    "add --resume to go on with it, or name a new folder",
+                );
+            }
+            Some(text) => {
+                let begun: Value = serde_json::from_str(&text)
+                    .into_diagnostic()
+                    .wrap_err_with(|| format!("reading {}", self.settings().display()))?;
+                if let Some(name) = difference(&begun, settings) {
+                    return fail(
+                        format!(
+                            "{root} was begun with another {name}: {}, not {}",
+                            begun[name], settings[name]
+                        ),
+                        "go on with what it was begun with (settings.json), or name a new folder",
+                    );
+                }
+            }
+            None => {}
+        }
+        self.remove_unfinished()
+            .into_diagnostic()
+            .wrap_err_with(|| format!("tidying {root}"))?;
+        let text = serde_json::to_string_pretty(settings).expect("plain values") + "\n";
+        self.write(&self.settings(), text.as_bytes())
+    }
+
+    /// Writes a file of the study, whole or not at all, and its folder where there is none.
+    pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<()> {
+        let folder = path.parent().expect("it lies in the study's folder");
+        std::fs::create_dir_all(folder)
+            .and_then(|()| files::replace(path, bytes))
+            .into_diagnostic()
+            .wrap_err_with(|| format!("writing {}", path.display()))
+    }
+
+    /// Files that were being written when a run was killed begin with a dot.
+    fn remove_unfinished(&self) -> std::io::Result<()> {
+        let cases = self.form().join("cases");
+        let mut folders = vec![self.root.clone(), self.form()];
+        if let Ok(all) = std::fs::read_dir(cases) {
+            folders.extend(all.flatten().map(|entry| entry.path()));
+        }
+        for folder in folders {
+            let Ok(all) = std::fs::read_dir(folder) else {
+                continue;
+            };
+            for entry in all.flatten() {
+                let name = entry.file_name().to_string_lossy().into_owned();
+                // As `files::replace` calls them: .NAME. and the number of a process.
+                let number = name.rsplit('.').next().unwrap_or_default();
+                let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+                let kinds = [".png.", ".json.", ".csv.", ".html."];
+                let is_ours = kinds.iter().any(|kind| name.contains(kind));
+                if name.starts_with('.') && is_number && is_ours {
+                    std::fs::remove_file(entry.path())?;
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What decides on the images, but for the files that the scenes name: an image of each case is made
+/// again to see whether those are the same.
+pub fn settings(plan: &Plan, common: &Common, seed: u32, device: &str) -> Result<Value> {
+    let mut scenes = Vec::new();
+    for scenario in &plan.scenarios {
+        let text = std::fs::read(&scenario.scene).into_diagnostic()?;
+        scenes.push(json!({ "name": scenario.name, "crc": crc32(&text) }));
+    }
+    let set = common.overrides.iter();
+    let set: Vec<String> = set.map(|(path, value)| format!("{path}={value}")).collect();
+    Ok(json!({
+        "program": format!("insonify {}", env!("CARGO_PKG_VERSION")),
+        "plan": crc32(plan.text().as_bytes()),
+        "scenes": scenes,
+        "order": seed,
+        "seed": common.seed,
+        "time_s": common.time,
+        "quality": common.quality.map(|q| format!("{q:?}").to_lowercase()),
+        "tracer": format!("{:?}", common.tracer).to_lowercase(),
+        "device": device,
+        "set": set,
+    }))
+}
+
+/// Name of the first setting in which the two differ.
+fn difference<'a>(begun: &Value, now: &'a Value) -> Option<&'a str> {
+    let now = now.as_object().expect("a table of settings");
+    let other = now
+        .iter()
+        .find(|(name, value)| begun.get(name) != Some(value));
+    other.map(|(name, _)| name.as_str())
+}

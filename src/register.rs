@@ -1,0 +1,34 @@
+//! A model registered with an acquired volume by surfaces (Starkov et al. 2019, figure 3): points of a
+//! structure that was segmented in the volume are laid onto the same structure of the model.
+//!
+//! Everything here is in the scene's world, mm: points of the volume have been through the placement
+//! that the scene gives it. What is found is the similarity that takes them from there to the model.
+//! [`landmarks`] give a start in closed form; [`icp`] does the rest.
+
+use glam::DAffine3;
+
+mod error;
+pub mod icp;
+pub mod landmarks;
+pub mod placement;
+pub mod points;
+pub mod surface;
+
+pub use error::RegisterError;
+pub use icp::{Fit, Residuals};
+pub use placement::Placement;
+pub use surface::Surface;
+
+/// What a registration may change. Neither mirrors.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Transformation {
+    /// Rotation and shift.
+    Rigid,
+    /// Those and one scale for all axes.
+    Similarity,
+}
+
+/// The scale of a similarity: the cube root of the factor on volumes.
+pub fn scale_of(similarity: &DAffine3) -> f64 {
+    similarity.matrix3.determinant().cbrt()
+}

@@ -1,0 +1,325 @@
+//! Points laid onto a surface, whatever part of them does not belong to it.
+//!
+//! Iterative closest points, as a least-squares problem (Fitzgibbon, Image and Vision Computing 21,
+//! 2003): each point's distance from the surface goes through Tukey's biweight, whose cutoff follows
+//! from the median distance and only ever shrinks, and Levenberg and Marquardt's method lowers their
+//! sum. So what lies far off pulls at nothing, and no step makes the fit worse.
+
+use glam::{DAffine3, DQuat, DVec3};
+use nalgebra::{SMatrix, SVector, SymmetricEigen};
+use rayon::prelude::*;
+
+use super::{RegisterError, Surface, Transformation, scale_of};
+use crate::statistics::Statistics;
+
+/// Fewest points.
+pub const MIN_POINTS: usize = 10;
+
+/// Most steps.
+const ROUNDS: usize = 300;
+/// A step that moves a typical point by less ends the search, mm.
+const STILL: f64 = 1e-5;
+/// Biweight cutoff in standard deviations: 95 % efficient on normal errors (Holland and Welsch 1977).
+const TUKEY: f64 = 4.685;
+/// Standard deviation over median magnitude of a normal distribution.
+const NORMAL: f64 = 1.4826;
+/// Least cutoff, mm: below it distances are rounding.
+const EXACT: f64 = 1e-6;
+/// Factors on the scale between which a similarity stays. A cloud of points that shrinks onto a spot
+/// of the surface fits it perfectly.
+const GROWTH: (f64, f64) = (0.5, 2.0);
+/// Mean squared change of distance, of unit motion, below which the surface says nothing about it.
+const LOOSE: f64 = 1e-3;
+
+/// Shift, rotation and growth, all in mm of a typical point's way.
+const FREEDOMS: usize = 7;
+type Motion = SVector<f64, FREEDOMS>;
+type Normal = SMatrix<f64, FREEDOMS, FREEDOMS>;
+
+/// How points lie on a surface.
+#[derive(Clone, Debug)]
+pub struct Fit {
+    /// Takes the points to the surface: a similarity, never a reflection.
+    pub transform: DAffine3,
+    /// Distances that are left.
+    pub residuals: Residuals,
+    /// Steps taken.
+    pub rounds: usize,
+    /// Whether it ended at a minimum and not at the limit of steps.
+    pub settled: bool,
+    /// Motions that the surface leaves open, in words; along them the points are where they started.
+    pub loose: Vec<String>,
+}
+
+/// Distances of points from a surface, mm. Those beyond the cutoff count as belonging to something
+/// else, and rms, median and 95 % are of the others.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Residuals {
+    /// Points.
+    pub points: usize,
+    /// Those that count.
+    pub kept: usize,
+    /// Distance from which on a point does not count.
+    pub cutoff: f64,
+    /// Root mean square.
+    pub rms: f64,
+    /// Half of them are nearer.
+    pub median: f64,
+    /// 95 of 100 are nearer.
+    pub p95: f64,
+}
+
+impl Residuals {
+    fn of(matched: &[Matched], cutoff: f64) -> Self {
+        let near: Vec<f64> = matched
+            .iter()
+            .map(|m| m.off)
+            .filter(|d| *d < cutoff)
+            .collect();
+        let statistics = Statistics::of(near.iter().copied());
+        let squares: f64 = near.iter().map(|d| d * d).sum();
+        Self {
+            points: matched.len(),
+            kept: near.len(),
+            cutoff,
+            rms: (squares / near.len() as f64).sqrt(),
+            median: statistics.median,
+            p95: statistics.p95,
+        }
+    }
+
+    /// Share of the points that do not count.
+    pub fn trimmed(&self) -> f64 {
+        1.0 - self.kept as f64 / self.points as f64
+    }
+}
+
+/// A point where it is now, with the nearest of the surface.
+struct Matched {
+    at: DVec3,
+    /// Unit vector from the surface to the point.
+    away: DVec3,
+    /// Distance.
+    off: f64,
+}
+
+/// Lays `points` onto `surface`, beginning with `start`: the nearest minimum from there. More than
+/// half of the points have to belong to the surface, of which they may cover a part.
+///
+/// # Errors
+/// Fewer than [`MIN_POINTS`] points, points that are no numbers or coincide; a start farther off than
+/// the surface is large; a similarity that more than doubles or halves the scale.
+pub fn fit(
+    points: &[DVec3],
+    surface: &Surface,
+    start: DAffine3,
+    transformation: Transformation,
+) -> Result<Fit, RegisterError> {
+    check(points)?;
+    let mut transform = start;
+    let mut matched = matches(points, surface, &transform);
+    let typical = Statistics::of(matched.iter().map(|m| m.off)).median;
+    if typical > surface.size() {
+        return Err(RegisterError::data(
+            format!(
+                "at the start the points lie {typical:.0} mm off the surface, which is {:.0} mm large",
+                surface.size()
+            ),
+            "give --landmarks, or --start centroids; check the frame of the points and which \
+             surface is meant",
+        ));
+    }
+    let mut cutoff = cutoff_of(&matched, f64::INFINITY);
+    let (mut damping, mut rounds, mut settled) = (1e-3, 0, false);
+    while rounds < ROUNDS && !settled {
+        rounds += 1;
+        let system = System::of(&matched, cutoff, transformation);
+        let cost = cost(&matched, cutoff);
+        // Where no step helps, however short, this is the minimum.
+        settled = true;
+        while damping < 1e9 {
+            let motion = system.step(damping);
+            if motion.norm() < STILL {
+                break;
+            }
+            let next = system.increment(&motion) * transform;
+            let there = matches(points, surface, &next);
+            if self::cost(&there, cutoff) < cost {
+                (transform, matched) = (next, there);
+                damping = (damping / 10.0).max(1e-9);
+                settled = false;
+                break;
+            }
+            damping *= 10.0;
+        }
+        let growth = scale_of(&transform) / scale_of(&start);
+        if !(GROWTH.0..=GROWTH.1).contains(&growth) {
+            return Err(RegisterError::data(
+                format!("the scale runs away: it is {growth:.2} times that of the start"),
+                "give --landmarks, register with --transformation rigid, or give points of more \
+                 of the surface",
+            ));
+        }
+        cutoff = cutoff_of(&matched, cutoff);
+    }
+    Ok(Fit {
+        transform,
+        residuals: Residuals::of(&matched, cutoff),
+        rounds,
+        settled,
+        loose: System::of(&matched, cutoff, transformation).loose(transformation),
+    })
+}
+
+fn check(points: &[DVec3]) -> Result<(), RegisterError> {
+    let fail = |cause: String, remedy| Err(RegisterError::data(cause, remedy));
+    if points.len() < MIN_POINTS {
+        return fail(
+            format!("{} points are given", points.len()),
+            "give points all over the surface: hundreds are usual, ten the least; of a few that are \
+             known in both, make --landmarks",
+        );
+    }
+    if !points.iter().all(|p| p.is_finite()) {
+        return fail(
+            "points have coordinates that are no numbers".to_owned(),
+            "give positions in mm",
+        );
+    }
+    let first = points[0];
+    if points.iter().all(|p| p.distance(first) < 1e-3) {
+        return fail(
+            "all points are the same".to_owned(),
+            "give points all over the surface",
+        );
+    }
+    Ok(())
+}
+
+fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Matched> {
+    let matched = |p: &DVec3| {
+        let at = transform.transform_point3(*p);
+        let nearest = surface.nearest(at);
+        let away = at - nearest.point;
+        let off = away.length();
+        Matched {
+            at,
+            // On the surface the difference is rounding.
+            away: if off > EXACT {
+                away / off
+            } else {
+                nearest.normal
+            },
+            off,
+        }
+    };
+    points.par_iter().map(matched).collect()
+}
+
+/// Cutoff by the median distance; none that is larger than `before`.
+fn cutoff_of(matched: &[Matched], before: f64) -> f64 {
+    let median = Statistics::of(matched.iter().map(|m| m.off)).median;
+    (TUKEY * NORMAL * median).max(EXACT).min(before)
+}
+
+/// Sum of Tukey's biweight over the distances, mm2.
+fn cost(matched: &[Matched], cutoff: f64) -> f64 {
+    let loss = |m: &Matched| {
+        let rest = 1.0 - (m.off / cutoff).powi(2).min(1.0);
+        1.0 - rest.powi(3)
+    };
+    cutoff * cutoff / 6.0 * matched.iter().map(loss).sum::<f64>()
+}
+
+/// Normal equations of the distances, linear in a small motion about the points' centre.
+struct System {
+    matrix: Normal,
+    gradient: Motion,
+    weight: f64,
+    centre: DVec3,
+    /// Root mean square distance of the points from it.
+    reach: f64,
+}
+
+impl System {
+    fn of(matched: &[Matched], cutoff: f64, transformation: Transformation) -> Self {
+        let count = matched.len() as f64;
+        let centre = matched.iter().map(|m| m.at).sum::<DVec3>() / count;
+        let squares = matched.iter().map(|m| m.at.distance_squared(centre));
+        let reach = (squares.sum::<f64>() / count).sqrt();
+        let mut out = Self {
+            matrix: Normal::zeros(),
+            gradient: Motion::zeros(),
+            weight: 0.0,
+            centre,
+            reach,
+        };
+        for m in matched.iter().filter(|m| m.off < cutoff) {
+            let weight = (1.0 - (m.off / cutoff).powi(2)).powi(2);
+            let arm = (m.at - centre) / reach;
+            let (shift, turn) = (m.away, arm.cross(m.away));
+            let growth = match transformation {
+                Transformation::Rigid => 0.0,
+                Transformation::Similarity => arm.dot(m.away),
+            };
+            let row = Motion::from([shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, growth]);
+            out.matrix += weight * row * row.transpose();
+            out.gradient += weight * m.off * row;
+            out.weight += weight;
+        }
+        out
+    }
+
+    /// The motion that lowers the sum, the shorter the more it is damped. What the points do not
+    /// determine stands still.
+    fn step(&self, damping: f64) -> Motion {
+        // An identity keeps apart what has no equation, as growth of what is rigid.
+        let held = Normal::identity() * (damping * self.matrix.trace() / FREEDOMS as f64);
+        let solved = (self.matrix + held).cholesky();
+        solved.map_or_else(Motion::zeros, |c| -c.solve(&self.gradient))
+    }
+
+    fn increment(&self, motion: &Motion) -> DAffine3 {
+        let part = |i: usize| DVec3::new(motion[i], motion[i + 1], motion[i + 2]);
+        let about = DAffine3::from_scale_rotation_translation(
+            DVec3::splat((motion[6] / self.reach).exp()),
+            DQuat::from_scaled_axis(part(3) / self.reach),
+            self.centre + part(0),
+        );
+        about * DAffine3::from_translation(-self.centre)
+    }
+
+    /// Motions that change next to no distance.
+    fn loose(&self, transformation: Transformation) -> Vec<String> {
+        let eigen = SymmetricEigen::new(self.matrix / self.weight.max(f64::MIN_POSITIVE));
+        let pairs = eigen
+            .eigenvalues
+            .iter()
+            .zip(eigen.eigenvectors.column_iter());
+        let mut out = Vec::new();
+        for (_, vector) in pairs.filter(|(value, _)| **value < LOOSE) {
+            let part = |i: usize| DVec3::new(vector[i], vector[i + 1], vector[i + 2]);
+            let (shift, turn, growth) = (part(0), part(3), vector[6].abs());
+            let largest = shift.length().max(turn.length()).max(growth);
+            let axis = |v: DVec3| {
+                let v = v.normalize();
+                format!("({:.2}, {:.2}, {:.2})", v.x, v.y, v.z)
+            };
+            if growth == largest {
+                // What is rigid does not grow.
+                if transformation == Transformation::Similarity {
+                    out.push("how large it is".to_owned());
+                }
+            } else if turn.length() == largest {
+                out.push(format!("how far it is turned about {}", axis(turn)));
+            } else {
+                out.push(format!("where it is along {}", axis(shift)));
+            }
+        }
+        out
+    }
+}
+
+#[cfg(test)]
+#[path = "icp_tests.rs"]
+mod tests;

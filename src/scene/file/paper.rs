@@ -1,0 +1,83 @@
+//! The way of the paper (Starkov et al. 2019) where ours differs by default: `docs/paper.md` says how and why.
+
+use std::path::Path;
+
+/// What a scene of any kind is simulated with.
+const SIMULATION: [(&str, &str); 6] = [
+    ("simulation.sampling", "plain"),
+    ("simulation.coherence", "coherent"),
+    ("simulation.rough_transmission", "true"),
+    ("simulation.beam_footprint", "false"),
+    ("simulation.scatter_mode", "voxel"),
+    ("simulation.texture_space", "world"),
+];
+/// How it is mixed with an acquired volume, where it has one.
+const FUSION: [(&str, &str); 4] = [
+    ("fusion.blend", "linear"),
+    ("fusion.blur", "32"),
+    ("fusion.mask_speed", "enclosing"),
+    ("fusion.background_shadows", "false"),
+];
+
+/// Overrides, as [`crate::scene::Scene::load`] takes them, with which the scene file at `path` is imaged as in the
+/// paper; with `selectors` keyframes are switched by its selector nodes, which only the compute tracer has. Of a file
+/// that cannot be read those that every scene takes: whoever loads it says what is wrong.
+pub fn paper(path: &Path, selectors: bool) -> Vec<(String, String)> {
+    let text = std::fs::read_to_string(path).unwrap_or_default();
+    let file: toml::Table = toml::from_str(&text).unwrap_or_default();
+    let pair = |&(key, value): &(&str, &str)| (key.to_owned(), value.to_owned());
+    let mut all: Vec<_> = SIMULATION.iter().map(pair).collect();
+    if file.contains_key("fusion") {
+        all.extend(FUSION.iter().map(pair));
+    }
+    let list = |name: &str| file.get(name).and_then(toml::Value::as_array);
+    let each = |name: &'static str, switches: fn(&toml::Value) -> bool| {
+        let tables = list(name).into_iter().flatten().enumerate();
+        let switching = tables.filter(move |(_, table)| selectors && switches(table));
+        switching.map(move |(i, _)| (format!("{name}.{i}.strategy"), "selector".to_owned()))
+    };
+    all.extend(each("selector", |_| true));
+    all.extend(each("mesh", |table| table.get("animation").is_some()));
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::graph_tests::{BEAT, beating, case, mesh};
+    use super::*;
+    use crate::scene::settings::{Coherence, Sampling, ScatterMode, TextureSpace};
+    use crate::scene::{Scene, Strategy};
+
+    #[test]
+    fn a_scene_is_imaged_as_in_the_paper() {
+        let case = case();
+        let path = case.folder.path().join("scene.toml");
+        let text = BEAT.to_owned() + &beating("heart", "a b") + &mesh("m", "file = \"cube.obj\"");
+        for (selectors, strategy) in [(true, Strategy::Selector), (false, Strategy::Exchange)] {
+            std::fs::write(&path, &text).expect("written");
+            let (scene, _) = Scene::load(&path, &paper(&path, selectors)).expect("sound");
+            let s = &scene.simulation;
+            assert_eq!(
+                (s.sampling, s.coherence, s.scatter_mode, s.texture_space),
+                (
+                    Sampling::Plain,
+                    Coherence::Coherent,
+                    ScatterMode::Voxel,
+                    TextureSpace::World
+                )
+            );
+            assert!(s.rough_transmission && !s.beam_footprint);
+            assert_eq!(scene.instances[0].keyframes.strategy, strategy);
+        }
+        assert_eq!(
+            paper(Path::new("nowhere.toml"), true).len(),
+            SIMULATION.len()
+        );
+        std::fs::write(
+            &path,
+            "[volume]\nfile = \"v.mha\"\n[fusion]\nmask = [\"m\"]\n",
+        )
+        .expect("written");
+        assert_eq!(paper(&path, true).len(), SIMULATION.len() + FUSION.len());
+    }
+}

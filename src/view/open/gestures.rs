@@ -1,0 +1,128 @@
+//! Input as the interface takes it: no press, way of the pointer and release at once.
+
+use egui::{Event, RawInput};
+
+/// The input in passes to be given to the interface one after the other, so that in none the pointer moves before
+/// or after a button changes. Where the window is drawn more slowly than a hand drags, all of a drag may lie between
+/// two of its pictures; egui takes what comes at once to have happened at the pointer's last place, and no drag
+/// to have been.
+pub(super) fn passes(mut input: RawInput) -> Vec<RawInput> {
+    let mut groups = vec![Vec::new()];
+    for event in std::mem::take(&mut input.events) {
+        let group = groups.last_mut().expect("there is one");
+        let mixed = match event {
+            Event::PointerMoved(_) => group.iter().any(is_button),
+            Event::PointerButton { .. } => group.iter().any(is_motion),
+            _ => false,
+        };
+        match mixed {
+            true => groups.push(vec![event]),
+            false => group.push(event),
+        }
+    }
+    let pass = |events| RawInput {
+        events,
+        ..input.clone()
+    };
+    groups.into_iter().map(pass).collect()
+}
+
+fn is_motion(event: &Event) -> bool {
+    matches!(event, Event::PointerMoved(_))
+}
+
+fn is_button(event: &Event) -> bool {
+    matches!(event, Event::PointerButton { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::{Context, Modifiers, PointerButton, Pos2, Rect, Sense, Vec2, pos2};
+
+    fn moved(x: f32) -> Event {
+        Event::PointerMoved(pos2(x, 50.0))
+    }
+
+    fn button(x: f32, pressed: bool) -> Event {
+        Event::PointerButton {
+            pos: pos2(x, 50.0),
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        }
+    }
+
+    /// Way by which a panel from x = 20 on was dragged, and number of clicks on it.
+    fn drawn(context: &Context, inputs: Vec<RawInput>) -> (Vec2, usize) {
+        let (mut by, mut clicks) = (Vec2::ZERO, 0);
+        for input in inputs {
+            let mut output = context.run_ui(input, |ui| {
+                let rect = Rect::from_min_size(pos2(20.0, 0.0), Vec2::splat(400.0));
+                let response = ui.interact(rect, ui.id().with("panel"), Sense::click_and_drag());
+                by += response.drag_delta();
+                clicks += usize::from(response.clicked());
+            });
+            output.textures_delta.clear();
+        }
+        (by, clicks)
+    }
+
+    fn input(events: Vec<Event>) -> RawInput {
+        RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, Vec2::splat(500.0))),
+            events,
+            ..RawInput::default()
+        }
+    }
+
+    #[test]
+    fn a_drag_between_two_pictures_is_a_drag_all_of_its_way() {
+        let drag = [vec![moved(10.0), moved(100.0), button(100.0, true)]];
+        let way = [vec![moved(130.0), moved(190.0), button(190.0, false)]];
+        let after = [vec![moved(300.0), moved(310.0)]];
+        let events = || [&drag[..], &way[..], &after[..]].concat().concat();
+        let context = Context::default();
+        drawn(&context, vec![input(Vec::new()); 2]);
+        assert_eq!(
+            drawn(&context, vec![input(events())]).0,
+            Vec2::ZERO,
+            "as egui has it"
+        );
+        let (by, clicks) = drawn(&context, passes(input(events())));
+        assert_eq!((by, clicks), (Vec2::new(90.0, 0.0), 0));
+    }
+
+    #[test]
+    fn a_click_between_two_pictures_is_one_where_it_was() {
+        let context = Context::default();
+        drawn(&context, vec![input(Vec::new()); 2]);
+        let events = vec![
+            moved(100.0),
+            button(100.0, true),
+            button(100.0, false),
+            moved(5.0),
+        ];
+        let (by, clicks) = drawn(&context, passes(input(events)));
+        assert_eq!((by, clicks), (Vec2::ZERO, 1));
+    }
+
+    #[test]
+    fn what_is_not_mixed_stays_together_and_in_order() {
+        let events = vec![Event::Copy, moved(1.0), Event::Cut, moved(2.0)];
+        let made = passes(input(events.clone()));
+        assert_eq!(made.len(), 1);
+        assert_eq!(made[0].events, events);
+        assert_eq!(passes(input(Vec::new())).len(), 1);
+        let order = vec![
+            moved(1.0),
+            Event::Copy,
+            button(1.0, true),
+            Event::Cut,
+            moved(2.0),
+        ];
+        let made = passes(input(order.clone()));
+        let again: Vec<Event> = made.into_iter().flat_map(|pass| pass.events).collect();
+        assert_eq!(again, order);
+    }
+}

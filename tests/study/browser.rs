@@ -1,0 +1,175 @@
+//! A real browser, driven through chromedriver (W3C WebDriver, the part that the tests need).
+
+use std::io::{BufRead as _, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+use serde_json::{Value, json};
+use tempfile::TempDir;
+use ureq::Agent;
+
+/// Keys as WebDriver names them.
+pub const ENTER: &str = "\u{e007}";
+pub const SPACE: &str = " ";
+pub const RIGHT: &str = "\u{e014}";
+
+/// A browser without a window, with a profile of its own.
+pub struct Browser {
+    agent: Agent,
+    driver: Child,
+    session: String,
+    folder: TempDir,
+}
+
+fn found(names: &[&str]) -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let all = std::env::split_paths(&path).flat_map(|f| names.iter().map(move |n| f.join(n)));
+    all.into_iter().find(|file| file.is_file())
+}
+
+impl Browser {
+    /// None where there is no Chromium with its driver, and it is said.
+    pub fn start() -> Option<Self> {
+        let chromium = found(&["chromium", "chromium-browser", "google-chrome"]);
+        let (Some(chromium), Some(driver)) = (chromium, found(&["chromedriver"])) else {
+            println!("skipped: no chromium with chromedriver (./tools/setup.sh installs both)");
+            return None;
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        std::fs::create_dir(folder.path().join("saved")).expect("made");
+        let mut driver = Command::new(driver)
+            .arg("--port=0")
+            .stdout(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()
+            .expect("chromedriver starts");
+        let lines = BufReader::new(driver.stdout.take().expect("piped")).lines();
+        let port = lines.map_while(Result::ok).find_map(|line| {
+            let (_, port) = line.split_once("started successfully on port ")?;
+            port.trim_end_matches('.').parse::<u16>().ok()
+        });
+        let agent = Agent::config_builder()
+            .http_status_as_error(false)
+            .timeout_global(Some(Duration::from_secs(120)))
+            .build();
+        let port = port.expect("chromedriver tells its port");
+        let mut browser = Self {
+            agent: agent.into(),
+            driver,
+            session: format!("http://127.0.0.1:{port}/session"),
+            folder,
+        };
+        let profile = browser.folder.path().join("profile");
+        let flags = [
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--disable-quic",
+            "--no-first-run",
+            "--disable-background-networking",
+            "--disable-component-update",
+            "--disable-sync",
+            "--disable-dev-shm-usage",
+            "--window-size=1600,1000",
+        ];
+        let flags: Vec<String> = flags
+            .map(str::to_owned)
+            .into_iter()
+            .chain([format!("--user-data-dir={}", profile.display())])
+            .collect();
+        let made = browser.post(
+            "",
+            &json!({ "capabilities": { "alwaysMatch": {
+            "browserName": "chrome",
+            "unhandledPromptBehavior": "ignore",
+            "goog:chromeOptions": {
+                "binary": chromium,
+                "args": flags,
+                "prefs": { "download.default_directory": browser.saved() },
+            },
+        } } }),
+        );
+        let id = made["sessionId"].as_str().expect("a session");
+        browser.session = format!("{}/{id}", browser.session);
+        Some(browser)
+    }
+
+    /// Where it puts downloads.
+    pub fn saved(&self) -> PathBuf {
+        self.folder.path().join("saved")
+    }
+
+    /// The value that WebDriver answers.
+    fn post(&self, command: &str, body: &Value) -> Value {
+        let url = format!("{}{command}", self.session);
+        let mut response = self.agent.post(&url).send_json(body).expect("it answers");
+        let mut answer: Value = response.body_mut().read_json().expect("JSON");
+        assert!(response.status().is_success(), "{command} {body}: {answer}");
+        answer["value"].take()
+    }
+
+    /// Opens a file.
+    pub fn open(&self, page: &Path) {
+        self.post(
+            "/url",
+            &json!({ "url": format!("file://{}", page.display()) }),
+        );
+    }
+
+    /// What a script returns.
+    pub fn run(&self, script: &str) -> Value {
+        self.post("/execute/sync", &json!({ "script": script, "args": [] }))
+    }
+
+    /// Waits until a script returns true.
+    pub fn wait(&self, script: &str) {
+        let begun = Instant::now();
+        while self.run(script) != json!(true) {
+            assert!(begun.elapsed() < Duration::from_secs(60), "never: {script}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    fn element(&self, css: &str) -> String {
+        let found = self.post(
+            "/element",
+            &json!({ "using": "css selector", "value": css }),
+        );
+        let id = found.as_object().and_then(|o| o.values().next());
+        let id = id.and_then(Value::as_str).expect("an element");
+        format!("/element/{id}")
+    }
+
+    /// Clicks as a user does: what is hidden or covered cannot be clicked.
+    pub fn click(&self, css: &str) {
+        self.post(&format!("{}/click", self.element(css)), &json!({}));
+    }
+
+    /// Types into an element, or gives a file to it.
+    pub fn type_into(&self, css: &str, text: &str) {
+        let element = self.element(css);
+        self.post(&format!("{element}/value"), &json!({ "text": text }));
+    }
+
+    /// Presses a key wherever the focus is.
+    pub fn press(&self, key: &str) {
+        let each = ["keyDown", "keyUp"].map(|kind| json!({ "type": kind, "value": key }));
+        let source = json!({ "type": "key", "id": "keyboard", "actions": each });
+        self.post("/actions", &json!({ "actions": [source] }));
+    }
+
+    /// Says yes to a question of the page.
+    pub fn accept(&self) {
+        self.post("/alert/accept", &json!({}));
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // Closes the browser; a driver that is gone has closed it already.
+        let _ = self.agent.delete(&self.session).call();
+        let _ = self.driver.kill();
+        let _ = self.driver.wait();
+    }
+}
