@@ -25,6 +25,7 @@ mod notice;
 mod open;
 mod opening;
 mod pads;
+mod planes;
 mod real;
 mod ring;
 mod saved;

@@ -146,6 +146,12 @@ impl Scene {
             live,
             origins,
         };
+        let model = (
+            file.model.translate,
+            file.model.rotate.as_ref(),
+            schema::even(file.model.scale),
+        );
+        scene.place_model(placing::placement(&document, "model", model)?);
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
         let variants = sweep::variants(&document, &file.sweep, &scene, suggested)?;

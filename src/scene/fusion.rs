@@ -29,7 +29,78 @@ pub struct Acquired {
     pub white: f64,
 }
 
+/// How an acquired volume is shown: where, and in which grey levels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Display {
+    /// See [`Acquired::world_from_lps`].
+    pub world_from_lps: DAffine3,
+    /// See [`Acquired::black`].
+    pub black: f64,
+    /// See [`Acquired::white`].
+    pub white: f64,
+}
+
 impl Acquired {
+    /// How it is shown.
+    pub fn display(&self) -> Display {
+        Display {
+            world_from_lps: self.world_from_lps,
+            black: self.black,
+            white: self.white,
+        }
+    }
+
+    /// Shows it like that from now on.
+    pub fn show(&mut self, display: &Display) {
+        let before = self.world_from_lps;
+        if display.world_from_lps != before {
+            let change = display.world_from_lps * before.inverse();
+            self.world_from_voxel = change * self.world_from_voxel;
+        }
+        (self.world_from_lps, self.black, self.white) =
+            (display.world_from_lps, display.black, display.white);
+    }
+
+    /// Grey level shown at a point of the world, 0 black to 1 white: trilinear between voxels. None outside the
+    /// volume.
+    pub fn grey(&self, world: DVec3) -> Option<f64> {
+        let voxel = self.world_from_voxel.inverse().transform_point3(world);
+        self.grey_at(voxel)
+    }
+
+    /// The same at a point in voxel indices.
+    pub fn grey_at(&self, voxel: DVec3) -> Option<f64> {
+        let last = DVec3::from(self.size.map(|n| n as f64 - 1.0));
+        // A voxel reaches half a step beyond its centre, with one value.
+        let within = voxel.cmpge(DVec3::splat(-0.5)).all() && voxel.cmple(last + 0.5).all();
+        if !within {
+            return None;
+        }
+        let at = voxel.clamp(DVec3::ZERO, last);
+        let low = at.floor().min((last - 1.0).max(DVec3::ZERO));
+        let share = at - low;
+        let [x, y, _] = self.size;
+        let mut value = 0.0;
+        for corner in 0..8_usize {
+            let (mut weight, mut index) = (1.0, [0; 3]);
+            for axis in 0..3 {
+                let far = corner >> axis & 1;
+                weight *= if far == 1 {
+                    share[axis]
+                } else {
+                    1.0 - share[axis]
+                };
+                index[axis] = low[axis] as usize + far;
+            }
+            // Beside an axis of one voxel there is nothing, of no weight.
+            if weight > 0.0 {
+                let [i, j, k] = index;
+                value += weight * self.voxels.get(i + x * (j + y * k));
+            }
+        }
+        Some(((value - self.black) / (self.white - self.black)).clamp(0.0, 1.0))
+    }
+
     /// Bytes of the volume on the device, where it is not larger than that holds.
     pub fn texture_bytes(&self) -> u64 {
         self.voxels.len() as u64 * self.voxels.kind().bytes() as u64

@@ -11,6 +11,9 @@ use super::{Instance, Scene, Strategy};
 pub struct Graph {
     /// In any order in which parents come before their children.
     pub nodes: Vec<Node>,
+    /// World from the frame in which the whole model was made: nodes without a parent, and instances that are no
+    /// node's, are placed in that frame. Scales alike in all directions.
+    pub world_from_model: DAffine3,
 }
 
 /// A node with its place in the graph.
@@ -90,7 +93,7 @@ impl Graph {
     fn evaluate(&self, seconds: f64, instances: &mut [Instance]) {
         let mut states: Vec<State> = Vec::with_capacity(self.nodes.len());
         for node in &self.nodes {
-            let (mut world, mut shown) = (DAffine3::IDENTITY, true);
+            let (mut world, mut shown) = (self.world_from_model, true);
             let mut sequence = None;
             if let Some(parent) = node.parent {
                 (world, shown) = (states[parent].world, states[parent].shown);
@@ -153,7 +156,8 @@ impl Graph {
         let mut rests = vec![None; count];
         for node in &self.nodes {
             let above = node.parent.map(|parent| of_nodes[parent]);
-            let (mut world, mut uneven, mut squeezes) = above.unwrap_or_default();
+            let top = (self.world_from_model, false, false);
+            let (mut world, mut uneven, mut squeezes) = above.unwrap_or(top);
             match &node.kind {
                 NodeKind::Transform { rest, motion } => {
                     world *= *rest * motion.rest();
@@ -184,7 +188,7 @@ impl Graph {
         out
     }
 
-    /// The world from what is below `node` at `seconds`; the world itself without one.
+    /// The world from what is below `node` at `seconds`; from the model without one.
     fn world_from(&self, mut node: Option<usize>, seconds: f64) -> DAffine3 {
         let mut out = DAffine3::IDENTITY;
         while let Some(below) = node.map(|i| &self.nodes[i]) {
@@ -193,7 +197,7 @@ impl Graph {
             }
             node = below.parent;
         }
-        out
+        self.world_from_model * out
     }
 
     /// The instances at `node` and below it.
@@ -263,7 +267,11 @@ impl Scene {
                 NodeKind::Group | NodeKind::Selector(_) => return None,
             },
             // A mesh without a parent is in no graph.
-            None => (None, self.instances[*own.first()?].world_from_object, own),
+            None => {
+                let model_from_world = self.graph.world_from_model.inverse();
+                let first = self.instances[*own.first()?].world_from_object;
+                (None, model_from_world * first, own)
+            }
         };
         Some(Placed {
             kind,
@@ -277,6 +285,30 @@ impl Scene {
     /// Any time, in any order. The scene stays as it is where nothing moves.
     pub fn set_time(&mut self, seconds: f64) {
         self.graph.evaluate(seconds, &mut self.instances);
+    }
+
+    /// Places the whole model, meshes and wires, in the world: probe and acquired volume stay. What the graph
+    /// places is there after [`Scene::set_time`].
+    pub fn place_model(&mut self, world_from_model: DAffine3) {
+        let before = self.graph.world_from_model;
+        if before == world_from_model {
+            return;
+        }
+        let change = world_from_model * before.inverse();
+        let mut loose = vec![true; self.instances.len()];
+        for node in &self.graph.nodes {
+            if let NodeKind::Mesh { instance, .. } = node.kind {
+                loose[instance] = false;
+            }
+        }
+        let instances = self.instances.iter_mut().zip(loose);
+        for (instance, _) in instances.filter(|(_, loose)| *loose) {
+            instance.world_from_object = change * instance.world_from_object;
+        }
+        for end in self.wires.iter_mut().flat_map(|wire| &mut wire.ends) {
+            *end = change.transform_point3((*end).into()).into();
+        }
+        self.graph.world_from_model = world_from_model;
     }
 
     /// Whether all keyframes of an instance consist of the same triangles over vertices of their

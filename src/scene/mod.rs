@@ -29,7 +29,7 @@ pub mod tracker;
 
 pub use contact::Contact;
 pub use file::SceneError;
-pub use fusion::{Acquired, Fusion};
+pub use fusion::{Acquired, Display, Fusion};
 pub use graph::Graph;
 pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};

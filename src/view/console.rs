@@ -8,6 +8,7 @@ mod fusion;
 mod image;
 mod input;
 mod probe;
+mod registration;
 mod simulation;
 
 use std::time::Instant;
@@ -43,6 +44,12 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             });
             if settings.fusion.is_some() {
                 section(ui, "Fusion", false, |ui| fusion::show(ui, model, now));
+            }
+            if model.registration.is_some() {
+                let planes = &mut state.planes.open;
+                section(ui, "Registration", false, |ui| {
+                    registration::show(ui, model, planes, now)
+                });
             }
             let (settings, loaded) = (&mut model.settings, &model.loaded);
             section(ui, "Tissues", false, |ui| {

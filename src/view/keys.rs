@@ -35,6 +35,7 @@ enum Action {
     Load,
     Console,
     Survey,
+    Planes,
     Hold,
     Timing,
     Mmode,
@@ -192,15 +193,16 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "save settings (with Shift: as), load settings or a scene",
     ),
     (
-        "C V T M B",
+        "C V G T M B",
         &[
             (Key::C, false, Action::Console),
             (Key::V, false, Action::Survey),
+            (Key::G, false, Action::Planes),
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
             (Key::B, false, Action::Real),
         ],
-        "console, 3D view, timings, M-mode, which pixels are real",
+        "console, 3D view, planes of the volume, timings, M-mode, which pixels are real",
     ),
     (
         "? Esc",
@@ -340,6 +342,7 @@ fn carry_out(
         Action::Load => state.files.ask(Purpose::Load, model),
         Action::Console => state.console = !state.console,
         Action::Survey => state.survey.open = !state.survey.open,
+        Action::Planes => state.planes.open = !state.planes.open,
         Action::Hold => {
             let stays = model.hold.as_ref().is_some_and(|hold| hold.stays);
             model.stay_on_skin(!stays, now);

@@ -12,10 +12,14 @@ use super::model::Model;
 use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
-use super::{calipers, cine, files, keys, mmode, notice, saved, strip, style, survey, timing};
+use super::{
+    calipers, cine, files, keys, mmode, notice, planes, saved, strip, style, survey, timing,
+};
 
 /// Room that the toggles and the loop want beside each other, points.
 const BAR: f32 = 760.0;
+/// And one toggle more, where there is a volume.
+const PLANES: f32 = 62.0;
 
 /// Least height that is left to the image beside a panel of timings, points.
 const LEAST_IMAGE: f32 = 200.0;
@@ -46,7 +50,16 @@ pub(super) fn show(
             .show(ui, |ui| console::show(ui, model, state, now));
     }
     // Below each other where there is no room beside each other.
-    let rows = if ui.available_width() < BAR { 2 } else { 1 };
+    let more = if model.registration.is_some() {
+        PLANES
+    } else {
+        0.0
+    };
+    let rows = if ui.available_width() < BAR + more {
+        2
+    } else {
+        1
+    };
     Panel::bottom("bar")
         .resizable(false)
         .exact_size(cine::HEIGHT * rows as f32)
@@ -81,8 +94,15 @@ pub(super) fn show(
         state.mmode.close();
     }
     // Transparent: the pictures are below the interface.
-    let room = survey::width(ui.available_width()).filter(|_| state.survey.open && !alone);
-    let survey = room.map(|width| {
+    let planes = state.planes.open && model.registration.is_some();
+    let beside = state.survey.open || planes;
+    let room = survey::width(ui.available_width()).filter(|_| beside && !alone);
+    if let Some(width) = room.filter(|_| planes) {
+        let panel = Panel::right("planes").resizable(false).exact_size(width);
+        let panel = panel.frame(Space::NONE).show_separator_line(false);
+        panel.show(ui, |ui| planes::show(ui, model, &mut state.planes, now));
+    }
+    let survey = room.filter(|_| !planes).map(|width| {
         let panel = Panel::right("survey").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
         let shown = panel.show(ui, |ui| {
@@ -150,6 +170,11 @@ fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
         (&mut state.help, "Keys", "What the keyboard does (?)"),
     ] {
         ui.toggle_value(open, name).on_hover_text(tip);
+    }
+    if model.registration.is_some() {
+        let tip = "Three planes through the acquired volume, in place of the 3D view (G)";
+        ui.toggle_value(&mut state.planes.open, "Planes")
+            .on_hover_text(tip);
     }
     let tip = "One scanline against time (M)";
     let strip = ui.selectable_label(model.mmode.is_some(), "M-mode");

@@ -14,6 +14,7 @@ mod pad;
 mod palette;
 mod pose;
 pub mod real;
+pub mod registration;
 mod saving;
 mod settings;
 pub mod sheet;
@@ -39,6 +40,7 @@ pub use pad::{Control, Pad, Press};
 pub use palette::Show;
 pub use pose::{Axis, STEP, moved};
 use real::Real;
+use registration::Registration;
 pub use saving::File;
 pub use settings::Settings;
 pub use survey::{Shown, Survey};
@@ -81,6 +83,8 @@ pub struct Model {
     pub home: DAffine3,
     /// What holds the probe to the skin, where the scene names one.
     pub hold: Option<Hold>,
+    /// How an acquired volume is laid onto the model, where there is one.
+    pub registration: Option<Registration>,
     /// The scene file.
     pub file: File,
     /// How acquired pixels are marked.
@@ -179,6 +183,7 @@ impl Model {
             survey: Survey::new(scene),
             home: scene.world_from_probe,
             hold: Hold::of(scene),
+            registration: Registration::of(scene),
             file,
             real: Real::default(),
             history: History::default(),
@@ -238,11 +243,21 @@ impl Model {
     pub fn note(&mut self, before: &Settings, now: Instant) {
         if *before != self.settings {
             self.unite(before);
+            self.carry_skin(before);
             let (origins, lattice) = (&self.file.origins, self.file.lattice);
             let changes = entries::changes(before, &self.settings, origins, lattice);
             let paths = changes.into_iter().map(|(path, _)| path).collect();
             self.history.push(before.clone(), paths, now);
             self.touch(now);
+        }
+    }
+
+    /// The skin goes with the model; the settings were `before`.
+    fn carry_skin(&mut self, before: &Settings) {
+        if let Some(hold) = &mut self.hold
+            && before.model != self.settings.model
+        {
+            hold.place_model(self.settings.model);
         }
     }
 
@@ -255,7 +270,8 @@ impl Model {
     /// Goes back by one change of the settings, if there is one.
     pub fn undo(&mut self, now: Instant) {
         if let Some(settings) = self.history.undo(self.settings.clone()) {
-            self.settings = settings;
+            let before = std::mem::replace(&mut self.settings, settings);
+            self.carry_skin(&before);
             self.touch(now);
         }
     }
@@ -263,7 +279,8 @@ impl Model {
     /// Goes forward again.
     pub fn redo(&mut self, now: Instant) {
         if let Some(settings) = self.history.redo(self.settings.clone()) {
-            self.settings = settings;
+            let before = std::mem::replace(&mut self.settings, settings);
+            self.carry_skin(&before);
             self.touch(now);
         }
     }

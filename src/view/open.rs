@@ -19,7 +19,7 @@ use super::session::{self, Session, Wake};
 use super::state::State;
 use super::timing;
 use super::tools::Tools;
-use super::{Model, Options, ViewError, keys, style, survey};
+use super::{Model, Options, ViewError, keys, planes, style, survey};
 use crate::gpu::{Device, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
@@ -140,6 +140,7 @@ impl Open {
             console: true,
             timing: false,
             survey: survey::State::default(),
+            planes: planes::State::default(),
             times: timing::Page::default(),
             help: false,
             mmode: Default::default(),

@@ -15,6 +15,8 @@ pub(super) struct State {
     pub(super) timing: bool,
     /// The 3D view.
     pub(super) survey: super::survey::State,
+    /// Planes through the acquired volume, in place of the 3D view.
+    pub(super) planes: super::planes::State,
     /// What of the timing panel is shown.
     pub(super) times: timing::Page,
     /// The list of keys is open.

@@ -7,6 +7,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use insonify::scene::{Scene, mesh};
 
 mod case;
+mod live;
 mod mistakes;
 #[path = "../common/program.rs"]
 mod program;

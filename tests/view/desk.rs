@@ -229,18 +229,18 @@ impl Desk {
         self.quiet(part, Duration::from_secs(1), true)
     }
 
-    /// Waits until a part has not changed for half a second, also while a cursor blinks in a field of text:
-    /// then the program never rests.
+    /// Waits until a part has not changed for a while, also where a cursor blinks in a field of text: twice a second
+    /// the part changes then, and the program never rests for long.
     pub fn still(&mut self, part: [u16; 4]) {
-        self.quiet(part, Duration::from_millis(500), false);
+        self.quiet(part, Duration::from_millis(250), false);
     }
 
     /// The image comes back at the scene's own quality once all is at rest: until then the program works.
     /// `works`: whether that counts for the whole of the time, or only at its end. A program that is kept
     /// from the processor has work to do although it uses no time: its threads' states tell.
     fn quiet(&mut self, part: [u16; 4], time: Duration, works: bool) -> Vec<u8> {
-        // Shorter than between two drawings of a blinking cursor.
-        const REST: Duration = Duration::from_millis(200);
+        // Shorter than between two drawings of a blinking cursor, on a busy machine, too.
+        const REST: Duration = Duration::from_millis(80);
         let (mut last, mut spent) = (self.grab(part), self.processor_time());
         let (mut since, mut rested) = (Instant::now(), Instant::now());
         self.wait_for("the program to come to rest", |desk| {

@@ -10,6 +10,7 @@ mod desk;
 mod live;
 mod mmode;
 mod panels;
+mod planes;
 mod robust;
 mod survey;
 mod tools;

@@ -152,6 +152,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         "Probe input",
         "Simulation",
         "Fusion",
+        "Registration",
         "Tissues",
         "Surfaces",
     ];

@@ -184,12 +184,14 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
                 Tracer::RayQuery => (Strategy::Mask, "masked keyframes", "III (mask)"),
             };
             let exchange = (Strategy::Exchange, "node exchange", "III (exchange)");
-            for (strategy, name, number) in [selector, exchange] {
+            let ways = [selector, exchange];
+            let pairs = keyframed(machine, heart, tracer, ways.map(|(s, ..)| s), &plan)?;
+            for ((_, name, number), pair) in ways.into_iter().zip(pairs) {
                 entries.push(Entry {
                     number,
                     what: format!("static / {name}"),
                     keys: ["static_ms", "animated_ms"],
-                    pair: keyframed(machine, heart, tracer, strategy, &plan)?,
+                    pair,
                     paper: TABLE_III,
                 });
             }
@@ -314,57 +316,54 @@ fn transform(machine: &Machine, scene: &Scene, tracer: Tracer, plan: &Plan) -> R
     })
 }
 
-/// Table III: the beating heart by `strategy` against hearts that stand still, one in each keyframe, which have its
-/// tight box; medians over the rounds, then mean and deviation over the keyframes as in the paper.
+/// Table III: the beating heart by each of `strategies` against one that stands still in each keyframe and has its
+/// tight box, all in turns; medians over the rounds, then mean and deviation over the keyframes as in the paper.
 fn keyframed(
     machine: &Machine,
     scene: &Scene,
     tracer: Tracer,
-    strategy: Strategy,
+    strategies: [Strategy; 2],
     plan: &Plan,
-) -> Result<Pair> {
-    let beating = by(scene, strategy);
-    let mut still = by(scene, Strategy::Exchange);
-    let keyframes = beating.instances.iter().map(|i| i.keyframes.meshes.len());
+) -> Result<[Pair; 2]> {
+    let [first, second] = strategies.map(|strategy| by(scene, strategy));
+    let keyframes = first.instances.iter().map(|i| i.keyframes.meshes.len());
     let count = keyframes.max().unwrap_or(0);
     let step = period(scene).unwrap_or(1.0) / count as f64;
-    let times: Vec<f64> = (0..count).map(|k| (k as f64 + 0.5) * step).collect();
-    let mut stills = Vec::new();
-    for &seconds in &times {
-        still.set_time(seconds);
-        stills.push(Rig::new(machine, still.clone(), tracer)?);
+    let still = by(scene, Strategy::Exchange);
+    let mut rigs = Vec::new();
+    for scene in [still, first, second] {
+        let mut rig = Rig::new(machine, scene, tracer)?;
+        rig.frame()?;
+        rigs.push(rig);
     }
-    let mut rig = Rig::new(machine, beating, tracer)?;
-    rig.frame()?;
-    for still in &mut stills {
-        still.frame()?;
-    }
-    let mut found = vec![[Vec::new(), Vec::new()]; count];
-    for round in 0..plan.rounds {
-        for (k, &seconds) in times.iter().enumerate() {
-            // Now the one first, now the other.
-            for way in [round % 2, 1 - round % 2] {
-                let sample = match way {
-                    0 => stills[k].frame()?,
-                    _ => rig.frame_at(seconds)?,
-                };
-                found[k][way as usize].push(sample.frame);
+    let mut found = vec![[const { Vec::new() }; 3]; count];
+    for round in 0..plan.rounds as usize {
+        for (k, found) in found.iter_mut().enumerate() {
+            let seconds = (k as f64 + 0.5) * step;
+            // Another first each time.
+            for way in (0..3).map(|i| (i + round + k) % 3) {
+                let moved = rigs[way].frame_at(seconds)?;
+                let sample = if way == 0 { rigs[0].frame()? } else { moved };
+                found[way].push(sample.frame);
             }
         }
     }
     let of = |way: usize| -> [f64; 2] {
-        let median = |times: &[Vec<f64>; 2]| Statistics::of(times[way].iter().copied()).median;
+        let median = |times: &[Vec<f64>; 3]| Statistics::of(times[way].iter().copied()).median;
         let medians: Vec<f64> = found.iter().map(median).collect();
         let middle = mean(medians.iter().copied());
         let squares = medians.iter().map(|m| (m - middle).powi(2));
         let degrees = (count.max(2) - 1) as f64;
         [middle, (squares.sum::<f64>() / degrees).sqrt()]
     };
-    let ([first, a], [second, b]) = (of(0), of(1));
-    Ok(Pair {
-        first,
-        second,
-        deviations: Some([a, b]),
-        triangles: scene.triangles(),
-    })
+    let [first, a] = of(0);
+    Ok([1, 2].map(|way| {
+        let [second, b] = of(way);
+        Pair {
+            first,
+            second,
+            deviations: Some([a, b]),
+            triangles: scene.triangles(),
+        }
+    }))
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use super::document::Document;
 use super::error::SceneError;
 use super::placing::placement;
-use super::schema::{FusionTable, VolumeTable};
+use super::schema::{FusionTable, VolumeTable, even};
 use super::within;
 use crate::scene::fusion::{Blend, Surroundings, open_edges};
 use crate::scene::{Acquired, Fusion, Instance, Mesh, Warning, suggest};
@@ -31,7 +31,7 @@ pub(super) fn volume(
         )
     })?;
     warnings.extend(found);
-    let place = (table.translate, table.rotate.as_ref(), table.factors());
+    let place = (table.translate, table.rotate.as_ref(), even(table.scale));
     let world_from_lps = placement(document, "volume", place)?;
     // All that is stored of a byte; of other types only the range in use says what is white.
     let range = match &volume.voxels {

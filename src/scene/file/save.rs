@@ -9,6 +9,7 @@ use toml_edit::{DocumentMut, InlineTable, Item, Key, KeyMut, Table, TableLike, V
 use super::document::Source;
 use super::error::SceneError;
 use super::placing::placement;
+use super::schema::even;
 use super::tissues::Tissues;
 use super::{parameters, probe};
 use crate::files;
@@ -95,9 +96,12 @@ fn check(source: &Source) -> Result<(), SceneError> {
     parameters::live(&document, &file.live)?;
     Tissues::new(&document, &file.tissues)?;
     if let Some(t) = &file.volume {
-        let place = (t.translate, t.rotate.as_ref(), t.factors());
+        let place = (t.translate, t.rotate.as_ref(), even(t.scale));
         placement(&document, "volume", place)?;
     }
+    let t = &file.model;
+    let place = (t.translate, t.rotate.as_ref(), even(t.scale));
+    placement(&document, "model", place)?;
     for (i, t) in file.transform.iter().enumerate() {
         let path = format!("transform.{i}");
         placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;

@@ -28,6 +28,8 @@ pub struct File {
     pub simulation: SimulationTable,
     #[serde(default)]
     pub imaging: ImagingTable,
+    #[serde(default)]
+    pub model: ModelTable,
     pub volume: Option<VolumeTable>,
     pub fusion: Option<FusionTable>,
     pub contact: Option<ContactTable>,
@@ -161,11 +163,18 @@ pub struct VolumeTable {
     pub white: Option<f64>,
 }
 
-impl VolumeTable {
-    /// A volume keeps its proportions.
-    pub fn factors(&self) -> Option<Factors> {
-        self.scale.map(|factor| Factors([factor; 3]))
-    }
+/// Where the whole model is.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ModelTable {
+    pub translate: Option<[Length; 3]>,
+    pub rotate: Option<Rotation>,
+    pub scale: Option<f64>,
+}
+
+/// Factors of what keeps its proportions.
+pub fn even(scale: Option<f64>) -> Option<Factors> {
+    scale.map(|factor| Factors([factor; 3]))
 }
 
 #[derive(Debug, Deserialize)]

@@ -30,7 +30,10 @@ fn scene(instances: Vec<Instance>, nodes: Vec<Node>) -> Scene {
     Scene {
         meshes: vec![Mesh::default(); 8],
         instances,
-        graph: Graph { nodes },
+        graph: Graph {
+            nodes,
+            ..Graph::default()
+        },
         ..Scene::homogeneous(
             Tissue::shipped("water").expect("shipped"),
             Probe::abdominal(),
@@ -235,6 +238,7 @@ fn only_what_time_squeezes_has_a_shape_at_rest() {
                 node(None, None, transform(rest, motion)),
                 node(Some(0), None, mesh(1, inner)),
             ],
+            ..Graph::default()
         };
         let expected = squeezes.then_some(rest * inner);
         assert_eq!(graph.rests(3), [None, expected, None], "{case}");
@@ -246,6 +250,7 @@ fn only_what_time_squeezes_has_a_shape_at_rest() {
             node(Some(0), None, transform(uneven, Motion::Still)),
             node(Some(1), None, mesh(0, inner)),
         ],
+        ..Graph::default()
     };
     assert_eq!(graph.rests(1), [None]);
 }

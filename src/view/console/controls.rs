@@ -9,7 +9,7 @@ use serde::de::value::{Error, StrDeserializer};
 use crate::view::catalogue::{self, Entry};
 
 /// Name and meaning of a key in a tooltip.
-fn explained(response: Response, key: &str, entry: &Entry) -> Response {
+pub(super) fn explained(response: Response, key: &str, entry: &Entry) -> Response {
     let unit = &entry.unit;
     let range = match entry.range {
         [least, most] if least.is_finite() && most.is_finite() => {
@@ -23,7 +23,7 @@ fn explained(response: Response, key: &str, entry: &Entry) -> Response {
 }
 
 /// A label and a control in a row of a two-column grid.
-fn row(ui: &mut Ui, key: &str, label: &str, add: impl FnOnce(&mut Ui, &Entry)) {
+pub(super) fn row(ui: &mut Ui, key: &str, label: &str, add: impl FnOnce(&mut Ui, &Entry)) {
     let entry = catalogue::entry(key);
     explained(ui.label(label), key, entry);
     ui.horizontal(|ui| add(ui, entry));

@@ -3,12 +3,13 @@
 use glam::{DAffine3, DVec3};
 use serde::Deserialize;
 use serde::de::value::{Error, StrDeserializer};
-use toml_edit::Key;
+use toml_edit::{Key, Value};
 
 use super::Settings;
 use crate::probe::{Kind, Probe};
+use crate::register::{Placement, Transformation};
 use crate::scene::file::Entry;
-use crate::scene::{Fusion, Imaging, Live, Origin, Origins, Simulation, Surface, Tissue};
+use crate::scene::{Display, Fusion, Imaging, Live, Origin, Origins, Simulation, Surface, Tissue};
 use crate::view::catalogue;
 
 /// Relative difference below which two lattices are the same: each has been multiplied by frequencies
@@ -33,8 +34,15 @@ pub(super) fn changes(
     out.extend(differing(imaging(&from.imaging), imaging(&to.imaging)));
     out.extend(differing(live(&from.live), live(&to.live)));
     if let (Some(from), Some(to)) = (&from.fusion, &to.fusion) {
-        out.extend(differing(fusion(from), fusion(to)));
+        out.extend(differing(fusion(from, origins), fusion(to, origins)));
     }
+    if let (Some(from), Some(to)) = (&from.volume, &to.volume) {
+        out.extend(differing(volume(from), volume(to)));
+    }
+    out.extend(differing(
+        placed("model", &from.model),
+        placed("model", &to.model),
+    ));
     out.extend(tissue_changes(&from.tissues, &to.tissues, &origins.bases));
     // Instances of one table have the same settings: the first speaks for all.
     let mut done: Vec<&Origin> = Vec::new();
@@ -297,22 +305,51 @@ fn live(l: &Live) -> Vec<Entry> {
     }]
 }
 
-fn fusion(f: &Fusion) -> Vec<Entry> {
+fn fusion(f: &Fusion, origins: &Origins) -> Vec<Entry> {
     let Fusion {
-        masks: _,
+        masks,
         surroundings,
         blur,
         blend,
         mask_speed,
         background_shadows,
     } = f;
+    let masks = masks.iter().filter_map(|&i| origins.instances.get(i));
+    // An animated file has several instances of one name.
+    let mut names: Vec<String> = masks
+        .map(|o| Value::from(o.mesh.as_str()).to_string())
+        .collect();
+    names.dedup();
     vec![
+        (
+            "fusion.mask".into(),
+            Some(format!("[{}]", names.join(", "))),
+        ),
         word("fusion.surroundings", surroundings),
         whole("fusion.blur", *blur),
         word("fusion.blend", blend),
         word("fusion.mask_speed", mask_speed),
         switched("fusion.background_shadows", *background_shadows),
     ]
+}
+
+fn volume(d: &Display) -> Vec<Entry> {
+    let Display {
+        world_from_lps,
+        black,
+        white,
+    } = d;
+    let mut out = placed("volume", world_from_lps);
+    out.extend([
+        number("volume.black", "volume.black", *black),
+        number("volume.white", "volume.white", *white),
+    ]);
+    out
+}
+
+/// Where `table` places something that keeps its proportions.
+fn placed(table: &str, place: &DAffine3) -> Vec<Entry> {
+    Placement::of(place, Transformation::Similarity).entries(table)
 }
 
 /// Those that are based on another one say themselves what that one no longer says as before.

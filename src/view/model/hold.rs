@@ -39,6 +39,12 @@ impl Hold {
         })
     }
 
+    /// The skin is where the model is: world from model.
+    pub(super) fn place_model(&mut self, model: DAffine3) {
+        self.body.place_model(model);
+        self.spot = None;
+    }
+
     /// The place that a probe at `pose` is held to. While the face's centre rests it is the same, however
     /// the probe is turned.
     fn spot(&self, hand: &Hand<'_>, pose: &DAffine3) -> Spot {

@@ -1,7 +1,11 @@
 //! What the console sets: everything of a scene but its geometry.
 
+use glam::DAffine3;
+
 use crate::probe::Probe;
-use crate::scene::{Fusion, Imaging, Live, Scene, Simulation, Strategy, Surface, Tissue};
+use crate::scene::{
+    Acquired, Display, Fusion, Imaging, Live, Scene, Simulation, Strategy, Surface, Tissue,
+};
 use crate::sim::Tracer;
 use crate::view::catalogue;
 
@@ -22,6 +26,10 @@ pub struct Settings {
     pub strategies: Vec<Option<Strategy>>,
     /// How an acquired volume is shown around what is simulated.
     pub fusion: Option<Fusion>,
+    /// Where an acquired volume is, and its grey levels.
+    pub volume: Option<Display>,
+    /// World from model: where the anatomy is.
+    pub model: DAffine3,
     /// How images keep pace while something moves.
     pub live: Live,
     /// How rays find surfaces.
@@ -42,6 +50,8 @@ impl Settings {
             surfaces: scene.instances.iter().map(|i| i.surface).collect(),
             strategies: scene.instances.iter().map(strategy).collect(),
             fusion: scene.fusion.clone(),
+            volume: scene.volume.as_ref().map(Acquired::display),
+            model: scene.graph.world_from_model,
             live: scene.live.clone(),
             tracer,
         }
@@ -73,6 +83,10 @@ impl Settings {
         scene.imaging.clone_from(&self.imaging);
         scene.tissues.clone_from(&self.tissues);
         scene.fusion.clone_from(&self.fusion);
+        if let (Some(volume), Some(display)) = (&mut scene.volume, &self.volume) {
+            volume.show(display);
+        }
+        scene.place_model(self.model);
         scene.live.clone_from(&self.live);
         let instances = scene.instances.iter_mut();
         for ((instance, surface), strategy) in instances.zip(&self.surfaces).zip(&self.strategies) {

@@ -53,6 +53,11 @@ impl Body {
         })
     }
 
+    /// Places the model that it belongs to: world from model.
+    pub fn place_model(&mut self, model: DAffine3) {
+        self.scene.place_model(model);
+    }
+
     /// As it is at `seconds` of the scene's time.
     pub fn at(&mut self, seconds: f64) -> Skin {
         self.scene.set_time(seconds);

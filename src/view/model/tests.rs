@@ -7,7 +7,7 @@ use super::{Axis, Clock, File, Model, Settings, Source, moved};
 use crate::scene::Scene;
 use crate::sim::Tracer;
 
-fn scene() -> Scene {
+pub(super) fn scene() -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("scene.toml");
     let text = r#"

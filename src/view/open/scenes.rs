@@ -56,6 +56,7 @@ impl Open {
         self.state.tools.lose();
         self.state.tools.sheet = Default::default();
         self.state.mmode = Default::default();
+        self.state.planes = Default::default();
         self.state.inputs.calibrate(scene.tracker.clone());
         plan.scene = scene;
         self.state.files.opening = false;

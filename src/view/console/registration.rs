@@ -1,0 +1,150 @@
+//! The acquired volume and the model laid onto each other, by numbers.
+
+use std::time::Instant;
+
+use egui::{DragValue, Ui};
+use glam::{DAffine3, DQuat, DVec3};
+
+use super::controls::{explained, grid, row};
+use crate::scene::Display;
+use crate::view::model::Model;
+use crate::view::model::registration::Moves;
+
+pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool, now: Instant) {
+    let seconds = model.clock.at(now);
+    let Some(registration) = &mut model.registration else {
+        return;
+    };
+    ui.horizontal(|ui| {
+        ui.toggle_value(planes, "Planes")
+            .on_hover_text("Three planes through the volume with the meshes' lines (G)");
+        ui.label("Moves:");
+        for (moves, name, tip) in [
+            (
+                Moves::Volume,
+                "Volume",
+                "The volume moves; model and probe stay",
+            ),
+            (
+                Moves::Model,
+                "Model",
+                "All meshes move; volume and probe stay",
+            ),
+        ] {
+            ui.selectable_value(&mut registration.moves, moves, name)
+                .on_hover_text(tip);
+        }
+    });
+    let table = match registration.moves {
+        Moves::Volume => "volume",
+        Moves::Model => "model",
+    };
+    let place = registration.place(&model.settings);
+    let mut changed = place;
+    grid(ui, "registration", |ui| placement(ui, table, &mut changed));
+    if changed != place {
+        registration.put(&mut model.settings, changed);
+    }
+    let tip = "Volume and model where the scene file has them";
+    if ui
+        .button("Place as in the file")
+        .on_hover_text(tip)
+        .clicked()
+    {
+        let (settings, loaded) = (&mut model.settings, &model.loaded);
+        settings.model = loaded.model;
+        if let (Some(volume), Some(as_loaded)) = (&mut settings.volume, &loaded.volume) {
+            volume.world_from_lps = as_loaded.world_from_lps;
+        }
+    }
+    if let Some(display) = &mut model.settings.volume {
+        grid(ui, "grey levels", |ui| levels(ui, display));
+    }
+    registration.follow(&model.settings, seconds);
+    masks(ui, model);
+}
+
+/// Shift, rotation and scale.
+fn placement(ui: &mut Ui, table: &str, place: &mut DAffine3) {
+    let (scale, rotation, mut shift) = place.to_scale_rotation_translation();
+    let mut factor = scale.x;
+    let (axis, angle) = rotation.to_axis_angle();
+    let mut turn = (axis * angle).to_array().map(f64::to_degrees);
+    let mut any = false;
+    row(ui, &format!("{table}.translate"), "Shift", |ui, entry| {
+        for part in shift.as_mut() {
+            let value = DragValue::new(part).speed(0.1).max_decimals(2);
+            any |= explained(ui.add(value), "mm, along the axes of the world", entry).changed();
+        }
+    });
+    row(ui, &format!("{table}.rotate.angle"), "Turn", |ui, entry| {
+        for part in &mut turn {
+            let value = DragValue::new(part).speed(0.1).max_decimals(2);
+            let what = "Degrees: a vector along the axis of the rotation, as long as its angle";
+            any |= explained(ui.add(value), what, entry).changed();
+        }
+    });
+    row(ui, &format!("{table}.scale"), "Scale", |ui, entry| {
+        let value = DragValue::new(&mut factor).speed(0.002).max_decimals(4);
+        any |= explained(
+            ui.add(value.range(entry.range[0]..=entry.range[1])),
+            "",
+            entry,
+        )
+        .changed();
+    });
+    if any {
+        let turn = DVec3::from(turn.map(f64::to_radians));
+        let rotation = DQuat::from_scaled_axis(turn);
+        *place = DAffine3::from_scale_rotation_translation(DVec3::splat(factor), rotation, shift);
+    }
+}
+
+/// The window of grey levels.
+fn levels(ui: &mut Ui, display: &mut Display) {
+    let step = (display.white - display.black).abs() / 200.0;
+    let before = *display;
+    for (key, name, level) in [
+        ("volume.black", "Black", &mut display.black),
+        ("volume.white", "White", &mut display.white),
+    ] {
+        row(ui, key, name, |ui, entry| {
+            explained(ui.add(DragValue::new(level).speed(step)), key, entry);
+        });
+    }
+    if display.black == display.white {
+        *display = before;
+    }
+}
+
+/// The masking meshes.
+fn masks(ui: &mut Ui, model: &mut Model) {
+    let (Some(registration), Some(fusion)) = (&model.registration, &mut model.settings.fusion)
+    else {
+        return;
+    };
+    ui.collapsing("Masks", |ui| {
+        ui.label("What the checked meshes enclose is simulated.");
+        for (index, mesh) in model.meshes.iter().enumerate() {
+            let mut chosen = fusion.masks.contains(&index);
+            let closed = registration.closed.get(index).copied().unwrap_or(false);
+            // A scene without a mask would be no fusion.
+            let last = chosen && fusion.masks.len() == 1;
+            let response = ui.add_enabled(
+                closed && !last,
+                egui::Checkbox::new(&mut chosen, &mesh.name),
+            );
+            let response = response.on_disabled_hover_text(match closed {
+                true => "One mesh has to be a mask",
+                false => "Not closed: it has no inside",
+            });
+            if response.changed() {
+                fusion.masks.retain(|&i| i != index);
+                if chosen {
+                    fusion.masks.push(index);
+                    fusion.masks.sort_unstable();
+                }
+            }
+        }
+    });
+}
