@@ -374,3 +374,77 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
         assert!(!fine && text.contains(cause), "{cause}: {text}");
     }
 }
+
+/// Volumes over a period: each is what the same sweep makes of the anatomy at its time.
+#[test]
+fn the_command_writes_volumes_over_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let run = |args: &[&str]| insonify(folder.path(), args);
+    let text = "background = \"liver\"\n[probe]\npreset = \"linear\"\nscanlines = 32\nsamples = 200\n\
+        elevation_layers = 1\n[imaging]\nimage_height = 64\n[[transform]]\nname = \"to and fro\"\n\
+        motion = { kind = \"sine\", period = 0.8, translate = [3, 0, 0] }\n[[mesh]]\nname = \"cyst\"\n\
+        parent = \"to and fro\"\nshape = { sphere = { radius = 6 } }\ntissue = \"water\"\n\
+        translate = [0, 0, 18]\n";
+    std::fs::write(folder.path().join("a.toml"), text).expect("written");
+    let sweep = [
+        "acquire",
+        "a.toml",
+        "--sweep",
+        "linear:6mm",
+        "--frames",
+        "4",
+        "--spacing",
+        "1,2,1",
+    ];
+    let acquired = |more: &[&str]| {
+        let (fine, text) = run(&[&sweep, more].concat());
+        assert!(fine, "{text}");
+        text
+    };
+    let times = ["--volumes", "4", "--period", "0.8s", "--time", "0.05"];
+    let text = acquired(&[&times[..], &["--volume", "all.mha"]].concat());
+    assert!(
+        text.contains("4 volumes over time, one every 0.2 s"),
+        "{text}"
+    );
+    let load = |name: &str| Volume::load(&folder.path().join(name)).expect("a volume").0;
+    let all = load("all.mha");
+    assert_eq!(all.interval, Some(0.2));
+    let all: Vec<_> = all.volumes().cloned().collect();
+    for (k, time) in ["0.05", "0.25", "0.45", "0.65"].into_iter().enumerate() {
+        acquired(&["--volume", "one.mha", "--time", time]);
+        assert!(load("one.mha").voxels == all[k], "{time} s");
+        assert!(all[(k + 1) % 4] != all[k], "nothing moved after {time} s");
+    }
+    for (args, cause) in [
+        (&["--volumes", "4", "--volume", "b.mha"][..], "--period"),
+        (&["--period", "1", "--volume", "b.mha"], "--volumes"),
+        (
+            &["--volumes", "4", "--period", "1", "-o", "b.mha"],
+            "--volume",
+        ),
+        (
+            &["--volumes", "1", "--period", "1", "--volume", "b.mha"],
+            "1 is not in 2..=1000",
+        ),
+        (
+            &["--volumes", "4", "--period", "0", "--volume", "b.mha"],
+            "it must lie between",
+        ),
+        (
+            &[
+                "--volumes",
+                "4",
+                "--period",
+                "1",
+                "--volume",
+                "b.mha",
+                "--moving",
+            ],
+            "cannot be used with",
+        ),
+    ] {
+        let (fine, text) = run(&[&sweep, args].concat());
+        assert!(!fine && text.contains(cause), "{cause}: {text}");
+    }
+}

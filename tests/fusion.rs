@@ -441,7 +441,9 @@ fn a_volume_beyond_the_devices_limit_is_averaged_with_a_warning() {
     let voxels = (0..4 * long).map(|i| value((i % long) as f64 * pitch - 30.0) as f32);
     scene.volume = Some(Acquired {
         size: [long, 2, 2],
-        voxels: Arc::new(Voxels::F32(voxels.collect())),
+        volumes: vec![Arc::new(Voxels::F32(voxels.collect()))],
+        now: 0,
+        sequence: None,
         world_from_voxel: DAffine3::from_translation(DVec3::new(-30.0, -30.0, -30.0))
             * DAffine3::from_scale(DVec3::new(pitch, 60.0, 90.0)),
         world_from_lps: DAffine3::IDENTITY,

@@ -9,7 +9,7 @@ use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::file;
 use insonify::sim::shaders::Library;
-use insonify::volume::{Sequence, Settings, write_meta};
+use insonify::volume::{Reconstruction, Sequence, Settings, write_meta};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common, Progress};
@@ -35,6 +35,14 @@ pub struct Acquire {
     /// Volume to reconstruct from them (.mha), along the axes of the probe at its middle frame.
     #[arg(long, value_name = "FILE")]
     volume: Option<PathBuf>,
+    /// Volumes to reconstruct over time, evenly over --period: each from a sweep of its own, while the
+    /// anatomy stands still at its time, as a gated acquisition puts them together.
+    #[arg(long, value_name = "COUNT", value_parser = clap::value_parser!(u32).range(2..=1000),
+        requires_all = ["volume", "period"], conflicts_with_all = ["output", "moving"])]
+    volumes: Option<u32>,
+    /// Time that --volumes cover, from --time on: seconds or with a unit, e.g. 0.8s.
+    #[arg(long, value_name = "TIME", value_parser = period, requires = "volumes")]
+    period: Option<f64>,
     /// Distance of the volume's voxels, mm: one number, or lateral,elevation,depth as 0.5,1,0.3.
     #[arg(long, value_parser = spacing, default_value = "0.5", requires = "volume")]
     spacing: DVec3,
@@ -89,6 +97,14 @@ fn rate(text: &str) -> Result<f64, String> {
     }
 }
 
+fn period(text: &str) -> Result<f64, String> {
+    let value = file::seconds(text)?;
+    match (1e-6..=86_400.0).contains(&value) {
+        true => Ok(value),
+        false => Err("it must lie between 0.000001 and 86400 s".to_owned()),
+    }
+}
+
 /// Refuses names that cannot be written before minutes have gone into what they are for.
 fn writable(path: &Path) -> Result<()> {
     let extension = path.extension().and_then(|e| e.to_str());
@@ -120,8 +136,19 @@ pub fn run(args: &Acquire) -> Result<()> {
     }
     let mut scene = args.common.scene(&args.scene)?;
     let stations = stations(args, &scene)?;
-    let sequence = simulate(args, &mut scene, &stations)?;
-    if let Some(path) = &args.output {
+    let mut made: Vec<Reconstruction> = Vec::new();
+    let mut single = None;
+    simulate(args, &mut scene, &stations, |sequence| {
+        match (args.volumes, &args.volume) {
+            (Some(count), Some(path)) => {
+                made.push(reconstructed(args, path, &sequence)?);
+                made[0].volume.fits(count as usize, path)?;
+            }
+            _ => single = Some(sequence),
+        }
+        Ok(())
+    })?;
+    if let (Some(path), Some(sequence)) = (&args.output, &single) {
         sequence.write(path)?;
         output::line(path.display());
         let [width, height] = sequence.size;
@@ -130,14 +157,25 @@ pub fn run(args: &Acquire) -> Result<()> {
             "  {count} tracked frames of {width} x {height} pixels"
         ));
     }
-    if let Some(path) = &args.volume {
-        let made = acquire::volume(&sequence, Settings::new(args.spacing));
-        let about = || format!("reconstructing {}", path.display());
-        let made = made.map_err(miette::Report::from).wrap_err_with(about)?;
-        write_meta(path, &made.volume)?;
-        tell(path, &made, sequence.frames.len());
+    if let (Some(path), Some(sequence)) = (&args.volume, &single) {
+        made.push(reconstructed(args, path, sequence)?);
+    }
+    let mut made = made.into_iter();
+    if let (Some(path), Some(mut first)) = (&args.volume, made.next()) {
+        let later: Vec<_> = made.map(|own| own.volume).collect();
+        if let (Some(count), Some(period)) = (args.volumes, args.period) {
+            first.volume = first.volume.followed_by(later, period / f64::from(count));
+        }
+        write_meta(path, &first.volume)?;
+        tell(path, &first, stations.len());
     }
     Ok(())
+}
+
+fn reconstructed(args: &Acquire, path: &Path, sequence: &Sequence) -> Result<Reconstruction> {
+    let made = acquire::volume(sequence, Settings::new(args.spacing));
+    let about = || format!("reconstructing {}", path.display());
+    made.map_err(miette::Report::from).wrap_err_with(about)
 }
 
 fn stations(args: &Acquire, scene: &Scene) -> Result<Vec<Station>> {
@@ -150,21 +188,39 @@ fn stations(args: &Acquire, scene: &Scene) -> Result<Vec<Station>> {
     }
 }
 
-fn simulate(args: &Acquire, scene: &mut Scene, stations: &[Station]) -> Result<Sequence> {
+/// Follows the sweep once, or once for each of the volumes; `taken` has the frames of each.
+fn simulate(
+    args: &Acquire,
+    scene: &mut Scene,
+    stations: &[Station],
+    mut taken: impl FnMut(Sequence) -> Result<()>,
+) -> Result<()> {
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device, scene)?;
     args.common.settle(scene, &device);
     let library = Library::embedded();
     let mut simulator = common::simulator(&device, &library, scene, tracer)?;
-    let mut progress = Progress::new(stations.len() as u32, "frames");
+    let count = args.volumes.unwrap_or(1);
+    let frames = stations.len() as u32;
+    let mut progress = Progress::new(count * frames, "frames");
     let moving = args.moving.then_some(args.common.time);
-    let made = acquire::acquire(&mut simulator, scene, stations, moving, |index| {
-        progress.done(index as u32 + 1);
-    });
+    let mut follow = || {
+        for number in 0..count {
+            if let Some(period) = args.period {
+                let passed = period * f64::from(number) / f64::from(count);
+                scene.set_time(args.common.time + passed);
+            }
+            let made = acquire::acquire(&mut simulator, scene, stations, moving, |index| {
+                progress.done(number * frames + index as u32 + 1);
+            });
+            taken(made.into_diagnostic()?)?;
+        }
+        Ok(())
+    };
+    let followed: Result<()> = follow();
     progress.finish();
-    let made = made.into_diagnostic()?;
-    args.common.validated(&device)?;
-    Ok(made)
+    followed?;
+    args.common.validated(&device)
 }
 
 #[cfg(test)]

@@ -159,12 +159,12 @@ impl Scene {
     }
 }
 
-/// The volume that the scene file at `path` names, as it is written there; none where it names none
-/// or cannot be read.
-pub fn volume_of(path: &Path) -> Option<PathBuf> {
-    let source = Source::read(path, &[]).ok()?;
-    let file = source.document().ok()?.parse().ok()?;
-    file.volume.map(|table| PathBuf::from(table.file))
+/// The files of the volume that the scene file at `path` names, as they are written there; none where
+/// it names none or cannot be read.
+pub fn volume_of(path: &Path) -> Vec<PathBuf> {
+    let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
+    let table = file.ok().and_then(|file| file.volume);
+    table.map_or_else(Vec::new, |table| table.files())
 }
 
 /// A time as the command line and scene files write it: seconds, or with a unit. Finite.

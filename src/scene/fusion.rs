@@ -4,21 +4,28 @@ use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
+use super::animation::Sequence;
 use super::mesh::{Soup, weld};
 use super::topology::Edges;
 use super::{Instance, Mesh, Scene};
 use crate::volume::Voxels;
 
-/// Most bytes of the volume on the device. What is larger is averaged: a frame reads less than a slice.
+/// Most bytes of the volume on the device, at all its times. What is larger is averaged: a frame reads
+/// less than a slice.
 pub const TEXTURE_BUDGET: u64 = 512 << 20;
 
-/// A volume of grey values acquired elsewhere, placed in the world.
+/// A volume of grey values acquired elsewhere, placed in the world. It may change with time: the grid,
+/// black and white stay.
 #[derive(Clone, Debug)]
 pub struct Acquired {
     /// Voxels along each axis, all at least 1.
     pub size: [usize; 3],
-    /// Values, first axis fastest.
-    pub voxels: Arc<Voxels>,
+    /// Values at each of its times, first axis fastest, all of one type; one where it does not change.
+    pub volumes: Vec<Arc<Voxels>>,
+    /// The one as it is now: index into `volumes`.
+    pub now: usize,
+    /// When each is shown; none where it does not change.
+    pub sequence: Option<Sequence>,
     /// Voxel indices (integers at voxel centres) to the world, mm.
     pub world_from_voxel: DAffine3,
     /// The volume's own frame, LPS in mm, to the world: its placement.
@@ -95,15 +102,26 @@ impl Acquired {
             // Beside an axis of one voxel there is nothing, of no weight.
             if weight > 0.0 {
                 let [i, j, k] = index;
-                value += weight * self.voxels.get(i + x * (j + y * k));
+                value += weight * self.voxels().get(i + x * (j + y * k));
             }
         }
         Some(((value - self.black) / (self.white - self.black)).clamp(0.0, 1.0))
     }
 
-    /// Bytes of the volume on the device, where it is not larger than that holds.
+    /// Bytes of the volume on the device at all its times, where that is not larger than it holds.
     pub fn texture_bytes(&self) -> u64 {
-        self.voxels.len() as u64 * self.voxels.kind().bytes() as u64
+        let bytes = |v: &Arc<Voxels>| v.len() as u64 * v.kind().bytes() as u64;
+        self.volumes.iter().map(bytes).sum()
+    }
+
+    /// The values as they are now, first axis fastest.
+    pub fn voxels(&self) -> &Voxels {
+        &self.volumes[self.now]
+    }
+
+    /// Takes the volume whose time it is at `seconds`.
+    pub(super) fn set_time(&mut self, seconds: f64) {
+        self.now = self.sequence.as_ref().map_or(0, |s| s.step(seconds));
     }
 }
 

@@ -4,7 +4,7 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::animation::{Motion, Sequence};
-use super::{Instance, Scene, Strategy};
+use super::{Acquired, Instance, Scene, Strategy};
 
 /// Nodes, each after its parent.
 #[derive(Clone, Debug, Default)]
@@ -281,10 +281,24 @@ impl Scene {
         })
     }
 
-    /// Moves everything to where it is at `seconds`: placements, what selectors show, and shapes.
-    /// Any time, in any order. The scene stays as it is where nothing moves.
+    /// Moves everything to where it is at `seconds`: placements, what selectors show, shapes, and the
+    /// acquired volume. Any time, in any order. The scene stays as it is where nothing moves.
     pub fn set_time(&mut self, seconds: f64) {
         self.graph.evaluate(seconds, &mut self.instances);
+        if let Some(acquired) = &mut self.volume {
+            acquired.set_time(seconds);
+        }
+    }
+
+    /// Whether anything follows time: the anatomy, or the acquired volume.
+    pub fn is_animated(&self) -> bool {
+        let moves = |node: &Node| match &node.kind {
+            NodeKind::Transform { motion, .. } => *motion != Motion::Still,
+            NodeKind::Selector(_) => true,
+            NodeKind::Group | NodeKind::Mesh { .. } => false,
+        };
+        let changes = |acquired: &Acquired| acquired.sequence.is_some();
+        self.graph.nodes.iter().any(moves) || self.volume.as_ref().is_some_and(changes)
     }
 
     /// Places the whole model, meshes and wires, in the world: probe and acquired volume stay. What the graph

@@ -28,7 +28,10 @@ mod tint;
 /// Everything of which a frame without fusion has no need.
 pub(super) struct Fused {
     device: Arc<Device>,
-    texture: Texture,
+    /// The volume; it outlives buffers that become too small.
+    texture: Arc<Texture>,
+    /// The time of the volume that the frame shows.
+    now: usize,
     kernels: Kernels,
     shadows: Shadows,
     bands: Bands,
@@ -84,13 +87,14 @@ pub(super) struct Simulated<'a> {
 }
 
 impl Fused {
-    /// Uploads the scene's volume; none where it has none.
+    /// Uploads the scene's volume, unless `before` has it; none where the scene has none.
     pub(super) fn new(
         device: &Arc<Device>,
         library: &Library,
         scene: &Scene,
         frame: &layout::Frame,
         tracer: Tracer,
+        before: Option<&Self>,
     ) -> Result<Option<Self>, GpuError> {
         let Some(acquired) = &scene.volume else {
             return Ok(None);
@@ -100,7 +104,11 @@ impl Fused {
         let new = |name: &str, size: u64| device.buffer(name, size.max(16), BufferKind::Storage);
         Ok(Some(Self {
             device: Arc::clone(device),
-            texture: Texture::new(device, acquired)?,
+            texture: match before {
+                Some(before) => Arc::clone(&before.texture),
+                None => Arc::new(Texture::new(device, acquired)?),
+            },
+            now: acquired.now,
             kernels: Kernels::new(device, library, tracer)?,
             shadows: Shadows::new(device, library, frame, tracer)?,
             bands: Bands::new(device, library, pixels)?,
@@ -135,7 +143,7 @@ impl Fused {
 
     /// Device memory of the volume, bytes.
     pub(super) fn volume_bytes(&self) -> u64 {
-        self.texture.image.bytes()
+        self.texture.bytes()
     }
 
     /// What the user should know of the volume.
@@ -145,7 +153,7 @@ impl Fused {
 
     fn constants(&self, acquired: &Acquired, fusion: &Fusion) -> layout::Fusion {
         let texel_from_world = self.texture.texel_from_voxel * acquired.world_from_voxel.inverse();
-        let [size_x, size_y, size_z] = self.texture.image.extent();
+        let [size_x, size_y, size_z] = self.texture.extent();
         let range = acquired.white - acquired.black;
         layout::Fusion {
             voxel_from_world: placement::rows(&texel_from_world),
@@ -173,6 +181,7 @@ impl Fused {
         if let (Some(acquired), Some(fusion)) = (&scene.volume, &scene.fusion) {
             let constants = self.constants(acquired, fusion);
             cmd.write(&self.constants, 0, bytemuck::bytes_of(&constants))?;
+            self.now = acquired.now;
             if fusion.background_shadows {
                 self.shadows.fit(&self.device)?;
             }
@@ -208,7 +217,7 @@ impl Fused {
                 buffer(world.triangles()),
                 world.structure(),
                 buffer(&self.constants),
-                Binding::Image(&self.texture.image),
+                Binding::Image(&self.texture.images[self.now]),
                 buffer(simulated.counters),
                 buffer(&self.prescan),
                 buffer(simulated.scanlines),

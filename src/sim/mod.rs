@@ -145,7 +145,7 @@ impl Simulator {
         let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, &frame, &batches.rounds, &tables)?;
-        let fusion = Fused::new(device, library, scene, &frame, tracer)?;
+        let fusion = Fused::new(device, library, scene, &frame, tracer, None)?;
         let simulator = Self {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,

@@ -25,7 +25,14 @@ impl Simulator {
         }
         self.frames.wait()?;
         let buffers = Buffers::new(&self.device, &frame, &batches.rounds, &tables)?;
-        let fusion = Fused::new(&self.device, library, scene, &frame, world.tracer())?;
+        let fusion = Fused::new(
+            &self.device,
+            library,
+            scene,
+            &frame,
+            world.tracer(),
+            self.passes.fusion.as_ref(),
+        )?;
         let passes = &mut self.passes;
         (passes.buffers, passes.fusion) = (buffers, fusion);
         (passes.frame, passes.batches) = (frame, batches);

@@ -48,8 +48,7 @@ use trajectory::Replay;
 pub use ways::{Kept, Ways};
 
 use super::engine::{Frame, Pixels};
-use crate::scene::graph::NodeKind;
-use crate::scene::{Scene, animation};
+use crate::scene::Scene;
 use crate::sim::Tracer;
 use crate::sim::fusion::Tint;
 
@@ -158,7 +157,7 @@ impl Model {
     /// The state of a scene as loaded from `file`, standing at `seconds`; it plays if it can.
     pub fn new(scene: &Scene, file: File, tracer: Tracer, seconds: f64, now: Instant) -> Self {
         let settings = Settings::of(scene, tracer);
-        let animated = is_animated(scene);
+        let animated = scene.is_animated();
         Self {
             title: scene.name.clone(),
             loaded: settings.clone(),
@@ -320,14 +319,6 @@ impl Model {
             at: self.changed,
         }
     }
-}
-
-fn is_animated(scene: &Scene) -> bool {
-    scene.graph.nodes.iter().any(|node| match &node.kind {
-        NodeKind::Transform { motion, .. } => *motion != animation::Motion::Still,
-        NodeKind::Selector(_) => true,
-        NodeKind::Group | NodeKind::Mesh { .. } => false,
-    })
 }
 
 #[cfg(test)]

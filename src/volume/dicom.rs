@@ -94,6 +94,8 @@ pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
         size,
         world_from_voxel,
         voxels,
+        later: Vec::new(),
+        interval: None,
         statistics,
     };
     volume.warn_of_shear(path, &mut warnings);

@@ -4,20 +4,19 @@ use std::path::Path;
 
 use super::error::VolumeError;
 use super::grid::Grid;
+use super::layout::Layout;
 use super::source::{Coding, MAX_BYTES, Payload};
 use super::voxels::{self, VoxelType, Voxels};
-use super::{Format, Volume, Warning};
+use super::{Format, Statistics, Volume, Warning};
 
 /// A header that has been read and found sound in itself.
 pub(super) struct Header {
     pub format: Format,
     pub kind: VoxelType,
     pub big_endian: bool,
-    /// Values per voxel, next to each other.
-    pub channels: usize,
-    pub size: [usize; 3],
-    /// Volumes after each other.
-    pub frames: usize,
+    pub layout: Layout,
+    /// Time from one volume to the next, s, where it is stated.
+    pub interval: Option<f64>,
     pub grid: Grid,
     /// Slope and intercept of values, where they are not as written.
     pub scale: Option<(f64, f64)>,
@@ -32,55 +31,44 @@ impl Header {
             .push(Warning::warning(path, count, message, remedy));
     }
 
-    /// Reads the voxels of the first frame and channel.
+    /// Reads the voxels of all volumes, of each the first of its values.
     pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
         let world_from_voxel = self.grid.world_from_voxel().map_err(|cause| {
             VolumeError::file(path, cause, "correct the direction or export it again")
         })?;
-        let product = |factors: &[usize]| {
-            factors
-                .iter()
-                .try_fold(1u64, |p, &f| p.checked_mul(f as u64))
-                .filter(|&p| p <= MAX_BYTES)
-        };
-        let [x, y, z] = self.size;
-        let values = product(&[x, y, z, self.channels]);
-        let total = product(&[x, y, z, self.channels, self.frames, self.kind.bytes()]);
-        let (Some(values), Some(total)) = (values, total) else {
-            return Err(VolumeError::file(
-                path,
-                format!(
-                    "{x} x {y} x {z} voxels of {} values, {} times, are more than {} GB",
-                    self.channels,
-                    self.frames,
-                    MAX_BYTES >> 30
-                ),
-                "correct the sizes in the header, or crop or resample the volume",
-            ));
-        };
-        let width = self.kind.bytes() as u64;
+        let total = self.bytes(path)?;
         let (bytes, more) = if self.payload.coding == Coding::Text {
             self.big_endian = false;
-            voxels::parse_text(&self.payload, self.kind, total / width, values)?
+            voxels::parse_text(&self.payload, self.kind, total / self.kind.bytes() as u64)?
         } else {
-            self.payload.read(total, values * width)?
+            self.payload.read(total)?
         };
         if more {
             let message = "data go on after the declared voxels; the rest is ignored";
             self.warn(path, 1, message, "compare the sizes in the header");
         }
-        let (mut voxels, rounded) =
-            Voxels::decode(&bytes, self.kind, self.big_endian, self.channels);
+        let mut rounded = 0;
+        let mut volumes = Vec::with_capacity(self.layout.volumes);
+        for number in 0..self.layout.volumes {
+            let (voxels, lost) =
+                Voxels::decode(&bytes, self.kind, self.big_endian, &self.layout, number);
+            rounded += lost;
+            volumes.push(match self.scale {
+                Some((slope, intercept)) => voxels.scaled(slope, intercept),
+                None => voxels,
+            });
+        }
         drop(bytes);
         if rounded > 0 {
             let message = format!("{rounded} values are rounded to 24 bits");
             self.warn(path, rounded, message, "");
         }
-        if let Some((slope, intercept)) = self.scale {
-            voxels = voxels.scaled(slope, intercept);
+        let channels = self.layout.channels;
+        if channels > 1 {
+            let message = format!("{channels} values per voxel; only the first is read");
+            self.warn(path, channels, message, "save the channel that you need");
         }
-        self.describe_extras(path);
-        let statistics = voxels.statistics();
+        let statistics = Statistics::of(&volumes);
         if statistics.not_finite > 0 {
             let message = format!("{} voxels are not finite numbers", statistics.not_finite);
             self.warn(path, statistics.not_finite, message, "replace them");
@@ -89,29 +77,47 @@ impl Header {
             format: self.format,
             frame: self.grid.frame,
             stored_as: self.kind,
-            size: self.size,
+            size: self.layout.size,
             world_from_voxel,
-            voxels,
+            voxels: volumes.remove(0),
+            later: volumes,
+            interval: self.interval,
             statistics,
         };
         volume.warn_of_shear(path, &mut self.warnings);
         Ok((volume, self.warnings))
     }
 
-    fn describe_extras(&mut self, path: &Path) {
-        if self.channels > 1 {
-            let message = format!("{} values per voxel; only the first is read", self.channels);
-            self.warn(
-                path,
-                self.channels,
-                message,
-                "save the channel that you need",
-            );
-        }
-        if self.frames > 1 {
-            let message = format!("{} volumes in a row; only the first is read", self.frames);
-            self.warn(path, self.frames, message, "save the one that you need");
-        }
+    /// Bytes of all values in the file, if neither they nor what is held of them is too much.
+    fn bytes(&self, path: &Path) -> Result<u64, VolumeError> {
+        let layout = &self.layout;
+        let held = match self.scale {
+            Some(_) => VoxelType::F32,
+            None => self.kind,
+        };
+        let fits = |count: Option<u64>, each: usize| {
+            let bytes = count.and_then(|count| count.checked_mul(each as u64));
+            bytes.filter(|&bytes| bytes <= MAX_BYTES)
+        };
+        let all = layout.voxels();
+        let all = all.and_then(|voxels| voxels.checked_mul(layout.volumes as u64));
+        let total = fits(layout.values(), self.kind.bytes());
+        total
+            .filter(|_| fits(all, held.held_bytes()).is_some())
+            .ok_or_else(|| {
+                let [x, y, z] = layout.size;
+                VolumeError::file(
+                    path,
+                    format!(
+                        "{x} x {y} x {z} voxels of {} values, {} times, are more than {} GB",
+                        layout.channels,
+                        layout.volumes,
+                        MAX_BYTES >> 30
+                    ),
+                    "correct the sizes in the header, crop or resample the volume, or leave out \
+                     some of several",
+                )
+            })
     }
 }
 

@@ -7,6 +7,7 @@ use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
+use super::layout::{Axis, Layout};
 use super::sequence::{self, frames};
 use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
 use super::voxels::VoxelType;
@@ -82,14 +83,11 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
         return Err(fields.error(axes, "2 to 10 axes can be read", "give a volume"));
     }
     let dims = fields.sizes(fields.need("DimSize")?, n)?;
-    let frames = dims
-        .iter()
-        .skip(3)
-        .try_fold(1usize, |p, &d| p.checked_mul(d));
-    let spacings = match fields.find(&["ElementSpacing", "ElementSize"]) {
-        Some(field) => fields.spacings(field, n)?,
-        None => vec![1.0; n],
-    };
+    let stated = fields.find(&["ElementSpacing", "ElementSize"]);
+    let stated = stated.map(|f| fields.spacings(f, n)).transpose()?;
+    // ITK and what is built on it write seconds.
+    let interval = stated.as_ref().and_then(|s| s.get(3)).copied();
+    let spacings = stated.unwrap_or_else(|| vec![1.0; n]);
     let identity = || {
         (0..n * n)
             .map(|i| f64::from(u8::from(i % (n + 1) == 0)))
@@ -103,15 +101,16 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
         Some(field) => fields.sizes(field, 1)?[0],
         None => 1,
     };
+    let kinds = [Axis::Space, Axis::Space, Axis::Space, Axis::Time];
+    let kinds = kinds.into_iter().chain(std::iter::repeat(Axis::Values));
+    let axes = kinds.zip(dims);
     let big_endian = fields.find(&BIG_ENDIAN).is_some_and(truth);
     Ok(Header {
         format: Format::MetaImage,
         kind: kind(fields)?,
         big_endian,
-        channels,
-        size: [dims[0], dims[1], dims.get(2).copied().unwrap_or(1)],
-        // A product beyond all numbers is refused with the sizes.
-        frames: frames.unwrap_or(usize::MAX),
+        layout: Layout::new([(Axis::Values, channels)].into_iter().chain(axes)),
+        interval,
         grid: Grid {
             steps: grid::steps(n, &rows, &spacings),
             origin: grid::point(&origin),
@@ -250,10 +249,11 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
 /// A warning where the third axis is none of space: a plane, or frames of a sequence. Plus calls
 /// the third axis of reconstructed volumes a list as well; only sequences have fields per frame.
 fn stacked(fields: &Fields) -> Option<Warning> {
-    let plane = fields.find(&["NDims"]).is_some_and(|f| f.value == "2");
-    let message = match (plane, frames::in_header(fields)) {
-        (true, _) => "is a plane: one slice of 1 mm",
-        (_, true) => "is a tracked sequence: its frames are stacked, their poses ignored",
+    let axes = fields.find(&["NDims"]).map(|f| f.value.as_str());
+    let message = match (axes, frames::in_header(fields)) {
+        (Some("2"), _) => "is a plane: one slice of 1 mm",
+        (Some("3"), true) => "is a tracked sequence: its frames are stacked, their poses ignored",
+        (_, true) => "is a tracked sequence: the poses of its frames are ignored",
         _ => return None,
     };
     Some(Warning::warning(

@@ -16,12 +16,14 @@ mod error;
 mod fields;
 mod grid;
 mod header;
+mod layout;
 mod meta;
 mod nifti;
 mod nrrd;
 mod reconstruct;
 mod report;
 mod sequence;
+mod series;
 mod source;
 #[cfg(test)]
 mod tests;
@@ -64,7 +66,7 @@ impl Format {
     }
 }
 
-/// A scalar volume.
+/// A scalar volume, or several of one grid that follow each other in time.
 #[derive(Clone, Debug)]
 pub struct Volume {
     /// Format of its file.
@@ -77,9 +79,13 @@ pub struct Volume {
     pub size: [usize; 3],
     /// Voxel indices (integers at voxel centres) to LPS, mm.
     pub world_from_voxel: DAffine3,
-    /// Values, first axis fastest.
+    /// Values, first axis fastest; of several volumes those of the first.
     pub voxels: Voxels,
-    /// Range and mean of the values.
+    /// Values of the volumes after the first.
+    pub later: Vec<Voxels>,
+    /// Time from one volume to the next, s, where the file says it.
+    pub interval: Option<f64>,
+    /// Range and mean of the values of all volumes.
     pub statistics: Statistics,
 }
 
@@ -98,8 +104,9 @@ pub fn is_volume(path: &Path) -> bool {
 }
 
 impl Volume {
-    /// Reads a volume by the extension of its file. Of several values per voxel the first is
-    /// read, of several volumes the first; slices of a tracked sequence are stacked as they come.
+    /// Reads a volume by the extension of its file, or several over time. Of several values per voxel
+    /// the first is read, of several DICOM volumes the first; slices of a tracked sequence are stacked
+    /// as they come.
     ///
     /// # Errors
     /// Where the file, or the data file that it names, is missing, cut off or wrong.
@@ -121,6 +128,11 @@ impl Volume {
                 "give a .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz or .dcm file",
             ))
         }
+    }
+
+    /// Values of all volumes in the order of time, at least one.
+    pub fn volumes(&self) -> impl Iterator<Item = &Voxels> {
+        std::iter::once(&self.voxels).chain(&self.later)
     }
 
     /// Distance of voxel centres along each axis, mm.
@@ -150,7 +162,7 @@ impl Volume {
         )
     }
 
-    /// Value of the voxel at these indices.
+    /// Value of the first volume's voxel at these indices.
     ///
     /// # Panics
     /// When there is no such voxel.

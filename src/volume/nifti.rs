@@ -9,6 +9,7 @@ use super::Format;
 use super::error::VolumeError;
 use super::grid::{Frame, Grid};
 use super::header::Header;
+use super::layout::{Axis, Layout};
 use super::source::{Coding, Payload, Skip};
 use super::voxels::VoxelType;
 
@@ -73,16 +74,20 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
         return Err(raw.error(112, "scl_slope or scl_inter is not a finite number", EXPORT));
     }
     let (grid, placed) = grid(&raw)?;
-    let mut further = dims.iter().skip(3);
-    let frames = further.try_fold(1usize, |p, &d| p.checked_mul(d));
-    let size = [0, 1, 2].map(|k| dims.get(k).copied().unwrap_or(1));
+    let kinds = [Axis::Space, Axis::Space, Axis::Space, Axis::Time];
+    let kinds = kinds.into_iter().chain(std::iter::repeat(Axis::Values));
+    let axes = kinds.zip(dims.iter().copied());
+    let layout = Layout::new([(Axis::Values, channels)].into_iter().chain(axes));
+    let (interval, assumed) = match layout.volumes {
+        1 => (None, false),
+        _ => interval(&raw)?,
+    };
     let mut out = Header {
         format: Format::Nifti,
         kind,
         big_endian: raw.big,
-        channels,
-        size,
-        frames: frames.unwrap_or(usize::MAX),
+        layout,
+        interval,
         grid,
         scale,
         payload,
@@ -96,6 +101,10 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
             message,
             "register it or export it with its position",
         );
+    }
+    if assumed {
+        let message = "xyzt_units states no unit of time; seconds are assumed";
+        out.warn(path, 1, message, "export it with its unit");
     }
     if dims.len() == 2 {
         out.warn(
@@ -187,6 +196,29 @@ fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
         return Err(raw.error(72, message, EXPORT));
     }
     Ok((kind, channels))
+}
+
+/// Time from one volume to the next, s, where the fourth axis is one of time and says it; and whether
+/// its unit is assumed.
+fn interval(raw: &Raw) -> Result<(Option<f64>, bool), VolumeError> {
+    let stated = raw.f32(92) as f32;
+    if !(stated.is_finite() && stated >= 0.0) {
+        let message =
+            format!("pixdim[4] is {stated}: the time between volumes has to be above zero");
+        return Err(raw.error(92, message, "state it, or 0 where it is not known"));
+    }
+    // The decimal that was meant: 0.05 s has no exact binary value, and many of them make a period.
+    let stated: f64 = stated.to_string().parse().expect("a number");
+    let per_second = match raw.bytes[123] & 0x38 {
+        0 | 8 => 1.0,
+        16 => 1e3,
+        24 => 1e6,
+        // Hz, ppm or rad/s.
+        _ => return Ok((None, false)),
+    };
+    let known = stated > 0.0;
+    let assumed = known && raw.bytes[123] & 0x38 == 0;
+    Ok((known.then_some(stated / per_second), assumed))
 }
 
 /// Position of voxels by sform, else qform, else spacing alone; and whether one of the first two

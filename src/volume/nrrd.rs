@@ -8,6 +8,7 @@ use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::Frame;
 use super::header::{Header, unused};
+use super::layout::{Axis, Layout};
 use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
 use super::voxels::VoxelType;
 
@@ -62,10 +63,19 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     }
     let sizes = fields.sizes(fields.need("sizes")?, n)?;
     let (directions, frame) = space::directions(&fields, n)?;
-    let (first, count) = space::spatial(&fields, n, directions.as_deref())?;
-    let stacked = count == 2 && n > first + 2;
-    let used = first + count + usize::from(stacked);
-    let product = |sizes: &[usize]| sizes.iter().try_fold(1usize, |p, &s| p.checked_mul(s));
+    let axes = space::axes(&fields, n, directions.as_deref())?;
+    let count = axes.iter().filter(|a| **a == Axis::Space).count();
+    let time = axes.iter().position(|a| *a == Axis::Time);
+    let grid = space::grid(&fields, &axes, directions.as_deref(), frame)?;
+    let interval = match time.filter(|&t| count == 3 && sizes[t] > 1) {
+        Some(time) => space::interval(&fields, n, time)?,
+        None => None,
+    };
+    let stacked = count == 2 && time.is_some();
+    let mut layout = Layout::new(axes.into_iter().zip(sizes));
+    if stacked {
+        layout.stack();
+    }
     let kind = kind(&fields)?;
     let payload = payload(&fields, data)?;
     let big_endian = match fields.find(&["endian"]) {
@@ -87,16 +97,9 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
         format: Format::Nrrd,
         kind,
         big_endian,
-        channels: product(&sizes[..first]).unwrap_or(usize::MAX),
-        size: [0, 1, 2].map(|k| {
-            if first + k < used {
-                sizes[first + k]
-            } else {
-                1
-            }
-        }),
-        frames: product(&sizes[used..]).unwrap_or(usize::MAX),
-        grid: space::grid(&fields, n, first, count, directions.as_deref(), frame)?,
+        layout,
+        interval,
+        grid,
         scale: None,
         payload,
         warnings: Vec::new(),

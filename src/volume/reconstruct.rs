@@ -186,6 +186,8 @@ pub fn reconstruct(
             size: lattice.size(),
             world_from_voxel: lattice.reference_from_voxel(),
             voxels,
+            later: Vec::new(),
+            interval: None,
             statistics,
         },
         frames: frames.len(),

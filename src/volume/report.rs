@@ -25,6 +25,14 @@ impl fmt::Display for Volume {
             self.format.name(),
             self.stored_as.name()
         )?;
+        if !self.later.is_empty() {
+            let count = self.later.len() + 1;
+            let pace = match self.interval {
+                Some(seconds) => format!("one every {seconds} s"),
+                None => "how fast they follow each other is not stated".to_owned(),
+            };
+            writeln!(f, "  {count} volumes over time, {pace}")?;
+        }
         writeln!(
             f,
             "  spacing {:.4} x {:.4} x {:.4} mm",
@@ -40,7 +48,7 @@ impl fmt::Display for Volume {
             vector(high)
         )?;
         let values = self.statistics;
-        if values.not_finite == self.voxels.len() {
+        if values.min > values.max {
             write!(f, "  no value is a finite number")
         } else {
             write!(

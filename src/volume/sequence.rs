@@ -50,7 +50,7 @@ impl Sequence {
         let (fields, data) = meta::fields(path)?;
         let mut header = meta::of_fields(&fields, data)?;
         let axes: usize = fields.number(fields.need("NDims")?)?;
-        let [width, height, depth] = header.size;
+        let [width, height, depth] = header.layout.size;
         if axes > 3 {
             // PLUS can write frames as volumes of one slice; the fourth axis is then time.
             if depth > 1 {
@@ -60,8 +60,7 @@ impl Sequence {
                     "give a sequence of planes",
                 ));
             }
-            header.size[2] = header.frames;
-            header.frames = 1;
+            header.layout.stack();
         } else if frames::third_axis_is_space(&fields) {
             return Err(fields.error(
                 fields.need("Kinds")?,
@@ -69,7 +68,7 @@ impl Sequence {
                 "give a sequence of planes, its third axis of kind `list`",
             ));
         }
-        let mut tracked = frames::parse(&fields, header.size[2])?;
+        let mut tracked = frames::parse(&fields, header.layout.size[2])?;
         let (volume, warnings) = header.load(path)?;
         let frames = (0..volume.size[2]).map(|i| tracked.remove(&i).unwrap_or_default());
         let spacing = volume.spacing();
@@ -107,7 +106,7 @@ impl Sequence {
         let count = self.frames.len();
         assert_eq!(self.pixels.len(), width * height * count, "pixels");
         let [x, y] = self.spacing.map(super::write::number);
-        let mut header = super::write::Header::new(&self.pixels);
+        let mut header = super::write::Header::new(&self.pixels, 3);
         header.entry("CenterOfRotation", "0 0 0");
         header.entry("AnatomicalOrientation", "RAI");
         header.entry("DimSize", format!("{width} {height} {count}"));
@@ -124,6 +123,6 @@ impl Sequence {
         for (index, frame) in self.frames.iter().enumerate() {
             frame.write(index, &mut header);
         }
-        header.finish(path, &self.pixels)
+        header.finish(path, [&self.pixels])
     }
 }

@@ -194,17 +194,21 @@ impl Payload {
         Ok(stream)
     }
 
-    /// The first `kept` of `total` bytes, all of which have to be there, and whether more follow.
-    /// Of a compressed stream at most one byte more is unpacked.
-    pub fn read(&self, total: u64, kept: u64) -> Result<(Vec<u8>, bool), VolumeError> {
+    /// The `total` bytes, and whether more follow. Of a compressed stream at most one byte more is
+    /// unpacked.
+    pub fn read(&self, total: u64) -> Result<(Vec<u8>, bool), VolumeError> {
         let mut stream = self.stream(total)?;
         let from_end = self.skip == Skip::AllButLast && self.coding != Coding::Raw;
-        let keep = if from_end { total + MAX_LEAD + 1 } else { kept };
+        let keep = if from_end {
+            total + MAX_LEAD + 1
+        } else {
+            total
+        };
         let mut out = Vec::new();
-        out.try_reserve_exact(kept as usize).map_err(|_| {
+        out.try_reserve_exact(total as usize).map_err(|_| {
             VolumeError::file(
                 &self.file,
-                format!("{kept} bytes of voxels do not fit into memory"),
+                format!("{total} bytes of voxels do not fit into memory"),
                 "crop or resample the volume",
             )
         })?;
@@ -224,14 +228,8 @@ impl Payload {
                 return Err(self.short(read, read, total));
             };
             out.drain(..lead as usize);
-            out.truncate(kept as usize);
             return Ok((out, false));
         }
-        if read < kept {
-            return Err(self.short(read, read, total));
-        }
-        let rest = io::copy(&mut stream.by_ref().take(total - kept), &mut io::sink());
-        let read = kept + rest.map_err(|e| self.broken(kept, total, &e))?;
         if read < total {
             return Err(self.short(read, read, total));
         }

@@ -3,6 +3,7 @@
 use std::io::{BufReader, Read};
 
 use super::error::VolumeError;
+use super::layout::Layout;
 use super::source::Payload;
 
 /// Type of a value in a file.
@@ -28,6 +29,11 @@ impl VoxelType {
             Self::U32 | Self::I32 | Self::F32 => 4,
             Self::F64 => 8,
         }
+    }
+
+    /// Bytes of one value as [`Voxels`] hold it.
+    pub(super) fn held_bytes(self) -> usize {
+        self.bytes().min(4)
     }
 
     /// In words.
@@ -129,12 +135,13 @@ impl Voxels {
         Self::F32(values!(self, v => v.iter().map(|&x| scale(f64::from(x))).collect()))
     }
 
-    /// Values from bytes; of every `channels` values the first. Also how many were rounded.
+    /// One of the volumes in these bytes. Also how many values were rounded.
     pub(super) fn decode(
         bytes: &[u8],
         kind: VoxelType,
         big: bool,
-        channels: usize,
+        layout: &Layout,
+        volume: usize,
     ) -> (Self, usize) {
         let mut rounded = 0;
         let mut round = |exact: f64| {
@@ -142,29 +149,34 @@ impl Voxels {
             rounded += usize::from(f64::from(single) != exact && exact.is_finite());
             single
         };
-        let step = kind.bytes() * channels;
         macro_rules! read {
-            ($t:ty) => {
-                bytes.chunks_exact(step).map(|value| {
-                    let (value, _) = value.split_first_chunk().expect("a step holds a value");
-                    if big {
-                        <$t>::from_be_bytes(*value)
-                    } else {
-                        <$t>::from_le_bytes(*value)
-                    }
-                })
-            };
+            ($t:ty, $held:expr) => {{
+                let width = size_of::<$t>();
+                let (rows, step) = layout.rows(volume);
+                let mut out = Vec::with_capacity(layout.size.iter().product());
+                for row in rows {
+                    out.extend((0..layout.size[0]).map(|i| {
+                        let value = &bytes[(row + i * step) * width..];
+                        let value = *value.first_chunk().expect("the bytes hold all values");
+                        $held(match big {
+                            true => <$t>::from_be_bytes(value),
+                            false => <$t>::from_le_bytes(value),
+                        })
+                    }));
+                }
+                out
+            }};
         }
         let voxels = match kind {
-            VoxelType::U8 => Self::U8(read!(u8).collect()),
-            VoxelType::I8 => Self::I8(read!(i8).collect()),
-            VoxelType::U16 => Self::U16(read!(u16).collect()),
-            VoxelType::I16 => Self::I16(read!(i16).collect()),
-            VoxelType::F32 => Self::F32(read!(f32).collect()),
-            VoxelType::U32 => Self::F32(read!(u32).map(|x| round(f64::from(x))).collect()),
-            VoxelType::I32 => Self::F32(read!(i32).map(|x| round(f64::from(x))).collect()),
+            VoxelType::U8 => Self::U8(read!(u8, |x| x)),
+            VoxelType::I8 => Self::I8(read!(i8, |x| x)),
+            VoxelType::U16 => Self::U16(read!(u16, |x| x)),
+            VoxelType::I16 => Self::I16(read!(i16, |x| x)),
+            VoxelType::F32 => Self::F32(read!(f32, |x| x)),
+            VoxelType::U32 => Self::F32(read!(u32, |x| round(f64::from(x)))),
+            VoxelType::I32 => Self::F32(read!(i32, |x| round(f64::from(x)))),
             // Decimal fractions are never exact in single precision; only a lost range matters.
-            VoxelType::F64 => Self::F32(read!(f64).map(|x| x as f32).collect()),
+            VoxelType::F64 => Self::F32(read!(f64, |x| x as f32)),
         };
         (voxels, rounded)
     }
@@ -192,16 +204,31 @@ fn statistics(values: impl Iterator<Item = f64>) -> Statistics {
     out
 }
 
+impl Statistics {
+    /// Those of all these volumes together.
+    pub(super) fn of<'v>(volumes: impl IntoIterator<Item = &'v Voxels>) -> Self {
+        let (mut out, mut count) = (statistics(std::iter::empty()), 0);
+        for voxels in volumes {
+            let own = voxels.statistics();
+            let finite = voxels.len() - own.not_finite;
+            count += finite;
+            out.min = out.min.min(own.min);
+            out.max = out.max.max(own.max);
+            out.mean += (own.mean - out.mean) * (finite as f64 / count.max(1) as f64);
+            out.not_finite += own.not_finite;
+        }
+        out
+    }
+}
+
 /// Longest number in text, bytes.
 const MAX_WORD: usize = 64;
 
-/// `total` numbers in text as the bytes of little-endian values, of which the first `kept` are
-/// returned; also whether more follow.
+/// `total` numbers in text as the bytes of little-endian values; also whether more follow.
 pub(super) fn parse_text(
     payload: &Payload,
     kind: VoxelType,
     total: u64,
-    kept: u64,
 ) -> Result<(Vec<u8>, bool), VolumeError> {
     let mut bytes = BufReader::new(payload.stream(total)?).bytes();
     let (mut out, mut count, mut at) = (Vec::new(), 0, payload.offset);
@@ -226,9 +253,7 @@ pub(super) fn parse_text(
             _ => {
                 let value =
                     encode(&word, kind).ok_or_else(|| no_number(payload, at, &word, kind))?;
-                if count < kept {
-                    out.extend(value);
-                }
+                out.extend(value);
                 count += 1;
                 word.clear();
             }

@@ -27,7 +27,7 @@ pub(super) fn number(value: f64) -> String {
 
 impl Header {
     /// The entries that depend on the voxels alone.
-    pub fn new(voxels: &Voxels) -> Self {
+    pub fn new(voxels: &Voxels, axes: usize) -> Self {
         let kind = match voxels.kind() {
             VoxelType::U8 => "MET_UCHAR",
             VoxelType::I8 => "MET_CHAR",
@@ -40,7 +40,7 @@ impl Header {
         };
         let mut out = Self(String::new());
         out.entry("ObjectType", "Image");
-        out.entry("NDims", "3");
+        out.entry("NDims", axes.to_string());
         out.entry("BinaryData", "True");
         out.entry("BinaryDataByteOrderMSB", "False");
         out.entry("CompressedData", "True");
@@ -59,8 +59,12 @@ impl Header {
         writeln!(self.0, "{key} = {value}").expect("memory");
     }
 
-    /// Writes the header and the voxels.
-    pub fn finish(mut self, path: &Path, voxels: &Voxels) -> Result<(), VolumeError> {
+    /// Writes the header and the voxels of one volume after another.
+    pub fn finish<'v>(
+        mut self,
+        path: &Path,
+        volumes: impl IntoIterator<Item = &'v Voxels>,
+    ) -> Result<(), VolumeError> {
         if path
             .extension()
             .is_none_or(|e| !e.eq_ignore_ascii_case("mha"))
@@ -72,7 +76,9 @@ impl Header {
             ));
         }
         let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-        encoder.write_all(&voxels.to_le_bytes()).expect("memory");
+        for voxels in volumes {
+            encoder.write_all(&voxels.to_le_bytes()).expect("memory");
+        }
         let data = encoder.finish().expect("memory");
         self.entry("CompressedDataSize", data.len().to_string());
         self.entry("ElementDataFile", "LOCAL");
@@ -91,15 +97,38 @@ impl Header {
     }
 }
 
-/// Writes a volume as MetaImage (.mha). Voxels read back equal, the placement to the rounding of
-/// 64-bit products.
+/// Writes a volume, or several over time, as MetaImage (.mha). Voxels read back equal, the placement to
+/// the rounding of 64-bit products.
 ///
 /// # Errors
 /// When the name is not .mha, or the file cannot be written.
+///
+/// # Panics
+/// When several volumes have no interval, which the file has to state.
 pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
     let [x, y, z] = volume.size;
     assert_eq!(volume.voxels.len(), x * y * z, "voxels");
+    let mut size = vec![x, y, z];
+    let mut spacing = volume.spacing().to_array().to_vec();
+    let mut origin = volume.world_from_voxel.translation.to_array().to_vec();
     let [i, j, k] = volume.directions();
+    // MetaImage lists the direction of one axis after that of the other.
+    let mut directions = DMat3::from_cols(i, j, k).to_cols_array().to_vec();
+    let mut kinds = "domain domain domain".to_owned();
+    if !volume.later.is_empty() {
+        size.push(volume.later.len() + 1);
+        spacing.push(
+            volume
+                .interval
+                .expect("how fast the volumes follow each other"),
+        );
+        origin.push(0.0);
+        for axis in 1..=3 {
+            directions.insert(4 * axis - 1, 0.0);
+        }
+        directions.extend([0.0, 0.0, 0.0, 1.0]);
+        kinds.push_str(" time");
+    }
     let text = |values: &[f64]| {
         values
             .iter()
@@ -107,17 +136,13 @@ pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
             .collect::<Vec<_>>()
             .join(" ")
     };
-    let mut header = Header::new(&volume.voxels);
-    header.entry("CenterOfRotation", "0 0 0");
-    header.entry("DimSize", format!("{x} {y} {z}"));
-    header.entry("Kinds", "domain domain domain");
-    header.entry("ElementSpacing", text(&volume.spacing().to_array()));
-    header.entry(
-        "Offset",
-        text(&volume.world_from_voxel.translation.to_array()),
-    );
-    // MetaImage lists the direction of one axis after that of the other.
-    let directions = DMat3::from_cols(i, j, k).to_cols_array();
+    let mut header = Header::new(&volume.voxels, size.len());
+    header.entry("CenterOfRotation", text(&vec![0.0; size.len()]));
+    let sizes: Vec<_> = size.iter().map(usize::to_string).collect();
+    header.entry("DimSize", sizes.join(" "));
+    header.entry("Kinds", kinds);
+    header.entry("ElementSpacing", text(&spacing));
+    header.entry("Offset", text(&origin));
     header.entry("TransformMatrix", text(&directions));
-    header.finish(path, &volume.voxels)
+    header.finish(path, volume.volumes())
 }

@@ -21,8 +21,8 @@ fn load(text: &str, set: &[(String, String)]) -> Result<Scene, SceneError> {
     std::fs::write(&file, text).expect("written");
     let way = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n1,5,0,0\n";
     std::fs::write(folder.path().join("way.csv"), way).expect("written");
-    let volume =
-        "NDims = 3\nDimSize = 2 2 2\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n01234567";
+    let volume = "NDims = 4\nDimSize = 2 2 2 2\nElementSpacing = 1 1 1 0.5\nElementType = MET_UCHAR\n\
+         ElementDataFile = LOCAL\n0123456789abcdef";
     std::fs::write(folder.path().join("volume.mha"), volume).expect("written");
     Scene::load(&file, set).map(|(scene, _)| scene)
 }

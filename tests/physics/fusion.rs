@@ -57,7 +57,9 @@ fn volume(size: [usize; 3], world_from_voxel: DAffine3, value: impl Fn(DVec3) ->
     }
     Acquired {
         size,
-        voxels: Arc::new(Voxels::F32(values)),
+        volumes: vec![Arc::new(Voxels::F32(values))],
+        now: 0,
+        sequence: None,
         world_from_voxel,
         world_from_lps: DAffine3::IDENTITY,
         black: 0.0,
@@ -565,7 +567,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
     let slope = DVec3::new(0.004, -0.006, 0.005);
     let value = |p: DVec3| 0.5 + slope.dot(p - seen);
     let whole = volume(size, world_from_voxel, value);
-    let Voxels::F32(exact) = &*whole.voxels else {
+    let Voxels::F32(exact) = whole.voxels() else {
         unreachable!("made of floats")
     };
     let code = |steps: f64| exact.iter().map(move |v| (f64::from(*v) * steps).round());
@@ -588,7 +590,9 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
     ];
     for (name, voxels, black, white, tolerance) in forms {
         scene.volume = Some(Acquired {
-            voxels: Arc::new(voxels),
+            volumes: vec![Arc::new(voxels)],
+            now: 0,
+            sequence: None,
             black,
             white,
             ..whole.clone()

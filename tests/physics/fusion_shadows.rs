@@ -49,7 +49,9 @@ fn scene(host: Tissue, slab: Tissue) -> Scene {
     }
     scene.volume = Some(Acquired {
         size: [2, 2, 2],
-        voxels: Arc::new(Voxels::F32(vec![LEVEL; 8])),
+        volumes: vec![Arc::new(Voxels::F32(vec![LEVEL; 8]))],
+        now: 0,
+        sequence: None,
         world_from_voxel: DAffine3::from_translation(DVec3::splat(-300.0))
             * DAffine3::from_scale(DVec3::splat(600.0)),
         world_from_lps: DAffine3::IDENTITY,

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 
 use super::Facts;
+use super::nodes::periods;
 use crate::scene::fusion::{Acquired, Surroundings, TEXTURE_BUDGET};
 use crate::scene::{Issue, Scene, file};
 use crate::volume::Volume;
@@ -17,10 +18,14 @@ pub fn describe(
     facts: impl Fn(usize) -> Facts,
 ) -> (Vec<String>, Vec<Issue>) {
     let (mut lines, mut issues) = (Vec::new(), Vec::new());
-    if let (Some(acquired), Some(named)) = (&scene.volume, file::volume_of(path)) {
-        lines.push(format!("volume {}", named.display()));
-        let folder = path.parent().unwrap_or(Path::new(""));
-        lines.extend(stored(folder.join(named)));
+    let named = file::volume_of(path);
+    if let (Some(acquired), Some(first)) = (&scene.volume, named.first()) {
+        let more = match named.as_slice() {
+            [_, .., last] => format!(" to {}, {} files", last.display(), named.len()),
+            _ => String::new(),
+        };
+        lines.push(format!("volume {}{more}", first.display()));
+        lines.extend(stored(path, &named));
         lines.extend(placed(acquired));
     }
     let Some(fusion) = &scene.fusion else {
@@ -60,12 +65,14 @@ pub fn describe(
     (lines, issues)
 }
 
-/// What the file holds, as `insonify check` says of it alone.
-fn stored(file: PathBuf) -> Vec<String> {
-    match Volume::load(&file) {
+/// What the files of the scene at `path` hold, as `insonify check` says of one alone.
+fn stored(path: &Path, named: &[PathBuf]) -> Vec<String> {
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let files: Vec<_> = named.iter().map(|file| folder.join(file)).collect();
+    match Volume::load_series(&files) {
         Ok((volume, _)) => volume.to_string().lines().map(str::to_owned).collect(),
         // The scene was loaded with it; it can only have been changed since.
-        Err(error) => vec![format!("  {error}")],
+        Err((_, error)) => vec![format!("  {error}")],
     }
 }
 
@@ -92,7 +99,7 @@ fn placed(acquired: &Acquired) -> Vec<String> {
         true => format!(", averaged to fit {} MiB", TEXTURE_BUDGET >> 20),
         false => String::new(),
     };
-    vec![
+    let mut lines = vec![
         format!(
             "  in the world: axes {i}, {j}, {k}, box {} to {} mm",
             vector(low),
@@ -103,7 +110,12 @@ fn placed(acquired: &Acquired) -> Vec<String> {
             acquired.black, acquired.white
         ),
         format!("  {:.1} MB on the device{averaged}", bytes as f64 / 1e6),
-    ]
+    ];
+    if let Some(sequence) = &acquired.sequence {
+        let (count, periods) = (sequence.count(), periods(sequence.clock()));
+        lines.push(format!("  plays: {count} volumes, {periods}"));
+    }
+    lines
 }
 
 #[cfg(test)]

@@ -55,7 +55,8 @@ fn moved(motion: &Motion) -> String {
     }
 }
 
-fn periods(clock: &Clock) -> String {
+/// Period of a clock, what follows it, and how often it is updated.
+pub fn periods(clock: &Clock) -> String {
     let mode = match clock.mode {
         Loop::Repeat => "",
         Loop::Once => ", once",

@@ -1,19 +1,42 @@
 //! The tables `volume` and `fusion`.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::document::Document;
 use super::error::SceneError;
+use super::motion;
 use super::placing::placement;
-use super::schema::{FusionTable, VolumeTable, even};
+use super::schema::{Files, FusionTable, VolumeTable, even};
 use super::within;
+use crate::scene::animation::{Interpolation, Loop, Sequence};
 use crate::scene::fusion::{Blend, Surroundings, open_edges};
 use crate::scene::{Acquired, Fusion, Instance, Mesh, Warning, suggest};
 use crate::volume::{Volume, Voxels};
 
 /// Pixels of the box by which the mask is blurred where the file says nothing, as in the paper.
 const BLUR: u32 = 32;
+
+/// Most volumes over time: 30 a second for half a minute, as keyframes of a mesh.
+const MAX_VOLUMES: usize = 1000;
+
+impl VolumeTable {
+    /// The files as they are written, at least one.
+    pub(super) fn files(&self) -> Vec<PathBuf> {
+        match &self.file {
+            Files::One(file) => vec![file.into()],
+            Files::Several(files) => files.iter().map(PathBuf::from).collect(),
+        }
+    }
+
+    /// Where the file of this number stands in the table.
+    fn key(&self, number: usize) -> String {
+        match self.file {
+            Files::One(_) => "volume.file".to_owned(),
+            Files::Several(_) => format!("volume.file.{number}"),
+        }
+    }
+}
 
 /// Reads the volume and places it.
 pub(super) fn volume(
@@ -22,18 +45,32 @@ pub(super) fn volume(
     warnings: &mut Vec<Warning>,
 ) -> Result<Acquired, SceneError> {
     let folder = document.source.path.parent().unwrap_or(Path::new(""));
-    let path = folder.join(&table.file);
-    let (volume, found) = Volume::load(&path).map_err(|error| {
-        document.fail(
+    let files: Vec<_> = table.files().iter().map(|f| folder.join(f)).collect();
+    if !(1..=MAX_VOLUMES).contains(&files.len()) {
+        return Err(document.fail(
             "volume.file",
+            format!("the volume has {} files", files.len()),
+            format!("name 1 to {MAX_VOLUMES}"),
+        ));
+    }
+    timing(document, table)?;
+    let (mut volume, found) = Volume::load_series(&files).map_err(|(number, error)| {
+        let remedy = match files.len() {
+            1 => "give a volume file that `insonify check` accepts".to_owned(),
+            _ => error.remedy.clone(),
+        };
+        document.fail(
+            &table.key(number),
             format!("the volume cannot be used: {error}"),
-            "give a volume file that `insonify check` accepts",
+            remedy,
         )
     })?;
     warnings.extend(found);
+    let sequence = sequence(document, table, volume.later.len() + 1, volume.interval)?;
     let place = (table.translate, table.rotate.as_ref(), even(table.scale));
     let world_from_lps = placement(document, "volume", place)?;
     // All that is stored of a byte; of other types only the range in use says what is white.
+    // Of all volumes: what is grey in one is as grey in the next.
     let range = match &volume.voxels {
         Voxels::U8(_) => (0.0, 255.0),
         _ => (volume.statistics.min, volume.statistics.max),
@@ -62,10 +99,93 @@ pub(super) fn volume(
         size: volume.size,
         world_from_voxel: world_from_lps * volume.world_from_voxel,
         world_from_lps,
-        voxels: Arc::new(volume.voxels),
+        volumes: {
+            volume.later.insert(0, volume.voxels);
+            volume.later.into_iter().map(Arc::new).collect()
+        },
+        now: 0,
+        sequence,
         black,
         white,
     })
+}
+
+/// Checks what the table says of time.
+fn timing(document: &Document<'_>, table: &VolumeTable) -> Result<(), SceneError> {
+    let period = table.period.map_or(1.0, |p| p.0);
+    motion::clock(
+        document,
+        "volume",
+        period,
+        (table.phase, table.mode, table.rate),
+    )?;
+    match table.period.is_some() && table.rate.is_some() {
+        true => Err(document.fail(
+            "volume.rate",
+            "`rate` and `period` both say how fast the volumes follow each other",
+            "remove one of them",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// When each of `count` volumes is shown, which follow each other every `interval` seconds by their file;
+/// none of one volume.
+fn sequence(
+    document: &Document<'_>,
+    table: &VolumeTable,
+    count: usize,
+    interval: Option<f64>,
+) -> Result<Option<Sequence>, SceneError> {
+    if count == 1 {
+        let keys = [
+            ("period", table.period.is_some()),
+            ("rate", table.rate.is_some()),
+            ("phase", table.phase.is_some()),
+            ("loop", table.mode.is_some()),
+        ];
+        return match keys.iter().find(|k| k.1) {
+            None => Ok(None),
+            Some((key, _)) => Err(document.fail(
+                &format!("volume.{key}"),
+                format!("`{key}` is for volumes that follow each other in time, and there is one"),
+                "remove it, or name several files",
+            )),
+        };
+    }
+    if count > MAX_VOLUMES {
+        return Err(document.fail(
+            "volume.file",
+            format!("the file holds {count} volumes over time"),
+            format!("leave out some: up to {MAX_VOLUMES} can be shown"),
+        ));
+    }
+    // To and fro, the last one stands at the end of the period.
+    let steps = match table.mode.unwrap_or_default() {
+        Loop::PingPong => count - 1,
+        Loop::Repeat | Loop::Once => count,
+    };
+    let turns = steps as f64;
+    let own = table.period.map(|p| ("volume.period", p.0));
+    let by_rate = table.rate.map(|rate| ("volume.rate", turns / rate.0));
+    let stated = interval.map(|seconds| ("volume.file", turns * seconds));
+    let Some((key, period)) = own.or(by_rate).or(stated) else {
+        return Err(document.fail(
+            "volume.file",
+            format!("there are {count} volumes over time, and nothing says how fast they follow each other"),
+            "add rate = \"20 Hz\", or the time in which all are shown: period = \"0.8 s\"",
+        ));
+    };
+    let (least, most) = motion::PERIODS;
+    if !(least..=most).contains(&period) {
+        return Err(document.fail(
+            key,
+            format!("all {count} volumes together take {period} s"),
+            format!("set a rate by which they take between {least} and {most} s"),
+        ));
+    }
+    let clock = motion::clock(document, "volume", period, (table.phase, table.mode, None))?;
+    Ok(Some(Sequence::even(clock, count, Interpolation::default())))
 }
 
 /// The settings of the fusion, with the meshes that its mask names.

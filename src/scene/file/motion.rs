@@ -11,7 +11,7 @@ use super::{trajectory, within};
 use crate::scene::animation::{Clock, Curve, Fetal, Loop, Motion, Trs, Turn};
 
 /// Shortest and longest period, s: a microsecond, which no frame resolves, to a day.
-const PERIODS: (f64, f64) = (1e-6, 86_400.0);
+pub(super) const PERIODS: (f64, f64) = (1e-6, 86_400.0);
 /// Updates per second: from one a day to more than any frame rate.
 const RATES: (f64, f64) = (1e-5, 1e6);
 /// Factors by which tissue is squeezed or stretched: half and twice is more than tissue bears, and as far as its

@@ -155,7 +155,12 @@ pub struct ImagingTable {
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeTable {
-    pub file: String,
+    pub file: Files,
+    pub period: Option<Duration>,
+    pub rate: Option<Rate>,
+    pub phase: Option<f64>,
+    #[serde(rename = "loop")]
+    pub mode: Option<Loop>,
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
     pub scale: Option<f64>,
@@ -370,6 +375,37 @@ impl<'de> Deserialize<'de> for Factors {
         }
 
         deserializer.deserialize_any(OneOrThree)
+    }
+}
+
+/// One file, or several in the order of time.
+#[derive(Debug, PartialEq)]
+pub enum Files {
+    One(String),
+    Several(Vec<String>),
+}
+
+impl<'de> Deserialize<'de> for Files {
+    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
+        struct OneOrSeveral;
+
+        impl<'de> Visitor<'de> for OneOrSeveral {
+            type Value = Files;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("text or list of texts: one file, or several in the order of time")
+            }
+
+            fn visit_str<E: Error>(self, file: &str) -> Result<Self::Value, E> {
+                Ok(Files::One(file.to_owned()))
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
+                Vec::deserialize(SeqAccessDeserializer::new(list)).map(Files::Several)
+            }
+        }
+
+        deserializer.deserialize_any(OneOrSeveral)
     }
 }
 

@@ -53,7 +53,12 @@ impl Simulator {
         use Element::{Float, Word};
         let mut dumped = vec![
             ("fusion", Word, 1, bytemuck::bytes_of(&constants).to_vec()),
-            ("acquired", Float, 1, fused.texture.read(&self.device)?),
+            (
+                "acquired",
+                Float,
+                1,
+                fused.texture.read(&self.device, acquired.now)?,
+            ),
             ("prescan", Float, 2, read(&fused.prescan, 8 * samples)?),
             ("mask", Float, 2, read(&fused.mask, 8 * pixels)?),
             ("sums", Float, 2, read(&fused.sums, 8 * pixels)?),

@@ -1,4 +1,4 @@
-//! The acquired volume as a 3D texture.
+//! The acquired volume as 3D textures, one for each of its times.
 
 use std::sync::Arc;
 
@@ -9,9 +9,10 @@ use crate::scene::Acquired;
 use crate::scene::fusion::TEXTURE_BUDGET as BUDGET;
 use crate::volume::Voxels;
 
-/// The texture, and what its texels mean.
+/// The textures, and what their texels mean, which is the same at all times.
 pub(in crate::sim) struct Texture {
-    pub(in crate::sim) image: Image,
+    /// All on the device: which of them is shown costs nothing.
+    pub(in crate::sim) images: Vec<Image>,
     /// Texel indices from voxel indices.
     pub(in crate::sim) texel_from_voxel: DAffine3,
     /// Stored values are `scale * texel + offset`.
@@ -31,8 +32,8 @@ struct Texels {
 }
 
 impl Texture {
-    /// Uploads the voxels. A volume beyond the device's limit or [`BUDGET`] is averaged over blocks of
-    /// whole voxels first.
+    /// Uploads the voxels of all times. What is beyond the device's limit or [`BUDGET`] is averaged over
+    /// blocks of whole voxels first, alike at all times.
     ///
     /// # Errors
     /// What the device says.
@@ -41,13 +42,19 @@ impl Texture {
         let block = block(acquired, limit, BUDGET);
         let size = std::array::from_fn(|i| acquired.size[i].div_ceil(block[i]));
         let whole = block == [1; 3];
-        let averaged = (!whole).then(|| average(acquired, block, size));
-        let voxels = averaged.as_ref().unwrap_or(&acquired.voxels);
-        let (image, texels) = match make(device, size, texels(voxels, acquired)) {
-            // 16-bit images are not everywhere.
-            Err(GpuError::Unsupported { .. }) => make(device, size, floats(voxels, acquired))?,
-            made => made?,
-        };
+        let (mut images, mut meaning) = (Vec::with_capacity(acquired.volumes.len()), (1.0, 0.0));
+        for voxels in &acquired.volumes {
+            let averaged = (!whole).then(|| average(voxels, acquired.size, block, size));
+            let voxels = averaged.as_ref().unwrap_or(voxels);
+            let (image, texels) = match make(device, size, texels(voxels, acquired)) {
+                // 16-bit images are not everywhere.
+                Err(GpuError::Unsupported { .. }) => make(device, size, floats(voxels, acquired))?,
+                made => made?,
+            };
+            images.push(image);
+            meaning = (texels.scale, texels.offset);
+        }
+        let (scale, offset) = meaning;
         let step = DVec3::from(block.map(|n| n as f64));
         // The middle of the first block.
         let voxel_from_texel =
@@ -55,27 +62,46 @@ impl Texture {
         let warning = (!whole).then(|| {
             let [x, y, z] = acquired.size;
             let [a, b, c] = size;
+            let times = match acquired.volumes.len() {
+                1 => String::new(),
+                count => format!(" at {count} times"),
+            };
             format!(
-                "the volume of {x} x {y} x {z} voxels is larger than this device holds (at most \
-                 {limit} along an axis, {} MiB in all): averaged to {a} x {b} x {c}",
+                "the volume of {x} x {y} x {z} voxels{times} is larger than this device holds (at \
+                 most {limit} along an axis, {} MiB in all): averaged to {a} x {b} x {c}",
                 BUDGET >> 20
             )
         });
         Ok(Self {
-            image,
+            images,
             texel_from_voxel: voxel_from_texel.inverse(),
-            scale: texels.scale,
-            offset: texels.offset,
+            scale,
+            offset,
             warning,
         })
     }
 }
 
 impl Texture {
-    /// The texels as a kernel fetches them, floats.
-    pub(in crate::sim) fn read(&self, device: &Arc<Device>) -> Result<Vec<u8>, GpuError> {
-        let bytes = device.read_back_image(&self.image)?;
-        let floats: Vec<f32> = match self.image.format() {
+    /// Texels along each axis.
+    pub(in crate::sim) fn extent(&self) -> [u32; 3] {
+        self.images[0].extent()
+    }
+
+    /// Bytes of all of them.
+    pub(in crate::sim) fn bytes(&self) -> u64 {
+        self.images.iter().map(Image::bytes).sum()
+    }
+
+    /// The texels of one time as a kernel fetches them, floats.
+    pub(in crate::sim) fn read(
+        &self,
+        device: &Arc<Device>,
+        time: usize,
+    ) -> Result<Vec<u8>, GpuError> {
+        let image = &self.images[time];
+        let bytes = device.read_back_image(image)?;
+        let floats: Vec<f32> = match image.format() {
             ImageFormat::R8Unorm => bytes.iter().map(|&b| f32::from(b) / 255.0).collect(),
             ImageFormat::R16Unorm => {
                 let words: Vec<u16> = bytemuck::pod_collect_to_vec(&bytes);
@@ -113,15 +139,15 @@ fn texel_bytes(voxels: &Voxels) -> u64 {
     }
 }
 
-/// Voxels along each axis that one texel stands for, so that the texture keeps to `limit` texels
-/// along an axis and `budget` bytes; where it must be coarser, along the axis of most texels.
+/// Voxels along each axis that one texel stands for, so that each texture keeps to `limit` texels
+/// along an axis and all to `budget` bytes; where they must be coarser, along the axis of most texels.
 fn block(acquired: &Acquired, limit: usize, budget: u64) -> [usize; 3] {
     let mut block = acquired.size.map(|n| n.div_ceil(limit));
     loop {
         let texels: [usize; 3] = std::array::from_fn(|i| acquired.size[i].div_ceil(block[i]));
-        let bytes =
-            texels.iter().map(|&n| n as u64).product::<u64>() * texel_bytes(&acquired.voxels);
-        if bytes <= budget {
+        let each = texels.iter().map(|&n| n as u64).product::<u64>();
+        let bytes = acquired.volumes.iter().map(|v| each * texel_bytes(v));
+        if bytes.sum::<u64>() <= budget {
             return block;
         }
         let longest = (0..3).max_by_key(|&i| texels[i]).expect("three axes");
@@ -130,12 +156,12 @@ fn block(acquired: &Acquired, limit: usize, budget: u64) -> [usize; 3] {
 }
 
 /// Means over blocks of voxels; those at the far ends may hold fewer.
-fn average(acquired: &Acquired, block: [usize; 3], size: [usize; 3]) -> Voxels {
-    let [x, y, _] = acquired.size;
+fn average(voxels: &Voxels, whole: [usize; 3], block: [usize; 3], size: [usize; 3]) -> Voxels {
+    let [x, y, _] = whole;
     let mut means = Vec::with_capacity(size.iter().product());
     let along = |axis: usize, at: usize| {
         let first = at * block[axis];
-        first..(first + block[axis]).min(acquired.size[axis])
+        first..(first + block[axis]).min(whole[axis])
     };
     for c in 0..size[2] {
         for b in 0..size[1] {
@@ -144,7 +170,7 @@ fn average(acquired: &Acquired, block: [usize; 3], size: [usize; 3]) -> Voxels {
                 for k in along(2, c) {
                     for j in along(1, b) {
                         for i in along(0, a) {
-                            sum += acquired.voxels.get(i + x * (j + y * k));
+                            sum += voxels.get(i + x * (j + y * k));
                             count += 1.0;
                         }
                     }
@@ -154,7 +180,7 @@ fn average(acquired: &Acquired, block: [usize; 3], size: [usize; 3]) -> Voxels {
         }
     }
     // In the type that they came in: the texture's size was reckoned with it.
-    match &*acquired.voxels {
+    match voxels {
         Voxels::U8(_) => Voxels::U8(means.iter().map(|v| v.round() as u8).collect()),
         Voxels::I8(_) => Voxels::I8(means.iter().map(|v| v.round() as i8).collect()),
         Voxels::U16(_) => Voxels::U16(means.iter().map(|v| v.round() as u16).collect()),

@@ -3,7 +3,9 @@ use super::*;
 fn acquired(size: [usize; 3], voxels: Voxels) -> Acquired {
     Acquired {
         size,
-        voxels: Arc::new(voxels),
+        volumes: vec![Arc::new(voxels)],
+        now: 0,
+        sequence: None,
         world_from_voxel: DAffine3::IDENTITY,
         world_from_lps: DAffine3::IDENTITY,
         black: 0.0,
@@ -18,6 +20,11 @@ fn blocks_keep_to_the_limit_and_the_budget() {
     assert_eq!(block(&volume([101, 50, 20]), 100, 300_000), [2, 1, 1]);
     assert_eq!(block(&volume([100, 50, 20]), 100, 199_999), [2, 1, 1]);
     assert_eq!(block(&volume([100, 50, 20]), 100, 50_000), [2, 2, 1]);
+    // Twice as much over time is as coarse as half the budget.
+    let mut twice = volume([100, 50, 20]);
+    twice.volumes.push(Arc::new(Voxels::U16(Vec::new())));
+    assert_eq!(block(&twice, 100, 400_000), [1, 1, 1]);
+    assert_eq!(block(&twice, 100, 399_999), [2, 1, 1]);
 }
 
 // A linear function: the mean of a block is its value in the middle of the block, which is where the
@@ -29,7 +36,7 @@ fn a_coarser_linear_function_is_the_same_function() {
     let places = (0..9 * 8 * 6).map(|i| [i % 9, i / 9 % 8, i / 72]);
     let volume = acquired(size, Voxels::F32(places.map(value).collect()));
     let block = [3, 2, 1];
-    let coarse = average(&volume, block, [3, 4, 6]);
+    let coarse = average(volume.voxels(), size, block, [3, 4, 6]);
     let step = DVec3::from(block.map(|n| n as f64));
     for (i, at) in (0..3 * 4 * 6).map(|i| (i, [i % 3, i / 3 % 4, i / 12])) {
         let p = DVec3::from(at.map(|n| n as f64)) * step + (step - 1.0) / 2.0;

@@ -17,7 +17,9 @@ fn scene() -> Scene {
     });
     scene.volume = Some(Acquired {
         size,
-        voxels: Arc::new(Voxels::F32(values.collect())),
+        volumes: vec![Arc::new(Voxels::F32(values.collect()))],
+        now: 0,
+        sequence: None,
         world_from_voxel: DAffine3::from_translation(DVec3::new(-10.0, -5.0, -15.0)),
         world_from_lps: DAffine3::IDENTITY,
         black: -200.0,

@@ -110,6 +110,36 @@ fn time_passes_while_it_plays_and_is_neither_held_nor_frozen() {
     assert_eq!(model.clock.at(later(6.0)), 2.0);
 }
 
+/// A volume that changes makes time pass as anatomy does that moves; paused, there is nothing to do.
+#[test]
+fn time_passes_for_a_volume_that_changes() {
+    let now = Instant::now();
+    let folder = tempfile::tempdir().unwrap();
+    let volume = "NDims = 4\nDimSize = 2 2 2 2\nElementSpacing = 1 1 1 0.5\n\
+        ElementType = MET_UCHAR\nElementDataFile = LOCAL\n0123456789abcdef";
+    std::fs::write(folder.path().join("two.mha"), volume).unwrap();
+    let single = volume.replacen("4\nDimSize = 2 2 2 2", "3\nDimSize = 2 2 2", 1);
+    let single = single.replacen("1 1 1 0.5", "1 1 1", 1);
+    std::fs::write(folder.path().join("one.mha"), &single[..single.len() - 8]).unwrap();
+    for (file, changes) in [("two.mha", true), ("one.mha", false)] {
+        let text = format!(
+            "[volume]\nfile = \"{file}\"\n[fusion]\nmask = [\"cyst\"]\n[[mesh]]\nname = \"cyst\"\n\
+             shape = {{ sphere = {{ radius = 5 }} }}\ntissue = \"cyst_fluid\"\n"
+        );
+        let path = folder.path().join("scene.toml");
+        std::fs::write(&path, text).unwrap();
+        let (scene, _) = Scene::load(&path, &[]).unwrap();
+        let file = File::new(path, Vec::new(), &scene);
+        let mut model = Model::new(&scene, file, Tracer::Bvh, 0.0, now);
+        assert_eq!(
+            (model.animated, model.order().runs(now)),
+            (changes, changes)
+        );
+        model.clock.play(false, now);
+        assert!(!model.order().runs(now));
+    }
+}
+
 #[test]
 fn settings_go_into_the_scene_and_come_back() {
     let mut scene = scene();

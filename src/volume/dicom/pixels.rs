@@ -9,6 +9,7 @@ use super::elements::{FLOAT_PIXELS, PIXELS, Value};
 use super::file::Transfer;
 use super::image::{Color, Image};
 use super::{Dicom, SAVE, VolumeError, bytes_of, source};
+use crate::volume::layout::{Axis, Layout};
 use crate::volume::voxels::{VoxelType, Voxels};
 
 /// Bytes of pixels that a compressed byte can stand for at most, generously: a run of 128 is two
@@ -32,7 +33,8 @@ pub(super) fn decode(
         _ => return Err(dicom.lacks("PixelData", tag)),
     };
     let big = dicom.syntax == Transfer::Big;
-    let (voxels, _) = Voxels::decode(&bytes, image.kind, big, 1);
+    let layout = Layout::new([(Axis::Space, bytes.len() / image.kind.bytes())]);
+    let (voxels, _) = Voxels::decode(&bytes, image.kind, big, &layout, 0);
     Ok(trim(voxels, image.bits))
 }
 

@@ -5,6 +5,7 @@ use glam::DVec3;
 use crate::volume::error::VolumeError;
 use crate::volume::fields::{Field, Fields};
 use crate::volume::grid::{self, Frame, Grid};
+use crate::volume::layout::Axis;
 
 /// A vector per axis, none for those outside space.
 pub(super) type Directions = Vec<Option<DVec3>>;
@@ -70,51 +71,101 @@ fn vectors(fields: &Fields, field: &Field) -> Result<Directions, VolumeError> {
     Ok(out)
 }
 
-/// First axis of space and how many there are in a row, three at most.
-pub(super) fn spatial(
+/// What each of `n` axes counts: two or three of them space, the first that do; of the others one time,
+/// which may stand anywhere.
+pub(super) fn axes(
     fields: &Fields,
     n: usize,
     directions: Option<&[Option<DVec3>]>,
-) -> Result<(usize, usize), VolumeError> {
+) -> Result<Vec<Axis>, VolumeError> {
     let kinds = fields.find(&["kinds"]);
     let kinds: Vec<_> = kinds.map_or(Vec::new(), |k| k.value.split_whitespace().collect());
-    let of_space = |axis: usize| match directions {
-        Some(vectors) => vectors[axis].is_some(),
-        None => {
-            let kind = kinds.get(axis).copied().unwrap_or("domain");
-            ["domain", "space", "none", "???"].contains(&kind.to_ascii_lowercase().as_str())
-        }
+    let kind = |axis: usize| {
+        kinds
+            .get(axis)
+            .map_or("domain".into(), |k| k.to_ascii_lowercase())
     };
-    let first = (0..n).find(|&axis| of_space(axis)).unwrap_or(n);
-    let count = (first..n).take_while(|&a| of_space(a)).take(3).count();
-    if count < 2 || (first + count..n).any(of_space) && count < 3 {
+    let plain = |axis: usize| ["domain", "space", "none", "???"].contains(&kind(axis).as_str());
+    let of_space = |axis: &usize| match directions {
+        Some(vectors) => vectors[*axis].is_some(),
+        None => plain(*axis),
+    };
+    let space: Vec<usize> = (0..n).filter(of_space).take(3).collect();
+    if space.len() < 2 {
         let field = fields.find(&["space directions", "kinds", "dimension"]);
         return Err(fields.error(
             field.expect("the dimension is there"),
-            "two or three axes of space in a row are needed",
-            "permute the axes, or save the volume alone",
+            "two or three axes of space are needed",
+            "say which they are, or save the volume alone",
         ));
     }
-    Ok((first, count))
+    let others = (0..n).filter(|axis| !space.contains(axis));
+    // What is not named are values of a voxel before the axes of space, volumes behind them.
+    let time = others.filter_map(|axis| match kind(axis).as_str() {
+        "time" => Some((0, axis)),
+        "list" => Some((1, axis)),
+        _ => (plain(axis) && axis > space[0]).then_some((2, axis)),
+    });
+    let time = time.min().map(|(_, axis)| axis);
+    Ok((0..n)
+        .map(|axis| match space.contains(&axis) {
+            true => Axis::Space,
+            false if time == Some(axis) => Axis::Time,
+            false => Axis::Values,
+        })
+        .collect())
+}
+
+/// Time from one volume to the next along the axis of time, s, where it is stated.
+pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<f64>, VolumeError> {
+    let Some(field) = fields.find(&["spacings"]) else {
+        return Ok(None);
+    };
+    let spacing = fields.numbers::<f64>(field, n)?[time];
+    if spacing.is_nan() {
+        return Ok(None);
+    }
+    if !(spacing.is_finite() && spacing > 0.0) {
+        return Err(fields.error(
+            field,
+            "the time between volumes has to be a finite number above zero",
+            "state it, or nan where it is not known",
+        ));
+    }
+    let units = fields.find(&["units"]);
+    let named = units.and_then(|f| f.value.split('"').skip(1).step_by(2).nth(time));
+    let per_second = match named.unwrap_or("") {
+        "" | "s" | "sec" | "second" | "seconds" => 1.0,
+        "ms" | "msec" | "millisecond" | "milliseconds" => 1e3,
+        "us" | "usec" | "microsecond" | "microseconds" => 1e6,
+        _ => {
+            return Err(fields.error(
+                units.expect("it names a unit"),
+                "the axis of the volumes needs a unit of time",
+                "write \"s\", \"ms\" or \"us\"",
+            ));
+        }
+    };
+    Ok(Some(spacing / per_second))
 }
 
 pub(super) fn grid(
     fields: &Fields,
-    n: usize,
-    first: usize,
-    count: usize,
+    axes: &[Axis],
     directions: Option<&[Option<DVec3>]>,
     frame: Frame,
 ) -> Result<Grid, VolumeError> {
     let mut steps = [DVec3::X, DVec3::Y, DVec3::Z];
+    let of_space = axes.iter().enumerate().filter(|(_, a)| **a == Axis::Space);
+    let of_space = of_space.map(|(axis, _)| axis);
     if let Some(vectors) = directions {
-        for (step, vector) in steps.iter_mut().zip(&vectors[first..first + count]) {
-            *step = vector.expect("an axis of space");
+        for (step, axis) in steps.iter_mut().zip(of_space) {
+            *step = vectors[axis].expect("an axis of space");
         }
     } else if let Some(field) = fields.find(&["spacings"]) {
-        let spacings: Vec<f64> = fields.numbers(field, n)?;
-        for (axis, step) in steps.iter_mut().take(count).enumerate() {
-            let spacing = spacings[first + axis];
+        let spacings: Vec<f64> = fields.numbers(field, axes.len())?;
+        for (step, axis) in steps.iter_mut().zip(of_space) {
+            let spacing = spacings[axis];
             if !(spacing.is_finite() && spacing > 0.0) {
                 return Err(fields.error(
                     field,
@@ -136,16 +187,21 @@ pub(super) fn grid(
         steps,
         origin,
         frame,
-        unit: unit(fields)?,
+        unit: unit(fields, axes)?,
     })
 }
 
-fn unit(fields: &Fields) -> Result<f64, VolumeError> {
+fn unit(fields: &Fields, axes: &[Axis]) -> Result<f64, VolumeError> {
     let Some(field) = fields.find(&["space units", "units"]) else {
         return Ok(1.0);
     };
     let mut units: Vec<_> = field.value.split('"').skip(1).step_by(2).collect();
-    units.retain(|u| !u.is_empty() && *u != "s" && *u != "ms");
+    if field.key.eq_ignore_ascii_case("units") {
+        // One for each axis.
+        let mut axes = axes.iter();
+        units.retain(|_| axes.next().is_none_or(|a| *a == Axis::Space));
+    }
+    units.retain(|u| !u.is_empty());
     units.dedup();
     match units.as_slice() {
         [] | ["mm" | "millimeter" | "millimeters"] => Ok(1.0),

@@ -30,8 +30,8 @@ impl Summary {
             return Ok(None);
         }
         let header = meta::of_fields(&fields, data)?;
-        let count = match header.size[2] {
-            1 => header.frames,
+        let count = match header.layout.size[2] {
+            1 => header.layout.volumes,
             count => count,
         };
         let frames = frames::parse(&fields, count)?;
