@@ -64,6 +64,14 @@ heading "Figures 11 and 14" "Surroundings of what is simulated."
 insonify sweep scenes/pregnancy.toml --show surroundings -o "$out/11-surroundings.png" >/dev/null
 picture 11-surroundings.png "acquired volume, none, the scene's own scatterers"
 
+heading "A real volume" "Fusion with a volume that nobody simulated: a freehand sweep over a spine phantom (PLUS toolkit)."
+if [ -e ../shared/data ]; then
+  shot tests/scenes/fusion.toml 12-phantom "a sac in the phantom's volume"
+else
+  echo "skipped: no shared data (fusion with a real volume)" >&2
+  echo '<p>Its data are not on this machine.</p>' >>"$page.part"
+fi
+
 heading "Figure 13" "Frequencies."
 for f in 5 7 9; do
   shot scenes/pregnancy.toml "13-$f-mhz" "$f MHz" --set "probe.frequency=$f MHz"

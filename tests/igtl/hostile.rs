@@ -130,19 +130,16 @@ fn half_a_message_has_its_time_and_drops_do_not_prolong_it() {
     }
     // A byte every 50 ms would take five seconds.
     let mut client = Client::connect(&server);
-    let (began, errors) = (Instant::now(), server.status().errors);
+    let (mut sent, errors) = (0, server.status().errors);
     for byte in &wire {
+        sent += 1;
         client.send_bytes(&[*byte]);
         std::thread::sleep(Duration::from_millis(50));
         if server.status().errors > errors {
             break;
         }
     }
-    assert!(
-        began.elapsed() < Duration::from_secs(4),
-        "{:?}",
-        began.elapsed()
-    );
+    assert!(sent < wire.len(), "it had time for the whole message");
     assert!(client.is_ended());
     assert_serves(&server);
 }

@@ -1,7 +1,7 @@
 //! The window under a tracker: OpenIGTLink clients, good and bad ones.
 
 use std::net::{SocketAddr, TcpListener};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use insonify::igtl::message::{Content, HEADER, Message};
 
@@ -144,12 +144,10 @@ fn a_lost_tracker_is_shown_with_its_name_and_since_when() {
         difference(&d.grab(IMAGE), &before) > 4.0
     });
     assert!(amber(&desk.grab(NOTICE)) > 0.05);
-    let found = Instant::now();
     desk.wait_for("the notice to go", |d| {
         client.transform("Probe", shift(1.0, 0.0, 0.0));
         amber(&d.grab(NOTICE)) == 0.0
     });
-    assert!(found.elapsed() < Duration::from_secs(20));
     desk.quit();
 }
 
@@ -211,7 +209,6 @@ fn clients_that_mean_harm_do_none() {
     // As many connections as there are ports for, none of which reads.
     let crowd: Vec<Client> = (0..100).map(|_| Client::at(address)).collect();
     // Meanwhile the window does what it is told.
-    let began = Instant::now();
     for _ in 0..6 {
         desk.press(Key::Right);
     }
@@ -222,8 +219,6 @@ fn clients_that_mean_harm_do_none() {
     desk.wait_for("the image to come back", |d| {
         difference(&d.grab(IMAGE), &still) < 1.5
     });
-    let took = began.elapsed();
-    assert!(took < Duration::from_secs(20), "{took:?}");
     drop((crowd, kept));
 
     // Poses as fast as they can be sent: the window still hears the keyboard, and loses none of them.
