@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use insonify::output;
 
 mod acquire;
 mod check;
@@ -69,7 +70,16 @@ pub fn run() -> ExitCode {
         Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
     };
     match result {
-        Ok(code) => code,
+        Ok(code) => match output::failure() {
+            None => code,
+            Some(cause) => {
+                eprintln!(
+                    "standard output could not be written: {cause}\n\
+                     Files are complete, lines are missing: run it again where there is room for them."
+                );
+                ExitCode::FAILURE
+            }
+        },
         Err(report) => {
             eprintln!("{report:?}");
             ExitCode::FAILURE

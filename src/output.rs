@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stdout};
+use std::sync::OnceLock;
 
 use serde_json::{Value, json};
 
@@ -29,16 +30,21 @@ pub fn settings(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Va
     })
 }
 
+/// Why standard output took no more lines, if it did not.
+static FAILURE: OnceLock<String> = OnceLock::new();
+
 /// Writes a line to standard output. Where nobody reads any more (`insonify info | head -1`) it is
-/// dropped, and the program goes on: its files and its exit code are wanted all the same.
-///
-/// # Panics
-/// When the line cannot be written for another reason, as on a full disk.
+/// dropped, and the program goes on: its files and its exit code are wanted all the same. So it does where the line
+/// cannot be written for another reason, as on a full disk; [`failure`] tells of it then.
 pub fn line(text: impl Display) {
-    if let Err(error) = writeln!(stdout(), "{text}") {
-        assert!(
-            error.kind() == ErrorKind::BrokenPipe,
-            "writing to standard output: {error}"
-        );
+    if let Err(error) = writeln!(stdout(), "{text}")
+        && error.kind() != ErrorKind::BrokenPipe
+    {
+        FAILURE.get_or_init(|| error.to_string());
     }
+}
+
+/// Why lines are missing in standard output, if some are.
+pub fn failure() -> Option<&'static str> {
+    FAILURE.get().map(String::as_str)
 }

@@ -442,3 +442,24 @@ fn time_moves_the_scene_and_frames_become_an_animation() {
         );
     }
 }
+
+/// A full disk behind standard output is the user's to hear of, not a bug; what was asked for is there.
+#[cfg(target_os = "linux")]
+#[test]
+fn lines_that_cannot_be_written_are_told_and_files_are_there_all_the_same() {
+    let dir = tempfile::tempdir().expect("a folder");
+    let png = dir.path().join("p.png");
+    let full = std::fs::OpenOptions::new().write(true).open("/dev/full");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
+    command.args(["render", "scenes/phantom.toml", "-o", path(&png)]);
+    command.args(SMALL).stdout(full.expect("a full device"));
+    let output = command.output().expect("the program starts");
+    let told = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{told}");
+    assert!(
+        told.contains("standard output could not be written: No space left"),
+        "{told}"
+    );
+    assert!(!told.contains("panicked"), "{told}");
+    assert!(image::open(&png).is_ok(), "the picture is whole");
+}

@@ -423,6 +423,26 @@ mod tests {
     use super::super::{Commands, GpuError, test_device};
     use super::{Lane, Slot};
 
+    #[test]
+    fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
+        let device = test_device();
+        let mut slot = Slot::new(&device, "test", Lane::Work).unwrap();
+        let mut commands = Commands::begin(&mut slot, 0).unwrap();
+        for _ in 0..4096 {
+            commands.scope("trace");
+            commands.scope("scatter");
+        }
+        commands.scope("beam");
+        drop(commands);
+        slot.submit(0).unwrap();
+        // SAFETY: the device is alive.
+        unsafe { device.raw.device_wait_idle() }.unwrap();
+        let times = slot.timer.collect().unwrap();
+        let [trace, beam] = ["trace", "beam"].map(|n| times.iter().filter(|t| t.0 == n).count());
+        assert!(trace > 100 && beam == 1, "{trace} {beam}");
+        assert!(device.validation_messages().is_empty());
+    }
+
     /// No driver at hand can be made to lose its device, so the code is planted.
     #[test]
     fn a_lost_device_names_the_last_pass_that_began() {

@@ -9,8 +9,11 @@ use super::device::Device;
 use super::error::{GpuError, during};
 use super::memory::{Buffer, BufferKind};
 
-/// Scopes in one submission at most. A frame has about ten.
+/// Scopes in one submission at most. A frame has about ten; where its paths are traced in many batches, more.
 const MAX_SCOPES: u32 = 255;
+/// From here on only names that are new begin a scope: batch after batch counts to the scope that lasts, and the
+/// stages after them still have their own.
+const CROWDED: usize = 224;
 
 /// Times of one finished submission.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -90,6 +93,9 @@ impl Timer {
 
     /// Begins a scope and ends the one before.
     pub(crate) fn scope(&mut self, commands: vk::CommandBuffer, name: &str) {
+        if self.names.len() >= CROWDED && self.names.iter().any(|n| n == name) {
+            return;
+        }
         let index = self.names.len() as u32;
         assert!(index < MAX_SCOPES, "more than {MAX_SCOPES} timer scopes");
         self.end_label(commands);

@@ -1,10 +1,36 @@
 //! The transducer's face: what touches the skin, and how much of it works for one line.
 
+use std::f64::consts::FRAC_PI_2;
+
 use glam::DVec3;
 
 use super::{Kind, Probe};
 
 impl Probe {
+    /// The sector's bounding box in probe space: left, top, right, bottom, mm. The top of a convex
+    /// face is above z = 0 at its edges.
+    pub fn bounds(&self) -> [f64; 4] {
+        let fan = |radius: f64, field_of_view: f64| {
+            let half = field_of_view / 2.0;
+            let outer = radius + self.depth;
+            let x = if half < FRAC_PI_2 {
+                outer * half.sin()
+            } else {
+                outer
+            };
+            let edge = if half < FRAC_PI_2 { radius } else { outer };
+            [-x, edge * half.cos() - radius, x, self.depth]
+        };
+        match self.kind {
+            Kind::Convex {
+                radius,
+                field_of_view,
+            } => fan(radius, field_of_view),
+            Kind::Phased { field_of_view } => fan(0.0, field_of_view),
+            Kind::Linear { width } => [-width / 2.0, 0.0, width / 2.0, self.depth],
+        }
+    }
+
     /// Width of the face along its surface, mm. A phased array is modelled as a point; what touches the
     /// skin is as wide as its aperture.
     pub fn face_width(&self) -> f64 {

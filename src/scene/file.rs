@@ -36,7 +36,11 @@ pub use save::{Entry, Note, save, save_with};
 pub use study::{Plan, Question, Scenario, Slice};
 pub use trajectory::load_trajectory;
 
+use crate::probe::Probe;
 use document::{Document, Source};
+
+/// Pixels that a picture has beside each other at most: what devices' images hold.
+const WIDEST: f64 = 16384.0;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
 ///
@@ -95,6 +99,7 @@ impl Scene {
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
         let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
         let imaging = parameters::imaging(&document, file.imaging)?;
+        presentable(&document, &probe, imaging.image_height)?;
         let volume = match &file.volume {
             Some(table) => Some(fusion::volume(&document, table, &mut warnings)?),
             None => None,
@@ -207,6 +212,21 @@ pub fn radians(text: &str) -> Result<f64, String> {
         true => Ok(value),
         false => Err(format!("{value} rad is no angle")),
     }
+}
+
+/// Fails on a picture wider than devices and files hold.
+fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<(), SceneError> {
+    let [left, top, right, bottom] = probe.bounds();
+    let width = (right - left) / (bottom - top) * f64::from(height);
+    if width <= WIDEST {
+        return Ok(());
+    }
+    let message =
+        format!("a picture of this probe would be {width:.0} pixels wide and {height} high");
+    let remedy = format!(
+        "at most {WIDEST} fit: give a smaller image_height, a deeper image or a narrower probe"
+    );
+    Err(document.fail("imaging.image_height", message, remedy))
 }
 
 /// Fails at `path` unless `value` lies in the closed range; NaN lies in none.

@@ -1,7 +1,5 @@
 //! What the kernels read: a scene as the structures of [`layout`](super::layout), computed in f64.
 
-use std::f64::consts::FRAC_PI_2;
-
 use glam::DAffine3;
 
 use super::calibration::{Calibration, LATERAL_CUT, amplitude};
@@ -27,30 +25,6 @@ pub fn matrix_rows(m: &DAffine3) -> Rows {
     })
 }
 
-/// The sector's bounding box in probe space: left, top, right, bottom, mm. The top of a convex
-/// face is above z = 0 at its edges.
-fn bounds(probe: &Probe) -> [f64; 4] {
-    let fan = |radius: f64, field_of_view: f64| {
-        let half = field_of_view / 2.0;
-        let outer = radius + probe.depth;
-        let x = if half < FRAC_PI_2 {
-            outer * half.sin()
-        } else {
-            outer
-        };
-        let edge = if half < FRAC_PI_2 { radius } else { outer };
-        [-x, edge * half.cos() - radius, x, probe.depth]
-    };
-    match probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => fan(radius, field_of_view),
-        Kind::Phased { field_of_view } => fan(0.0, field_of_view),
-        Kind::Linear { width } => [-width / 2.0, 0.0, width / 2.0, probe.depth],
-    }
-}
-
 /// Kernels read 0 as "none"; infinity is no number to compute with.
 fn finite_or_zero(x: f64) -> f32 {
     if x.is_finite() { x as f32 } else { 0.0 }
@@ -70,7 +44,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         Kind::Phased { field_of_view } => (layout::KIND_PHASED, 0.0, field_of_view, 0.0),
     };
     let flag = |on: bool, flag: u32| if on { flag } else { 0 };
-    let [left, top, right, bottom] = bounds(probe);
+    let [left, top, right, bottom] = probe.bounds();
     let pixel_pitch = (bottom - top) / f64::from(imaging.image_height.max(1));
     let image_width = ((right - left) / pixel_pitch).ceil().max(1.0);
     let (surface_scale, volume_scale) = calibration.scales();

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::de::DeserializeOwned;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml_edit::Key;
 
 use super::error::{SceneError, advice};
 use super::schema::File;
@@ -26,6 +27,8 @@ pub(super) struct Source {
 #[derive(Clone)]
 struct Override {
     path: String,
+    /// The path's parts.
+    segments: Vec<String>,
     shown: String,
     /// `v = value` behind so many blanks that its spans come out in this numbering.
     padded: String,
@@ -73,6 +76,7 @@ impl Source {
             let end = start + shown.len();
             all.push(Override {
                 path: path.clone(),
+                segments: segments(path),
                 shown,
                 padded: format!("{blanks}v = {written}"),
                 start,
@@ -108,7 +112,7 @@ impl Source {
             let value = self.table(&set.padded)?.into_iter().next();
             let value = value.expect("the text has one key").1;
             let key = set.start..set.start + set.path.len();
-            let segments: Vec<_> = set.path.split('.').collect();
+            let segments: Vec<&str> = set.segments.iter().map(String::as_str).collect();
             insert(&mut document.root, &segments, value, &key)
                 .map_err(|(message, remedy)| self.error(key, message, Some(remedy)))?;
         }
@@ -246,6 +250,15 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
 type Misfit = (String, String);
 
 /// Puts `value` at a path; elements of arrays of tables are addressed by index or by name.
+/// The parts of a path as the command line and the program itself write it. Names with dots stand in quotes, as in
+/// TOML; others need none, and may hold what a bare key of TOML may not.
+pub(super) fn segments(path: &str) -> Vec<String> {
+    match Key::parse(path) {
+        Ok(keys) => keys.iter().map(|key| key.get().to_owned()).collect(),
+        Err(_) => path.split('.').map(str::to_owned).collect(),
+    }
+}
+
 fn insert<'s>(
     table: &mut DeTable<'s>,
     path: &[&'s str],

@@ -4,9 +4,9 @@
 use std::path::{Component, Path, PathBuf};
 
 use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
-use toml_edit::{DocumentMut, InlineTable, Item, Key, KeyMut, Table, TableLike, Value};
+use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value};
 
-use super::document::Source;
+use super::document::{Source, segments};
 use super::error::SceneError;
 use super::placing::placement;
 use super::schema::even;
@@ -116,14 +116,6 @@ fn check(source: &Source) -> Result<(), SceneError> {
 /// A value as the command line takes it: what is not TOML is a text.
 fn parsed(value: &str) -> Value {
     value.parse().unwrap_or_else(|_| Value::from(value))
-}
-
-/// The parts of a path. Names on the command line are not quoted, and may hold what a bare key may not.
-fn segments(path: &str) -> Vec<String> {
-    match Key::parse(path) {
-        Ok(keys) => keys.iter().map(|key| key.get().to_owned()).collect(),
-        Err(_) => path.split('.').map(str::to_owned).collect(),
-    }
 }
 
 fn into_table(

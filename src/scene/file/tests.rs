@@ -131,6 +131,40 @@ fn a_whole_scene_is_understood() {
     assert!((scene.wires[0].amplitude - 0.1).abs() < 1e-12);
 }
 
+/// As the program writes paths: names with dots in quotes, names that TOML would quote without.
+#[test]
+fn overrides_name_what_has_dots_in_its_name() {
+    let case = Case::new();
+    let text = "[[mesh]]\nname = \"Cube.001\"\nfile = \"cube.obj\"\ntissue = \"liver\"\n\
+        [[mesh]]\nname = \"left one\"\nfile = \"cube.obj\"\ntissue = \"liver\"\n";
+    let set = [
+        ("mesh.\"Cube.001\".tissue", "fat"),
+        ("mesh.left one.tissue", "kidney"),
+    ];
+    let (scene, _) = case.load(text, &set).expect("sound");
+    let named = scene
+        .instances
+        .iter()
+        .map(|i| scene.tissues[i.tissue].name.as_str());
+    assert_eq!(named.collect::<Vec<_>>(), ["fat", "kidney"]);
+    let wrong = [("mesh.\"Cube.002\".tissue", "fat")];
+    let error = case
+        .load(text, &wrong)
+        .map(|_| ())
+        .expect_err("no such mesh");
+    assert!(error.to_string().contains("Cube.002"), "{error}");
+}
+
+#[test]
+fn a_picture_too_wide_for_any_device_is_refused() {
+    let case = Case::new();
+    let text =
+        "[probe]\npreset = \"linear\"\nwidth = 1000\ndepth = 1\n[imaging]\nimage_height = 100\n";
+    case.fails(text, (6, 16), "100000 pixels wide", "at most 16384");
+    let wide = [("probe.depth", "6.2 mm")];
+    assert!(case.load(text, &wide).is_ok(), "16129 wide");
+}
+
 #[test]
 fn overrides_are_put_in_before_checking() {
     let case = Case::new();
