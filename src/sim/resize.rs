@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 impl Simulator {
     /// Makes room for frames of `scene`, whose lines, samples, paths, image, tissues and points may
-    /// have become more; its meshes must be those at creation. After the frames in flight, and only
+    /// have become more; its meshes and volume must be those at creation. After the frames in flight, and only
     /// where there is too little. Whether there was.
     ///
     /// # Errors

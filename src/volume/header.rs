@@ -9,6 +9,9 @@ use super::source::{Coding, MAX_BYTES, Payload};
 use super::voxels::{self, VoxelType, Voxels};
 use super::{Format, Statistics, Volume, Warning};
 
+/// Most volumes over time: twice what an axis of NIfTI-1 can count. Each takes memory beside its voxels.
+const MAX_VOLUMES: usize = 1 << 16;
+
 /// A header that has been read and found sound in itself.
 pub(super) struct Header {
     pub format: Format,
@@ -91,6 +94,16 @@ impl Header {
     /// Bytes of all values in the file, if neither they nor what is held of them is too much.
     fn bytes(&self, path: &Path) -> Result<u64, VolumeError> {
         let layout = &self.layout;
+        if layout.volumes > MAX_VOLUMES {
+            return Err(VolumeError::file(
+                path,
+                format!(
+                    "{} volumes over time are more than {MAX_VOLUMES}",
+                    layout.volumes
+                ),
+                "correct the sizes in the header, or leave out some",
+            ));
+        }
         let held = match self.scale {
             Some(_) => VoxelType::F32,
             None => self.kind,

@@ -28,7 +28,8 @@ impl fmt::Display for Volume {
         if !self.later.is_empty() {
             let count = self.later.len() + 1;
             let pace = match self.interval {
-                Some(seconds) => format!("one every {seconds} s"),
+                // A period over a count has no short value.
+                Some(seconds) => format!("one every {} s", (seconds * 1e12).round() / 1e12),
                 None => "how fast they follow each other is not stated".to_owned(),
             };
             writeln!(f, "  {count} volumes over time, {pace}")?;

@@ -246,8 +246,25 @@ fn planted_mistakes_in_time_are_refused() {
     };
     folder.refused("a.mha", &times("0"), "holds no voxels");
     folder.refused("a.mha", &times("-3"), "no number that fits");
-    folder.refused("a.mha", &times("1000000"), "is cut off");
-    folder.refused("a.mha", &times(&u64::MAX.to_string()), "more than 4 GB");
+    folder.refused("a.mha", &times("60000"), "is cut off");
+    let huge = u64::MAX.to_string();
+    folder.refused("a.mha", &times(&huge), "over time are more than 65536");
+    // Volumes of a byte would each take many more: of four billion in a file of some bytes nothing is read.
+    let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
+    encoder.write_all(&vec![0; 1 << 20]).expect("memory");
+    let tiny = nrrd_4d("1 1 1 4000000000", "", &encoder.finish().expect("memory"));
+    let at = tiny
+        .windows(3)
+        .position(|w| w == b"raw")
+        .expect("an encoding");
+    let tiny = [&tiny[..at], b"bzip2", &tiny[at + 3..]].concat();
+    let at = tiny.windows(5).position(|w| w == b"short").expect("a type");
+    let tiny = [&tiny[..at], b"uint8", &tiny[at + 5..]].concat();
+    folder.refused(
+        "t.nrrd",
+        &tiny,
+        "4000000000 volumes over time are more than 65536",
+    );
     let nrrd = |spacing: &str, unit: &str| {
         let more = format!(
             "endian: little\nkinds: domain domain domain time\nspacings: 1 1 1 {spacing}\n\
