@@ -1,6 +1,6 @@
 // A path and its steps between interfaces.
 //
-// The includer declares frame and stacks[] and includes random.glsl, probe.glsl, transform.glsl,
+// The includer declares frame, stacks[] and triangles[], and includes random.glsl, probe.glsl, transform.glsl,
 // acoustics.glsl and media.glsl.
 
 struct Path {
@@ -72,9 +72,13 @@ void start(uint line, uint n, out Path path, inout Media media) {
 }
 
 // Whether rounding has brought back the triangle that the path starts on, which a straight line meets
-// only once. Where refraction leaves a path nearly along the triangle, no clearance would do.
+// only once. Where refraction leaves a path nearly along the triangle, no clearance would do. One that
+// was cut has several numbers: its corners say which it is.
 bool is_left(Path path, Hit hit) {
-    return hit.instance == path.left_instance && hit.primitive == path.left_primitive;
+    if (hit.instance != path.left_instance) return false;
+    uint a = 3u * hit.primitive;
+    uint b = 3u * path.left_primitive;
+    return triangles[a] == triangles[b] && triangles[a + 1u] == triangles[b + 1u] && triangles[a + 2u] == triangles[b + 2u];
 }
 
 void leave(inout Path path, Hit hit) {

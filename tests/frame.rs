@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use insonify::gpu::{Device, test_device};
 use insonify::scene::Scene;
+use insonify::sim::bvh::Splits;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use shared_data::shared_data;
@@ -35,8 +36,12 @@ struct Shot {
 
 /// Frame 0 of `scene` from a simulator of its own; nothing may saturate or overflow.
 fn shoot(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> Shot {
-    let mut simulator =
-        Simulator::new(device, &Library::embedded(), scene, tracer).expect("a simulator");
+    shoot_with(device, scene, tracer, Splits::default())
+}
+
+fn shoot_with(device: &Arc<Device>, scene: &Scene, tracer: Tracer, splits: Splits) -> Shot {
+    let mut simulator = Simulator::with_splits(device, &Library::embedded(), scene, tracer, splits)
+        .expect("a simulator");
     simulator.frame(scene, 0).expect("a frame");
     let counters = simulator.counters().expect("counters");
     let lost = [
@@ -159,6 +164,22 @@ fn the_phantom_repeats_and_both_tracers_agree() {
 #[test]
 fn the_abdomen_repeats_and_both_tracers_agree() {
     repeats_and_agrees("scenes/abdomen.toml");
+}
+
+/// Where triangles are cut, every echo is what it is where none is, to the last bit.
+#[test]
+fn cut_triangles_are_imaged_as_whole_ones() {
+    let device = test_device();
+    for file in ["scenes/heart.toml", "scenes/abdomen.toml"] {
+        let scene = small(file);
+        let [whole, cut] = [Splits::Object, Splits::Spatial]
+            .map(|splits| shoot_with(&device, &scene, Tracer::Bvh, splits));
+        let different = whole.echoes.concat();
+        let different = different.iter().zip(cut.echoes.concat());
+        let different = different.filter(|(a, b)| **a != *b).count();
+        assert!(whole == cut, "{file}: {different} samples differ");
+    }
+    assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
 /// Anatomy from patients, as it comes: open valves closed by coincident caps, crossing vessels.

@@ -4,6 +4,7 @@
 //! ```text
 //! cargo run --release --bin profile -- strategies scenes/heart.toml
 //! cargo run --release --bin profile -- crossover
+//! cargo run --release --bin profile -- crossover --splits --tracer bvh
 //! cargo run --release --bin profile -- paper --json paper.json
 //! cargo run --release --bin profile -- stages scenes/*.toml
 //! ```
@@ -35,6 +36,8 @@ mod measure;
 mod paper;
 #[path = "common/provenance.rs"]
 mod provenance;
+#[path = "profile/splits.rs"]
+mod splits;
 #[path = "profile/stages.rs"]
 mod stages;
 #[path = "profile/strategies.rs"]

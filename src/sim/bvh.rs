@@ -1,10 +1,12 @@
 //! Bounding volume hierarchies for the compute tracer: one per mesh, and one over the placed meshes.
 //!
 //! Built on the CPU with obvhs: PLOC, reinsertion, then collapse to eight children with quantised
-//! boxes. Triangles are never split, so that every triangle lies in exactly one leaf and the leaf
-//! order is a permutation. The node format is described in `glsl/intersect_bvh.glsl`.
+//! boxes. With [`Splits::Object`] every triangle lies in exactly one leaf and the leaf order is a
+//! permutation; with [`Splits::Spatial`] a triangle may lie in several. The node format is described in
+//! `glsl/intersect_bvh.glsl`.
 
 mod refit;
+mod split;
 
 use std::time::Duration;
 
@@ -12,7 +14,7 @@ use glam::{DAffine3, DVec3, Vec3A};
 use obvhs::{
     BvhBuildParams,
     aabb::Aabb,
-    bvh2::{Bvh2, builder::build_bvh2},
+    bvh2::{Bvh2, builder::build_bvh2, reinsertion::ReinsertionOptimizer},
     cwbvh::{CwBvh, builder::build_cwbvh, bvh2_to_cwbvh::bvh2_to_cwbvh, node::CwBvhNode},
     ploc::{PlocSearchDistance, SortPrecision},
 };
@@ -59,12 +61,23 @@ pub enum BvhError {
     TooDeep(usize),
 }
 
+/// Whether the builder of a tree may cut triangles.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Splits {
+    /// No: what is refitted must not be cut, and what is built for one keyframe has no time for it.
+    Object,
+    /// Where it makes rays cheaper: builds take longer, and cut triangles are stored several times.
+    #[default]
+    Spatial,
+}
+
 /// The hierarchy of one mesh.
 #[derive(Clone, Debug)]
 pub struct MeshBvh {
     nodes: Vec<CwBvhNode>,
     depth: usize,
-    /// `triangle_order[i]` is the index in [`Mesh::triangles`] of the i-th triangle in leaf order.
+    /// `triangle_order[i]` is the index in [`Mesh::triangles`] of the i-th triangle in leaf order; those
+    /// that were cut are there several times.
     pub triangle_order: Vec<u32>,
     /// Smallest and largest corner of the mesh, object space.
     pub bounds: [[f32; 3]; 2],
@@ -82,23 +95,23 @@ impl MeshBvh {
     }
 
     fn with(mesh: &Mesh, params: BvhBuildParams) -> Self {
-        Self::of_triangles(&mesh.positions, &mesh.triangles, params)
+        let boxes = boxes(&mesh.positions, &mesh.triangles);
+        Self::of(wide(&boxes, params))
     }
 
     /// Builds the hierarchy of `triangles` over `positions`, of which some may be others'.
-    pub fn over(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Self {
-        Self::of_triangles(positions, triangles, MESH)
+    pub fn over(positions: &[[f32; 3]], triangles: &[[u32; 3]], splits: Splits) -> Self {
+        Self::of(match splits {
+            Splits::Object => wide(&boxes(positions, triangles), MESH),
+            Splits::Spatial => {
+                let mut tree = split::tree(positions, triangles);
+                ReinsertionOptimizer::default().run(&mut tree, MESH.reinsertion_batch_ratio, None);
+                bvh2_to_cwbvh(&tree, MESH.max_prims_per_leaf, true, false)
+            }
+        })
     }
 
-    fn of_triangles(
-        positions: &[[f32; 3]],
-        triangles: &[[u32; 3]],
-        params: BvhBuildParams,
-    ) -> Self {
-        let boxes: Vec<Aabb> = (triangles.iter())
-            .map(|t| Aabb::from_points(&t.map(|i| Vec3A::from(positions[i as usize]))))
-            .collect();
-        let tree = wide(&boxes, params);
+    fn of(tree: CwBvh) -> Self {
         Self {
             depth: depth(&tree.nodes),
             nodes: tree.nodes,
@@ -126,6 +139,11 @@ pub(super) fn binary(boxes: &[Aabb]) -> Bvh2 {
         true => Bvh2::default(),
         false => build_bvh2(boxes, MESH, &mut Duration::default()),
     }
+}
+
+fn boxes(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<Aabb> {
+    let around = |t: &[u32; 3]| Aabb::from_points(&t.map(|i| Vec3A::from(positions[i as usize])));
+    triangles.iter().map(around).collect()
 }
 
 fn wide(boxes: &[Aabb], params: BvhBuildParams) -> CwBvh {

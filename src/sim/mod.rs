@@ -29,6 +29,7 @@ use crate::gpu::{Abandon, AdapterKind, Buffer, Device, FrameTimings, Frames, Gpu
 use crate::probe::Probe;
 use crate::scene::settings::Machine;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
+use bvh::Splits;
 use contact::Touch;
 use fusion::{Fused, Tint};
 pub use memory::Memory;
@@ -138,8 +139,22 @@ impl Simulator {
         scene: &Scene,
         tracer: Tracer,
     ) -> Result<Self, SimError> {
+        Self::with_splits(device, library, scene, tracer, Splits::default())
+    }
+
+    /// As [`Self::new`], with trees of the compute tracer built so.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn with_splits(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+    ) -> Result<Self, SimError> {
         let shapers = Arc::new(world::Kernels::new(device, library)?);
-        let world = World::new(device, &shapers, scene, tracer)?;
+        let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
         let coincident = scene.coincident_triangles() > 0;
         let room = Room::of(device);
         let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);

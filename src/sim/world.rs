@@ -9,7 +9,7 @@ mod top;
 
 use std::sync::Arc;
 
-use super::bvh::BvhError;
+use super::bvh::{BvhError, Splits};
 use super::fields::{Fields, padded};
 use super::layout;
 use super::memory::Memory;
@@ -44,6 +44,7 @@ pub enum WorldError {
 /// The anatomy on the device.
 pub struct World {
     tracer: Tracer,
+    splits: Splits,
     geometry: Geometry,
     fields: Fields,
     places: Vec<Place>,
@@ -101,16 +102,33 @@ impl World {
         scene: &Scene,
         tracer: Tracer,
     ) -> Result<Self, WorldError> {
-        let apart = vec![false; scene.instances.len()];
-        Self::with_fields(device, kernels, scene, tracer, Fields::build(scene), apart)
+        Self::with_splits(device, kernels, scene, tracer, Splits::default())
     }
 
-    /// As [`Self::new`], with displacement fields made before.
+    /// As [`Self::new`], with trees of the compute tracer built so. What moves by refit, and what is
+    /// built for one keyframe, is never cut.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn with_splits(
+        device: &Arc<Device>,
+        kernels: &Arc<Kernels>,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+    ) -> Result<Self, WorldError> {
+        let apart = vec![false; scene.instances.len()];
+        let fields = Fields::build(scene);
+        Self::with_fields(device, kernels, scene, tracer, splits, fields, apart)
+    }
+
+    /// As [`Self::with_splits`], with displacement fields made before.
     pub(super) fn with_fields(
         device: &Arc<Device>,
         kernels: &Arc<Kernels>,
         scene: &Scene,
         tracer: Tracer,
+        splits: Splits,
         fields: Fields,
         apart: Vec<bool>,
     ) -> Result<Self, WorldError> {
@@ -131,8 +149,8 @@ impl World {
                 kernels.refit.prepare();
             }
         }
-        let sets = Sets::new(scene, &apart);
-        let arrays = Arrays::with_sets(scene, tracer, fields, sets)?;
+        let most = device.limits().max_storage_buffer_bytes;
+        let arrays = Arrays::within(most, scene, tracer, splits, fields, &apart)?;
         let geometry = Geometry {
             instances: upload(device, "instances", bytemuck::cast_slice(&arrays.instances))?,
             vertices: upload(device, "vertices", bytemuck::cast_slice(&arrays.vertices))?,
@@ -147,6 +165,7 @@ impl World {
         };
         let mut world = Self {
             tracer,
+            splits,
             changing: Changing::new(device, kernels, scene, tracer, &geometry, &arrays.regions)?,
             top: Top::new(device, scene, &arrays.sets, arrays.bvh)?,
             geometry,
@@ -199,7 +218,8 @@ impl World {
         };
         let mut apart = self.apart.clone();
         self.sets.mark_apart(scene, &mut apart);
-        *self = Self::with_fields(device, &self.kernels, scene, self.tracer, fields, apart)?;
+        let (tracer, splits) = (self.tracer, self.splits);
+        *self = Self::with_fields(device, &self.kernels, scene, tracer, splits, fields, apart)?;
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use insonify::gpu::{Binding, Buffer, BufferKind, Device, Kernel};
 use insonify::scene::Scene;
+use insonify::sim::bvh::Splits;
 use insonify::sim::layout::NONE;
 use insonify::sim::shaders::Library;
 use insonify::sim::tracer::Tracer;
@@ -67,6 +68,15 @@ pub struct Rig {
 
 impl Rig {
     pub fn on(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> Self {
+        Self::with_splits(device, scene, tracer, Splits::default())
+    }
+
+    pub fn with_splits(
+        device: &Arc<Device>,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+    ) -> Self {
         assert!(
             device.supports_ray_query(),
             "'{}' has no ray queries: both tracers are tested",
@@ -79,7 +89,7 @@ impl Rig {
         };
         let kernel = Kernel::new(device, stem, Library::embedded().words(stem), &[]).unwrap();
         let kernels = Arc::new(Kernels::new(device, &Library::embedded()).unwrap());
-        let world = World::new(device, &kernels, scene, tracer).unwrap();
+        let world = World::with_splits(device, &kernels, scene, tracer, splits).unwrap();
         Self {
             kernel,
             world,

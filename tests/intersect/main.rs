@@ -10,6 +10,7 @@ mod keyframes;
 mod placements;
 mod rays;
 mod refit;
+mod splits;
 mod suite;
 mod walk;
 

@@ -3,9 +3,8 @@
 use glam::DAffine3;
 use insonify::gpu::{Binding, Buffer, Kernel, Stage};
 use insonify::scene::{Scene, shapes};
-use insonify::sim::bvh::{Levels, MeshBvh, levels};
+use insonify::sim::bvh::{Levels, MeshBvh, Splits, levels};
 use insonify::sim::shaders::Library;
-use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
 
 use super::compare::{self, Found};
@@ -72,7 +71,7 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
         .par_iter()
         .map(|ray| compare::expected(&moved, ray))
         .collect();
-    let mut rig = Rig::new(&rest, Tracer::Bvh);
+    let mut rig = Rig::split(&rest, Splits::Object);
     let positions: Vec<[f32; 3]> = moved
         .meshes
         .iter()
@@ -88,7 +87,7 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
         rig.replaced.extend(nodes.map(|nodes| (NODES, nodes)));
         rig.found(&rays)
     };
-    let nodes = refitted(&Rig::new(&rest, Tracer::Bvh), &levels, &vertices);
+    let nodes = refitted(&Rig::split(&rest, Splits::Object), &levels, &vertices);
     let wrong = compare::wrong(&moved, &rays, &expected, &found(Some(nodes)));
     assert!(wrong.is_empty(), "{wrong:?}");
 
@@ -111,7 +110,7 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
     let mut short = levels.clone();
     let largest = short.ranges.iter_mut().max_by_key(|range| range.count);
     largest.expect("a tree has levels").count -= 1;
-    let nodes = refitted(&Rig::new(&rest, Tracer::Bvh), &short, &vertices);
+    let nodes = refitted(&Rig::split(&rest, Splits::Object), &short, &vertices);
     let stale = missed(&found(Some(nodes)));
     assert!(stale > 0, "a node without its boxes goes unnoticed");
     rig.assert_silent();

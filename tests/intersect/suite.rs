@@ -4,6 +4,7 @@ use std::sync::{Arc, OnceLock};
 
 use insonify::gpu::{Binding, Buffer, BufferKind, Device, test_device};
 use insonify::scene::Scene;
+use insonify::sim::bvh::Splits;
 use insonify::sim::tracer::Tracer;
 
 use super::device::Rig;
@@ -17,6 +18,11 @@ fn device() -> Arc<Device> {
 impl Rig {
     pub fn new(scene: &Scene, tracer: Tracer) -> Self {
         Self::on(&device(), scene, tracer)
+    }
+
+    /// The compute tracer with trees built by `splits`.
+    pub fn split(scene: &Scene, splits: Splits) -> Self {
+        Self::with_splits(&device(), scene, Tracer::Bvh, splits)
     }
 
     /// No validation message so far.

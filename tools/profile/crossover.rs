@@ -2,7 +2,7 @@
 //! unlike places; how far, and of how many triangles, decides whether a selector or a rebuild is
 //! cheaper.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::plot::{Curve, Plot};
@@ -14,6 +14,7 @@ use serde_json::{Value, json};
 use crate::Machine;
 use crate::builds;
 use crate::measure::{Rig, Sample, Statistics};
+use crate::splits;
 use crate::table::{Table, ms, write_json, write_plot};
 
 /// Seven and the slot of the shown one keep 1.3 million triangles each within the 128 MiB of a storage
@@ -37,6 +38,10 @@ pub struct Arguments {
     /// Distances between keyframes, mm.
     #[arg(long, value_delimiter = ',', default_value = "0,5,10,20,40,60")]
     distances: Vec<f64>,
+    /// Instead, what spatial splits bring to these scenes [default: the heart, the limbs and a limb of
+    /// 1.3 million triangles]: nodes and triangles per ray, times, memory.
+    #[arg(long, value_name = "SCENE", num_args = 0..)]
+    splits: Option<Vec<PathBuf>>,
 }
 
 /// The shipped limb's scene with a plain limb of so many triangles, which is elsewhere in every
@@ -133,7 +138,19 @@ fn samples(
     Ok(rigs)
 }
 
+/// One limb of so many triangles that a tree takes long to build.
+pub fn large() -> Result<Scene> {
+    let mut scene = limb(8, 0.0, Strategy::Exchange)?;
+    let limb = scene.instances.last_mut().expect("the limb is the last");
+    limb.keyframes = Keyframes::default();
+    scene.name = "limb of 1.3 million".into();
+    Ok(scene)
+}
+
 pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
+    if let Some(scenes) = &arguments.splits {
+        return splits::run(machine, scenes, arguments.frames);
+    }
     let mut results = Vec::new();
     for &tracer in &machine.tracers {
         let swap = swap(machine, tracer, arguments)?;

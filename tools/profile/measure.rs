@@ -31,11 +31,16 @@ pub struct Rig {
 impl Rig {
     pub fn new(machine: &Machine, scene: Scene, tracer: Tracer) -> Result<Self> {
         let simulator = Simulator::new(&machine.device, &machine.library, &scene, tracer);
-        Ok(Self {
-            simulator: simulator.into_diagnostic()?,
+        Ok(Self::of(simulator.into_diagnostic()?, scene))
+    }
+
+    /// With a simulator made for `scene`.
+    pub fn of(simulator: Simulator, scene: Scene) -> Self {
+        Self {
+            simulator,
             scene,
             index: 0,
-        })
+        }
     }
 
     /// Images the scene as it stands, alone on the device: its passes, and what the processor did, ms.

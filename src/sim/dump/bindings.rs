@@ -4,6 +4,7 @@ use std::path::Path;
 
 use bytemuck::Pod;
 
+use super::super::bvh::Splits;
 use super::super::fields::Fields;
 use super::super::stages::{Buffers, lines};
 use super::super::world::Arrays;
@@ -18,12 +19,12 @@ use crate::scene::Scene;
 /// kernel that runs alone starts them anew. Of a frame whose paths are traced in several batches,
 /// the segments are the last batch's; `push` is the first's.
 ///
-/// Geometry is always laid out for the compute tracer, whichever traced the frame: the order of the
-/// triangles means nothing to the ray query.
+/// Geometry is always laid out for the compute tracer, whichever traced the frame, with every
+/// triangle once: their order means nothing to the ray query, nor to a hit who else has its triangle.
 pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
     use Element::{Float, Integer, Word};
     let still = scene.still();
-    let arrays = Arrays::new(&still, Tracer::Bvh, Fields::build(&still));
+    let arrays = Arrays::new(&still, Tracer::Bvh, Splits::Object, Fields::build(&still));
     let arrays = arrays.map_err(|e| SimError::World(e.into()))?;
     let nodes = &arrays.bvh.expect("made for the compute tracer").nodes;
     // The tissue of a still scene rests: where it has gone, the device knows.

@@ -11,6 +11,7 @@ use super::Tracer;
 use crate::gpu::{Binding, BufferKind, Device, GpuError, Kernel};
 use crate::scene::Scene;
 use crate::sim::SimError;
+use crate::sim::bvh::Splits;
 use crate::sim::fields::Fields;
 use crate::sim::layout::{NONE, Ray, RayHit};
 use crate::sim::shaders::Library;
@@ -100,7 +101,15 @@ impl Bench {
         // Rays do not ask where tissue has gone.
         let fields = Fields::none(scene);
         let apart = vec![false; scene.instances.len()];
-        let world = World::with_fields(device, &kernels, scene, tracer, fields, apart)?;
+        let world = World::with_fields(
+            device,
+            &kernels,
+            scene,
+            tracer,
+            Splits::default(),
+            fields,
+            apart,
+        )?;
         Ok(Self { kernel, world })
     }
 

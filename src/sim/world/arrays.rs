@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::entry;
 use super::joined::{Set, Sets};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
-use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh};
+use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh, Splits};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
 use crate::sim::tracer::Tracer;
@@ -18,11 +18,13 @@ pub(super) type Bounds = [[f32; 3]; 2];
 pub(super) struct Place {
     pub(super) first_vertex: u32,
     pub(super) first_triangle: u32,
+    /// As many as the array has of it.
     pub(super) triangles: u32,
     /// Of the compute tracer's tree; NONE: it has none.
     pub(super) root: u32,
     pub(super) bounds: Bounds,
-    /// Index in the mesh of each triangle, in the order of the array; none where it is the mesh's.
+    /// Index in the mesh of each triangle, in the order of the array, several times of those that were
+    /// cut; none where it is the mesh's.
     pub(super) order: Option<Vec<u32>>,
     /// Of an instance that changes its shape: how often the device has made it.
     pub(super) version: u64,
@@ -106,22 +108,28 @@ struct Joint {
 }
 
 impl Arrays {
-    /// What `tracer` needs of `scene`, whose tissue deforms by `fields`. Instances that change their shape on the device have room, but
-    /// nothing in it.
+    /// What `tracer` needs of `scene`, whose tissue deforms by `fields`, with trees built by `splits`.
+    /// Instances that change their shape on the device have room, but nothing in it.
     ///
     /// # Errors
     /// When the hierarchy is deeper than the compute tracer walks.
     ///
     /// # Panics
     /// When a mesh has not one normal per vertex.
-    pub fn new(scene: &Scene, tracer: Tracer, fields: Fields) -> Result<Self, BvhError> {
-        Self::with_sets(scene, tracer, fields, Sets::new(scene, &[]))
+    pub fn new(
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+        fields: Fields,
+    ) -> Result<Self, BvhError> {
+        Self::with_sets(scene, tracer, splits, fields, Sets::new(scene, &[]))
     }
 
     /// As [`Self::new`], with the instances of `sets` sharing structures.
-    pub(super) fn with_sets(
+    fn with_sets(
         scene: &Scene,
         tracer: Tracer,
+        splits: Splits,
         fields: Fields,
         sets: Sets,
     ) -> Result<Self, BvhError> {
@@ -140,14 +148,14 @@ impl Arrays {
         let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
             .map(|(mesh, need)| {
                 let walked = tracer == Tracer::Bvh && *need == Need::Structure;
-                walked.then(|| MeshBvh::build(mesh))
+                walked.then(|| MeshBvh::over(&mesh.positions, &mesh.triangles, splits))
             })
             .collect();
         for ((mesh, tree), need) in scene.meshes.iter().zip(trees).zip(needs) {
             let place = arrays.add(mesh, tree, need);
             arrays.places.push(place);
         }
-        let owners = arrays.join(scene, tracer);
+        let owners = arrays.join(scene, tracer, splits);
         for instance in &scene.instances {
             let region = is_dynamic(instance).then(|| arrays.reserve(scene, instance));
             arrays.regions.push(region);
@@ -173,9 +181,36 @@ impl Arrays {
         Ok(arrays)
     }
 
+    /// As [`Self::new`] without those that are `apart` ([`Sets::new`]); no triangle is cut where a buffer
+    /// would have more than `most` bytes for it.
+    pub(super) fn within(
+        most: u64,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+        fields: Fields,
+        apart: &[bool],
+    ) -> Result<Self, BvhError> {
+        let sets = || Sets::new(scene, apart);
+        let arrays = Self::with_sets(scene, tracer, splits, fields, sets())?;
+        match splits == Splits::Spatial && arrays.largest_buffer() > most {
+            true => Self::with_sets(scene, tracer, Splits::Object, arrays.fields, sets()),
+            false => Ok(arrays),
+        }
+    }
+
+    /// Bytes of the largest of the buffers that cut triangles make larger.
+    fn largest_buffer(&self) -> u64 {
+        let nodes = self
+            .bvh
+            .as_ref()
+            .map_or(0, |bvh| size_of_val(&bvh.nodes[..]));
+        nodes.max(size_of_val(&self.triangles[..])) as u64
+    }
+
     /// Appends the structures of the sets; whose their triangles are, one list after the other, each
     /// of an even length.
-    fn join(&mut self, scene: &Scene, tracer: Tracer) -> Vec<u16> {
+    fn join(&mut self, scene: &Scene, tracer: Tracer, splits: Splits) -> Vec<u16> {
         let shapes = |set: &Set| {
             let keyframes = scene.instances[set.members[0]].keyframes.meshes.len();
             keyframes.max(1)
@@ -185,7 +220,7 @@ impl Arrays {
             .flat_map(|(number, set)| (0..shapes(set)).map(move |shape| (number, shape)))
             .collect();
         let joints: Vec<Joint> = (wanted.par_iter())
-            .map(|&(set, shape)| self.joint(scene, tracer, &self.sets.all[set], shape))
+            .map(|&(set, shape)| self.joint(scene, tracer, splits, &self.sets.all[set], shape))
             .collect();
         let mut owners = Vec::new();
         for (&(set, shape), joint) in wanted.iter().zip(joints) {
@@ -210,7 +245,14 @@ impl Arrays {
         owners
     }
 
-    fn joint(&self, scene: &Scene, tracer: Tracer, set: &Set, shape: usize) -> Joint {
+    fn joint(
+        &self,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+        set: &Set,
+        shape: usize,
+    ) -> Joint {
         let (mut triangles, mut from) = (Vec::new(), Vec::new());
         for &member in &set.members {
             let mesh = Set::mesh(scene, member, shape);
@@ -219,7 +261,8 @@ impl Arrays {
             let count = scene.meshes[mesh].triangles.len() as u32;
             from.extend((0..count).map(|t| (member as u16, t)));
         }
-        let tree = (tracer == Tracer::Bvh).then(|| MeshBvh::over(&self.vertices, &triangles));
+        let tree =
+            (tracer == Tracer::Bvh).then(|| MeshBvh::over(&self.vertices, &triangles, splits));
         if let Some(tree) = &tree {
             let order = || tree.triangle_order.iter().map(|&t| t as usize);
             triangles = order().map(|t| triangles[t]).collect();
@@ -271,6 +314,7 @@ impl Arrays {
         if need >= Need::Geometry {
             let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
             let triangles = ordered(mesh, order, place.first_vertex);
+            place.triangles = triangles.len() as u32;
             self.triangles.extend(triangles);
         }
         if let (Some(bvh), Some(tree)) = (&mut self.bvh, tree) {
@@ -321,4 +365,28 @@ pub(super) fn placed(entries: &[entry::Entry]) -> Vec<Placed> {
         partial: matches!(e.geometry, entry::Geometry::Joined { partial: true, .. }),
     };
     entries.iter().map(place).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// A device whose largest buffer has no room for cut triangles gets whole ones.
+    #[test]
+    fn triangles_are_cut_where_they_fit() {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/limbs.toml");
+        let (scene, _) = Scene::load(&file, &[]).unwrap();
+        let within = |most, splits| {
+            let fields = Fields::none(&scene);
+            Arrays::within(most, &scene, Tracer::Bvh, splits, fields, &[]).unwrap()
+        };
+        let whole = within(u64::MAX, Splits::Object);
+        let cut = within(u64::MAX, Splits::Spatial);
+        assert!(cut.triangles.len() > whole.triangles.len());
+        let room = cut.largest_buffer();
+        assert_eq!(within(room, Splits::Spatial).triangles, cut.triangles);
+        assert_eq!(within(room - 1, Splits::Spatial).triangles, whole.triangles);
+    }
 }
