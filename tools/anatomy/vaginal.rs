@@ -288,7 +288,7 @@ source = "chosen by this project, no source found"
 # behind is as bright as behind the sac.
 [tissues.filling]
 based_on = "placenta"
-attenuation = "0.1 dB/cm/MHz"
+attenuation = "0.2 dB/cm/MHz"
 echogenicity = "+2 dB"
 source = "chosen by this project, no source found"
 
