@@ -48,6 +48,7 @@ fn gestation() -> Gestation {
         scale: 1.0,
         yolk: (Vec3::new(11.2, 0.0, -1.8), 2.5),
         amnion: true,
+        heart: 1.0,
         beats: 162.0,
     }
 }

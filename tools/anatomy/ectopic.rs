@@ -53,6 +53,7 @@ fn gestation() -> Gestation {
         scale: 0.5,
         yolk: (Vec3::new(4.3, 0.0, -2.5), 1.9),
         amnion: false,
+        heart: 1.35,
         beats: 136.0,
     }
 }

@@ -57,6 +57,8 @@ pub struct Gestation {
     pub yolk: (Vec3, f32),
     /// Whether the amnion is seen: not before it has left the embryo.
     pub amnion: bool,
+    /// Factor on the heart: the younger the embryo, the larger its share of the body.
+    pub heart: f32,
     /// Heartbeats per minute.
     pub beats: f32,
 }
@@ -97,10 +99,11 @@ impl Gestation {
                 at.x, at.y, at.z
             )
         };
-        let scale = match self.scale {
+        let factor = |by: f32| match by {
             1.0 => String::new(),
-            s => format!("scale = {s}\n"),
+            by => format!("scale = {by}\n"),
         };
+        let scale = factor(self.scale);
         let (rest, turn) = REST;
         // Small movements begin at seven to eight weeks (de Vries, Visser and Prechtl 1982).
         let body = format!(
@@ -111,7 +114,8 @@ impl Gestation {
         let nod = "motion = { kind = \"fetal\", rotate = { axis = [0, 1, 0], angle = \"5 deg\" }, seed = 2, \
                    duration = \"1.5 s\", pause = \"3 s\" }\n";
         let beat = format!(
-            "motion = {{ kind = \"sine\", period = \"{:.3} s\", scale = [1.2, 1.3, 1.3] }}\n",
+            "{}motion = {{ kind = \"sine\", period = \"{:.3} s\", scale = [1.2, 1.3, 1.3] }}\n",
+            factor(self.heart),
             60.0 / self.beats
         );
         let membranes = if self.amnion {
