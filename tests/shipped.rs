@@ -140,8 +140,8 @@ fn the_early_pregnancy_has_embryo_and_yolk_sac_in_a_small_volume() {
         assert_eq!(tissue(&scene, point), expected, "at {point:?}");
     }
     holds_its_view("early", &scene, [1.0, 79.0], 10.0);
-    // The heart beats 162 times a minute: wide after a quarter of 0.370 s, narrow after three.
-    for (time, expected) in [(0.093, "blood"), (0.278, "embryonic_heart")] {
+    // The heart beats 160 times a minute: wide after a quarter of 0.375 s, narrow after three.
+    for (time, expected) in [(0.094, "blood"), (0.281, "embryonic_heart")] {
         scene.set_time(time);
         assert_eq!(tissue(&scene, [0.25, 0.0, 39.6]), expected, "at {time} s");
     }

@@ -1,5 +1,6 @@
 //! What a scan through the vagina shows around the uterus in a coronal plane: vaginal wall, pelvic side
-//! walls with iliac vessels, broad ligaments with veins, ovaries, bowel.
+//! walls with iliac vessels, broad ligaments with veins, ovaries, bowel. Sizes and places were chosen by
+//! this project, no source found.
 //!
 //! Frame, mm: that of the probe, x to the mother's left, y to her back, z into the pelvis, to her head.
 
@@ -136,10 +137,13 @@ fn gas(p: &Point) -> Tree {
     intersection(inside, beside, 2.0)
 }
 
-/// An ovary: middle, half-axes, and follicles by their place in it and radius, mm.
+/// An ovary with its follicles; sizes chosen by this project, no source found.
 pub struct Ovary {
+    /// Its middle, mm.
     pub middle: Vec3,
+    /// Its half-axes, mm.
     pub radii: Vec3,
+    /// Follicles: place from the ovary's middle, and radius, mm.
     pub follicles: &'static [([f32; 3], f32)],
 }
 
@@ -160,7 +164,7 @@ impl Ovary {
     }
 }
 
-/// What a corpus luteum is made of: `inset` 0 is its outer face.
+/// A corpus luteum of this radius, less `inset` all around, mm.
 pub fn luteum(p: &Point, middle: Vec3, radius: f32, inset: f32) -> Tree {
     let radii = Vec3::new(1.05, 1.0, 0.95) * radius - inset;
     ellipsoid(&p.from(middle), radii) + undulation(p, 0.35, 7.0, 0.8 + inset)

@@ -49,7 +49,7 @@ fn gestation() -> Gestation {
         yolk: (Vec3::new(11.2, 0.0, -1.8), 2.5),
         amnion: true,
         heart: 1.0,
-        beats: 162.0,
+        beats: 160.0,
     }
 }
 

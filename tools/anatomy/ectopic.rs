@@ -54,7 +54,7 @@ fn gestation() -> Gestation {
         yolk: (Vec3::new(4.3, 0.0, -2.5), 1.9),
         amnion: false,
         heart: 1.35,
-        beats: 136.0,
+        beats: 134.0,
     }
 }
 

@@ -29,7 +29,8 @@ const BUDGET: usize = 6_000;
 /// Crown to rump.
 const CROWN_RUMP: f32 = 16.0;
 
-/// Half-axes of the chorionic sac: 27 mm in the mean (days = diameter + 30, Hellman's rule, is 8 weeks).
+/// Half-axes of the chorionic sac: 27 mm in the mean. By the common rule, days =
+/// diameter + 30, that is 8 weeks; where the rule comes from was not traced.
 const SAC: Vec3 = Vec3::new(16.0, 12.5, 12.5);
 
 /// Middle of the amnion in the sac, and its half-axes.
@@ -53,13 +54,14 @@ pub struct Gestation {
     pub middle: Vec3,
     /// Factor on all lengths but the yolk sac's: 1 is 8 weeks.
     pub scale: f32,
-    /// Middle of the yolk sac from that of the sac, and its radius, mm.
+    /// Middle of the yolk sac from that of the sac, and its radius, mm; chosen, no source found.
     pub yolk: (Vec3, f32),
     /// Whether the amnion is seen: not before it has left the embryo.
     pub amnion: bool,
     /// Factor on the heart: the younger the embryo, the larger its share of the body.
     pub heart: f32,
-    /// Heartbeats per minute.
+    /// Heartbeats per minute: on the mean 123 at six weeks and 177 at nine (Robinson and Shaw-Dunn, J Obstet
+    /// Gynaecol Br Commonw 1973;80:805-809), linear between.
     pub beats: f32,
 }
 

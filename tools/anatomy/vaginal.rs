@@ -39,7 +39,7 @@ pub struct Case {
     pub mask: &'static str,
     /// Entries of `[imaging]` by which the simulation looks like the volume.
     pub matched: &'static str,
-    /// The entries of `[probe]` and `[imaging]` that both files share.
+    /// The entry of `[imaging]` that both files share.
     pub sliders: &'static str,
     /// The medium around the mask.
     pub mother: &'static str,
