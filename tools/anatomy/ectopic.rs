@@ -143,7 +143,7 @@ pub fn case() -> Case {
         pelvis: parts(),
         mask: "ring",
         sliders: "tgc_sliders = [-2, 0, 1, 1, 0, -3, -5, -6]\n",
-        matched: "gain = \"9 dB\"\ndynamic_range = \"76 dB\"\npsf_scale = [1.9, 1.8, 1]\nnoise = \"-134 dB\" # black where nothing is shown\n",
+        matched: "gain = \"9 dB\"\ndynamic_range = \"76 dB\"\npsf_scale = [1.9, 1.8, 1]\nnoise = \"-140 dB\" # black where nothing is shown\n",
         mother: r#"# Vaginal wall, connective tissue and tube as one medium: on the way to the ring their mean speed
 # and attenuation.
 [tissues.mother]
