@@ -122,37 +122,119 @@ fn the_pregnancy_has_its_fetus_in_a_small_volume_of_the_pelvis() {
     ] {
         assert_eq!(tissue(&scene, point), expected, "at {point:?}");
     }
+    holds_its_view("pregnancy", &scene, [1.0, 117.0], 15.0);
+}
+
+#[test]
+fn the_early_pregnancy_has_embryo_and_yolk_sac_in_a_small_volume() {
+    let mut scene = shipped("early");
+    for (point, expected) in [
+        ([0.0, 0.0, 15.0], "mother"),
+        ([0.0, 0.0, 22.5], "decidua"),
+        ([0.0, 0.0, 30.0], "amniotic_fluid"),
+        ([-1.4, 0.0, 40.0], "blood"),
+        ([0.3, 0.0, 44.0], "embryonic"),
+        ([12.2, 0.0, 36.2], "amniotic_fluid"),
+        ([12.2, 0.0, 38.45], "yolk_wall"),
+    ] {
+        assert_eq!(tissue(&scene, point), expected, "at {point:?}");
+    }
+    holds_its_view("early", &scene, [1.0, 79.0], 10.0);
+    // The heart beats 160 times a minute: wide after a quarter of 0.375 s, narrow after three.
+    for (time, expected) in [(0.094, "blood"), (0.281, "embryonic_heart")] {
+        scene.set_time(time);
+        assert_eq!(tissue(&scene, [0.25, 0.0, 39.6]), expected, "at {time} s");
+    }
+}
+
+#[test]
+fn the_ectopic_pregnancy_has_its_ring_beside_the_middle_of_a_small_volume() {
+    let scene = shipped("ectopic");
+    for (point, expected) in [
+        // Where the empty uterus is in the volume.
+        ([-20.0, 0.0, 38.0], "mother"),
+        ([24.0, 0.0, 30.0], "decidua"),
+        ([24.0, 0.0, 35.0], "amniotic_fluid"),
+        ([22.5, 0.0, 40.1], "blood"),
+        ([28.3, 0.0, 38.15], "yolk_wall"),
+    ] {
+        assert_eq!(tissue(&scene, point), expected, "at {point:?}");
+    }
+    holds_its_view("ectopic", &scene, [1.0, 79.0], 10.0);
+}
+
+/// What the default view shows between two depths lies in the scene's volume, and so do views `beside`
+/// mm from it; mm. The volume is small enough for a repository.
+fn holds_its_view(name: &str, scene: &Scene, depths: [f64; 2], beside: f64) {
     assert!(scene.shows_volume() && scene.masks_off_the_image().is_empty());
     let acquired = scene.volume.as_ref().expect("a volume");
-    // What the default view shows lies in it, and so do views 15 mm beside it.
     let voxel_from_probe = acquired.world_from_voxel.inverse() * scene.world_from_probe;
     let last = DVec3::from(acquired.size.map(|n| n as f64 - 1.0));
-    for (l, y) in [0, 96, 191]
+    let lines = scene.probe.scanlines;
+    for (l, y) in [0, lines / 2, lines - 1]
         .iter()
-        .flat_map(|l| [-15.0, 0.0, 15.0].map(|y| (*l, y)))
+        .flat_map(|l| [-beside, 0.0, beside].map(|y| (*l, y)))
     {
         let (mut origin, direction) = scene.probe.ray(l, 0);
         origin.y = y;
-        for depth in [1.0, 117.0] {
+        for depth in depths {
             let voxel = voxel_from_probe.transform_point3(origin + depth * direction);
             assert!(
                 voxel.cmpge(DVec3::ZERO).all() && voxel.cmple(last).all(),
-                "line {l}, y {y}, depth {depth}: {voxel}"
+                "{name}: line {l}, y {y}, depth {depth}: {voxel}"
             );
         }
     }
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/pregnancy/pelvis.mha");
+    let file = format!("scenes/{name}/pelvis.mha");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
     let bytes = std::fs::metadata(&file).expect("the volume").len();
     assert!(bytes < 3_200_000, "{bytes} bytes in the repository");
 }
 
-/// In front of the sac nothing of the fetus shades the decidua: there the volume, swept over a pelvis
-/// with all its layers, and the simulation, through one medium that stands for them, show the same
-/// tissue.
+/// The rim of a mask in the picture: middle, half-axes of the ellipse in the middle of the rim, and the
+/// half of its width as a share of them; lateral and depth, mm.
+struct Rim {
+    middle: [f64; 2],
+    radii: [f64; 2],
+    width: f64,
+}
+
 #[test]
 fn the_pregnancys_simulation_is_as_bright_as_its_volume() {
-    let mut scene = shipped("pregnancy");
-    scene.probe.scanlines = 96;
+    let rim = Rim {
+        middle: [0.0, 70.0],
+        radii: [39.0, 26.0],
+        width: 0.03,
+    };
+    is_as_bright("pregnancy", 96, &rim);
+}
+
+#[test]
+fn the_early_pregnancys_simulation_is_as_bright_as_its_volume() {
+    let rim = Rim {
+        middle: [0.4, 38.8],
+        radii: [19.2, 15.6],
+        width: 0.06,
+    };
+    is_as_bright("early", 128, &rim);
+}
+
+#[test]
+fn the_ectopic_pregnancys_simulation_is_as_bright_as_its_volume() {
+    let rim = Rim {
+        middle: [24.0, 39.0],
+        radii: [10.4, 8.6],
+        width: 0.1,
+    };
+    is_as_bright("ectopic", 128, &rim);
+}
+
+/// In front of the sac nothing of what floats in it shades its rim: there the volume, swept over a pelvis
+/// with all its layers, and the simulation, through one medium that stands for them, show the same
+/// tissue.
+fn is_as_bright(name: &str, scanlines: u32, rim: &Rim) {
+    let mut scene = shipped(name);
+    scene.probe.scanlines = scanlines;
     scene.probe.elevation_layers = 3;
     let device = test_device();
     let simulator = Simulator::new(&device, &Library::embedded(), &scene, Tracer::Bvh);
@@ -172,10 +254,10 @@ fn the_pregnancys_simulation_is_as_bright_as_its_volume() {
                 ];
                 let x = f64::from(frame.image_left) + (f64::from(i) + 0.5) * pitch;
                 let z = f64::from(frame.image_top) + (f64::from(j) + 0.5) * pitch;
-                // Half-axes in the middle of the ring.
-                let (x, z) = (x / 39.0, (z - 70.0) / 26.0);
+                let x = (x - rim.middle[0]) / rim.radii[0];
+                let z = (z - rim.middle[1]) / rim.radii[1];
                 let turn = z.atan2(x).to_degrees() - middle;
-                if (x.hypot(z) - 1.0).abs() < 0.03 && turn.abs() < 20.0 {
+                if (x.hypot(z) - 1.0).abs() < rim.width && turn.abs() < 20.0 {
                     sums[0] += 255.0 * f64::from(steps.background[pixel]);
                     sums[1] += f64::from(steps.simulated[4 * pixel]);
                     count += 1.0;
@@ -198,7 +280,7 @@ fn the_pregnancys_simulation_is_as_bright_as_its_volume() {
     // 12 grey levels are 2.8 of the 60 dB: what a reader of two grey wedges side by side overlooks.
     let alike = |d: [f64; 3]| d.iter().all(|d| d.abs() < 12.0);
     let found = differences(&scene);
-    println!("simulation above volume by {found:.1?} grey levels");
+    println!("{name}: simulation above volume by {found:.1?} grey levels");
     assert!(alike(found), "{found:?}");
     // Planted: 6 dB.
     scene.imaging.gain += 6.0;

@@ -3,8 +3,8 @@
 //! ```text
 //! cargo run --features anatomy --bin anatomy -- abdomen --triangles 25000 -o scenes
 //! ```
-//! writes `scenes/abdomen.toml` and `scenes/abdomen/*.obj`; `heart`, `fetus` and `limbs` are animated, `pregnancy` is a
-//! volume for fusion.
+//! writes `scenes/abdomen.toml` and `scenes/abdomen/*.obj`; `heart`, `fetus` and `limbs` are animated, `pregnancy`,
+//! `early` and `ectopic` are for fusion, with a volume.
 //! The same fields are meshed at every budget: finely enough for the thinnest vessel, then thinned
 //! where the surface is flat, all parts together, until the budget is met.
 
@@ -15,6 +15,10 @@ use clap::{Parser, Subcommand};
 
 #[path = "anatomy/abdomen.rs"]
 mod abdomen;
+#[path = "anatomy/acquired.rs"]
+mod acquired;
+#[path = "anatomy/adnexa.rs"]
+mod adnexa;
 #[path = "anatomy/beat.rs"]
 mod beat;
 #[path = "anatomy/body.rs"]
@@ -23,6 +27,12 @@ mod body;
 mod check;
 #[path = "anatomy/decimate.rs"]
 mod decimate;
+#[path = "anatomy/early.rs"]
+mod early;
+#[path = "anatomy/ectopic.rs"]
+mod ectopic;
+#[path = "anatomy/embryo.rs"]
+mod embryo;
 #[path = "anatomy/fetus.rs"]
 mod fetus;
 #[path = "anatomy/fetus_scene.rs"]
@@ -53,6 +63,8 @@ mod pelvis;
 mod pose;
 #[path = "anatomy/pregnancy.rs"]
 mod pregnancy;
+#[path = "anatomy/vaginal.rs"]
+mod vaginal;
 #[path = "anatomy/valves.rs"]
 mod valves;
 #[path = "anatomy/vessels.rs"]
@@ -110,6 +122,30 @@ enum Scene {
         #[arg(long, value_name = "DIR")]
         keep: Option<PathBuf>,
     },
+    /// An embryo of eight weeks in its sac, seen through the vagina: embryo, and a volume for fusion.
+    Early {
+        /// Triangles of the pelvis.
+        #[arg(long, default_value_t = 60_000, value_parser = clap::value_parser!(u64).range(20_000..))]
+        triangles: u64,
+        /// Folder for early.toml, early/* and embryo/*.obj.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Keeps the pelvis as a scene of its own in this folder: pelvis.toml and pelvis/*.obj.
+        #[arg(long, value_name = "DIR")]
+        keep: Option<PathBuf>,
+    },
+    /// A tubal pregnancy beside an empty uterus, seen through the vagina: the same for it.
+    Ectopic {
+        /// Triangles of the pelvis.
+        #[arg(long, default_value_t = 60_000, value_parser = clap::value_parser!(u64).range(20_000..))]
+        triangles: u64,
+        /// Folder for ectopic.toml, ectopic/* and embryo/*.obj.
+        #[arg(short, long)]
+        output: PathBuf,
+        /// Keeps the pelvis as a scene of its own in this folder: pelvis.toml and pelvis/*.obj.
+        #[arg(long, value_name = "DIR")]
+        keep: Option<PathBuf>,
+    },
     /// A limb in eight keyframes that have nothing in common: boxes without overlap.
     Limbs {
         /// Triangles of one keyframe.
@@ -134,6 +170,21 @@ fn main() -> ExitCode {
             output,
             keep,
         } => pregnancy::make(triangles as usize, &output, keep.as_deref()),
+        Scene::Early {
+            triangles,
+            output,
+            keep,
+        } => vaginal::make(&early::case(), triangles as usize, &output, keep.as_deref()),
+        Scene::Ectopic {
+            triangles,
+            output,
+            keep,
+        } => vaginal::make(
+            &ectopic::case(),
+            triangles as usize,
+            &output,
+            keep.as_deref(),
+        ),
         Scene::Limbs {
             triangles,
             spread,

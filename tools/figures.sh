@@ -60,7 +60,7 @@ heading "Figures 10 and 12" "Steps of a fusion."
 insonify sweep scenes/pregnancy.toml --show steps -o "$out/10-steps.png" >/dev/null
 picture 10-steps.png "volume, simulation, mask, composition, blurred mask, fused image"
 
-heading "Figures 11 and 14" "Surroundings of what is simulated."
+heading "Figure 11" "Surroundings of what is simulated."
 insonify sweep scenes/pregnancy.toml --show surroundings -o "$out/11-surroundings.png" >/dev/null
 picture 11-surroundings.png "acquired volume, none, the scene's own scatterers"
 
@@ -72,10 +72,14 @@ else
   echo '<p>Its data are not on this machine.</p>' >>"$page.part"
 fi
 
-heading "Figure 13" "Frequencies."
+heading "Figure 13" "Frequencies: a second pregnancy, of eight weeks."
 for f in 5 7 9; do
-  shot scenes/pregnancy.toml "13-$f-mhz" "$f MHz" --set "probe.frequency=$f MHz"
+  shot scenes/early.toml "13-$f-mhz" "$f MHz" --set "probe.frequency=$f MHz"
 done
+
+heading "Figure 14" "An ectopic pregnancy, with each of the surroundings."
+insonify sweep scenes/ectopic.toml --show surroundings -o "$out/14-surroundings.png" >/dev/null
+picture 14-surroundings.png "acquired volume, none, the scene's own scatterers"
 
 heading "Figure 15" "Transform nodes: a fetus at rest, and moved."
 shot scenes/fetus.toml 15-nominal "nominal" --time 0

@@ -86,7 +86,7 @@ fn the_plan_in_the_manual_loads() {
 fn the_shipped_plan_shows_what_is_simulated_in_every_slice() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("studies/realism.toml");
     let plan = Plan::load(&path).expect("sound");
-    assert_eq!(plan.backgrounds.len(), 3);
+    assert_eq!((plan.scenarios.len(), plan.backgrounds.len()), (3, 3));
     for scenario in &plan.scenarios {
         let (scene, variants, warnings) = Scene::load_sweep(&scenario.scene, &[]).expect("sound");
         assert!(warnings.is_empty(), "{warnings:?}");

@@ -120,7 +120,7 @@ fn name(node: Node) -> &'static str {
 }
 
 /// The surface in the frame of a node at `joint`.
-fn about(surface: &Surface, joint: Vec3) -> Surface {
+pub fn about(surface: &Surface, joint: Vec3) -> Surface {
     let mut out = surface.clone();
     for p in &mut out.positions {
         *p -= joint;

@@ -3,6 +3,7 @@
 use fidget::context::Tree;
 
 /// One mesh of the scene.
+#[derive(Clone)]
 pub struct Part {
     /// Name of the mesh and of its file.
     pub name: &'static str,

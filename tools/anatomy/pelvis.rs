@@ -29,7 +29,7 @@ const LAYERS: [(&str, &str, f32, f32); 9] = [
 ];
 
 /// Wall of small bowel, of the rectum (normal: under 3 mm).
-const BOWEL: (f32, f32) = (1.8, 2.6);
+pub const BOWEL: (f32, f32) = (1.8, 2.6);
 
 /// How much fainter than flat mirrors the surfaces of a part are, dB: fibres and glands that grow into
 /// each other are no smooth faces.
@@ -47,7 +47,7 @@ fn layer(p: &Point, depth: f32, phase: f32) -> Tree {
 }
 
 /// A loop of bowel: middles of its bends, and its radius.
-struct Bowel(&'static [[f32; 3]], f32);
+pub struct Bowel(pub &'static [[f32; 3]], pub f32);
 
 /// Loops of small bowel that lie on the uterus, the last one with gas.
 const SMALL: [Bowel; 3] = [
@@ -91,7 +91,8 @@ const RECTUM: [Bowel; 1] = [Bowel(
     12.5,
 )];
 
-fn loops(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
+/// Loops of bowel less their `wall`, not cleared of anything.
+pub fn tubes(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
     let one = |Bowel(bends, radius): &Bowel| {
         let pieces = bends.windows(2).map(|w| {
             let r = radius - wall;
@@ -99,10 +100,13 @@ fn loops(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
         });
         union_all(pieces.collect(), 5.0)
     };
-    let all = union_all(bowel.iter().map(one).collect(), 0.5) + undulation(p, 0.9, 19.0, 0.8);
+    union_all(bowel.iter().map(one).collect(), 0.5) + undulation(p, 0.9, 19.0, 0.8)
+}
+
+fn loops(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
     let clear = womb::uterus(p) - (1.2 + wall);
     intersection(
-        difference(all, clear, 3.0),
+        difference(tubes(p, bowel, wall), clear, 3.0),
         womb::skin(p) + (25.0 + wall),
         4.0,
     )
@@ -148,25 +152,27 @@ fn junction(p: &Point) -> Tree {
     intersection(womb::sac(p, DECIDUA + 3.4), womb::uterus(p) + 9.0, 3.0)
 }
 
-/// Arcuate vessels: in the outer third of the muscle, around it. Angles about the transverse axis in
-/// degrees with radius and slant, mm.
-fn vessels(p: &Point) -> Tree {
-    let arcs = [
-        (-152.0f32, 1.5f32, 13.0f32),
-        (-120.0, 1.3, -16.0),
-        (-76.0, 1.4, 12.0),
-        (-48.0, 1.6, -14.0),
-        (-20.0, 1.4, 15.0),
-        (32.0, 1.6, -13.0),
-        (60.0, 1.5, 17.0),
-        (88.0, 1.7, 12.0),
-        (116.0, 1.5, -16.0),
-        (152.0, 1.4, -12.0),
-    ];
+/// Angles of the arcuate vessels about the y axis in degrees, with radius and slant, mm.
+const ARCS: [(f32, f32, f32); 10] = [
+    (-152.0, 1.5, 13.0),
+    (-120.0, 1.3, -16.0),
+    (-76.0, 1.4, 12.0),
+    (-48.0, 1.6, -14.0),
+    (-20.0, 1.4, 15.0),
+    (32.0, 1.6, -13.0),
+    (60.0, 1.5, 17.0),
+    (88.0, 1.7, 12.0),
+    (116.0, 1.5, -16.0),
+    (152.0, 1.4, -12.0),
+];
+
+/// Arcuate vessels: in the outer third of the muscle, on an ellipsoid of these half-axes around
+/// `middle`.
+pub fn arcuate(p: &Point, middle: Vec3, radii: Vec3, arcs: &[(f32, f32, f32)]) -> Tree {
     let at = |angle: f32, y: f32| {
-        let shrink = (1.0 - (y / 43.0).powi(2)).sqrt();
+        let shrink = (1.0 - (y / radii.y).powi(2)).sqrt();
         let (sin, cos) = angle.to_radians().sin_cos();
-        womb::SAC + Vec3::new(-1.0 + 48.5 * shrink * cos, y, 34.0 * shrink * sin)
+        middle + Vec3::new(radii.x * shrink * cos, y, radii.z * shrink * sin)
     };
     let pieces = arcs.iter().flat_map(|&(angle, r, slant)| {
         let ys = [-26.0f32, -13.0, 0.0, 13.0, 26.0];
@@ -243,7 +249,12 @@ pub fn parts() -> Vec<Part> {
         part("bladder-wall", "bladder", organ, womb::bladder(p, 0.0)),
         part("bladder", "urine", organ, womb::bladder(p, 2.2)),
         part("uterus", "myometrium", organ, womb::uterus(p)),
-        part("vessels", "arcuate", (1.0, 1.5), vessels(p)),
+        part(
+            "vessels",
+            "arcuate",
+            (1.0, 1.5),
+            arcuate(p, womb::SAC - Vec3::X, Vec3::new(48.5, 43.0, 34.0), &ARCS),
+        ),
         part("fibroid", "fibroid", fine, fibroid(p)),
         part("cervix", "cervix", organ, cervical(p, 4.6)),
         part("canal", "canal", fine, cervical(p, 1.3)),

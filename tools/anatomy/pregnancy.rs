@@ -1,19 +1,14 @@
 //! The fusion scene: a pelvis without a sac, swept over by the simulator itself and reconstructed, and
 //! in it the moving fetus with its sac, which alone is simulated.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::DVec3;
-use insonify::acquire::{self, Sweep};
-use insonify::gpu::{Device, DeviceOptions};
-use insonify::scene::Scene;
-use insonify::sim::shaders::Library;
-use insonify::sim::{Simulator, Tracer};
-use insonify::volume::{Settings, Volume, write_meta};
 
+use crate::acquired::Exam;
 use crate::fetus_scene::{self, CHORION, DECIDUAL, FETAL, PELVIC};
 use crate::model::Extent;
-use crate::{fetus, model, output, pelvis, womb};
+use crate::{fetus, output, pelvis, womb};
 
 /// Elevational extent of the sweep, mm, and its frames: one plane of voxels each.
 const SWEEP: (f64, u32) = (36.0, 19);
@@ -32,77 +27,24 @@ pub fn make(budget: usize, output: &Path, keep: Option<&Path>) -> Result<(), Str
             output.display()
         ));
     }
-    let path = output.join("pregnancy.toml");
-    let text = fused(&output::command("pregnancy", budget, "", output));
-    output::write(&path, &text)?;
-    let name = format!("insonify-pelvis-{}", std::process::id());
-    let folder = keep.map_or_else(|| std::env::temp_dir().join(name), PathBuf::from);
-    let made = pelvis_scene(budget, &folder).and_then(|scene| sweep(&scene));
-    if keep.is_none() {
-        // What is left behind in a temporary folder harms nobody.
-        let _ = std::fs::remove_dir_all(&folder);
-    }
-    let volume = made?;
-    let file = output.join("pregnancy/pelvis.mha");
-    let explain = |e: &dyn std::fmt::Display| format!("{}: {e}", file.display());
-    std::fs::create_dir_all(output.join("pregnancy")).map_err(|e| explain(&e))?;
-    write_meta(&file, &volume).map_err(|e| e.to_string())?;
-    let bytes = std::fs::metadata(&file).map_err(|e| explain(&e))?.len();
-    println!("{}\n{volume}\n  {bytes} bytes", file.display());
-    println!("{}", path.display());
-    Ok(())
-}
-
-/// Makes the pelvis in `folder`; its scene file.
-fn pelvis_scene(budget: usize, folder: &Path) -> Result<PathBuf, String> {
-    let extent = Extent {
-        step: 2.0,
-        ..womb::EXTENT
+    let exam = Exam {
+        name: "pregnancy",
+        scene: fused(&output::command("pregnancy", budget, "", output)),
+        pelvis: format!(
+            "{}{PELVIS}{PELVIC}{DECIDUAL}",
+            head("Pelvis without a sac", "gel", "")
+        ),
+        parts: pelvis::parts(),
+        faint: pelvis::faint,
+        axes: fetus_scene::WORLD_AXES,
+        extent: Extent {
+            step: 2.0,
+            ..womb::EXTENT
+        },
+        sweep: SWEEP,
+        voxel: VOXEL,
     };
-    let parts = pelvis::parts();
-    let surfaces = model::surfaces(&parts, extent, budget)?;
-    let mut out = format!(
-        "{}{PELVIS}{PELVIC}{DECIDUAL}",
-        head("Pelvis without a sac", "gel", "")
-    );
-    for (priority, (part, surface)) in parts.iter().zip(&surfaces).enumerate() {
-        let file = folder.join(format!("pelvis/{}.obj", part.name));
-        let axes = fetus_scene::WORLD_AXES;
-        output::write(&file, &output::obj(part.name, axes, surface))?;
-        let faint = match pelvis::faint(part.name) {
-            0 => String::new(),
-            level => format!("surface_gain = \"{level} dB\"\n"),
-        };
-        let rest = format!("file = \"pelvis/{}.obj\"\n{faint}", part.name);
-        out += &output::mesh_entry(part.name, part.tissue, priority, &rest);
-    }
-    let path = folder.join("pelvis.toml");
-    output::write(&path, &out)?;
-    Ok(path)
-}
-
-/// The volume that a sweep over the pelvis gives.
-fn sweep(path: &Path) -> Result<Volume, String> {
-    let (mut scene, warnings) = Scene::load(path, &[]).map_err(|e| e.to_string())?;
-    for warning in warnings {
-        println!("{warning}");
-    }
-    let device = Device::new(&DeviceOptions::default()).map_err(|e| e.to_string())?;
-    let library = Library::embedded();
-    let (tracer, _) = Tracer::choose(None, &device, &library, &scene);
-    let simulator = Simulator::new(&device, &library, &scene, tracer);
-    let mut simulator = simulator.map_err(|e| e.to_string())?;
-    let (extent, frames) = SWEEP;
-    let stations = Sweep::Linear(extent).stations(&scene, frames, 20.0);
-    let sequence = acquire::acquire(&mut simulator, &mut scene, &stations, None, |index| {
-        println!("frame {} of {frames}", index + 1);
-    });
-    let sequence = sequence.map_err(|e| e.to_string())?;
-    let mut settings = Settings::new(VOXEL);
-    // Each plane of voxels has a frame; only what no scanline reaches is empty.
-    settings.holes = Vec::new();
-    let made = acquire::volume(&sequence, settings).map_err(|e| e.to_string())?;
-    Ok(made.volume)
+    exam.make(budget, output, keep)
 }
 
 /// Title, background, probe and image formation, which both scenes share but for `more`: so depths,
