@@ -39,8 +39,8 @@ pub use trajectory::load_trajectory;
 use crate::probe::Probe;
 use document::{Document, Source};
 
-/// Pixels that a picture has beside each other at most: what devices' images hold.
-const WIDEST: f64 = 16384.0;
+/// Pixels that a picture has beside each other at most: what files and messages can say.
+const WIDEST: f64 = 65535.0;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
 ///
@@ -214,7 +214,7 @@ pub fn radians(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Fails on a picture wider than devices and files hold.
+/// Fails on a picture wider than can be written or sent.
 fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<(), SceneError> {
     let [left, top, right, bottom] = probe.bounds();
     let width = (right - left) / (bottom - top) * f64::from(height);

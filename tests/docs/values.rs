@@ -55,6 +55,7 @@ pub fn place(path: &str) -> (String, String) {
             "[volume]\nfile = \"volume.mha\"\nrotate = { axis = [0, 0, 1], angle = 0 }\n\
              [fusion]\nmask = [\"one\"]\n",
         ),
+        "model" => text.push_str("[model]\nrotate = { axis = [0, 0, 1], angle = 0 }\n"),
         "contact" => text.push_str("[contact]\nmesh = [\"one\"]\n"),
         "tracker" => text.push_str(
             "[tracker]\nworld_from_reference = { rotate = { axis = [0, 0, 1], angle = 0 } }\n\

@@ -160,9 +160,9 @@ fn a_picture_too_wide_for_any_device_is_refused() {
     let case = Case::new();
     let text =
         "[probe]\npreset = \"linear\"\nwidth = 1000\ndepth = 1\n[imaging]\nimage_height = 100\n";
-    case.fails(text, (6, 16), "100000 pixels wide", "at most 16384");
-    let wide = [("probe.depth", "6.2 mm")];
-    assert!(case.load(text, &wide).is_ok(), "16129 wide");
+    case.fails(text, (6, 16), "100000 pixels wide", "at most 65535");
+    let wide = [("probe.depth", "1.6 mm")];
+    assert!(case.load(text, &wide).is_ok(), "62500 wide");
 }
 
 #[test]
