@@ -342,9 +342,11 @@ fn keyframed(
             let seconds = (k as f64 + 0.5) * step;
             // Another first each time.
             for way in (0..3).map(|i| (i + round + k) % 3) {
-                let moved = rigs[way].frame_at(seconds)?;
-                let sample = if way == 0 { rigs[0].frame()? } else { moved };
-                found[way].push(sample.frame);
+                // After a frame of its own, which has its data at hand: of the keyframe before, or of the same where
+                // nothing moves.
+                let before = if way == 0 { seconds } else { seconds - step };
+                rigs[way].frame_at(before)?;
+                found[way].push(rigs[way].frame_at(seconds)?.frame);
             }
         }
     }
