@@ -123,7 +123,6 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
             let differ = off(&live, &fresh(&device, &wanted, tracer));
             assert_eq!(differ, 0, "{tracer} {settings:?} of {}", live.len());
             // And back.
-            let mut scene = scene;
             scene.place_model(DAffine3::IDENTITY);
             scene.set_time(TIME);
             let display = plain.volume.as_ref().expect("a volume").display();
