@@ -130,7 +130,7 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     painter.text(at, Align2::LEFT_TOP, &model.title, title, style::TEXT);
     let small = FontId::proportional(12.0);
     let below = at + vec2(0.0, 20.0);
-    painter.text(
+    let left = painter.text(
         below,
         Align2::LEFT_TOP,
         settings,
@@ -154,7 +154,12 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
         line = format!("{line}   {:.1} frames/s", 1e3 / ms.max(1e-3));
     }
     if model.animated {
-        line = format!("{:.2} s   {line}", frame.seconds);
+        let timed = format!("{:.2} s   {line}", frame.seconds);
+        let shown = painter.layout_no_wrap(timed.clone(), small.clone(), style::FAINT);
+        // The console has the time, too.
+        if left.right() + 10.0 + shown.size().x < at.x {
+            line = timed;
+        }
     }
     // In a narrow window the probe's settings need the room.
     if area.width() < NARROW {
