@@ -68,14 +68,8 @@ impl Acquired {
             (display.world_from_lps, display.black, display.white);
     }
 
-    /// Grey level shown at a point of the world, 0 black to 1 white: trilinear between voxels. None outside the
+    /// Grey level shown at a point in voxel indices, 0 black to 1 white: trilinear between voxels. None outside the
     /// volume.
-    pub fn grey(&self, world: DVec3) -> Option<f64> {
-        let voxel = self.world_from_voxel.inverse().transform_point3(world);
-        self.grey_at(voxel)
-    }
-
-    /// The same at a point in voxel indices.
     pub fn grey_at(&self, voxel: DVec3) -> Option<f64> {
         let last = DVec3::from(self.size.map(|n| n as f64 - 1.0));
         // A voxel reaches half a step beyond its centre, with one value.

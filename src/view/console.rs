@@ -48,7 +48,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             if model.registration.is_some() {
                 let planes = &mut state.planes.open;
                 section(ui, "Registration", false, |ui| {
-                    registration::show(ui, model, planes, now)
+                    registration::show(ui, model, planes)
                 });
             }
             let (settings, loaded) = (&mut model.settings, &model.loaded);

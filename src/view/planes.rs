@@ -7,11 +7,12 @@ use egui::{
     Align2, Color32, ColorImage, FontId, Painter, PointerButton, Pos2, Rect, Response, Sense,
     Shape, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use super::model::registration::{Outline, Plane, Registration};
 use super::model::{Model, Settings};
 use super::style;
+use crate::scene::Display;
 
 /// Points of a wheel's turn that bring the planes on by a pixel.
 const NOTCH: f32 = 8.0;
@@ -44,7 +45,8 @@ struct Picture {
 /// All that a plane's picture depends on.
 #[derive(Clone, PartialEq)]
 struct Key {
-    settings: Settings,
+    volume: Option<Display>,
+    model: DAffine3,
     seconds: f64,
     middle: DVec3,
     size: [usize; 2],
@@ -70,7 +72,8 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
         let pitch = registration.extent / f64::from(rect.width().min(rect.height()));
         let scale = ui.ctx().pixels_per_point();
         let key = Key {
-            settings: model.settings.clone(),
+            volume: model.settings.volume,
+            model: model.settings.model,
             seconds,
             middle: registration.middle,
             size: [rect.width(), rect.height()].map(|x| (x * scale).max(1.0) as usize),

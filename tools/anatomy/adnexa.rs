@@ -149,12 +149,12 @@ pub struct Ovary {
 
 impl Ovary {
     /// The whole ovary.
-    pub fn field(&self, p: &Point) -> Tree {
+    fn field(&self, p: &Point) -> Tree {
         ellipsoid(&p.from(self.middle), self.radii) + undulation(p, 0.5, 12.0, 1.1)
     }
 
     /// Its follicles.
-    pub fn follicles(&self, p: &Point) -> Tree {
+    fn follicles(&self, p: &Point) -> Tree {
         let one = |(at, r): &([f32; 3], f32)| {
             let uneven = Vec3::new(1.08, 1.0, 0.92) * *r;
             ellipsoid(&p.from(self.middle + Vec3::from(*at)), uneven)
@@ -164,14 +164,47 @@ impl Ovary {
     }
 }
 
-/// A corpus luteum of this radius, less `inset` all around, mm.
-pub fn luteum(p: &Point, middle: Vec3, radius: f32, inset: f32) -> Tree {
-    let radii = Vec3::new(1.05, 1.0, 0.95) * radius - inset;
-    ellipsoid(&p.from(middle), radii) + undulation(p, 0.35, 7.0, 0.8 + inset)
+/// A corpus luteum: middle, radius, and how thick its wall is around the fluid, mm.
+pub struct Luteum {
+    pub middle: Vec3,
+    pub radius: f32,
+    pub wall: f32,
+}
+
+impl Luteum {
+    /// What lies `inset` mm within its surface.
+    fn field(&self, p: &Point, inset: f32) -> Tree {
+        let radii = Vec3::new(1.05, 1.0, 0.95) * self.radius - inset;
+        ellipsoid(&p.from(self.middle), radii) + undulation(p, 0.35, 7.0, 0.8 + inset)
+    }
+}
+
+/// A uterus, from its middle and half-axes, mm.
+pub fn uterus(p: &Point, (middle, radii): (Vec3, Vec3)) -> Tree {
+    ellipsoid(&p.from(middle), radii) + undulation(p, 1.0, 39.0, 2.2)
+}
+
+/// Ovaries with what they hold, and the uterus with its vessels, in rising priority.
+pub fn organs(
+    p: &Point,
+    [one, other]: [&Ovary; 2],
+    luteum: &Luteum,
+    womb: (Vec3, Vec3),
+) -> [Part; 6] {
+    let follicles = one.follicles(p).min(other.follicles(p));
+    let fluid = luteum.field(p, luteum.wall);
+    [
+        part("ovaries", "ovary", ORGAN, one.field(p).min(other.field(p))),
+        part("corpus-luteum", "luteum", FINE, luteum.field(p, 0.0)),
+        part("luteal-fluid", "luteal_fluid", FINE, fluid),
+        part("follicles", "cyst_fluid", FINE, follicles),
+        part("uterus", "myometrium", ORGAN, uterus(p, womb)),
+        part("arcuate", "arcuate", FINE, arcuate(p, womb)),
+    ]
 }
 
 /// Arcuate vessels of a uterus.
-pub fn arcuate(p: &Point, middle: Vec3, radii: Vec3) -> Tree {
+fn arcuate(p: &Point, (middle, radii): (Vec3, Vec3)) -> Tree {
     let arcs = [
         (-143.0, 1.2, 13.0),
         (-104.0, 0.9, -16.0),

@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use crate::adnexa::{self, FINE, ORGAN, Ovary};
+use crate::adnexa::{self, Luteum, ORGAN, Ovary};
 use crate::embryo::Gestation;
 use crate::field::{Point, ellipsoid, intersection, undulation};
 use crate::part::{Part, part};
@@ -39,8 +39,11 @@ const LEFT: Ovary = Ovary {
     ],
 };
 
-/// The corpus luteum: middle and radius.
-const LUTEUM: (Vec3, f32) = (Vec3::new(42.5, 1.0, 47.0), 7.6);
+const LUTEUM: Luteum = Luteum {
+    middle: Vec3::new(42.5, 1.0, 47.0),
+    radius: 7.6,
+    wall: 3.8,
+};
 
 fn gestation() -> Gestation {
     Gestation {
@@ -57,7 +60,7 @@ fn gestation() -> Gestation {
 fn parts() -> Vec<Part> {
     let p = &Point::world();
     let (middle, radii) = UTERUS;
-    let uterus = ellipsoid(&p.from(middle), radii) + undulation(p, 1.0, 39.0, 2.2);
+    let uterus = adnexa::uterus(p, UTERUS);
     let gestation = gestation();
     let (wide, whither) = DECIDUA;
     let rim = |wider: f32| {
@@ -65,32 +68,9 @@ fn parts() -> Vec<Part> {
         ellipsoid(&q, gestation.radii() + wider) + undulation(p, 0.8, 19.0, 1.4)
     };
     let inside = |field, depth: f32| intersection(field, uterus.clone() + depth, 3.0);
-    let (yellow, r) = LUTEUM;
     let mut out = adnexa::around(p, [middle.x - radii.x, middle.x + radii.x]);
-    let ovaries = RIGHT.field(p).min(LEFT.field(p));
-    let follicles = RIGHT.follicles(p).min(LEFT.follicles(p));
+    out.extend(adnexa::organs(p, [&RIGHT, &LEFT], &LUTEUM, UTERUS));
     out.extend([
-        part("ovaries", "ovary", ORGAN, ovaries),
-        part(
-            "corpus-luteum",
-            "luteum",
-            FINE,
-            adnexa::luteum(p, yellow, r, 0.0),
-        ),
-        part(
-            "luteal-fluid",
-            "luteal_fluid",
-            FINE,
-            adnexa::luteum(p, yellow, r, 3.8),
-        ),
-        part("follicles", "cyst_fluid", FINE, follicles),
-        part("uterus", "myometrium", ORGAN, uterus.clone()),
-        part(
-            "arcuate",
-            "arcuate",
-            FINE,
-            adnexa::arcuate(p, middle, radii),
-        ),
         part("junction", "junction", ORGAN, inside(rim(wide + 2.6), 4.0)),
         part("decidua", "decidua", ORGAN, inside(rim(wide), 5.0)),
         part("filling", "filling", ORGAN, gestation.sac(p, 0.0)),

@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use crate::adnexa::{self, FINE, ORGAN, Ovary};
+use crate::adnexa::{self, Luteum, ORGAN, Ovary};
 use crate::embryo::Gestation;
 use crate::field::{Point, cone, ellipsoid, intersection, undulation, union};
 use crate::part::{Part, part};
@@ -44,8 +44,11 @@ const LEFT: Ovary = Ovary {
     ],
 };
 
-/// The corpus luteum: middle and radius.
-const LUTEUM: (Vec3, f32) = (Vec3::new(50.0, 1.0, 48.0), 6.6);
+const LUTEUM: Luteum = Luteum {
+    middle: Vec3::new(50.0, 1.0, 48.0),
+    radius: 6.6,
+    wall: 3.0,
+};
 
 fn gestation() -> Gestation {
     Gestation {
@@ -62,7 +65,7 @@ fn gestation() -> Gestation {
 fn parts() -> Vec<Part> {
     let p = &Point::world();
     let (middle, radii) = UTERUS;
-    let uterus = ellipsoid(&p.from(middle), radii) + undulation(p, 1.0, 39.0, 2.2);
+    let uterus = adnexa::uterus(p, UTERUS);
     let gestation = gestation();
     let ring = |wider: f32| {
         let smooth = ellipsoid(&p.from(gestation.middle), gestation.radii() + wider);
@@ -84,34 +87,11 @@ fn parts() -> Vec<Part> {
         Vec3::new(33.0, 27.0, 6.8),
     );
     let blood = adnexa::within(p, blood + undulation(p, 1.2, 26.0, 0.7));
-    let (yellow, r) = LUTEUM;
-    let ovaries = RIGHT.field(p).min(LEFT.field(p));
-    let follicles = RIGHT.follicles(p).min(LEFT.follicles(p));
     let junction = lining(LINING[0] + 2.4, 0.7);
     let mut out = adnexa::around(p, [middle.x - radii.x, middle.x + radii.x]);
+    out.push(part("blood", "free_blood", ORGAN, blood));
+    out.extend(adnexa::organs(p, [&RIGHT, &LEFT], &LUTEUM, UTERUS));
     out.extend([
-        part("blood", "free_blood", ORGAN, blood),
-        part("ovaries", "ovary", ORGAN, ovaries),
-        part(
-            "corpus-luteum",
-            "luteum",
-            FINE,
-            adnexa::luteum(p, yellow, r, 0.0),
-        ),
-        part(
-            "luteal-fluid",
-            "luteal_fluid",
-            FINE,
-            adnexa::luteum(p, yellow, r, 3.0),
-        ),
-        part("follicles", "cyst_fluid", FINE, follicles),
-        part("uterus", "myometrium", ORGAN, uterus.clone()),
-        part(
-            "arcuate",
-            "arcuate",
-            FINE,
-            adnexa::arcuate(p, middle, radii),
-        ),
         part(
             "junction",
             "junction",

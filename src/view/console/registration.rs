@@ -1,7 +1,5 @@
 //! The acquired volume and the model laid onto each other, by numbers.
 
-use std::time::Instant;
-
 use egui::{DragValue, Ui};
 use glam::{DAffine3, DQuat, DVec3};
 
@@ -10,8 +8,7 @@ use crate::scene::Display;
 use crate::view::model::Model;
 use crate::view::model::registration::Moves;
 
-pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool, now: Instant) {
-    let seconds = model.clock.at(now);
+pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
     let Some(registration) = &mut model.registration else {
         return;
     };
@@ -60,7 +57,6 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool, now: Insta
     if let Some(display) = &mut model.settings.volume {
         grid(ui, "grey levels", |ui| levels(ui, display));
     }
-    registration.follow(&model.settings, seconds);
     masks(ui, model);
 }
 
@@ -127,7 +123,7 @@ fn masks(ui: &mut Ui, model: &mut Model) {
         ui.label("What the checked meshes enclose is simulated.");
         for (index, mesh) in model.meshes.iter().enumerate() {
             let mut chosen = fusion.masks.contains(&index);
-            let closed = registration.closed.get(index).copied().unwrap_or(false);
+            let closed = registration.is_closed(index);
             // A scene without a mask would be no fusion.
             let last = chosen && fusion.masks.len() == 1;
             let response = ui.add_enabled(

@@ -1,10 +1,12 @@
 //! The acquired volume and the model, laid onto each other by hand.
 
+use std::cell::OnceCell;
+
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::Settings;
 use crate::scene::fusion::open_edges;
-use crate::scene::{Acquired, Scene};
+use crate::scene::{Acquired, Instance, Scene};
 
 /// Least and most that a plane shows, mm across.
 const EXTENTS: [f64; 2] = [5.0, 2000.0];
@@ -69,8 +71,8 @@ pub struct Registration {
     pub middle: DVec3,
     /// What a plane shows across its smaller side, mm.
     pub extent: f64,
-    /// Per placed mesh: whether it is closed, so that it can be a mask.
-    pub closed: Vec<bool>,
+    /// See [`Self::is_closed`]; found out when it is first asked.
+    closed: OnceCell<Vec<bool>>,
     scene: Scene,
 }
 
@@ -78,16 +80,12 @@ impl Registration {
     /// Of the scene's volume, if it has one; planes meet in the middle of the masks.
     pub fn of(scene: &Scene) -> Option<Self> {
         let volume = scene.volume.as_ref()?;
-        let closed = |i: &crate::scene::Instance| {
-            let mut shapes = i.keyframes.meshes.iter().chain([&i.mesh]);
-            shapes.all(|&m| open_edges(&scene.meshes[m]) == 0)
-        };
         let [low, high] = corners(volume);
         let mut out = Self {
             moves: Moves::Volume,
             middle: (low + high) / 2.0,
             extent: (0.7 * (high - low).max_element()).clamp(EXTENTS[0], EXTENTS[1]),
-            closed: scene.instances.iter().map(closed).collect(),
+            closed: OnceCell::new(),
             scene: scene.clone(),
         };
         out.centre();
@@ -98,6 +96,16 @@ impl Registration {
     pub fn follow(&mut self, settings: &Settings, seconds: f64) {
         settings.apply(&mut self.scene);
         self.scene.set_time(seconds);
+    }
+
+    /// Whether placed mesh `index` is closed in every shape that it takes, so that it can be a mask.
+    pub fn is_closed(&self, index: usize) -> bool {
+        let closed = |i: &Instance| {
+            let mut shapes = i.keyframes.meshes.iter().chain([&i.mesh]);
+            shapes.all(|&m| open_edges(&self.scene.meshes[m]) == 0)
+        };
+        self.closed
+            .get_or_init(|| self.scene.instances.iter().map(closed).collect())[index]
     }
 
     /// The scene as it was followed last.
