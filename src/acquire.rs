@@ -64,10 +64,7 @@ pub fn probe_from_image(frame: &Frame) -> DAffine3 {
 /// The part of the image that holds echoes, pixels; none where it is all of it.
 fn fan(scene: &Scene, probe_from_image: &DAffine3) -> Option<Fan> {
     let (radius, angle) = match scene.probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => (radius, field_of_view),
+        Kind::Convex { radius, field_of_view } => (radius, field_of_view),
         Kind::Phased { field_of_view } => (0.0, field_of_view),
         Kind::Linear { .. } => return None,
     };
@@ -111,11 +108,7 @@ pub fn acquire(
         let (width, height, rgba) = simulator.pixels()?;
         let bytes = u64::from(width) * u64::from(height) * stations.len() as u64;
         if bytes > MAX_PIXELS {
-            return Err(AcquireError::TooLarge {
-                frames: stations.len(),
-                width,
-                height,
-            });
+            return Err(AcquireError::TooLarge { frames: stations.len(), width, height });
         }
         pixels.reserve_exact(bytes as usize - pixels.len());
         pixels.extend(rgba.chunks_exact(4).map(|p| p[0]));

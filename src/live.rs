@@ -74,11 +74,7 @@ pub struct Pace {
 impl Pace {
     /// For a machine, before the first frame.
     pub fn new(machine: Machine) -> Self {
-        Self {
-            machine,
-            ladder: None,
-            share: 1.0,
-        }
+        Self { machine, ladder: None, share: 1.0 }
     }
 
     /// Another scene is imaged from now on.

@@ -44,11 +44,7 @@ impl Movie {
     /// What the file system says.
     pub fn new(path: &Path) -> Result<Self, MovieError> {
         let file = File::create(path).map_err(|e| failed(path, e))?;
-        Ok(Self {
-            path: path.to_owned(),
-            state: State::Empty(BufWriter::new(file)),
-            shown: 0.0,
-        })
+        Ok(Self { path: path.to_owned(), state: State::Empty(BufWriter::new(file)), shown: 0.0 })
     }
 
     /// Adds a frame that is shown until `end`, s from the beginning: the red channel of RGBA bytes, row
@@ -65,8 +61,7 @@ impl Movie {
     ) -> Result<(), MovieError> {
         let delay = centiseconds(self.shown, end);
         self.shown = 100.0 * end;
-        self.write(width, height, rgba, delay)
-            .map_err(|e| failed(&self.path, e))
+        self.write(width, height, rgba, delay).map_err(|e| failed(&self.path, e))
     }
 
     fn write(
@@ -93,11 +88,7 @@ impl Movie {
             width,
             height,
             delay,
-            buffer: rgba
-                .chunks_exact(4)
-                .map(|p| p[0])
-                .collect::<Vec<_>>()
-                .into(),
+            buffer: rgba.chunks_exact(4).map(|p| p[0]).collect::<Vec<_>>().into(),
             ..Frame::default()
         })?;
         self.state = State::Begun(encoder);
@@ -106,10 +97,7 @@ impl Movie {
 }
 
 fn failed(path: &Path, cause: impl ToString) -> MovieError {
-    MovieError {
-        path: path.to_owned(),
-        cause: cause.to_string(),
-    }
+    MovieError { path: path.to_owned(), cause: cause.to_string() }
 }
 
 /// How long a frame that begins at so many hundredths of a second is shown until `end`, s, in the
@@ -133,10 +121,7 @@ mod tests {
             let shown = (0..frames).map(|i| centiseconds(100.0 * at(i), at(i + 1)));
             let total: u32 = shown.map(u32::from).sum();
             let exact = 100.0 * at(frames);
-            assert!(
-                (f64::from(total) - exact).abs() <= 0.5,
-                "{rate}: {total} {exact}"
-            );
+            assert!((f64::from(total) - exact).abs() <= 0.5, "{rate}: {total} {exact}");
         }
         assert_eq!(centiseconds(0.0, 0.001), 2);
     }
@@ -147,8 +132,7 @@ mod tests {
         let path = folder.path().join("a.gif");
         let picture = |offset: u8| -> Vec<u8> {
             let grey = (0..=255u8).map(|g| g.wrapping_add(offset));
-            grey.flat_map(|g| [g, g, g, if g < 9 { 0 } else { 255 }])
-                .collect()
+            grey.flat_map(|g| [g, g, g, if g < 9 { 0 } else { 255 }]).collect()
         };
         let mut movie = Movie::new(&path).expect("made");
         for (offset, end) in [(0, 0.05), (7, 0.1)] {

@@ -67,9 +67,7 @@ pub fn read(path: &Path) -> Result<Vec<u8>, String> {
 
 fn parse(bytes: &[u8]) -> Result<Vec<u8>, String> {
     let cut = || "the file is cut off".to_owned();
-    let rest = bytes
-        .strip_prefix(b"\x93NUMPY")
-        .ok_or("this is no NumPy file (.npy)")?;
+    let rest = bytes.strip_prefix(b"\x93NUMPY").ok_or("this is no NumPy file (.npy)")?;
     let (version, rest) = rest.split_first_chunk::<2>().ok_or_else(cut)?;
     let (length, rest) = match version[0] {
         1 => {
@@ -81,17 +79,12 @@ fn parse(bytes: &[u8]) -> Result<Vec<u8>, String> {
             (u32::from_le_bytes(*n) as usize, rest)
         }
         other => {
-            return Err(format!(
-                "format version {other} is unknown; save it with NumPy 1.x"
-            ));
+            return Err(format!("format version {other} is unknown; save it with NumPy 1.x"));
         }
     };
     let (header, data) = rest.split_at_checked(length).ok_or_else(cut)?;
     let header = String::from_utf8_lossy(header);
-    if !["<f4", "<u4", "<i4"]
-        .iter()
-        .any(|d| header.contains(&format!("'{d}'")))
-    {
+    if !["<f4", "<u4", "<i4"].iter().any(|d| header.contains(&format!("'{d}'"))) {
         return Err(format!(
             "needs 32-bit little-endian numbers (float32, uint32 or int32), not {}",
             header.trim()
@@ -100,9 +93,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<u8>, String> {
     if header.contains("'fortran_order': True") {
         return Err("needs C order: save numpy.ascontiguousarray(array)".to_owned());
     }
-    let shape = header
-        .split_once("'shape': (")
-        .and_then(|(_, rest)| rest.split_once(')'));
+    let shape = header.split_once("'shape': (").and_then(|(_, rest)| rest.split_once(')'));
     let (shape, _) = shape.ok_or("the header has no shape")?;
     let sizes = shape.split(',').map(str::trim).filter(|n| !n.is_empty());
     let count = sizes
@@ -110,10 +101,7 @@ fn parse(bytes: &[u8]) -> Result<Vec<u8>, String> {
         .try_fold(1_usize, |all, n| all.checked_mul(n?))
         .ok_or("the header has no valid shape")?;
     if count.checked_mul(4) != Some(data.len()) {
-        return Err(format!(
-            "{} bytes of data for the shape ({shape})",
-            data.len()
-        ));
+        return Err(format!("{} bytes of data for the shape ({shape})", data.len()));
     }
     Ok(data.to_vec())
 }
@@ -133,20 +121,14 @@ mod tests {
         }
         let file = std::fs::read(&path).unwrap();
         assert_eq!((file.len() - 48) % 64, 0, "data is aligned");
-        for (cut, what) in [
-            (3, "no NumPy"),
-            (9, "cut off"),
-            (40, "cut off"),
-            (file.len() - 4, "44 bytes"),
-        ] {
+        for (cut, what) in
+            [(3, "no NumPy"), (9, "cut off"), (40, "cut off"), (file.len() - 4, "44 bytes")]
+        {
             let error = parse(&file[..cut]).unwrap_err();
             assert!(error.contains(what), "{cut}: {error}");
         }
         let with = |from: &str, to: &str| {
-            let at = file
-                .windows(from.len())
-                .position(|w| w == from.as_bytes())
-                .unwrap();
+            let at = file.windows(from.len()).position(|w| w == from.as_bytes()).unwrap();
             let mut bytes = file.clone();
             bytes.splice(at..at + from.len(), to.bytes());
             parse(&bytes).unwrap_err()

@@ -29,31 +29,19 @@ pub struct Plot {
 impl Curve {
     /// What was measured.
     pub fn dots(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
-        Self {
-            label: label.into(),
-            points,
-            line: false,
-        }
+        Self { label: label.into(), points, line: false }
     }
 
     /// The closed form.
     pub fn line(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
-        Self {
-            line: true,
-            ..Self::dots(label, points)
-        }
+        Self { line: true, ..Self::dots(label, points) }
     }
 }
 
 impl Plot {
     /// On linear axes.
     pub fn linear(title: impl Into<String>, axes: [&str; 2], curves: Vec<Curve>) -> Self {
-        Self {
-            title: title.into(),
-            axes: axes.map(String::from),
-            logarithmic: [false; 2],
-            curves,
-        }
+        Self { title: title.into(), axes: axes.map(String::from), logarithmic: [false; 2], curves }
     }
 
     /// It has names, something to draw, and only points that its axes can show.
@@ -79,9 +67,8 @@ const TOP: f64 = 28.0;
 const FRAME: [f64; 2] = [SIZE[0] - LEFT - 12.0, SIZE[1] - TOP - 60.0];
 
 /// Told apart by people who see colours differently (Okabe and Ito 2008), without the yellow.
-const COLOURS: [&str; 7] = [
-    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555",
-];
+const COLOURS: [&str; 7] =
+    ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555"];
 
 /// One axis: the range that it shows, in decades if logarithmic, and where its ticks are.
 struct Axis {
@@ -93,19 +80,10 @@ struct Axis {
 impl Axis {
     fn new(values: impl Iterator<Item = f64>, logarithmic: bool) -> Self {
         let scaled = values.map(|v| if logarithmic { v.log10() } else { v });
-        let (low, high) = scaled.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-            (l.min(v), h.max(v))
-        });
-        let margin = if high > low {
-            0.03 * (high - low)
-        } else {
-            0.5 * high.abs().max(1.0)
-        };
-        Self {
-            logarithmic,
-            low: low - margin,
-            high: high + margin,
-        }
+        let (low, high) =
+            scaled.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let margin = if high > low { 0.03 * (high - low) } else { 0.5 * high.abs().max(1.0) };
+        Self { logarithmic, low: low - margin, high: high + margin }
     }
 
     /// 0 at the low end, 1 at the high one.
@@ -123,16 +101,11 @@ impl Axis {
         } else {
             [1.0, 2.0, 5.0, 10.0]
         };
-        let step = steps
-            .into_iter()
-            .map(|s| s * decade)
-            .find(|s| *s >= rough)
-            .unwrap_or(10.0 * decade);
+        let step =
+            steps.into_iter().map(|s| s * decade).find(|s| *s >= rough).unwrap_or(10.0 * decade);
         let (first, last) = ((self.low / step).ceil() as i64, (self.high / step) as i64);
         let values = (first..=last).map(|i| i as f64 * step);
-        values
-            .map(|v| if self.logarithmic { 10f64.powf(v) } else { v })
-            .collect()
+        values.map(|v| if self.logarithmic { 10f64.powf(v) } else { v }).collect()
     }
 
     /// 1, 2 and 5 of every decade shown, or only 1 where that would be many.
@@ -155,11 +128,7 @@ fn label(v: f64) -> String {
     }
     let text = format!("{v:.4}");
     let text = text.trim_end_matches('0').trim_end_matches('.');
-    if text == "-0" {
-        "0".into()
-    } else {
-        text.into()
-    }
+    if text == "-0" { "0".into() } else { text.into() }
 }
 
 /// Text with the characters that HTML and SVG read as markup replaced.
@@ -181,11 +150,7 @@ pub fn escape(text: &str) -> String {
 /// The plot as an `<svg>` element, its legend included.
 pub fn svg(plot: &Plot) -> String {
     let axis = |i: usize| {
-        let values = plot
-            .curves
-            .iter()
-            .flat_map(|c| &c.points)
-            .map(move |p| p[i]);
+        let values = plot.curves.iter().flat_map(|c| &c.points).map(move |p| p[i]);
         Axis::new(values, plot.logarithmic[i])
     };
     let axes = [axis(0), axis(1)];
@@ -202,23 +167,14 @@ pub fn svg(plot: &Plot) -> String {
         let colour = COLOURS[i % COLOURS.len()];
         let before = plot.curves[..i].iter().filter(|c| !c.line).count();
         drawn(&mut out, curve, &dot(colour, before), colour, &axes);
-        legend(
-            &mut out,
-            curve,
-            &dot(colour, before),
-            colour,
-            SIZE[1] + 16.0 * i as f64,
-        );
+        legend(&mut out, curve, &dot(colour, before), colour, SIZE[1] + 16.0 * i as f64);
     }
     out.push_str("</svg>\n");
     out
 }
 
 fn position(axes: &[Axis; 2], [x, y]: [f64; 2]) -> [f64; 2] {
-    [
-        LEFT + axes[0].place(x) * FRAME[0],
-        TOP + (1.0 - axes[1].place(y)) * FRAME[1],
-    ]
+    [LEFT + axes[0].place(x) * FRAME[0], TOP + (1.0 - axes[1].place(y)) * FRAME[1]]
 }
 
 fn grid(out: &mut String, plot: &Plot, axes: &[Axis; 2]) {
@@ -306,10 +262,7 @@ mod tests {
     fn ticks_are_round_and_inside() {
         let axis = |low: f64, high: f64, log| Axis::new([low, high].into_iter(), log);
         let labels = |a: Axis| a.ticks().into_iter().map(label).collect::<Vec<_>>();
-        assert_eq!(
-            labels(axis(0.0, 1.0, false)),
-            ["0", "0.2", "0.4", "0.6", "0.8", "1"]
-        );
+        assert_eq!(labels(axis(0.0, 1.0, false)), ["0", "0.2", "0.4", "0.6", "0.8", "1"]);
         assert_eq!(labels(axis(-3.0, 3.0, false)).len(), 7);
         assert_eq!(labels(axis(1.0, 1000.0, true)), ["1", "10", "100", "1000"]);
         assert_eq!(labels(axis(1.0, 12.0, true)), ["1", "2", "5", "10"]);
@@ -327,11 +280,8 @@ mod tests {
             ],
         );
         let svg = svg(&plot);
-        let middle = format!(
-            "<circle cx='{:.1}' cy='{:.1}'",
-            LEFT + FRAME[0] / 2.0,
-            TOP + FRAME[1] / 2.0
-        );
+        let middle =
+            format!("<circle cx='{:.1}' cy='{:.1}'", LEFT + FRAME[0] / 2.0, TOP + FRAME[1] / 2.0);
         assert!(svg.contains(&middle), "{svg}");
         assert!(svg.contains("a &lt; b") && svg.contains("<polyline"));
     }

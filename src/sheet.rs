@@ -121,11 +121,8 @@ impl Sheet<'_> {
         let columns = self.columns.min(self.tiles.len().max(1)) as u32;
         let rows = (self.tiles.len() as u32).div_ceil(columns);
         let step = [width + gap, height + line + gap];
-        let mut page = GrayImage::from_pixel(
-            columns * step[0] + gap,
-            head + rows * step[1],
-            Luma([PAPER]),
-        );
+        let mut page =
+            GrayImage::from_pixel(columns * step[0] + gap, head + rows * step[1], Luma([PAPER]));
         title.write(&mut page, [gap, gap], &self.title);
         let mut places = Vec::with_capacity(self.tiles.len());
         for (i, tile) in (0..).zip(&self.tiles) {
@@ -147,10 +144,7 @@ impl Sheet<'_> {
                 }
             }
         }
-        Page {
-            image: page,
-            places,
-        }
+        Page { image: page, places }
     }
 
     /// Letters with which every caption fits below its image, and every text into its place.
@@ -180,17 +174,10 @@ mod tests {
     }
 
     fn sheet(images: &[GrayImage], columns: usize) -> Sheet<'_> {
-        let tile = |(i, image)| Tile::Image {
-            caption: format!("{i} gain"),
-            image,
-        };
+        let tile = |(i, image)| Tile::Image { caption: format!("{i} gain"), image };
         let mut tiles: Vec<_> = (1..).zip(images).map(tile).collect();
         tiles.insert(1, Tile::Text(vec!["as the scene says:".to_owned(); 3]));
-        Sheet {
-            title: "a sheet".to_owned(),
-            columns,
-            tiles,
-        }
+        Sheet { title: "a sheet".to_owned(), columns, tiles }
     }
 
     #[test]
@@ -235,10 +222,7 @@ mod tests {
             let sheet = Sheet {
                 title: String::new(),
                 columns: 1,
-                tiles: vec![Tile::Image {
-                    caption: caption.to_owned(),
-                    image: &images[0],
-                }],
+                tiles: vec![Tile::Image { caption: caption.to_owned(), image: &images[0] }],
             };
             let letters = sheet.letters(300, 200);
             (letters.size, letters.width(caption))
@@ -246,10 +230,7 @@ mod tests {
         let (size, _) = of("7");
         assert_eq!(size, (300.0 * LARGEST).floor());
         let (size, width) = of("a caption that is nearly too long for it");
-        assert!(
-            (11.0..18.0).contains(&size) && width <= 300.0,
-            "{size} {width}"
-        );
+        assert!((11.0..18.0).contains(&size) && width <= 300.0, "{size} {width}");
         assert_eq!(of(&"far too long".repeat(9)).0, SMALLEST);
     }
 }

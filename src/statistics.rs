@@ -22,16 +22,9 @@ impl Statistics {
         sorted.sort_by(f64::total_cmp);
         let rank = |q: f64| {
             let rank = (sorted.len() as f64 * q).ceil() as usize;
-            sorted
-                .get(rank.saturating_sub(1))
-                .copied()
-                .unwrap_or(f64::NAN)
+            sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
         };
-        Self {
-            median: rank(0.5),
-            p95: rank(0.95),
-            p99: rank(0.99),
-        }
+        Self { median: rank(0.5), p95: rank(0.95), p99: rank(0.99) }
     }
 }
 
@@ -42,10 +35,7 @@ mod tests {
     #[test]
     fn ranks_are_values_that_were_measured() {
         let hundred = Statistics::of((1..=100).rev().map(f64::from));
-        assert_eq!(
-            [hundred.median, hundred.p95, hundred.p99],
-            [50.0, 95.0, 99.0]
-        );
+        assert_eq!([hundred.median, hundred.p95, hundred.p99], [50.0, 95.0, 99.0]);
         let three = Statistics::of([3.0, 1.0, 2.0]);
         assert_eq!([three.median, three.p95, three.p99], [2.0, 3.0, 3.0]);
         assert!(Statistics::of([]).median.is_nan());

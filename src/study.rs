@@ -25,11 +25,7 @@ pub struct StudyError {
 
 impl StudyError {
     fn new(file: &std::path::Path, message: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self {
-            file: file.display().to_string(),
-            message: message.into(),
-            remedy: remedy.into(),
-        }
+        Self { file: file.display().to_string(), message: message.into(), remedy: remedy.into() }
     }
 }
 

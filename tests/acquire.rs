@@ -17,12 +17,8 @@ use insonify::volume::{Fan, Sequence, Settings, Transforms, Volume, reconstruct}
 use program::insonify;
 
 /// Points in the world, mm: apart from each other in every direction, none in the middle.
-const POINTS: [[f64; 3]; 4] = [
-    [-9.0, -3.2, 14.3],
-    [6.4, 2.1, 17.6],
-    [-3.7, 4.4, 26.2],
-    [10.1, -1.3, 24.9],
-];
+const POINTS: [[f64; 3]; 4] =
+    [[-9.0, -3.2, 14.3], [6.4, 2.1, 17.6], [-3.7, 4.4, 26.2], [10.1, -1.3, 24.9]];
 
 /// The points in fluid without scatterers, of the speed that the machine assumes.
 fn points(probe: &str) -> Scene {
@@ -56,13 +52,7 @@ fn follow(scene: &mut Scene, stations: &[Station]) -> Sequence {
     let device = test_device();
     let library = Library::embedded();
     let simulator = Simulator::new(&device, &library, scene, Tracer::Bvh);
-    let made = acquire(
-        &mut simulator.expect("a simulator"),
-        scene,
-        stations,
-        None,
-        |_| {},
-    );
+    let made = acquire(&mut simulator.expect("a simulator"), scene, stations, None, |_| {});
     assert_eq!(device.validation_messages(), Vec::<String>::new());
     made.expect("acquired")
 }
@@ -189,10 +179,7 @@ fn speckle_is_kept_to_the_last_grey_level() {
     let off = made.volume.world_from_voxel.translation - expected.translation;
     assert!(off.abs().max_element() < 1e-5, "{off}");
     let range = sequence.pixels.statistics();
-    assert!(
-        range.max - range.min > 100.0 && range.mean > 30.0,
-        "speckle: {range:?}"
-    );
+    assert!(range.max - range.min > 100.0 && range.mean > 30.0, "speckle: {range:?}");
     // Planted: a row off.
     let mut settings = Settings::new(spacing);
     settings.lattice = Some((first + pitch * DVec3::Z, made.volume.size));
@@ -233,10 +220,7 @@ fn a_fan_leaves_the_corners_out() {
     assert!(fan.is_some());
     let (with, without) = (mean(fan), mean(None));
     println!("{with} with, {without} without the fan");
-    assert!(
-        with > 1.5 * without,
-        "{with} with, {without} without the fan"
-    );
+    assert!(with > 1.5 * without, "{with} with, {without} without the fan");
 }
 
 #[test]
@@ -247,17 +231,11 @@ fn a_sequence_is_read_back_with_poses_and_fan() {
     sequence.write(&path).expect("written");
     let (read, _) = Sequence::load(&path).expect("readable");
     assert_eq!(read, sequence);
-    let (fan, written) = (
-        Fan::of(&read).expect("a fan"),
-        Fan::of(&sequence).expect("a fan"),
-    );
+    let (fan, written) = (Fan::of(&read).expect("a fan"), Fan::of(&sequence).expect("a fan"));
     assert_eq!(fan, written);
     // Closed form: the apex lies a radius above the face, in the middle of the image.
     let fan = fan.expect("a fan");
-    assert!(
-        (fan.origin[0] - (read.size[0] as f64 - 1.0) / 2.0).abs() < 1e-3,
-        "{fan:?}"
-    );
+    assert!((fan.origin[0] - (read.size[0] as f64 - 1.0) / 2.0).abs() < 1e-3, "{fan:?}");
     assert!(
         (fan.angles[1] - 35.0).abs() < 1e-9
             && (fan.radii[1] / fan.radii[0] - 56.0 / 20.0).abs() < 1e-6
@@ -271,9 +249,7 @@ fn a_sequence_is_read_back_with_poses_and_fan() {
     }
     let mut planted = sequence.clone();
     planted.fields.retain(|(key, _)| key != "FanAnglesDeg");
-    let told = Fan::of(&planted)
-        .expect_err("an entry is missing")
-        .to_string();
+    let told = Fan::of(&planted).expect_err("an entry is missing").to_string();
     assert!(told.contains("`FanAnglesDeg`"), "{told}");
 }
 
@@ -292,17 +268,11 @@ fn a_file_of_poses_is_followed() {
             .map(|s| (s.time, s.world_from_probe.translation.to_array()))
             .collect::<Vec<_>>()
     };
-    let rows = [
-        (1.0, [0.0, 0.0, 0.0]),
-        (3.0, [4.0, 0.0, 2.0]),
-        (4.0, [4.0, 8.0, 2.0]),
-    ];
+    let rows = [(1.0, [0.0, 0.0, 0.0]), (3.0, [4.0, 0.0, 2.0]), (4.0, [4.0, 8.0, 2.0])];
     assert_eq!(at(None), rows);
     assert_eq!(at(Some(4))[1], (2.0, [2.0, 0.0, 1.0]));
     // What the file leaves out is the scene's.
-    let turned = stations_of(&track, &scene, None)[2]
-        .world_from_probe
-        .matrix3;
+    let turned = stations_of(&track, &scene, None)[2].world_from_probe.matrix3;
     let off = turned - scene.world_from_probe.matrix3;
     assert!(off.to_cols_array().iter().all(|v| v.abs() < 1e-12), "{off}");
     let error = load_trajectory(&folder.path().join("none.csv")).expect_err("no file");
@@ -332,20 +302,10 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     ]);
     assert!(fine && text.contains("4 tracked frames of"), "{text}");
     let (fine, text) = run(&["check", "a.igs.mha"]);
-    assert!(
-        fine && text.contains("pose ProbeToTracker: 4, 4 of them OK"),
-        "{text}"
-    );
+    assert!(fine && text.contains("pose ProbeToTracker: 4, 4 of them OK"), "{text}");
     assert!(!text.contains("keys are not used"), "{text}");
     // The same volume without a word about geometry: the probe's axes are the world's here.
-    let (fine, text) = run(&[
-        "reconstruct",
-        "a.igs.mha",
-        "--spacing",
-        "1,2,1",
-        "-o",
-        "b.mha",
-    ]);
+    let (fine, text) = run(&["reconstruct", "a.igs.mha", "--spacing", "1,2,1", "-o", "b.mha"]);
     assert!(fine && text.contains("4 of 4 frames"), "{text}");
     let load = |name: &str| Volume::load(&folder.path().join(name)).expect("a volume").0;
     let (a, b) = (load("a.mha"), load("b.mha"));
@@ -356,19 +316,10 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     for (args, cause) in [
         (&["--sweep", "linear:6mm"][..], "--output"),
         (&["--sweep", "tilt:6", "-o", "c.mha"], "has no unit"),
-        (
-            &["--sweep", "linear:6mm", "-o", "c.nrrd"],
-            "end the name in .mha",
-        ),
-        (
-            &["--sweep", "linear:6mm", "-o", "none/c.mha"],
-            "its folder does not exist",
-        ),
+        (&["--sweep", "linear:6mm", "-o", "c.nrrd"], "end the name in .mha"),
+        (&["--sweep", "linear:6mm", "-o", "none/c.mha"], "its folder does not exist"),
         (&["--sweep", "none.csv", "-o", "c.mha"], "check the path"),
-        (
-            &["--sweep", "linear:6mm", "-o", "c.mha", "--spacing", "1"],
-            "--volume",
-        ),
+        (&["--sweep", "linear:6mm", "-o", "c.mha", "--spacing", "1"], "--volume"),
     ] {
         let (fine, text) = run(&[&["acquire", "a.toml"], args].concat());
         assert!(!fine && text.contains(cause), "{cause}: {text}");
@@ -386,16 +337,8 @@ fn the_command_writes_volumes_over_time() {
         parent = \"to and fro\"\nshape = { sphere = { radius = 6 } }\ntissue = \"water\"\n\
         translate = [0, 0, 18]\n";
     std::fs::write(folder.path().join("a.toml"), text).expect("written");
-    let sweep = [
-        "acquire",
-        "a.toml",
-        "--sweep",
-        "linear:6mm",
-        "--frames",
-        "4",
-        "--spacing",
-        "1,2,1",
-    ];
+    let sweep =
+        ["acquire", "a.toml", "--sweep", "linear:6mm", "--frames", "4", "--spacing", "1,2,1"];
     let acquired = |more: &[&str]| {
         let (fine, text) = run(&[&sweep, more].concat());
         assert!(fine, "{text}");
@@ -403,10 +346,7 @@ fn the_command_writes_volumes_over_time() {
     };
     let times = ["--volumes", "4", "--period", "0.8s", "--time", "0.05"];
     let text = acquired(&[&times[..], &["--volume", "all.mha"]].concat());
-    assert!(
-        text.contains("4 volumes over time, one every 0.2 s"),
-        "{text}"
-    );
+    assert!(text.contains("4 volumes over time, one every 0.2 s"), "{text}");
     let load = |name: &str| Volume::load(&folder.path().join(name)).expect("a volume").0;
     let all = load("all.mha");
     assert_eq!(all.interval, Some(0.2));
@@ -419,28 +359,11 @@ fn the_command_writes_volumes_over_time() {
     for (args, cause) in [
         (&["--volumes", "4", "--volume", "b.mha"][..], "--period"),
         (&["--period", "1", "--volume", "b.mha"], "--volumes"),
+        (&["--volumes", "4", "--period", "1", "-o", "b.mha"], "--volume"),
+        (&["--volumes", "1", "--period", "1", "--volume", "b.mha"], "1 is not in 2..=1000"),
+        (&["--volumes", "4", "--period", "0", "--volume", "b.mha"], "it must lie between"),
         (
-            &["--volumes", "4", "--period", "1", "-o", "b.mha"],
-            "--volume",
-        ),
-        (
-            &["--volumes", "1", "--period", "1", "--volume", "b.mha"],
-            "1 is not in 2..=1000",
-        ),
-        (
-            &["--volumes", "4", "--period", "0", "--volume", "b.mha"],
-            "it must lie between",
-        ),
-        (
-            &[
-                "--volumes",
-                "4",
-                "--period",
-                "1",
-                "--volume",
-                "b.mha",
-                "--moving",
-            ],
+            &["--volumes", "4", "--period", "1", "--volume", "b.mha", "--moving"],
             "cannot be used with",
         ),
     ] {

@@ -86,12 +86,7 @@ fn sound(scene: &Scene, count: usize) {
     }
 }
 
-const CHAMBERS: [&str; 4] = [
-    "left-ventricle",
-    "right-ventricle",
-    "left-atrium",
-    "right-atrium",
-];
+const CHAMBERS: [&str; 4] = ["left-ventricle", "right-ventricle", "left-atrium", "right-atrium"];
 
 #[test]
 fn the_heart_has_eight_sound_keyframes() {
@@ -111,12 +106,8 @@ fn the_heart_has_eight_sound_keyframes() {
 #[test]
 fn the_heart_ejects_what_a_healthy_one_does() {
     let scene = shipped("heart");
-    let volumes = CHAMBERS.map(|name| {
-        keyframes(&scene, name)
-            .into_iter()
-            .map(volume)
-            .collect::<Vec<_>>()
-    });
+    let volumes =
+        CHAMBERS.map(|name| keyframes(&scene, name).into_iter().map(volume).collect::<Vec<_>>());
     let most = |v: &[f64]| v.iter().copied().fold(f64::MIN, f64::max);
     let least = |v: &[f64]| v.iter().copied().fold(f64::MAX, f64::min);
     let [lv, rv, la, ra] = &volumes;
@@ -127,29 +118,21 @@ fn the_heart_ejects_what_a_healthy_one_does() {
     // and men alike. Left ventricle 62-106 ml at end diastole, 21-42 ml at end systole, ejection
     // fraction 54-72 %; right ventricle above 45 % by three-dimensional echocardiography.
     let ejected = |v: &[f64]| 1.0 - least(v) / most(v);
-    assert!(
-        (62.0..=106.0).contains(&most(lv)) && (21.0..=42.0).contains(&least(lv)),
-        "{lv:?}"
-    );
+    assert!((62.0..=106.0).contains(&most(lv)) && (21.0..=42.0).contains(&least(lv)), "{lv:?}");
     assert!((0.54..=0.72).contains(&ejected(lv)), "{}", ejected(lv));
     assert!((0.45..=0.70).contains(&ejected(rv)), "{}", ejected(rv));
     // Largest left atrium 16-34 ml per m2 of body surface, here 1.8 m2.
     assert!((29.0..=61.0).contains(&most(la)), "{la:?}");
     // Keyframe 0 is end diastole, 3 end systole; the atria fill while the ventricles empty.
     for (ventricle, atrium) in [(lv, la), (rv, ra)] {
-        assert_eq!(
-            (ventricle[0], ventricle[3]),
-            (most(ventricle), least(ventricle))
-        );
+        assert_eq!((ventricle[0], ventricle[3]), (most(ventricle), least(ventricle)));
         assert_eq!((atrium[0], atrium[3]), (least(atrium), most(atrium)));
     }
     // Muscle keeps its volume to 10 %: it thickens as the cavity narrows. Outer surface less the
     // chambers; the aorta lies outside but for its root.
     let outer = keyframes(&scene, "epicardium").into_iter().map(volume);
-    let muscle: Vec<f64> = outer
-        .enumerate()
-        .map(|(k, v)| v - volumes.iter().map(|c| c[k]).sum::<f64>())
-        .collect();
+    let muscle: Vec<f64> =
+        outer.enumerate().map(|(k, v)| v - volumes.iter().map(|c| c[k]).sum::<f64>()).collect();
     println!("muscle: {muscle:.1?} ml");
     assert!(least(&muscle) > 0.9 * most(&muscle), "{muscle:?}");
 }
@@ -162,12 +145,7 @@ fn the_hearts_chambers_are_apart_in_every_keyframe() {
     for k in 0..8 {
         for (i, a) in chambers.iter().enumerate() {
             let within = common(a[k], outer[k]);
-            assert_eq!(
-                within,
-                a[k].positions.len().div_ceil(3),
-                "{} {k}",
-                CHAMBERS[i]
-            );
+            assert_eq!(within, a[k].positions.len().div_ceil(3), "{} {k}", CHAMBERS[i]);
             for (j, b) in chambers.iter().enumerate().filter(|(j, _)| *j != i) {
                 let both = common(a[k], b[k]);
                 assert_eq!(both, 0, "{} in {}, keyframe {k}", CHAMBERS[i], CHAMBERS[j]);
@@ -214,10 +192,7 @@ fn the_fetus_has_the_sizes_of_eleven_weeks() {
         assert!(volume(&scene.meshes[at.mesh]) > 0.0, "{}", at.name);
     }
     // Crown to rump, along the fetus' own axis: the head's frame begins 3 mm above the body's.
-    let (crown, rump) = (
-        extent([mesh("head")]).1.x + 3.0,
-        extent([mesh("trunk")]).0.x,
-    );
+    let (crown, rump) = (extent([mesh("head")]).1.x + 3.0, extent([mesh("trunk")]).0.x);
     // Robinson and Fleming 1975: 45.5 +- 2 x 3.5 mm at 11 weeks 0 to 2 days.
     let length = crown - rump;
     assert!((41.0..=45.0).contains(&length), "{length}");
@@ -225,27 +200,15 @@ fn the_fetus_has_the_sizes_of_eleven_weeks() {
     assert!((76.0..=80.0).contains(&days), "{days}");
     // Outer to outer at the skull; 16 +- 2 mm at 11 weeks.
     let (low, high) = extent([mesh("skull")]);
-    assert!(
-        (14.0..=18.0).contains(&(high.y - low.y)),
-        "{}",
-        high.y - low.y
-    );
+    assert!((14.0..=18.0).contains(&(high.y - low.y)), "{}", high.y - low.y);
 }
 
 #[test]
 fn the_fetus_moves_and_stays_in_its_sac() {
     let mut scene = shipped("fetus");
     let sac = scene.meshes[instance(&scene, "sac").mesh].clone();
-    let names = [
-        "head",
-        "trunk",
-        "left-upper-arm",
-        "left-lower-arm",
-        "right-lower-arm",
-    ];
-    let names = names
-        .into_iter()
-        .chain(["left-thigh", "left-calf", "right-calf"]);
+    let names = ["head", "trunk", "left-upper-arm", "left-lower-arm", "right-lower-arm"];
+    let names = names.into_iter().chain(["left-thigh", "left-calf", "right-calf"]);
     let names: Vec<&str> = names.collect();
     let mut apart = 0.0f64;
     let relative = |scene: &Scene| -> DAffine3 {
@@ -261,14 +224,8 @@ fn the_fetus_moves_and_stays_in_its_sac() {
         for name in &names {
             let at = instance(&scene, name);
             for p in scene.meshes[at.mesh].positions.iter().step_by(9) {
-                let p = at
-                    .world_from_object
-                    .transform_point3(p.map(f64::from).into());
-                assert!(
-                    inside(&sac, p),
-                    "{name} at {} s leaves the sac at {p}",
-                    step as f64 / 2.0
-                );
+                let p = at.world_from_object.transform_point3(p.map(f64::from).into());
+                assert!(inside(&sac, p), "{name} at {} s leaves the sac at {p}", step as f64 / 2.0);
             }
         }
     }

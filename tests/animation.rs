@@ -11,9 +11,7 @@ use insonify::sim::{Simulator, Tracer};
 
 /// A shipped scene at a size that a software driver renders in a second.
 fn small(name: &str) -> Scene {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("scenes")
-        .join(name);
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes").join(name);
     let smaller = [
         ("probe.scanlines", "48"),
         ("probe.elevation_layers", "1"),
@@ -68,11 +66,7 @@ fn every_strategy_shows_the_same_image() {
                     expected.push(found.clone());
                 }
                 // The two tracers may see a seam differently; one tracer sees what it saw.
-                let allowed = if tracer == Tracer::Bvh {
-                    0
-                } else {
-                    found.len() / 1000
-                };
+                let allowed = if tracer == Tracer::Bvh { 0 } else { found.len() / 1000 };
                 let far = match strategy {
                     // A billionth of a second from its keyframe: single precision may see that.
                     Strategy::Interpolate => {
@@ -97,10 +91,7 @@ fn every_strategy_shows_the_same_image() {
         differing(&expected[0], &expected[1]) > expected[0].len() / 100,
         "the limb does not move"
     );
-    assert_eq!(
-        expected[0], expected[3],
-        "the same instant is the same image"
-    );
+    assert_eq!(expected[0], expected[3], "the same instant is the same image");
     let messages = device.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }
@@ -110,11 +101,7 @@ fn every_strategy_shows_the_same_image() {
 fn a_moving_scene_looks_like_the_still_one() {
     let device = test_device();
     let library = Library::embedded();
-    for (name, seconds) in [
-        ("heart.toml", 0.3),
-        ("fetus.toml", 3.1),
-        ("limbs.toml", 0.9),
-    ] {
+    for (name, seconds) in [("heart.toml", 0.3), ("fetus.toml", 3.1), ("limbs.toml", 0.9)] {
         let mut scene = small(name);
         // Without keyframes there is no reference shape that tissue could follow.
         scene.simulation.texture_space = TextureSpace::Object;
@@ -127,10 +114,7 @@ fn a_moving_scene_looks_like_the_still_one() {
         let mut fresh =
             Simulator::new(&device, &library, &still, Tracer::Bvh).expect("a simulator");
         assert_eq!(differing(&moved, &image(&mut fresh, &still)), 0, "{name}");
-        assert!(
-            differing(&moved, &rest) > rest.len() / 500,
-            "{name} does not move"
-        );
+        assert!(differing(&moved, &rest) > rest.len() / 500, "{name} does not move");
     }
     let messages = device.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
@@ -154,15 +138,8 @@ fn between_keyframes_the_device_moves_vertices_as_the_host_does() {
             let mut fresh = Simulator::new(&device, &library, &still, tracer).expect("a simulator");
             // Vertices differ in their last bits, which moves some echoes by a grey level.
             let far = differing(&found, &image(&mut fresh, &still));
-            assert!(
-                far < found.len() / 200,
-                "{tracer}, {seconds} s: {far} of {}",
-                found.len()
-            );
-            assert!(
-                differing(&found, &last) > found.len() / 100,
-                "{tracer}: nothing moves"
-            );
+            assert!(far < found.len() / 200, "{tracer}, {seconds} s: {far} of {}", found.len());
+            assert!(differing(&found, &last) > found.len() / 100, "{tracer}: nothing moves");
             last = found;
         }
     }
@@ -178,8 +155,5 @@ fn the_ray_query_refuses_a_selector_node() {
     choose(&mut scene, Strategy::Selector, 0.0);
     let refused = Simulator::new(&device, &Library::embedded(), &scene, Tracer::RayQuery);
     let message = refused.err().expect("refused").to_string();
-    assert!(
-        message.contains("`selector`") && message.contains("`mask`"),
-        "{message}"
-    );
+    assert!(message.contains("`selector`") && message.contains("`mask`"), "{message}");
 }

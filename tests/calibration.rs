@@ -19,11 +19,7 @@ fn axial(frame: &layout::Frame, k: f64, kappa: f64) -> f64 {
     let sigma = f64::from(frame.axial_sigma);
     let radius = (4.0 * sigma).ceil().min(32.0);
     let tap = |j: f64| {
-        if j.abs() <= radius {
-            (-j * j / (2.0 * sigma * sigma)).exp()
-        } else {
-            0.0
-        }
+        if j.abs() <= radius { (-j * j / (2.0 * sigma * sigma)).exp() } else { 0.0 }
     };
     tap((kappa + 0.5).floor() - k)
 }
@@ -34,10 +30,7 @@ fn lattice_rms(scene: &Scene, k: usize, realisations: u32) -> f64 {
     let tissue = tables::tissues(scene)[0];
     let (h, dz) = (f64::from(frame.cell), f64::from(frame.sample_pitch));
     let (sx, se) = (f64::from(row.sigma_lateral), f64::from(row.sigma_elevation));
-    let (cut, reach) = (
-        f64::from(frame.lateral_cut) * sx,
-        f64::from(frame.elevation_reach),
-    );
+    let (cut, reach) = (f64::from(frame.lateral_cut) * sx, f64::from(frame.elevation_reach));
     let gain = f64::from(row.volume_gain) / f64::from(row.compensation);
     let z = k as f64 * dz;
     let deep = 5.0 * scene.probe.sigma_axial();
@@ -120,11 +113,8 @@ fn echogenicity_sets_brightness_whatever_density_and_mean() {
     let n = 1500;
     for (rho, mean) in [(0.3, 0.0), (0.5, 1.0), (1.0, 2.0)] {
         let mut scene = scene(Probe::linear());
-        scene.tissues[0] = Tissue {
-            density_of_scatterers: rho,
-            mean_over_sigma: mean,
-            ..tissue(-6.0)
-        };
+        scene.tissues[0] =
+            Tissue { density_of_scatterers: rho, mean_over_sigma: mean, ..tissue(-6.0) };
         let level = decibel(lattice_rms(&scene, 1000, n));
         assert!((level + 51.0).abs() < tolerance(n), "{rho} {mean}: {level}");
     }
@@ -137,10 +127,7 @@ fn a_missing_elevation_factor_is_caught() {
     let full = Calibration::new(&scene).speckle_gain(50.0);
     scene.probe.slice_thickness = 1.0;
     let thin = Calibration::new(&scene).speckle_gain(50.0);
-    assert!(
-        decibel(thin / full) > 2.0 * tolerance(1500),
-        "{thin} {full}"
-    );
+    assert!(decibel(thin / full) > 2.0 * tolerance(1500), "{thin} {full}");
 }
 
 #[test]
@@ -155,11 +142,9 @@ fn the_full_slab_needs_no_correction() {
 #[test]
 fn voxel_speckle_is_45_db_under_a_mirror() {
     let n = 3000;
-    for (probe, h) in [
-        (Probe::paper_table1(), 0.04),
-        (Probe::paper_table1(), 0.15),
-        (Probe::linear(), 0.3),
-    ] {
+    for (probe, h) in
+        [(Probe::paper_table1(), 0.04), (Probe::paper_table1(), 0.15), (Probe::linear(), 0.3)]
+    {
         let mut scene = scene(probe);
         scene.simulation.scatter_mode = ScatterMode::Voxel;
         scene.simulation.cell = h;
@@ -218,9 +203,7 @@ fn points_show_their_amplitude_at_the_transmit_focus() {
 fn noise_has_its_level_after_the_axial_kernel() {
     let mut scene = scene(Probe::paper_table1());
     let frame = tables::frame(&scene, 0);
-    let energy: f64 = (-32..=32)
-        .map(|j| axial(&frame, 0.0, f64::from(j)).powi(2))
-        .sum();
+    let energy: f64 = (-32..=32).map(|j| axial(&frame, 0.0, f64::from(j)).powi(2)).sum();
     let rms = f64::from(frame.noise) * (2.0 * energy).sqrt();
     assert!((decibel(rms) + 116.0).abs() < 1e-4, "{}", decibel(rms));
     scene.imaging.noise = f64::NEG_INFINITY;
@@ -241,12 +224,8 @@ fn sums_cannot_reach_the_accumulators_end() {
         tissue: 0,
         priority: 0,
         world_from_object: DAffine3::IDENTITY,
-        surface: [Surface {
-            roughness: f64::INFINITY,
-            thickness: 0.3,
-            specularity: 1.0,
-            gain: 6.0,
-        }; 2],
+        surface: [Surface { roughness: f64::INFINITY, thickness: 0.3, specularity: 1.0, gain: 6.0 };
+            2],
     });
     scene.wires.push(Wire {
         ends: [[-10.0, 0.0, 50.0], [10.0, 0.0, 50.0]],
@@ -301,20 +280,10 @@ fn speckle_stays_above_the_rounding_everywhere() {
 
 #[test]
 fn the_picture_holds_the_whole_sector() {
-    let wide = Probe {
-        kind: Kind::Convex {
-            radius: 10.0,
-            field_of_view: 4.0,
-        },
-        ..Probe::paper_table1()
-    };
-    for probe in [
-        Probe::paper_table1(),
-        Probe::abdominal(),
-        Probe::linear(),
-        Probe::phased(),
-        wide,
-    ] {
+    let wide =
+        Probe { kind: Kind::Convex { radius: 10.0, field_of_view: 4.0 }, ..Probe::paper_table1() };
+    for probe in [Probe::paper_table1(), Probe::abdominal(), Probe::linear(), Probe::phased(), wide]
+    {
         let scene = scene(probe);
         let frame = tables::frame(&scene, 0);
         let right = -frame.image_left;
@@ -327,10 +296,7 @@ fn the_picture_holds_the_whole_sector() {
             let u = f64::from(i) / 1000.0 - 0.5;
             for depth in [0.0, scene.probe.depth] {
                 let (x, z) = match scene.probe.kind {
-                    Kind::Convex {
-                        radius,
-                        field_of_view,
-                    } => {
+                    Kind::Convex { radius, field_of_view } => {
                         let (s, c) = (u * field_of_view).sin_cos();
                         ((radius + depth) * s, (radius + depth) * c - radius)
                     }

@@ -16,10 +16,7 @@ const SMALL: [&str; 6] = [
 ];
 
 fn insonify(args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_insonify"))
-        .args(args)
-        .output()
-        .expect("the program starts")
+    Command::new(env!("CARGO_BIN_EXE_insonify")).args(args).output().expect("the program starts")
 }
 
 fn render(scene: &str, more: &[&str]) -> Output {
@@ -37,11 +34,8 @@ fn path(path: &Path) -> &str {
 #[test]
 fn render_writes_picture_stages_and_figures_without_a_validation_message() {
     let dir = tempfile::tempdir().expect("a folder");
-    let (png, json, dump) = (
-        dir.path().join("a.png"),
-        dir.path().join("a.json"),
-        dir.path().join("stages"),
-    );
+    let (png, json, dump) =
+        (dir.path().join("a.png"), dir.path().join("a.json"), dir.path().join("stages"));
     for tracer in ["bvh", "ray-query"] {
         let out = render(
             "scenes/phantom.toml",
@@ -68,39 +62,22 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
         assert!(first != last, "each frame has its noise");
         let image = last;
         let bright = image.pixels().filter(|p| p.0[0] > 60).count();
-        assert!(
-            bright * 5 > (image.width() * image.height()) as usize,
-            "{bright} bright pixels"
-        );
+        assert!(bright * 5 > (image.width() * image.height()) as usize, "{bright} bright pixels");
         let figures: Value =
             serde_json::from_slice(&std::fs::read(&json).expect("figures")).expect("JSON");
         assert_eq!(figures["tracer"], tracer);
         assert_eq!(figures["saturated_samples"], 0);
         let counts = &figures["settings"]["counts"];
         assert_eq!(
-            [
-                &counts["lines"],
-                &counts["paths_per_line"],
-                &counts["paths"]
-            ],
+            [&counts["lines"], &counts["paths_per_line"], &counts["paths"]],
             [96, 8, 96 * 8]
         );
         assert_eq!(figures["validation_messages"], Value::Array(vec![]));
-        for key in [
-            "settings",
-            "device",
-            "stages_ms",
-            "frame_ms",
-            "memory",
-            "counters",
-        ] {
+        for key in ["settings", "device", "stages_ms", "frame_ms", "memory", "counters"] {
             assert!(figures[key].is_object(), "{key}");
         }
         for stage in ["origin", "trace", "scatter", "beam", "axial", "display"] {
-            assert!(
-                figures["stages_ms"][stage]["p99"].as_f64() > Some(0.0),
-                "{stage}"
-            );
+            assert!(figures["stages_ms"][stage]["p99"].as_f64() > Some(0.0), "{stage}");
         }
         assert!(figures["memory"]["device_peak_bytes"].as_u64() > Some(100_000));
         for (name, values) in [
@@ -109,9 +86,7 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
             ("3_envelope", 48 * 512),
             ("4_log", 48 * 512),
         ] {
-            let size = std::fs::metadata(dump.join(name).with_extension("npy"))
-                .expect(name)
-                .len();
+            let size = std::fs::metadata(dump.join(name).with_extension("npy")).expect(name).len();
             assert_eq!(size % 64, (values * 4) % 64, "{name} has a padded header");
             let axes: Value = serde_json::from_slice(
                 &std::fs::read(dump.join(name).with_extension("json")).expect(name),
@@ -144,15 +119,7 @@ fn every_sampling_scatter_mode_and_probe_renders() {
     for mode in modes {
         let out = render(
             "scenes/abdomen.toml",
-            &[
-                "--set",
-                mode,
-                "--quality",
-                "draft",
-                "-o",
-                path(&png),
-                "--validate",
-            ],
+            &["--set", mode, "--quality", "draft", "-o", path(&png), "--validate"],
         );
         assert!(out.status.success(), "{mode}: {}", text(&out.stderr));
         let image = image::open(&png).expect("a PNG").into_luma8();
@@ -188,41 +155,15 @@ fn quality_sets_the_counts_that_the_user_does_not() {
 fn mistakes_are_explained() {
     let cases: [(&[&str], &str); 5] = [
         (&["render", "scenes/nowhere.toml"], "nowhere.toml"),
-        (
-            &["render", "scenes/phantom.toml", "--set", "probe.dept=3"],
-            "depth",
-        ),
-        (
-            &[
-                "render",
-                "scenes/phantom.toml",
-                "--set",
-                "probe.depth=5 MHz",
-            ],
-            "mm",
-        ),
-        (
-            &[
-                "render",
-                "scenes/phantom.toml",
-                "--device",
-                "no such device",
-            ],
-            "no such device",
-        ),
-        (
-            &["render", "scenes/phantom.toml", "--set", "nonsense"],
-            "PATH=VALUE",
-        ),
+        (&["render", "scenes/phantom.toml", "--set", "probe.dept=3"], "depth"),
+        (&["render", "scenes/phantom.toml", "--set", "probe.depth=5 MHz"], "mm"),
+        (&["render", "scenes/phantom.toml", "--device", "no such device"], "no such device"),
+        (&["render", "scenes/phantom.toml", "--set", "nonsense"], "PATH=VALUE"),
     ];
     for (args, needle) in cases {
         let out = insonify(args);
         assert!(!out.status.success(), "{args:?}");
-        assert!(
-            text(&out.stderr).contains(needle),
-            "{args:?}: {}",
-            text(&out.stderr)
-        );
+        assert!(text(&out.stderr).contains(needle), "{args:?}: {}", text(&out.stderr));
     }
 }
 
@@ -230,11 +171,7 @@ fn mistakes_are_explained() {
 fn info_lists_this_machine() {
     let out = insonify(&["info"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
-    assert!(
-        text(&out.stdout).contains("Vulkan 1."),
-        "{}",
-        text(&out.stdout)
-    );
+    assert!(text(&out.stdout).contains("Vulkan 1."), "{}", text(&out.stdout));
 }
 
 /// A program whose reader has left before the first line.
@@ -297,15 +234,7 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
             .output()
             .expect("the program starts")
     };
-    for name in [
-        "origin",
-        "trace",
-        "scatter_rigid",
-        "beam",
-        "axial",
-        "detect",
-        "display",
-    ] {
+    for name in ["origin", "trace", "scatter_rigid", "beam", "axial", "detect", "display"] {
         let out = kernels(name);
         let said = text(&out.stdout) + &text(&out.stderr);
         assert!(out.status.success(), "{said}");
@@ -319,11 +248,7 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
     std::fs::write(&rows, bytes).expect("rows");
     let out = kernels("detect");
     assert!(!out.status.success());
-    assert!(
-        text(&out.stderr).contains("rows.npy"),
-        "{}",
-        text(&out.stderr)
-    );
+    assert!(text(&out.stderr).contains("rows.npy"), "{}", text(&out.stderr));
 }
 
 /// Kernels compiled from the checked-in sources are the checked-in kernels.
@@ -374,11 +299,7 @@ parent = "blink"
 
 /// Row of the brightest line, as a share of the picture's height.
 fn brightest(image: &image::GrayImage) -> f64 {
-    let sum = |y: u32| -> u64 {
-        (0..image.width())
-            .map(|x| u64::from(image[(x, y)].0[0]))
-            .sum()
-    };
+    let sum = |y: u32| -> u64 { (0..image.width()).map(|x| u64::from(image[(x, y)].0[0])).sum() };
     let row = (0..image.height()).max_by_key(|&y| sum(y)).expect("rows");
     f64::from(row) / f64::from(image.height())
 }
@@ -386,15 +307,10 @@ fn brightest(image: &image::GrayImage) -> f64 {
 #[test]
 fn time_moves_the_scene_and_frames_become_an_animation() {
     let dir = tempfile::tempdir().expect("a folder");
-    let (scene, gif, png) = (
-        dir.path().join("moving.toml"),
-        dir.path().join("a.gif"),
-        dir.path().join("a.png"),
-    );
+    let (scene, gif, png) =
+        (dir.path().join("moving.toml"), dir.path().join("a.gif"), dir.path().join("a.png"));
     std::fs::write(&scene, MOVING).expect("written");
-    let more = [
-        "--tracer", "bvh", "--frames", "4", "--fps", "4", "--time", "100 ms",
-    ];
+    let more = ["--tracer", "bvh", "--frames", "4", "--fps", "4", "--time", "100 ms"];
     let out = render(path(&scene), &[&more[..], &["-o", path(&gif)]].concat());
     assert!(out.status.success(), "{}", text(&out.stderr));
     assert_eq!(text(&out.stdout).trim(), path(&gif));
@@ -403,10 +319,8 @@ fn time_moves_the_scene_and_frames_become_an_animation() {
     let frames = image::AnimationDecoder::into_frames(decoder);
     let frames = frames.collect_frames().expect("whole");
     assert_eq!(frames.len(), 4);
-    let grey: Vec<_> = frames
-        .iter()
-        .map(|f| image::DynamicImage::from(f.buffer().clone()).into_luma8())
-        .collect();
+    let grey: Vec<_> =
+        frames.iter().map(|f| image::DynamicImage::from(f.buffer().clone()).into_luma8()).collect();
     // At 0.1 and 0.35 s; the plate's front is at 15 - 5 cos(pi t) of 30 mm, within a row or two of
     // the 120 rows; the pulse is 0.2 mm long.
     for (frame, t) in grey.iter().zip([0.1, 0.35]) {
@@ -417,29 +331,17 @@ fn time_moves_the_scene_and_frames_become_an_animation() {
     // In the second half of the second the plate is hidden.
     let light = |image: &image::GrayImage| image.pixels().filter(|p| p.0[0] > 60).count();
     let counts: Vec<_> = grey.iter().map(light).collect();
-    assert!(
-        counts[..2].iter().all(|&n| n > 100) && counts[2..] == [0, 0],
-        "{counts:?}"
-    );
+    assert!(counts[..2].iter().all(|&n| n > 100) && counts[2..] == [0, 0], "{counts:?}");
     assert_eq!(frames[0].delay().numer_denom_ms(), (250, 1));
 
-    let out = render(
-        path(&scene),
-        &["--tracer", "bvh", "--time", "0.35", "-o", path(&png)],
-    );
+    let out = render(path(&scene), &["--tracer", "bvh", "--time", "0.35", "-o", path(&png)]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let still = image::open(&png).expect("a PNG").into_luma8();
     assert!((brightest(&still) - brightest(&grey[1])).abs() < 0.01);
 
-    for (wrong, cause) in [
-        (["--time", "4 mm"], "`s`, `ms`"),
-        (["--fps", "0"], "between"),
-    ] {
+    for (wrong, cause) in [(["--time", "4 mm"], "`s`, `ms`"), (["--fps", "0"], "between")] {
         let out = render(path(&scene), &wrong);
-        assert!(
-            !out.status.success() && text(&out.stderr).contains(cause),
-            "{wrong:?}"
-        );
+        assert!(!out.status.success() && text(&out.stderr).contains(cause), "{wrong:?}");
     }
 }
 
@@ -456,10 +358,7 @@ fn lines_that_cannot_be_written_are_told_and_files_are_there_all_the_same() {
     let output = command.output().expect("the program starts");
     let told = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{told}");
-    assert!(
-        told.contains("standard output could not be written: No space left"),
-        "{told}"
-    );
+    assert!(told.contains("standard output could not be written: No space left"), "{told}");
     assert!(!told.contains("panicked"), "{told}");
     assert!(image::open(&png).is_ok(), "the picture is whole");
 }

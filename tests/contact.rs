@@ -59,10 +59,7 @@ fn lines(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> Vec<Vec<f32>> {
     simulator.frame(scene, 0).expect("a frame");
     let lateral = simulator.lateral().expect("samples");
     let each = 2 * scene.probe.samples as usize;
-    lateral[..each * scene.probe.scanlines as usize]
-        .chunks(each)
-        .map(<[f32]>::to_vec)
-        .collect()
+    lateral[..each * scene.probe.scanlines as usize].chunks(each).map(<[f32]>::to_vec).collect()
 }
 
 fn coupling(scene: &Scene) -> Coupling {
@@ -106,10 +103,7 @@ fn columns_whose_gap_exceeds_the_gel_are_dark_and_the_others_as_they_were() {
         };
         assert!(dark_as(3.0, border(3.0)), "{tracer}");
         assert!(dark_as(1.0, border(1.0)), "{tracer}");
-        assert!(
-            !dark_as(3.0, border(2.5)),
-            "{tracer}: the wrong gel is noticed"
-        );
+        assert!(!dark_as(3.0, border(2.5)), "{tracer}: the wrong gel is noticed");
     }
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
@@ -124,33 +118,23 @@ fn a_line_keeps_the_coupled_shares_of_what_sends_and_of_what_receives() {
     without.contact = None;
     let (width, border) = (38.0, 3.0 / angle.tan());
     let share = |middle: f64, aperture: f64| {
-        let (left, right) = (
-            (middle - aperture / 2.0).max(0.0),
-            (middle + aperture / 2.0).min(width),
-        );
+        let (left, right) =
+            ((middle - aperture / 2.0).max(0.0), (middle + aperture / 2.0).min(width));
         ((border - left) / (right - left)).clamp(0.0, 1.0)
     };
     let pitch = width / 96.0;
     let transmit = with.probe.focus / with.probe.f_number_transmit;
     for tracer in TRACERS {
-        let (seen, free) = (
-            lines(&device, &with, tracer),
-            lines(&device, &without, tracer),
-        );
+        let (seen, free) = (lines(&device, &with, tracer), lines(&device, &without, tracer));
         let worst = |receives: bool| {
             let mut worst = 0.0_f64;
             for l in 0..96 {
                 let middle = (f64::from(l) + 0.5) * pitch;
                 for k in 0..with.probe.samples {
                     let z = f64::from(k) * with.probe.sample_pitch();
-                    let receive = (z / with.probe.f_number_receive)
-                        .min(with.probe.aperture)
-                        .max(pitch);
-                    let rest = if receives {
-                        share(middle, receive)
-                    } else {
-                        1.0
-                    };
+                    let receive =
+                        (z / with.probe.f_number_receive).min(with.probe.aperture).max(pitch);
+                    let rest = if receives { share(middle, receive) } else { 1.0 };
                     let expected = share(middle, transmit) * rest;
                     let i = (l as usize, 2 * k as usize);
                     let [a, b] = [&seen, &free].map(|f| f64::from(f[i.0][i.1]));
@@ -184,9 +168,7 @@ fn on_a_sphere_the_coupled_elements_and_the_depth_are_those_of_the_closed_form()
     };
     // Joined where x^2 <= R^2 - (R + lift - gel)^2.
     let elements = |lift: f64, gel: f64| {
-        let x = (60f64.powi(2) - (60.0 + lift - gel).powi(2))
-            .max(0.0)
-            .sqrt();
+        let x = (60f64.powi(2) - (60.0 + lift - gel).powi(2)).max(0.0).sqrt();
         (2.0 * x).min(38.0) / 38.0 * 96.0
     };
     for lift in [1.9, 1.0, 0.5, 0.0, -0.5, -0.9, -3.0] {
@@ -195,19 +177,15 @@ fn on_a_sphere_the_coupled_elements_and_the_depth_are_those_of_the_closed_form()
         assert!((found - expected).abs() < 1.0, "{lift}: {found} {expected}");
     }
     let planted = coupled(&ball(0.5));
-    assert!(
-        (planted - elements(0.5, 1.8)).abs() > 1.0,
-        "2 mm are not 1.8"
-    );
+    assert!((planted - elements(0.5, 1.8)).abs() > 1.0, "2 mm are not 1.8");
     assert_eq!(coupled(&ball(2.01)), 0.0);
     // Mean of sqrt(R^2 - x^2) - (R - p) over where it is above 0.
     let press = 1.5_f64;
     let half = (60f64.powi(2) - (60.0 - press).powi(2)).sqrt();
     let steps = 10_000;
     let at = |i: i32| (f64::from(i) + 0.5) / f64::from(steps) * half;
-    let sum: f64 = (0..steps)
-        .map(|i| (60f64.powi(2) - at(i).powi(2)).sqrt() - (60.0 - press))
-        .sum();
+    let sum: f64 =
+        (0..steps).map(|i| (60f64.powi(2) - at(i).powi(2)).sqrt() - (60.0 - press)).sum();
     let expected = sum / f64::from(steps) * 2.0 * half / 38.0;
     let depth = coupling(&ball(-press)).touch.depth;
     assert!((depth - expected).abs() < 0.01, "{depth} {expected}");
@@ -238,11 +216,7 @@ fn lifted_off_there_is_nothing_but_noise() {
         assert_eq!(none, None);
         assert_eq!(dark, noise, "{tracer}");
         lifted.world_from_probe.translation.z = -2.9;
-        assert_ne!(
-            touch(&lifted).0,
-            noise,
-            "{tracer}: held to the skin it hears"
-        );
+        assert_ne!(touch(&lifted).0, noise, "{tracer}: held to the skin it hears");
     }
 }
 
@@ -286,10 +260,7 @@ fn the_skin_is_where_its_transforms_and_selectors_put_it() {
         // The skin's top lies at the sine: above 1 mm of gap nothing is coupled, below 0 it is pressed.
         let (touch, top) = (at(t), phase(t));
         assert_eq!(touch.share, if top <= 1.0 { 1.0 } else { 0.0 }, "{t}");
-        assert!(
-            (touch.depth - (-top).max(0.0)).abs() < 1e-6,
-            "{t}: {touch:?}"
-        );
+        assert!((touch.depth - (-top).max(0.0)).abs() < 1e-6, "{t}: {touch:?}");
     }
     assert_eq!(at(1.5).share, 0.0, "the other skin is far away");
 }
@@ -359,11 +330,7 @@ fn shipped_scenes_are_in_full_contact_and_look_as_without_it() {
             scene.set_time(seconds);
             let coupling = Coupling::of(&scene, &mut skins).expect(name);
             assert_eq!(coupling.touch.share, 1.0, "{name} at {seconds} s");
-            assert_eq!(
-                table(&scene, Some(&coupling)),
-                table(&scene, None),
-                "{name}"
-            );
+            assert_eq!(table(&scene, Some(&coupling)), table(&scene, None), "{name}");
         }
     }
     let device = test_device();
@@ -380,13 +347,7 @@ fn every_kind_of_probe_has_a_face_as_wide_as_it_is() {
     let mut scene = rocked(0.0, 3.0);
     for (kind, width) in [
         (Kind::Linear { width: 38.0 }, 38.0),
-        (
-            Kind::Convex {
-                radius: 50.0,
-                field_of_view: 1.0,
-            },
-            50.0,
-        ),
+        (Kind::Convex { radius: 50.0, field_of_view: 1.0 }, 50.0),
         (Kind::Phased { field_of_view: 1.5 }, 19.0),
     ] {
         scene.probe.kind = kind;

@@ -21,25 +21,16 @@ fn shipped() -> Vec<PathBuf> {
 }
 
 fn explicit() -> Vec<u8> {
-    let path = shipped()
-        .into_iter()
-        .find(|p| p.ends_with("explicit_u8.dcm"));
+    let path = shipped().into_iter().find(|p| p.ends_with("explicit_u8.dcm"));
     std::fs::read(path.expect("it ships")).expect("readable")
 }
 
 /// Places of the values of an element with types written down, little endian.
 fn places(file: &[u8], group: u16, element: u16, kind: &str) -> Vec<usize> {
-    let head = [
-        &group.to_le_bytes()[..],
-        &element.to_le_bytes(),
-        kind.as_bytes(),
-    ]
-    .concat();
+    let head = [&group.to_le_bytes()[..], &element.to_le_bytes(), kind.as_bytes()].concat();
     let short = !["OB", "OW", "SQ"].contains(&kind);
     let starts = file.windows(6).enumerate().filter(|(_, w)| *w == head);
-    starts
-        .map(|(at, _)| at + if short { 8 } else { 12 })
-        .collect()
+    starts.map(|(at, _)| at + if short { 8 } else { 12 }).collect()
 }
 
 struct Folder(tempfile::TempDir);
@@ -65,15 +56,8 @@ impl Folder {
         let path = self.0.path().join("b.dcm");
         std::fs::write(&path, bytes).expect("written");
         let Outcome { code, text } = check(&path);
-        let text = text
-            .replace("│ ", "")
-            .split_whitespace()
-            .collect::<Vec<_>>()
-            .join(" ");
-        assert!(
-            code == Some(1) && text.contains(cause),
-            "{code:?} {text}, not {cause}"
-        );
+        let text = text.replace("│ ", "").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(code == Some(1) && text.contains(cause), "{code:?} {text}, not {cause}");
     }
 }
 
@@ -88,90 +72,20 @@ fn planted_mistakes_are_refused_with_their_cause() {
     let double = |v: f64| v.to_le_bytes().to_vec();
     let uid = b"1.2.840.10008.1.2.7\0".to_vec();
     for (group, element, kind, which, value, cause) in [
-        (
-            0x0002,
-            0x0010,
-            "UI",
-            0,
-            uid,
-            "is written in a transfer syntax that cannot be read",
-        ),
-        (
-            0x0028,
-            0x0010,
-            "US",
-            0,
-            vec![0xff, 0xff],
-            "is cut off: 3 frames of 327675 bytes",
-        ),
-        (
-            0x0028,
-            0x0010,
-            "US",
-            0,
-            vec![0, 0],
-            "5 x 0 pixels are no image",
-        ),
-        (
-            0x0028,
-            0x0008,
-            "IS",
-            0,
-            b"4 ".to_vec(),
-            "but 3 frames are described",
-        ),
+        (0x0002, 0x0010, "UI", 0, uid, "is written in a transfer syntax that cannot be read"),
+        (0x0028, 0x0010, "US", 0, vec![0xff, 0xff], "is cut off: 3 frames of 327675 bytes"),
+        (0x0028, 0x0010, "US", 0, vec![0, 0], "5 x 0 pixels are no image"),
+        (0x0028, 0x0008, "IS", 0, b"4 ".to_vec(), "but 3 frames are described"),
         (0x0028, 0x0008, "IS", 0, b"-1".to_vec(), "NumberOfFrames"),
         (0x0028, 0x0008, "IS", 0, b"x ".to_vec(), "NumberOfFrames"),
-        (
-            0x0028,
-            0x0004,
-            "CS",
-            0,
-            b"MONOCHROME1".to_vec(),
-            "grow towards black",
-        ),
-        (
-            0x0028,
-            0x0004,
-            "CS",
-            0,
-            b"PALETTECOLO".to_vec(),
-            "cannot be read",
-        ),
+        (0x0028, 0x0004, "CS", 0, b"MONOCHROME1".to_vec(), "grow towards black"),
+        (0x0028, 0x0004, "CS", 0, b"PALETTECOLO".to_vec(), "cannot be read"),
         (0x0028, 0x0002, "US", 0, vec![2, 0], "of 2 values per pixel"),
         (0x0028, 0x0100, "US", 0, vec![32, 0], "values of 32 bits"),
-        (
-            0x0028,
-            0x0101,
-            "US",
-            0,
-            vec![9, 0],
-            "9 bits up to bit 7 of 8",
-        ),
-        (
-            0x0028,
-            0x0102,
-            "US",
-            0,
-            vec![6, 0],
-            "8 bits up to bit 6 of 8",
-        ),
-        (
-            0x0028,
-            0x0030,
-            "DS",
-            0,
-            b"nan".to_vec(),
-            "a spacing has to be above zero",
-        ),
-        (
-            0x0028,
-            0x0030,
-            "DS",
-            0,
-            b"0.0".to_vec(),
-            "a spacing has to be above zero",
-        ),
+        (0x0028, 0x0101, "US", 0, vec![9, 0], "9 bits up to bit 7 of 8"),
+        (0x0028, 0x0102, "US", 0, vec![6, 0], "8 bits up to bit 6 of 8"),
+        (0x0028, 0x0030, "DS", 0, b"nan".to_vec(), "a spacing has to be above zero"),
+        (0x0028, 0x0030, "DS", 0, b"0.0".to_vec(), "a spacing has to be above zero"),
         (0x0028, 0x0030, "DS", 0, b"0,5".to_vec(), "PixelSpacing"),
         (0x0020, 0x9301, "FD", 1, double(f64::NAN), "is not finite"),
         (0x0020, 0x9301, "FD", 1, double(9.0), "not evenly spaced"),
@@ -180,9 +94,7 @@ fn planted_mistakes_are_refused_with_their_cause() {
     ] {
         let mut bad = good.clone();
         let found = places(&good, group, element, kind);
-        let at = *found
-            .get(which)
-            .unwrap_or_else(|| panic!("{group:04x},{element:04x}"));
+        let at = *found.get(which).unwrap_or_else(|| panic!("{group:04x},{element:04x}"));
         if value.is_empty() {
             // Half of the pixels.
             bad[at - 4..at].copy_from_slice(&30u32.to_le_bytes());
@@ -204,17 +116,12 @@ fn planted_mistakes_are_refused_with_their_cause() {
     let mut bad = good.clone();
     let at = places(&good, 0x5200, 0x9230, "SQ")[0];
     bad[at - 10] = 0x31;
-    folder.refused(
-        &bad,
-        "is no volume: 3 frames of 5 x 4 pixels, without the position",
-    );
+    folder.refused(&bad, "is no volume: 3 frames of 5 x 4 pixels, without the position");
 }
 
 #[test]
 fn check_says_type_place_and_range() {
-    let path = shipped()
-        .into_iter()
-        .find(|p| p.ends_with("implicit_i16.dcm"));
+    let path = shipped().into_iter().find(|p| p.ends_with("implicit_i16.dcm"));
     let Outcome { code, text } = check(&path.expect("it ships"));
     assert_eq!(code, Some(0), "{text}");
     for said in [
@@ -233,11 +140,7 @@ fn check_says_type_place_and_range() {
 fn cut_and_changed_files_never_panic() {
     let folder = folder();
     for path in shipped() {
-        let name = path
-            .file_name()
-            .expect("a name")
-            .to_string_lossy()
-            .into_owned();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         let whole = std::fs::read(&path).expect("readable");
         // Of a deflated file the last bytes are an end and padding.
         let end = whole.len() - if name.starts_with("deflated") { 8 } else { 0 };
@@ -264,11 +167,7 @@ fn hostile_sizes_and_bombs_stay_within_bounds() {
         let mut bad = good.clone();
         let at = places(&good, group, element, kind)[0];
         bad[at - 4..at].copy_from_slice(&0xffff_fff0u32.to_le_bytes());
-        let cause = if group == 2 {
-            "TransferSyntaxUID"
-        } else {
-            "declares 4294967280 bytes"
-        };
+        let cause = if group == 2 { "TransferSyntaxUID" } else { "declares 4294967280 bytes" };
         folder.refused_within_bounds(&bad, cause);
     }
     // Rows and columns of 65535 in every way to write pixels.
@@ -299,9 +198,7 @@ fn hostile_sizes_and_bombs_stay_within_bounds() {
     }
     folder.refused_within_bounds(&items, "Rows");
     // 256 MB of zeros, deflated to one.
-    let deflated = shipped()
-        .into_iter()
-        .find(|p| p.ends_with("deflated_i16.dcm"));
+    let deflated = shipped().into_iter().find(|p| p.ends_with("deflated_i16.dcm"));
     let deflated = std::fs::read(deflated.expect("it ships")).expect("readable");
     let uid = places(&deflated, 0x0002, 0x0010, "UI")[0];
     let mut bomb = deflated[..uid + 22].to_vec();
@@ -319,14 +216,8 @@ fn hostile_sizes_and_bombs_stay_within_bounds() {
 fn files_of_scanners_are_refused_with_the_reason() {
     let Some(data) = shared_data() else { return };
     for (name, cause) in [
-        (
-            "examples_ybr_color.dcm",
-            "is no volume: 30 frames of 320 x 240 pixels",
-        ),
-        (
-            "examples_palette.dcm",
-            "`PALETTE COLOR` of 1 values per pixel",
-        ),
+        ("examples_ybr_color.dcm", "is no volume: 30 frames of 320 x 240 pixels"),
+        ("examples_palette.dcm", "`PALETTE COLOR` of 1 values per pixel"),
         ("examples_rgb_color.dcm", "has no position and orientation"),
         ("examples_jpeg2k.dcm", "JPEG 2000"),
         ("ExplVR_BigEnd.dcm", "has no position and orientation"),
@@ -350,9 +241,7 @@ fn bits_above_those_stored_are_dropped() {
         twelve[at] = value;
     }
     let found = folder().load(&twelve).expect("sound").voxels;
-    let Voxels::I16(values) = full.voxels else {
-        panic!("16 bits")
-    };
+    let Voxels::I16(values) = full.voxels else { panic!("16 bits") };
     let low = |v: &i16| (i32::from(*v) & 0xfff) - if v & 0x800 == 0 { 0 } else { 0x1000 };
     let expected = values.iter().map(|v| low(v) as i16).collect();
     assert_eq!(found, Voxels::I16(expected));

@@ -51,12 +51,8 @@ fn picture(manifest: Option<&Path>, scene: &str, folder: &Path, more: &[&str]) -
     let mut command = on(manifest, env!("CARGO_BIN_EXE_insonify"));
     command.arg("render");
     command.arg(root().join(format!("scenes/{scene}.toml")));
-    command
-        .args(["--quality", "standard", "--output"])
-        .arg(&file);
-    command
-        .arg("--validate")
-        .args(SIZE.iter().flat_map(|size| ["--set", size]));
+    command.args(["--quality", "standard", "--output"]).arg(&file);
+    command.arg("--validate").args(SIZE.iter().flat_map(|size| ["--set", size]));
     command.args(more);
     output_of(&mut command);
     image::open(file).expect("a PNG").into_luma8()
@@ -77,10 +73,7 @@ fn same_picture(scene: &str) {
     let first = picture(None, scene, folder.path(), &[]);
     let second = picture(Some(&second), scene, folder.path(), &[]);
     let share = apart(&first, &second);
-    println!(
-        "{scene}: {:.4} % of the pixels more than a grey level apart",
-        100.0 * share
-    );
+    println!("{scene}: {:.4} % of the pixels more than a grey level apart", 100.0 * share);
     assert!(share < APART, "{scene}: {share}");
 }
 
@@ -131,9 +124,6 @@ fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {
     let right = picture(None, "phantom", folder.path(), &[]);
     let wrong = picture(None, "phantom", folder.path(), &["--glsl", glsl]);
     let share = apart(&right, &wrong);
-    println!(
-        "planted: {:.2} % of the pixels more than a grey level apart",
-        100.0 * share
-    );
+    println!("planted: {:.2} % of the pixels more than a grey level apart", 100.0 * share);
     assert!(share > APART, "{share}");
 }

@@ -44,11 +44,7 @@ fn shoot_with(device: &Arc<Device>, scene: &Scene, tracer: Tracer, splits: Split
         .expect("a simulator");
     simulator.frame(scene, 0).expect("a frame");
     let counters = simulator.counters().expect("counters");
-    let lost = [
-        counters.saturated,
-        counters.segments_dropped,
-        counters.stack_overflow,
-    ];
+    let lost = [counters.saturated, counters.segments_dropped, counters.stack_overflow];
     assert_eq!(lost, [0; 3], "saturated, dropped, overflown: {tracer}");
     Shot {
         echoes: simulator.echoes().expect("echoes"),
@@ -61,9 +57,7 @@ fn differing(a: &[u8], b: &[u8]) -> f64 {
     assert_eq!(a.len(), b.len());
     let pairs = a.chunks(4).zip(b.chunks(4));
     let inside: Vec<_> = pairs.filter(|(p, q)| p[3] > 0 || q[3] > 0).collect();
-    let far = inside
-        .iter()
-        .filter(|(p, q)| p[3] != q[3] || p[0].abs_diff(q[0]) > 1);
+    let far = inside.iter().filter(|(p, q)| p[3] != q[3] || p[0].abs_diff(q[0]) > 1);
     far.count() as f64 / inside.len() as f64
 }
 
@@ -79,19 +73,13 @@ fn fainter(device: &Arc<Device>, scene: &Scene, decibels: f64) -> Vec<u8> {
 fn repeats(device: &Arc<Device>, scene: &Scene) -> [Shot; 2] {
     let shots = [Tracer::Bvh, Tracer::RayQuery].map(|tracer| {
         let first = shoot(device, scene, tracer);
-        assert!(
-            first.echoes.concat().iter().any(|&v| v != 0),
-            "{tracer}: silence"
-        );
+        assert!(first.echoes.concat().iter().any(|&v| v != 0), "{tracer}: silence");
         assert!(first == shoot(device, scene, tracer), "{tracer} twice");
         first
     });
     let mut other = scene.clone();
     other.simulation.seed += 1;
-    assert!(
-        shots[0] != shoot(device, &other, Tracer::Bvh),
-        "another seed is noticed"
-    );
+    assert!(shots[0] != shoot(device, &other, Tracer::Bvh), "another seed is noticed");
     shots
 }
 
@@ -100,11 +88,7 @@ fn repeats(device: &Arc<Device>, scene: &Scene) -> [Shot; 2] {
 /// finds the neighbour.
 fn agree(device: &Arc<Device>, scene: &Scene, [bvh, query]: &[Shot; 2]) {
     let share = differing(&bvh.pixels, &query.pixels);
-    assert!(
-        share <= 0.001,
-        "{:.3} % of the pixels differ",
-        100.0 * share
-    );
+    assert!(share <= 0.001, "{:.3} % of the pixels differ", 100.0 * share);
     let planted = differing(&fainter(device, scene, 0.5), &query.pixels);
     assert!(planted > 0.001, "half a decibel is noticed: {planted}");
 }

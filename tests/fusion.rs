@@ -94,18 +94,8 @@ fn mistakes_name_line_cause_and_remedy() {
     let open = "[[mesh]]\nname = \"sheet\"\ntissue = \"around\"\nfile = \"open.obj\"\n";
     for (more, at, cause, remedy) in [
         (volume.to_owned(), line, "no [fusion]", "add [fusion]"),
-        (
-            "[fusion]\nmask = [\"ball\"]\n".to_owned(),
-            line,
-            "the scene has none",
-            "add [volume]",
-        ),
-        (
-            format!("{volume}[fusion]\nmask = []\n"),
-            line + 3,
-            "no mesh",
-            "name the closed mesh",
-        ),
+        ("[fusion]\nmask = [\"ball\"]\n".to_owned(), line, "the scene has none", "add [volume]"),
+        (format!("{volume}[fusion]\nmask = []\n"), line + 3, "no mesh", "name the closed mesh"),
         (
             format!("{volume}[fusion]\nmask = [\"ball\", \"blok\"]\n"),
             line + 3,
@@ -118,18 +108,8 @@ fn mistakes_name_line_cause_and_remedy() {
             "3 of its edges are open",
             "cap_openings",
         ),
-        (
-            format!("{FUSED}blur = 0\n"),
-            line + 4,
-            "blur is 0",
-            "between 1 and 512",
-        ),
-        (
-            FUSED.replace("volume.mha", "nothing.mha"),
-            line + 1,
-            "cannot be used",
-            "insonify check",
-        ),
+        (format!("{FUSED}blur = 0\n"), line + 4, "blur is 0", "between 1 and 512"),
+        (FUSED.replace("volume.mha", "nothing.mha"), line + 1, "cannot be used", "insonify check"),
         (
             FUSED.replace("[fusion]", "black = 7\nwhite = 7\n[fusion]"),
             line + 2,
@@ -274,20 +254,14 @@ fn a_mask_follows_its_transform_and_its_selector_by_every_strategy() {
     let library = Library::embedded();
     let obj = |radius: f64| {
         let ball = shapes::sphere(radius, 4);
-        let vertices = ball
-            .positions
-            .iter()
-            .map(|[x, y, z]| format!("v {x} {y} {z}\n"));
+        let vertices = ball.positions.iter().map(|[x, y, z]| format!("v {x} {y} {z}\n"));
         let face = |t: &[u32; 3]| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
         let faces = ball.triangles.iter().map(face);
         vertices.chain(faces).collect::<String>()
     };
     for strategy in Strategy::ALL {
         let folder = tempfile::tempdir().expect("a folder");
-        write(
-            folder.path(),
-            &MOVING.replace("STRATEGY", &strategy.to_string()),
-        );
+        write(folder.path(), &MOVING.replace("STRATEGY", &strategy.to_string()));
         for (name, radius) in [("small", RADII[0]), ("large", RADII[1])] {
             std::fs::write(folder.path().join(format!("{name}.obj")), obj(radius))
                 .expect("written");
@@ -356,14 +330,7 @@ fn render_warns_of_a_mask_off_the_image_and_shows_the_steps() {
     let at = |name: &str| folder.path().join(name).display().to_string();
     let render = |more: &[&str]| {
         let (scene, image) = (at("scene.toml"), at("image.png"));
-        let fixed = [
-            "render",
-            scene.as_str(),
-            "-o",
-            image.as_str(),
-            "--tracer",
-            "bvh",
-        ];
+        let fixed = ["render", scene.as_str(), "-o", image.as_str(), "--tracer", "bvh"];
         let out = std::process::Command::new(env!("CARGO_BIN_EXE_insonify"))
             .args(fixed.iter().chain(more))
             .output()
@@ -475,12 +442,9 @@ fn a_sac_in_a_real_acquired_volume() {
     }
     let device = test_device();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/scenes/fusion.toml");
-    let smaller = [
-        ("probe.scanlines", "96"),
-        ("probe.samples", "1024"),
-        ("imaging.image_height", "300"),
-    ]
-    .map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let smaller =
+        [("probe.scanlines", "96"), ("probe.samples", "1024"), ("imaging.image_height", "300")]
+            .map(|(key, value)| (key.to_owned(), value.to_owned()));
     let (scene, warnings) = Scene::load(&path, &smaller).expect("sound");
     assert!(warnings.is_empty(), "{warnings:?}");
     assert!(scene.masks_off_the_image().is_empty());
@@ -492,10 +456,7 @@ fn a_sac_in_a_real_acquired_volume() {
         let (_, _, rgba) = simulator.pixels().expect("pixels");
         let steps = simulator.fusion_steps().expect("read").expect("fused");
         let mean = |weight: &dyn Fn(f32) -> bool| {
-            let chosen = rgba
-                .chunks_exact(4)
-                .zip(&steps.blurred)
-                .filter(|(_, m)| weight(**m));
+            let chosen = rgba.chunks_exact(4).zip(&steps.blurred).filter(|(_, m)| weight(**m));
             let (count, sum) =
                 chosen.fold((0.0, 0.0), |(n, s), (p, _)| (n + 1.0, s + f64::from(p[0])));
             (count, sum / count)
@@ -504,24 +465,12 @@ fn a_sac_in_a_real_acquired_volume() {
         let (outside, acquired) = mean(&|m| m == 1.0);
         let area = inside / (inside + outside);
         // An ellipse of 27 by 21 mm in an image of 38 by 46 mm, less half the ramp.
-        assert!(
-            (0.15..0.26).contains(&area),
-            "{tracer}: share simulated {area}"
-        );
-        assert!(
-            simulated > 15.0 && acquired > 15.0,
-            "{tracer}: {simulated} {acquired}"
-        );
+        assert!((0.15..0.26).contains(&area), "{tracer}: share simulated {area}");
+        assert!(simulated > 15.0 && acquired > 15.0, "{tracer}: {simulated} {acquired}");
         images.push(rgba);
     }
-    let differ = images[0]
-        .iter()
-        .zip(&images[1])
-        .filter(|(a, b)| a.abs_diff(**b) > 1);
-    assert!(
-        differ.count() * 1000 < images[0].len(),
-        "the tracers differ"
-    );
+    let differ = images[0].iter().zip(&images[1]).filter(|(a, b)| a.abs_diff(**b) > 1);
+    assert!(differ.count() * 1000 < images[0].len(), "the tracers differ");
 }
 
 /// What lies behind a bone in a real volume is darker, and all beside the mask is what it was.
@@ -574,10 +523,7 @@ fn a_bone_throws_its_shadow_into_a_real_acquired_volume() {
 #[test]
 fn the_tint_marks_the_acquired_pixels_and_leaves_the_image_alone() {
     let device = test_device();
-    let tint = Tint {
-        colour: [255, 0, 128],
-        opacity: 1.0,
-    };
+    let tint = Tint { colour: [255, 0, 128], opacity: 1.0 };
     for (settings, is_hard) in [
         ("blur = 1\n", true),
         ("blur = 9\n", false),

@@ -21,11 +21,7 @@ const ADD_GROUP: u32 = 32;
 
 /// Drops the device and fails if the layers have said anything until then, leaks included.
 fn assert_clean(device: Arc<Device>) {
-    assert_eq!(
-        Arc::strong_count(&device),
-        1,
-        "drop what was made of the device first"
-    );
+    assert_eq!(Arc::strong_count(&device), 1, "drop what was made of the device first");
     let log = device.validation_log();
     drop(device);
     let messages = log.messages();
@@ -44,9 +40,7 @@ fn add_kernel(device: &Arc<Device>, factor: u32) -> Kernel {
 
 fn buffer_of(device: &Arc<Device>, name: &str, values: &[u32]) -> Buffer {
     let bytes = bytemuck::cast_slice(values);
-    let buffer = device
-        .buffer(name, bytes.len() as u64, BufferKind::Storage)
-        .unwrap();
+    let buffer = device.buffer(name, bytes.len() as u64, BufferKind::Storage).unwrap();
     device.upload(&buffer, bytes).unwrap();
     buffer
 }
@@ -61,21 +55,14 @@ fn devices_are_listed_with_what_they_lack() {
         assert!(device.memory_bytes > 0);
         assert!(!device.ray_query || device.acceleration_structure);
         let says_so = device.lacks.iter().any(|l| l.contains("ray quer"));
-        assert_eq!(
-            says_so,
-            device.acceleration_structure && !device.ray_query,
-            "{device:?}"
-        );
+        assert_eq!(says_so, device.acceleration_structure && !device.ray_query, "{device:?}");
     }
 }
 
 #[test]
 fn an_unknown_device_is_answered_with_the_list() {
     for selector in ["no such adapter", "99"] {
-        let options = DeviceOptions {
-            selector: Some(selector.into()),
-            ..Default::default()
-        };
+        let options = DeviceOptions { selector: Some(selector.into()), ..Default::default() };
         let error = Device::new(&options).err().expect("no device is called so");
         let text = error.to_string();
         assert!(matches!(error, GpuError::UnknownDevice { .. }));
@@ -91,10 +78,7 @@ fn a_device_is_chosen_by_index_or_part_of_its_name() {
     let first = list_devices().unwrap().remove(0);
     let part = first.name[1..].to_uppercase();
     for selector in ["0".to_owned(), part] {
-        let options = DeviceOptions {
-            selector: Some(selector),
-            ..Default::default()
-        };
+        let options = DeviceOptions { selector: Some(selector), ..Default::default() };
         assert_eq!(Device::new(&options).unwrap().name(), first.name);
     }
 }
@@ -109,11 +93,7 @@ fn uploads_read_back_and_memory_is_counted_and_returned() {
     assert!(device.memory().current >= before + 4012);
     let bytes: Vec<u8> = (0..4000).map(|i| (i * 7 % 251) as u8).collect();
     device
-        .upload_many(&[
-            (&a, 0, &bytes[..1000]),
-            (&b, 4, &[9; 8]),
-            (&a, 1000, &bytes[1000..]),
-        ])
+        .upload_many(&[(&a, 0, &bytes[..1000]), (&b, 4, &[9; 8]), (&a, 1000, &bytes[1000..])])
         .unwrap();
     assert_eq!(device.read_back(&a).unwrap(), bytes);
     assert_eq!(device.read_back(&b).unwrap()[4..], [9; 8]);
@@ -122,11 +102,7 @@ fn uploads_read_back_and_memory_is_counted_and_returned() {
     assert_eq!(piece, bytes[501..506]);
 
     let error = device.upload(&b, &[0; 13]).unwrap_err();
-    assert!(
-        error
-            .to_string()
-            .contains("upload of 'b': bytes 0..13 of 12")
-    );
+    assert!(error.to_string().contains("upload of 'b': bytes 0..13 of 12"));
     let error = device.read_into(&a, 3999, &mut piece).unwrap_err();
     assert!(matches!(error, GpuError::OutOfBounds { end: 4004, .. }));
     drop((a, b));
@@ -139,9 +115,7 @@ fn uploads_read_back_and_memory_is_counted_and_returned() {
 fn uploads_larger_than_the_staging_memory_arrive_whole() {
     let device = test_device();
     let count = (33 << 20) / 4 + 3; // beyond the 32 MiB of one submission
-    let values: Vec<u32> = (0..count)
-        .map(|i: u32| i.wrapping_mul(2654435761))
-        .collect();
+    let values: Vec<u32> = (0..count).map(|i: u32| i.wrapping_mul(2654435761)).collect();
     let buffer = buffer_of(&device, "large", &values);
     assert!(device.read_back_as::<u32>(&buffer).unwrap() == values);
     drop(buffer);
@@ -152,15 +126,9 @@ fn uploads_larger_than_the_staging_memory_arrive_whole() {
 fn a_buffer_beyond_the_limit_is_refused_with_the_limit() {
     let device = test_device();
     let limit = device.limits().max_storage_buffer_bytes;
-    let error = device
-        .buffer("echoes", limit + 4, BufferKind::Storage)
-        .err()
-        .expect("too large");
+    let error = device.buffer("echoes", limit + 4, BufferKind::Storage).err().expect("too large");
     let text = error.to_string();
-    assert!(
-        text.contains("'echoes'") && text.contains(&limit.to_string()),
-        "{text}"
-    );
+    assert!(text.contains("'echoes'") && text.contains(&limit.to_string()), "{text}");
     assert_clean(device);
 }
 
@@ -170,11 +138,7 @@ fn a_kernel_is_reflected_and_specialized() {
     let kernel = add_kernel(&device, 3);
     assert_eq!(kernel.local_size(), [ADD_GROUP, 1, 1]);
     assert_eq!(kernel.push_constant_bytes(), 8);
-    let written: Vec<_> = kernel
-        .bindings()
-        .iter()
-        .map(|b| (b.binding, b.written))
-        .collect();
+    let written: Vec<_> = kernel.bindings().iter().map(|b| (b.binding, b.written)).collect();
     assert_eq!(written, [(0, false), (1, true)]);
 
     let source: Vec<u32> = (0..1001).collect();
@@ -192,20 +156,11 @@ fn a_kernel_is_reflected_and_specialized() {
     assert_eq!(device.read_back_as::<u32>(&b).unwrap(), expected);
 
     let spirv = words(include_bytes!("gpu/add.spv"));
-    let error = Kernel::new(&device, "add", &spirv, &[(9, 1)])
-        .err()
-        .unwrap();
-    assert!(
-        error.to_string().contains("no specialization constant 9"),
-        "{error}"
-    );
-    let error = Kernel::new(&device, "add", &spirv, &[(0, 1 << 20)])
-        .err()
-        .unwrap();
+    let error = Kernel::new(&device, "add", &spirv, &[(9, 1)]).err().unwrap();
+    assert!(error.to_string().contains("no specialization constant 9"), "{error}");
+    let error = Kernel::new(&device, "add", &spirv, &[(0, 1 << 20)]).err().unwrap();
     assert!(error.to_string().contains("work group"), "{error}");
-    let error = Kernel::new(&device, "noise", &[1, 2, 3], &[])
-        .err()
-        .unwrap();
+    let error = Kernel::new(&device, "noise", &[1, 2, 3], &[]).err().unwrap();
     assert!(error.to_string().contains("'noise'"), "{error}");
     drop((kernel, a, b));
     assert_clean(device);
@@ -230,20 +185,10 @@ fn a_dispatch_that_does_not_fit_its_kernel_is_refused_by_name() {
     let error = refused([1, 1, 1], &[0; 8], &[both[0], Binding::Sampler(&sampler)]);
     let text = error.to_string();
     assert!(matches!(error, GpuError::Binding { .. }), "{text}");
-    assert!(
-        text.contains("binding 1") && text.contains("a sampler was given"),
-        "{text}"
-    );
+    assert!(text.contains("binding 1") && text.contains("a sampler was given"), "{text}");
 
     let error = refused([1, 1, 1], &[0; 12], &both);
-    assert!(matches!(
-        error,
-        GpuError::PushConstants {
-            expected: 8,
-            given: 12,
-            ..
-        }
-    ));
+    assert!(matches!(error, GpuError::PushConstants { expected: 8, given: 12, .. }));
 
     let beyond = device.limits().max_group_count[1].saturating_add(1);
     if beyond > device.limits().max_group_count[1] {
@@ -270,25 +215,16 @@ fn images_are_uploaded_sampled_written_and_read_back() {
     // Ramp along x, with the mean of the two layers read halfway between them.
     let layer = |add: f32| (0..8).map(move |i| (i % 4) as f32 + add);
     let texels: Vec<f32> = layer(0.0).chain(layer(2.0)).collect();
-    device
-        .upload_image(&volume, bytemuck::cast_slice(&texels))
-        .unwrap();
-    device
-        .upload_image(&plane, bytemuck::cast_slice(&[0.0_f32, 0.0, 8.0, 8.0]))
-        .unwrap();
-    assert_eq!(
-        device.read_back_image(&volume).unwrap(),
-        bytemuck::cast_slice::<f32, u8>(&texels)
-    );
+    device.upload_image(&volume, bytemuck::cast_slice(&texels)).unwrap();
+    device.upload_image(&plane, bytemuck::cast_slice(&[0.0_f32, 0.0, 8.0, 8.0])).unwrap();
+    assert_eq!(device.read_back_image(&volume).unwrap(), bytemuck::cast_slice::<f32, u8>(&texels));
     let bindings = [
         Binding::Image(&volume),
         Binding::Sampler(&linear),
         Binding::Sampled(&plane, &linear),
         Binding::Image(&result),
     ];
-    device
-        .once(|commands| commands.dispatch(&kernel, [7, 5, 1], &[], &bindings))
-        .unwrap();
+    device.once(|commands| commands.dispatch(&kernel, [7, 5, 1], &[], &bindings)).unwrap();
     let bytes = device.read_back_image(&result).unwrap();
     let got: &[f32] = bytemuck::cast_slice(&bytes);
     for (at, &value) in got.iter().enumerate() {
@@ -297,30 +233,15 @@ fn images_are_uploaded_sampled_written_and_read_back() {
         let plane = 8.0 * (2.0 * v - 0.5).clamp(0.0, 1.0);
         // Filter weights have at least 8 fractional bits (Vulkan's limit of 4 is met by no
         // device in use), on steps of at most 8.
-        assert!(
-            (value - ramp - plane).abs() < 9.0 / 256.0,
-            "{at}: {value} {ramp} {plane}"
-        );
+        assert!((value - ramp - plane).abs() < 9.0 / 256.0, "{at}: {value} {ramp} {plane}");
     }
 
     let swapped = [bindings[2], bindings[1], bindings[0], bindings[3]];
-    let error = device
-        .once(|c| c.dispatch(&kernel, [7, 5, 1], &[], &swapped))
-        .unwrap_err();
+    let error = device.once(|c| c.dispatch(&kernel, [7, 5, 1], &[], &swapped)).unwrap_err();
     assert!(error.to_string().contains("binding 0"), "{error}");
-    let flat = [
-        Binding::Image(&plane),
-        bindings[1],
-        bindings[2],
-        bindings[3],
-    ];
-    let error = device
-        .once(|c| c.dispatch(&kernel, [7, 5, 1], &[], &flat))
-        .unwrap_err();
-    assert!(
-        error.to_string().contains("2 axes, the kernel's has 3"),
-        "{error}"
-    );
+    let flat = [Binding::Image(&plane), bindings[1], bindings[2], bindings[3]];
+    let error = device.once(|c| c.dispatch(&kernel, [7, 5, 1], &[], &flat)).unwrap_err();
+    assert!(error.to_string().contains("2 axes, the kernel's has 3"), "{error}");
     assert!(device.upload_image(&plane, &[0; 15]).is_err());
     drop((kernel, volume, plane, result, linear));
     assert_clean(device);

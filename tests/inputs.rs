@@ -59,9 +59,7 @@ fn every_mesh_is_loaded_or_refused_with_a_reason() {
             (false, true) => 1,
             _ => 0,
         };
-        counts
-            .entry(set.to_string_lossy().into_owned())
-            .or_default()[kind] += 1;
+        counts.entry(set.to_string_lossy().into_owned()).or_default()[kind] += 1;
         if let Some(cause) = verdict(&path, &outcome) {
             bad.push(format!("{}: {cause}\n{}", inside.display(), outcome.text));
         }
@@ -76,10 +74,7 @@ fn every_mesh_is_loaded_or_refused_with_a_reason() {
     assert!(bad.is_empty(), "{}", bad.join("\n"));
     let real = ["liver-scikit-surgery", "heart-4d-bivme", "baby-makehuman"];
     for set in real {
-        assert!(
-            counts[set][0] + counts[set][1] > 0,
-            "{set} holds readable meshes"
-        );
+        assert!(counts[set][0] + counts[set][1] > 0, "{set} holds readable meshes");
     }
 }
 
@@ -109,10 +104,7 @@ fn what_the_gltf_validator_refuses_is_not_loaded_in_silence() {
             silent.push(format!("{}\n{}", path.display(), outcome.text));
         }
     }
-    println!(
-        "{refused} files with errors of the validator, {} silent",
-        silent.len()
-    );
+    println!("{refused} files with errors of the validator, {} silent", silent.len());
     assert!(refused > 200, "the corpus is there");
     assert!(silent.is_empty(), "{}", silent.join("\n"));
 }
@@ -121,22 +113,13 @@ fn what_the_gltf_validator_refuses_is_not_loaded_in_silence() {
 #[test]
 fn planted_outcomes_are_rejected() {
     let path = Path::new("folder/a.obj");
-    let outcome = |code, text: &str| Outcome {
-        code,
-        text: text.to_owned(),
-    };
+    let outcome = |code, text: &str| Outcome { code, text: text.to_owned() };
     assert!(verdict(path, &outcome(Some(0), "0 errors")).is_none());
     assert!(verdict(path, &outcome(Some(1), "error: folder/a.obj: no triangles")).is_none());
     assert!(verdict(path, &outcome(Some(101), "panicked")).is_some());
     assert!(verdict(path, &outcome(None, "killed")).is_some());
     assert!(verdict(path, &outcome(Some(1), "0 errors")).is_some());
-    assert!(
-        verdict(
-            path,
-            &outcome(Some(0), "error: folder/a.obj: cause is here")
-        )
-        .is_some()
-    );
+    assert!(verdict(path, &outcome(Some(0), "error: folder/a.obj: cause is here")).is_some());
     assert!(verdict(path, &outcome(Some(1), "error: something went wrong")).is_some());
 }
 
@@ -144,10 +127,7 @@ fn planted_outcomes_are_rejected() {
 #[test]
 fn the_limits_bite() {
     // `tail` keeps its input until a line ends; here none does.
-    let hungry = limited(
-        "head -c 1200000000 /dev/zero | tail > /dev/null",
-        Path::new("x"),
-    );
+    let hungry = limited("head -c 1200000000 /dev/zero | tail > /dev/null", Path::new("x"));
     assert_eq!(hungry.code, Some(1), "{}", hungry.text);
     assert!(verdict(Path::new("x"), &hungry).is_some());
     let slow = limited("exec sleep 60", Path::new("x"));
@@ -163,11 +143,7 @@ fn a_file_that_is_too_large_is_not_read() {
     file.set_len(600 << 20).expect("sized");
     let outcome = check(&path);
     assert_eq!(outcome.code, Some(1), "{}", outcome.text);
-    assert!(
-        outcome.text.contains("the limit is 256 MB"),
-        "{}",
-        outcome.text
-    );
+    assert!(outcome.text.contains("the limit is 256 MB"), "{}", outcome.text);
 }
 
 #[test]
@@ -175,30 +151,10 @@ fn scene_mistakes_show_file_line_column_and_remedy() {
     let cube = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n";
     let mesh = "[[mesh]]\nname = \"organ\"\nfile = \"organ.obj\"\ntissue = \"liver\"\n";
     for (text, place, cause, remedy) in [
-        (
-            "[probe]\ndept = 3\n".to_owned(),
-            "2:1",
-            "unknown field `dept`",
-            "did you mean `depth`",
-        ),
-        (
-            "[probe]\nfrequency = \"5 mm\"\n".to_owned(),
-            "2:13",
-            "`mm` does not fit",
-            "`MHz`, `kHz`",
-        ),
-        (
-            mesh.replace("organ.obj", "orgn.obj"),
-            "3:8",
-            "orgn.obj",
-            "check the path",
-        ),
-        (
-            mesh.replace("liver", "livre"),
-            "4:10",
-            "unknown tissue `livre`",
-            "did you mean `liver`",
-        ),
+        ("[probe]\ndept = 3\n".to_owned(), "2:1", "unknown field `dept`", "did you mean `depth`"),
+        ("[probe]\nfrequency = \"5 mm\"\n".to_owned(), "2:13", "`mm` does not fit", "`MHz`, `kHz`"),
+        (mesh.replace("organ.obj", "orgn.obj"), "3:8", "orgn.obj", "check the path"),
+        (mesh.replace("liver", "livre"), "4:10", "unknown tissue `livre`", "did you mean `liver`"),
         (
             format!("{mesh}[tissues.liver]\nimpedance = \"1.75 MRayl\"\n"),
             "6:13",
@@ -218,14 +174,8 @@ fn scene_mistakes_show_file_line_column_and_remedy() {
         assert_eq!(output.status.code(), Some(1));
         // The report wraps its lines to the terminal.
         let shown = String::from_utf8_lossy(&output.stderr);
-        let shown: Vec<_> = shown
-            .split(|c: char| c.is_whitespace() || c == '\u{2502}')
-            .collect();
-        let shown = shown
-            .into_iter()
-            .filter(|w| !w.is_empty())
-            .collect::<Vec<_>>()
-            .join(" ");
+        let shown: Vec<_> = shown.split(|c: char| c.is_whitespace() || c == '\u{2502}').collect();
+        let shown = shown.into_iter().filter(|w| !w.is_empty()).collect::<Vec<_>>().join(" ");
         for wanted in [&format!("s.toml:{place}"), cause, remedy] {
             assert!(shown.contains(wanted), "{wanted}: {shown}");
         }
@@ -237,11 +187,7 @@ fn the_real_scenes_are_sound() {
     if shared_data().is_none() {
         return;
     }
-    for (name, triangles) in [
-        ("liver", 70_000),
-        ("heart", 10_000),
-        ("heart_rodero", 120_000),
-    ] {
+    for (name, triangles) in [("liver", 70_000), ("heart", 10_000), ("heart_rodero", 120_000)] {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/scenes/{name}.toml"));
         let (scene, warnings) = insonify::scene::Scene::load(&path, &[]).expect(name);
         let total: usize = scene.meshes.iter().map(|m| m.triangles.len()).sum();
@@ -252,10 +198,7 @@ fn the_real_scenes_are_sound() {
         );
         assert!(total > triangles, "{name}: {total}");
         // Open organs would leak tissue into the picture.
-        assert!(
-            warnings.iter().all(|w| !w.message.contains("open edges")),
-            "{warnings:?}"
-        );
+        assert!(warnings.iter().all(|w| !w.message.contains("open edges")), "{warnings:?}");
     }
 }
 
@@ -293,9 +236,7 @@ fn damaged_files_never_panic() {
     let mut state = 1u64;
     let mut random = move |below: usize| {
         // Knuth's MMIX generator.
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 33) as usize % below
     };
     for (name, sound) in [

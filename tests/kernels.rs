@@ -19,9 +19,7 @@ fn subject(name: &str) {
         for case in Case::ALL {
             let job = (subject.job)(case, Size::Small);
             let extent = (subject.extent)(&job);
-            let mut outputs = harness::run(&device, &kernel, &job, &extent)
-                .unwrap()
-                .outputs;
+            let mut outputs = harness::run(&device, &kernel, &job, &extent).unwrap().outputs;
             for check in (subject.check)(&job, &outputs) {
                 println!("{stem} {case:?}: {check}");
                 if !check.passed() {
@@ -37,12 +35,7 @@ fn subject(name: &str) {
             }
         }
     }
-    assert!(
-        wrong.is_empty(),
-        "{}\ntolerance: {}",
-        wrong.join("\n"),
-        subject.tolerance
-    );
+    assert!(wrong.is_empty(), "{}\ntolerance: {}", wrong.join("\n"), subject.tolerance);
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 

@@ -46,9 +46,7 @@ impl Bench {
         self.0.frame(scene, 0).expect("a frame");
         let iq = self.0.iq().expect("baseband");
         let line = |l: &[f32]| l.chunks(2).map(|v| [v[0].into(), v[1].into()]).collect();
-        iq.chunks(2 * scene.probe.samples as usize)
-            .map(line)
-            .collect()
+        iq.chunks(2 * scene.probe.samples as usize).map(line).collect()
     }
 }
 
@@ -87,13 +85,7 @@ fn measured(scene: &Scene, seeds: u32, count: usize) -> Vec<[f64; 2]> {
 fn probes() -> impl Iterator<Item = (&'static str, Probe)> {
     let fewer = |(name, probe): &(&'static str, fn() -> Probe)| {
         let probe = probe();
-        (
-            *name,
-            Probe {
-                scanlines: 40,
-                ..probe
-            },
-        )
+        (*name, Probe { scanlines: 40, ..probe })
     };
     Probe::PRESETS.iter().map(fewer)
 }
@@ -109,14 +101,8 @@ fn speckle_is_fully_developed_and_level_at_every_depth_of_every_probe() {
         let first = usize::from(!matches!(scene.probe.kind, Kind::Linear { .. }));
         for (i, [ratio, level]) in all.into_iter().enumerate().skip(first) {
             let rayleigh = (PI / (4.0 - PI)).sqrt();
-            assert!(
-                (ratio - rayleigh).abs() < 0.05,
-                "{name}, band {i}: {ratio:.3}"
-            );
-            assert!(
-                (level + 45.0).abs() < 0.25,
-                "{name}, band {i}: {level:.2} dB"
-            );
+            assert!((ratio - rayleigh).abs() < 0.05, "{name}, band {i}: {ratio:.3}");
+            assert!((level + 45.0).abs() < 0.25, "{name}, band {i}: {level:.2} dB");
         }
     }
 }
@@ -130,19 +116,13 @@ fn seam(levels: &[f64], expected: &[f64]) -> f64 {
 // 32 bands of 400 cells each, over 12 frames: 0.06 dB; four of them, and the beam's ends.
 #[test]
 fn no_seam_shows_where_one_lattice_takes_over_from_another() {
-    let scene = speckle(Probe {
-        scanlines: 40,
-        ..Probe::abdominal()
-    });
+    let scene = speckle(Probe { scanlines: 40, ..Probe::abdominal() });
     let rows = tables::rows(&scene);
     let count = 32;
     let levels: Vec<f64> = (0..count)
         .map(|i| f64::from(rows[(2 * i + 1) * rows.len() / (2 * count)].shape[3]))
         .collect();
-    let changes = levels
-        .windows(2)
-        .filter(|w| w[0].floor() != w[1].floor())
-        .count();
+    let changes = levels.windows(2).filter(|w| w[0].floor() != w[1].floor()).count();
     assert!(changes >= 3, "levels change along the depth: {levels:?}");
     let all = measured(&scene, 12, count);
     let got: Vec<f64> = all.iter().map(|v| v[1]).collect();
@@ -194,17 +174,12 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
     type Width<'a> = &'a dyn Fn(f64) -> f64;
     let mean = |sigma: Width, d: f64| {
         let at = |i: u32| depths[0] + (f64::from(i) + 0.5) / 30.0 * (depths[1] - depths[0]);
-        (0..30)
-            .map(|i| (-d * d / (4.0 * sigma(at(i)).powi(2))).exp())
-            .sum::<f64>()
-            / 30.0
+        (0..30).map(|i| (-d * d / (4.0 * sigma(at(i)).powi(2))).exp()).sum::<f64>() / 30.0
     };
     let lateral = |z: f64| calibration.sigma_lateral(z);
     let elevation = |z: f64| calibration.sigma_elevation(z);
-    let ways: [(&str, DVec3, Width); 2] = [
-        ("laterally", DVec3::X, &lateral),
-        ("across the slice", DVec3::Y, &elevation),
-    ];
+    let ways: [(&str, DVec3, Width); 2] =
+        [("laterally", DVec3::X, &lateral), ("across the slice", DVec3::Y, &elevation)];
     for (way, axis, sigma) in ways {
         let step = 0.1;
         let mut shots = Vec::new();
@@ -217,19 +192,11 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
         let expected = mean(sigma, step);
         for (i, pair) in shots.windows(2).enumerate() {
             let got = correlation(&scene, &pair[0], &pair[1], depths);
-            assert!(
-                (got - expected).abs() < 0.01,
-                "{way}, step {i}: {got:.4}, {expected:.4}"
-            );
+            assert!((got - expected).abs() < 0.01, "{way}, step {i}: {got:.4}, {expected:.4}");
         }
-        let (got, expected) = (
-            correlation(&scene, &shots[0], &shots[7], depths),
-            mean(sigma, 7.0 * step),
-        );
-        assert!(
-            (got - expected).abs() < 0.06,
-            "{way}: {got:.3}, {expected:.3}"
-        );
+        let (got, expected) =
+            (correlation(&scene, &shots[0], &shots[7], depths), mean(sigma, 7.0 * step));
+        assert!((got - expected).abs() < 0.06, "{way}: {got:.3}, {expected:.3}");
         // Planted: another beam's width.
         assert!((got - mean(&|z| sigma(z) / SQRT_2, 7.0 * step)).abs() > 0.06);
     }
@@ -239,10 +206,7 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
 #[test]
 fn neighbouring_lines_share_speckle_as_their_beams_overlap() {
     let probe = Probe {
-        kind: Kind::Convex {
-            radius: 50.0,
-            field_of_view: FRAC_PI_4,
-        },
+        kind: Kind::Convex { radius: 50.0, field_of_view: FRAC_PI_4 },
         scanlines: 192,
         ..Probe::abdominal()
     };
@@ -257,10 +221,8 @@ fn neighbouring_lines_share_speckle_as_their_beams_overlap() {
         };
         let expected = (0..40).map(|i| share(at(i))).sum::<f64>() / 40.0;
         for group in [0..32, 80..112, 160..191] {
-            let (a, b) = (
-                lines[group.clone()].to_vec(),
-                lines[group.start + 1..=group.end].to_vec(),
-            );
+            let (a, b) =
+                (lines[group.clone()].to_vec(), lines[group.start + 1..=group.end].to_vec());
             let got = correlation(&scene, &a, &b, depths);
             assert!(
                 (got - expected).abs() < 0.05,

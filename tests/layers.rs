@@ -4,10 +4,7 @@ use std::path::Path;
 
 /// Module and the crate's modules that it must not name.
 const FORBIDDEN: [(&str, &[&str]); 5] = [
-    (
-        "gpu",
-        &["scene", "probe", "sim", "reference", "harness", "view"],
-    ),
+    ("gpu", &["scene", "probe", "sim", "reference", "harness", "view"]),
     ("scene", &["gpu", "sim", "reference", "harness", "view"]),
     ("probe", &["gpu", "sim", "reference", "harness", "view"]),
     ("reference", &["gpu", "harness", "view"]),
@@ -67,10 +64,8 @@ fn unsafe_code_stays_in_gpu() {
     sources(Path::new("tools"), &mut files);
     for file in files.iter().filter(|f| !f.starts_with("src/gpu")) {
         let text = std::fs::read_to_string(file).expect("a source");
-        let found: Vec<_> = text
-            .lines()
-            .filter(|l| l.contains("unsafe {") || l.contains("unsafe fn"))
-            .collect();
+        let found: Vec<_> =
+            text.lines().filter(|l| l.contains("unsafe {") || l.contains("unsafe fn")).collect();
         assert!(found.is_empty(), "{}: {found:?}", file.display());
     }
 }
@@ -78,9 +73,6 @@ fn unsafe_code_stays_in_gpu() {
 #[test]
 fn a_planted_use_is_noticed() {
     assert_eq!(offences("use crate::gpu::Device;", &["gpu"]).len(), 1);
-    assert_eq!(
-        offences("use crate::{scene::Scene, gpu::Device};", &["gpu"]).len(),
-        1
-    );
+    assert_eq!(offences("use crate::{scene::Scene, gpu::Device};", &["gpu"]).len(), 1);
     assert!(offences("use crate::scene::Scene; // gpu", &["gpu"]).is_empty());
 }

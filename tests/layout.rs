@@ -41,16 +41,9 @@ fn mirrors() -> [Mirror; 11] {
 
 /// Types of all storage buffers of a module.
 fn buffers(words: &[u32]) -> Vec<Type> {
-    let entries = ReflectConfig::new()
-        .spv(words.to_vec())
-        .ref_all_rscs(true)
-        .reflect()
-        .unwrap();
+    let entries = ReflectConfig::new().spv(words.to_vec()).ref_all_rscs(true).reflect().unwrap();
     let variables = entries.into_iter().flat_map(|e| e.vars);
-    variables
-        .filter(|v| matches!(v, Variable::Descriptor { .. }))
-        .map(|v| v.ty().clone())
-        .collect()
+    variables.filter(|v| matches!(v, Variable::Descriptor { .. })).map(|v| v.ty().clone()).collect()
 }
 
 /// Structures that stand as elements (with the array's stride) or members of storage blocks.
@@ -75,11 +68,7 @@ fn elements(words: &[u32]) -> Vec<(StructType, Option<usize>)> {
 }
 
 fn offsets(structure: &StructType) -> Vec<usize> {
-    structure
-        .members
-        .iter()
-        .map(|m| m.offset.unwrap())
-        .collect()
+    structure.members.iter().map(|m| m.offset.unwrap()).collect()
 }
 
 /// In what `structure` of the shader, an array's element, differs from its mirror.
@@ -89,17 +78,10 @@ fn difference(structure: &StructType, stride: Option<usize>, mirror: &Mirror) ->
         .iter()
         .map(|m| (m.name.clone().unwrap_or_default(), m.offset.unwrap()))
         .collect();
-    let here: Vec<_> = mirror
-        .offsets
-        .iter()
-        .map(|(n, o)| ((*n).to_owned(), *o))
-        .collect();
+    let here: Vec<_> = mirror.offsets.iter().map(|(n, o)| ((*n).to_owned(), *o)).collect();
     let pairs = shader.iter().zip(&here).find(|(s, h)| s != h);
     if let Some((shader, here)) = pairs {
-        return Some(format!(
-            "{}: {here:?} here, {shader:?} in the shader",
-            mirror.name
-        ));
+        return Some(format!("{}: {here:?} here, {shader:?} in the shader", mirror.name));
     }
     if shader.len() != here.len() {
         return Some(format!(
@@ -110,10 +92,7 @@ fn difference(structure: &StructType, stride: Option<usize>, mirror: &Mirror) ->
         ));
     }
     (stride != Some(mirror.size)).then(|| {
-        format!(
-            "{}: {} bytes here, stride {stride:?} in the shader",
-            mirror.name, mirror.size
-        )
+        format!("{}: {} bytes here, stride {stride:?} in the shader", mirror.name, mirror.size)
     })
 }
 
@@ -125,11 +104,7 @@ fn named() -> Vec<(StructType, Option<usize>)> {
 #[test]
 fn every_structure_has_the_names_offsets_and_size_of_its_mirror() {
     let shader = named();
-    assert_eq!(
-        shader.len(),
-        mirrors().len(),
-        "layout.comp mentions every structure"
-    );
+    assert_eq!(shader.len(), mirrors().len(), "layout.comp mentions every structure");
     for mirror in &mirrors() {
         let (structure, stride) = shader
             .iter()
@@ -142,31 +117,16 @@ fn every_structure_has_the_names_offsets_and_size_of_its_mirror() {
 #[test]
 fn a_planted_mismatch_is_noticed() {
     let shader = named();
-    let (structure, stride) = shader
-        .iter()
-        .find(|(s, _)| s.name() == Some("Surface"))
-        .unwrap();
-    let planted = |offsets, size| {
-        difference(
-            structure,
-            *stride,
-            &Mirror {
-                name: "Surface",
-                size,
-                offsets,
-            },
-        )
-    };
+    let (structure, stride) = shader.iter().find(|(s, _)| s.name() == Some("Surface")).unwrap();
+    let planted =
+        |offsets, size| difference(structure, *stride, &Mirror { name: "Surface", size, offsets });
     let mut fields = Surface::OFFSETS.to_vec();
     fields.swap(1, 2);
     assert!(planted(fields.leak(), 32).is_some(), "two fields swapped");
     let mut fields = Surface::OFFSETS.to_vec();
     fields[3].1 += 4;
     assert!(planted(fields.leak(), 32).is_some(), "a field moved");
-    assert!(
-        planted(&Surface::OFFSETS[..7], 32).is_some(),
-        "a field missing"
-    );
+    assert!(planted(&Surface::OFFSETS[..7], 32).is_some(), "a field missing");
     assert!(planted(Surface::OFFSETS, 48).is_some(), "another size");
     assert!(planted(Surface::OFFSETS, 32).is_none());
 }

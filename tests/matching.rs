@@ -53,19 +53,10 @@ fn truth() -> Imaging {
     }
 }
 
-const ALL: Adjusted = Adjusted {
-    gain: true,
-    tgc: true,
-    range: true,
-    size: true,
-};
+const ALL: Adjusted = Adjusted { gain: true, tgc: true, range: true, size: true };
 
 fn options(band: f64) -> Options {
-    Options {
-        band,
-        frames: 2,
-        adjusted: ALL,
-    }
+    Options { band, frames: 2, adjusted: ALL }
 }
 
 /// The scanlines of a linear array are a grid: its log image, with another seed and the settings of
@@ -120,12 +111,7 @@ fn errors(scene: &Scene, made: &Matching, imaging: &Imaging) -> [f64; 4] {
     let truth = truth();
     let places = depths(&scene.probe);
     let off = |&i: &usize| level(scene, imaging, places[i]) - level(scene, &truth, places[i]);
-    let largest = made
-        .compared
-        .iter()
-        .map(off)
-        .map(f64::abs)
-        .fold(0.0, f64::max);
+    let largest = made.compared.iter().map(off).map(f64::abs).fold(0.0, f64::max);
     let relative = |a: f64, b: f64| (a / b - 1.0).abs();
     [
         largest,
@@ -162,15 +148,9 @@ fn settings_of_the_simulators_own_image_are_recovered() {
     assert_eq!(scene.simulation.seed, 1, "the user's seed");
     let allowed = allowed(&made);
     let found = errors(&scene, &made, &scene.imaging);
-    println!(
-        "{} rounds; errors {found:.3?}, allowed {allowed:.3?}",
-        made.rounds
-    );
+    println!("{} rounds; errors {found:.3?}, allowed {allowed:.3?}", made.rounds);
     println!("{:?}", scene.imaging);
-    assert!(
-        allowed[0] < 1.0 && allowed[1] < 0.06 && allowed[2] < 0.07,
-        "{allowed:?}"
-    );
+    assert!(allowed[0] < 1.0 && allowed[1] < 0.06 && allowed[2] < 0.07, "{allowed:?}");
     let recovered = |imaging: &Imaging| {
         let found = errors(&scene, &made, imaging);
         found.iter().zip(&allowed).all(|(e, a)| e <= a)
@@ -179,26 +159,11 @@ fn settings_of_the_simulators_own_image_are_recovered() {
     // Each of them off by little is seen.
     let truth = truth();
     for planted in [
-        Imaging {
-            gain: truth.gain + 1.0,
-            ..truth.clone()
-        },
-        Imaging {
-            dynamic_range: 1.07 * truth.dynamic_range,
-            ..truth.clone()
-        },
-        Imaging {
-            psf_scale: [1.08 * 1.6, 1.4, 1.0],
-            ..truth.clone()
-        },
-        Imaging {
-            psf_scale: [1.6, 1.08 * 1.4, 1.0],
-            ..truth.clone()
-        },
-        Imaging {
-            tgc_sliders: [0.0; 8],
-            ..truth.clone()
-        },
+        Imaging { gain: truth.gain + 1.0, ..truth.clone() },
+        Imaging { dynamic_range: 1.07 * truth.dynamic_range, ..truth.clone() },
+        Imaging { psf_scale: [1.08 * 1.6, 1.4, 1.0], ..truth.clone() },
+        Imaging { psf_scale: [1.6, 1.08 * 1.4, 1.0], ..truth.clone() },
+        Imaging { tgc_sliders: [0.0; 8], ..truth.clone() },
         made.before.imaging.clone(),
     ] {
         assert!(!recovered(&planted), "{planted:?}");
@@ -217,21 +182,10 @@ fn only_what_is_asked_for_is_fitted() {
     scene.imaging.gain = 25.0;
     let before = scene.imaging.clone();
     let mut options = options(8.0);
-    options.adjusted = Adjusted {
-        gain: true,
-        tgc: false,
-        range: false,
-        size: false,
-    };
+    options.adjusted = Adjusted { gain: true, tgc: false, range: false, size: false };
     let made = fit(&mut scene, &options);
     assert_ne!(scene.imaging.gain, before.gain);
-    assert_eq!(
-        Imaging {
-            gain: before.gain,
-            ..scene.imaging.clone()
-        },
-        before
-    );
+    assert_eq!(Imaging { gain: before.gain, ..scene.imaging.clone() }, before);
     let mean = |stage: &Stage| {
         let errors = made.level_errors(stage);
         errors.iter().sum::<f64>() / errors.len() as f64
@@ -268,13 +222,8 @@ fn the_scene_file_is_written_and_nothing_else_in_it_changes() {
     let out = run(&scene, &["--dry-run"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     let said = text(&out.stdout);
-    for what in [
-        "brightness at 19 mm",
-        "spread",
-        "size axial",
-        "rms difference",
-        "imaging.gain = ",
-    ] {
+    for what in ["brightness at 19 mm", "spread", "size axial", "rms difference", "imaging.gain = "]
+    {
         assert!(said.contains(what), "{what}: {said}");
     }
     assert_eq!(read("scene.toml"), before);
@@ -290,25 +239,12 @@ fn the_scene_file_is_written_and_nothing_else_in_it_changes() {
     let after = read("scene.toml");
     assert_eq!(after.replace("acquired.mha", "../acquired.mha"), other);
     assert!(after.contains(" # loud\n"), "{after}");
-    let kept = |line: &&str| {
-        !["gain", "dynamic", "tgc", "psf"]
-            .iter()
-            .any(|k| line.starts_with(k))
-    };
-    let lines = |text: &str| {
-        text.lines()
-            .filter(kept)
-            .map(str::to_owned)
-            .collect::<Vec<_>>()
-    };
+    let kept = |line: &&str| !["gain", "dynamic", "tgc", "psf"].iter().any(|k| line.starts_with(k));
+    let lines = |text: &str| text.lines().filter(kept).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines(&after), lines(&before));
     // What is matched stays as it is, to the byte.
     let out = run(&scene, &[]);
-    assert!(
-        text(&out.stdout).contains("matched already"),
-        "{}",
-        text(&out.stdout)
-    );
+    assert!(text(&out.stdout).contains("matched already"), "{}", text(&out.stdout));
     assert_eq!(read("scene.toml"), after);
 }
 
@@ -322,21 +258,13 @@ fn what_cannot_be_matched_is_said_and_nothing_is_written() {
     let fluid = "mesh.island.tissue=amniotic_fluid";
     let small = "mesh.island.shape={ sphere = { radius = 0.8 } }";
     for (more, cause, remedy) in [
-        (
-            vec!["--set", "fusion.surroundings=none"],
-            "shows no acquired volume",
-            "add [volume]",
-        ),
+        (vec!["--set", "fusion.surroundings=none"], "shows no acquired volume", "add [volume]"),
         (
             vec!["--set", "mesh.island.translate=[90, 0, 0]"],
             "no border of the mask",
             "move the mask",
         ),
-        (
-            vec!["--set", "mesh.island.scale=100"],
-            "no border of the mask",
-            "move the mask",
-        ),
+        (vec!["--set", "mesh.island.scale=100"], "no border of the mask", "move the mask"),
         (
             vec!["--set", "volume.translate=[0, 90, 0]"],
             "does not reach to the mask",
@@ -347,46 +275,20 @@ fn what_cannot_be_matched_is_said_and_nothing_is_written() {
             "acquired volume outside",
             "widen",
         ),
-        (
-            vec!["--set", fluid],
-            "simulation inside the mask",
-            "tissue that echoes",
-        ),
-        (
-            vec!["--set", small],
-            "simulation inside the mask",
-            "widen --band",
-        ),
-        (
-            vec!["--set", "imaging.gain=80"],
-            "at no depth",
-            "change gain",
-        ),
+        (vec!["--set", fluid], "simulation inside the mask", "tissue that echoes"),
+        (vec!["--set", small], "simulation inside the mask", "widen --band"),
+        (vec!["--set", "imaging.gain=80"], "at no depth", "change gain"),
         (vec!["--band", "0.1"], "between 0.5 and 100 mm", ""),
         (vec!["--fit", "colour"], "colour", "gain"),
         (vec!["--dry-run", "-o", "x.toml"], "cannot be used with", ""),
-        (
-            vec!["-o", "/nowhere/at/all.toml", "--band", "8"],
-            "folder cannot be used",
-            "exists",
-        ),
+        (vec!["-o", "/nowhere/at/all.toml", "--band", "8"], "folder cannot be used", "exists"),
     ] {
         let out = run(&scene, &more);
-        let said = text(&out.stderr)
-            .split_whitespace()
-            .collect::<Vec<_>>()
-            .join(" ");
+        let said = text(&out.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
         let said = said.replace("│ ", "");
         assert!(!out.status.success(), "{more:?}: {said}");
-        assert!(
-            said.contains(cause) && said.contains(remedy),
-            "{more:?}: {said}"
-        );
-        assert_eq!(
-            std::fs::read_to_string(&file).expect("there"),
-            before,
-            "{more:?}"
-        );
+        assert!(said.contains(cause) && said.contains(remedy), "{more:?}: {said}");
+        assert_eq!(std::fs::read_to_string(&file).expect("there"), before, "{more:?}");
     }
 }
 
@@ -418,15 +320,7 @@ fn a_real_volume_is_approached() {
     let (before, after) = (&made.before, &made.after);
     println!("levels {:.2} -> {:.2} dB", rms(before), rms(after));
     println!("spread {:.3} -> {:.3}", spread(before), spread(after));
-    println!(
-        "{:?} {:?} {} rounds",
-        after.imaging, made.notes, made.rounds
-    );
-    assert!(
-        rms(after) < 0.7 * rms(before),
-        "{} {}",
-        rms(before),
-        rms(after)
-    );
+    println!("{:?} {:?} {} rounds", after.imaging, made.notes, made.rounds);
+    assert!(rms(after) < 0.7 * rms(before), "{} {}", rms(before), rms(after));
     assert!(spread(after) < 0.5 * spread(before) + 0.02);
 }

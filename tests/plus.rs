@@ -59,12 +59,7 @@ fn spine(data: &Path) -> Sweep {
     let (sequence, _) = sequence.expect("a sweep");
     let stored = Volume::load(&images.join("SpinePhantomFreehandReconstructed.mha"));
     let poses = config.transforms.of_frames(&sequence, "Image", "Reference");
-    Sweep {
-        poses: poses.expect("joined"),
-        config,
-        sequence,
-        stored: stored.expect("a volume").0,
-    }
+    Sweep { poses: poses.expect("joined"), config, sequence, stored: stored.expect("a volume").0 }
 }
 
 /// Nine voxels in ten are within the 2 grey levels that PLUS's own tests allow between machines,
@@ -73,12 +68,7 @@ fn spine(data: &Path) -> Sweep {
 #[test]
 fn a_volume_is_what_plus_made_of_the_sweep() {
     let Some(data) = shared_data() else { return };
-    let Sweep {
-        config,
-        sequence,
-        poses,
-        stored,
-    } = spine(&data);
+    let Sweep { config, sequence, poses, stored } = spine(&data);
     let made = reconstruct(&sequence, &poses, &config.settings).expect("made");
     assert_eq!(made.frames, 21);
     assert_eq!(made.volume.size, [147, 106, 105]);
@@ -143,11 +133,7 @@ impl Voxels {
         for corner in 0..8 {
             let upper = [corner >> 2 & 1, corner >> 1 & 1, corner & 1].map(|bit| bit == 1);
             let pick = |a: usize| {
-                if upper[a] {
-                    part[a]
-                } else {
-                    (1 << BITS) - part[a]
-                }
+                if upper[a] { part[a] } else { (1 << BITS) - part[a] }
             };
             let weight = real(product(pick(0), product(pick(1), pick(2))));
             let voxel = [0, 1, 2].map(|a| if upper[a] { high[a] } else { low[a] });
@@ -183,9 +169,7 @@ impl Voxels {
         let around = -1..=1;
         let steps = around.clone().flat_map(|z| {
             let around = around.clone();
-            around
-                .clone()
-                .flat_map(move |y| around.clone().map(move |x| [x, y, z]))
+            around.clone().flat_map(move |y| around.clone().map(move |x| [x, y, z]))
         });
         // Each line once: the first step that is not 0, from z on, goes up.
         for step in steps.filter(|[x, y, z]| (*z, *y, *x) > (0, 0, 0)) {
@@ -213,32 +197,21 @@ impl Voxels {
 #[test]
 fn the_arithmetic_of_plus_explains_the_difference() {
     let Some(data) = shared_data() else { return };
-    let Sweep {
-        config,
-        sequence,
-        poses,
-        stored,
-    } = spine(&data);
+    let Sweep { config, sequence, poses, stored } = spine(&data);
     let ours = reconstruct(&sequence, &poses, &config.settings).expect("made");
     let voxel_from_reference = ours.volume.world_from_voxel.inverse();
     let size = ours.volume.size;
     let count = size.iter().product();
     let [width, height] = sequence.size;
     let run = |rounded: bool| {
-        let mut voxels = Voxels {
-            size,
-            value: vec![0.0; count],
-            weight: vec![0.0; count],
-        };
+        let mut voxels = Voxels { size, value: vec![0.0; count], weight: vec![0.0; count] };
         for (frame, pose) in poses.iter().enumerate() {
             let m = voxel_from_reference * pose.expect("all poses are OK");
             let column = |v: DVec3| v.to_array().map(fixed);
             let (x, y) = (column(m.matrix3.x_axis), column(m.matrix3.y_axis));
             let origin = column(m.translation);
             for (row, at) in (0..height).flat_map(|r| (0..width).map(move |c| (r, c))) {
-                let pixel = sequence
-                    .pixels
-                    .get(sequence.first_pixel(frame) + row * width + at);
+                let pixel = sequence.pixels.get(sequence.first_pixel(frame) + row * width + at);
                 let (row, at) = (row as i32, at as i32);
                 let place = [0, 1, 2].map(|a| origin[a] + row * y[a] + at * x[a]);
                 voxels.insert(place, pixel, rounded);
@@ -247,11 +220,7 @@ fn the_arithmetic_of_plus_explains_the_difference() {
         let value = |at: [usize; 3]| {
             let at = at.map(|n| n as i32);
             let index = voxels.index(at).expect("inside");
-            if voxels.weight[index] > 0.0 {
-                voxels.value[index].round()
-            } else {
-                voxels.filled(at)
-            }
+            if voxels.weight[index] > 0.0 { voxels.value[index].round() } else { voxels.filled(at) }
         };
         compare(size, value, &stored)
     };

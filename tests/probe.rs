@@ -22,10 +22,7 @@ fn frame(probe: &Probe) -> Frame {
         ..Frame::default()
     };
     match probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => {
+        Kind::Convex { radius, field_of_view } => {
             frame.kind = KIND_CONVEX;
             frame.radius = radius as f32;
             frame.field_of_view = field_of_view as f32;
@@ -44,37 +41,18 @@ fn frame(probe: &Probe) -> Frame {
 
 /// Origin, elevation, direction and lateral axis of every line as the device computes them.
 fn lines(device: &std::sync::Arc<Device>, probe: &Probe) -> Vec<[[f32; 4]; 4]> {
-    let kernel = Kernel::new(
-        device,
-        "geometry",
-        Library::embedded().words("geometry"),
-        &[],
-    )
-    .unwrap();
+    let kernel =
+        Kernel::new(device, "geometry", Library::embedded().words("geometry"), &[]).unwrap();
     let count = probe.scanlines * probe.elevation_layers;
-    let rays = device
-        .buffer("rays", u64::from(count) * 64, BufferKind::Storage)
-        .unwrap();
-    let input = device
-        .buffer("frame", size_of::<Frame>() as u64, BufferKind::Storage)
-        .unwrap();
-    device
-        .upload(&input, bytemuck::bytes_of(&frame(probe)))
-        .unwrap();
+    let rays = device.buffer("rays", u64::from(count) * 64, BufferKind::Storage).unwrap();
+    let input = device.buffer("frame", size_of::<Frame>() as u64, BufferKind::Storage).unwrap();
+    device.upload(&input, bytemuck::bytes_of(&frame(probe))).unwrap();
     let table = tables::scanlines(probe);
     let table: &[u8] = bytemuck::cast_slice(&table);
-    let scanlines = device
-        .buffer("scanlines", table.len() as u64, BufferKind::Storage)
-        .unwrap();
+    let scanlines = device.buffer("scanlines", table.len() as u64, BufferKind::Storage).unwrap();
     device.upload(&scanlines, table).unwrap();
-    let bindings = [
-        Binding::Buffer(&input),
-        Binding::Buffer(&rays),
-        Binding::Buffer(&scanlines),
-    ];
-    device
-        .once(|commands| commands.dispatch(&kernel, [count, 1, 1], &[], &bindings))
-        .unwrap();
+    let bindings = [Binding::Buffer(&input), Binding::Buffer(&rays), Binding::Buffer(&scanlines)];
+    device.once(|commands| commands.dispatch(&kernel, [count, 1, 1], &[], &bindings)).unwrap();
     device.read_back_as(&rays).unwrap()
 }
 
@@ -103,9 +81,7 @@ fn worst(lines: &[[[f32; 4]; 4]], probe: &Probe) -> f64 {
                 distance(line[1], direction),
                 distance(line[2], lateral),
             ];
-            worst = errors
-                .into_iter()
-                .fold(worst, |w, error| w.max(error / epsilon));
+            worst = errors.into_iter().fold(worst, |w, error| w.max(error / epsilon));
         }
     }
     worst
@@ -133,11 +109,7 @@ fn glsl_and_rust_agree_on_every_line() {
                 *field_of_view *= 1.0 + 0.01 / 96.0;
             }
         }
-        assert!(
-            worst(&lines, &planted) > 1.0,
-            "{:?}: planted error",
-            probe.kind
-        );
+        assert!(worst(&lines, &planted) > 1.0, "{:?}: planted error", probe.kind);
     }
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }

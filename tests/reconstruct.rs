@@ -47,9 +47,7 @@ fn sweep(size: [usize; 2], image_to_probe: DAffine3, poses: &[DAffine3]) -> Sequ
 fn poses(sequence: &Sequence, image_to_probe: DAffine3) -> Vec<Option<DAffine3>> {
     let mut known = Transforms::default();
     known.add("Image", "Probe", image_to_probe);
-    known
-        .of_frames(sequence, "Image", "Reference")
-        .expect("joined")
+    known.of_frames(sequence, "Image", "Reference").expect("joined")
 }
 
 /// Pixels of 0.5 x 0.25 mm.
@@ -86,14 +84,8 @@ fn pixels_on_voxels_are_kept() {
     for mode in [Interpolation::Nearest, Interpolation::Linear] {
         settings.interpolation = mode;
         let made = reconstruct(&sweep, &poses, &settings).expect("made");
-        assert_eq!(
-            (made.volume.size, made.frames, made.filled),
-            ([13, 9, 5], 5, 0)
-        );
-        assert_eq!(
-            made.volume.world_from_voxel.translation,
-            DVec3::new(-4.0, 2.0, 0.0)
-        );
+        assert_eq!((made.volume.size, made.frames, made.filled), ([13, 9, 5], 5, 0));
+        assert_eq!(made.volume.world_from_voxel.translation, DVec3::new(-4.0, 2.0, 0.0));
         assert!(worst(&made.volume, |_| true) < 1e-5);
         // Planted: half a voxel to one side.
         let shifted =
@@ -132,10 +124,7 @@ fn a_tilted_sweep_gives_the_field_back() {
     // Half a voxel along each axis: (3 + 2 + 5) / 4. A hole is filled between voxels as wrong, and
     // by weights of PLUS that are up to a tenth of the line off its middle.
     assert!(errors[0] < 2.5 * 1.25 && errors[1] < 2.5, "{errors:?}");
-    println!(
-        "largest difference: nearest {:.2}, linear {:.2}",
-        errors[0], errors[1]
-    );
+    println!("largest difference: nearest {:.2}, linear {:.2}", errors[0], errors[1]);
 }
 
 #[test]
@@ -152,24 +141,16 @@ fn compounding_lost_poses_and_orientation() {
     };
     let u8 = |v: [u8; 4]| Voxels::U8(v.to_vec());
     assert_eq!(made(&sweep, Compounding::Mean), (u8([21, 20, 11, 30]), 3));
-    assert_eq!(
-        made(&sweep, Compounding::Maximum),
-        (u8([40, 20, 30, 40]), 3)
-    );
+    assert_eq!(made(&sweep, Compounding::Maximum), (u8([40, 20, 30, 40]), 3));
     assert_eq!(made(&sweep, Compounding::Latest), (u8([13, 20, 3, 40]), 3));
     let lost = sweep.frames[1].poses.get_mut("ProbeToReference");
     lost.expect("a pose").status = Some("OUT_OF_VIEW".to_owned());
-    assert_eq!(
-        made(&sweep, Compounding::Maximum),
-        (u8([13, 20, 30, 40]), 2)
-    );
+    assert_eq!(made(&sweep, Compounding::Maximum), (u8([13, 20, 30, 40]), 2));
     sweep.frames[2].image = Some(false);
     assert_eq!(made(&sweep, Compounding::Latest), (u8([10, 20, 30, 40]), 1));
-    for (orientation, voxels) in [
-        ("UFA", [20, 10, 40, 30]),
-        ("MN", [30, 40, 10, 20]),
-        ("UN", [40, 30, 20, 10]),
-    ] {
+    for (orientation, voxels) in
+        [("UFA", [20, 10, 40, 30]), ("MN", [30, 40, 10, 20]), ("UN", [40, 30, 20, 10])]
+    {
         sweep.orientation = Some(orientation.to_owned());
         assert_eq!(made(&sweep, Compounding::Latest), (u8(voxels), 1));
     }
@@ -217,10 +198,8 @@ fn the_command_writes_a_volume_or_says_why_not() {
     };
     config("Interpolation=\"LINEAR\" CompoundingMode=\"LATEST\" FillHoles=\"OFF\"");
     let (source, xml, out) = (at("a.igs.mha"), at("a.xml"), at("a.mha"));
-    let (fine, text) = insonify(
-        folder.path(),
-        &["reconstruct", &source, "--config", &xml, "-o", &out],
-    );
+    let (fine, text) =
+        insonify(folder.path(), &["reconstruct", &source, "--config", &xml, "-o", &out]);
     assert!(
         fine && text.contains("5 of 5 frames; 585 voxels reached, 0 filled, 0 empty"),
         "{text}"
@@ -229,24 +208,14 @@ fn the_command_writes_a_volume_or_says_why_not() {
     assert_eq!(volume.size, [13, 9, 5]);
     assert!(worst(&volume, |_| true) < 1e-5);
     let given = ["--image-to-probe", matrix, "--spacing", "0.5,0.25,2"];
-    let extent = [
-        "--extent",
-        "-4,2,0,3,4,2",
-        "--interpolation",
-        "nearest",
-        "--fill",
-        "0",
-    ];
+    let extent = ["--extent", "-4,2,0,3,4,2", "--interpolation", "nearest", "--fill", "0"];
     let (fine, text) = insonify(
         folder.path(),
         &[&["reconstruct", &source, "-o", &out], &given[..], &extent].concat(),
     );
     assert!(fine && text.contains("3 x 4 x 2 voxels"), "{text}");
     let (fine, text) = insonify(folder.path(), &["check", &source]);
-    assert!(
-        fine && text.contains("pose ProbeToReference: 5, 5 of them OK"),
-        "{text}"
-    );
+    assert!(fine && text.contains("pose ProbeToReference: 5, 5 of them OK"), "{text}");
 
     for (attributes, cause) in [
         ("CompoundingMode=\"IMPORTANCE_MASK\"", "cannot be done"),
@@ -260,44 +229,22 @@ fn the_command_writes_a_volume_or_says_why_not() {
             "ClipRectangleOrigin=\"90 0\" ClipRectangleSize=\"5 5\"",
             "lies outside the 13 x 9 pixels",
         ),
-        (
-            "OutputOrigin=\"0 0 0\" OutputExtent=\"0 99999 0 99999 0 99999\"",
-            "or more than",
-        ),
+        ("OutputOrigin=\"0 0 0\" OutputExtent=\"0 99999 0 99999 0 99999\"", "or more than"),
     ] {
         config(attributes);
-        let (fine, text) = insonify(
-            folder.path(),
-            &["reconstruct", &source, "--config", &xml, "-o", &out],
-        );
-        assert!(
-            !fine && text.contains(cause) && text.contains("help:"),
-            "{cause}: {text}"
-        );
+        let (fine, text) =
+            insonify(folder.path(), &["reconstruct", &source, "--config", &xml, "-o", &out]);
+        assert!(!fine && text.contains(cause) && text.contains("help:"), "{cause}: {text}");
     }
     for (more, cause) in [
-        (
-            &[][..],
-            "nothing leads from `Image` to `Reference`; there is ProbeToReference",
-        ),
+        (&[][..], "nothing leads from `Image` to `Reference`; there is ProbeToReference"),
         (&["--image-to-probe", "1 0 0"], "does not have 16 numbers"),
-        (
-            &["--image-to-probe", matrix, "--spacing", "0"],
-            "spacing above zero",
-        ),
-        (
-            &["--image-to-probe", matrix, "--spacing", "1e-9"],
-            "or more than",
-        ),
-        (
-            &["--image-to-probe", matrix, "--reference", "Tracker"],
-            "to `Tracker`",
-        ),
+        (&["--image-to-probe", matrix, "--spacing", "0"], "spacing above zero"),
+        (&["--image-to-probe", matrix, "--spacing", "1e-9"], "or more than"),
+        (&["--image-to-probe", matrix, "--reference", "Tracker"], "to `Tracker`"),
     ] {
-        let (fine, text) = insonify(
-            folder.path(),
-            &[&["reconstruct", &source, "-o", &out], more].concat(),
-        );
+        let (fine, text) =
+            insonify(folder.path(), &[&["reconstruct", &source, "-o", &out], more].concat());
         assert!(!fine && text.contains(cause), "{cause}: {text}");
     }
 }

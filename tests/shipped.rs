@@ -171,9 +171,8 @@ fn holds_its_view(name: &str, scene: &Scene, depths: [f64; 2], beside: f64) {
     let voxel_from_probe = acquired.world_from_voxel.inverse() * scene.world_from_probe;
     let last = DVec3::from(acquired.size.map(|n| n as f64 - 1.0));
     let lines = scene.probe.scanlines;
-    for (l, y) in [0, lines / 2, lines - 1]
-        .iter()
-        .flat_map(|l| [-beside, 0.0, beside].map(|y| (*l, y)))
+    for (l, y) in
+        [0, lines / 2, lines - 1].iter().flat_map(|l| [-beside, 0.0, beside].map(|y| (*l, y)))
     {
         let (mut origin, direction) = scene.probe.ray(l, 0);
         origin.y = y;
@@ -201,31 +200,19 @@ struct Rim {
 
 #[test]
 fn the_pregnancys_simulation_is_as_bright_as_its_volume() {
-    let rim = Rim {
-        middle: [0.0, 70.0],
-        radii: [39.0, 26.0],
-        width: 0.03,
-    };
+    let rim = Rim { middle: [0.0, 70.0], radii: [39.0, 26.0], width: 0.03 };
     is_as_bright("pregnancy", 96, &rim);
 }
 
 #[test]
 fn the_early_pregnancys_simulation_is_as_bright_as_its_volume() {
-    let rim = Rim {
-        middle: [0.4, 38.8],
-        radii: [19.2, 15.6],
-        width: 0.06,
-    };
+    let rim = Rim { middle: [0.4, 38.8], radii: [19.2, 15.6], width: 0.06 };
     is_as_bright("early", 128, &rim);
 }
 
 #[test]
 fn the_ectopic_pregnancys_simulation_is_as_bright_as_its_volume() {
-    let rim = Rim {
-        middle: [24.0, 39.0],
-        radii: [10.4, 8.6],
-        width: 0.1,
-    };
+    let rim = Rim { middle: [24.0, 39.0], radii: [10.4, 8.6], width: 0.1 };
     is_as_bright("ectopic", 128, &rim);
 }
 
@@ -248,10 +235,7 @@ fn is_as_bright(name: &str, scanlines: u32, rim: &Rim) {
         [-130f64, -90.0, -50.0].map(|middle| {
             let (mut sums, mut count) = ([0.0, 0.0], 0.0);
             for pixel in 0..steps.background.len() {
-                let [i, j] = [
-                    pixel as u32 % frame.image_width,
-                    pixel as u32 / frame.image_width,
-                ];
+                let [i, j] = [pixel as u32 % frame.image_width, pixel as u32 / frame.image_width];
                 let x = f64::from(frame.image_left) + (f64::from(i) + 0.5) * pitch;
                 let z = f64::from(frame.image_top) + (f64::from(j) + 0.5) * pitch;
                 let x = (x - rim.middle[0]) / rim.radii[0];

@@ -132,12 +132,7 @@ fn inside_two_masks_in_a_row_the_echoes_are_those_of_the_whole_scene_for_less_wo
         let (other, _) = shoot(&device, &shifted, tracer);
         assert!(unequal(&fused, &other, &expected) > 100, "{tracer}");
         // Two thirds of the lines meet no mask; the others end behind the second.
-        assert!(
-            4 * kept.rays < 3 * all.rays,
-            "{} of {}",
-            kept.rays,
-            all.rays
-        );
+        assert!(4 * kept.rays < 3 * all.rays, "{} of {}", kept.rays, all.rays);
         assert!(2 * kept.segments < all.segments, "{kept:?} of {all:?}");
         assert!(3 * kept.candidates < all.candidates, "{kept:?} of {all:?}");
         assert!(kept.deposits > 0);
@@ -148,10 +143,7 @@ fn inside_two_masks_in_a_row_the_echoes_are_those_of_the_whole_scene_for_less_wo
 #[test]
 fn a_mask_off_the_image_costs_no_ray() {
     let device = test_device();
-    let off = [
-        ("mesh.near.translate", "[60, 0, 20]"),
-        ("mesh.far.translate", "[0, 0, 60]"),
-    ];
+    let off = [("mesh.near.translate", "[60, 0, 20]"), ("mesh.far.translate", "[0, 0, 60]")];
     let scene = load(FUSED, &off);
     for tracer in TRACERS {
         let ([surface, volume], counters) = shoot(&device, &scene, tracer);
@@ -178,11 +170,7 @@ fn a_plate_in_front_of_the_mask_weakens_what_is_heard_and_moves_nothing() {
     ];
     let (clear, behind) = (load(FUSED, &far), load(&format!("{plate}{FUSED}"), &far));
     let rows = tables::tissues(&behind);
-    let bone = behind
-        .instances
-        .last()
-        .expect("the plate is the last")
-        .tissue;
+    let bone = behind.instances.last().expect("the plate is the last").tissue;
     let (around, bone) = (rows[behind.background], rows[bone]);
     let along = thickness / angle.to_radians().cos();
     let reflected = (bone.impedance - around.impedance) / (bone.impedance + around.impedance);
@@ -194,19 +182,13 @@ fn a_plate_in_front_of_the_mask_weakens_what_is_heard_and_moves_nothing() {
         let ([_, shadowed], _) = shoot(&device, &behind, tracer);
         let places = inside(&behind);
         let sum = |a: &[i32], b: &[i32]| -> f64 {
-            places
-                .iter()
-                .map(|&i| f64::from(a[i]) * f64::from(b[i]))
-                .sum()
+            places.iter().map(|&i| f64::from(a[i]) * f64::from(b[i])).sum()
         };
         let level = sum(&clear, &shadowed) / sum(&clear, &clear);
         let alike =
             sum(&clear, &shadowed) / (sum(&clear, &clear) * sum(&shadowed, &shadowed)).sqrt();
         // Fixed point rounds each sample; phases as above.
-        assert!(
-            (level / expected - 1.0).abs() < 2e-3,
-            "{tracer}: {level} for {expected}"
-        );
+        assert!((level / expected - 1.0).abs() < 2e-3, "{tracer}: {level} for {expected}");
         assert!(alike > 0.999, "{tracer}: {alike}");
     }
 }

@@ -59,25 +59,7 @@ fn no_kernel_relies_on_the_trigonometry_of_a_device() {
         );
     }
     // Behind a header: x = Floor(y), then Cos(y).
-    let planted = [
-        0,
-        0,
-        0,
-        0,
-        0,
-        6 << 16 | 12,
-        1,
-        2,
-        3,
-        8,
-        4,
-        6 << 16 | 12,
-        1,
-        5,
-        3,
-        14,
-        4,
-    ];
+    let planted = [0, 0, 0, 0, 0, 6 << 16 | 12, 1, 2, 3, 8, 4, 6 << 16 | 12, 1, 5, 3, 14, 4];
     assert_eq!(trigonometry(&planted), [11]);
 }
 
@@ -87,11 +69,7 @@ fn every_way_of_being_stale_is_noticed() {
     let (glsl, spirv) = (dir.path().join("glsl"), dir.path().join("spirv"));
     copy(&root().join("glsl"), &glsl);
     copy(&root().join("spirv"), &spirv);
-    let found = || {
-        stamp::differences(&glsl, &spirv, &compiler())
-            .unwrap()
-            .join("\n")
-    };
+    let found = || stamp::differences(&glsl, &spirv, &compiler()).unwrap().join("\n");
     assert_eq!(found(), "");
 
     let edit = |path: PathBuf, change: &dyn Fn(Vec<u8>) -> Vec<u8>, expected: &[&str]| {
@@ -112,50 +90,22 @@ fn every_way_of_being_stale_is_noticed() {
         bytes
     };
     let older = "older than its sources";
-    edit(
-        glsl.join("darken.comp"),
-        &append,
-        &[&format!("darken.spv: {older}")],
-    );
+    edit(glsl.join("darken.comp"), &append, &[&format!("darken.spv: {older}")]);
     // An include: everything that uses it is stale, directly or not.
-    let by_include = [
-        format!("geometry.spv: {older}"),
-        format!("trace_query.spv: {older}"),
-    ];
-    edit(
-        glsl.join("probe.glsl"),
-        &append,
-        &[&by_include[0], &by_include[1]],
-    );
-    edit(
-        spirv.join("darken.spv"),
-        &flip,
-        &["darken.spv: not the bytes"],
-    );
+    let by_include = [format!("geometry.spv: {older}"), format!("trace_query.spv: {older}")];
+    edit(glsl.join("probe.glsl"), &append, &[&by_include[0], &by_include[1]]);
+    edit(spirv.join("darken.spv"), &flip, &["darken.spv: not the bytes"]);
     let other_flags = |bytes: Vec<u8>| {
         let text = String::from_utf8(bytes).unwrap();
-        text.replace("query(RAY_QUERY)", "query(RAY_QUERY,MORE)")
-            .into_bytes()
+        text.replace("query(RAY_QUERY)", "query(RAY_QUERY,MORE)").into_bytes()
     };
-    edit(
-        glsl.join("trace.comp"),
-        &other_flags,
-        &["trace_query.spv: older"],
-    );
+    edit(glsl.join("trace.comp"), &other_flags, &["trace_query.spv: older"]);
 
     fs::write(spirv.join("orphan.spv"), b"").unwrap();
-    assert!(
-        found().contains("orphan.spv: no kernel gives it"),
-        "{}",
-        found()
-    );
+    assert!(found().contains("orphan.spv: no kernel gives it"), "{}", found());
     fs::remove_file(spirv.join("orphan.spv")).unwrap();
     fs::remove_file(glsl.join("darken.comp")).unwrap();
-    assert!(
-        found().contains("darken: stamped, but no kernel"),
-        "{}",
-        found()
-    );
+    assert!(found().contains("darken: stamped, but no kernel"), "{}", found());
     fs::write(glsl.join("extra.comp"), b"void main() {}").unwrap();
     assert!(found().contains("extra: not compiled"), "{}", found());
     let other = stamp::differences(&glsl, &spirv, "shaderc-sys 0.0.0").unwrap();
@@ -166,11 +116,7 @@ fn every_way_of_being_stale_is_noticed() {
 fn every_kernel_is_embedded_and_nothing_else() {
     let library = Library::embedded();
     let variants = source::variants(&root().join("glsl")).unwrap();
-    let kernels: Vec<_> = variants
-        .iter()
-        .filter(|v| !v.keep_names)
-        .map(|v| &v.stem)
-        .collect();
+    let kernels: Vec<_> = variants.iter().filter(|v| !v.keep_names).map(|v| &v.stem).collect();
     assert_eq!(library.stems().collect::<Vec<_>>(), kernels);
     for stem in kernels {
         assert_eq!(bytes_of(library.words(stem)), module(stem), "{stem}");
@@ -187,10 +133,7 @@ fn naga_and_spirv_val_accept_every_module() {
             by_naga += 1;
         }
         let checked = validate::spirv_val(&variant.stem, &bytes, variant.target()).unwrap();
-        assert!(
-            checked,
-            "spirv-val is not installed (Debian: apt-get install spirv-tools)"
-        );
+        assert!(checked, "spirv-val is not installed (Debian: apt-get install spirv-tools)");
     }
     assert!(by_naga > 0);
 }
@@ -202,9 +145,7 @@ fn an_invalid_module_is_refused() {
     bytes.truncate(bytes.len() - 4);
     let error = validate::naga("cut", &bytes).unwrap_err().to_string();
     assert!(error.starts_with("cut: refused by naga"), "{error}");
-    let error = validate::spirv_val("cut", &bytes, "vulkan1.1")
-        .unwrap_err()
-        .to_string();
+    let error = validate::spirv_val("cut", &bytes, "vulkan1.1").unwrap_err().to_string();
     assert!(error.starts_with("cut: refused by spirv-val"), "{error}");
     // A ray-query module is valid, but not for the older target and not for naga.
     let bytes = module("trace_query");
@@ -219,14 +160,9 @@ fn malformed_directives_and_includes_name_the_line() {
     for first in ["// variants:", "// variants: a(B", "// variants: a-b"] {
         fs::write(&path, format!("{first}\nvoid main() {{}}\n")).unwrap();
         let error = source::variants(dir.path()).unwrap_err().to_string();
-        assert!(
-            error.contains("bad.comp:1: ") && error.contains("write e.g."),
-            "{error}"
-        );
+        assert!(error.contains("bad.comp:1: ") && error.contains("write e.g."), "{error}");
     }
     fs::write(&path, "#version 460\n#include \"absent.glsl\"\n").unwrap();
-    let error = source::files(dir.path(), "bad.comp")
-        .unwrap_err()
-        .to_string();
+    let error = source::files(dir.path(), "bad.comp").unwrap_err().to_string();
     assert!(error.contains("bad.comp:2: include not found"), "{error}");
 }

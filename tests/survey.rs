@@ -39,9 +39,8 @@ fn scene(ball: &str) -> Scene {
 }
 
 fn ball(scene: &Scene, radius: f64, across: f64) -> String {
-    let [x, y, z] = (scene.world_from_probe)
-        .transform_point3(DVec3::new(0.0, across, 30.0))
-        .to_array();
+    let [x, y, z] =
+        (scene.world_from_probe).transform_point3(DVec3::new(0.0, across, 30.0)).to_array();
     format!(
         r#"
         [[mesh]]
@@ -113,10 +112,7 @@ fn a_ball_covers_what_perspective_says() {
     let expected = shadow(&survey, centre, 9.0);
     for picture in pictures(&scene, &survey.sight(SIZE)) {
         let seen = picture.iter().filter(|p| is_ball(p)).count() as f64;
-        assert!(
-            (seen - expected).abs() < 0.01 * expected,
-            "{seen} of {expected}"
-        );
+        assert!((seen - expected).abs() < 0.01 * expected, "{seen} of {expected}");
     }
     // Another radius is noticed.
     let planted = shadow(&survey, centre, 9.15);
@@ -129,10 +125,7 @@ fn what_is_before_the_image_plane_is_cut_away_and_only_that() {
         let (scene, mut survey, _) = view(9.0, across);
         let count = |survey: &Survey| {
             // Without the image, which would hide what is behind it.
-            let sight = Sight {
-                image: false,
-                ..survey.sight(SIZE)
-            };
+            let sight = Sight { image: false, ..survey.sight(SIZE) };
             let pictures = pictures(&scene, &sight);
             pictures.map(|p| p.iter().filter(|p| is_ball(p)).count())
         };
@@ -156,14 +149,10 @@ fn a_ball_in_the_plane_shows_its_section() {
     let panel = DVec2::from(SIZE.map(f64::from));
     for picture in pictures(&scene, &sight) {
         for x in [-24.0, 24.0] {
-            let point = scene
-                .world_from_probe
-                .transform_point3(DVec3::new(x, 0.0, 30.0));
+            let point = scene.world_from_probe.transform_point3(DVec3::new(x, 0.0, 30.0));
             let at = survey.camera.project(panel, point).unwrap();
             let pixel = picture[at.y as usize * SIZE[0] as usize + at.x as usize];
-            let flat = survey.shown[0]
-                .colour
-                .map(|c| (0.85 * f64::from(c)).round() as u8);
+            let flat = survey.shown[0].colour.map(|c| (0.85 * f64::from(c)).round() as u8);
             assert_eq!(pixel[..3], flat, "{x}");
         }
     }
@@ -183,9 +172,7 @@ fn the_image_lies_where_its_corners_are_seen() {
         unreachable!("a linear probe")
     };
     let at = |x: f64, z: f64| {
-        let point = plain
-            .world_from_probe
-            .transform_point3(DVec3::new(x, 0.0, z));
+        let point = plain.world_from_probe.transform_point3(DVec3::new(x, 0.0, z));
         let at = survey.camera.project(panel, point).unwrap();
         at.y as usize * SIZE[0] as usize + at.x as usize
     };

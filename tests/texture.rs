@@ -41,10 +41,7 @@ fn shoot(scene: &Scene) -> Shot {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
     let line = |l: &[f32]| l.chunks(2).map(|v| [v[0].into(), v[1].into()]).collect();
     Shot {
-        iq: iq
-            .chunks(2 * scene.probe.samples as usize)
-            .map(line)
-            .collect(),
+        iq: iq.chunks(2 * scene.probe.samples as usize).map(line).collect(),
         grey: pixels.chunks(4).map(|p| p[0]).collect(),
     }
 }
@@ -61,10 +58,7 @@ fn scene(map: impl Fn(DVec3) -> DVec3) -> Scene {
         ..Probe::paper_table1()
     };
     let mut scene = signal::scene(probe);
-    let silent = Tissue {
-        echogenicity: f64::NEG_INFINITY,
-        ..signal::tissue(0.0)
-    };
+    let silent = Tissue { echogenicity: f64::NEG_INFINITY, ..signal::tissue(0.0) };
     scene.tissues.push(silent);
     scene.background = 1;
     scene.simulation.paths = 1;
@@ -78,19 +72,12 @@ fn scene(map: impl Fn(DVec3) -> DVec3) -> Scene {
             *p = (oblique.inverse() * world).as_vec3().to_array();
         }
         for n in &mut mesh.normals {
-            *n = (oblique.inverse() * DVec3::from(n.map(f64::from)))
-                .as_vec3()
-                .to_array();
+            *n = (oblique.inverse() * DVec3::from(n.map(f64::from))).as_vec3().to_array();
         }
         mesh
     };
     scene.meshes = vec![shape(&|p| p), shape(&map)];
-    let smooth = Surface {
-        roughness: f64::INFINITY,
-        thickness: 0.0,
-        specularity: 1.0,
-        gain: 0.0,
-    };
+    let smooth = Surface { roughness: f64::INFINITY, thickness: 0.0, specularity: 1.0, gain: 0.0 };
     scene.instances = vec![Instance {
         name: "body".into(),
         mesh: 1,
@@ -178,10 +165,7 @@ fn a_probe_that_moves_with_tissue_sees_the_same_speckle() {
     let mut planted = moved(&rigid, turn);
     planted.world_from_probe = off;
     let (correlation, _) = compared(&rigid, &planted);
-    assert!(
-        correlation < 1.0 - 1e-4,
-        "20 um beside it is caught: {correlation}"
-    );
+    assert!(correlation < 1.0 - 1e-4, "20 um beside it is caught: {correlation}");
 }
 
 /// Correlation that is left, over those depths, of echoes of beams `shift` mm apart: autocorrelation of
@@ -214,15 +198,9 @@ fn in_the_world_anatomy_slides_through_speckle_as_the_beam_overlaps() {
         let measured = correlation(&scene, &shot, &shoot(&moved(&scene, by)));
         let expected = expected_overlap(&scene, &shot, shift);
         println!("{shift} mm: {measured:.4}, expected {expected:.4}");
-        assert!(
-            (measured - expected).abs() < 0.05,
-            "{shift}: {measured}, {expected}"
-        );
+        assert!((measured - expected).abs() < 0.05, "{shift}: {measured}, {expected}");
         let planted = expected_overlap(&scene, &shot, 1.5 * shift);
-        assert!(
-            (measured - planted).abs() > 0.05,
-            "a wider shift is caught at {shift}"
-        );
+        assert!((measured - planted).abs() > 0.05, "a wider shift is caught at {shift}");
     }
 }
 
@@ -246,9 +224,8 @@ fn tracked(scene: &Scene, a: &Shot, b: &Shot, z: f64) -> f64 {
         dot(&reference, &other) / (dot(&reference, &reference) * dot(&other, &other)).sqrt()
     };
     let scores: Vec<f64> = (-40..=40).map(score).collect();
-    let best = (1..scores.len() - 1)
-        .max_by(|&i, &j| scores[i].total_cmp(&scores[j]))
-        .expect("shifts");
+    let best =
+        (1..scores.len() - 1).max_by(|&i, &j| scores[i].total_cmp(&scores[j])).expect("shifts");
     let [low, top, high] = [scores[best - 1], scores[best], scores[best + 1]];
     (best as f64 - 40.0 + (low - high) / (2.0 * (low - 2.0 * top + high))) * pitch
 }
@@ -264,10 +241,7 @@ fn tracking(scene: &Scene, expected: f64) -> (f64, f64) {
         .map(|i| DEPTHS[0] + 2.0 * f64::from(i))
         .map(|z| [z - 4.0, tracked(scene, &a, &b, z)])
         .collect();
-    let worst = places
-        .iter()
-        .map(|[z, u]| (u - expected * z).abs())
-        .fold(0.0, f64::max);
+    let worst = places.iter().map(|[z, u]| (u - expected * z).abs()).fold(0.0, f64::max);
     let n = places.len() as f64;
     let mean = |k: usize| places.iter().map(|p| p[k]).sum::<f64>() / n;
     let (mz, mu) = (mean(0), mean(1));
@@ -328,11 +302,7 @@ fn in_the_beams(scene: &Scene, [from, to]: [f64; 2]) -> f64 {
 fn no_scatterer_of_deformed_tissue_is_lost_or_doubled() {
     let rigid = DMat3::IDENTITY;
     let squeeze = DMat3::from_diagonal(DVec3::new(1.15, 1.1, 0.8));
-    let shear = DMat3::from_cols(
-        DVec3::new(1.0, 0.1, 0.0),
-        DVec3::Y,
-        DVec3::new(0.25, 0.1, 1.0),
-    );
+    let shear = DMat3::from_cols(DVec3::new(1.0, 0.1, 0.0), DVec3::Y, DVec3::new(0.25, 0.1, 1.0));
     for (name, map) in [("rigid", rigid), ("squeezed", squeeze), ("sheared", shear)] {
         let about = DVec3::new(0.0, 0.0, 24.0);
         let mut scene = scene(|p| map * (p - about) + about);
@@ -344,10 +314,7 @@ fn no_scatterer_of_deformed_tissue_is_lost_or_doubled() {
         println!("{name}: {ratio:.5} of the scatterers that are there");
         let holds = |ratio: f64| (ratio - 1.0).abs() < 5e-3;
         assert!(holds(ratio), "{name}: {ratio}");
-        assert!(
-            !holds(0.99 * ratio) && !holds(1.01 * ratio),
-            "one in a hundred is caught"
-        );
+        assert!(!holds(0.99 * ratio) && !holds(1.01 * ratio), "one in a hundred is caught");
     }
 }
 
@@ -360,9 +327,7 @@ fn unwelded(path: &std::path::Path) -> Mesh {
         let kind = words.next();
         let mut three = || std::array::from_fn(|_| words.next().expect("three words").to_owned());
         match kind {
-            Some("v") => mesh
-                .positions
-                .push(three().map(|w| w.parse().expect("a number"))),
+            Some("v") => mesh.positions.push(three().map(|w| w.parse().expect("a number"))),
             Some("f") => {
                 let corner = |w: String| w.parse::<u32>().expect("an index") - 1;
                 mesh.triangles.push(three().map(corner));
@@ -387,9 +352,7 @@ fn heart(grouped: bool) -> Option<[f64; 3]> {
     for name in ["EPICARDIAL", "LV_ENDOCARDIAL", "RV_ENDOCARDIAL"] {
         let first = scene.meshes.len();
         let file = |phase: usize| folder.join(format!("patient1_{name}_{phase:03}.obj"));
-        scene
-            .meshes
-            .extend((0..25).map(|phase| unwelded(&file(phase))));
+        scene.meshes.extend((0..25).map(|phase| unwelded(&file(phase))));
         let mut instance = placed.clone();
         instance.world_from_object = DAffine3::IDENTITY;
         instance.keyframes.meshes = (first..first + 25).collect();
@@ -435,10 +398,7 @@ fn a_real_heart_s_field_fits_its_surfaces_and_does_not_fold() {
     assert!(least > 0.05, "{least}");
     let [alone, ..] = heart(false).expect("the same files");
     println!("without the ventricles: {alone:.3} mm");
-    assert!(
-        alone > 0.01 * largest,
-        "a field that ignores the ventricles is caught: {alone}"
-    );
+    assert!(alone > 0.01 * largest, "a field that ignores the ventricles is caught: {alone}");
 }
 
 /// The body of [`scene`], of one shape, below a transform that scales it by `factors` about its middle in world axes; at
@@ -448,28 +408,15 @@ fn squeezed(factors: DVec3, seconds: f64) -> Scene {
     scene.instances[0].keyframes = Keyframes::default();
     scene.instances[0].mesh = 0;
     let motion = Motion::Sine {
-        clock: Clock {
-            period: 4.0,
-            ..Clock::default()
-        },
+        clock: Clock { period: 4.0, ..Clock::default() },
         translation: DVec3::ZERO,
-        turn: Turn {
-            centre: DVec3::new(0.0, 0.0, 24.0),
-            ..Turn::default()
-        },
+        turn: Turn { centre: DVec3::new(0.0, 0.0, 24.0), ..Turn::default() },
         scale: factors,
     };
-    let node = |name: &str, parent, kind| Node {
-        name: name.into(),
-        parent,
-        alternative: None,
-        kind,
-    };
+    let node =
+        |name: &str, parent, kind| Node { name: name.into(), parent, alternative: None, kind };
     let rest = DAffine3::IDENTITY;
-    let placed = NodeKind::Mesh {
-        instance: 0,
-        rest: scene.instances[0].world_from_object,
-    };
+    let placed = NodeKind::Mesh { instance: 0, rest: scene.instances[0].world_from_object };
     scene.graph.nodes = vec![
         node("palpation", None, NodeKind::Transform { rest, motion }),
         node("body", Some(0), placed),
@@ -522,25 +469,19 @@ fn squeezed_tissue_is_as_bright_as_at_rest() {
     let power = |scene: &Scene| {
         let shot = shoot(scene);
         let samples = inside(scene, &shot).flatten();
-        let (sum, count) = samples.fold((0.0, 0), |(sum, n), v| {
-            (sum + v[0] * v[0] + v[1] * v[1], n + 1)
-        });
+        let (sum, count) =
+            samples.fold((0.0, 0), |(sum, n), v| (sum + v[0] * v[0] + v[1] * v[1], n + 1));
         10.0 * (sum / f64::from(count)).log10()
     };
-    for factors in [
-        DVec3::new(0.8, 1.0, 0.8),
-        DVec3::new(1.2, 1.2, 0.9),
-        DVec3::new(1.0, 0.7, 0.85),
-    ] {
+    for factors in
+        [DVec3::new(0.8, 1.0, 0.8), DVec3::new(1.2, 1.2, 0.9), DVec3::new(1.0, 0.7, 0.85)]
+    {
         let [rest, now] = [0.0, 1.0].map(|seconds| power(&squeezed(factors, seconds)));
         // What as many scatterers in less room would be.
         let denser = -10.0 * factors.element_product().log10();
         let change = now - rest;
         println!("{factors}: {change:+.2} dB; without compensation {denser:+.2}");
         assert!(change.abs() < 0.35, "{factors}: {rest} {now}");
-        assert!(
-            (change - denser).abs() > 0.35,
-            "{factors}: denser tissue would be noticed"
-        );
+        assert!((change - denser).abs() > 0.35, "{factors}: denser tissue would be noticed");
     }
 }

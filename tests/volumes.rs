@@ -175,9 +175,7 @@ fn every_encoding_of_the_ball_gives_the_same_voxels() {
     }
     // And written anew, from the voxels: every type that holds them, both byte orders, every way
     // to write, in the header's file and beside it.
-    let Voxels::I16(ball) = &plain else {
-        panic!("16 bits")
-    };
+    let Voxels::I16(ball) = &plain else { panic!("16 bits") };
     let folder = tempfile::tempdir().expect("a folder");
     for kind in ["uint16", "int16", "int32", "uint32", "float", "double"] {
         for (big, encoding) in [false, true]
@@ -218,11 +216,7 @@ fn sequences_of_plus_are_written_back_equal() {
         let name = p.to_string_lossy();
         name.ends_with(".igs.mha") || name.ends_with(".igs.mhd")
     }) {
-        let name = path
-            .file_name()
-            .expect("a name")
-            .to_string_lossy()
-            .into_owned();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
         match Sequence::load(&path) {
             Ok((sequence, _)) => {
                 sequence.write(&copy).expect("written");
@@ -245,11 +239,7 @@ fn sequences_of_plus_are_written_back_equal() {
     assert!(read >= 18, "{read}");
     let nwires = data.join("us-plus/TestImages/NwirePhantomFreehand.igs.mha");
     let (sequence, _) = Sequence::load(&nwires).expect("readable");
-    let poses: Vec<_> = sequence
-        .frames
-        .iter()
-        .flat_map(|f| f.poses.values())
-        .collect();
+    let poses: Vec<_> = sequence.frames.iter().flat_map(|f| f.poses.values()).collect();
     let ok = poses.iter().filter(|p| p.is_ok()).count();
     assert_eq!((sequence.frames.len(), poses.len(), ok), (97, 291, 194));
     // Numbers of the header, as they stand there.
@@ -274,27 +264,15 @@ fn files_written_by_others_give_their_voxels_and_places() {
             list.iter().map(|v| v.as_f64().expect("a number")).collect()
         };
         let (volume, _) = Volume::load(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"));
-        assert_eq!(
-            volume.size.map(|n| n as f64).to_vec(),
-            numbers("size"),
-            "{name}"
-        );
-        let found: Vec<_> = (0..volume.voxels.len())
-            .map(|i| volume.voxels.get(i))
-            .collect();
+        assert_eq!(volume.size.map(|n| n as f64).to_vec(), numbers("size"), "{name}");
+        let found: Vec<_> = (0..volume.voxels.len()).map(|i| volume.voxels.get(i)).collect();
         // Of JPEG the standard allows a decoder a grey level; all others are exact.
         let tolerance = f64::from(u8::from(name.starts_with("jpeg")));
         // Nine digits name a single-precision number.
-        let values: Vec<_> = numbers("values")
-            .iter()
-            .map(|v| f64::from(*v as f32))
-            .collect();
+        let values: Vec<_> = numbers("values").iter().map(|v| f64::from(*v as f32)).collect();
         let worst = found.iter().zip(&values).map(|(a, b)| (a - b).abs());
         let worst = worst.fold(0.0, f64::max);
-        assert!(
-            found.len() == values.len() && worst <= tolerance,
-            "{name}: {worst}"
-        );
+        assert!(found.len() == values.len() && worst <= tolerance, "{name}: {worst}");
         // NIfTI holds positions in single precision and directions as a quaternion of it.
         let tolerance = if name.contains(".nii") { 1e-5 } else { 1e-9 };
         let (spacing, origin, direction) =
@@ -350,14 +328,8 @@ fn check_describes_or_refuses_every_file() {
         for path in volumes(&data.join(set)) {
             let Outcome { code, text } = check(&path);
             match code {
-                Some(0) => assert!(
-                    text.contains("values ") && text.contains("0 errors"),
-                    "{text}"
-                ),
-                Some(1) => assert!(
-                    text.contains("help:") && text.contains("1 errors"),
-                    "{text}"
-                ),
+                Some(0) => assert!(text.contains("values ") && text.contains("0 errors"), "{text}"),
+                Some(1) => assert!(text.contains("help:") && text.contains("1 errors"), "{text}"),
                 _ => panic!("{}: {code:?}\n{text}", path.display()),
             }
             counts[usize::from(code == Some(1))] += 1;
@@ -384,10 +356,7 @@ fn cut_and_changed_files_are_refused_within_bounds() {
         }
         // Sizes blown up in place of what they are; nothing may be allocated for them.
         let text = String::from_utf8_lossy(&whole[..whole.len().min(400)]).into_owned();
-        for (key, huge) in [
-            ("sizes: ", "60000 60000 1"),
-            ("DimSize = ", "1500 1500 1700"),
-        ] {
+        for (key, huge) in [("sizes: ", "60000 60000 1"), ("DimSize = ", "1500 1500 1700")] {
             let Some(at) = text.find(key) else { continue };
             let end = at + text[at..].find('\n').expect("a line");
             let axes = text[at + key.len()..end].split_whitespace().count();

@@ -165,31 +165,18 @@ fn main() -> ExitCode {
         Scene::Abdomen { triangles, output } => abdomen(triangles as usize, &output),
         Scene::Heart { triangles, output } => heart_scene::make(triangles as usize, &output),
         Scene::Fetus { triangles, output } => fetus_scene::make(triangles as usize, &output),
-        Scene::Pregnancy {
-            triangles,
-            output,
-            keep,
-        } => pregnancy::make(triangles as usize, &output, keep.as_deref()),
-        Scene::Early {
-            triangles,
-            output,
-            keep,
-        } => vaginal::make(&early::case(), triangles as usize, &output, keep.as_deref()),
-        Scene::Ectopic {
-            triangles,
-            output,
-            keep,
-        } => vaginal::make(
-            &ectopic::case(),
-            triangles as usize,
-            &output,
-            keep.as_deref(),
-        ),
-        Scene::Limbs {
-            triangles,
-            spread,
-            output,
-        } => limbs::make(triangles as usize, spread, &output),
+        Scene::Pregnancy { triangles, output, keep } => {
+            pregnancy::make(triangles as usize, &output, keep.as_deref())
+        }
+        Scene::Early { triangles, output, keep } => {
+            vaginal::make(&early::case(), triangles as usize, &output, keep.as_deref())
+        }
+        Scene::Ectopic { triangles, output, keep } => {
+            vaginal::make(&ectopic::case(), triangles as usize, &output, keep.as_deref())
+        }
+        Scene::Limbs { triangles, spread, output } => {
+            limbs::make(triangles as usize, spread, &output)
+        }
     };
     match made {
         Ok(()) => ExitCode::SUCCESS,
@@ -202,11 +189,7 @@ fn main() -> ExitCode {
 
 fn abdomen(budget: usize, output: &Path) -> Result<(), String> {
     let parts = abdomen::parts();
-    let extent = Extent {
-        low: body::LOW,
-        high: body::HIGH,
-        step: 4.0,
-    };
+    let extent = Extent { low: body::LOW, high: body::HIGH, step: 4.0 };
     let surfaces = model::surfaces(&parts, extent, budget)?;
     let total = model::count(&surfaces);
     for (part, surface) in parts.iter().zip(&surfaces) {
@@ -217,10 +200,6 @@ fn abdomen(budget: usize, output: &Path) -> Result<(), String> {
     let command = output::command("abdomen", budget, "", output);
     let path = output.join("abdomen.toml");
     output::write(&path, &output::scene(&parts, "abdomen", &command, total))?;
-    println!(
-        "{total} triangles in {} meshes: {}",
-        parts.len(),
-        path.display()
-    );
+    println!("{total} triangles in {} meshes: {}", parts.len(), path.display());
     Ok(())
 }

@@ -24,10 +24,7 @@ fn main() -> ExitCode {
     match run(&root.join("glsl"), &root.join("spirv"), root, check) {
         Ok(stale) if stale.is_empty() => ExitCode::SUCCESS,
         Ok(stale) => {
-            eprintln!(
-                "not what the sources compile to: {}; run without --check",
-                stale.join(", ")
-            );
+            eprintln!("not what the sources compile to: {}; run without --check", stale.join(", "));
             ExitCode::FAILURE
         }
         Err(error) => {
@@ -52,10 +49,8 @@ fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String
         if !variant.keep_names {
             table += &format!("    (\"{stem}\", include_bytes!(\"{stem}.spv\")),\n");
         }
-        let entry = Entry {
-            source: source::hash(glsl, &variant, &version)?,
-            spirv: source::fnv1a(&bytes),
-        };
+        let entry =
+            Entry { source: source::hash(glsl, &variant, &version)?, spirv: source::fnv1a(&bytes) };
         outputs.insert(spirv.join(format!("{stem}.spv")), bytes);
         entries.insert(stem, entry);
     }
@@ -73,43 +68,19 @@ fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String
         if fs::read(path).is_ok_and(|old| old == *bytes) {
             continue;
         }
-        stale.push(
-            path.file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
-        );
+        stale.push(path.file_name().unwrap_or_default().to_string_lossy().into_owned());
         if !check {
-            fs::write(path, bytes).map_err(|cause| Error::File {
-                path: path.clone(),
-                cause,
-            })?;
+            fs::write(path, bytes).map_err(|cause| Error::File { path: path.clone(), cause })?;
         }
     }
-    for entry in fs::read_dir(spirv).map_err(|cause| Error::File {
-        path: spirv.into(),
-        cause,
-    })? {
-        let path = entry
-            .map_err(|cause| Error::File {
-                path: spirv.into(),
-                cause,
-            })?
-            .path();
+    for entry in fs::read_dir(spirv).map_err(|cause| Error::File { path: spirv.into(), cause })? {
+        let path = entry.map_err(|cause| Error::File { path: spirv.into(), cause })?.path();
         if outputs.contains_key(&path) {
             continue;
         }
-        stale.push(
-            path.file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
-        );
+        stale.push(path.file_name().unwrap_or_default().to_string_lossy().into_owned());
         if !check {
-            fs::remove_file(&path).map_err(|cause| Error::File {
-                path: path.clone(),
-                cause,
-            })?;
+            fs::remove_file(&path).map_err(|cause| Error::File { path: path.clone(), cause })?;
         }
     }
     Ok(if check { stale } else { Vec::new() })

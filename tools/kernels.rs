@@ -76,25 +76,13 @@ fn main() -> Result<ExitCode> {
     output::line(format_args!("{} ({})", device.name(), device.driver()));
     let passed = match arguments.command {
         Command::List => true,
-        Command::Run {
-            name,
-            input,
-            output,
-            size,
-        } => {
+        Command::Run { name, input, output, size } => {
             let subject = find(&name)?;
             let size = match size {
                 Extent::Small => Size::Small,
                 Extent::Standard => Size::Standard,
             };
-            run(
-                &device,
-                &library,
-                subject,
-                size,
-                input.as_deref(),
-                output.as_deref(),
-            )?
+            run(&device, &library, subject, size, input.as_deref(), output.as_deref())?
         }
         Command::Check => check(&device, &library)?,
     };
@@ -107,24 +95,15 @@ fn main() -> Result<ExitCode> {
 
 fn find(name: &str) -> Result<&'static Subject> {
     let names: Vec<_> = SUBJECTS.iter().map(|s| s.name).collect();
-    let found = SUBJECTS
-        .iter()
-        .find(|s| s.name == name || s.stems.contains(&name));
+    let found = SUBJECTS.iter().find(|s| s.name == name || s.stems.contains(&name));
     found.ok_or_else(|| miette!("no kernel '{name}'; there are {}", names.join(", ")))
 }
 
 fn list() {
     for subject in &SUBJECTS {
-        let bindings: Vec<_> = (subject.job)(Case::One, Size::Small)
-            .inputs
-            .iter()
-            .map(|i| i.name)
-            .collect();
-        output::line(format_args!(
-            "{:<9} {}",
-            subject.name,
-            subject.stems.join(" ")
-        ));
+        let bindings: Vec<_> =
+            (subject.job)(Case::One, Size::Small).inputs.iter().map(|i| i.name).collect();
+        output::line(format_args!("{:<9} {}", subject.name, subject.stems.join(" ")));
         output::line(format_args!("          bindings:  {}", bindings.join(" ")));
         output::line(format_args!("          tolerance: {}", subject.tolerance));
     }
@@ -167,10 +146,7 @@ fn run(
             fastest = fastest.min(outcome.milliseconds);
             outputs = outcome.outputs;
         }
-        output::line(format_args!(
-            "{}: {fastest:.3} ms, fastest of {REPEATS}",
-            kernel.name()
-        ));
+        output::line(format_args!("{}: {fastest:.3} ms, fastest of {REPEATS}", kernel.name()));
         let start = Instant::now();
         for check in (subject.check)(&job, &outputs) {
             output::line(format_args!("  {check}"));

@@ -62,11 +62,7 @@ fn main() -> Result<ExitCode> {
     let mut examined = vec![];
     for check in checks {
         let found = check::examine(&check, &bench);
-        let verdict = if found.holds() {
-            "holds"
-        } else {
-            "DOES NOT HOLD"
-        };
+        let verdict = if found.holds() { "holds" } else { "DOES NOT HOLD" };
         println!("{:<4} {}: {verdict}", check.row, check.name);
         print!("{}", found.complaints(&check));
         examined.push((check, found));
@@ -84,9 +80,5 @@ fn main() -> Result<ExitCode> {
         .wrap_err_with(|| format!("cannot write {}", path.display()))?;
     println!("{}", path.display());
     let holds = examined.iter().all(|(_, found)| found.holds());
-    Ok(if holds {
-        ExitCode::SUCCESS
-    } else {
-        ExitCode::FAILURE
-    })
+    Ok(if holds { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -82,14 +82,7 @@ pub fn stations_at(track: &Track, scene: &Scene, rate: f64, frames: Option<u32>)
 
 fn stations(track: &Track, scene: &Scene, times: Vec<f64>) -> Vec<Station> {
     let (_, rotation, translation) = scene.world_from_probe.to_scale_rotation_translation();
-    let rest = Trs {
-        translation,
-        rotation,
-        ..Trs::default()
-    };
-    let station = |time| Station {
-        time,
-        world_from_probe: track.at(rest, time).matrix(),
-    };
+    let rest = Trs { translation, rotation, ..Trs::default() };
+    let station = |time| Station { time, world_from_probe: track.at(rest, time).matrix() };
     times.into_iter().map(station).collect()
 }

@@ -153,9 +153,7 @@ pub fn run(args: &Acquire) -> Result<()> {
         output::line(path.display());
         let [width, height] = sequence.size;
         let count = sequence.frames.len();
-        output::line(format!(
-            "  {count} tracked frames of {width} x {height} pixels"
-        ));
+        output::line(format!("  {count} tracked frames of {width} x {height} pixels"));
     }
     if let (Some(path), Some(sequence)) = (&args.volume, &single) {
         made.push(reconstructed(args, path, sequence)?);

@@ -165,10 +165,9 @@ impl Common {
     pub fn validated(&self, device: &Device) -> Result<()> {
         let messages = device.validation_messages();
         match messages.first() {
-            Some(first) if self.validate => Err(miette!(
-                "{} validation messages, the first: {first}",
-                messages.len()
-            )),
+            Some(first) if self.validate => {
+                Err(miette!("{} validation messages, the first: {first}", messages.len()))
+            }
             _ => Ok(()),
         }
     }
@@ -262,10 +261,7 @@ impl Progress {
     pub fn new(count: u32, noun: &str) -> Self {
         let template = format!("{{wide_bar}} {{pos}}/{{len}} {noun}, {{eta}} left");
         let style = ProgressStyle::with_template(&template).expect("a valid template");
-        Self {
-            bar: ProgressBar::new(u64::from(count)).with_style(style),
-            start: Instant::now(),
-        }
+        Self { bar: ProgressBar::new(u64::from(count)).with_style(style), start: Instant::now() }
     }
 
     /// So many are done.

@@ -24,16 +24,10 @@ impl Images {
             .or_else(|| percent(&text))
             .or_else(|| (frames > 1).then(|| before_extension(output, digits)));
         match parts {
-            Some((before, digits, after)) => Self {
-                before,
-                numbered: Some((digits, after)),
-                frames,
-            },
-            None => Self {
-                before: text.into_owned(),
-                numbered: None,
-                frames,
-            },
+            Some((before, digits, after)) => {
+                Self { before, numbered: Some((digits, after)), frames }
+            }
+            None => Self { before: text.into_owned(), numbered: None, frames },
         }
     }
 
@@ -79,9 +73,8 @@ fn percent(text: &str) -> Option<Parts> {
 }
 
 fn before_extension(output: &Path, digits: usize) -> Parts {
-    let extension = output
-        .extension()
-        .map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    let extension =
+        output.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
     let stem = output.with_extension("");
     (format!("{}.", stem.to_string_lossy()), digits, extension)
 }

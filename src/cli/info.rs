@@ -28,11 +28,7 @@ pub fn run(_: &Info) -> Result<()> {
             device.driver,
             device.api_version,
             device.memory_bytes as f64 / f64::from(1 << 30),
-            if device.usable {
-                ""
-            } else {
-                " - cannot be used"
-            }
+            if device.usable { "" } else { " - cannot be used" }
         ));
         for lack in &device.lacks {
             output::line(format_args!("   lacks {lack}"));

@@ -30,12 +30,7 @@ pub struct Match {
     #[arg(long, default_value_t = 4.0, value_parser = band)]
     band: f64,
     /// What is fitted.
-    #[arg(
-        long,
-        value_enum,
-        value_delimiter = ',',
-        default_value = "gain,tgc,range,size"
-    )]
+    #[arg(long, value_enum, value_delimiter = ',', default_value = "gain,tgc,range,size")]
     fit: Vec<Fitted>,
     /// Realisations of the speckle that are simulated per round: more are surer.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100))]
@@ -97,11 +92,9 @@ pub fn run(args: &Match) -> Result<()> {
     };
     let made = matching::fit(&mut simulator, &mut scene, &options, told);
     let made = made.map_err(|error| match error {
-        MatchError::Nothing { cause, remedy } => miette!(
-            help = remedy,
-            "{} cannot be matched: {cause}",
-            args.scene.display()
-        ),
+        MatchError::Nothing { cause, remedy } => {
+            miette!(help = remedy, "{} cannot be matched: {cause}", args.scene.display())
+        }
         MatchError::Sim(error) => miette!(error),
     })?;
     args.common.validated(&device)?;
@@ -149,20 +142,8 @@ fn settings(made: &Matching, overrides: &[(String, String)]) -> Vec<Entry> {
     };
     let level = |decibel: f64| format!("\"{decibel} dB\"");
     set("gain", before.gain != after.gain, level(after.gain));
-    set(
-        "dynamic_range",
-        before.dynamic_range != after.dynamic_range,
-        level(after.dynamic_range),
-    );
-    set(
-        "tgc_sliders",
-        before.tgc_sliders != after.tgc_sliders,
-        format!("{:?}", after.tgc_sliders),
-    );
-    set(
-        "psf_scale",
-        before.psf_scale != after.psf_scale,
-        format!("{:?}", after.psf_scale),
-    );
+    set("dynamic_range", before.dynamic_range != after.dynamic_range, level(after.dynamic_range));
+    set("tgc_sliders", before.tgc_sliders != after.tgc_sliders, format!("{:?}", after.tgc_sliders));
+    set("psf_scale", before.psf_scale != after.psf_scale, format!("{:?}", after.psf_scale));
     out
 }

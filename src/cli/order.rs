@@ -43,9 +43,7 @@ mod tests {
         }
         let expected = f64::from(runs) / 5.0;
         let cells = counts.iter().flatten();
-        let chi: f64 = cells
-            .map(|&n| (f64::from(n) - expected).powi(2) / expected)
-            .sum();
+        let chi: f64 = cells.map(|&n| (f64::from(n) - expected).powi(2) / expected).sum();
         assert!(chi < 39.25, "{chi}: {counts:?}");
     }
 }

@@ -155,10 +155,7 @@ pub fn run(args: &Reconstruct) -> Result<()> {
         };
     }
     if let Some(length) = args.fill {
-        let stick = Filling::Stick {
-            length: usize::from(length),
-            count: 1,
-        };
+        let stick = Filling::Stick { length: usize::from(length), count: 1 };
         settings.holes = if length > 0 { vec![stick] } else { vec![] };
     }
     let about = || format!("reconstructing {}", args.sequence.display());

@@ -277,10 +277,7 @@ fn write(args: &Register, entries: &[Entry], target: &Target, made: &Registered)
             return Ok(());
         }
     };
-    let note = (
-        format!("{}.translate", target.table),
-        told::note(made, &inputs::names(args)),
-    );
+    let note = (format!("{}.translate", target.table), told::note(made, &inputs::names(args)));
     save_with(&args.scene, output, entries, &[note])?;
     output::line(output.display());
     Ok(())
@@ -292,10 +289,6 @@ impl Registered {
         let shift = self.transform.transform_point3(self.middle) - self.middle;
         let (_, rotation, _) = self.transform.to_scale_rotation_translation();
         let angle = rotation.to_axis_angle().1.to_degrees();
-        (
-            shift.length(),
-            angle.min(360.0 - angle),
-            scale_of(&self.transform),
-        )
+        (shift.length(), angle.min(360.0 - angle), scale_of(&self.transform))
     }
 }

@@ -89,10 +89,7 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
-    let output = args
-        .output
-        .clone()
-        .unwrap_or_else(|| default_output(&args.scene));
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
     let timings = simulate(&mut simulator, &mut library, &mut scene, args, &output)?;
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
@@ -151,10 +148,7 @@ fn scatterers(scene: &Scene) -> Option<Vec<Value>> {
     }
     let calibration = Calibration::new(scene);
     let most = |z| {
-        let counts = scene
-            .tissues
-            .iter()
-            .map(|t| calibration.scatterers_at(t, z));
+        let counts = scene.tissues.iter().map(|t| calibration.scatterers_at(t, z));
         counts.fold(0.0, f64::max)
     };
     let depth = |eighth: u32| scene.probe.depth * f64::from(eighth) / 8.0;
@@ -229,10 +223,7 @@ fn moments(args: &Render, scene: &Scene) -> Result<Vec<Moment>> {
     let start = args.common.time;
     let Some(path) = &args.trajectory else {
         let gone = |index| args.fps.map_or(0.0, |fps| f64::from(index) / fps);
-        let moment = |index| Moment {
-            seconds: start + gone(index),
-            pose: None,
-        };
+        let moment = |index| Moment { seconds: start + gone(index), pose: None };
         return Ok((0..args.frames.unwrap_or(1)).map(moment).collect());
     };
     let track = file::load_trajectory(path)?;
@@ -326,21 +317,15 @@ fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
     let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
     for (index, frame) in timings.iter().enumerate() {
         for (name, ms) in &frame.passes {
-            let at = stages
-                .iter()
-                .position(|(n, _)| n == name)
-                .unwrap_or_else(|| {
-                    stages.push((name.clone(), Vec::new()));
-                    stages.len() - 1
-                });
+            let at = stages.iter().position(|(n, _)| n == name).unwrap_or_else(|| {
+                stages.push((name.clone(), Vec::new()));
+                stages.len() - 1
+            });
             stages[at].1.resize(index + 1, 0.0);
             stages[at].1[index] += ms;
         }
     }
-    stages
-        .into_iter()
-        .map(|(name, ms)| (name, json!(Statistics::of(ms))))
-        .collect()
+    stages.into_iter().map(|(name, ms)| (name, json!(Statistics::of(ms)))).collect()
 }
 
 /// Largest resident size of this process so far, where the system tells it.

@@ -133,11 +133,7 @@ fn simulate(
         }
         let picture = Picture::new(simulator.constants(), &rgba);
         server.publish(picture, &scene.world_from_probe);
-        shown = Some(Shown {
-            state: now,
-            level,
-            at: Instant::now(),
-        });
+        shown = Some(Shown { state: now, level, at: Instant::now() });
         frames += 1;
         if Some(frames) == args.frames {
             return Ok(());
@@ -184,10 +180,7 @@ impl Told {
             eprintln!("clients: {}", status.clients);
         }
         if status.refused != self.status.refused {
-            eprintln!(
-                "clients refused, because there is no room: {}",
-                status.refused
-            );
+            eprintln!("clients refused, because there is no room: {}", status.refused);
         }
         if status.errors != self.status.errors {
             let last = status.last_error.as_deref().unwrap_or_default();

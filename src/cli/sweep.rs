@@ -123,11 +123,7 @@ impl Files {
         let output = args.output.clone().unwrap_or_else(named);
         let png = |e: &std::ffi::OsStr| e.eq_ignore_ascii_case("png");
         if output.extension().is_some_and(png) {
-            return Ok(Self {
-                table: output.with_extension("csv"),
-                sheet: output,
-                folder: None,
-            });
+            return Ok(Self { table: output.with_extension("csv"), sheet: output, folder: None });
         }
         std::fs::create_dir_all(&output)
             .into_diagnostic()
@@ -175,10 +171,7 @@ fn write(args: &Sweep, scene: &Scene, pictures: &[Picture], files: &Files) -> Re
                 1 => 0,
                 n => n - 1 + shift,
             };
-            let file = files
-                .folder
-                .as_ref()
-                .map(|_| single(number, picture, blind));
+            let file = files.folder.as_ref().map(|_| single(number, picture, blind));
             Record::new(number, picture, page.places[tile], file)
         })
         .collect();
@@ -195,10 +188,7 @@ fn write(args: &Sweep, scene: &Scene, pictures: &[Picture], files: &Files) -> Re
 }
 
 fn save(image: &image::GrayImage, path: &Path) -> Result<()> {
-    image
-        .save(path)
-        .into_diagnostic()
-        .wrap_err_with(|| format!("writing {}", path.display()))
+    image.save(path).into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
 }
 
 /// Name of a single image. In blind rating it says nothing of what it shows.

@@ -72,10 +72,7 @@ pub fn run(args: &View) -> Result<()> {
         screenshot: args.screenshot.clone(),
         json: args.json.clone(),
         trajectory: trajectory(args)?,
-        listen: args.igtl_port.map(|port| Listen {
-            address: args.igtl_bind,
-            port,
-        }),
+        listen: args.igtl_port.map(|port| Listen { address: args.igtl_bind, port }),
         captures: args.captures.clone(),
         prepare: Box::new(move |device, scene| {
             common.settle_simulation(&mut scene.simulation, device);

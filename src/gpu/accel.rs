@@ -61,11 +61,7 @@ impl RawAccel {
             .acceleration_structure(self.handle);
         let accel = self.device.require_accel().expect("checked at creation");
         // SAFETY: the structure is alive.
-        unsafe {
-            accel
-                .functions
-                .get_acceleration_structure_device_address(&info)
-        }
+        unsafe { accel.functions.get_acceleration_structure_device_address(&info) }
     }
 }
 
@@ -74,9 +70,7 @@ impl Drop for RawAccel {
         if let Some(accel) = &self.device.accel {
             // SAFETY: submissions and top levels keep what they use alive.
             unsafe {
-                accel
-                    .functions
-                    .destroy_acceleration_structure(self.handle, None);
+                accel.functions.destroy_acceleration_structure(self.handle, None);
             }
         }
     }
@@ -151,9 +145,7 @@ pub(crate) unsafe fn record_build(
 ) -> Result<(), GpuError> {
     let mut info = info
         .dst_acceleration_structure(structure.handle)
-        .scratch_data(vk::DeviceOrHostAddressKHR {
-            device_address: scratch.address,
-        });
+        .scratch_data(vk::DeviceOrHostAddressKHR { device_address: scratch.address });
     if info.mode == vk::BuildAccelerationStructureModeKHR::UPDATE {
         info = info.src_acceleration_structure(structure.handle);
     }
@@ -161,9 +153,7 @@ pub(crate) unsafe fn record_build(
     let accel = structure.device.require_accel()?;
     // SAFETY: the caller's promise.
     unsafe {
-        accel
-            .functions
-            .cmd_build_acceleration_structures(commands.raw(), &[info], &[&[range]]);
+        accel.functions.cmd_build_acceleration_structures(commands.raw(), &[info], &[&[range]]);
     }
     Ok(())
 }
@@ -179,17 +169,11 @@ impl CompactedSizes {
     const TYPE: vk::QueryType = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
 
     pub(crate) fn new(device: &Arc<Device>, count: u32) -> Result<Self, GpuError> {
-        let info = vk::QueryPoolCreateInfo::default()
-            .query_type(Self::TYPE)
-            .query_count(count);
+        let info = vk::QueryPoolCreateInfo::default().query_type(Self::TYPE).query_count(count);
         // SAFETY: acceleration structures are on (checked by the caller); `Drop` destroys it.
         let pool = unsafe { device.raw.create_query_pool(&info, None) }
             .map_err(during("creating the queries for compacted sizes"))?;
-        Ok(Self {
-            pool,
-            count,
-            device: device.clone(),
-        })
+        Ok(Self { pool, count, device: device.clone() })
     }
 
     pub(crate) fn record(
@@ -204,15 +188,13 @@ impl CompactedSizes {
             let raw = commands.raw();
             let device = &self.device.raw;
             device.cmd_reset_query_pool(raw, self.pool, 0, self.count);
-            accel
-                .functions
-                .cmd_write_acceleration_structures_properties(
-                    raw,
-                    &handles,
-                    Self::TYPE,
-                    self.pool,
-                    0,
-                );
+            accel.functions.cmd_write_acceleration_structures_properties(
+                raw,
+                &handles,
+                Self::TYPE,
+                self.pool,
+                0,
+            );
         }
         Ok(())
     }
@@ -221,12 +203,8 @@ impl CompactedSizes {
         let mut sizes = vec![0_u64; self.count as usize];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the submission that wrote the queries has finished.
-        unsafe {
-            self.device
-                .raw
-                .get_query_pool_results(self.pool, 0, &mut sizes, flags)
-        }
-        .map_err(during("reading the compacted sizes"))?;
+        unsafe { self.device.raw.get_query_pool_results(self.pool, 0, &mut sizes, flags) }
+            .map_err(during("reading the compacted sizes"))?;
         Ok(sizes)
     }
 }

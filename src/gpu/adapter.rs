@@ -129,9 +129,9 @@ pub(crate) fn choose(
             let wanted = selector.to_lowercase();
             let found = match selector.parse::<usize>() {
                 Ok(index) => (index < adapters.len()).then_some(index),
-                Err(_) => adapters
-                    .iter()
-                    .position(|a| a.info.name.to_lowercase().contains(&wanted)),
+                Err(_) => {
+                    adapters.iter().position(|a| a.info.name.to_lowercase().contains(&wanted))
+                }
             };
             let refuse = |problem: String| GpuError::UnknownDevice {
                 selector: selector.into(),
@@ -145,13 +145,11 @@ pub(crate) fn choose(
             }
             Some(found)
         }
-        None => (0..adapters.len())
-            .filter(|&i| adapters[i].info.usable)
-            .min_by_key(|&i| {
-                let adapter = &adapters[i];
-                let shows = plan(adapter).is_some();
-                (!shows, rank(adapter.info.kind, adapter.driver))
-            }),
+        None => (0..adapters.len()).filter(|&i| adapters[i].info.usable).min_by_key(|&i| {
+            let adapter = &adapters[i];
+            let shows = plan(adapter).is_some();
+            (!shows, rank(adapter.info.kind, adapter.driver))
+        }),
     };
     match chosen {
         Some(index) => {
@@ -164,12 +162,8 @@ pub(crate) fn choose(
                 }),
             }
         }
-        None if adapters.is_empty() => Err(GpuError::NoDevice {
-            seen: String::new(),
-        }),
-        None => Err(GpuError::NoDevice {
-            seen: format!(", of these:\n{}", table(&adapters)),
-        }),
+        None if adapters.is_empty() => Err(GpuError::NoDevice { seen: String::new() }),
+        None => Err(GpuError::NoDevice { seen: format!(", of these:\n{}", table(&adapters)) }),
     }
 }
 
@@ -236,12 +230,8 @@ fn probe(
     if at_least_1_1 {
         // SAFETY: both calls are core in 1.1; each structure in the chains is offered by the device.
         unsafe {
-            instance
-                .raw
-                .get_physical_device_features2(physical, &mut features);
-            instance
-                .raw
-                .get_physical_device_properties2(physical, &mut properties2);
+            instance.raw.get_physical_device_features2(physical, &mut features);
+            instance.raw.get_physical_device_properties2(physical, &mut properties2);
         }
     }
     let core = features.features;
@@ -253,11 +243,7 @@ fn probe(
     let ray_query = query.ray_query == vk::TRUE && acceleration_structure;
 
     // SAFETY: `physical` belongs to this instance.
-    let families = unsafe {
-        instance
-            .raw
-            .get_physical_device_queue_family_properties(physical)
-    };
+    let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
     let family = Plan::alone(&families).map(|plan| plan.work.family as usize);
     let timestamp_bits = family.map_or(0, |f| families[f].timestamp_valid_bits);
 
@@ -377,10 +363,7 @@ mod tests {
         ];
         devices.sort_by_key(|&(kind, driver)| rank(kind, driver));
         let drivers = devices.map(|(_, driver)| driver);
-        let best = [
-            DriverId::NVIDIA_PROPRIETARY,
-            DriverId::INTEL_OPEN_SOURCE_MESA,
-        ];
+        let best = [DriverId::NVIDIA_PROPRIETARY, DriverId::INTEL_OPEN_SOURCE_MESA];
         let worst = [DriverId::MESA_LLVMPIPE, DriverId::MESA_DOZEN];
         assert_eq!(drivers, [best, worst].concat()[..]);
     }

@@ -21,10 +21,8 @@ pub(super) fn compile(
     spirv: &[u32],
     specialization: &[(u32, u32)],
 ) -> Result<(), GpuError> {
-    let device = Device::new(&DeviceOptions {
-        selector: Some(device.into()),
-        ..DeviceOptions::default()
-    })?;
+    let device =
+        Device::new(&DeviceOptions { selector: Some(device.into()), ..DeviceOptions::default() })?;
     let kernel = Kernel::when_needed(&device, name, spirv, specialization)?;
     dispatch_nothing(&device, &kernel)
 }

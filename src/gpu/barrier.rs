@@ -46,10 +46,7 @@ impl Stage {
                 };
                 (Pipeline::COMPUTE_SHADER, memory | trace)
             }
-            Self::Transfer => (
-                Pipeline::TRANSFER,
-                Access::TRANSFER_READ | Access::TRANSFER_WRITE,
-            ),
+            Self::Transfer => (Pipeline::TRANSFER, Access::TRANSFER_READ | Access::TRANSFER_WRITE),
             Self::Build if accel => (
                 Pipeline::ACCELERATION_STRUCTURE_BUILD_KHR,
                 // Vertices and instances are read as SHADER_READ, scratch and structures as
@@ -107,12 +104,7 @@ impl HazardCheck {
                     a.stage,
                 )
             });
-        earlier.push(Access {
-            stage,
-            write,
-            by: by.to_owned(),
-            seen_by: 0,
-        });
+        earlier.push(Access { stage, write, by: by.to_owned(), seen_by: 0 });
         hazard
     }
 
@@ -143,11 +135,7 @@ mod tests {
     #[test]
     fn a_barrier_covers_its_two_stages_and_what_it_carries_on() {
         let mut check = HazardCheck::default();
-        assert!(
-            check
-                .access(1, "b", Stage::Transfer, true, "fill")
-                .is_none()
-        );
+        assert!(check.access(1, "b", Stage::Transfer, true, "fill").is_none());
         check.barrier(Stage::Compute, Stage::Compute);
         check.barrier(Stage::Transfer, Stage::Compute);
         assert!(check.access(1, "b", Stage::Compute, true, "k").is_none());
@@ -155,10 +143,6 @@ mod tests {
         assert!(check.access(1, "b", Stage::Build, false, "build").is_none());
         let message = check.access(1, "b", Stage::Transfer, true, "fill");
         assert!(message.is_some_and(|m| m.contains("'b'") && m.contains("Compute -> Transfer")));
-        assert!(
-            check
-                .access(2, "other", Stage::Transfer, true, "fill")
-                .is_none()
-        );
+        assert!(check.access(2, "other", Stage::Transfer, true, "fill").is_none());
     }
 }

@@ -39,10 +39,7 @@ impl BlasInput<'_> {
         } else {
             return Ok(());
         };
-        Err(GpuError::Geometry {
-            name: self.name.into(),
-            problem,
-        })
+        Err(GpuError::Geometry { name: self.name.into(), problem })
     }
 
     fn input_bytes(&self) -> u64 {
@@ -61,26 +58,16 @@ pub struct BlasOptions {
 
 impl Default for BlasOptions {
     fn default() -> Self {
-        Self {
-            fast_trace: true,
-            compact: true,
-        }
+        Self { fast_trace: true, compact: true }
     }
 }
 
 impl BlasOptions {
     fn flags(self) -> vk::BuildAccelerationStructureFlagsKHR {
         use vk::BuildAccelerationStructureFlagsKHR as Flags;
-        let speed = if self.fast_trace {
-            Flags::PREFER_FAST_TRACE
-        } else {
-            Flags::PREFER_FAST_BUILD
-        };
-        let compact = if self.compact {
-            Flags::ALLOW_COMPACTION
-        } else {
-            Flags::empty()
-        };
+        let speed =
+            if self.fast_trace { Flags::PREFER_FAST_TRACE } else { Flags::PREFER_FAST_BUILD };
+        let compact = if self.compact { Flags::ALLOW_COMPACTION } else { Flags::empty() };
         speed | compact
     }
 }
@@ -175,9 +162,7 @@ fn plan<'a>(
     Ok(Planned {
         input,
         structure_bytes: sizes.acceleration_structure_size,
-        scratch_bytes: sizes
-            .build_scratch_size
-            .next_multiple_of(accel.scratch_alignment),
+        scratch_bytes: sizes.build_scratch_size.next_multiple_of(accel.scratch_alignment),
     })
 }
 
@@ -207,15 +192,7 @@ fn build_batch(
         .collect::<Result<Vec<_>, _>>()?;
     let sizes = CompactedSizes::new(device, batch.len() as u32)?;
     times.bytes += structures.iter().map(|s| s.buffer.size()).sum::<u64>();
-    times.build_ms += record_builds(
-        device,
-        batch,
-        options,
-        &inputs,
-        &starts,
-        &structures,
-        &sizes,
-    )?;
+    times.build_ms += record_builds(device, batch, options, &inputs, &starts, &structures, &sizes)?;
     drop(inputs);
     if options.compact {
         let (compacted, ms) = compact(device, &structures, &sizes.read()?)?;
@@ -249,9 +226,7 @@ fn record_builds(
             scratch_at += planned.scratch_bytes;
             build_info(geometry, options)
                 .dst_acceleration_structure(structure.handle)
-                .scratch_data(vk::DeviceOrHostAddressKHR {
-                    device_address: address,
-                })
+                .scratch_data(vk::DeviceOrHostAddressKHR { device_address: address })
         })
         .collect();
     let ranges: Vec<_> = (batch.iter())
@@ -266,9 +241,7 @@ fn record_builds(
         // SAFETY: inputs, scratch and structures have the sizes that the device asked for and
         // live until `once` returns, which waits; vertex numbers were checked.
         unsafe {
-            accel
-                .functions
-                .cmd_build_acceleration_structures(commands.raw(), &infos, &ranges);
+            accel.functions.cmd_build_acceleration_structures(commands.raw(), &infos, &ranges);
         }
         if options.compact {
             commands.barrier(Stage::Build, Stage::Build);
@@ -301,9 +274,7 @@ fn compact(
             // SAFETY: the source was built for compaction, the target has the size reported, and
             // both live until `once` returns.
             unsafe {
-                accel
-                    .functions
-                    .cmd_copy_acceleration_structure(commands.raw(), &info);
+                accel.functions.cmd_copy_acceleration_structure(commands.raw(), &info);
             }
         }
         Ok(())

@@ -62,10 +62,8 @@ pub fn refit_times(
     let mut meshes = Vec::with_capacity(inputs.len());
     for input in inputs {
         input.check(device)?;
-        let (positions, triangles) = (
-            bytemuck::cast_slice(input.positions),
-            bytemuck::cast_slice(input.triangles),
-        );
+        let (positions, triangles) =
+            (bytemuck::cast_slice(input.positions), bytemuck::cast_slice(input.triangles));
         let storage = |bytes: &[u8]| {
             let size = bytes.len() as u64;
             let buffer = device.buffer(input.name, size, BufferKind::Storage)?;
@@ -98,9 +96,5 @@ pub fn refit_times(
         }
         Ok(())
     })?;
-    Ok(RefitTimes {
-        build_ms: timings.of("build"),
-        refit_ms: timings.of("refit"),
-        bytes,
-    })
+    Ok(RefitTimes { build_ms: timings.of("build"), refit_ms: timings.of("refit"), bytes })
 }

@@ -59,11 +59,7 @@ pub struct Commands<'a> {
 impl<'a> Commands<'a> {
     pub(crate) fn begin(slot: &'a mut Slot, frame: u64) -> Result<Self, GpuError> {
         slot.begin()?;
-        let commands = Self {
-            slot,
-            frame,
-            scope: String::new(),
-        };
+        let commands = Self { slot, frame, scope: String::new() };
         commands.follow();
         Ok(commands)
     }
@@ -117,9 +113,8 @@ impl<'a> Commands<'a> {
         };
         let (from_stages, from_access) = masks(from);
         let (to_stages, to_access) = masks(to);
-        let memory = [vk::MemoryBarrier::default()
-            .src_access_mask(from_access)
-            .dst_access_mask(to_access)];
+        let memory =
+            [vk::MemoryBarrier::default().src_access_mask(from_access).dst_access_mask(to_access)];
         // SAFETY: the buffer is being recorded; the flags belong to enabled features.
         unsafe {
             device.raw.cmd_pipeline_barrier(
@@ -205,11 +200,7 @@ impl<'a> Commands<'a> {
     ) -> Result<(), GpuError> {
         let limit = self.device().limits().max_group_count;
         if (0..3).any(|axis| groups[axis] > limit[axis]) {
-            return Err(GpuError::GroupCount {
-                kernel: kernel.name().into(),
-                groups,
-                limit,
-            });
+            return Err(GpuError::GroupCount { kernel: kernel.name().into(), groups, limit });
         }
         if push.len() != kernel.push_constant_bytes() {
             return Err(GpuError::PushConstants {

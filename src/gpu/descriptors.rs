@@ -25,11 +25,7 @@ pub(crate) struct DescriptorPools {
 
 impl DescriptorPools {
     pub(crate) fn new(device: &Arc<Device>) -> Self {
-        Self {
-            pools: Vec::new(),
-            current: 0,
-            device: device.clone(),
-        }
+        Self { pools: Vec::new(), current: 0, device: device.clone() }
     }
 
     /// Frees all sets; no submission may use them any more.
@@ -91,9 +87,8 @@ impl DescriptorPools {
         if self.device.supports_ray_query() {
             sizes.push(size(vk::DescriptorType::ACCELERATION_STRUCTURE_KHR, 1));
         }
-        let info = vk::DescriptorPoolCreateInfo::default()
-            .max_sets(SETS_PER_POOL)
-            .pool_sizes(&sizes);
+        let info =
+            vk::DescriptorPoolCreateInfo::default().max_sets(SETS_PER_POOL).pool_sizes(&sizes);
         // SAFETY: the sizes name only types that the device knows; `Drop` destroys the pool.
         let pool = unsafe { self.device.raw.create_descriptor_pool(&info, None) }
             .map_err(during("creating a descriptor pool"))?;
@@ -115,14 +110,12 @@ impl Binding<'_> {
     /// A sentence on why `self` does not fit `info`, if so.
     fn misfit(&self, info: &BindingInfo, device: &Device) -> Option<String> {
         let fits = match self {
-            Self::Buffer(_) => matches!(
-                info.kind,
-                BindingKind::StorageBuffer | BindingKind::UniformBuffer
-            ),
-            Self::Image(_) => matches!(
-                info.kind,
-                BindingKind::StorageImage | BindingKind::SampledImage
-            ),
+            Self::Buffer(_) => {
+                matches!(info.kind, BindingKind::StorageBuffer | BindingKind::UniformBuffer)
+            }
+            Self::Image(_) => {
+                matches!(info.kind, BindingKind::StorageImage | BindingKind::SampledImage)
+            }
             Self::Sampled(..) => info.kind == BindingKind::ImageAndSampler,
             Self::Sampler(_) => info.kind == BindingKind::Sampler,
             Self::Tlas(_) => info.kind == BindingKind::AccelerationStructure,
@@ -134,16 +127,10 @@ impl Binding<'_> {
             Self::Buffer(buffer) => {
                 let limit = device.limits().max_uniform_buffer_bytes;
                 if buffer.kind() != BufferKind::Storage {
-                    return Some(format!(
-                        "{self} is of kind {:?}, not Storage",
-                        buffer.kind()
-                    ));
+                    return Some(format!("{self} is of kind {:?}, not Storage", buffer.kind()));
                 }
                 (info.kind == BindingKind::UniformBuffer && buffer.size() > limit).then(|| {
-                    format!(
-                        "{self} of {} bytes exceeds the limit of {limit}",
-                        buffer.size()
-                    )
+                    format!("{self} of {} bytes exceeds the limit of {limit}", buffer.size())
                 })
             }
             Self::Image(image) | Self::Sampled(image, _) => {
@@ -214,9 +201,9 @@ pub(crate) fn write(
     // The writes point into these, so each is complete before the first write is made.
     let buffers: Vec<_> = (bindings.iter())
         .map(|binding| match binding {
-            Binding::Buffer(buffer) => [vk::DescriptorBufferInfo::default()
-                .buffer(buffer.0.handle)
-                .range(vk::WHOLE_SIZE)],
+            Binding::Buffer(buffer) => {
+                [vk::DescriptorBufferInfo::default().buffer(buffer.0.handle).range(vk::WHOLE_SIZE)]
+            }
             _ => Default::default(),
         })
         .collect();

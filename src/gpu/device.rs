@@ -118,21 +118,14 @@ impl Device {
         // Before the driver makes its folders.
         let jit_forgotten = kept::llvmpipe_has_nothing();
         let instance = Instance::new(options.validate || from_environment, window.is_some())?;
-        let probe = window
-            .map(|window| Probe::new(&instance, window))
-            .transpose();
+        let probe = window.map(|window| Probe::new(&instance, window)).transpose();
         let probe = probe.map_err(|reason| GpuError::Window {
-            device: options
-                .selector
-                .clone()
-                .unwrap_or_else(|| "any device".into()),
+            device: options.selector.clone().unwrap_or_else(|| "any device".into()),
             reason,
         })?;
         let presents =
             |physical, family| probe.as_ref().is_some_and(|p| p.presents(physical, family));
-        let presents = window
-            .is_some()
-            .then_some(&presents as adapter::Presents<'_>);
+        let presents = window.is_some().then_some(&presents as adapter::Presents<'_>);
         let (mut adapter, plan) =
             adapter::choose(&instance, options.selector.as_deref(), presents)?;
         drop(probe);
@@ -305,10 +298,7 @@ impl Device {
 
     /// Runs `work` with the allocator.
     pub(crate) fn with_allocator<T>(&self, work: impl FnOnce(&mut Allocator) -> T) -> T {
-        let mut allocator = self
-            .allocator
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
+        let mut allocator = self.allocator.lock().unwrap_or_else(PoisonError::into_inner);
         work(allocator.as_mut().expect("the device is alive"))
     }
 
@@ -318,9 +308,8 @@ impl Device {
         // A name is never worth an error: a NUL inside it only shortens it, and a failure of the
         // call leaves the object nameless.
         let text = CString::new(name.split('\0').next().unwrap_or_default()).unwrap_or_default();
-        let info = vk::DebugUtilsObjectNameInfoEXT::default()
-            .object_handle(handle)
-            .object_name(&text);
+        let info =
+            vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&text);
         let _listed = LOADER_LISTS.read();
         // SAFETY: the handle was made from this device by the caller and is alive.
         let _ = unsafe { debug.set_debug_utils_object_name(&info) };
@@ -345,11 +334,7 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        let allocator = self
-            .allocator
-            .get_mut()
-            .unwrap_or_else(PoisonError::into_inner)
-            .take();
+        let allocator = self.allocator.get_mut().unwrap_or_else(PoisonError::into_inner).take();
         let _changing = LOADER_LISTS.write();
         // SAFETY: everything made from the device holds it alive, so nothing is left but the cache
         // and the allocator's blocks. A lost device may be destroyed without waiting.
@@ -398,9 +383,8 @@ fn create_device(
         shader_storage_image_extended_formats: adapter.extended_storage_formats.into(),
         ..Default::default()
     };
-    let mut info = vk::DeviceCreateInfo::default()
-        .queue_create_infos(&queues)
-        .enabled_features(&features);
+    let mut info =
+        vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features);
     let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default()
         .buffer_device_address(adapter.buffer_device_address);
     let mut accel =
@@ -423,10 +407,8 @@ fn create_device(
     let info = info.enabled_extension_names(&extensions);
     let _changing = LOADER_LISTS.write();
     // SAFETY: extensions and features were found on this device; all pointers outlive the call.
-    unsafe { instance.raw.create_device(adapter.physical, &info, None) }.map_err(during(format!(
-        "opening the device '{}'",
-        adapter.info.name
-    )))
+    unsafe { instance.raw.create_device(adapter.physical, &info, None) }
+        .map_err(during(format!("opening the device '{}'", adapter.info.name)))
 }
 
 fn accel_support(
@@ -441,16 +423,11 @@ fn accel_support(
     let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut accel);
     // SAFETY: the device offers the extension whose properties are asked for.
     unsafe {
-        instance
-            .raw
-            .get_physical_device_properties2(adapter.physical, &mut properties);
+        instance.raw.get_physical_device_properties2(adapter.physical, &mut properties);
     }
     Some(AccelSupport {
         functions: khr::acceleration_structure::Device::new(&instance.raw, raw),
-        scratch_alignment: accel
-            .min_acceleration_structure_scratch_offset_alignment
-            .max(1)
-            .into(),
+        scratch_alignment: accel.min_acceleration_structure_scratch_offset_alignment.max(1).into(),
         max_primitives: accel.max_primitive_count,
         max_instances: accel.max_instance_count,
     })
@@ -459,10 +436,7 @@ fn accel_support(
 /// A device for tests: the best one, with validation. Panics with the remedy where the driver or
 /// the layer is missing, because a test that skips validation in silence proves nothing.
 pub fn test_device() -> Arc<Device> {
-    let options = DeviceOptions {
-        validate: true,
-        ..Default::default()
-    };
+    let options = DeviceOptions { validate: true, ..Default::default() };
     match Device::new(&options) {
         Ok(device) => device,
         Err(error) => panic!(

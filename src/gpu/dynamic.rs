@@ -73,11 +73,7 @@ impl DynamicBlas {
             return Err(problem(name, text));
         }
         let geometry = triangles(0, max_vertices, 0);
-        let info = build_info(
-            &geometry,
-            fast_trace,
-            vk::BuildAccelerationStructureModeKHR::BUILD,
-        );
+        let info = build_info(&geometry, fast_trace, vk::BuildAccelerationStructureModeKHR::BUILD);
         let sizes = build_sizes(accel, &info, max_triangles);
         let bottom = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
         let structure = RawAccel::new(device, name, bottom, sizes.acceleration_structure_size)?;
@@ -160,20 +156,14 @@ impl DynamicBlas {
         for buffer in [source.vertices, source.triangles] {
             if buffer.kind() != BufferKind::Storage {
                 let (name, kind) = (buffer.name(), buffer.kind());
-                return refuse(format!(
-                    "the buffer '{name}' is of kind {kind:?}, not Storage"
-                ));
+                return refuse(format!("the buffer '{name}' is of kind {kind:?}, not Storage"));
             }
         }
         let range = |buffer: &Buffer, first: u32, count: u32| {
             buffer.check_range("build from", 12 * u64::from(first), 12 * u64::from(count))
         };
         range(source.vertices, source.first_vertex, source.vertex_count)?;
-        range(
-            source.triangles,
-            source.first_triangle,
-            source.triangle_count,
-        )?;
+        range(source.triangles, source.first_triangle, source.triangle_count)?;
         if source.triangle_count == 0 || source.vertex_count == 0 {
             return refuse("it has no triangles".into());
         }
@@ -211,15 +201,7 @@ impl DynamicBlas {
         // structure and scratch were made; a refit has the topology of the build (`refit`); the
         // submission keeps all of them alive. Indices beyond the vertices are the caller's breach of
         // contract, which robust buffer access does not cover.
-        unsafe {
-            record_build(
-                commands,
-                info,
-                structure,
-                &self.scratch,
-                source.triangle_count,
-            )
-        }
+        unsafe { record_build(commands, info, structure, &self.scratch, source.triangle_count) }
     }
 }
 
@@ -243,10 +225,7 @@ impl Built {
 }
 
 fn problem(name: &str, problem: String) -> GpuError {
-    GpuError::Geometry {
-        name: name.into(),
-        problem,
-    }
+    GpuError::Geometry { name: name.into(), problem }
 }
 
 fn build_info<'a>(
@@ -255,11 +234,7 @@ fn build_info<'a>(
     mode: vk::BuildAccelerationStructureModeKHR,
 ) -> vk::AccelerationStructureBuildGeometryInfoKHR<'a> {
     use vk::BuildAccelerationStructureFlagsKHR as Flags;
-    let speed = if fast_trace {
-        Flags::PREFER_FAST_TRACE
-    } else {
-        Flags::PREFER_FAST_BUILD
-    };
+    let speed = if fast_trace { Flags::PREFER_FAST_TRACE } else { Flags::PREFER_FAST_BUILD };
     vk::AccelerationStructureBuildGeometryInfoKHR::default()
         .ty(vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL)
         .flags(Flags::ALLOW_UPDATE | speed)

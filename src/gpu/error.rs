@@ -169,8 +169,5 @@ pub enum GpuError {
 /// Turns a bare result code into an error that says what was being done; `what` completes the
 /// sentence "Vulkan error X while ...".
 pub(crate) fn during(what: impl Into<String>) -> impl FnOnce(vk::Result) -> GpuError {
-    move |code| GpuError::Vulkan {
-        code,
-        what: what.into(),
-    }
+    move |code| GpuError::Vulkan { code, what: what.into() }
 }

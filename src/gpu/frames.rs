@@ -147,13 +147,8 @@ impl Slot {
     /// the one before are under way. Fails where the rest is wanted no longer; what was recorded before
     /// is on its way all the same.
     pub(crate) fn cut(&mut self) -> Result<(), GpuError> {
-        self.hand_over()
-            .map_err(|code| self.failure(code, "submitting a piece of a frame"))?;
-        match self
-            .abandon
-            .as_ref()
-            .is_some_and(|wanted_no_longer| wanted_no_longer())
-        {
+        self.hand_over().map_err(|code| self.failure(code, "submitting a piece of a frame"))?;
+        match self.abandon.as_ref().is_some_and(|wanted_no_longer| wanted_no_longer()) {
             true => Err(GpuError::Abandoned),
             false => Ok(()),
         }
@@ -244,25 +239,16 @@ impl Slot {
         }
         let compiling = self.device.kept.patience(self.new_kernels.iter().copied());
         // SAFETY: the fence belongs to the submission under way.
-        unsafe {
-            self.device
-                .raw
-                .wait_for_fences(&[self.fence], true, u64::MAX)
-        }
-        .map_err(|code| self.failure(code, "waiting for a submission"))?;
+        unsafe { self.device.raw.wait_for_fences(&[self.fence], true, u64::MAX) }
+            .map_err(|code| self.failure(code, "waiting for a submission"))?;
         drop(compiling);
         self.device.kept.learn(self.new_kernels.drain(..));
         self.pending = false;
         self.wait_for_pieces();
         self.kept.clear();
-        let timings = FrameTimings {
-            frame: self.frame,
-            passes: self.timer.collect()?,
-        };
+        let timings = FrameTimings { frame: self.frame, passes: self.timer.collect()? };
         if let Some(pieces) = &mut self.pieces {
-            let took = self
-                .began
-                .map_or(0.0, |began| began.elapsed().as_secs_f64() * 1e3);
+            let took = self.began.map_or(0.0, |began| began.elapsed().as_secs_f64() * 1e3);
             pieces.learn(&timings, took);
         }
         Ok(Some(timings))
@@ -274,11 +260,7 @@ impl Slot {
             return during(what)(code);
         }
         let (last_pass, passes) = self.timer.last_begun();
-        GpuError::DeviceLost {
-            what: what.into(),
-            last_pass,
-            passes,
-        }
+        GpuError::DeviceLost { what: what.into(), last_pass, passes }
     }
 
     /// Notes that the submission runs `kernel`.
@@ -354,12 +336,7 @@ impl Frames {
             slot.pieces = Some(Pieces::new(device.queues.are_shared()));
             Ok(slot)
         };
-        Ok(Self {
-            slots: [slot(0)?, slot(1)?],
-            next: 0,
-            finished: Vec::new(),
-            abandon: None,
-        })
+        Ok(Self { slots: [slot(0)?, slot(1)?], next: 0, finished: Vec::new(), abandon: None })
     }
 
     /// Number of the frame that [`Self::begin`] starts next; modulo [`FRAMES_IN_FLIGHT`] it is the
@@ -454,19 +431,13 @@ mod tests {
         drop(commands);
         let lost = vk::Result::ERROR_DEVICE_LOST;
         let text = slot.failure(lost, "waiting").to_string();
-        assert!(
-            text.contains("'none'") && text.contains("trace, scatter"),
-            "{text}"
-        );
+        assert!(text.contains("'none'") && text.contains("trace, scatter"), "{text}");
 
         slot.submit(0).unwrap();
         // SAFETY: the device is alive.
         unsafe { device.raw.device_wait_idle() }.unwrap();
         let text = slot.failure(lost, "waiting").to_string();
-        assert!(
-            text.contains("ERROR_DEVICE_LOST") && text.contains("'scatter'"),
-            "{text}"
-        );
+        assert!(text.contains("ERROR_DEVICE_LOST") && text.contains("'scatter'"), "{text}");
         let other = slot.failure(vk::Result::ERROR_OUT_OF_HOST_MEMORY, "waiting");
         let kept = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
         assert!(matches!(other, GpuError::Vulkan { code, .. } if code == kept));

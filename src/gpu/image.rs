@@ -83,10 +83,7 @@ impl Image {
         check_extent(device, name, dim, extent)?;
         // SAFETY: the physical device belongs to the instance.
         let properties = unsafe {
-            device
-                .instance
-                .raw
-                .get_physical_device_format_properties(device.physical, format.vk())
+            device.instance.raw.get_physical_device_format_properties(device.physical, format.vk())
         };
         let features = properties.optimal_tiling_features;
         use vk::{FormatFeatureFlags as Feature, ImageUsageFlags as Usage};
@@ -120,9 +117,7 @@ impl Image {
             .initial_layout(vk::ImageLayout::UNDEFINED);
         // The simulation writes what the window shows.
         if let Some(families) = &sharing {
-            info = info
-                .sharing_mode(vk::SharingMode::CONCURRENT)
-                .queue_family_indices(families);
+            info = info.sharing_mode(vk::SharingMode::CONCURRENT).queue_family_indices(families);
         }
         // SAFETY: extent, format and usage were checked against the device.
         let handle = unsafe { device.raw.create_image(&info, None) }
@@ -206,10 +201,8 @@ impl RawImage {
         let memory = Memory::new(&self.device, &self.name, requirements, location, false)?;
         let (block, offset) = memory.bind();
         // SAFETY: the memory fulfils the image's requirements and is owned by it from here on.
-        unsafe { raw.bind_image_memory(self.handle, block, offset) }.map_err(during(format!(
-            "binding memory to the image '{}'",
-            self.name
-        )))?;
+        unsafe { raw.bind_image_memory(self.handle, block, offset) }
+            .map_err(during(format!("binding memory to the image '{}'", self.name)))?;
         self.memory = Some(memory);
         let info = vk::ImageViewCreateInfo::default()
             .image(self.handle)
@@ -260,11 +253,7 @@ pub(crate) fn whole() -> vk::ImageSubresourceRange {
 }
 
 fn extent_3d([width, height, depth]: [u32; 3]) -> vk::Extent3D {
-    vk::Extent3D {
-        width,
-        height,
-        depth,
-    }
+    vk::Extent3D { width, height, depth }
 }
 
 fn check_extent(
@@ -347,11 +336,7 @@ impl Sampler {
         let handle = unsafe { device.raw.create_sampler(&info, None) }
             .map_err(during(format!("creating the sampler '{name}'")))?;
         device.set_name(handle, name);
-        Ok(Self(Arc::new(RawSampler {
-            handle,
-            filter,
-            device: device.clone(),
-        })))
+        Ok(Self(Arc::new(RawSampler { handle, filter, device: device.clone() })))
     }
 }
 

@@ -89,16 +89,11 @@ const MACOS_LOADERS: [&str; 6] = [
 fn load() -> Result<ash::Entry, ash::LoadingError> {
     // SAFETY: the loader is the system's Vulkan library; its initialisers have no precondition.
     let usual = unsafe { ash::Entry::load() };
-    let others: &[&str] = if cfg!(target_os = "macos") {
-        &MACOS_LOADERS
-    } else {
-        &[]
-    };
+    let others: &[&str] = if cfg!(target_os = "macos") { &MACOS_LOADERS } else { &[] };
     usual.or_else(|error| {
         // SAFETY: as above.
-        let mut found = others
-            .iter()
-            .filter_map(|path| unsafe { ash::Entry::load_from(path) }.ok());
+        let mut found =
+            others.iter().filter_map(|path| unsafe { ash::Entry::load_from(path) }.ok());
         found.next().ok_or(error)
     })
 }
@@ -146,9 +141,8 @@ impl Instance {
             extensions.push(ext::validation_features::NAME.as_ptr());
         }
 
-        let application = vk::ApplicationInfo::default()
-            .application_name(c"insonify")
-            .api_version(api_version);
+        let application =
+            vk::ApplicationInfo::default().application_name(c"insonify").api_version(api_version);
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
@@ -213,9 +207,7 @@ impl Drop for Instance {
         // SAFETY: every device of this instance has been destroyed by its owner before.
         unsafe {
             if let Some(messenger) = self.messenger.take() {
-                messenger
-                    .functions
-                    .destroy_debug_utils_messenger(messenger.handle, None);
+                messenger.functions.destroy_debug_utils_messenger(messenger.handle, None);
             }
             self.raw.destroy_instance(None);
         }
@@ -250,19 +242,12 @@ fn extension_names(
 
 /// The extensions of the validation layer, or an error saying what is missing.
 fn validation_extensions(entry: &ash::Entry) -> Result<Vec<std::ffi::CString>, GpuError> {
-    let unavailable = |reason: &str| GpuError::ValidationUnavailable {
-        reason: reason.into(),
-    };
+    let unavailable = |reason: &str| GpuError::ValidationUnavailable { reason: reason.into() };
     // SAFETY: the entry is loaded.
     let layers = unsafe { entry.enumerate_instance_layer_properties() }
         .map_err(during("listing the instance layers"))?;
-    if !layers
-        .iter()
-        .any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER))
-    {
-        return Err(unavailable(
-            "the layer VK_LAYER_KHRONOS_validation is not installed",
-        ));
+    if !layers.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION_LAYER)) {
+        return Err(unavailable("the layer VK_LAYER_KHRONOS_validation is not installed"));
     }
     let extensions = extension_names(entry, Some(VALIDATION_LAYER))?;
     let has = |name: &CStr| extensions.iter().any(|e| e.as_c_str() == name);

@@ -212,9 +212,7 @@ fn decode(bytes: &[u8]) -> Option<Content> {
         return None;
     }
     let (count, rest) = rest.split_first_chunk::<8>()?;
-    let bytes = usize::try_from(u64::from_le_bytes(*count))
-        .ok()?
-        .checked_mul(8)?;
+    let bytes = usize::try_from(u64::from_le_bytes(*count)).ok()?.checked_mul(8)?;
     let (ids, data) = rest.split_at_checked(bytes)?;
     let (ids, _) = ids.as_chunks::<8>();
     let known = ids.iter().map(|id| u64::from_le_bytes(*id)).collect();
@@ -277,9 +275,7 @@ fn forget_oldest(folder: &Path) -> std::io::Result<()> {
     files.sort();
     let excess = files.len().saturating_sub(MAX_FILES);
     // Another process may have been faster.
-    files[..excess]
-        .iter()
-        .for_each(|(_, file)| drop(fs::remove_file(file)));
+    files[..excess].iter().for_each(|(_, file)| drop(fs::remove_file(file)));
     Ok(())
 }
 

@@ -67,10 +67,7 @@ fn a_foreign_file_is_refused() {
 fn files_do_not_become_more_and_more() {
     let folder = tempfile::tempdir().unwrap();
     for version in 0..20 {
-        let properties = vk::PhysicalDeviceProperties {
-            driver_version: version,
-            ..properties()
-        };
+        let properties = vk::PhysicalDeviceProperties { driver_version: version, ..properties() };
         let file = folder.path().join(file_name(&properties));
         write(&file, &encode(&BTreeSet::new(), &[])).unwrap();
         assert!(file.exists(), "the newest stays");
@@ -104,9 +101,7 @@ fn a_kernel_that_has_run_is_known_at_the_next_start() {
     commands.scope("add");
     let bindings = [Binding::Buffer(&source), Binding::Buffer(&target)];
     let push = vec![0; add.push_constant_bytes()];
-    commands
-        .dispatch(&add, [32, 1, 1], &push, &bindings)
-        .unwrap();
+    commands.dispatch(&add, [32, 1, 1], &push, &bindings).unwrap();
     commands.submit().unwrap();
     assert!(first.kept.is_new(add.0.id), "it has not finished");
     frames.wait().unwrap();
@@ -114,10 +109,7 @@ fn a_kernel_that_has_run_is_known_at_the_next_start() {
 
     let second = device(folder.path());
     assert!(!second.kept.is_new(kernel(&second, 3).0.id));
-    assert!(
-        second.kept.is_new(kernel(&second, 4).0.id),
-        "another constant"
-    );
+    assert!(second.kept.is_new(kernel(&second, 4).0.id), "another constant");
     let [file] = &fs::read_dir(folder.path())
         .unwrap()
         .map(|entry| entry.unwrap().path())

@@ -71,10 +71,7 @@ impl Kernel {
         spirv: &[u32],
         specialization: &[(u32, u32)],
     ) -> Result<Self, GpuError> {
-        let problem = |problem: String| GpuError::Kernel {
-            kernel: name.into(),
-            problem,
-        };
+        let problem = |problem: String| GpuError::Kernel { kernel: name.into(), problem };
         let reflection = reflect(spirv, specialization).map_err(problem)?;
         check_limits(device, &reflection).map_err(problem)?;
         let mut kernel = RawKernel {
@@ -136,9 +133,7 @@ impl Kernel {
         };
         let what = || format!("creating the pipeline of '{}'", kernel.name);
         let made = made.map_err(|code| during(what())(code))?;
-        kernel
-            .named
-            .call_once(|| kernel.device.set_name(made, &kernel.name));
+        kernel.named.call_once(|| kernel.device.set_name(made, &kernel.name));
         Ok(made)
     }
 
@@ -211,10 +206,7 @@ fn check_limits(device: &Device, reflection: &Reflection) -> Result<(), String> 
     let traces = (reflection.bindings.iter())
         .any(|binding| binding.kind == BindingKind::AccelerationStructure);
     if traces && !device.supports_ray_query() {
-        return Err(format!(
-            "it needs ray queries, which '{}' lacks",
-            device.name()
-        ));
+        return Err(format!("it needs ray queries, which '{}' lacks", device.name()));
     }
     Ok(())
 }
@@ -235,10 +227,8 @@ impl RawKernel {
                 .collect();
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
             // SAFETY: the numbers are unique; `Drop` destroys the layout.
-            let layout =
-                unsafe { self.device.raw.create_descriptor_set_layout(&info, None) }.map_err(
-                    during(format!("creating the set layout of '{}'", self.name)),
-                )?;
+            let layout = unsafe { self.device.raw.create_descriptor_set_layout(&info, None) }
+                .map_err(during(format!("creating the set layout of '{}'", self.name)))?;
             self.set_layouts.push(layout);
         }
         let ranges = [vk::PushConstantRange::default()
@@ -283,17 +273,10 @@ impl Pipeline {
         // SAFETY: the words parsed as SPIR-V; the kernels of this crate are checked by spirv-val.
         // The device is alive: see the structure.
         let module = unsafe { self.raw.create_shader_module(&info, None) }?;
-        let values: Vec<u32> = self
-            .specialization
-            .iter()
-            .map(|&(_, value)| value)
-            .collect();
+        let values: Vec<u32> = self.specialization.iter().map(|&(_, value)| value).collect();
         let entries: Vec<_> = (self.specialization.iter().enumerate())
             .map(|(at, &(id, _))| {
-                vk::SpecializationMapEntry::default()
-                    .constant_id(id)
-                    .offset(4 * at as u32)
-                    .size(4)
+                vk::SpecializationMapEntry::default().constant_id(id).offset(4 * at as u32).size(4)
             })
             .collect();
         let constants = vk::SpecializationInfo::default()
@@ -336,9 +319,7 @@ impl Drop for RawKernel {
             .and_then(|p| p.made.get_or_init(|| Err(vk::Result::NOT_READY)).ok());
         // SAFETY: submissions keep the kernels they use alive; null handles are ignored.
         unsafe {
-            self.device
-                .raw
-                .destroy_pipeline(made.unwrap_or_default(), None);
+            self.device.raw.destroy_pipeline(made.unwrap_or_default(), None);
             self.device.raw.destroy_pipeline_layout(self.layout, None);
             for &layout in &self.set_layouts {
                 self.device.raw.destroy_descriptor_set_layout(layout, None);

@@ -77,11 +77,7 @@ impl BufferKind {
                     | Usage::UNIFORM_BUFFER
                     | Usage::TRANSFER_SRC
                     | Usage::TRANSFER_DST;
-                if accel {
-                    kernels | build_input
-                } else {
-                    kernels
-                }
+                if accel { kernels | build_input } else { kernels }
             }
             Self::BuildInput => build_input | Usage::TRANSFER_DST,
             Self::Scratch => Usage::STORAGE_BUFFER | Usage::SHADER_DEVICE_ADDRESS,
@@ -134,18 +130,12 @@ impl Memory {
                 reason: error.to_string(),
             })?;
         device.memory_use.add(allocation.size());
-        Ok(Self {
-            allocation,
-            device: device.clone(),
-        })
+        Ok(Self { allocation, device: device.clone() })
     }
 
     pub(crate) fn bind(&self) -> (vk::DeviceMemory, u64) {
         // SAFETY: the handle is only used to bind a buffer or image that is dropped before `self`.
-        (
-            unsafe { self.allocation.memory() },
-            self.allocation.offset(),
-        )
+        (unsafe { self.allocation.memory() }, self.allocation.offset())
     }
 }
 
@@ -301,10 +291,7 @@ impl Buffer {
     fn mapped(&self) -> *mut u8 {
         let memory = self.0.memory.as_ref().expect("bound at creation");
         let pointer = memory.allocation.mapped_ptr();
-        pointer
-            .expect("upload and readback memory is mapped")
-            .as_ptr()
-            .cast()
+        pointer.expect("upload and readback memory is mapped").as_ptr().cast()
     }
 
     /// Address on the device; only for kinds that builds use, where acceleration structures are on.
@@ -345,11 +332,7 @@ mod tests {
         let device = test_device();
         let buffer = device.buffer("fresh", 1000, BufferKind::Storage).unwrap();
         assert_eq!(device.read_back(&buffer).unwrap(), [0xcd; 1000]);
-        for format in [
-            ImageFormat::R8Unorm,
-            ImageFormat::R16Unorm,
-            ImageFormat::R32Float,
-        ] {
+        for format in [ImageFormat::R8Unorm, ImageFormat::R16Unorm, ImageFormat::R32Float] {
             let image = Image::new(&device, "fresh", ImageDim::D3, [5, 4, 3], format).unwrap();
             let bytes = image.read_back().unwrap();
             assert!(bytes.iter().all(|&b| b == 0xcd), "{format:?}: {bytes:x?}");

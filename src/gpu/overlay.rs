@@ -50,10 +50,7 @@ impl Overlay {
             device.physical,
             device.raw.clone(),
             RenderMode::RenderPass(pass),
-            Options {
-                in_flight_frames: FRAMES_IN_FLIGHT,
-                ..Options::default()
-            },
+            Options { in_flight_frames: FRAMES_IN_FLIGHT, ..Options::default() },
         );
         made.renderer = Some(renderer.map_err(failed("making the interface's pipeline"))?);
         Ok(made)
@@ -76,9 +73,7 @@ impl Overlay {
         if self.leaving.len() > FRAMES_IN_FLIGHT {
             for id in self.leaving.remove(0) {
                 self.textures.remove(&id);
-                renderer
-                    .free_texture(id)
-                    .map_err(failed("dropping a texture of the interface"))?;
+                renderer.free_texture(id).map_err(failed("dropping a texture of the interface"))?;
             }
         }
         Ok(())

@@ -196,10 +196,7 @@ impl Painter {
             }
             texel[3] = 255;
         }
-        Shot {
-            size: [extent.width, extent.height],
-            rgba,
-        }
+        Shot { size: [extent.width, extent.height], rgba }
     }
 
     /// Waits until nothing of the window is under way any more.
@@ -235,11 +232,8 @@ impl Drop for Painter {
 type Use = (vk::ImageLayout, vk::PipelineStageFlags, vk::AccessFlags);
 
 /// As the window system hands it over: the semaphore is waited for before TRANSFER.
-const UNDEFINED: Use = (
-    vk::ImageLayout::UNDEFINED,
-    vk::PipelineStageFlags::TRANSFER,
-    vk::AccessFlags::empty(),
-);
+const UNDEFINED: Use =
+    (vk::ImageLayout::UNDEFINED, vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::empty());
 const COPY_TO: Use = (
     vk::ImageLayout::TRANSFER_DST_OPTIMAL,
     vk::PipelineStageFlags::TRANSFER,
@@ -277,9 +271,7 @@ fn render_pass(device: &Device, format: vk::Format) -> Result<vk::RenderPass, Gp
     let subpasses = [vk::SubpassDescription::default()
         .pipeline_bind_point(vk::PipelineBindPoint::GRAPHICS)
         .color_attachments(&colours)];
-    let info = vk::RenderPassCreateInfo::default()
-        .attachments(&attachments)
-        .subpasses(&subpasses);
+    let info = vk::RenderPassCreateInfo::default().attachments(&attachments).subpasses(&subpasses);
     // SAFETY: the structure is complete; the painter destroys the pass.
     unsafe { device.raw.create_render_pass(&info, None) }
         .map_err(during("making the window's render pass"))
@@ -302,9 +294,7 @@ impl Commands<'_> {
     }
 
     fn clear(&self, image: vk::Image) {
-        let black = vk::ClearColorValue {
-            float32: [0.0, 0.0, 0.0, 1.0],
-        };
+        let black = vk::ClearColorValue { float32: [0.0, 0.0, 0.0, 1.0] };
         // SAFETY: the picture is acquired and in the layout of copies.
         unsafe {
             let raw = &self.device().raw;
@@ -320,10 +310,7 @@ impl Commands<'_> {
         let axis = |low: f32, high: f32, limit: u32, texels: u32| {
             let clipped = [low, high].map(|x| x.clamp(0.0, limit as f32).round());
             let from = clipped.map(|x| ((x - low) / (high - low) * texels as f32).round());
-            (
-                clipped.map(|x| x as i32),
-                from.map(|x| x.clamp(0.0, texels as f32) as i32),
-            )
+            (clipped.map(|x| x as i32), from.map(|x| x.clamp(0.0, texels as f32) as i32))
         };
         let [left, top, right, bottom] = placed.to;
         let (x, from_x) = axis(left, right, extent.width, width);
@@ -333,11 +320,7 @@ impl Commands<'_> {
             return;
         }
         let corners = |x: [i32; 2], y: [i32; 2]| {
-            let corner = |i: usize| vk::Offset3D {
-                x: x[i],
-                y: y[i],
-                z: i as i32,
-            };
+            let corner = |i: usize| vk::Offset3D { x: x[i], y: y[i], z: i as i32 };
             [corner(0), corner(1)]
         };
         let layers = vk::ImageSubresourceLayers {

@@ -162,17 +162,9 @@ mod tests {
     #[test]
     fn pieces_are_as_long_as_they_may_be() {
         let mut pieces = Pieces::new(true);
-        assert_eq!(
-            pieces.cut("trace", [64, 1, 1], false).0.len(),
-            16,
-            "untimed"
-        );
+        assert_eq!(pieces.cut("trace", [64, 1, 1], false).0.len(), 16, "untimed");
         pieces.begin();
-        let passes = vec![
-            ("trace".into(), 20.0),
-            ("trace".into(), 22.0),
-            ("beam".into(), 3.0),
-        ];
+        let passes = vec![("trace".into(), 20.0), ("trace".into(), 22.0), ("beam".into(), 3.0)];
         for scope in ["trace", "trace", "beam"] {
             pieces.cut(scope, [64, 1, 1], false);
         }
@@ -183,10 +175,7 @@ mod tests {
         assert_eq!(boxes.len(), 22, "a frame of eight times as many groups");
         assert_eq!(pieces.cut("beam", [64, 1, 1], false).0.len(), 1);
         pieces.begin();
-        assert!(
-            !pieces.add(3.0) && !pieces.add(3.0),
-            "short ones go together"
-        );
+        assert!(!pieces.add(3.0) && !pieces.add(3.0), "short ones go together");
         assert!(pieces.add(3.0), "until the piece is full");
         assert!(!pieces.add(3.0));
     }
@@ -201,11 +190,7 @@ mod tests {
         pieces.learn(&FrameTimings { frame: 0, passes }, 1e4);
         assert_eq!(pieces.cut("trace", [64, 1, 1], false).0.len(), 1);
         let (boxes, each) = pieces.cut("scatter", [64, 1, 1], false);
-        assert!(
-            boxes.len() >= 11 && each <= 200.0,
-            "{} of {each}",
-            boxes.len()
-        );
+        assert!(boxes.len() >= 11 && each <= 200.0, "{} of {each}", boxes.len());
     }
 
     #[test]
@@ -220,10 +205,7 @@ mod tests {
         pieces.learn(&FrameTimings::default(), 5.0);
         assert_eq!(frame(&mut pieces), 10, "a fast device is not cut");
         let (_, each) = pieces.cut("trace", [64, 1, 1], false);
-        assert!(
-            each < 1.0,
-            "nor are its dispatches submitted one by one: {each}"
-        );
+        assert!(each < 1.0, "nor are its dispatches submitted one by one: {each}");
         pieces.learn(&FrameTimings::default(), 70.0);
         assert_eq!(
             pieces.cut("trace", [64, 1, 1], false),

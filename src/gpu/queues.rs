@@ -34,10 +34,7 @@ impl Plan {
         let (compute, graphics) = (vk::QueueFlags::COMPUTE, vk::QueueFlags::GRAPHICS);
         let found = find(families, |_, flags| flags.contains(compute | graphics))
             .or_else(|| find(families, |_, flags| flags.contains(compute)))?;
-        Some(Self {
-            work: found,
-            window: found,
-        })
+        Some(Self { work: found, window: found })
     }
 
     /// With a window: it takes a family with graphics that presents to it, and the simulation a family
@@ -48,12 +45,9 @@ impl Plan {
         presents: impl Fn(u32) -> bool,
     ) -> Option<Self> {
         let (compute, graphics) = (vk::QueueFlags::COMPUTE, vk::QueueFlags::GRAPHICS);
-        let window = find(families, |family, flags| {
-            flags.contains(compute | graphics) && presents(family)
-        })?;
-        let alone = find(families, |_, flags| {
-            flags.contains(compute) && !flags.contains(graphics)
-        });
+        let window =
+            find(families, |family, flags| flags.contains(compute | graphics) && presents(family))?;
+        let alone = find(families, |_, flags| flags.contains(compute) && !flags.contains(graphics));
         let second = Place { index: 1, ..window };
         let several = families[window.family as usize].queue_count > 1;
         let work = alone.unwrap_or(if several { second } else { window });
@@ -145,11 +139,7 @@ mod tests {
     const COMPUTE: vk::QueueFlags = vk::QueueFlags::COMPUTE;
 
     fn family(queue_flags: vk::QueueFlags, queue_count: u32) -> vk::QueueFamilyProperties {
-        vk::QueueFamilyProperties {
-            queue_flags,
-            queue_count,
-            ..Default::default()
-        }
+        vk::QueueFamilyProperties { queue_flags, queue_count, ..Default::default() }
     }
 
     fn at(family: u32, index: u32) -> Place {
@@ -190,10 +180,7 @@ mod tests {
     fn without_a_window_one_queue_is_taken() {
         let all = GRAPHICS | COMPUTE;
         let alone = |families: &[_]| Plan::alone(families).map(|plan| plan.families());
-        assert_eq!(
-            alone(&[family(COMPUTE, 4), family(all, 2)]),
-            Some(vec![(1, 1)])
-        );
+        assert_eq!(alone(&[family(COMPUTE, 4), family(all, 2)]), Some(vec![(1, 1)]));
         assert_eq!(alone(&[family(COMPUTE, 4)]), Some(vec![(0, 1)]));
         assert_eq!(alone(&[family(GRAPHICS, 4)]), None);
     }

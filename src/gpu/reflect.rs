@@ -107,10 +107,7 @@ pub(crate) fn reflect(words: &[u32], specialization: &[(u32, u32)]) -> Result<Re
         n => return Err(format!("it has {n} entry points, one is needed")),
     };
     if entry.exec_model != ExecutionModel::GLCompute {
-        return Err(format!(
-            "it is a {:?} shader, not compute",
-            entry.exec_model
-        ));
+        return Err(format!("it is a {:?} shader, not compute", entry.exec_model));
     }
     let mut bindings = Vec::new();
     let mut push_constant_bytes = 0;
@@ -148,21 +145,12 @@ pub(crate) fn reflect(words: &[u32], specialization: &[(u32, u32)]) -> Result<Re
 }
 
 fn binding(variable: &Variable) -> Result<BindingInfo, String> {
-    let Variable::Descriptor {
-        name,
-        desc_bind,
-        desc_ty,
-        ty,
-        nbind,
-    } = variable
-    else {
+    let Variable::Descriptor { name, desc_bind, desc_ty, ty, nbind } = variable else {
         unreachable!("the caller passes descriptors only");
     };
     let at = format!("binding {desc_bind}");
     if *nbind != 1 {
-        return Err(format!(
-            "{at} is an array of descriptors, which is not supported"
-        ));
+        return Err(format!("{at} is an array of descriptors, which is not supported"));
     }
     let writes = |access: &AccessType| *access != AccessType::ReadOnly;
     let (kind, written) = match desc_ty {

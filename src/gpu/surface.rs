@@ -52,8 +52,7 @@ impl<'a> Probe<'a> {
     pub(crate) fn presents(&self, physical: vk::PhysicalDevice, family: u32) -> bool {
         // SAFETY: surface and device are of one instance, and the device has that family.
         let answer = unsafe {
-            self.functions
-                .get_physical_device_surface_support(physical, family, self.handle)
+            self.functions.get_physical_device_surface_support(physical, family, self.handle)
         };
         answer.unwrap_or(false)
     }
@@ -79,10 +78,7 @@ impl Surface {
     /// # Errors
     /// A window system or a device that cannot show pictures, with the remedy.
     pub(crate) fn new(device: &Arc<Device>, window: Arc<Window>) -> Result<Self, GpuError> {
-        let refused = |reason: String| GpuError::Window {
-            device: device.name().into(),
-            reason,
-        };
+        let refused = |reason: String| GpuError::Window { device: device.name().into(), reason };
         let instance = &device.instance;
         let surface = surface_of(instance, &window).map_err(refused)?;
         let mut made = Self {
@@ -111,8 +107,7 @@ impl Surface {
     fn choose_format(&self) -> Result<vk::SurfaceFormatKHR, GpuError> {
         // SAFETY: the surface is alive.
         let formats = unsafe {
-            self.functions
-                .get_physical_device_surface_formats(self.device.physical, self.handle)
+            self.functions.get_physical_device_surface_formats(self.device.physical, self.handle)
         }
         .map_err(during("listing the window's formats"))?;
         let wanted = [vk::Format::B8G8R8A8_UNORM, vk::Format::R8G8B8A8_UNORM];

@@ -173,8 +173,7 @@ impl Swapchain {
         // SAFETY: the semaphore has been waited for since its last use.
         let acquired = unsafe {
             let none = vk::Fence::null();
-            self.functions
-                .acquire_next_image(self.handle, ACQUIRE_NS, free, none)
+            self.functions.acquire_next_image(self.handle, ACQUIRE_NS, free, none)
         };
         match acquired {
             Ok((index, suboptimal)) => {

@@ -69,12 +69,7 @@ impl Timer {
         } else {
             None
         };
-        Ok(Self {
-            queries,
-            names: Vec::new(),
-            begun,
-            device: device.clone(),
-        })
+        Ok(Self { queries, names: Vec::new(), begun, device: device.clone() })
     }
 
     /// Starts over; the slot's last submission must have been waited for.
@@ -146,9 +141,7 @@ impl Timer {
         // reset in `begin` and is written once.
         unsafe {
             let index = self.names.len() as u32;
-            self.device
-                .raw
-                .cmd_write_timestamp(commands, stage, pool, index);
+            self.device.raw.cmd_write_timestamp(commands, stage, pool, index);
         }
     }
 
@@ -161,21 +154,12 @@ impl Timer {
         let mut ticks = vec![0_u64; names.len() + 1];
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
         // SAFETY: the submission wrote exactly these queries and has finished.
-        unsafe {
-            self.device
-                .raw
-                .get_query_pool_results(pool, 0, &mut ticks, flags)
-        }
-        .map_err(during("reading the timestamps"))?;
+        unsafe { self.device.raw.get_query_pool_results(pool, 0, &mut ticks, flags) }
+            .map_err(during("reading the timestamps"))?;
         let device = &self.device;
-        let times = ticks.windows(2).map(|t| {
-            elapsed_ms(
-                t[0],
-                t[1],
-                device.timestamp_bits,
-                device.timestamp_period_ns,
-            )
-        });
+        let times = ticks
+            .windows(2)
+            .map(|t| elapsed_ms(t[0], t[1], device.timestamp_bits, device.timestamp_period_ns));
         Ok(names.into_iter().zip(times).collect())
     }
 

@@ -151,13 +151,7 @@ impl Tlas {
 
         let name = self.structure.name.clone();
         let stage = Stage::Build;
-        commands.uses(
-            &self.instances.0,
-            self.instances.name(),
-            stage,
-            false,
-            "build",
-        );
+        commands.uses(&self.instances.0, self.instances.name(), stage, false, "build");
         commands.uses(&self.scratch.buffer.0, "scratch", stage, true, "build");
         commands.uses(&self.structure, &name, stage, true, "build");
         commands.keep(&self.bottom);
@@ -179,10 +173,7 @@ impl Tlas {
         } else {
             return Ok(());
         };
-        Err(GpuError::Geometry {
-            name: self.name().into(),
-            problem,
-        })
+        Err(GpuError::Geometry { name: self.name().into(), problem })
     }
 
     pub(crate) fn handle(&self) -> vk::AccelerationStructureKHR {
@@ -212,11 +203,8 @@ impl Tlas {
 }
 
 fn geometry<'a>(address: u64) -> vk::AccelerationStructureGeometryKHR<'a> {
-    let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default().data(
-        vk::DeviceOrHostAddressConstKHR {
-            device_address: address,
-        },
-    );
+    let instances = vk::AccelerationStructureGeometryInstancesDataKHR::default()
+        .data(vk::DeviceOrHostAddressConstKHR { device_address: address });
     vk::AccelerationStructureGeometryKHR::default()
         .geometry_type(vk::GeometryTypeKHR::INSTANCES)
         .geometry(vk::AccelerationStructureGeometryDataKHR { instances })

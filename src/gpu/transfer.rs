@@ -37,9 +37,7 @@ impl Commands<'_> {
             ImageFormat::R32Float => f32::from_bits(POISON),
             _ => f32::from(POISON as u8) / 255.0,
         };
-        let colour = vk::ClearColorValue {
-            float32: [texel; 4],
-        };
+        let colour = vk::ClearColorValue { float32: [texel; 4] };
         let general = vk::ImageLayout::GENERAL;
         // SAFETY: the image can be copied to, is in GENERAL and kept.
         unsafe {
@@ -73,11 +71,7 @@ impl Commands<'_> {
     }
 
     fn copy_unchecked(&self, from: (&Buffer, u64), to: (&Buffer, u64), size: u64) {
-        let region = vk::BufferCopy {
-            src_offset: from.1,
-            dst_offset: to.1,
-            size,
-        };
+        let region = vk::BufferCopy { src_offset: from.1, dst_offset: to.1, size };
         // SAFETY: callers have checked the ranges and keep both buffers.
         unsafe {
             self.device().raw.cmd_copy_buffer(
@@ -242,9 +236,7 @@ impl Device {
     pub fn upload_image(self: &Arc<Self>, image: &Image, bytes: &[u8]) -> Result<(), GpuError> {
         check_texels("upload", image, bytes.len() as u64)?;
         self.once(|commands| {
-            let staging = commands
-                .device()
-                .buffer("staging", image.bytes(), BufferKind::Upload)?;
+            let staging = commands.device().buffer("staging", image.bytes(), BufferKind::Upload)?;
             // SAFETY: the buffer is new, so no submission reads it yet.
             unsafe { staging.write_mapped(0, bytes) };
             commands.copy_to_image(&staging, image)

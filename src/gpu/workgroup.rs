@@ -45,10 +45,7 @@ pub(crate) fn shared_bytes(words: &[u32], value_of: &HashMap<u32, u32>) -> Resul
             }
             (OP_TYPE_ARRAY, &[_, id, of, count]) => {
                 let count = value_of.get(&count).copied().map(u64::from);
-                (
-                    id,
-                    bytes(&of).zip(count).and_then(|(b, n)| b.checked_mul(n)),
-                )
+                (id, bytes(&of).zip(count).and_then(|(b, n)| b.checked_mul(n)))
             }
             (OP_TYPE_STRUCT, &[_, id, ref members @ ..]) => (id, members.iter().map(bytes).sum()),
             (OP_TYPE_POINTER, &[_, id, WORKGROUP, to]) => {

@@ -82,24 +82,9 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     };
     vec![
         Check::equal("bits of the circle", &found, &twin),
-        close(
-            "cosine",
-            0,
-            given.iter().map(|v| turn(v).cos()).collect(),
-            2.5e-7,
-        ),
-        close(
-            "sine",
-            1,
-            given.iter().map(|v| turn(v).sin()).collect(),
-            2.5e-7,
-        ),
-        close(
-            "angle",
-            2,
-            exact(|v| f64::from(v[1]).atan2(v[2].into())),
-            4e-7,
-        ),
+        close("cosine", 0, given.iter().map(|v| turn(v).cos()).collect(), 2.5e-7),
+        close("sine", 1, given.iter().map(|v| turn(v).sin()).collect(), 2.5e-7),
+        close("angle", 2, exact(|v| f64::from(v[1]).atan2(v[2].into())), 4e-7),
         close("arcsine", 3, exact(|v| f64::from(v[3]).asin()), 5e-7),
     ]
 }

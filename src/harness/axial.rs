@@ -69,7 +69,5 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let sum = (f64::from(frame.axial_sigma) * std::f64::consts::TAU.sqrt()).max(1.0);
     let finite = lateral.iter().filter(|v| v.is_finite());
     let largest = f64::from(finite.fold(0.0_f32, |m, v| m.max(v.abs())));
-    vec![Check::close("iq", &got, &expected, |_| {
-        2e-6 * sum * largest
-    })]
+    vec![Check::close("iq", &got, &expected, |_| 2e-6 * sum * largest)]
 }

@@ -24,15 +24,7 @@ pub const SUBJECT: Subject = Subject {
         let rows = size_of::<Row>() * frame.samples as usize;
         let counters = size_of::<Counters>();
         let contact = 8 * frame.scanlines as usize + 4;
-        vec![
-            size_of::<Frame>(),
-            rows,
-            values,
-            values,
-            counters,
-            values,
-            contact,
-        ]
+        vec![size_of::<Frame>(), rows, values, values, counters, values, contact]
     },
     extent: |job| {
         let frame: Frame = job.one("frame");
@@ -56,9 +48,7 @@ fn job(case: Case, size: Size) -> Job {
     frame.noise = NOISE;
     let mut random = Random(1);
     let mut echoes = || -> Vec<i32> {
-        (0..2 * samples(&frame))
-            .map(|_| random.within(-ECHO, ECHO) as i32)
-            .collect()
+        (0..2 * samples(&frame)).map(|_| random.within(-ECHO, ECHO) as i32).collect()
     };
     let (mut surface, volume) = (echoes(), echoes());
     let mut contact = random.floats(frame.scanlines as usize, 0.0, 1.0);
@@ -105,10 +95,6 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     };
     vec![
         Check::close("lateral", &got, &expected, allowed),
-        Check::equal(
-            "saturated",
-            &[counters[0].saturated],
-            &[beam::saturated(&surface, &volume)],
-        ),
+        Check::equal("saturated", &[counters[0].saturated], &[beam::saturated(&surface, &volume)]),
     ]
 }

@@ -49,25 +49,13 @@ impl Check {
 
     /// A count of differing things, of which `allowed` may differ.
     pub fn count(what: &'static str, of: usize, differing: usize, allowed: usize) -> Self {
-        Self {
-            what,
-            count: of,
-            error: differing as f64,
-            allowed: allowed as f64,
-            at: 0,
-        }
+        Self { what, count: of, error: differing as f64, allowed: allowed as f64, at: 0 }
     }
 
     /// One number.
     pub fn one(what: &'static str, error: f64, allowed: f64) -> Self {
         let error = if error.is_nan() { f64::INFINITY } else { error };
-        Self {
-            what,
-            count: 1,
-            error,
-            allowed,
-            at: 0,
-        }
+        Self { what, count: 1, error, allowed, at: 0 }
     }
 
     fn of_same_length(
@@ -77,13 +65,7 @@ impl Check {
         errors: impl Iterator<Item = f64>,
         allowed: impl Fn(usize) -> f64,
     ) -> Self {
-        let mut worst = Self {
-            what,
-            count: expected,
-            error: 0.0,
-            allowed: 0.0,
-            at: 0,
-        };
+        let mut worst = Self { what, count: expected, error: 0.0, allowed: 0.0, at: 0 };
         if got != expected {
             worst.error = f64::INFINITY;
             return worst;
@@ -95,12 +77,7 @@ impl Check {
             let here = if error == 0.0 { 0.0 } else { error / allowed };
             if here > ratio {
                 ratio = here;
-                worst = Self {
-                    error,
-                    allowed,
-                    at,
-                    ..worst
-                };
+                worst = Self { error, allowed, at, ..worst };
             }
         }
         worst

@@ -20,12 +20,7 @@ pub const SUBJECT: Subject = Subject {
     sizes: |job| {
         let frame: Frame = job.one("frame");
         let pixels = display::pixels(&frame);
-        vec![
-            size_of::<Frame>(),
-            8 * samples(&frame),
-            8 * pixels,
-            4 * pixels,
-        ]
+        vec![size_of::<Frame>(), 8 * samples(&frame), 8 * pixels, 4 * pixels]
     },
     extent: display::per_pixel,
     check,
@@ -74,20 +69,12 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     };
     let masks: Vec<f32> = mask.iter().map(|m| m[0]).collect();
     let weights: Vec<f32> = mask.iter().map(|m| m[1]).collect();
-    let inside: Vec<f64> = converted
-        .iter()
-        .map(|v| f64::from(u8::from(v.is_some())))
-        .collect();
+    let inside: Vec<f64> = converted.iter().map(|v| f64::from(u8::from(v.is_some()))).collect();
     vec![
         Check::close("mask", &masks, &expected(0, &masks), allowed),
         Check::close("weight", &weights, &inside, |i| {
             f64::from(u8::from(display::near_edge(&frame, i)))
         }),
-        Check::close(
-            "background",
-            &background,
-            &expected(1, &background),
-            allowed,
-        ),
+        Check::close("background", &background, &expected(1, &background), allowed),
     ]
 }

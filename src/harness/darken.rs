@@ -16,12 +16,7 @@ pub const SUBJECT: Subject = Subject {
     sizes: |job| {
         let frame: Frame = job.one("frame");
         let pairs = 8 * samples(&frame);
-        vec![
-            size_of::<Frame>(),
-            16 * MAX_PIECES * lines(&frame),
-            pairs,
-            pairs,
-        ]
+        vec![size_of::<Frame>(), 16 * MAX_PIECES * lines(&frame), pairs, pairs]
     },
     extent: |job| {
         let frame: Frame = job.one("frame");
@@ -30,9 +25,7 @@ pub const SUBJECT: Subject = Subject {
     check,
     plant: |job, outputs| {
         job.edit(outputs, "shaded", |shaded: &mut [f32]| {
-            let at = (1..shaded.len())
-                .step_by(2)
-                .find(|&i| shaded[i] > 0.1 && shaded[i] < 0.9);
+            let at = (1..shaded.len()).step_by(2).find(|&i| shaded[i] > 0.1 && shaded[i] < 0.9);
             shaded[at.expect("most are between")] += 1e-4;
         });
     },

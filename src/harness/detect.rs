@@ -37,14 +37,7 @@ fn job(case: Case, size: Size) -> Job {
     };
     let mut iq: Vec<f32> = (0..2 * samples(&frame)).map(|_| value()).collect();
     if case == Case::NotFinite {
-        let odd = [
-            f32::NAN,
-            f32::INFINITY,
-            f32::NEG_INFINITY,
-            0.0,
-            f32::MAX,
-            1e-40,
-        ];
+        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, f32::MAX, 1e-40];
         let pairs = odd.iter().flat_map(|&a| odd.map(|b| [a, b]));
         for (to, from) in iq.chunks_exact_mut(2).zip(pairs) {
             to.copy_from_slice(&from);

@@ -15,13 +15,7 @@ pub const SUBJECT: Subject = Subject {
     job,
     sizes: |job| {
         let pixels = display::pixels(&job.one("frame"));
-        vec![
-            size_of::<Frame>(),
-            4 * pixels,
-            4 * pixels,
-            8 * pixels,
-            12 * pixels,
-        ]
+        vec![size_of::<Frame>(), 4 * pixels, 4 * pixels, 8 * pixels, 12 * pixels]
     },
     extent: display::per_pixel,
     check,

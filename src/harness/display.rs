@@ -21,20 +21,13 @@ pub const SUBJECT: Subject = Subject {
     job,
     sizes: |job| {
         let frame: Frame = job.one("frame");
-        vec![
-            size_of::<Frame>(),
-            4 * samples(&frame),
-            1024,
-            4 * pixels(&frame),
-        ]
+        vec![size_of::<Frame>(), 4 * samples(&frame), 1024, 4 * pixels(&frame)]
     },
     extent: per_pixel,
     check,
     plant: |job, outputs| {
         job.edit(outputs, "pixels", |pixels: &mut [u32]| {
-            let inside = pixels
-                .iter_mut()
-                .find(|p| (0xff101010..0xffe0e0e0).contains(*p));
+            let inside = pixels.iter_mut().find(|p| (0xff101010..0xffe0e0e0).contains(*p));
             *inside.expect("most greys are between") += 0x0002_0202;
         });
     },
@@ -100,9 +93,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let index = |level: f64| (level.clamp(0.0, 1.0) * 255.0 + 0.5).floor() as usize;
     let shows = |pixel: u32, level: f64| {
         let greys = &grey[index(level - LEVEL)..=index(level + LEVEL)];
-        greys
-            .iter()
-            .any(|g| pixel == 0xff00_0000 | (g * 0x0001_0101))
+        greys.iter().any(|g| pixel == 0xff00_0000 | (g * 0x0001_0101))
     };
     let mut wrong = 0;
     for (i, (&pixel, level)) in got.iter().zip(&levels).enumerate() {
@@ -128,7 +119,5 @@ pub(super) fn near_edge(frame: &Frame, i: usize) -> bool {
     let z = f64::from(frame.image_top) + ((i / width) as f64 + 0.5) * pitch;
     let shifts = [(EDGE, 0.0), (-EDGE, 0.0), (0.0, EDGE), (0.0, -EDGE)];
     let inside = |dx: f64, dz: f64| display::sector(frame, x + dx, z + dz).is_some();
-    shifts
-        .iter()
-        .any(|&(dx, dz)| inside(dx, dz) != inside(0.0, 0.0))
+    shifts.iter().any(|&(dx, dz)| inside(dx, dz) != inside(0.0, 0.0))
 }

@@ -66,10 +66,7 @@ pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static
         ));
     }
     if found.contains(&"frame") && job.get::<crate::sim::layout::Frame>("frame").is_empty() {
-        return Err(format!(
-            "{}: frame.npy is shorter than a frame",
-            dir.display()
-        ));
+        return Err(format!("{}: frame.npy is shorter than a frame", dir.display()));
     }
     let needed = (subject.sizes)(job);
     for (input, needed) in job.inputs.iter_mut().zip(needed) {

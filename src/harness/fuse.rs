@@ -34,9 +34,7 @@ pub const SUBJECT: Subject = Subject {
     check,
     plant: |job, outputs| {
         job.edit(outputs, "fused", |fused: &mut [u32]| {
-            let inside = fused
-                .iter_mut()
-                .find(|p| (0xff10_1010..0xffe0_e0e0).contains(*p));
+            let inside = fused.iter_mut().find(|p| (0xff10_1010..0xffe0_e0e0).contains(*p));
             *inside.expect("most greys are between") += 0x0001_0101;
         });
     },
@@ -108,13 +106,9 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         let level = fuse::level(&fusion, simulated[i], background[i], sums[i], added);
         let level = level.unwrap_or(0.0);
         let greys = [level - ROUNDING, level + ROUNDING].map(|v| (v.max(0.0) + 0.5).floor() as u32);
-        greys
-            .iter()
-            .any(|g| got[i] == 0xff00_0000 | (g.min(&255) * 0x0001_0101))
+        greys.iter().any(|g| got[i] == 0xff00_0000 | (g.min(&255) * 0x0001_0101))
     };
-    let wrong = (0..simulated.len().min(got.len()))
-        .filter(|&i| !right(i))
-        .count();
+    let wrong = (0..simulated.len().min(got.len())).filter(|&i| !right(i)).count();
     vec![
         Check::count("pixels", simulated.len(), wrong, 0),
         Check::equal("image size", &[got.len()], &[simulated.len()]),

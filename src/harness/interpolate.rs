@@ -50,11 +50,7 @@ fn job(case: Case, size: Size) -> Job {
         // Catmull-Rom's at a quarter of the interval.
         weights: [-0.070_312_5, 0.867_187_5, 0.226_562_5, -0.023_437_5],
         // Displacements have a float to spare.
-        stride: if matches!(case, Case::Random | Case::One) {
-            4
-        } else {
-            3
-        },
+        stride: if matches!(case, Case::Random | Case::One) { 4 } else { 3 },
         ..Interpolation::default()
     };
     let mut values = Random(31).floats(5 * (push.stride * count) as usize, -1.0, 1.0);
@@ -75,20 +71,14 @@ fn job(case: Case, size: Size) -> Job {
         }
         Case::NotFinite => {
             push.weights[3] = 0.0;
-            for (i, bad) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY]
-                .into_iter()
-                .enumerate()
-            {
+            for (i, bad) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().enumerate() {
                 values[7 * i] = bad;
                 values[9 * count as usize..][70 * i] = bad;
             }
         }
         Case::Random | Case::Empty | Case::One => {}
     }
-    Job {
-        inputs: vec![Input::floats("values", &values)],
-        push: bytemuck::bytes_of(&push).to_vec(),
-    }
+    Job { inputs: vec![Input::floats("values", &values)], push: bytemuck::bytes_of(&push).to_vec() }
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
@@ -99,9 +89,8 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let expected: Vec<f64> = expected.iter().flat_map(|v| v.to_array()).collect();
     let stride = push.stride as usize;
     let first = stride * push.target as usize;
-    let written: Vec<usize> = (0..3 * push.count as usize)
-        .map(|i| first + stride * (i / 3) + i % 3)
-        .collect();
+    let written: Vec<usize> =
+        (0..3 * push.count as usize).map(|i| first + stride * (i / 3) + i % 3).collect();
     // What is added up, and how long the sum is.
     let plain = Interpolation { unit: 0, ..push };
     let sums = interpolate::interpolate(&plain, &before);

@@ -112,10 +112,7 @@ fn job(case: Case, size: Size) -> Job {
     inputs.push(Input::output("prescan", Element::Float, prescan));
     inputs.push(scanlines(&frame));
     inputs.push(Input::words("tissues", &worlds::tissues()));
-    Job {
-        inputs,
-        push: Vec::new(),
-    }
+    Job { inputs, push: Vec::new() }
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
@@ -137,20 +134,13 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
             f64::from(found) == line.mask(depth) || (either && (found == 0.0 || found == 1.0));
         wrong += usize::from(!right);
     }
-    let size = DVec3::new(
-        fusion.size_x.into(),
-        fusion.size_y.into(),
-        fusion.size_z.into(),
-    );
+    let size = DVec3::new(fusion.size_x.into(), fusion.size_y.into(), fusion.size_z.into());
     let at_end = |p: DVec3| {
         let ends = [p + 0.5, size - 0.5 - p];
         ends.iter().any(|e| e.abs().min_element() < EDGE)
     };
     let shown: Vec<f32> = got.iter().map(|v| v[1]).collect();
-    let expected: Vec<f64> = places
-        .iter()
-        .map(|&p| mask::acquired(&fusion, &texels, p))
-        .collect();
+    let expected: Vec<f64> = places.iter().map(|&p| mask::acquired(&fusion, &texels, p)).collect();
     let allowed = |i: usize| if at_end(places[i]) { 1.0 } else { LEVEL };
     vec![
         Check::count("mask", got.len(), wrong, 0),

@@ -60,14 +60,8 @@ pub enum Case {
 
 impl Case {
     /// All cases.
-    pub const ALL: [Self; 6] = [
-        Self::Random,
-        Self::Empty,
-        Self::One,
-        Self::Odd,
-        Self::Modes,
-        Self::NotFinite,
-    ];
+    pub const ALL: [Self; 6] =
+        [Self::Random, Self::Empty, Self::One, Self::Odd, Self::Modes, Self::NotFinite];
 }
 
 /// Size of [`Case::Random`].
@@ -105,12 +99,7 @@ pub struct Input {
 
 impl Input {
     fn new<T: Pod>(name: &'static str, element: Element, values: &[T]) -> Self {
-        Self {
-            name,
-            role: Role::Read,
-            element,
-            bytes: bytemuck::cast_slice(values).to_vec(),
-        }
+        Self { name, role: Role::Read, element, bytes: bytemuck::cast_slice(values).to_vec() }
     }
 
     fn words<T: Pod>(name: &'static str, values: &[T]) -> Self {

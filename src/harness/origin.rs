@@ -70,27 +70,17 @@ fn job(case: Case, size: Size) -> Job {
     inputs.extend(world.inputs());
     let stacks = START_WORDS * lines(&frame);
     inputs.push(Input::output("stacks", Element::Word, stacks));
-    inputs.push(Input::sum(
-        "counters",
-        Element::Word,
-        size_of::<Counters>() / 4,
-    ));
+    inputs.push(Input::sum("counters", Element::Word, size_of::<Counters>() / 4));
     inputs.push(Input::words("tissues", &worlds::tissues()));
     inputs.push(scanlines(&frame));
-    Job {
-        inputs,
-        push: Vec::new(),
-    }
+    Job { inputs, push: Vec::new() }
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let owned = worlds::owned(job);
     let (expected, overflow) = origin::origin(&owned.world());
-    let got: Vec<Start> = job
-        .after::<[u32; START_WORDS]>(outputs, "stacks")
-        .iter()
-        .map(origin::unpack)
-        .collect();
+    let got: Vec<Start> =
+        job.after::<[u32; START_WORDS]>(outputs, "stacks").iter().map(origin::unpack).collect();
     let media = |starts: &[Start]| -> Vec<Vec<u32>> {
         let each = |s: &Start| [&s.media.0[..], &[s.interactions]].concat();
         starts.iter().map(each).collect()

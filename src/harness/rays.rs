@@ -64,10 +64,7 @@ fn job(case: Case, size: Size) -> Job {
     };
     let mut rays: Vec<Ray> = (0..count).map(&mut ray).collect();
     if case == Case::NotFinite {
-        for (i, bad) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY]
-            .into_iter()
-            .enumerate()
-        {
+        for (i, bad) in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY].into_iter().enumerate() {
             rays[i].origin[i] = bad;
             rays[3 + i].direction[i] = bad;
         }
@@ -80,10 +77,7 @@ fn job(case: Case, size: Size) -> Job {
     inputs.push(Input::words("rays", &rays));
     let words = count * size_of::<RayHit>() / 4;
     inputs.push(Input::output("hits", Element::Word, words));
-    Job {
-        inputs,
-        push: Vec::new(),
-    }
+    Job { inputs, push: Vec::new() }
 }
 
 /// Worst differences over all rays that hit.
@@ -105,10 +99,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         compare(&owned, ray, hit, &mut worst);
     }
     let count = worst.compared;
-    let summary = |what, error, allowed| Check {
-        count,
-        ..Check::one(what, error, allowed)
-    };
+    let summary = |what, error, allowed| Check { count, ..Check::one(what, error, allowed) };
     vec![
         Check::equal("rays", &[hits.len()], &[rays.len()]),
         Check::count("surface", rays.len(), worst.wrong, 0),
@@ -138,9 +129,7 @@ fn compare(owned: &Owned, ray: &Ray, hit: &RayHit, worst: &mut Worst) {
         return;
     }
     // The first for sure, or one before it that may count or is as near.
-    let candidates = seen
-        .iter()
-        .filter(|c| surely.is_none_or(|s| c.t <= s.t + MARGIN));
+    let candidates = seen.iter().filter(|c| surely.is_none_or(|s| c.t <= s.t + MARGIN));
     let same = |c: &&&crate::reference::world::Crossing| {
         c.instance == hit.instance && (c.t - t).abs() < MARGIN
     };

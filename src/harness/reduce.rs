@@ -67,10 +67,7 @@ pub(super) fn noise(random: &mut Random, size: [u32; 2]) -> Vec<[f32; 3]> {
 
 /// A level as the twin reads it.
 pub(super) fn level(size: [usize; 2], sums: &[[f32; 3]]) -> Level {
-    Level {
-        size,
-        sums: sums.iter().map(|s| s.map(f64::from)).collect(),
-    }
+    Level { size, sums: sums.iter().map(|s| s.map(f64::from)).collect() }
 }
 
 fn job(case: Case, size: Size) -> Job {

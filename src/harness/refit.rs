@@ -18,11 +18,7 @@ pub const SUBJECT: Subject = Subject {
     job,
     sizes: |job| {
         let push = push(job);
-        let nodes = job
-            .get::<u32>("order")
-            .into_iter()
-            .max()
-            .map_or(0, |n| n + 1) as usize;
+        let nodes = job.get::<u32>("order").into_iter().max().map_or(0, |n| n + 1) as usize;
         let vertices = job.get::<u32>("triangles").into_iter().max();
         vec![
             4 * WORDS * nodes,
@@ -106,10 +102,7 @@ fn job(case: Case, size: Size) -> Job {
             largest.unwrap_or(0)
         }
     };
-    let geometry = Geometry {
-        vertices: &vertices,
-        triangles: &triangles,
-    };
+    let geometry = Geometry { vertices: &vertices, triangles: &triangles };
     let mut nodes = scene.nodes.clone();
     let mut boxes: Vec<Box3> = vec![[[0.0; 3]; 2]; nodes.len()];
     for &range in &ranges[..done] {
@@ -133,10 +126,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let push = push(job);
     let (vertices, triangles): (Vec<[f32; 3]>, Vec<[u32; 3]>) =
         (job.get("vertices"), job.get("triangles"));
-    let geometry = Geometry {
-        vertices: &vertices,
-        triangles: &triangles,
-    };
+    let geometry = Geometry { vertices: &vertices, triangles: &triangles };
     let (mut nodes, mut boxes): (Vec<u32>, Vec<Box3>) = (job.get("nodes"), job.get("boxes"));
     let order: Vec<u32> = job.get("order");
     refit::refit(push, &mut nodes, geometry, &mut boxes, &order);

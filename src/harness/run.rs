@@ -65,12 +65,7 @@ pub fn run(
             }
             Extent::Rounds(rounds) => rounds.iter().try_for_each(|round| {
                 let push = bytemuck::cast_slice(&round.push);
-                commands.dispatch(
-                    &by_role[&round.role],
-                    [round.workers, 1, 1],
-                    push,
-                    &bindings,
-                )?;
+                commands.dispatch(&by_role[&round.role], [round.workers, 1, 1], push, &bindings)?;
                 commands.barrier(Stage::Compute, Stage::Compute);
                 Ok(())
             }),
@@ -83,10 +78,7 @@ pub fn run(
         outputs.push(bytes);
     }
     let milliseconds = timings.passes.first().map_or(f64::NAN, |pass| pass.1);
-    Ok(Outcome {
-        outputs,
-        milliseconds,
-    })
+    Ok(Outcome { outputs, milliseconds })
 }
 
 /// The kernel for each role that some round has.
@@ -101,13 +93,7 @@ fn upload_image(device: &Arc<Device>, job: &Job, at: usize) -> Result<Image, Gpu
     let fusion: Fusion = job.one("fusion");
     let extent = [fusion.size_x, fusion.size_y, fusion.size_z];
     let input = &job.inputs[at];
-    let image = Image::new(
-        device,
-        input.name,
-        ImageDim::D3,
-        extent,
-        ImageFormat::R32Float,
-    )?;
+    let image = Image::new(device, input.name, ImageDim::D3, extent, ImageFormat::R32Float)?;
     device.upload_image(&image, &input.bytes)?;
     Ok(image)
 }

@@ -13,12 +13,8 @@ use crate::sim::tables::with_spheres;
 const CHUNKS: u32 = 2;
 
 /// The kernel for worlds in which tissue deforms.
-pub const DEFORMING: Subject = Subject {
-    name: "scatter_deforming",
-    stems: &["scatter_deforming"],
-    job,
-    ..RIGID
-};
+pub const DEFORMING: Subject =
+    Subject { name: "scatter_deforming", stems: &["scatter_deforming"], job, ..RIGID };
 
 /// The kernel for worlds in which none does.
 pub const RIGID: Subject = Subject {
@@ -107,10 +103,7 @@ fn scene(case: Case, size: Size) -> Job {
         Case::NotFinite => Case::Random,
         case => case,
     };
-    Job {
-        inputs: trace::scene(case, size),
-        push: Vec::new(),
-    }
+    Job { inputs: trace::scene(case, size), push: Vec::new() }
 }
 
 /// The same world with no displacement fields.
@@ -193,21 +186,14 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     // A cell whose middle lies within 8e-6 mm of either end of the layer's slab may count or not: that share
     // of the scatterers, and of their power.
     let at_an_end = 4.0 * 8e-6 / (2.0 * f64::from(frame.elevation_reach));
-    let allowed = if frame.flags & FLAG_VOXEL == 0 {
-        (2e-3_f64.powi(2) + at_an_end).sqrt()
-    } else {
-        3e-2
-    };
+    let allowed =
+        if frame.flags & FLAG_VOXEL == 0 { (2e-3_f64.powi(2) + at_an_end).sqrt() } else { 3e-2 };
     let fixed: Vec<f64> = twin.fixed.iter().map(|&x| x as f64).collect();
     let counters: Counters = job.after(outputs, "counters")[0];
     let echoed = twin.deposits.iter().any(|&n| n > 0) as u32;
     vec![
         Check::one("echo norm", relative_norm(&echoes, &fixed), allowed),
         Check::equal("saturated", &[counters.saturated], &[twin.saturated]),
-        Check::equal(
-            "echoes at all",
-            &[u32::from(echoes.iter().any(|&e| e != 0.0))],
-            &[echoed],
-        ),
+        Check::equal("echoes at all", &[u32::from(echoes.iter().any(|&e| e != 0.0))], &[echoed]),
     ]
 }

@@ -78,15 +78,9 @@ fn job(case: Case, size: Size) -> Job {
     if case == Case::NotFinite {
         tissues[2].absorption = f32::INFINITY;
     }
-    let mut inputs = vec![
-        Input::words("frame", &[frame]),
-        Input::words("tissues", &tissues),
-    ];
+    let mut inputs = vec![Input::words("frame", &[frame]), Input::words("tissues", &tissues)];
     inputs.extend(world.inputs());
-    let mut job = Job {
-        inputs,
-        push: Vec::new(),
-    };
+    let mut job = Job { inputs, push: Vec::new() };
     let (starts, _) = origin::origin(&worlds::owned(&job).world());
     job.inputs.extend([
         Input::words("stacks", &origin::pack(&starts)),
@@ -100,11 +94,7 @@ fn job(case: Case, size: Size) -> Job {
 /// The pieces of each line from the device's buffer.
 pub(super) fn unpack(pieces: &[[f32; 4]]) -> Vec<Vec<Piece>> {
     let (lines, _) = pieces.as_chunks::<MAX_PIECES>();
-    let piece = |p: &[f32; 4]| Piece {
-        begin: p[0].into(),
-        level: p[1].into(),
-        slope: p[2].into(),
-    };
+    let piece = |p: &[f32; 4]| Piece { begin: p[0].into(), level: p[1].into(), slope: p[2].into() };
     let line = |line: &[[f32; 4]; MAX_PIECES]| {
         let held = line.iter().take_while(|p| p[0] < FAR_PIECE);
         held.map(piece).collect()
@@ -117,10 +107,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     // How a surface echoes does not matter here: to the twin all are mirrors.
     let sides = owned.instances.iter();
     let sides = sides.map(|i| i.surface_outside.max(i.surface_inside) as usize + 1);
-    let mirror = Surface {
-        roughness: 1e9,
-        ..Surface::default()
-    };
+    let mirror = Surface { roughness: 1e9, ..Surface::default() };
     owned.surfaces = vec![mirror; sides.max().unwrap_or(0)];
     let (world, frame) = (owned.world(), owned.frame);
     let starts = job.get::<[u32; START_WORDS]>("stacks");
@@ -138,10 +125,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
             beside || (a - b).abs() < LEVEL || (a.is_nan() && b.is_nan())
         })
     };
-    let wrong = got
-        .iter()
-        .zip(&twin)
-        .filter(|(got, twin)| !alike(got, twin));
+    let wrong = got.iter().zip(&twin).filter(|(got, twin)| !alike(got, twin));
     let wrong = wrong.count();
     // Else nothing would be compared.
     let flat = twin.iter().filter(|p| p.len() < 3).count();

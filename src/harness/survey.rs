@@ -111,22 +111,14 @@ fn job(case: Case, size: Size) -> Job {
         Input::words("pixels", &image),
         Input::output("picture", Element::Word, pixels(&survey)),
     ]);
-    Job {
-        inputs,
-        push: Vec::new(),
-    }
+    Job { inputs, push: Vec::new() }
 }
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let owned = worlds::owned(job);
     let survey: Survey = job.one("survey");
     let (looks, image): (Vec<[f32; 4]>, Vec<u32>) = (job.get("looks"), job.get("pixels"));
-    let view = View {
-        world: owned.world(),
-        survey: &survey,
-        looks: &looks,
-        pixels: &image,
-    };
+    let view = View { world: owned.world(), survey: &survey, looks: &looks, pixels: &image };
     let picture: Vec<u32> = job.after(outputs, "picture");
     let (mut wrong, mut edges, mut clear) = (0, 0, 0);
     for (i, &pixel) in picture.iter().enumerate() {
@@ -150,11 +142,6 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         Check::count("pixels", picture.len(), wrong, 0),
         Check::count("transparent pixels", picture.len(), clear, 0),
         // A hundredth is what edges may be; else the comparison excuses everything.
-        Check::count(
-            "pixels at an edge",
-            picture.len(),
-            edges,
-            picture.len() / 100 + 1,
-        ),
+        Check::count("pixels at an edge", picture.len(), edges, picture.len() / 100 + 1),
     ]
 }

@@ -32,9 +32,7 @@ pub const SUBJECT: Subject = Subject {
     check,
     plant: |job, outputs| {
         job.edit(outputs, "tinted", |tinted: &mut [u32]| {
-            let inside = tinted
-                .iter_mut()
-                .find(|p| (**p >> 8) & 0xff < 0xff && **p > 0);
+            let inside = tinted.iter_mut().find(|p| (**p >> 8) & 0xff < 0xff && **p > 0);
             *inside.expect("most are not white") += 0x0000_0100;
         });
     },
@@ -115,9 +113,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
                 either.contains(&f64::from(byte))
             })
     };
-    let wrong = (0..fused.len().min(got.len()))
-        .filter(|&i| !right(i))
-        .count();
+    let wrong = (0..fused.len().min(got.len())).filter(|&i| !right(i)).count();
     vec![
         Check::count("pixels", fused.len(), wrong, 0),
         Check::equal("image size", &[got.len()], &[fused.len()]),

@@ -51,9 +51,7 @@ fn sizes(job: &Job) -> Vec<usize> {
     let instances: Vec<layout::Instance> = job.get("instances");
     let tissues = instances.iter().map(|i| i.tissue).max().unwrap_or(0);
     let tissues = tissues.max(frame.background) as usize + 1;
-    let sides = instances
-        .iter()
-        .map(|i| i.surface_outside.max(i.surface_inside) as usize + 1);
+    let sides = instances.iter().map(|i| i.surface_outside.max(i.surface_inside) as usize + 1);
     let mut sizes = vec![
         size_of::<Frame>(),
         tissues * size_of::<Tissue>(),
@@ -87,11 +85,9 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
     frame.surface_scale = (1 << 20) as f32;
     frame.volume_scale = frame.surface_scale;
     (frame.sampling, frame.flags, frame.paths) = match case {
-        Case::Odd => (
-            SAMPLING_PLAIN,
-            FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED,
-            7,
-        ),
+        Case::Odd => {
+            (SAMPLING_PLAIN, FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED, 7)
+        }
         Case::Modes => (
             SAMPLING_SHARED_PRIMARY,
             FLAG_COINCIDENT | FLAG_COHERENT | FLAG_WORLD_TEXTURE | FLAG_FOOTPRINT | FLAG_SOBOL,
@@ -123,10 +119,7 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
 }
 
 fn job(case: Case, size: Size) -> Job {
-    let mut job = Job {
-        inputs: scene(case, size),
-        push: Vec::new(),
-    };
+    let mut job = Job { inputs: scene(case, size), push: Vec::new() };
     let frame: Frame = job.one("frame");
     let mut rows = rows(&frame);
     if case == Case::NotFinite {
@@ -164,11 +157,8 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let owned = worlds::owned(job);
     let world = owned.world();
     let frame = world.frame;
-    let stacks: Vec<_> = job
-        .get::<[u32; START_WORDS]>("stacks")
-        .iter()
-        .map(origin::unpack)
-        .collect();
+    let stacks: Vec<_> =
+        job.get::<[u32; START_WORDS]>("stacks").iter().map(origin::unpack).collect();
     let twin = trace::trace(&world, &stacks);
 
     let segments: Vec<layout::Segment> = job.after(outputs, "segments");
@@ -177,10 +167,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     for (line, expected) in twin.segments.iter().enumerate() {
         let first = line * frame.segment_capacity as usize;
         let held = counts[line].min(frame.segment_capacity) as usize;
-        let got = segments[first..first + held]
-            .iter()
-            .map(Segment::from)
-            .collect();
+        let got = segments[first..first + held].iter().map(Segment::from).collect();
         missing += unmatched(got, expected);
         total += expected.len();
     }

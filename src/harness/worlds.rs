@@ -191,26 +191,11 @@ pub fn world(case: Case) -> Builder {
         Case::One => builder.place(shapes::sphere(9.0, 2), pose(0.0, 0.0, 25.0), 1, 0),
         _ => {
             // A body around the probe, with nested and overlapping organs and a bone.
-            builder.place(
-                shapes::ellipsoid([60.0, 40.0, 70.0], 3),
-                pose(0.0, 0.0, 20.0),
-                1,
-                0,
-            );
-            builder.place(
-                shapes::ellipsoid([14.0, 11.0, 9.0], 2),
-                pose(3.0, 0.0, 28.0),
-                2,
-                1,
-            );
+            builder.place(shapes::ellipsoid([60.0, 40.0, 70.0], 3), pose(0.0, 0.0, 20.0), 1, 0);
+            builder.place(shapes::ellipsoid([14.0, 11.0, 9.0], 2), pose(3.0, 0.0, 28.0), 2, 1);
             builder.deform();
             builder.place(shapes::sphere(5.0, 2), pose(2.0, 1.0, 27.0), 0, 2);
-            builder.place(
-                shapes::cuboid([9.0, 30.0, 6.0]),
-                pose(-14.0, 0.0, 40.0),
-                3,
-                5,
-            );
+            builder.place(shapes::cuboid([9.0, 30.0, 6.0]), pose(-14.0, 0.0, 40.0), 3, 5);
             builder.place(shapes::cylinder(4.0, 50.3, 24), pose(12.0, 0.0, 33.0), 0, 1);
             // A second placement of the same mesh, scaled and mirrored.
             let mirrored = DAffine3::from_scale(DVec3::new(-1.4, 0.8, 1.1));

@@ -53,9 +53,7 @@ pub(super) fn is_understood(header: &Header) -> bool {
 /// Prefix and type of a query.
 fn query(kind: &str) -> Option<(&str, &str)> {
     let (prefix, of) = kind.split_at_checked(4)?;
-    ["GET_", "STT_", "STP_"]
-        .contains(&prefix)
-        .then_some((prefix, of))
+    ["GET_", "STT_", "STP_"].contains(&prefix).then_some((prefix, of))
 }
 
 /// Lets a message act.
@@ -122,10 +120,7 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
         ("STP_", "TDATA") => choose(&|wants| wants.tracking = None),
         ("STT_", "TDATA") => match &message.content {
             // There is one frame, whose name is left out.
-            Content::StartTracking {
-                resolution,
-                coordinates,
-            } if coordinates.is_empty() => {
+            Content::StartTracking { resolution, coordinates } if coordinates.is_empty() => {
                 let least = Duration::from_millis((*resolution).into());
                 choose(&|wants| wants.tracking = Some(least))
             }
@@ -135,31 +130,18 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
     };
     match client.answer(answer) {
         true => Ok(()),
-        false => Err(Refused::Client(
-            "it asks and does not read the answers".to_owned(),
-        )),
+        false => Err(Refused::Client("it asks and does not read the answers".to_owned())),
     }
 }
 
 /// An answer under the query's name, in its header version and under its number.
 fn respond(query: &Message, content: Content) -> Vec<u8> {
-    let extension = query.extension.as_ref().map(|e| Extension {
-        id: e.id,
-        metadata: Vec::new(),
-    });
-    Message {
-        device: query.device,
-        extension,
-        ..Message::new("", content)
-    }
-    .encode()
+    let extension = query.extension.as_ref().map(|e| Extension { id: e.id, metadata: Vec::new() });
+    Message { device: query.device, extension, ..Message::new("", content) }.encode()
 }
 
 fn rts(of: &str, status: u8) -> Content {
-    Content::Other {
-        kind: Label::new(&format!("RTS_{of}")),
-        bytes: vec![status],
-    }
+    Content::Other { kind: Label::new(&format!("RTS_{of}")), bytes: vec![status] }
 }
 
 fn capability() -> Content {
@@ -195,11 +177,7 @@ pub(super) fn no_room(most: usize) -> Vec<u8> {
 
 /// The probe's pose as a TDATA message.
 pub(super) fn tracking_message(frame: &Published) -> Vec<u8> {
-    let tool = Tool {
-        name: Label::new(POSE_DEVICE),
-        kind: SIX,
-        reserved: 0,
-        matrix: frame.matrix(),
-    };
+    let tool =
+        Tool { name: Label::new(POSE_DEVICE), kind: SIX, reserved: 0, matrix: frame.matrix() };
     Message::new(POSE_DEVICE, Content::Tracking(vec![tool])).encode()
 }

@@ -79,11 +79,7 @@ impl Client {
             outbox: Mutex::new(Outbox {
                 answers: VecDeque::new(),
                 frame,
-                wants: Wants {
-                    image: true,
-                    transform: true,
-                    tracking: None,
-                },
+                wants: Wants { image: true, transform: true, tracking: None },
                 tracking_sent: None,
                 closed: false,
             }),
@@ -143,10 +139,7 @@ impl Client {
             if let Some(frame) = outbox.frame.take() {
                 return Some(Next::Frame(frame));
             }
-            outbox = self
-                .changed
-                .wait(outbox)
-                .unwrap_or_else(std::sync::PoisonError::into_inner);
+            outbox = self.changed.wait(outbox).unwrap_or_else(std::sync::PoisonError::into_inner);
         }
     }
 

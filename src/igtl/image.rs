@@ -91,10 +91,7 @@ impl Image {
             axes,
             size: [width, height, 1],
             steps: [m.x_axis, m.y_axis, m.z_axis].map(|v| v.as_vec3().to_array()),
-            centre: patient_from_pixel
-                .transform_point3(middle)
-                .as_vec3()
-                .to_array(),
+            centre: patient_from_pixel.transform_point3(middle).as_vec3().to_array(),
             part_offset: [0; 3],
             part_size: [width, height, 1],
             values,
@@ -166,10 +163,7 @@ impl Image {
         // At most 2^48 pixels of 255 components of 8 bytes: this does not overflow.
         let pixels: u64 = part_size.iter().map(|&n| u64::from(n)).product();
         if u128::from(pixels) * u128::from(components) * u128::from(bytes) != values.len() as u128 {
-            return Err(DecodeError::Length {
-                what: "an image with pixels",
-                bytes: values.len(),
-            });
+            return Err(DecodeError::Length { what: "an image with pixels", bytes: values.len() });
         }
         Ok(Self {
             components,

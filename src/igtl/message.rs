@@ -146,22 +146,14 @@ impl Content {
                 }
             }
             Self::Image(image) => image.encode(out),
-            Self::Status {
-                code,
-                subcode,
-                name,
-                message,
-            } => {
+            Self::Status { code, subcode, name, message } => {
                 out.extend(code.to_be_bytes());
                 out.extend(subcode.to_be_bytes());
                 out.extend(name.0);
                 out.extend_from_slice(message);
             }
             Self::Capability(kinds) => out.extend(kinds.iter().flat_map(|k| k.0)),
-            Self::StartTracking {
-                resolution,
-                coordinates,
-            } => {
+            Self::StartTracking { resolution, coordinates } => {
                 out.extend(resolution.to_be_bytes());
                 out.extend(coordinates.0);
             }
@@ -170,10 +162,7 @@ impl Content {
     }
 
     fn decode(kind: Label<12>, content: &[u8]) -> Result<Self, DecodeError> {
-        let odd = |what| DecodeError::Length {
-            what,
-            bytes: content.len(),
-        };
+        let odd = |what| DecodeError::Length { what, bytes: content.len() };
         Ok(match &*kind.text() {
             "TRANSFORM" => {
                 let mut from = Reader::new(content, "a TRANSFORM");
@@ -217,15 +206,9 @@ impl Content {
                 let mut from = Reader::new(content, "an STT_TDATA");
                 let (resolution, coordinates) = (from.u32()?, Label(from.array()?));
                 from.end()?;
-                Self::StartTracking {
-                    resolution,
-                    coordinates,
-                }
+                Self::StartTracking { resolution, coordinates }
             }
-            _ => Self::Other {
-                kind,
-                bytes: content.to_vec(),
-            },
+            _ => Self::Other { kind, bytes: content.to_vec() },
         })
     }
 }
@@ -233,12 +216,7 @@ impl Content {
 impl Message {
     /// A message of now, in header version 1, which everybody reads.
     pub fn new(device: &str, content: Content) -> Self {
-        Self {
-            device: Label::new(device),
-            time: Timestamp::now(),
-            extension: None,
-            content,
-        }
+        Self { device: Label::new(device), time: Timestamp::now(), extension: None, content }
     }
 
     /// Text of a metadata value.
@@ -281,17 +259,11 @@ impl Message {
     /// A body that is not the one of the header, or not of its type.
     pub fn decode(header: &Header, body: &[u8]) -> Result<Self, DecodeError> {
         if body.len() as u64 != header.body_size {
-            return Err(DecodeError::Length {
-                what: "a body",
-                bytes: body.len(),
-            });
+            return Err(DecodeError::Length { what: "a body", bytes: body.len() });
         }
         let computed = checksum(body);
         if computed != header.checksum {
-            return Err(DecodeError::Checksum {
-                stated: header.checksum,
-                computed,
-            });
+            return Err(DecodeError::Checksum { stated: header.checksum, computed });
         }
         let (extension, content) = match header.version {
             1 => (None, body),
@@ -313,10 +285,9 @@ impl Message {
     /// # Errors
     /// As [`Self::decode`], and bytes that are missing or left over.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, DecodeError> {
-        let (header, body) = bytes.split_first_chunk().ok_or(DecodeError::Length {
-            what: "a header",
-            bytes: bytes.len(),
-        })?;
+        let (header, body) = bytes
+            .split_first_chunk()
+            .ok_or(DecodeError::Length { what: "a header", bytes: bytes.len() })?;
         Self::decode(&Header::decode(header)?, body)
     }
 }

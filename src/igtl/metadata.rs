@@ -56,16 +56,16 @@ impl Extension {
         let (size, index_size) = (usize::from(from.u16()?), usize::from(from.u16()?));
         let (text_size, id) = (from.u32()? as usize, from.u32()?);
         // What a later version may add to the extended header.
-        from.take(size.checked_sub(EXTENDED).ok_or(DecodeError::Length {
-            what: "an extended header",
-            bytes: size,
-        })?)?;
+        from.take(
+            size.checked_sub(EXTENDED)
+                .ok_or(DecodeError::Length { what: "an extended header", bytes: size })?,
+        )?;
         let rest = from.rest();
         let tail = index_size.saturating_add(text_size);
-        let cut = rest.len().checked_sub(tail).ok_or(DecodeError::Length {
-            what: "metadata",
-            bytes: tail,
-        })?;
+        let cut = rest
+            .len()
+            .checked_sub(tail)
+            .ok_or(DecodeError::Length { what: "metadata", bytes: tail })?;
         let (content, tail) = rest.split_at(cut);
         let (index, text) = tail.split_at(index_size);
         let metadata = match index_size {

@@ -32,24 +32,14 @@ impl Picture {
         let size = size.map(|n| u16::try_from(n).expect("a side of a B-mode image"));
         let (pixels, rest) = rgba.as_chunks::<4>();
         let count = usize::from(size[0]) * usize::from(size[1]);
-        assert!(
-            rest.is_empty() && pixels.len() == count,
-            "the pixels of the frame"
-        );
+        assert!(rest.is_empty() && pixels.len() == count, "the pixels of the frame");
         let shown = pixels.iter().map(|p| if p[3] == 0 { [0; 4] } else { *p });
-        let grey = pixels
-            .iter()
-            .all(|p| p[3] == 0 || p[0] == p[1] && p[1] == p[2]);
+        let grey = pixels.iter().all(|p| p[3] == 0 || p[0] == p[1] && p[1] == p[2]);
         let (components, values) = match grey {
             true => (1, shown.map(|p| p[0]).collect()),
             false => (3, shown.flat_map(|p| [p[0], p[1], p[2]]).collect()),
         };
-        Self {
-            size,
-            components,
-            values,
-            probe_from_pixel: probe_from_pixel(frame),
-        }
+        Self { size, components, values, probe_from_pixel: probe_from_pixel(frame) }
     }
 }
 
@@ -110,8 +100,7 @@ impl Published {
 
     /// The TRANSFORM message.
     pub fn transform(&self) -> &[u8] {
-        self.transform
-            .get_or_init(|| self.message(POSE_DEVICE, Content::Transform(self.matrix())))
+        self.transform.get_or_init(|| self.message(POSE_DEVICE, Content::Transform(self.matrix())))
     }
 
     /// RAS from probe space as messages hold it.
@@ -120,10 +109,6 @@ impl Published {
     }
 
     fn message(&self, device: &str, content: Content) -> Vec<u8> {
-        Message {
-            time: self.time,
-            ..Message::new(device, content)
-        }
-        .encode()
+        Message { time: self.time, ..Message::new(device, content) }.encode()
     }
 }

@@ -104,11 +104,7 @@ struct Source<'s> {
 
 impl<'s> Source<'s> {
     fn new(stream: &'s TcpStream, settings: &Settings) -> Self {
-        Self {
-            stream,
-            limit: settings.message_timeout,
-            end: Instant::now(),
-        }
+        Self { stream, limit: settings.message_timeout, end: Instant::now() }
     }
 
     /// Waits for the first byte for as long as it takes; the message's time begins with it. False
@@ -173,8 +169,5 @@ impl<'s> Source<'s> {
 /// Whether there is just nothing to read yet.
 fn waits(error: &std::io::Error) -> bool {
     let kind = error.kind();
-    matches!(
-        kind,
-        ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut
-    )
+    matches!(kind, ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut)
 }

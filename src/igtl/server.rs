@@ -202,15 +202,9 @@ impl Server {
         let thread = {
             let shared = Arc::clone(&shared);
             let builder = thread::Builder::new().name("igtl listener".to_owned());
-            builder
-                .spawn(move || Doorman::new(shared).run(&listener))
-                .map_err(fail)?
+            builder.spawn(move || Doorman::new(shared).run(&listener)).map_err(fail)?
         };
-        Ok(Self {
-            shared,
-            address: bound,
-            listener: Some(thread),
-        })
+        Ok(Self { shared, address: bound, listener: Some(thread) })
     }
 
     /// Where it listens.
@@ -272,11 +266,7 @@ struct Doorman {
 
 impl Doorman {
     fn new(shared: Arc<Shared>) -> Self {
-        Self {
-            shared,
-            threads: Vec::new(),
-            refused: VecDeque::new(),
-        }
+        Self { shared, threads: Vec::new(), refused: VecDeque::new() }
     }
 
     fn run(mut self, listener: &TcpListener) {
@@ -320,8 +310,7 @@ impl Doorman {
         });
         let seated = self.threads.len();
         let mut before = seated;
-        self.shared
-            .count(|status| before = std::mem::replace(&mut status.clients, seated));
+        self.shared.count(|status| before = std::mem::replace(&mut status.clients, seated));
         if seated != before {
             self.shared.tell();
         }

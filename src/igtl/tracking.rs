@@ -59,10 +59,7 @@ struct Last {
 
 impl Tracking {
     pub fn new(tracker: Tracker) -> Self {
-        Self {
-            tracker: Mutex::new(tracker),
-            last: Mutex::new(None),
-        }
+        Self { tracker: Mutex::new(tracker), last: Mutex::new(None) }
     }
 
     pub fn tracker(&self) -> Tracker {
@@ -125,12 +122,7 @@ impl Tracking {
         let mut last = lock(&self.last);
         let number = last.as_ref().map_or(0, |last| last.pose.number) + 1;
         *last = Some(Last {
-            pose: Pose {
-                world_from_probe,
-                arrived: Instant::now(),
-                number,
-                device,
-            },
+            pose: Pose { world_from_probe, arrived: Instant::now(), number, device },
             missing: false,
         });
         Ok(true)

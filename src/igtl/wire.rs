@@ -64,10 +64,7 @@ impl<'b> Reader<'b> {
         let (taken, rest) = self
             .rest
             .split_at_checked(count)
-            .ok_or(DecodeError::Length {
-                what: self.what,
-                bytes: self.rest.len(),
-            })?;
+            .ok_or(DecodeError::Length { what: self.what, bytes: self.rest.len() })?;
         self.rest = rest;
         Ok(taken)
     }
@@ -119,10 +116,7 @@ impl<'b> Reader<'b> {
     pub fn end(self) -> Result<(), DecodeError> {
         match self.rest.len() {
             0 => Ok(()),
-            bytes => Err(DecodeError::Length {
-                what: self.what,
-                bytes,
-            }),
+            bytes => Err(DecodeError::Length { what: self.what, bytes }),
         }
     }
 }

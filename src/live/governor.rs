@@ -122,9 +122,7 @@ impl Governor {
         let mut known: Vec<(f64, f64)> = self.known_works().collect();
         known.sort_by(|a, b| (a.0 - work).abs().total_cmp(&(b.0 - work).abs()));
         let &(near, ms) = known.first()?;
-        let slope = known
-            .get(1)
-            .map(|&(far, other)| (ms - other) / (near - far));
+        let slope = known.get(1).map(|&(far, other)| (ms - other) / (near - far));
         let slope = slope.filter(|slope| (0.0..=ms / near).contains(slope));
         Some(ms + slope.unwrap_or(ms / near) * (work - near))
     }
@@ -294,10 +292,7 @@ mod tests {
             let cost = device(whole);
             let last = *levels.last().unwrap();
             assert!(cost(last, 0) <= 66.0 * 1.1, "{whole}: {levels:?}");
-            assert!(
-                last == 0 || cost(last - 1, 0) > 66.0 * 0.75,
-                "{whole}: {levels:?}"
-            );
+            assert!(last == 0 || cost(last - 1, 0) > 66.0 * 0.75, "{whole}: {levels:?}");
             assert!(changes(&levels[30..]) == 0, "{whole}: {levels:?}");
         }
     }
@@ -378,10 +373,7 @@ mod tests {
         assert_eq!(governor.refined(next), Some(0));
         // What the frames at rest took is learned, and the level that was chosen stays.
         governor.finished(0, 300.0);
-        assert_eq!(
-            (governor.level(), governor.refined(shown)),
-            (shown, Some(0))
-        );
+        assert_eq!((governor.level(), governor.refined(shown)), (shown, Some(0)));
     }
 
     #[test]

@@ -35,15 +35,7 @@ struct Step {
 /// Counts in the order of [`Step`]: scanlines, layers, samples, paths, scatterers, and height of the picture.
 const fn step(shares: [f64; 6], reflections: u32) -> Step {
     let [scanlines, layers, samples, paths, scatterers, height] = shares;
-    Step {
-        scanlines,
-        layers,
-        samples,
-        paths,
-        scatterers,
-        reflections,
-        height,
-    }
+    Step { scanlines, layers, samples, paths, scatterers, reflections, height }
 }
 
 /// Each about two thirds of the work of the one before. Paths and layers go first: they cost most and
@@ -154,14 +146,7 @@ impl Level {
 impl fmt::Display for Level {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self {
-            scanlines,
-            layers,
-            samples,
-            paths,
-            scatterers,
-            reflections,
-            image_height,
-            ..
+            scanlines, layers, samples, paths, scatterers, reflections, image_height, ..
         } = self;
         write!(
             f,
@@ -181,12 +166,7 @@ impl Ladder {
     /// The levels of a scene. Where it mixes an acquired volume in, the picture keeps its size: the width
     /// of the blending is counted in pixels.
     pub fn of(scene: &Scene) -> Self {
-        Self::new(
-            &scene.probe,
-            &scene.simulation,
-            &scene.imaging,
-            scene.shows_volume(),
-        )
+        Self::new(&scene.probe, &scene.simulation, &scene.imaging, scene.shows_volume())
     }
 
     fn new(probe: &Probe, simulation: &Simulation, imaging: &Imaging, keeps_picture: bool) -> Self {
@@ -291,12 +271,8 @@ mod tests {
 
     #[test]
     fn the_last_level_costs_a_twentieth_where_there_are_layers_to_leave_out() {
-        let probe = Probe {
-            scanlines: 192,
-            elevation_layers: 7,
-            samples: 2048,
-            ..Probe::abdominal()
-        };
+        let probe =
+            Probe { scanlines: 192, elevation_layers: 7, samples: 2048, ..Probe::abdominal() };
         let works = ladder(&probe, false).works();
         let last = works.last().copied().unwrap();
         assert!((1.0 / 40.0..1.0 / 15.0).contains(&last), "{works:?}");
@@ -312,18 +288,9 @@ mod tests {
                 assert!(sigma / pitch >= 0.999 || level.samples == probe.samples);
             }
         }
-        let small = Probe {
-            scanlines: 32,
-            elevation_layers: 1,
-            ..Probe::abdominal()
-        };
+        let small = Probe { scanlines: 32, elevation_layers: 1, ..Probe::abdominal() };
         let ladder = ladder(&small, false);
-        assert!(
-            ladder
-                .levels()
-                .iter()
-                .all(|l| l.scanlines == 32 && l.layers == 1)
-        );
+        assert!(ladder.levels().iter().all(|l| l.scanlines == 32 && l.layers == 1));
     }
 
     #[test]

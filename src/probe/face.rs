@@ -13,19 +13,12 @@ impl Probe {
         let fan = |radius: f64, field_of_view: f64| {
             let half = field_of_view / 2.0;
             let outer = radius + self.depth;
-            let x = if half < FRAC_PI_2 {
-                outer * half.sin()
-            } else {
-                outer
-            };
+            let x = if half < FRAC_PI_2 { outer * half.sin() } else { outer };
             let edge = if half < FRAC_PI_2 { radius } else { outer };
             [-x, edge * half.cos() - radius, x, self.depth]
         };
         match self.kind {
-            Kind::Convex {
-                radius,
-                field_of_view,
-            } => fan(radius, field_of_view),
+            Kind::Convex { radius, field_of_view } => fan(radius, field_of_view),
             Kind::Phased { field_of_view } => fan(0.0, field_of_view),
             Kind::Linear { width } => [-width / 2.0, 0.0, width / 2.0, self.depth],
         }
@@ -35,10 +28,7 @@ impl Probe {
     /// skin is as wide as its aperture.
     pub fn face_width(&self) -> f64 {
         match self.kind {
-            Kind::Convex {
-                radius,
-                field_of_view,
-            } => radius * field_of_view,
+            Kind::Convex { radius, field_of_view } => radius * field_of_view,
             Kind::Linear { width } => width,
             Kind::Phased { .. } if self.aperture.is_finite() => self.aperture,
             Kind::Phased { .. } => self.transmit_aperture(),
@@ -50,10 +40,7 @@ impl Probe {
     pub fn face(&self, across: f64, along: f64) -> (DVec3, DVec3) {
         let y = along * self.elevation_height;
         match self.kind {
-            Kind::Convex {
-                radius,
-                field_of_view,
-            } => {
+            Kind::Convex { radius, field_of_view } => {
                 let (sin, cos) = (field_of_view * across).sin_cos();
                 let point = DVec3::new(radius * sin, y, radius * cos - radius);
                 (point, DVec3::new(sin, 0.0, cos))

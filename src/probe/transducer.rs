@@ -106,15 +106,9 @@ impl Probe {
     /// -1/2, its one edge, to 1/2.
     pub fn ray_across(&self, u: f64) -> (DVec3, DVec3) {
         match self.kind {
-            Kind::Convex {
-                radius,
-                field_of_view,
-            } => {
+            Kind::Convex { radius, field_of_view } => {
                 let (sin, cos) = (field_of_view * u).sin_cos();
-                (
-                    DVec3::new(radius * sin, 0.0, radius * cos - radius),
-                    DVec3::new(sin, 0.0, cos),
-                )
+                (DVec3::new(radius * sin, 0.0, radius * cos - radius), DVec3::new(sin, 0.0, cos))
             }
             Kind::Linear { width } => (DVec3::new(width * u, 0.0, 0.0), DVec3::Z),
             Kind::Phased { field_of_view } => {
@@ -128,10 +122,7 @@ impl Probe {
     pub fn line_pitch(&self, z: f64) -> f64 {
         let lines = f64::from(self.scanlines);
         match self.kind {
-            Kind::Convex {
-                radius,
-                field_of_view,
-            } => (radius + z) * field_of_view / lines,
+            Kind::Convex { radius, field_of_view } => (radius + z) * field_of_view / lines,
             Kind::Linear { width } => width / lines,
             Kind::Phased { field_of_view } => z * field_of_view / lines,
         }
@@ -141,10 +132,7 @@ impl Probe {
     /// 7 MHz. Radius, slice thickness and the focusing are ours: the paper does not print them.
     pub fn paper_table1() -> Self {
         Self {
-            kind: Kind::Convex {
-                radius: 11.0,
-                field_of_view: std::f64::consts::FRAC_PI_2,
-            },
+            kind: Kind::Convex { radius: 11.0, field_of_view: std::f64::consts::FRAC_PI_2 },
             scanlines: 192,
             elevation_layers: 7,
             samples: 2048,
@@ -165,10 +153,7 @@ impl Probe {
     /// Abdominal curved array: 3.5 MHz, 65 degrees, 160 mm deep.
     pub fn abdominal() -> Self {
         Self {
-            kind: Kind::Convex {
-                radius: 50.0,
-                field_of_view: 65f64.to_radians(),
-            },
+            kind: Kind::Convex { radius: 50.0, field_of_view: 65f64.to_radians() },
             depth: 160.0,
             frequency: 3.5,
             focus: 80.0,
@@ -183,10 +168,7 @@ impl Probe {
     /// Cardiac sector: 3 MHz, 80 degrees, small face.
     pub fn cardiac() -> Self {
         Self {
-            kind: Kind::Convex {
-                radius: 5.0,
-                field_of_view: 80f64.to_radians(),
-            },
+            kind: Kind::Convex { radius: 5.0, field_of_view: 80f64.to_radians() },
             depth: 150.0,
             frequency: 3.0,
             focus: 75.0,
@@ -216,9 +198,7 @@ impl Probe {
     /// Phased array: point face, 90 degrees, 2.7 MHz, 120 mm deep (the P4-2v class).
     pub fn phased() -> Self {
         Self {
-            kind: Kind::Phased {
-                field_of_view: std::f64::consts::FRAC_PI_2,
-            },
+            kind: Kind::Phased { field_of_view: std::f64::consts::FRAC_PI_2 },
             depth: 120.0,
             frequency: 2.7,
             focus: 60.0,

@@ -92,14 +92,7 @@ impl Accumulator {
         let before = kappa.floor();
         for (i, share) in shares(kappa - before).into_iter().enumerate() {
             let k = before as i64 + i as i64 - 1;
-            self.add(
-                l,
-                k,
-                share * amplitude,
-                angle,
-                &gain,
-                [dither[2 * i], dither[2 * i + 1]],
-            );
+            self.add(l, k, share * amplitude, angle, &gain, [dither[2 * i], dither[2 * i + 1]]);
         }
     }
 
@@ -197,12 +190,7 @@ mod tests {
 
     #[test]
     fn echoes_are_summed_where_their_time_says() {
-        let echoes = [
-            (0, 2.25, 1.0),
-            (0, 2.75, 0.5),
-            (1, 7.4, 2.0),
-            (1, 0.0, -1.0),
-        ];
+        let echoes = [(0, 2.25, 1.0), (0, 2.75, 0.5), (1, 7.4, 2.0), (1, 0.0, -1.0)];
         let mut sum = Accumulator::new(&frame());
         let mut overwritten = Accumulator::new(&frame());
         for (l, kappa, amplitude) in echoes {
@@ -218,15 +206,8 @@ mod tests {
         }
         // Phases of a few turns in f64: rounding is below 1e-14.
         assert!(worst(&sum.exact, &echoes) < 1e-12);
-        assert!(
-            worst(&overwritten.exact, &echoes) > 0.1,
-            "overwriting is caught"
-        );
-        assert_eq!(
-            sum.deposits.iter().sum::<u32>(),
-            13,
-            "samples -1, 8 and 9 are outside"
-        );
+        assert!(worst(&overwritten.exact, &echoes) > 0.1, "overwriting is caught");
+        assert_eq!(sum.deposits.iter().sum::<u32>(), 13, "samples -1, 8 and 9 are outside");
     }
 
     // Four points on a cubic reproduce any cubic: all moments up to the third are the echo's own.
@@ -235,10 +216,7 @@ mod tests {
         for f in [0.0, 0.1, 0.3, 0.5, 0.99] {
             let moment = |n: i32| -> f64 {
                 let places = [-1.0, 0.0, 1.0, 2.0].into_iter();
-                places
-                    .zip(shares(f))
-                    .map(|(k, s)| s * (k - f).powi(n))
-                    .sum()
+                places.zip(shares(f)).map(|(k, s)| s * (k - f).powi(n)).sum()
             };
             assert!((moment(0) - 1.0).abs() < 1e-14);
             assert!((1..4).all(|n| moment(n).abs() < 1e-14), "{f}");
@@ -259,13 +237,7 @@ mod tests {
         assert_eq!(a.deposits.iter().sum::<u32>(), 1);
         // From one sample to the next its share goes without a step.
         let blend = f64::from(SAMPLE_BLEND);
-        for (off, later) in [
-            (-0.51, 0.0),
-            (-0.25, 0.25),
-            (0.0, 0.5),
-            (0.25, 0.75),
-            (0.51, 1.0),
-        ] {
+        for (off, later) in [(-0.51, 0.0), (-0.25, 0.25), (0.0, 0.5), (0.25, 0.75), (0.51, 1.0)] {
             let mut a = Accumulator::new(&frame());
             a.deposit_nearest(0, (2.5 + off * blend) * 0.25 / 1.5, 1.0, |_| 1.0);
             let [first, second] = [4, 6].map(|at| a.exact[at].hypot(a.exact[at + 1]));

@@ -140,23 +140,15 @@ fn cosines(roughness: f64) -> Vec<f64> {
 fn roughness_lobe_has_its_mean_cosine_and_its_echo_lobe() {
     for s in [0.0, 1.0, 10.0, 100.0, 1e4] {
         let cos = cosines(s);
-        assert!(
-            standard_errors(&cos, (s + 1.0) / (s + 2.0)) < 4.0,
-            "s = {s}"
-        );
+        assert!(standard_errors(&cos, (s + 1.0) / (s + 2.0)) < 4.0, "s = {s}");
         // Exponent s against 2 s + 1: half the tilt's variance must be told apart.
-        assert!(
-            standard_errors(&cos, (2.0 * s + 2.0) / (2.0 * s + 3.0)) > 4.0,
-            "s = {s}"
-        );
+        assert!(standard_errors(&cos, (2.0 * s + 2.0) / (2.0 * s + 3.0)) > 4.0, "s = {s}");
         for n_s in [1.0, 4.0] {
             // At normal incidence the mirrored ray is 2 theta off: midpoint quadrature over cos.
             let steps = 200_000;
             let x = |i: i32| (f64::from(i) + 0.5) / f64::from(steps);
             let echo = |c: f64| (2.0 * c * c - 1.0).max(0.0).powf(n_s);
-            let mean = (0..steps)
-                .map(|i| echo(x(i).powf(1.0 / (s + 1.0))))
-                .sum::<f64>()
+            let mean = (0..steps).map(|i| echo(x(i).powf(1.0 / (s + 1.0)))).sum::<f64>()
                 / f64::from(steps);
             let samples: Vec<f64> = cos.iter().map(|&c| echo(c)).collect();
             assert!(standard_errors(&samples, mean) < 4.0, "s = {s}, n = {n_s}");

@@ -32,12 +32,7 @@ mod tests {
 
     #[test]
     fn an_impulse_becomes_the_gaussian_of_its_own_line() {
-        let frame = Frame {
-            scanlines: 3,
-            samples: 21,
-            axial_sigma: 1.5,
-            ..Frame::default()
-        };
+        let frame = Frame { scanlines: 3, samples: 21, axial_sigma: 1.5, ..Frame::default() };
         let mut lateral = vec![0.0; 126];
         lateral[2 * (21 + 2)] = 2.0;
         lateral[2 * (21 + 2) + 1] = -1.0;
@@ -45,11 +40,7 @@ mod tests {
         for l in 0..3 {
             for k in 0..21i32 {
                 let j = f64::from(k - 2);
-                let here = if l == 1 && j.abs() <= 6.0 {
-                    (-j * j / 4.5).exp()
-                } else {
-                    0.0
-                };
+                let here = if l == 1 && j.abs() <= 6.0 { (-j * j / 4.5).exp() } else { 0.0 };
                 let at = 2 * (21 * l + k as usize);
                 assert!((out[at] - 2.0 * here).abs() < 1e-12 && (out[at + 1] + here).abs() < 1e-12);
             }
@@ -58,11 +49,7 @@ mod tests {
 
     #[test]
     fn a_zero_width_copies() {
-        let frame = Frame {
-            scanlines: 1,
-            samples: 4,
-            ..Frame::default()
-        };
+        let frame = Frame { scanlines: 1, samples: 4, ..Frame::default() };
         let lateral = [1.0, 2.0, -3.0, 4.0, 5.0, 6.0, 7.0, 8.0];
         assert_eq!(axial(&frame, &lateral), lateral.map(f64::from));
     }

@@ -98,9 +98,7 @@ fn weights(sigma: f64) -> Vec<f64> {
         return vec![1.0];
     }
     let reach = (3.0 * sigma).ceil().min(16.0) as i32;
-    (-reach..=reach)
-        .map(|j| (-f64::from(j * j) / (2.0 * sigma * sigma)).exp())
-        .collect()
+    (-reach..=reach).map(|j| (-f64::from(j * j) / (2.0 * sigma * sigma)).exp()).collect()
 }
 
 #[cfg(test)]
@@ -108,11 +106,7 @@ mod tests {
     use super::*;
 
     fn frame(scanlines: u32, samples: u32) -> Frame {
-        Frame {
-            scanlines,
-            samples,
-            ..Frame::default()
-        }
+        Frame { scanlines, samples, ..Frame::default() }
     }
 
     fn rows(samples: usize, lateral_lines: f32) -> Vec<Row> {
@@ -204,10 +198,7 @@ mod tests {
         let zero = vec![0; 20_000];
         let first = beam(&frame, &rows, [&zero, &zero], &joined(&frame));
         let power = first.iter().map(|x| x * x).sum::<f64>() / 20_000.0;
-        assert!(
-            (power / 0.09 - 1.0).abs() < 0.04,
-            "4 standard errors of 20 000 squares"
-        );
+        assert!((power / 0.09 - 1.0).abs() < 0.04, "4 standard errors of 20 000 squares");
         frame.frame_index = 1;
         assert_ne!(first, beam(&frame, &rows, [&zero, &zero], &joined(&frame)));
     }

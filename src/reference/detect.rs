@@ -30,15 +30,10 @@ mod tests {
             inverse_range: 1.0 / 60.0,
             ..Frame::default()
         };
-        let row = Row {
-            tgc: 2.0,
-            ..Row::default()
-        };
+        let row = Row { tgc: 2.0, ..Row::default() };
         // Reference 0.1, gain 2: (0.03, 0.04) is an envelope of exactly the reference.
         let (inf, nan) = (f32::INFINITY, f32::NAN);
-        let iq = [
-            0.03, 0.04, 3e-4, -4e-4, 0.0, 0.0, 9.0, 0.0, inf, 0.0, nan, inf, 3e-5, 4e-5,
-        ];
+        let iq = [0.03, 0.04, 3e-4, -4e-4, 0.0, 0.0, 9.0, 0.0, inf, 0.0, nan, inf, 3e-5, 4e-5];
         let expected = [1.0, 1.0 / 3.0, 0.0, 1.0, 1.0, 0.0, 0.0];
         // inverse_range is rounded to f32: 6e-8 of at most 60 dB.
         for (got, expected) in detect(&frame, &[row; 7], &iq).iter().zip(expected) {

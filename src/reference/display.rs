@@ -6,11 +6,8 @@ use crate::sim::layout::Frame;
 
 /// Column and row in the scanlines of each pixel, row by row; none outside the sector.
 pub fn places(frame: &Frame) -> Vec<Option<[f64; 2]>> {
-    let (pitch, left, top) = (
-        f64::from(frame.pixel_pitch),
-        f64::from(frame.image_left),
-        f64::from(frame.image_top),
-    );
+    let (pitch, left, top) =
+        (f64::from(frame.pixel_pitch), f64::from(frame.image_left), f64::from(frame.image_top));
     let mut out = Vec::new();
     for j in 0..frame.image_height {
         for i in 0..frame.image_width {
@@ -39,10 +36,7 @@ pub fn sector(frame: &Frame, x: f64, z: f64) -> Option<[f64; 2]> {
         (x.hypot(z + radius) - radius, angle / field_of_view)
     };
     let (depth, across) = match probe(frame).kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => fan(radius, field_of_view),
+        Kind::Convex { radius, field_of_view } => fan(radius, field_of_view),
         Kind::Phased { field_of_view } => fan(0.0, field_of_view),
         Kind::Linear { width } => (z, x / width),
     };
@@ -54,15 +48,9 @@ pub fn sector(frame: &Frame, x: f64, z: f64) -> Option<[f64; 2]> {
 /// Bilinear in values per sample of the scanlines, clamped at the edges.
 pub fn sample(frame: &Frame, log_image: &[f32], column: f64, row: f64) -> f64 {
     let clamped = |v: f64, n: u32| v.clamp(0.0, f64::from(n) - 1.0);
-    let (column, row) = (
-        clamped(column, frame.scanlines),
-        clamped(row, frame.samples),
-    );
+    let (column, row) = (clamped(column, frame.scanlines), clamped(row, frame.samples));
     let mut sum = 0.0;
-    for (l, wl) in [
-        (column.floor(), 1.0 - column.fract()),
-        (column.ceil(), column.fract()),
-    ] {
+    for (l, wl) in [(column.floor(), 1.0 - column.fract()), (column.ceil(), column.fract())] {
         for (k, wk) in [(row.floor(), 1.0 - row.fract()), (row.ceil(), row.fract())] {
             let level = log_image[l as usize * frame.samples as usize + k as usize];
             sum += wl * wk * f64::from(level);
@@ -113,15 +101,9 @@ mod tests {
                 1 => 30.0 * 40.0,
                 _ => 0.6 * ((r + d).powi(2) - r * r),
             };
-            let inside = levels(&frame, &vec![1.0; 128 * 400])
-                .iter()
-                .flatten()
-                .count();
+            let inside = levels(&frame, &vec![1.0; 128 * 400]).iter().flatten().count();
             let area = inside as f64 * 0.01;
-            assert!(
-                (area / expected - 1.0).abs() < 0.005,
-                "{kind}: {area} {expected}"
-            );
+            assert!((area / expected - 1.0).abs() < 0.005, "{kind}: {area} {expected}");
         }
     }
 

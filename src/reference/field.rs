@@ -73,11 +73,7 @@ impl<'a> Field<'a> {
             let (v, gradient) = self.with_gradient(found);
             let miss = p - found - v;
             let jacobian = DMat3::IDENTITY + gradient;
-            found += if jacobian.determinant() > 0.05 {
-                jacobian.inverse() * miss
-            } else {
-                miss
-            };
+            found += if jacobian.determinant() > 0.05 { jacobian.inverse() * miss } else { miss };
             if miss.length() < 1e-12 {
                 break;
             }
@@ -87,9 +83,7 @@ impl<'a> Field<'a> {
 
     /// How many times its volume at rest the tissue around the reference point `p` takes now.
     pub fn growth(&self, p: DVec3) -> f64 {
-        (DMat3::IDENTITY + self.with_gradient(p).1)
-            .determinant()
-            .abs()
+        (DMat3::IDENTITY + self.with_gradient(p).1).determinant().abs()
     }
 
     /// Distance of nodes along x, mm.
@@ -130,13 +124,7 @@ mod tests {
     /// 3 x 2 x 2 nodes, 2 mm apart, from (-2, 0, 0); squeezed in x behind the middle.
     fn squeezed() -> Vec<[f32; 3]> {
         let mut fields = vec![[-2.0, 0.0, 0.0], [0.5; 3], [3.0, 2.0, 2.0]];
-        fields.extend((0..12).map(|i| {
-            if i % 3 == 2 {
-                [-1.0, 0.0, 0.5]
-            } else {
-                [0.0; 3]
-            }
-        }));
+        fields.extend((0..12).map(|i| if i % 3 == 2 { [-1.0, 0.0, 0.5] } else { [0.0; 3] }));
         fields
     }
 
@@ -144,13 +132,7 @@ mod tests {
     fn displacements_are_linear_between_nodes_and_constant_outside() {
         let fields = squeezed();
         let field = Field::new(&fields, 0);
-        for (x, expected) in [
-            (-9.0, 0.0),
-            (-1.0, 0.0),
-            (0.5, -0.25),
-            (2.0, -1.0),
-            (7.0, -1.0),
-        ] {
+        for (x, expected) in [(-9.0, 0.0), (-1.0, 0.0), (0.5, -0.25), (2.0, -1.0), (7.0, -1.0)] {
             let v = field.displacement(DVec3::new(x, 1.0, -3.0));
             assert_eq!(v, DVec3::new(expected, 0.0, -0.5 * expected), "{x}");
         }

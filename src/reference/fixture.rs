@@ -141,11 +141,7 @@ impl Fixture {
                 let ring = [at(0.0, 0.0), at(1.0, 0.0), at(1.0, 1.0), at(0.0, 1.0)];
                 for i in 0..4 {
                     let (a, b) = (ring[i], ring[(i + 1) % 4]);
-                    corners.extend(if outward {
-                        [middle, a, b]
-                    } else {
-                        [middle, b, a]
-                    });
+                    corners.extend(if outward { [middle, a, b] } else { [middle, b, a] });
                 }
             }
         }
@@ -166,12 +162,8 @@ impl Fixture {
         let mut corners = Vec::new();
         for i in 0..n {
             for j in 0..n {
-                let [a, b, c, d] = [
-                    point(i, j),
-                    point(i + 1, j),
-                    point(i + 1, j + 1),
-                    point(i, j + 1),
-                ];
+                let [a, b, c, d] =
+                    [point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)];
                 corners.extend([a, c, b, a, d, c]);
             }
         }

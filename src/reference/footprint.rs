@@ -18,13 +18,7 @@ const RULE: [[f64; 2]; 4] = [
 fn normal_mass(x: f64) -> f64 {
     let z = x.abs() / std::f64::consts::SQRT_2;
     let t = 1.0 / (1.0 + 0.327_591_1 * z);
-    let series = [
-        1.061_405_429,
-        -1.453_152_027,
-        1.421_413_741,
-        -0.284_496_736,
-        0.254_829_592,
-    ];
+    let series = [1.061_405_429, -1.453_152_027, 1.421_413_741, -0.284_496_736, 0.254_829_592];
     let tail = 0.5 * series.iter().fold(0.0, |sum, a| (sum + a) * t) * (-z * z).exp();
     if x < 0.0 { tail } else { 1.0 - tail }
 }
@@ -53,11 +47,7 @@ pub fn reflectance(before: Fluid, after: Fluid, cos_i: f64, width: f64) -> f64 {
         sum += mass * at((1.0 - s * s).max(0.0).sqrt());
         norm += mass;
     }
-    let below = if norm > 0.0 {
-        between(-critical, critical).max(0.0) * sum / norm
-    } else {
-        0.0
-    };
+    let below = if norm > 0.0 { between(-critical, critical).max(0.0) * sum / norm } else { 0.0 };
     (totally + below).clamp(0.0, 1.0)
 }
 
@@ -66,10 +56,7 @@ mod tests {
     use super::*;
 
     fn fluid(speed: f64, density: f64) -> Fluid {
-        Fluid {
-            speed,
-            impedance: speed * density,
-        }
+        Fluid { speed, impedance: speed * density }
     }
 
     /// Rays beside each other, one by one.

@@ -4,16 +4,8 @@ use crate::sim::layout::{BLEND_MULTIBAND, BLEND_SMOOTH, Fusion};
 
 /// Weight of the acquired image from the box sums of mask and weight.
 pub fn weight(fusion: &Fusion, [mask, weight]: [f32; 2]) -> f64 {
-    let m = if mask >= weight {
-        1.0
-    } else {
-        f64::from(mask) / f64::from(weight)
-    };
-    if fusion.blend == BLEND_SMOOTH {
-        m * m * (3.0 - 2.0 * m)
-    } else {
-        m
-    }
+    let m = if mask >= weight { 1.0 } else { f64::from(mask) / f64::from(weight) };
+    if fusion.blend == BLEND_SMOOTH { m * m * (3.0 - 2.0 * m) } else { m }
 }
 
 /// Grey level 0..=255 before rounding of one pixel inside the sector; none where it is no number.

@@ -26,13 +26,8 @@ pub fn probe(frame: &Frame) -> Probe {
     let field_of_view = frame.field_of_view.into();
     Probe {
         kind: match frame.kind {
-            KIND_CONVEX => Kind::Convex {
-                radius: frame.radius.into(),
-                field_of_view,
-            },
-            KIND_LINEAR => Kind::Linear {
-                width: frame.width.into(),
-            },
+            KIND_CONVEX => Kind::Convex { radius: frame.radius.into(), field_of_view },
+            KIND_LINEAR => Kind::Linear { width: frame.width.into() },
             KIND_PHASED => Kind::Phased { field_of_view },
             kind => panic!("probe kind {kind}"),
         },
@@ -50,21 +45,13 @@ pub fn probe(frame: &Frame) -> Probe {
 /// Scanline `l` of layer `e` in probe space.
 pub fn line(frame: &Frame, l: u32, e: u32) -> Line {
     let (origin, direction) = probe(frame).ray(l, e);
-    Line {
-        origin,
-        direction,
-        lateral: DVec3::new(direction.z, 0.0, -direction.x),
-    }
+    Line { origin, direction, lateral: DVec3::new(direction.z, 0.0, -direction.x) }
 }
 
 /// Amplitude factor of an echo `off` mm beside the geometric scanline.
 pub fn beam_weight(frame: &Frame, off: f64) -> f64 {
     let sigma = f64::from(frame.beam_width);
-    if sigma > 0.0 {
-        (-off * off / (2.0 * sigma * sigma)).exp()
-    } else {
-        1.0
-    }
+    if sigma > 0.0 { (-off * off / (2.0 * sigma * sigma)).exp() } else { 1.0 }
 }
 
 /// Scanline `l` of layer `e` in world space.
@@ -83,10 +70,7 @@ pub fn world_line(frame: &Frame, l: u32, e: u32) -> Line {
 pub fn face(frame: &Frame, origin: DVec3, direction: DVec3, t_min: f64) -> Option<(f64, DVec3)> {
     let probe = probe(frame);
     let (t, normal, inside) = match probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => {
+        Kind::Convex { radius, field_of_view } => {
             let axis = DVec3::new(0.0, 0.0, -radius);
             let across = |v: DVec3| DVec3::new(v.x, 0.0, v.z);
             let (from, along) = (across(origin - axis), across(direction));
@@ -98,11 +82,7 @@ pub fn face(frame: &Frame, origin: DVec3, direction: DVec3, t_min: f64) -> Optio
             // The nearer root is where the ray enters the cylinder, that is, comes from the body.
             let t = (-b - discriminant.sqrt()) / a;
             let normal = (from + t * along).normalize();
-            (
-                t,
-                normal,
-                normal.x.atan2(normal.z).abs() <= field_of_view / 2.0,
-            )
+            (t, normal, normal.x.atan2(normal.z).abs() <= field_of_view / 2.0)
         }
         Kind::Linear { width } => {
             if direction.z >= 0.0 {
@@ -163,11 +143,7 @@ mod tests {
             "radius and height are exact in f32"
         );
         assert!((n - DVec3::new(0.4f64.sin(), 0.0, 0.4f64.cos())).length() < 1e-9);
-        assert_eq!(
-            at(0, 10.0 * 0.6f64.sin(), 0.0, 5.0, up),
-            None,
-            "outside 0.5 rad"
-        );
+        assert_eq!(at(0, 10.0 * 0.6f64.sin(), 0.0, 5.0, up), None, "outside 0.5 rad");
         assert_eq!(at(0, 0.0, 0.0, 5.0, DVec3::Z), None);
     }
 }

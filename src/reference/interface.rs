@@ -52,10 +52,7 @@ pub(super) struct Interface {
 }
 
 fn fluid(tissue: &Tissue) -> Fluid {
-    Fluid {
-        speed: tissue.speed.into(),
-        impedance: tissue.impedance.into(),
-    }
+    Fluid { speed: tissue.speed.into(), impedance: tissue.impedance.into() }
 }
 
 /// The interface at `hit`, where `path` has arrived, with `after` the media behind it; `row` is that
@@ -80,11 +77,8 @@ pub(super) fn meet(
     let (before, behind) = (tissue(&path.stack), tissue(after));
     let fluids = [fluid(before), fluid(behind)];
     let instance = &world.instances[hit.instance as usize];
-    let surface = world.surfaces[if outside {
-        instance.surface_outside
-    } else {
-        instance.surface_inside
-    } as usize];
+    let surface = world.surfaces
+        [if outside { instance.surface_outside } else { instance.surface_inside } as usize];
     let roughness = f64::from(surface.roughness);
     let cos_i = -d.dot(shading);
     let width = if world.frame.flags & FLAG_FOOTPRINT == 0 {
@@ -155,9 +149,7 @@ impl Interface {
         let frame = world.frame;
         let (surface, d) = (&self.surface, path.direction);
         let r = reflection(self.fluids[0], self.fluids[1], -d.dot(micro.normal));
-        let lobe = (-d.dot(micro.reflected))
-            .max(0.0)
-            .powf(surface.specularity.into());
+        let lobe = (-d.dot(micro.reflected)).max(0.0).powf(surface.specularity.into());
         let amplitude = path.weight * r * lobe * f64::from(surface.gain) * path.beam_weight(frame);
         let words = draw(frame, path.n, path.key(), PURPOSE_THICKNESS);
         let q =
@@ -171,19 +163,8 @@ impl Interface {
             out.deposit(l, time, path.share * behind, 0.0, &gain, dither);
             return;
         }
-        let coherence = if surface.thickness == 0.0 {
-            1.0
-        } else {
-            f64::from(surface.coherence)
-        };
-        out.deposit(
-            l,
-            path.time,
-            coherence * path.share * amplitude,
-            0.0,
-            &gain,
-            dither,
-        );
+        let coherence = if surface.thickness == 0.0 { 1.0 } else { f64::from(surface.coherence) };
+        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, &gain, dither);
         let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
         if rest > 0.0 {
             let p = world.tissue_point(self.instance, path.origin);

@@ -8,24 +8,15 @@ use crate::sim::layout::Interpolation;
 pub fn interpolate(push: &Interpolation, values: &[f32]) -> Vec<DVec3> {
     let at = |vector: u32| {
         let at = (push.stride * vector) as usize;
-        DVec3::new(
-            values[at].into(),
-            values[at + 1].into(),
-            values[at + 2].into(),
-        )
+        DVec3::new(values[at].into(), values[at + 1].into(), values[at + 2].into())
     };
     let sum = |i| {
         let keyframes = push.sources.into_iter().zip(push.weights);
         let read = keyframes.filter(|&(_, weight)| weight != 0.0);
-        read.map(|(source, weight)| f64::from(weight) * at(source + i))
-            .sum()
+        read.map(|(source, weight)| f64::from(weight) * at(source + i)).sum()
     };
     let made = (0..push.count).map(sum);
-    if push.unit == 0 {
-        made.collect()
-    } else {
-        made.map(DVec3::normalize_or_zero).collect()
-    }
+    if push.unit == 0 { made.collect() } else { made.map(DVec3::normalize_or_zero).collect() }
 }
 
 #[cfg(test)]
@@ -48,10 +39,7 @@ mod tests {
             "and what has no weight is not read"
         );
         push.unit = 1;
-        assert_eq!(
-            interpolate(&push, &values),
-            [DVec3::new(1.0, 2.0, 1.0).normalize()]
-        );
+        assert_eq!(interpolate(&push, &values), [DVec3::new(1.0, 2.0, 1.0).normalize()]);
         push.weights = [0.0; 4];
         assert_eq!(interpolate(&push, &values), [DVec3::ZERO]);
     }

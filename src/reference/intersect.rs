@@ -26,11 +26,7 @@ pub struct Hit {
 /// which two triangles that share an edge compute exactly opposite values: no ray passes between.
 pub fn triangle(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<[f64; 3]> {
     let [a, b, c] = corners.map(|corner| corner - origin);
-    let weights = [
-        direction.dot(c.cross(b)),
-        direction.dot(a.cross(c)),
-        direction.dot(b.cross(a)),
-    ];
+    let weights = [direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a))];
     if weights.iter().any(|&w| w < 0.0) && weights.iter().any(|&w| w > 0.0) {
         return None;
     }
@@ -60,13 +56,7 @@ pub fn all_hits(scene: &Scene, origin: DVec3, direction: DVec3, t_min: f64) -> V
             if let Some([t, u, v]) = triangle(corners, o, d)
                 && t > t_min
             {
-                hits.push(Hit {
-                    t,
-                    instance,
-                    triangle: index,
-                    u,
-                    v,
-                });
+                hits.push(Hit { t, instance, triangle: index, u, v });
             }
         }
     }
@@ -102,10 +92,6 @@ mod tests {
         assert_eq!(at(0.0, 0.0), Some([6.0, 0.0, 0.0]), "vertices are inside");
         assert_eq!(at(-1e-9, 1.0), None);
         assert_eq!(at(1.5, 1.5), None);
-        assert_eq!(
-            triangle(corners, DVec3::ZERO, DVec3::X),
-            None,
-            "a ray in the plane misses"
-        );
+        assert_eq!(triangle(corners, DVec3::ZERO, DVec3::X), None, "a ray in the plane misses");
     }
 }

@@ -53,9 +53,7 @@ impl Level {
     /// What `cell` holds, if anything.
     pub fn scatterer(&self, cell: I64Vec3) -> Option<Scatterer> {
         let at = [cell.x, cell.y, cell.z];
-        let words = pcg3d(std::array::from_fn(|i| {
-            (at[i] as u32).wrapping_add(self.key[i])
-        }));
+        let words = pcg3d(std::array::from_fn(|i| (at[i] as u32).wrapping_add(self.key[i])));
         // The low bytes: unit() uses the upper 24 bits, so presence and sign do not bias the position.
         let presence = (words[0] & 255) << 8 | (words[1] & 255);
         let present = presence < ((self.presence * 65_536.0).round() as u32).max(1);
@@ -98,12 +96,7 @@ mod tests {
     use super::*;
 
     fn tissue(density: f32) -> Tissue {
-        Tissue {
-            density,
-            amplitude: 0.7,
-            seed: 9,
-            ..Tissue::default()
-        }
+        Tissue { density, amplitude: 0.7, seed: 9, ..Tissue::default() }
     }
 
     #[test]
@@ -156,9 +149,6 @@ mod tests {
         assert_eq!(wanted_level(&tissue(0.3), -3.0, 0.0), 0.0);
         assert_eq!(wanted_level(&tissue(0.3), 2.0, 1.5), 7.0);
         assert_eq!(wanted_level(&tissue(1.0 / 512.0), 2.0, 0.0), 12.0);
-        assert_eq!(
-            wanted_level(&tissue(1.0 / 512.0), ALL_LEVELS.into(), 9.0),
-            0.0
-        );
+        assert_eq!(wanted_level(&tissue(1.0 / 512.0), ALL_LEVELS.into(), 9.0), 0.0);
     }
 }

@@ -53,10 +53,7 @@ fn middle(frame: &Frame, l: u32) -> (DVec3, DVec3) {
     let place = affine(&frame.world_from_probe);
     let mut start = line(frame, l, 0).origin;
     start.y = 0.0;
-    (
-        place.transform_point3(start),
-        world_line(frame, l, 0).direction,
-    )
+    (place.transform_point3(start), world_line(frame, l, 0).direction)
 }
 
 /// The crossings of each scanline. What it leaves more often than it enters encloses its start.
@@ -75,12 +72,7 @@ pub fn crossings(world: &World, fusion: &Fusion) -> Vec<Crossings> {
             let along = all.iter().enumerate().map(|(i, crossing)| {
                 depth += (crossing.t - distance) / rate(i);
                 distance = crossing.t;
-                Met {
-                    distance,
-                    depth,
-                    entry: crossing.entry,
-                    rate: rate(i + 1),
-                }
+                Met { distance, depth, entry: crossing.entry, rate: rate(i + 1) }
             });
             Crossings {
                 along: along.collect(),
@@ -99,9 +91,7 @@ fn sign(crossing: &Crossing) -> i32 {
 /// priority, of equals the one entered last; over the probe's.
 fn rate_behind(world: &World, all: &[Crossing], passed: usize) -> f64 {
     let around = all[passed..].iter().filter(|candidate| {
-        let own = all[passed..]
-            .iter()
-            .filter(|c| c.instance == candidate.instance);
+        let own = all[passed..].iter().filter(|c| c.instance == candidate.instance);
         own.map(sign).sum::<i32>() < 0
     });
     let rank = |c: &&Crossing| {
@@ -110,13 +100,7 @@ fn rate_behind(world: &World, all: &[Crossing], passed: usize) -> f64 {
         (world.instances[c.instance as usize].priority, entered)
     };
     // Of several that are alike the first: the one left first.
-    let best = around.reduce(|best, next| {
-        if rank(&next) > rank(&best) {
-            next
-        } else {
-            best
-        }
-    });
+    let best = around.reduce(|best, next| if rank(&next) > rank(&best) { next } else { best });
     best.map_or(1.0, |crossing| {
         let tissue = world.instances[crossing.instance as usize].tissue;
         f64::from(world.tissues[tissue as usize].speed) / f64::from(world.frame.speed)

@@ -71,11 +71,7 @@ impl Path {
         let words = self.line_random(frame, PURPOSE_DITHER);
         std::array::from_fn(|i| {
             let word = words[i / 2];
-            let half = if i % 2 == 0 {
-                word >> 16
-            } else {
-                word & 0xffff
-            };
+            let half = if i % 2 == 0 { word >> 16 } else { word & 0xffff };
             f64::from(half) / 65_536.0
         })
     }

@@ -18,11 +18,7 @@ pub struct Level {
 /// One pixel of the finest level, from a pixel of the display, the acquired grey level, and mask and
 /// weight of the sector.
 pub fn difference(simulated: u32, acquired: f32, [mask, weight]: [f32; 2]) -> [f64; 3] {
-    let sector = if simulated >> 24 == 0 {
-        0.0
-    } else {
-        f64::from(weight)
-    };
+    let sector = if simulated >> 24 == 0 { 0.0 } else { f64::from(weight) };
     let inside = sector * (1.0 - f64::from(mask));
     let acquired = if acquired.is_nan() { 0.0 } else { acquired };
     let acquired = f64::from(acquired.clamp(0.0, 1.0));
@@ -57,9 +53,7 @@ fn children(size: [usize; 2], at: [usize; 2]) -> Vec<(usize, f64)> {
             (place < size[axis]).then_some((place, GENERATING[tap]))
         })
     };
-    along(1)
-        .flat_map(|(y, wy)| along(0).map(move |(x, wx)| (y * size[0] + x, wx * wy)))
-        .collect()
+    along(1).flat_map(|(y, wy)| along(0).map(move |(x, wx)| (y * size[0] + x, wx * wy))).collect()
 }
 
 /// What the blend adds to the acquired image at each pixel of `fine`, from the next coarser level and

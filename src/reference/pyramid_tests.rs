@@ -49,11 +49,7 @@ fn equal_images_stay_and_a_mask_of_one_kind_shows_its_image() {
             assert_eq!(largest(&same), 0.0, "{size:?} {levels}");
             let d = |x, y| grey(x, y, 1) - grey(x, y, 2);
             let none = blend(level(size, d, |_, _| 0.0, fan), levels);
-            assert_eq!(
-                largest(&none),
-                0.0,
-                "{size:?} {levels}: nothing is simulated"
-            );
+            assert_eq!(largest(&none), 0.0, "{size:?} {levels}: nothing is simulated");
             let all = level(size, d, |_, _| 1.0, fan);
             let given = blend(all.clone(), levels);
             // Beside the sector nothing is shown.
@@ -89,11 +85,7 @@ fn constant_images_meet_along_a_ramp_of_known_width() {
             let inside = |x, _| f64::from(u8::from(x < border));
             let given = blend(level(size, |_, _| -1.0, inside, |_, _| true), levels);
             let moments = ramp_moments(|i| given[601 + i], 601);
-            let expected = [
-                1.0,
-                border as f64 - 0.5,
-                2.0 * (4f64.powi(levels as i32) - 1.0) / 3.0,
-            ];
+            let expected = [1.0, border as f64 - 0.5, 2.0 * (4f64.powi(levels as i32) - 1.0) / 3.0];
             for (found, expected) in moments.iter().zip(expected) {
                 assert!(
                     (found - expected).abs() < 1e-8 * expected.max(1.0),
@@ -101,10 +93,7 @@ fn constant_images_meet_along_a_ramp_of_known_width() {
                 );
             }
             let deepest = 2.0 * (4f64.powi(levels as i32 + 1) - 1.0) / 3.0;
-            assert!(
-                (moments[2] - deepest).abs() > 1.0,
-                "a level more is noticed"
-            );
+            assert!((moments[2] - deepest).abs() > 1.0, "a level more is noticed");
         }
     }
 }
@@ -114,20 +103,13 @@ fn nothing_bleeds_in_from_beside_the_sector_or_from_beside_the_mask() {
     for size in SIZES {
         // Beside sector and mask stands what would show at once.
         let wild = |x, y| {
-            if fan(x, y) && half(x, y) > 0.0 {
-                0.25
-            } else {
-                1e6
-            }
+            if fan(x, y) && half(x, y) > 0.0 { 0.25 } else { 1e6 }
         };
         let spoilt = level(size, wild, half, fan);
         let given = blend(spoilt.clone(), 5);
         for ((v, sums), n) in given.iter().zip(&spoilt.sums).zip(0..) {
             let seen = sums[2] > 0.0;
-            assert!(
-                !seen || (-1e-12..0.25 + 1e-12).contains(v),
-                "{size:?} {n}: {v}"
-            );
+            assert!(!seen || (-1e-12..0.25 + 1e-12).contains(v), "{size:?} {n}: {v}");
         }
     }
 }

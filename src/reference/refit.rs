@@ -89,9 +89,7 @@ fn encode(node: &mut [u32], [low, high]: Extent, children: &[Extent; 8]) {
         let corner = f64::from(low[axis]);
         let extent = f64::from(high[axis]) - corner;
         let quantum = |exponent: u32| f64::from(exponent as i32 - 127).exp2();
-        let exponent = (LEAST_EXPONENT..255)
-            .find(|&e| 255.0 * quantum(e) >= extent)
-            .unwrap_or(255);
+        let exponent = (LEAST_EXPONENT..255).find(|&e| 255.0 * quantum(e) >= extent).unwrap_or(255);
         node[axis] = low[axis].to_bits();
         header |= exponent << (8 * axis);
         let planes = &mut node[8 + 4 * axis..][..4];
@@ -123,18 +121,10 @@ mod tests {
             [1.0 + 255.0, 1.5, 5.0],
             [1.0 + 10.5, 510.0, 5.0],
         ];
-        let geometry = Geometry {
-            vertices: &vertices,
-            triangles: &[[0, 1, 2], [3, 3, 3], [4, 3, 4]],
-        };
+        let geometry =
+            Geometry { vertices: &vertices, triangles: &[[0, 1, 2], [3, 3, 3], [4, 3, 4]] };
         let mut boxes = [NOTHING];
-        refit(
-            RefitLevel { first: 0, count: 1 },
-            &mut nodes,
-            geometry,
-            &mut boxes,
-            &[0],
-        );
+        refit(RefitLevel { first: 0, count: 1 }, &mut nodes, geometry, &mut boxes, &[0]);
         assert_eq!(boxes, [[[1.0, 0.0, 5.0], [256.0, 510.0, 5.0]]]);
         assert_eq!(nodes[..3], [1f32, 0.0, 5.0].map(f32::to_bits));
         // Quanta of 1 and 2; along z there is no extent.

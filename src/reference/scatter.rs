@@ -75,11 +75,7 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
         })
     };
     let fields: Vec<_> = (0..world.instances.len() as u32).map(deformed).collect();
-    let numbers = |s: &Segment| {
-        [s.length, s.time, s.weight, s.share]
-            .into_iter()
-            .chain(s.spread)
-    };
+    let numbers = |s: &Segment| [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread);
     let finite = |s: &&Segment| {
         let vectors = [s.origin, s.direction, s.lateral];
         numbers(s).all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
@@ -176,10 +172,8 @@ impl<'a> Tube<'a> {
         field: Option<Deformed<'a>>,
     ) -> Self {
         let elevation = segment.handedness * segment.direction.cross(segment.lateral);
-        let (l, layer) = (
-            segment.line % world.frame.scanlines,
-            segment.line / world.frame.scanlines,
-        );
+        let (l, layer) =
+            (segment.line % world.frame.scanlines, segment.line / world.frame.scanlines);
         let line = world_line(world.frame, l, layer);
         Self {
             world,
@@ -258,11 +252,7 @@ impl<'a> Tube<'a> {
         let passed = out.kappa(self.time(end)) > 0.0
             && out.kappa(self.segment.time) < f64::from(self.world.frame.samples);
         let first = self.bin(0.0, out);
-        let last = if passed {
-            self.bin(end, out) + 1
-        } else {
-            first
-        };
+        let last = if passed { self.bin(end, out) + 1 } else { first };
         first..last
     }
 
@@ -367,9 +357,7 @@ impl<'a> Tube<'a> {
     fn power(&self, number: u32, x: f64, bin: u32, loudest: &Loudest, out: &Accumulator) -> f64 {
         let wanted = f64::from(self.row(x, out).shape[3]);
         let drowned = self.drowned(bin, loudest, out);
-        drowned.map_or(0.0, |d| {
-            level_power(wanted_level(self.tissue, wanted, d), number)
-        })
+        drowned.map_or(0.0, |d| level_power(wanted_level(self.tissue, wanted, d), number))
     }
 
     /// Plane by plane. A cell counts when its middle lies within the beam's width, taken where the axis
@@ -450,11 +438,7 @@ impl<'a> Tube<'a> {
                 let begin = bin * SCATTER_BIN + piece * SCATTER_PIECE;
                 let ends = [begin, begin + SCATTER_PIECE].map(|k| self.distance(f64::from(k)));
                 // Before the first sample and behind the last there is no other piece.
-                let first = if begin == 0 {
-                    f64::NEG_INFINITY
-                } else {
-                    ends[0]
-                };
+                let first = if begin == 0 { f64::NEG_INFINITY } else { ends[0] };
                 let last = if begin + SCATTER_PIECE >= self.world.frame.samples {
                     f64::INFINITY
                 } else {

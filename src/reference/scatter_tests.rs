@@ -59,14 +59,8 @@ fn points_outside_the_beam_the_slab_or_the_segment_are_silent() {
     fixture.frame.layers = 3;
     let seen = |fixture: &mut Fixture, p: [f32; 3], line: u32| {
         fixture.points = vec![[p[0], p[1], p[2], 1.0]];
-        let s = Segment {
-            line,
-            ..segment(30.0)
-        };
-        scatter(&fixture.world(), &[s])
-            .exact
-            .iter()
-            .any(|&v| v != 0.0)
+        let s = Segment { line, ..segment(30.0) };
+        scatter(&fixture.world(), &[s]).exact.iter().any(|&v| v != 0.0)
     };
     // Half a layer's slab is 1 mm, give or take a hundredth of a slab; lateral cut at 1.6 mm.
     assert!(seen(&mut fixture, [1.59, 0.97, 29.9], 1));
@@ -89,10 +83,7 @@ fn a_point_between_two_layers_belongs_to_one() {
                 line: layer,
                 ..segment(30.0)
             };
-            scatter(&fixture.world(), &[s])
-                .deposits
-                .iter()
-                .any(|&n| n > 0)
+            scatter(&fixture.world(), &[s]).deposits.iter().any(|&n| n > 0)
         };
         assert_eq!((0..3).filter(|&layer| heard(layer)).count(), 1, "{y}");
     }
@@ -104,11 +95,7 @@ fn elevation_weighs_the_distance_from_the_image_plane() {
     let mut fixture = point_fixture(0.0);
     fixture.frame.layers = 3;
     fixture.points = vec![[0.0, 1.5, 20.0, 1.0]];
-    let s = Segment {
-        origin: DVec3::new(0.0, 2.0, 0.0),
-        line: 2,
-        ..segment(30.0)
-    };
+    let s = Segment { origin: DVec3::new(0.0, 2.0, 0.0), line: 2, ..segment(30.0) };
     let total = |s| {
         let out = scatter(&fixture.world(), &[s]);
         magnitude(&out, 80) + magnitude(&out, 81)
@@ -116,11 +103,7 @@ fn elevation_weighs_the_distance_from_the_image_plane() {
     let expected = (-(1.5f64 / 0.6).powi(2) / 2.0).exp();
     assert!((total(s) / expected - 1.0).abs() < 1e-6);
     // Mirrored twice, once with the other handedness: the elevation axis stays what it was.
-    let flipped = Segment {
-        lateral: -DVec3::X,
-        handedness: -1.0,
-        ..s
-    };
+    let flipped = Segment { lateral: -DVec3::X, handedness: -1.0, ..s };
     assert!((total(flipped) / expected - 1.0).abs() < 1e-6);
 }
 
@@ -161,10 +144,7 @@ fn a_lattice_is_as_bright_as_its_density_says() {
 #[test]
 fn texture_changes_the_level_but_not_the_mean_power_law() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
-    (
-        fixture.tissues[0].texture_depth,
-        fixture.tissues[0].texture_length,
-    ) = (0.5, 0.7);
+    (fixture.tissues[0].texture_depth, fixture.tissues[0].texture_length) = (0.5, 0.7);
     let got = mean_power(&mut fixture, &[segment(60.0)]);
     // E (1 + k L)^2 = 1 + k^2; the texture adds to the spread: twice the bound above.
     let expected = 1.25 * expected_power(&fixture);
@@ -183,10 +163,7 @@ fn a_cut_segment_sums_to_the_whole() {
         let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.01)]);
         fixture.frame.flags = flags;
         // Off the cells' faces, where rounding would choose the voxel.
-        let whole = Segment {
-            origin: DVec3::new(0.1, 0.05, 0.07),
-            ..segment(30.0)
-        };
+        let whole = Segment { origin: DVec3::new(0.1, 0.05, 0.07), ..segment(30.0) };
         let cut = 12.34;
         let rest = Segment {
             origin: whole.origin + cut * whole.direction,
@@ -195,17 +172,8 @@ fn a_cut_segment_sums_to_the_whole() {
             weight: (-f64::from(0.01f32) * cut).exp(),
             ..whole
         };
-        let halves = [
-            Segment {
-                length: cut,
-                ..whole
-            },
-            rest,
-        ];
-        let (a, b) = (
-            scatter(&fixture.world(), &[whole]),
-            scatter(&fixture.world(), &halves),
-        );
+        let halves = [Segment { length: cut, ..whole }, rest];
+        let (a, b) = (scatter(&fixture.world(), &[whole]), scatter(&fixture.world(), &halves));
         assert!(a.exact.iter().any(|&v| v != 0.0));
         assert!(worst(&a, &b) < 1e-9, "{}", worst(&a, &b));
         assert!(
@@ -219,10 +187,7 @@ fn a_cut_segment_sums_to_the_whole() {
 fn the_lattice_moves_with_its_instance() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
     fixture.block([-1.0; 3], [1.0; 3], 0, 0);
-    let still = Segment {
-        instance: 0,
-        ..segment(20.0)
-    };
+    let still = Segment { instance: 0, ..segment(20.0) };
     let a = scatter(&fixture.world(), &[still]);
     // A quarter turn and whole millimetres: exact in f32.
     let turn = DAffine3 {
@@ -249,11 +214,7 @@ fn spread_averages_down_and_never_up() {
     let mut fixture = point_fixture(0.0);
     fixture.points = vec![[0.0, 0.0, 20.0, 1.0]];
     let echo = |spread, share| {
-        let s = Segment {
-            spread,
-            share,
-            ..segment(60.0)
-        };
+        let s = Segment { spread, share, ..segment(60.0) };
         let out = scatter(&fixture.world(), &[s]);
         magnitude(&out, 80) + magnitude(&out, 81)
     };
@@ -314,20 +275,11 @@ fn what_is_drowned_is_as_bright_with_fewer_scatterers() {
     }
     fixture.tissues[1].presence = 1.0;
     fixture.tissues[1].amplitude = 0.0;
-    let faint = Segment {
-        weight: 0.1,
-        ..segment(60.0)
-    };
-    let loud = Segment {
-        tissue: 1,
-        ..segment(60.0)
-    };
+    let faint = Segment { weight: 0.1, ..segment(60.0) };
+    let loud = Segment { tissue: 1, ..segment(60.0) };
     let count = |fixture: &Fixture, segments: &[Segment]| {
         let out = scatter(&fixture.world(), segments);
-        out.exact
-            .chunks(2)
-            .filter(|v| v[0] != 0.0 || v[1] != 0.0)
-            .count()
+        out.exact.chunks(2).filter(|v| v[0] != 0.0 || v[1] != 0.0).count()
     };
     let alone = count(&fixture, &[faint]);
     let drowned = count(&fixture, &[faint, loud]);

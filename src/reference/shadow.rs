@@ -37,11 +37,7 @@ pub fn shadow(world: &World, starts: &[Start]) -> Vec<Vec<Piece>> {
         .zip(starts)
         .map(|(line, start)| match start.weight > 0.0 {
             true => follow(world, middle(world, line, start)),
-            false => vec![Piece {
-                begin: 0.0,
-                level: 0.0,
-                slope: 0.0,
-            }],
+            false => vec![Piece { begin: 0.0, level: 0.0, slope: 0.0 }],
         })
         .collect()
 }
@@ -68,11 +64,7 @@ fn middle(world: &World, line: u32, begin: &Start) -> Path {
         spread: [0.0; 3],
         survival: 1.0,
         stack: begin.media.clone(),
-        t_min: if begin.travelled > 0.0 {
-            step(origin)
-        } else {
-            0.0
-        },
+        t_min: if begin.travelled > 0.0 { step(origin) } else { 0.0 },
     }
 }
 
@@ -114,11 +106,7 @@ fn follow(world: &World, mut path: Path) -> Vec<Piece> {
         let ends = lost || full || crossing == 64 + frame.max_interactions;
         if fresh || ends {
             pieces.push(Piece {
-                begin: if crossing == 0 {
-                    0.0
-                } else {
-                    samples * path.time
-                },
+                begin: if crossing == 0 { 0.0 } else { samples * path.time },
                 level,
                 slope: if ends { 0.0 } else { excess * speed / samples },
             });
@@ -129,9 +117,7 @@ fn follow(world: &World, mut path: Path) -> Vec<Piece> {
             break;
         }
         let toggled = world.toggled(&path.stack, &crossings);
-        let Toggled {
-            hit, after, last, ..
-        } = toggled;
+        let Toggled { hit, after, last, .. } = toggled;
         let hears = world.is_heard(&after);
         let same = world.medium(&path.stack) == world.medium(&after);
         if same && heard == hears {

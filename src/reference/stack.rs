@@ -42,10 +42,7 @@ mod tests {
     use super::*;
 
     fn instances(priorities: &[i32]) -> Vec<Instance> {
-        let instance = |&priority| Instance {
-            priority,
-            ..Instance::default()
-        };
+        let instance = |&priority| Instance { priority, ..Instance::default() };
         priorities.iter().map(instance).collect()
     }
 
@@ -67,20 +64,12 @@ mod tests {
         assert_eq!(after(&equal, &[]), None);
         assert_eq!(after(&equal, &[0, 1]), Some(1));
         assert_eq!(after(&equal, &[1, 0]), Some(0));
-        assert_eq!(
-            after(&equal, &[0, 1, -1]),
-            Some(1),
-            "left the outer one first"
-        );
+        assert_eq!(after(&equal, &[0, 1, -1]), Some(1), "left the outer one first");
         assert_eq!(after(&equal, &[0, 1, -2]), Some(0));
         let vessel_wins = instances(&[5, 1, -3]);
         assert_eq!(after(&vessel_wins, &[0, 1]), Some(0));
         assert_eq!(after(&vessel_wins, &[0, 1, 2, -1]), Some(1));
-        assert_eq!(
-            after(&vessel_wins, &[2]),
-            Some(2),
-            "negative priorities beat nothing at all"
-        );
+        assert_eq!(after(&vessel_wins, &[2]), Some(2), "negative priorities beat nothing at all");
     }
 
     #[test]

@@ -47,10 +47,7 @@ impl View<'_> {
         let s = self.survey;
         let (width, height) = (f64::from(s.width), f64::from(s.height));
         let share = place.y / height;
-        let (top, bottom) = (
-            DVec3::new(0.075, 0.085, 0.1),
-            DVec3::new(0.02, 0.022, 0.027),
-        );
+        let (top, bottom) = (DVec3::new(0.075, 0.085, 0.1), DVec3::new(0.02, 0.022, 0.027));
         let background = top + share * (bottom - top);
         let eye = xyz(s.eye);
         let along = xyz(s.forward)
@@ -68,11 +65,7 @@ impl View<'_> {
         let probe_from_world = affine(&self.world.frame.probe_from_world);
         let from = probe_from_world.transform_point3(o);
         let to = probe_from_world.transform_vector3(d);
-        let plane = if from.y * to.y < 0.0 {
-            -from.y / to.y
-        } else {
-            f64::INFINITY
-        };
+        let plane = if from.y * to.y < 0.0 { -from.y / to.y } else { f64::INFINITY };
         let cut = self.survey.flags & SURVEY_CUT != 0;
         let begin = if cut { plane } else { 0.0 };
         let (mut end, mut last) = (f64::INFINITY, background);
@@ -88,10 +81,7 @@ impl View<'_> {
             let turn = affine(&self.world.frame.world_from_probe);
             (end, last) = (t, self.lit(colour, turn.transform_vector3(normal), d));
         }
-        let mut seen = Seen {
-            colour: DVec3::ZERO,
-            clear: 1.0,
-        };
+        let mut seen = Seen { colour: DVec3::ZERO, clear: 1.0 };
         if begin < end {
             self.anatomy(o, d, [begin, end], cut, &mut seen);
         }
@@ -120,19 +110,11 @@ impl View<'_> {
             }
             (last, layers) = (c.t, layers + 1);
             let (geometric, shading) = self.world.normals(c);
-            let n = if shading.is_finite() {
-                shading
-            } else {
-                geometric
-            };
+            let n = if shading.is_finite() { shading } else { geometric };
             let look = self.looks[c.instance as usize];
             let own = f64::from(look[3]);
             let rim = 0.75 * (1.0 - n.dot(d).abs()).powi(3);
-            let opacity = if own >= 1.0 {
-                1.0
-            } else {
-                own + (1.0 - own) * rim
-            };
+            let opacity = if own >= 1.0 { 1.0 } else { own + (1.0 - own) * rim };
             seen.lay(self.lit(xyz(look), n, d), opacity);
         }
     }

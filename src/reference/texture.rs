@@ -101,13 +101,7 @@ mod tests {
 
     #[test]
     fn voxels_hold_scatterers_as_often_and_as_strong_as_the_tissue_says() {
-        let tissue = Tissue {
-            presence: 0.3,
-            mean: 2.0,
-            sigma: 0.5,
-            seed: 9,
-            ..Tissue::default()
-        };
+        let tissue = Tissue { presence: 0.3, mean: 2.0, sigma: 0.5, seed: 9, ..Tissue::default() };
         let n = 100_000_i64;
         let cell = |i: i64| I64Vec3::new(i % 50 - 25, i / 50 % 50 - 25, i / 2500 - 20);
         let found: Vec<Voxel> = (0..n).filter_map(|i| voxel(&tissue, cell(i))).collect();

@@ -54,9 +54,7 @@ pub fn trace(world: &World, starts: &[Start]) -> Traced {
     let mut out = tracer.out;
     let sizes = out.segments.iter().map(|s| s.len() as u32);
     out.counters.segments = sizes.clone().sum();
-    out.counters.segments_dropped = sizes
-        .map(|n| n.saturating_sub(frame.segment_capacity))
-        .sum();
+    out.counters.segments_dropped = sizes.map(|n| n.saturating_sub(frame.segment_capacity)).sum();
     out.counters.saturated = out.surface.saturated;
     out
 }
@@ -66,10 +64,7 @@ impl Tracer<'_> {
         let frame = self.world.frame;
         let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
         let words = draw(frame, n, 0, PURPOSE_JITTER);
-        let (jitter, lobe) = (
-            f64::from(frame.origin_jitter),
-            f64::from(frame.emission_lobe),
-        );
+        let (jitter, lobe) = (f64::from(frame.origin_jitter), f64::from(frame.emission_lobe));
         let (mut direction, mut lateral, mut fan) = (start.direction, start.lateral, 0.0);
         if lobe > 0.0 {
             direction = acoustics::power_cosine(direction, lobe, [unit(words[1]), unit(words[2])]);
@@ -83,11 +78,7 @@ impl Tracer<'_> {
             t_min = step(origin);
         }
         Path {
-            role: if frame.sampling == SAMPLING_MAIN_PATH {
-                Role::Main
-            } else {
-                Role::Single
-            },
+            role: if frame.sampling == SAMPLING_MAIN_PATH { Role::Main } else { Role::Single },
             n,
             line,
             weight: begin.weight,
@@ -144,9 +135,7 @@ impl Tracer<'_> {
                 }
                 let toggled = self.world.toggled(&path.stack, &crossings);
                 self.out.counters.stack_overflow += toggled.overflow;
-                let Toggled {
-                    hit, after, last, ..
-                } = toggled;
+                let Toggled { hit, after, last, .. } = toggled;
                 let heard = [&path.stack, &after].map(|s| self.world.is_heard(s));
                 let same = self.world.medium(&path.stack) == self.world.medium(&after);
                 if same || heard == [false; 2] {
@@ -216,10 +205,8 @@ impl Tracer<'_> {
             return None;
         }
         let to_probe = &self.probe_from_world;
-        let (o, d) = (
-            to_probe.transform_point3(path.origin),
-            to_probe.transform_vector3(path.direction),
-        );
+        let (o, d) =
+            (to_probe.transform_point3(path.origin), to_probe.transform_vector3(path.direction));
         let (t, normal) = face(self.world.frame, o, d, path.t_min)?;
         let world = affine(&self.world.frame.world_from_probe);
         (t < limit).then(|| (t, world.transform_vector3(normal).normalize()))
@@ -259,17 +246,12 @@ impl Tracer<'_> {
     /// The reflected part that main-path sampling splits off, followed to its end.
     fn branch(&mut self, main: &Path, interface: &Interface) {
         let frame = self.world.frame;
-        let Some(echo) = interface
-            .micro
-            .filter(|_| main.reflections < frame.max_reflections)
+        let Some(echo) = interface.micro.filter(|_| main.reflections < frame.max_reflections)
         else {
             return;
         };
         let (n, big_r) = (f64::from(frame.paths), interface.reflectance);
-        let mut path = Path {
-            role: Role::Branch,
-            ..main.clone()
-        };
+        let mut path = Path { role: Role::Branch, ..main.clone() };
         let branches = (n * big_r).ceil().clamp(1.0, n);
         if f64::from(main.n) >= branches {
             return;
@@ -306,9 +288,7 @@ impl Tracer<'_> {
             return self.transmit(path, interface, after);
         }
         path.probability *= interface.reflectance;
-        let Some(micro) = interface
-            .micro
-            .filter(|_| path.reflections < frame.max_reflections)
+        let Some(micro) = interface.micro.filter(|_| path.reflections < frame.max_reflections)
         else {
             return false;
         };

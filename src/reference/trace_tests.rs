@@ -18,12 +18,7 @@ fn layers(tissues: Vec<Tissue>, tops: &[f64]) -> Fixture {
     for (i, &top) in tops.iter().enumerate() {
         let far = FAR + i as f64;
         let tissue = i as u32 + 1;
-        fixture.block(
-            [-far, -far, top],
-            [far, far, FAR - i as f64],
-            tissue,
-            i as i32,
-        );
+        fixture.block([-far, -far, top], [far, far, FAR - i as f64], tissue, i as i32);
     }
     fixture
 }
@@ -57,17 +52,11 @@ fn transmission_error(weights: &[f64], tissues: &[Tissue], tops: &[f64]) -> f64 
             previous = *top;
         }
     }
-    if weights.len() == tops.len() + 1 {
-        worst
-    } else {
-        f64::INFINITY
-    }
+    if weights.len() == tops.len() + 1 { worst } else { f64::INFINITY }
 }
 
 fn main_weights(out: &Traced) -> Vec<f64> {
-    let straight = out.segments[0]
-        .iter()
-        .filter(|s| s.direction.z > 0.0 && s.spread[2] == 0.0);
+    let straight = out.segments[0].iter().filter(|s| s.direction.z > 0.0 && s.spread[2] == 0.0);
     straight.map(|s| s.weight).collect()
 }
 
@@ -98,10 +87,7 @@ fn segments_abut_in_space_and_time_down_to_the_image_bottom() {
     let out = run(&fixture);
     let s = &out.segments[0];
     assert_eq!(s.iter().map(|s| s.tissue).collect::<Vec<_>>(), [0, 1, 2, 3]);
-    assert_eq!(
-        s.iter().map(|s| s.instance).collect::<Vec<_>>(),
-        [NONE, 0, 1, 2]
-    );
+    assert_eq!(s.iter().map(|s| s.instance).collect::<Vec<_>>(), [NONE, 0, 1, 2]);
     for pair in s.windows(2) {
         let speed = f64::from(fixture.tissues[pair[0].tissue as usize].speed);
         let end = pair[0].origin + pair[0].length * pair[0].direction;
@@ -160,10 +146,7 @@ fn a_slab_reverberates_with_the_exact_series_in_every_sampling() {
         for m in 0..3 {
             let expected = (1.0 - r * r) * -r * (r * r).powi(m);
             let got = echo(&fixture, &out, 16.0 + 6.0 * f64::from(m));
-            assert!(
-                (got / expected - 1.0).abs() < 0.095,
-                "{sampling} {m}: {got} {expected}"
-            );
+            assert!((got / expected - 1.0).abs() < 0.095, "{sampling} {m}: {got} {expected}");
         }
         assert_eq!(out.counters.paths_lost, 0);
     }
@@ -177,10 +160,7 @@ fn samplings_choose_which_segments_speak_for_a_path() {
     // Straight: above, inside, below, W = 1, 3/4, 9/16; branches: R W of each wall from n = 0.
     let down = main_weights(&main);
     assert!(down.iter().take(1).all(|&w| w == 1.0));
-    let up: Vec<&Segment> = main.segments[0]
-        .iter()
-        .filter(|s| s.direction.z < 0.0)
-        .collect();
+    let up: Vec<&Segment> = main.segments[0].iter().filter(|s| s.direction.z < 0.0).collect();
     assert!((up[0].weight - 0.25).abs() < 1e-9 && up[0].share == 1.0);
     assert_eq!(up[0].handedness, -1.0);
     fixture.frame.sampling = 1;
@@ -191,19 +171,12 @@ fn samplings_choose_which_segments_speak_for_a_path() {
     // Stratified: exactly R N = 2 of 8 reflect at the first wall.
     let reflected = |out: &Traced| {
         let upwards = |s: &&Segment| s.direction.z < 0.0 && (s.time - 10.0 / 1.5).abs() < 1e-6;
-        out.segments[0]
-            .iter()
-            .filter(upwards)
-            .filter(|s| s.tissue == 0)
-            .count()
+        out.segments[0].iter().filter(upwards).filter(|s| s.tissue == 0).count()
     };
     assert_eq!(reflected(&plain), 2);
     fixture.frame.sampling = 2;
     let shared = run(&fixture);
-    let first: Vec<&Segment> = shared.segments[0]
-        .iter()
-        .filter(|s| s.time == 0.0)
-        .collect();
+    let first: Vec<&Segment> = shared.segments[0].iter().filter(|s| s.time == 0.0).collect();
     assert_eq!(first.len(), 1);
     assert_eq!((first[0].weight, first[0].share), (1.0, 1.0));
     assert_eq!(reflected(&shared), 2);
@@ -212,11 +185,8 @@ fn samplings_choose_which_segments_speak_for_a_path() {
 #[test]
 fn null_crossings_are_passed_without_echo_or_interaction() {
     // A low-priority block overlaps the end of a high-priority one: its entry changes nothing.
-    let mut fixture = Fixture::new(vec![
-        tissue(1.5, 1.5, 0.0),
-        tissue(1.5, 2.0, 0.0),
-        tissue(1.5, 2.5, 0.0),
-    ]);
+    let mut fixture =
+        Fixture::new(vec![tissue(1.5, 1.5, 0.0), tissue(1.5, 2.0, 0.0), tissue(1.5, 2.5, 0.0)]);
     fixture.block([-9.0, -9.0, 10.0], [9.0, 9.0, 30.0], 1, 5);
     fixture.block([-9.0, -9.0, 20.0], [9.0, 9.0, 40.0], 2, 0);
     fixture.frame.max_reflections = 0;
@@ -234,11 +204,8 @@ fn null_crossings_are_passed_without_echo_or_interaction() {
 #[test]
 fn shared_faces_are_one_interface() {
     // A block within a block that share their top: one step from water to the inner one.
-    let mut fixture = Fixture::new(vec![
-        tissue(1.5, 1.0, 0.0),
-        tissue(1.5, 2.0, 0.0),
-        tissue(1.5, 3.0, 0.0),
-    ]);
+    let mut fixture =
+        Fixture::new(vec![tissue(1.5, 1.0, 0.0), tissue(1.5, 2.0, 0.0), tissue(1.5, 3.0, 0.0)]);
     fixture.block([-9.0, -9.0, 10.0], [9.0, 9.0, 30.0], 1, 0);
     fixture.block([-9.0, -9.0, 10.0], [9.0, 9.0, 20.0], 2, 1);
     fixture.frame.flags = FLAG_COINCIDENT;
@@ -246,10 +213,7 @@ fn shared_faces_are_one_interface() {
     let out = run(&fixture);
     let tissues: Vec<u32> = out.segments[0].iter().map(|s| s.tissue).collect();
     assert_eq!(tissues, [0, 2, 1, 0]);
-    assert!(
-        (echo(&fixture, &out, 10.0) - 0.5).abs() < 1e-9,
-        "(3 - 1) / (3 + 1)"
-    );
+    assert!((echo(&fixture, &out, 10.0) - 0.5).abs() < 1e-9, "(3 - 1) / (3 + 1)");
 }
 
 /// A wall at 40 mm turned by `angle` about y, and the run's segments behind or off it.
@@ -279,30 +243,18 @@ fn tilted_walls_refract_by_speed_and_mirror_by_angle() {
     let back = s.iter().find(|s| s.direction.z < 0.0).expect("reflected");
     let expected = DVec3::new(-(2.0 * angle).sin(), 0.0, -(2.0 * angle).cos());
     assert!((back.direction - expected).length() < 1e-6);
-    assert!(
-        (elevation(back) - DVec3::Y).length() < 1e-6,
-        "y is in the mirror's plane"
-    );
+    assert!((elevation(back) - DVec3::Y).length() < 1e-6, "y is in the mirror's plane");
 }
 
 #[test]
 fn total_reflection_returns_everything() {
     // Fat to bone beyond 24.2 degrees.
     for (degrees, total) in [(24.0, false), (24.4, true)] {
-        let wall = tilted(
-            f64::to_radians(degrees),
-            tissue(1.440, 1.34, 0.0),
-            tissue(3.515, 6.5, 0.0),
-        );
+        let wall =
+            tilted(f64::to_radians(degrees), tissue(1.440, 1.34, 0.0), tissue(3.515, 6.5, 0.0));
         let out = run(&wall);
-        assert_eq!(
-            out.segments[0].iter().any(|s| s.tissue == 1),
-            !total,
-            "{degrees}"
-        );
-        let back = out.segments[0]
-            .iter()
-            .find(|s| s.direction.z < 0.9 && s.tissue == 0);
+        assert_eq!(out.segments[0].iter().any(|s| s.tissue == 1), !total, "{degrees}");
+        let back = out.segments[0].iter().find(|s| s.direction.z < 0.9 && s.tissue == 0);
         let weight = back.expect("reflected").weight;
         assert_eq!(weight == 1.0, total);
     }
@@ -315,11 +267,7 @@ fn the_face_ends_reflected_paths_or_sends_them_back() {
     let ends = run(&fixture);
     // Down, up, down: one-way 30 mm.
     let z = 30.0;
-    assert_eq!(
-        echo(&fixture, &ends, z),
-        0.0,
-        "nothing returns from the probe"
-    );
+    assert_eq!(echo(&fixture, &ends, z), 0.0, "nothing returns from the probe");
     fixture.frame.flags = FLAG_FACE_REFLECTION;
     let back = run(&fixture);
     // N = 1: W = R after the wall, all of it back from the face, then r at the wall.
@@ -340,35 +288,22 @@ fn faint_branches_are_followed_by_chance_and_keep_level_and_power() {
     let bound = 4.0 * (3.0 / lines).sqrt();
     // Back from the first wall, which is half of the way that the face's echo takes.
     let upwards = |s: &&Segment| s.direction.z < 0.0 && (s.time - 10.0 / 1.5).abs() < 1e-6;
-    let found: Vec<f64> = (out.segments.iter().flatten().filter(upwards))
-        .map(|s| s.weight)
-        .collect();
+    let found: Vec<f64> =
+        (out.segments.iter().flatten().filter(upwards)).map(|s| s.weight).collect();
     assert!((found.len() as f64 / (0.25 * lines) - 1.0).abs() < bound);
     let power =
         |scale: f64| found.iter().map(|w| (w * scale).powi(2)).sum::<f64>() / lines / 0.0625;
     assert!((power(1.0) - 1.0).abs() < bound, "{}", power(1.0));
     let samples = 2 * fixture.frame.samples as usize;
-    let echoes = out
-        .surface
-        .exact
-        .chunks(samples)
-        .map(|line| echo_of(&fixture, line, 20.0));
+    let echoes = out.surface.exact.chunks(samples).map(|line| echo_of(&fixture, line, 20.0));
     let mean = echoes.sum::<f64>() / lines;
     assert!((mean / 0.25 - 1.0).abs() < bound, "{mean}");
     // Planted: louder by the whole chance, as echoes in phase are; not louder at all.
     assert!(power(2.0) > 1.0 + bound && power(0.5) < 1.0 - bound);
     // However faint: one of 32.
     fixture.frame.branch_floor = 1e9;
-    let rare = run(&fixture)
-        .segments
-        .iter()
-        .flatten()
-        .filter(upwards)
-        .count();
-    assert!(
-        (rare as f64 / (lines / 32.0) - 1.0).abs() < 4.0 * (31.0 / lines).sqrt(),
-        "{rare}"
-    );
+    let rare = run(&fixture).segments.iter().flatten().filter(upwards).count();
+    assert!((rare as f64 / (lines / 32.0) - 1.0).abs() < 4.0 * (31.0 / lines).sqrt(), "{rare}");
 }
 
 #[test]
@@ -378,17 +313,11 @@ fn rough_branches_spread_and_smooth_ones_do_not() {
     fixture.surfaces[0].roughness = 98.0;
     fixture.frame.paths = 4;
     let out = run(&fixture);
-    let up = out.segments[0]
-        .iter()
-        .find(|s| s.direction.z < 0.0)
-        .expect("reflected");
+    let up = out.segments[0].iter().find(|s| s.direction.z < 0.0).expect("reflected");
     assert!((up.spread[2] - 0.04).abs() < 1e-12, "4 / (s + 2)");
     assert_eq!(up.spread[..2], [0.0, 0.0]);
     let straight = main_weights(&out);
-    assert!(
-        (straight[1] - 0.75).abs() < 1e-9,
-        "transmission stays at the smooth normal"
-    );
+    assert!((straight[1] - 0.75).abs() < 1e-9, "transmission stays at the smooth normal");
 }
 
 // |sum|^2 averaged over 1500 lines in cells of their own; energy 1 in expectation, for any N.

@@ -24,12 +24,7 @@ pub struct Start {
 impl Start {
     /// At the line's own start.
     pub fn at_face(media: Stack) -> Self {
-        Self {
-            media,
-            travelled: 0.0,
-            weight: 1.0,
-            interactions: 0,
-        }
+        Self { media, travelled: 0.0, weight: 1.0, interactions: 0 }
     }
 }
 

@@ -148,10 +148,7 @@ impl World<'_> {
         let [na, nb, nc] = self.geometry.triangles[crossing.triangle]
             .map(|i| widen(self.geometry.normals[i as usize]));
         let shading = (1.0 - u - v) * na + u * nb + v * nc;
-        (
-            (turn * (b - a).cross(c - a)).normalize(),
-            (turn * shading).normalize(),
-        )
+        ((turn * (b - a).cross(c - a)).normalize(), (turn * shading).normalize())
     }
 
     /// How fast the interpolated normal turns along the direction `along` (world, any length), rad/mm.

@@ -23,12 +23,7 @@ pub struct RegisterError {
 impl RegisterError {
     /// An error of the data.
     pub(super) fn data(cause: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self {
-            file: None,
-            line: 0,
-            cause: cause.into(),
-            remedy: remedy.into(),
-        }
+        Self { file: None, line: 0, cause: cause.into(), remedy: remedy.into() }
     }
 
     /// An error of a file as a whole.
@@ -43,11 +38,7 @@ impl RegisterError {
         cause: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        Self {
-            file: Some(file.to_owned()),
-            line,
-            ..Self::data(cause, remedy)
-        }
+        Self { file: Some(file.to_owned()), line, ..Self::data(cause, remedy) }
     }
 
     fn place(&self) -> String {

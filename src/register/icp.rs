@@ -71,11 +71,7 @@ pub struct Residuals {
 
 impl Residuals {
     fn of(matched: &[Matched], cutoff: f64) -> Self {
-        let near: Vec<f64> = matched
-            .iter()
-            .map(|m| m.off)
-            .filter(|d| *d < cutoff)
-            .collect();
+        let near: Vec<f64> = matched.iter().map(|m| m.off).filter(|d| *d < cutoff).collect();
         let statistics = Statistics::of(near.iter().copied());
         let squares: f64 = near.iter().map(|d| d * d).sum();
         Self {
@@ -188,10 +184,7 @@ fn check(points: &[DVec3]) -> Result<(), RegisterError> {
     }
     let first = points[0];
     if points.iter().all(|p| p.distance(first) < 1e-3) {
-        return fail(
-            "all points are the same".to_owned(),
-            "give points all over the surface",
-        );
+        return fail("all points are the same".to_owned(), "give points all over the surface");
     }
     Ok(())
 }
@@ -205,11 +198,7 @@ fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Mat
         Matched {
             at,
             // On the surface the difference is rounding.
-            away: if off > EXACT {
-                away / off
-            } else {
-                nearest.normal
-            },
+            away: if off > EXACT { away / off } else { nearest.normal },
             off,
         }
     };
@@ -247,13 +236,8 @@ impl System {
         let centre = matched.iter().map(|m| m.at).sum::<DVec3>() / count;
         let squares = matched.iter().map(|m| m.at.distance_squared(centre));
         let reach = (squares.sum::<f64>() / count).sqrt();
-        let mut out = Self {
-            matrix: Normal::zeros(),
-            gradient: Motion::zeros(),
-            weight: 0.0,
-            centre,
-            reach,
-        };
+        let mut out =
+            Self { matrix: Normal::zeros(), gradient: Motion::zeros(), weight: 0.0, centre, reach };
         for m in matched.iter().filter(|m| m.off < cutoff) {
             let weight = (1.0 - (m.off / cutoff).powi(2)).powi(2);
             let arm = (m.at - centre) / reach;
@@ -292,10 +276,7 @@ impl System {
     /// Motions that change next to no distance.
     fn loose(&self, transformation: Transformation) -> Vec<String> {
         let eigen = SymmetricEigen::new(self.matrix / self.weight.max(f64::MIN_POSITIVE));
-        let pairs = eigen
-            .eigenvalues
-            .iter()
-            .zip(eigen.eigenvectors.column_iter());
+        let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
         let mut out = Vec::new();
         for (_, vector) in pairs.filter(|(value, _)| **value < LOOSE) {
             let part = |i: usize| DVec3::new(vector[i], vector[i + 1], vector[i + 2]);

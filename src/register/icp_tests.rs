@@ -79,20 +79,11 @@ fn a_displaced_surface_is_found_from_where_it_is() {
     let (off, angle) = error(&DAffine3::IDENTITY, &truth);
     // Planted: without a search both tolerances are exceeded many times.
     assert!(off > 10.0 && angle > 8.9, "{off} {angle}");
-    for start in [
-        DAffine3::IDENTITY,
-        DAffine3::from_translation(DVec3::new(6.0, -8.0, 0.0)),
-    ] {
+    for start in [DAffine3::IDENTITY, DAffine3::from_translation(DVec3::new(6.0, -8.0, 0.0))] {
         let made = fit(&points, &surface(), start, Transformation::Rigid).expect("found");
         let (off, angle) = error(&made.transform, &truth);
-        assert!(
-            made.settled && off < 0.01 && angle < 0.01,
-            "{made:?} {off} {angle}"
-        );
-        assert!(
-            made.residuals.rms < 1e-3 && made.loose.is_empty(),
-            "{made:?}"
-        );
+        assert!(made.settled && off < 0.01 && angle < 0.01, "{made:?} {off} {angle}");
+        assert!(made.residuals.rms < 1e-3 && made.loose.is_empty(), "{made:?}");
         // Planted: its inverse is no answer.
         assert!(error(&made.transform.inverse(), &truth).0 > 20.0);
     }
@@ -102,13 +93,7 @@ fn a_displaced_surface_is_found_from_where_it_is() {
 fn noise_averages_out_and_is_measured() {
     let truth = truth(1.0);
     let points = cloud(&truth, 3000, 0.3, 0.0);
-    let made = fit(
-        &points,
-        &surface(),
-        DAffine3::IDENTITY,
-        Transformation::Rigid,
-    )
-    .expect("found");
+    let made = fit(&points, &surface(), DAffine3::IDENTITY, Transformation::Rigid).expect("found");
     let (off, angle) = error(&made.transform, &truth);
     // About its longest axis the ellipsoid is nearly round: there the standard error is 0.1 degrees.
     assert!(off < 0.1 && angle < 0.3, "{off} {angle}");
@@ -124,13 +109,7 @@ fn noise_averages_out_and_is_measured() {
 fn points_of_something_else_do_no_harm() {
     let truth = truth(1.0);
     let points = cloud(&truth, 3000, 0.3, 0.2);
-    let made = fit(
-        &points,
-        &surface(),
-        DAffine3::IDENTITY,
-        Transformation::Rigid,
-    )
-    .expect("found");
+    let made = fit(&points, &surface(), DAffine3::IDENTITY, Transformation::Rigid).expect("found");
     let (off, angle) = error(&made.transform, &truth);
     assert!(off < 0.3 && angle < 0.3, "{off} {angle}");
     let trimmed = made.residuals.trimmed();
@@ -165,18 +144,9 @@ fn far_starts_arrive_in_spite_of_many_strays() {
 fn a_part_of_the_surface_is_enough() {
     let truth = truth(1.0);
     let mut points = cloud(&truth, 3000, 0.3, 0.1);
-    let high = truth
-        .inverse()
-        .transform_point3(DVec3::new(0.0, 0.0, -2.0))
-        .z;
+    let high = truth.inverse().transform_point3(DVec3::new(0.0, 0.0, -2.0)).z;
     points.retain(|p| p.z > high);
-    let made = fit(
-        &points,
-        &surface(),
-        DAffine3::IDENTITY,
-        Transformation::Rigid,
-    )
-    .expect("found");
+    let made = fit(&points, &surface(), DAffine3::IDENTITY, Transformation::Rigid).expect("found");
     let (off, angle) = error(&made.transform, &truth);
     assert!(off < 0.3 && angle < 0.3, "{off} {angle}");
 }
@@ -206,36 +176,17 @@ fn what_the_surface_leaves_open_stays_and_is_said() {
     let turned = made.loose.iter().filter(|l| l.contains("turned about"));
     assert_eq!((turned.count(), made.loose.len()), (3, 3), "{made:?}");
     let shift = made.transform.translation;
-    assert!(
-        shift.distance(DVec3::new(-3.0, 2.0, -1.0)) < 0.02,
-        "{made:?}"
-    );
+    assert!(shift.distance(DVec3::new(-3.0, 2.0, -1.0)) < 0.02, "{made:?}");
     let quarter = triangles(&shapes::cuboid([50.0, 40.0, 30.0]), |p| p);
-    let floor: Vec<_> = quarter
-        .iter()
-        .copied()
-        .filter(|t| t.iter().all(|p| p.z < 0.0))
-        .collect();
+    let floor: Vec<_> = quarter.iter().copied().filter(|t| t.iter().all(|p| p.z < 0.0)).collect();
     let points = samples(&floor, 500);
     let plane = Surface::new(&floor).expect("a plane");
     // Its rim would hold what is larger.
-    let small: Vec<_> = points
-        .into_iter()
-        .map(|p| p * DVec3::new(0.5, 0.5, 1.0))
-        .collect();
-    let made = fit(
-        &small,
-        &plane,
-        DAffine3::IDENTITY,
-        Transformation::Similarity,
-    )
-    .expect("found");
+    let small: Vec<_> = points.into_iter().map(|p| p * DVec3::new(0.5, 0.5, 1.0)).collect();
+    let made = fit(&small, &plane, DAffine3::IDENTITY, Transformation::Similarity).expect("found");
     let words = made.loose.join("; ");
     assert_eq!(made.loose.len(), 4, "{words}");
-    assert!(
-        words.contains("along") && words.contains("how large"),
-        "{words}"
-    );
+    assert!(words.contains("along") && words.contains("how large"), "{words}");
 }
 
 #[test]
@@ -247,12 +198,7 @@ fn what_cannot_be_laid_onto_a_surface_is_refused() {
     let here = DAffine3::IDENTITY;
     for (points, start, cause, remedy) in [
         (vec![], here, "0 points are given", "--landmarks"),
-        (
-            good[..9].to_vec(),
-            here,
-            "9 points are given",
-            "--landmarks",
-        ),
+        (good[..9].to_vec(), here, "9 points are given", "--landmarks"),
         (vec![DVec3::ONE; 20], here, "the same", "all over"),
         (broken, here, "no numbers", "mm"),
         (good, far, "mm off the surface", "--landmarks"),
@@ -263,10 +209,7 @@ fn what_cannot_be_laid_onto_a_surface_is_refused() {
     }
     // A handful of points on one spot shrinks onto it.
     let spot = samples(&MODEL, 40_000);
-    let spot = spot
-        .iter()
-        .filter(|p| p.x > 36.0)
-        .map(|p| DVec3::new(-3.0 * p.x + 148.0, p.y, p.z));
+    let spot = spot.iter().filter(|p| p.x > 36.0).map(|p| DVec3::new(-3.0 * p.x + 148.0, p.y, p.z));
     let spot: Vec<_> = spot.collect();
     let error = fit(&spot, &surface(), here, Transformation::Similarity);
     let error = error.map(|f| f.transform).expect_err("it shrinks");

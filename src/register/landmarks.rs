@@ -94,9 +94,7 @@ pub fn worst<'l>(transform: &DAffine3, landmarks: &'l [Landmark]) -> Option<(&'l
 }
 
 fn off(transform: &DAffine3, landmark: &Landmark) -> f64 {
-    transform
-        .transform_point3(landmark.from)
-        .distance(landmark.to)
+    transform.transform_point3(landmark.from).distance(landmark.to)
 }
 
 fn vector(v: DVec3) -> Vector3<f64> {
@@ -114,10 +112,7 @@ impl Cloud {
         let count = points.len() as f64;
         let mean = points.clone().sum::<DVec3>() / count;
         let squares = points.map(|p| vector(p - mean) * vector(p - mean).transpose());
-        Self {
-            mean,
-            covariance: squares.sum::<Matrix3<f64>>() / count,
-        }
+        Self { mean, covariance: squares.sum::<Matrix3<f64>>() / count }
     }
 
     /// Whether the points lie in a plane. Fails where they leave a rotation open.
@@ -195,10 +190,7 @@ mod tests {
                 let turned = DAffine3::from_translation(centre)
                     * DAffine3::from_axis_angle(axis, sign * 0.01)
                     * DAffine3::from_translation(-centre);
-                for other in [
-                    turned * made,
-                    DAffine3::from_translation(sign * 0.1 * axis) * made,
-                ] {
+                for other in [turned * made, DAffine3::from_translation(sign * 0.1 * axis) * made] {
                     assert!(rms(&other, &all) > least);
                 }
             }

@@ -33,11 +33,7 @@ impl Placement {
         let degrees = round(angle.to_degrees(), STEPS[1]);
         let scaled = transformation == Transformation::Similarity;
         Self {
-            scale: if scaled {
-                round(scale, STEPS[3])
-            } else {
-                scale
-            },
+            scale: if scaled { round(scale, STEPS[3]) } else { scale },
             axis: match degrees == 0.0 {
                 true => DVec3::Z,
                 false => axis.map(|x| round(x, STEPS[2])),
@@ -79,11 +75,7 @@ mod tests {
 
     #[test]
     fn any_similarity_is_written_to_nanometres() {
-        let axes = [
-            DVec3::X,
-            DVec3::new(0.2, -0.7, 0.4),
-            DVec3::new(-1.0, -1.0, -1.0),
-        ];
+        let axes = [DVec3::X, DVec3::new(0.2, -0.7, 0.4), DVec3::new(-1.0, -1.0, -1.0)];
         for axis in axes {
             for degrees in [0.0, 1e-9, 0.5, 90.0, 179.999, 180.0, 300.0] {
                 let wanted = DAffine3::from_scale_rotation_translation(
@@ -109,11 +101,7 @@ mod tests {
         let placed = DAffine3::from_scale(DVec3::splat(0.3));
         let made = Placement::of(&placed, Transformation::Rigid);
         assert!((made.scale - 0.3).abs() < 1e-15);
-        let keys: Vec<_> = made
-            .entries("volume")
-            .into_iter()
-            .map(|(key, _)| key)
-            .collect();
+        let keys: Vec<_> = made.entries("volume").into_iter().map(|(key, _)| key).collect();
         assert_eq!(keys, ["volume.translate", "volume.rotate"]);
     }
 }

@@ -69,10 +69,7 @@ pub fn load(path: &Path, stated: Option<Frame>) -> Result<Vec<Point>, RegisterEr
     let name = ["label", "name"].iter().find_map(|n| table.column(n));
     let point = |row: &Row| {
         Ok(Point {
-            name: name
-                .and_then(|i| row.cells.get(i))
-                .unwrap_or_default()
-                .to_owned(),
+            name: name.and_then(|i| row.cells.get(i)).unwrap_or_default().to_owned(),
             position: signs * table.vector(row, columns)?,
         })
     };
@@ -96,9 +93,7 @@ pub fn load_landmarks(path: &Path, stated: Option<Frame>) -> Result<Vec<Landmark
     let signs = agreed(path, table.frame, stated)?.lps_signs();
     let name = ["name", "label"].iter().find_map(|n| table.column(n));
     let landmark = |row: &Row| {
-        let name = name
-            .and_then(|i| row.cells.get(i))
-            .filter(|n| !n.is_empty());
+        let name = name.and_then(|i| row.cells.get(i)).filter(|n| !n.is_empty());
         Ok(Landmark {
             name: name.map_or_else(|| format!("line {}", row.line), str::to_owned),
             from: signs * table.vector(row, &volume)?,
@@ -192,11 +187,7 @@ pub fn agreed(path: &Path, said: Frame, stated: Option<Frame>) -> Result<Frame, 
         (Frame::Unstated, stated) => Ok(stated.unwrap_or(Frame::Lps)),
         (said, Some(stated)) if said != stated => Err(RegisterError::file(
             path,
-            format!(
-                "says that it is in {}, and --frame {}",
-                said.name(),
-                stated.name()
-            ),
+            format!("says that it is in {}, and --frame {}", said.name(), stated.name()),
             "leave --frame out; or correct the file",
         )),
         (said, _) => Ok(said),
@@ -224,11 +215,7 @@ fn text(path: &Path) -> Result<String, RegisterError> {
         return Err(fail("is not a regular file".to_owned(), "name a file"));
     }
     if info.len() > MAX_TEXT {
-        let cause = format!(
-            "is {} MB, the limit is {} MB",
-            info.len() >> 20,
-            MAX_TEXT >> 20
-        );
+        let cause = format!("is {} MB, the limit is {} MB", info.len() >> 20, MAX_TEXT >> 20);
         return Err(fail(cause, "give fewer points: thousands are enough"));
     }
     std::fs::read_to_string(path).map_err(unread)

@@ -45,10 +45,7 @@ impl Surface {
         // Readers keep vertices under 2^32.
         let numbers = (0..solid.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
         let tree = TriMesh::new(vertices.collect(), numbers.collect()).map_err(|_| {
-            RegisterError::data(
-                "the surface has no triangle",
-                "name a mesh with faces, or several",
-            )
+            RegisterError::data("the surface has no triangle", "name a mesh with faces, or several")
         })?;
         let corners = || solid.iter().copied().flatten();
         let low = corners().fold(DVec3::INFINITY, |low, p| low.min(*p));
@@ -67,9 +64,7 @@ impl Surface {
 
     /// The point on the surface that is nearest to `p`.
     pub fn nearest(&self, p: DVec3) -> Nearest {
-        let found = self
-            .tree
-            .project_local_point_and_get_location(inner(p), false);
+        let found = self.tree.project_local_point_and_get_location(inner(p), false);
         let (projection, (triangle, _)) = found;
         Nearest {
             point: projection.point.to_array().into(),
@@ -149,10 +144,7 @@ mod tests {
             ([3.0, 2.0, 3.0], [3.0, 2.0, 3.0]),
         ] {
             let found = surface.nearest(p.into());
-            assert!(
-                found.point.distance(expected.into()) < 1e-12,
-                "{p:?} {found:?}"
-            );
+            assert!(found.point.distance(expected.into()) < 1e-12, "{p:?} {found:?}");
         }
         assert!(surface.nearest([0.0, 0.0, 9.0].into()).normal.z > 0.999);
     }
@@ -162,10 +154,7 @@ mod tests {
         let all = triangles(&shapes::cuboid([20.0, 10.0, 6.0]));
         let made = samples(&all, 4000);
         let surface = Surface::new(&all).expect("a box");
-        assert!(
-            made.iter()
-                .all(|&p| surface.nearest(p).point.distance(p) < 1e-12)
-        );
+        assert!(made.iter().all(|&p| surface.nearest(p).point.distance(p) < 1e-12));
         let top = made.iter().filter(|p| p.z > 2.999).count() as f64;
         let share = 200.0 / (2.0 * (200.0 + 120.0 + 60.0));
         assert!((top / 4000.0 - share).abs() < 0.002, "{top} on the top");

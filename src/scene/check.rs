@@ -48,8 +48,7 @@ pub(super) fn examine(
     if let Some(issue) = not_finite(path, soup) {
         issues.push(issue);
         let positions = &soup.positions;
-        soup.triangles
-            .retain(|t| t.iter().all(|&i| !bad(&positions[i as usize])));
+        soup.triangles.retain(|t| t.iter().all(|&i| !bad(&positions[i as usize])));
     }
     if soup.triangles.is_empty() {
         issues.push(Issue::error(
@@ -102,11 +101,7 @@ pub(super) fn examine_shape(
     }
     let mut issues = Vec::new();
     issues.extend(size(path, measure(soup).size() * enlarged, units));
-    let flat = soup
-        .triangles
-        .iter()
-        .filter(|t| !topology::has_area(**t, &soup.positions))
-        .count();
+    let flat = soup.triangles.iter().filter(|t| !topology::has_area(**t, &soup.positions)).count();
     if flat > 0 {
         issues.push(Issue::warning(
             path,
@@ -173,9 +168,7 @@ fn measure(soup: &Soup) -> Facts {
 impl Facts {
     /// Largest edge of the bounding box, mm.
     pub fn size(&self) -> f64 {
-        (0..3)
-            .map(|axis| self.max[axis] - self.min[axis])
-            .fold(0.0, f64::max)
+        (0..3).map(|axis| self.max[axis] - self.min[axis]).fold(0.0, f64::max)
     }
 }
 
@@ -192,18 +185,12 @@ fn size(path: &Path, size: f64, units: Units) -> Option<Issue> {
         .filter(|(name, mm)| *name != "in" && (least..=most).contains(&(size / units.0 * mm)))
         .min_by(|a, b| away(a.1).total_cmp(&away(b.1)));
     let remedy = match guess {
-        Some((name, mm)) => format!(
-            "state its unit: units = \"{name}\" makes it {:.4} mm",
-            size / units.0 * mm
-        ),
+        Some((name, mm)) => {
+            format!("state its unit: units = \"{name}\" makes it {:.4} mm", size / units.0 * mm)
+        }
         None => "scale it in the modeller".to_owned(),
     };
-    Some(Issue::error(
-        path,
-        1,
-        format!("is {size:.4} mm large, which no anatomy is"),
-        remedy,
-    ))
+    Some(Issue::error(path, 1, format!("is {size:.4} mm large, which no anatomy is"), remedy))
 }
 
 #[cfg(test)]

@@ -111,27 +111,17 @@ impl Scene {
             &anatomy.meshes,
             &anatomy.instances,
         )?;
-        let contact = contact::build(
-            &document,
-            file.contact.as_ref(),
-            &anatomy.meshes,
-            &anatomy.instances,
-        )?;
+        let contact =
+            contact::build(&document, file.contact.as_ref(), &anatomy.meshes, &anatomy.instances)?;
         let tracker = tracker::build(&document, file.tracker.as_ref())?;
         let live = parameters::live(&document, &file.live)?;
         warnings.extend(tissues.unused());
-        let name = file.name.unwrap_or_else(|| {
-            path.file_stem()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned()
-        });
+        let name = file
+            .name
+            .unwrap_or_else(|| path.file_stem().unwrap_or_default().to_string_lossy().into_owned());
         let tissues = tissues.used();
         let bases = |tissue: &Tissue| tissues::bases(&file.tissues, &tissue.name);
-        let origins = Origins {
-            instances,
-            bases: tissues.iter().map(bases).collect(),
-        };
+        let origins = Origins { instances, bases: tissues.iter().map(bases).collect() };
         let mut scene = Self {
             name,
             tissues,
@@ -151,11 +141,8 @@ impl Scene {
             live,
             origins,
         };
-        let model = (
-            file.model.translate,
-            file.model.rotate.as_ref(),
-            schema::even(file.model.scale),
-        );
+        let model =
+            (file.model.translate, file.model.rotate.as_ref(), schema::even(file.model.scale));
         scene.place_model(placing::placement(&document, "model", model)?);
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
@@ -242,21 +229,11 @@ fn within(
         return Ok(());
     }
     let key = path.rsplit('.').next().unwrap_or(path);
-    let unit = if unit.is_empty() {
-        String::new()
-    } else {
-        format!(" {unit}")
-    };
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
     let (message, remedy) = if most.is_infinite() {
-        (
-            format!("{key} is {value}{unit}"),
-            format!("it must be at least {least}{unit}"),
-        )
+        (format!("{key} is {value}{unit}"), format!("it must be at least {least}{unit}"))
     } else {
-        (
-            format!("{key} is {value}{unit}"),
-            format!("it must lie between {least} and {most}{unit}"),
-        )
+        (format!("{key} is {value}{unit}"), format!("it must lie between {least} and {most}{unit}"))
     };
     Err(document.fail(path, message, remedy))
 }

@@ -50,11 +50,7 @@ pub struct Display {
 impl Acquired {
     /// How it is shown.
     pub fn display(&self) -> Display {
-        Display {
-            world_from_lps: self.world_from_lps,
-            black: self.black,
-            white: self.white,
-        }
+        Display { world_from_lps: self.world_from_lps, black: self.black, white: self.white }
     }
 
     /// Shows it like that from now on.
@@ -86,11 +82,7 @@ impl Acquired {
             let (mut weight, mut index) = (1.0, [0; 3]);
             for axis in 0..3 {
                 let far = corner >> axis & 1;
-                weight *= if far == 1 {
-                    share[axis]
-                } else {
-                    1.0 - share[axis]
-                };
+                weight *= if far == 1 { share[axis] } else { 1.0 - share[axis] };
                 index[axis] = low[axis] as usize + far;
             }
             // Beside an axis of one voxel there is nothing, of no weight.

@@ -236,11 +236,7 @@ pub fn is_even(placement: &DAffine3) -> bool {
 /// Takes the present keyframe, or the place between keyframes.
 fn choose(instance: &mut Instance, sequence: &Sequence, seconds: f64) {
     let keyframes = &mut instance.keyframes;
-    assert_eq!(
-        keyframes.meshes.len(),
-        sequence.count(),
-        "one for each turn"
-    );
+    assert_eq!(keyframes.meshes.len(), sequence.count(), "one for each turn");
     keyframes.blend = match keyframes.strategy {
         Strategy::Interpolate => sequence.blend(seconds),
         _ => [(sequence.step(seconds), 1.0), (0, 0.0), (0, 0.0), (0, 0.0)],
@@ -253,10 +249,7 @@ impl Scene {
     /// called so.
     pub fn placed(&self, name: &str, seconds: f64) -> Option<Placed> {
         let named = self.origins.instances.iter().enumerate();
-        let own: Vec<_> = named
-            .filter(|(_, o)| o.mesh == name)
-            .map(|(i, _)| i)
-            .collect();
+        let own: Vec<_> = named.filter(|(_, o)| o.mesh == name).map(|(i, _)| i).collect();
         let node = self.graph.nodes.iter().position(|n| n.name == name);
         let kind = if own.is_empty() { "transform" } else { "mesh" };
         let (parent, rest, instances) = match node.map(|i| (i, &self.graph.nodes[i])) {

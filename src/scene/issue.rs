@@ -57,10 +57,7 @@ impl Issue {
         message: impl Into<String>,
         remedy: impl Into<String>,
     ) -> Self {
-        Self {
-            severity: Severity::Warning,
-            ..Self::error(file, count, message, remedy)
-        }
+        Self { severity: Severity::Warning, ..Self::error(file, count, message, remedy) }
     }
 
     /// Names the mesh, unless it is named already.

@@ -131,17 +131,11 @@ impl Keyframes {
             normals: vec![[0.0; 3]; first.normals.len()],
             ..first.clone()
         };
-        let mut sums = [
-            vec![DVec3::ZERO; first.positions.len()],
-            vec![DVec3::ZERO; first.normals.len()],
-        ];
+        let mut sums =
+            [vec![DVec3::ZERO; first.positions.len()], vec![DVec3::ZERO; first.normals.len()]];
         for &(keyframe, weight) in self.blend.iter().filter(|(_, weight)| *weight != 0.0) {
             let mesh = &meshes[self.meshes[keyframe]];
-            assert!(
-                mesh.shares_topology(first),
-                "`{}` has other triangles",
-                mesh.name
-            );
+            assert!(mesh.shares_topology(first), "`{}` has other triangles", mesh.name);
             for (sum, values) in sums.iter_mut().zip([&mesh.positions, &mesh.normals]) {
                 for (sum, v) in sum.iter_mut().zip(values) {
                     *sum += weight * DVec3::from(v.map(f64::from));

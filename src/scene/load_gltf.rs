@@ -52,11 +52,7 @@ fn open<'p>(
     animation: Option<Choice<'_>>,
 ) -> Result<File<'p>, Vec<Issue>> {
     let one = |issue: Issue| vec![issue];
-    let glb::Container {
-        json,
-        binary,
-        mut issues,
-    } = glb::open(path, bytes).map_err(one)?;
+    let glb::Container { json, binary, mut issues } = glb::open(path, bytes).map_err(one)?;
     let root = parse(path, json).map_err(one)?;
     let findings = validate::validate(&root, animation.is_some());
     issues.extend(validate::issues(path, findings));
@@ -73,10 +69,8 @@ fn open<'p>(
     let json: gltf::json::Root =
         serde_json::from_value(reduced.json).map_err(|e| invalid(e.to_string()))?;
     let gltf = gltf::Document::from_json(json).map_err(|e| invalid(e.to_string()))?;
-    let buffers::Buffers {
-        bytes: buffers,
-        issues: unread,
-    } = buffers::load(path, &gltf, binary, &reduced.buffers);
+    let buffers::Buffers { bytes: buffers, issues: unread } =
+        buffers::load(path, &gltf, binary, &reduced.buffers);
     issues.extend(unread);
     if issues.iter().any(Issue::is_error) {
         return Err(issues);
@@ -106,34 +100,22 @@ impl File<'_> {
     fn node(&self, name: &str) -> Result<gltf::Node<'_>, Issue> {
         let found = self.gltf.nodes().find(|n| n.name() == Some(name));
         found.ok_or_else(|| {
-            let names = self
-                .gltf
-                .nodes()
-                .filter_map(|n| n.name().map(str::to_owned));
+            let names = self.gltf.nodes().filter_map(|n| n.name().map(str::to_owned));
             mesh::no_such_node(self.path, name, &names.collect::<Vec<_>>())
         })
     }
 
     /// What the tree of nodes does not say.
     fn remarks(&self, visited: &[bool]) -> Vec<Issue> {
-        let unseen = self
-            .gltf
-            .nodes()
-            .filter(|n| n.mesh().is_some() && !visited[n.index()])
-            .count();
+        let unseen =
+            self.gltf.nodes().filter(|n| n.mesh().is_some() && !visited[n.index()]).count();
         let remark = |count: usize, message: &str| {
             let message = format!("{message} ({count})");
             (count > 0).then(|| Issue::warning(self.path, count, message, ""))
         };
         let both = [
-            remark(
-                self.without_data,
-                "primitives without stored positions are ignored",
-            ),
-            remark(
-                unseen,
-                "nodes with meshes outside the default scene are ignored",
-            ),
+            remark(self.without_data, "primitives without stored positions are ignored"),
+            remark(unseen, "nodes with meshes outside the default scene are ignored"),
         ];
         both.into_iter().flatten().collect()
     }
@@ -151,12 +133,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     walk.surfaces.issues = issues;
     let chosen = node.map(|name| file.node(name)).transpose().map_err(one)?;
     for root in file.roots() {
-        walk.node(
-            &root,
-            DMat4::IDENTITY,
-            chosen.as_ref().map(gltf::Node::index),
-        )
-        .map_err(one)?;
+        walk.node(&root, DMat4::IDENTITY, chosen.as_ref().map(gltf::Node::index)).map_err(one)?;
     }
     if let Some(node) = &chosen
         && !walk.visited[node.index()]
@@ -169,10 +146,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     }
     let mut issues = walk.surfaces.issues;
     issues.extend(file.remarks(&walk.visited));
-    Ok(Parts {
-        parts: walk.parts,
-        issues,
-    })
+    Ok(Parts { parts: walk.parts, issues })
 }
 
 /// Names of a file's animations; none where it cannot be read.
@@ -185,10 +159,7 @@ pub(super) fn animations(path: &Path, bytes: &[u8]) -> Vec<String> {
 fn parse(path: &Path, json: &[u8]) -> Result<serde_json::Map<String, serde_json::Value>, Issue> {
     let fail = |message: String, remedy: &str| Issue::error(path, 1, message, remedy);
     if json.iter().filter(|&&b| b == b',').count() > MAX_VALUES {
-        return Err(fail(
-            "its JSON part is too large".to_owned(),
-            "store numbers in buffers",
-        ));
+        return Err(fail("its JSON part is too large".to_owned(), "store numbers in buffers"));
     }
     let again = "export or copy it again";
     match serde_json::from_slice(json) {
@@ -238,10 +209,7 @@ impl Walk<'_> {
                 ));
             }
             let kept = kept || only == Some(node.index());
-            let local = node
-                .transform()
-                .matrix()
-                .map(|column| column.map(f64::from));
+            let local = node.transform().matrix().map(|column| column.map(f64::from));
             let matrix = parent * DMat4::from_cols_array_2d(&local);
             if let Some(mesh) = node.mesh().filter(|_| kept) {
                 let name = node.name().or(mesh.name()).unwrap_or_default();
@@ -260,10 +228,8 @@ impl Walk<'_> {
         primitive: &gltf::Primitive<'_>,
         matrix: DMat4,
     ) -> Result<(), Issue> {
-        let Some(Surface {
-            positions,
-            mut triangles,
-        }) = self.surfaces.primitive(name, primitive)?
+        let Some(Surface { positions, mut triangles }) =
+            self.surfaces.primitive(name, primitive)?
         else {
             return Ok(());
         };
@@ -273,14 +239,9 @@ impl Walk<'_> {
                 t.swap(1, 2);
             }
         }
-        let placed = positions
-            .into_iter()
-            .map(|p| matrix.transform_point3(p.into()).as_vec3().to_array());
-        self.parts.push(Soup {
-            name: name.to_owned(),
-            positions: placed.collect(),
-            triangles,
-        });
+        let placed =
+            positions.into_iter().map(|p| matrix.transform_point3(p.into()).as_vec3().to_array());
+        self.parts.push(Soup { name: name.to_owned(), positions: placed.collect(), triangles });
         Ok(())
     }
 }

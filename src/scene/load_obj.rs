@@ -32,10 +32,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
         positions: model.mesh.positions.as_chunks().0.to_vec(),
         triangles: model.mesh.indices.as_chunks().0.to_vec(),
     });
-    Ok(Parts {
-        parts: parts.collect(),
-        issues,
-    })
+    Ok(Parts { parts: parts.collect(), issues })
 }
 
 /// The lines that carry geometry or names, each face reduced to its position indices: the rest
@@ -144,12 +141,7 @@ fn scan(path: &Path, bytes: &[u8]) -> Vec<Issue> {
     let issues = tally.0.into_iter().map(|(what, stops, line, count)| {
         let message = format!("{what} ({count} times, first in line {line})");
         if stops {
-            Issue::error(
-                path,
-                count,
-                message,
-                "correct the line or export the file again",
-            )
+            Issue::error(path, count, message, "correct the line or export the file again")
         } else {
             Issue::warning(path, count, message, "")
         }
@@ -196,21 +188,13 @@ fn face<'a>(
             Err(_) => tally.note("face indices are not integers", true, line),
             Ok(0) => tally.note("face indices are zero (they count from 1)", true, line),
             Ok(i) if i.unsigned_abs() as usize > vertices => {
-                tally.note(
-                    "face indices name vertices that do not exist yet",
-                    true,
-                    line,
-                );
+                tally.note("face indices name vertices that do not exist yet", true, line);
             }
             Ok(_) => {}
         }
     }
     if corners < 3 {
-        tally.note(
-            "faces with fewer than three corners are ignored",
-            false,
-            line,
-        );
+        tally.note("faces with fewer than three corners are ignored", false, line);
     }
     corners.saturating_sub(2)
 }
@@ -229,11 +213,8 @@ mod tests {
     fn quads_become_two_triangles_of_the_same_winding() {
         let parts = load(&format!("{SQUARE}f 1/9/9 2//7 3 4\n")).expect("readable");
         let soup = &parts.parts[0];
-        let corners: Vec<_> = soup
-            .triangles
-            .iter()
-            .map(|t| t.map(|i| soup.positions[i as usize]))
-            .collect();
+        let corners: Vec<_> =
+            soup.triangles.iter().map(|t| t.map(|i| soup.positions[i as usize])).collect();
         assert_eq!(corners.len(), 2);
         assert_eq!(corners[0], [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]]);
     }

@@ -34,10 +34,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
             ));
         }
         if declared > MAX_ELEMENTS {
-            return Err(fail(
-                format!("{declared} triangles are too many"),
-                "reduce the mesh",
-            ));
+            return Err(fail(format!("{declared} triangles are too many"), "reduce the mesh"));
         }
     }
     // The reader takes a file that begins with "solid" for text; a binary one may do so too.
@@ -50,10 +47,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
         owned.as_slice()
     });
     let mesh = stl_io::read_stl(&mut input).map_err(|e| {
-        fail(
-            format!("is not a readable STL file: {e}"),
-            "export it again as binary STL",
-        )
+        fail(format!("is not a readable STL file: {e}"), "export it again as binary STL")
     })?;
     let solids = if text { count(bytes, b"endsolid") } else { 1 };
     if solids > 1 {
@@ -67,16 +61,9 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
     let soup = Soup {
         name: String::new(),
         positions: mesh.vertices.iter().map(|v| v.0).collect(),
-        triangles: mesh
-            .faces
-            .iter()
-            .map(|f| f.vertices.map(|i| i as u32))
-            .collect(),
+        triangles: mesh.faces.iter().map(|f| f.vertices.map(|i| i as u32)).collect(),
     };
-    Ok(Parts {
-        parts: vec![soup],
-        issues,
-    })
+    Ok(Parts { parts: vec![soup], issues })
 }
 
 fn declared(bytes: &[u8]) -> Option<usize> {
@@ -102,9 +89,7 @@ mod tests {
         bytes.resize(80, 0);
         bytes.extend(declared.to_le_bytes());
         for t in 0..held {
-            let corners = [
-                0.0, 0.0, 1.0, 0.0, 0.0, t as f32, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0f32,
-            ];
+            let corners = [0.0, 0.0, 1.0, 0.0, 0.0, t as f32, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0f32];
             bytes.extend(corners.iter().flat_map(|v| v.to_le_bytes()));
             bytes.extend([0, 0]);
         }
@@ -122,10 +107,7 @@ mod tests {
     #[test]
     fn a_cut_file_says_how_much_is_missing() {
         let issues = read(Path::new("x.stl"), &binary(b"", 9, 2)).expect_err("cut off");
-        assert!(
-            issues[0].message.contains("9 triangles, it holds 2"),
-            "{issues:?}"
-        );
+        assert!(issues[0].message.contains("9 triangles, it holds 2"), "{issues:?}");
         assert!(read(Path::new("x.stl"), &binary(b"", u32::MAX, 0)).is_err());
         assert!(read(Path::new("x.stl"), b"").is_err());
     }

@@ -48,13 +48,8 @@ pub struct Units(
 
 impl Units {
     /// Names as scene files write them, with the length of each in mm.
-    pub const NAMES: [(&str, f64); 5] = [
-        ("um", 1e-3),
-        ("mm", 1.0),
-        ("cm", 10.0),
-        ("m", 1000.0),
-        ("in", 25.4),
-    ];
+    pub const NAMES: [(&str, f64); 5] =
+        [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4)];
 
     /// The unit called `name`.
     pub fn named(name: &str) -> Option<Self> {
@@ -162,11 +157,7 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
         }
         _ => parts,
     };
-    let default_units = if kind == Some(Kind::Gltf) {
-        1000.0
-    } else {
-        1.0
-    };
+    let default_units = if kind == Some(Kind::Gltf) { 1000.0 } else { 1.0 };
     let units = options.units.unwrap_or(Units(default_units));
     Some((merge(parts, units), units))
 }
@@ -174,12 +165,7 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
 /// Message for a node that a file does not have.
 pub(super) fn no_such_node(path: &Path, node: &str, names: &[String]) -> Issue {
     let remedy = super::suggest::among(node, names.iter().map(String::as_str));
-    Issue::error(
-        path,
-        1,
-        format!("no node or object `{node}` with triangles"),
-        remedy,
-    )
+    Issue::error(path, 1, format!("no node or object `{node}` with triangles"), remedy)
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -216,11 +202,7 @@ pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>, Vec<Issue>> {
     }
     if info.len() > MAX_FILE {
         return Err(fail(
-            format!(
-                "is {} MB, the limit is {} MB",
-                info.len() >> 20,
-                MAX_FILE >> 20
-            ),
+            format!("is {} MB, the limit is {} MB", info.len() >> 20, MAX_FILE >> 20),
             "reduce the mesh or split the file",
         ));
     }
@@ -232,10 +214,7 @@ fn merge(parts: Vec<Soup>, units: Units) -> Soup {
         [one] => one.name.clone(),
         _ => String::new(),
     };
-    let mut all = Soup {
-        name,
-        ..Soup::default()
-    };
+    let mut all = Soup { name, ..Soup::default() };
     for part in parts {
         // Readers keep the sum of all vertices under MAX_ELEMENTS, hence under 2^32.
         let base = all.positions.len() as u32;

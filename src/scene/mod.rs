@@ -178,9 +178,6 @@ impl Scene {
 
     /// Triangles of all placed meshes.
     pub fn triangles(&self) -> usize {
-        self.instances
-            .iter()
-            .map(|i| self.meshes[i.mesh].triangles.len())
-            .sum()
+        self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len()).sum()
     }
 }

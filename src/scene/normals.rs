@@ -33,10 +33,7 @@ pub fn split(soup: &Soup, crease: f32) -> Split {
             fans.unite(corner(soup, s, vertex), corner(soup, t, vertex));
         }
     }
-    let mut out = Split {
-        triangles: Vec::with_capacity(soup.triangles.len()),
-        source: Vec::new(),
-    };
+    let mut out = Split { triangles: Vec::with_capacity(soup.triangles.len()), source: Vec::new() };
     let mut vertex_of_fan = vec![u32::MAX; soup.triangles.len() * 3];
     for (t, triangle) in soup.triangles.iter().enumerate() {
         out.triangles.push([0, 1, 2].map(|k| {
@@ -82,12 +79,7 @@ impl Split {
                 normals[i as usize] = unit.unwrap_or(Vec3::Z).to_array();
             }
         }
-        Mesh {
-            name: name.to_owned(),
-            positions,
-            normals,
-            triangles: self.triangles.clone(),
-        }
+        Mesh { name: name.to_owned(), positions, normals, triangles: self.triangles.clone() }
     }
 }
 
@@ -132,12 +124,7 @@ mod tests {
         // Two triangles sharing the x axis, folded by `degrees`.
         let (sin, cos) = degrees.to_radians().sin_cos();
         Soup {
-            positions: vec![
-                [0.0; 3],
-                [1.0, 0.0, 0.0],
-                [0.5, 1.0, 0.0],
-                [0.5, -cos, -sin],
-            ],
+            positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.5, 1.0, 0.0], [0.5, -cos, -sin]],
             triangles: vec![[0, 1, 2], [1, 0, 3]],
             ..Soup::default()
         }
@@ -154,10 +141,7 @@ mod tests {
         let mesh = shade(&wedge(30.0), 40.0);
         let n = Vec3::from(mesh.normals[0]);
         // Equal corner angles: the bisector, 15 degrees from either face; f32 rounding.
-        assert!(
-            (n.angle_between(Vec3::Z).to_degrees() - 15.0).abs() < 1e-3,
-            "{n}"
-        );
+        assert!((n.angle_between(Vec3::Z).to_degrees() - 15.0).abs() < 1e-3, "{n}");
         assert!((n.length() - 1.0).abs() < 1e-6);
     }
 }

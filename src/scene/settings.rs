@@ -294,24 +294,15 @@ mod tests {
             assert!(more(&standard, &proof) && standard != proof);
         }
         let standard = made(Quality::Standard, Software);
-        assert_eq!(
-            standard,
-            Simulation::default(),
-            "the defaults suit a software driver"
-        );
+        assert_eq!(standard, Simulation::default(), "the defaults suit a software driver");
         assert!(more(&standard, &made(Quality::Standard, Gpu)));
-        assert_eq!(
-            made(Quality::Reference, Software),
-            made(Quality::Reference, Gpu)
-        );
+        assert_eq!(made(Quality::Reference, Software), made(Quality::Reference, Gpu));
     }
 
     #[test]
     fn voxels_keep_their_size() {
-        let mut simulation = Simulation {
-            scatter_mode: ScatterMode::Voxel,
-            ..Simulation::default()
-        };
+        let mut simulation =
+            Simulation { scatter_mode: ScatterMode::Voxel, ..Simulation::default() };
         simulation.set_quality(Quality::Reference, Machine::Gpu);
         assert_eq!(simulation.cell, Simulation::default().cell);
     }

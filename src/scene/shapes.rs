@@ -24,10 +24,7 @@ pub fn ellipsoid(radii: [f64; 3], subdivisions: u32) -> Mesh {
         name: "ellipsoid".to_owned(),
         positions: directions.iter().map(|&d| single(d * radii)).collect(),
         // Gradient of x^2/a^2 + y^2/b^2 + z^2/c^2 at the point a d.
-        normals: directions
-            .iter()
-            .map(|&d| single((d / radii).normalize()))
-            .collect(),
+        normals: directions.iter().map(|&d| single((d / radii).normalize())).collect(),
         triangles,
     }
 }
@@ -35,10 +32,7 @@ pub fn ellipsoid(radii: [f64; 3], subdivisions: u32) -> Mesh {
 /// Cylinder along z with flat ends. Rings along the side keep its triangles well shaped.
 pub fn cylinder(radius: f64, length: f64, segments: u32) -> Mesh {
     let n = segments.max(3);
-    let mut mesh = Mesh {
-        name: "cylinder".to_owned(),
-        ..Mesh::default()
-    };
+    let mut mesh = Mesh { name: "cylinder".to_owned(), ..Mesh::default() };
     let spoke = |i: u32| {
         let (sin, cos) = (TAU * f64::from(i % n) / f64::from(n)).sin_cos();
         DVec3::new(cos, sin, 0.0)
@@ -67,8 +61,7 @@ pub fn cylinder(radius: f64, length: f64, segments: u32) -> Mesh {
         }
         for i in 0..n {
             let (a, b) = (hub + 1 + i, hub + 1 + (i + 1) % n);
-            mesh.triangles
-                .push(if side > 0.0 { [hub, a, b] } else { [hub, b, a] });
+            mesh.triangles.push(if side > 0.0 { [hub, a, b] } else { [hub, b, a] });
         }
     }
     mesh
@@ -77,10 +70,7 @@ pub fn cylinder(radius: f64, length: f64, segments: u32) -> Mesh {
 /// Box with the given edge lengths.
 pub fn cuboid(size: [f64; 3]) -> Mesh {
     let half = DVec3::from(size) / 2.0;
-    let mut mesh = Mesh {
-        name: "box".to_owned(),
-        ..Mesh::default()
-    };
+    let mut mesh = Mesh { name: "box".to_owned(), ..Mesh::default() };
     for axis in 0..3 {
         for side in [-1.0, 1.0] {
             let mut normal = DVec3::ZERO;
@@ -120,12 +110,7 @@ fn push(mesh: &mut Mesh, position: DVec3, normal: DVec3) -> u32 {
 fn icosphere(subdivisions: u32) -> (Vec<DVec3>, Vec<[u32; 3]>) {
     let golden = (1.0 + 5f64.sqrt()) / 2.0;
     let mut points = Vec::new();
-    for (a, b) in [
-        (-1.0, golden),
-        (1.0, golden),
-        (-1.0, -golden),
-        (1.0, -golden),
-    ] {
+    for (a, b) in [(-1.0, golden), (1.0, golden), (-1.0, -golden), (1.0, -golden)] {
         points.push(DVec3::new(a, b, 0.0).normalize());
     }
     for k in 0..4 {
@@ -208,16 +193,8 @@ mod tests {
             positions: places.clone(),
             ..Soup::default()
         };
-        assert!(
-            topology::clean(Path::new("x"), &mut soup, &[]).is_empty(),
-            "{}",
-            mesh.name
-        );
-        assert!(
-            topology::orient(Path::new("x"), &mut soup).is_empty(),
-            "{}",
-            mesh.name
-        );
+        assert!(topology::clean(Path::new("x"), &mut soup, &[]).is_empty(), "{}", mesh.name);
+        assert!(topology::orient(Path::new("x"), &mut soup).is_empty(), "{}", mesh.name);
         assert!(topology::boundary_loops(&soup).is_empty(), "{}", mesh.name);
         for t in &mesh.triangles {
             let [a, b, c] = t.map(|i| glam::Vec3::from(mesh.positions[i as usize]));
@@ -244,11 +221,7 @@ mod tests {
         let exact = 4.0 / 3.0 * PI * 512.0;
         let error = |n| (exact - volume(&sphere(8.0, n))) / exact;
         assert!(error(5) > 0.0 && error(5) < 1e-3, "{}", error(5));
-        assert!(
-            (error(4) / error(5) - 4.0).abs() < 0.05,
-            "{}",
-            error(4) / error(5)
-        );
+        assert!((error(4) / error(5) - 4.0).abs() < 0.05, "{}", error(4) / error(5));
         // Area of the regular polygon times length; f32 positions.
         let polygon = 0.5 * 24.0 * 9.0 * (TAU / 24.0).sin();
         approx::assert_relative_eq!(

@@ -60,57 +60,25 @@ impl Parameter {
         let (key, name, unit, setting) = match self {
             Self::Frequency => ("frequency", "frequency", "MHz", "probe.frequency"),
             Self::Gain => ("gain", "gain", "dB", "imaging.gain"),
-            Self::TgcAttenuation => (
-                "tgc_attenuation",
-                "TGC slope",
-                "dB/cm/MHz",
-                "imaging.tgc_attenuation",
-            ),
-            Self::DynamicRange => (
-                "dynamic_range",
-                "dynamic range",
-                "dB",
-                "imaging.dynamic_range",
-            ),
-            Self::SpeckleGain => (
-                "speckle_gain",
-                "speckle level",
-                "dB",
-                "simulation.speckle_gain",
-            ),
-            Self::DensityScale => (
-                "density_scale",
-                "scatterer density",
-                "",
-                "simulation.density_scale",
-            ),
+            Self::TgcAttenuation => {
+                ("tgc_attenuation", "TGC slope", "dB/cm/MHz", "imaging.tgc_attenuation")
+            }
+            Self::DynamicRange => ("dynamic_range", "dynamic range", "dB", "imaging.dynamic_range"),
+            Self::SpeckleGain => ("speckle_gain", "speckle level", "dB", "simulation.speckle_gain"),
+            Self::DensityScale => {
+                ("density_scale", "scatterer density", "", "simulation.density_scale")
+            }
             Self::LateralPsf => ("psf_lateral", "lateral PSF", "", "imaging.psf_scale"),
             Self::AxialPsf => ("psf_axial", "axial PSF", "", "imaging.psf_scale"),
-            Self::SurfaceGain => (
-                "surface_gain",
-                "surface level",
-                "dB",
-                "simulation.surface_gain",
-            ),
-            Self::RoughnessScale => (
-                "roughness_scale",
-                "roughness exponent",
-                "",
-                "simulation.roughness_scale",
-            ),
-            Self::ThicknessScale => (
-                "thickness_scale",
-                "surface thickness",
-                "",
-                "simulation.thickness_scale",
-            ),
+            Self::SurfaceGain => ("surface_gain", "surface level", "dB", "simulation.surface_gain"),
+            Self::RoughnessScale => {
+                ("roughness_scale", "roughness exponent", "", "simulation.roughness_scale")
+            }
+            Self::ThicknessScale => {
+                ("thickness_scale", "surface thickness", "", "simulation.thickness_scale")
+            }
         };
-        Facts {
-            key,
-            name,
-            unit,
-            setting,
-        }
+        Facts { key, name, unit, setting }
     }
 
     /// Its key in the table `[sweep]` of a scene file.
@@ -242,10 +210,7 @@ mod tests {
     #[test]
     fn captions_name_value_and_unit() {
         assert_eq!(Parameter::Gain.caption(-10.0), "gain -10 dB");
-        assert_eq!(
-            Parameter::AxialPsf.caption(2.0 / 3.0),
-            "axial PSF \u{d7} 0.6667"
-        );
+        assert_eq!(Parameter::AxialPsf.caption(2.0 / 3.0), "axial PSF \u{d7} 0.6667");
         assert_eq!(short(f64::NEG_INFINITY), "-inf");
     }
 }

@@ -75,11 +75,7 @@ pub fn volume(soup: &Soup) -> f64 {
         return 0.0;
     };
     let origin = DVec3::from(first.map(f64::from));
-    let sum: f64 = soup
-        .triangles
-        .iter()
-        .map(|&t| six_volumes(soup, t, origin))
-        .sum();
+    let sum: f64 = soup.triangles.iter().map(|&t| six_volumes(soup, t, origin)).sum();
     sum / 6.0
 }
 
@@ -89,8 +85,7 @@ pub fn clean(path: &Path, soup: &mut Soup, others: &[Vec<[f32; 3]>]) -> Vec<Issu
     let mut issues = Vec::new();
     let before = soup.triangles.len();
     let positions = &soup.positions;
-    soup.triangles
-        .retain(|t| has_area(*t, positions) || others.iter().any(|p| has_area(*t, p)));
+    soup.triangles.retain(|t| has_area(*t, positions) || others.iter().any(|p| has_area(*t, p)));
     let degenerate = before - soup.triangles.len();
     if degenerate > 0 {
         issues.push(Issue::warning(
@@ -182,10 +177,7 @@ pub fn cap(path: &Path, soup: &mut Soup) -> (Vec<Vec<u32>>, Vec<Issue>) {
     let mut issues = vec![Issue::warning(
         path,
         loops.len(),
-        format!(
-            "{} openings were closed by flat fans (cap_openings)",
-            loops.len()
-        ),
+        format!("{} openings were closed by flat fans (cap_openings)", loops.len()),
         "",
     )];
     issues.extend(orient(path, soup));
@@ -198,26 +190,12 @@ pub(super) mod tests {
 
     /// A unit cube, corner at the origin, outward.
     pub fn cube() -> Soup {
-        let positions = (0..8)
-            .map(|i| [(i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32])
-            .collect();
-        let quads = [
-            [0, 2, 3, 1],
-            [4, 5, 7, 6],
-            [0, 1, 5, 4],
-            [2, 6, 7, 3],
-            [0, 4, 6, 2],
-            [1, 3, 7, 5],
-        ];
-        let triangles = quads
-            .iter()
-            .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-            .collect();
-        Soup {
-            positions,
-            triangles,
-            ..Soup::default()
-        }
+        let positions =
+            (0..8).map(|i| [(i & 1) as f32, (i >> 1 & 1) as f32, (i >> 2) as f32]).collect();
+        let quads =
+            [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        Soup { positions, triangles, ..Soup::default() }
     }
 
     fn kinds(issues: &[Issue]) -> Vec<usize> {
@@ -258,19 +236,10 @@ pub(super) mod tests {
     fn one_inverted_body_among_several_is_reported() {
         let mut soup = cube();
         let second = cube();
-        soup.positions
-            .extend(second.positions.iter().map(|p| p.map(|v| v * 0.5 + 3.0)));
-        soup.triangles.extend(
-            second
-                .triangles
-                .iter()
-                .map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]),
-        );
+        soup.positions.extend(second.positions.iter().map(|p| p.map(|v| v * 0.5 + 3.0)));
+        soup.triangles.extend(second.triangles.iter().map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]));
         let issues = orient(Path::new("x"), &mut soup);
-        assert!(
-            issues[0].message.contains("1 of 2 closed bodies"),
-            "{issues:?}"
-        );
+        assert!(issues[0].message.contains("1 of 2 closed bodies"), "{issues:?}");
     }
 
     #[test]
@@ -298,10 +267,8 @@ pub(super) mod tests {
         let n = 12u32;
         let positions = (0..2 * n)
             .map(|i| {
-                let (angle, side) = (
-                    f64::from(i / 2) / f64::from(n) * std::f64::consts::TAU,
-                    i % 2,
-                );
+                let (angle, side) =
+                    (f64::from(i / 2) / f64::from(n) * std::f64::consts::TAU, i % 2);
                 let w = if side == 0 { 0.3 } else { -0.3 };
                 let r = 1.0 + w * (angle / 2.0).cos();
                 [r * angle.cos(), r * angle.sin(), w * (angle / 2.0).sin()].map(|v| v as f32)
@@ -313,15 +280,8 @@ pub(super) mod tests {
             let (c, d) = if i + 1 < n { (a + 2, b + 2) } else { (1, 0) };
             triangles.extend([[a, b, d], [a, d, c]]);
         }
-        let mut soup = Soup {
-            positions,
-            triangles,
-            ..Soup::default()
-        };
+        let mut soup = Soup { positions, triangles, ..Soup::default() };
         let issues = orient(Path::new("x"), &mut soup);
-        assert!(
-            issues.iter().any(|i| i.message.contains("one-sided")),
-            "{issues:?}"
-        );
+        assert!(issues.iter().any(|i| i.message.contains("one-sided")), "{issues:?}");
     }
 }

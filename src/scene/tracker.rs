@@ -80,19 +80,14 @@ pub fn rigid(transform: DAffine3) -> Result<DAffine3, String> {
     let off = (m.transpose() * m - DMat3::IDENTITY).to_cols_array();
     let off = off.iter().fold(0.0, |worst: f64, x| worst.max(x.abs()));
     if off > RIGID {
-        return Err(format!(
-            "its axes are no unit vectors at right angles (off by {off:.2})"
-        ));
+        return Err(format!("its axes are no unit vectors at right angles (off by {off:.2})"));
     }
     if m.determinant() < 0.0 {
         return Err("it mirrors".to_owned());
     }
     let x = m.x_axis.normalize();
     let y = (m.y_axis - x * x.dot(m.y_axis)).normalize();
-    Ok(DAffine3::from_mat3_translation(
-        DMat3::from_cols(x, y, x.cross(y)),
-        transform.translation,
-    ))
+    Ok(DAffine3::from_mat3_translation(DMat3::from_cols(x, y, x.cross(y)), transform.translation))
 }
 
 #[cfg(test)]
@@ -113,10 +108,7 @@ mod tests {
         );
         let probe = tracker.world_from_probe(tool);
         let (face, depth) = (probe.translation, probe.transform_vector3(DVec3::Z));
-        assert!(
-            (face - DVec3::new(101.0, 32.0, 3.0)).length() < 1e-12,
-            "{face}"
-        );
+        assert!((face - DVec3::new(101.0, 32.0, 3.0)).length() < 1e-12, "{face}");
         assert!((depth - DVec3::Y).length() < 1e-12, "{depth}");
     }
 
@@ -141,14 +133,8 @@ mod tests {
             (DAffine3::from_scale(DVec3::splat(1.01)), "right angles"),
             (DAffine3::from_mat3(DMat3::ZERO), "right angles"),
             (DAffine3::from_scale(DVec3::new(1.0, 1.0, -1.0)), "mirrors"),
-            (
-                DAffine3::from_translation(DVec3::new(f64::NAN, 0.0, 0.0)),
-                "finite",
-            ),
-            (
-                DAffine3::from_translation(DVec3::new(2e5, 0.0, 0.0)),
-                "mm from",
-            ),
+            (DAffine3::from_translation(DVec3::new(f64::NAN, 0.0, 0.0)), "finite"),
+            (DAffine3::from_translation(DVec3::new(2e5, 0.0, 0.0)), "mm from"),
         ] {
             let said = rigid(wrong).expect_err(why);
             assert!(said.contains(why), "{said}");

@@ -206,13 +206,7 @@ impl SceneBvh {
         // A tree never has more nodes than primitives.
         let mut nodes = vec![[0; 20]; 1 + capacity + capacity.div_ceil(20)];
         nodes[0][..2].copy_from_slice(&[NONE, 1 + capacity as u32]);
-        Self {
-            nodes,
-            slots: Vec::new(),
-            top: Bvh2::default(),
-            deepest: 0,
-            capacity,
-        }
+        Self { nodes, slots: Vec::new(), top: Bvh2::default(), deepest: 0, capacity }
     }
 
     /// A scene of meshes, whose leaf-ordered triangles begin at `first_triangles`, with room for
@@ -247,8 +241,7 @@ impl SceneBvh {
 
     /// Forgets the meshes' trees, once the device has them; the top level stays.
     pub fn forget_meshes(&mut self) {
-        self.nodes
-            .truncate(self.table() + self.capacity.div_ceil(20));
+        self.nodes.truncate(self.table() + self.capacity.div_ceil(20));
         self.nodes.shrink_to_fit();
     }
 
@@ -264,10 +257,8 @@ impl SceneBvh {
     /// When the kernel's stack could overflow.
     pub fn place(&mut self, placed: &[Placed], refit: bool) -> Result<&[Node], BvhError> {
         assert!(placed.len() <= self.capacity, "more places than reserved");
-        let boxes: Vec<Aabb> = placed
-            .iter()
-            .map(|p| world_box(p.bounds, &p.world_from_object))
-            .collect();
+        let boxes: Vec<Aabb> =
+            placed.iter().map(|p| world_box(p.bounds, &p.world_from_object)).collect();
         if refit && self.top.primitives_to_nodes.len() == boxes.len() {
             for (node, bounds) in self.top.primitives_to_nodes.iter().zip(&boxes) {
                 self.top.nodes[*node as usize].set_aabb(*bounds);
@@ -307,11 +298,7 @@ fn top_tree(boxes: &[Aabb]) -> Bvh2 {
     if boxes.is_empty() {
         return Bvh2::default();
     }
-    let params = BvhBuildParams {
-        max_prims_per_leaf: 1,
-        reinsertion_batch_ratio: 1.0,
-        ..MESH
-    };
+    let params = BvhBuildParams { max_prims_per_leaf: 1, reinsertion_batch_ratio: 1.0, ..MESH };
     let mut tree = build_bvh2(boxes, params, &mut Duration::default());
     tree.update_primitives_to_nodes();
     tree
@@ -321,18 +308,11 @@ fn top_tree(boxes: &[Aabb]) -> Bvh2 {
 /// transforms (a few ulps of the largest coordinate that enters).
 fn world_box([lo, hi]: [[f32; 3]; 2], world_from_object: &DAffine3) -> Aabb {
     let corners = (0..8).map(|i| {
-        let pick = |axis: usize| {
-            f64::from(if i >> axis & 1 == 0 {
-                lo[axis]
-            } else {
-                hi[axis]
-            })
-        };
+        let pick = |axis: usize| f64::from(if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] });
         world_from_object.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
     });
-    let (min, max) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| {
-        (a.min(p), b.max(p))
-    });
+    let (min, max) =
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(a, b), p| (a.min(p), b.max(p)));
     let margin = DVec3::splat(2e-6 * min.abs().max(max.abs()).max_element());
     Aabb::new((min - margin).as_vec3a(), (max + margin).as_vec3a())
 }

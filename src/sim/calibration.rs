@@ -41,9 +41,7 @@ pub fn lateral_taps(lines: f64) -> Vec<f64> {
 }
 
 fn gaussian_taps(sigma: f64, radius: i32) -> Vec<f64> {
-    (0..=radius)
-        .map(|j| (-f64::from(j * j) / (2.0 * sigma * sigma)).exp())
-        .collect()
+    (0..=radius).map(|j| (-f64::from(j * j) / (2.0 * sigma * sigma)).exp()).collect()
 }
 
 /// Autocorrelation at lag `m` of a symmetric kernel given by its right half.
@@ -69,11 +67,7 @@ impl<'a> Calibration<'a> {
         // A pulse much narrower than a sample cannot be represented.
         let axial_sigma = samples.max(0.1);
         let radius = ((4.0 * axial_sigma).ceil() as i32).min(32);
-        Self {
-            scene,
-            axial_sigma,
-            axial_taps: gaussian_taps(axial_sigma, radius),
-        }
+        Self { scene, axial_sigma, axial_taps: gaussian_taps(axial_sigma, radius) }
     }
 
     /// Two-way lateral sigma at depth `z`, mm, with the user's scale.
@@ -132,10 +126,7 @@ impl<'a> Calibration<'a> {
     /// Sum over the layers of a surface echo's weights exp(-y_e^2 / 2 sigma_e^2).
     pub fn elevation_weights(&self, z: f64) -> f64 {
         let sigma = self.sigma_elevation(z);
-        let sum: f64 = self
-            .elevations()
-            .map(|y| (-y * y / (2.0 * sigma * sigma)).exp())
-            .sum();
+        let sum: f64 = self.elevations().map(|y| (-y * y / (2.0 * sigma * sigma)).exp()).sum();
         sum.max(1e-12)
     }
 
@@ -156,16 +147,12 @@ impl<'a> Calibration<'a> {
         };
         let probe = &self.scene.probe;
         let sigma = self.sigma_elevation(z);
-        let layers: Vec<f64> = self
-            .elevations()
-            .map(|y| (-y * y / (2.0 * sigma * sigma)).exp())
-            .collect();
+        let layers: Vec<f64> =
+            self.elevations().map(|y| (-y * y / (2.0 * sigma * sigma)).exp()).collect();
         let half = lateral_taps(self.lateral_lines(z));
         let lines: Vec<f64> = half.iter().skip(1).rev().chain(&half).copied().collect();
         let layer_pitch = probe.slice_thickness / f64::from(probe.elevation_layers);
-        (kept(&layers, layer_pitch) * kept(&lines, probe.line_pitch(z)))
-            .sqrt()
-            .recip()
+        (kept(&layers, layer_pitch) * kept(&lines, probe.line_pitch(z))).sqrt().recip()
     }
 
     /// Energy of the whole two-way beam across and up, pi sigma_x sigma_e, over what the layers hear of
@@ -218,11 +205,7 @@ impl<'a> Calibration<'a> {
             && simulation.origin_jitter <= 0.0
             && simulation.emission_lobe == f64::INFINITY
             && !simulation.rough_transmission;
-        let share = if alike {
-            1.0
-        } else {
-            f64::from(simulation.paths.max(1))
-        };
+        let share = if alike { 1.0 } else { f64::from(simulation.paths.max(1)) };
         (level / share).log2()
     }
 
@@ -301,10 +284,7 @@ impl<'a> Calibration<'a> {
                     .map(|m| pair(m) * same(m as f64 * pitch) * autocorrelation(&taps, m))
                     .sum();
                 let sigma = self.sigma_elevation(z);
-                let layers: f64 = self
-                    .elevations()
-                    .map(|y| (-y * y / (sigma * sigma)).exp())
-                    .sum();
+                let layers: f64 = self.elevations().map(|y| (-y * y / (sigma * sigma)).exp()).sum();
                 // Voxels far longer than the pulse hold next to nothing at the carrier; they may
                 // be dark rather than amplified without limit.
                 axial.max(0.01 * self.axial_energy(0)) * lateral * layers.max(1e-12)

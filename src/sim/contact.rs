@@ -48,10 +48,8 @@ impl Coupling {
             for row in 0..ROWS {
                 let share = |i: u32, count: u32| (f64::from(i) + 0.5) / f64::from(count) - 0.5;
                 let (point, normal) = probe.face(share(column, columns), share(row, ROWS));
-                let (point, normal) = (
-                    place.transform_point3(point),
-                    place.transform_vector3(normal),
-                );
+                let (point, normal) =
+                    (place.transform_point3(point), place.transform_vector3(normal));
                 let gap = skin.gap(point, normal);
                 if gap.is_some_and(|gap| gap <= contact.gel) {
                     coupled[(column / per_element) as usize] += 1;

@@ -30,10 +30,7 @@ pub enum DumpError {
 
 impl DumpError {
     fn file(path: &Path, cause: impl ToString) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            cause: cause.to_string(),
-        }
+        Self::File { path: path.to_owned(), cause: cause.to_string() }
     }
 }
 

@@ -74,14 +74,9 @@ impl Fields {
     /// squeeze. Others have none.
     pub fn build(scene: &Scene) -> Self {
         let rests = scene.graph.rests(scene.instances.len());
-        let made: Vec<Option<Made>> = (0..scene.instances.len())
-            .into_par_iter()
-            .map(|i| make(scene, i, &rests))
-            .collect();
-        let mut fields = Self {
-            rests,
-            ..Self::default()
-        };
+        let made: Vec<Option<Made>> =
+            (0..scene.instances.len()).into_par_iter().map(|i| make(scene, i, &rests)).collect();
+        let mut fields = Self { rests, ..Self::default() };
         for made in made {
             let slots = made.map(|made| fields.append(&made));
             fields.slots.push(slots);
@@ -113,11 +108,7 @@ impl Fields {
             Some(displacements) => self.values.extend_from_slice(displacements),
             None => self.values.resize(self.values.len() + nodes, [0.0; 3]),
         }
-        Slots {
-            first,
-            stride: HEADER + nodes as u32,
-            blended,
-        }
+        Slots { first, stride: HEADER + nodes as u32, blended }
     }
 
     /// What the kernels bind: a buffer is never empty.
@@ -155,9 +146,7 @@ impl Fields {
         let slots = self.slots[i].filter(|_| between)?;
         let at = |keyframe: usize| slots.first + keyframe as u32 * slots.stride + HEADER;
         Some(Blend {
-            sources: keyframes
-                .blend
-                .map(|(keyframe, weight)| (at(keyframe), weight)),
+            sources: keyframes.blend.map(|(keyframe, weight)| (at(keyframe), weight)),
             target: slots.blended + HEADER,
             count: slots.stride - HEADER,
         })
@@ -229,9 +218,8 @@ struct Made {
 
 /// Meshes of an instance's keyframes, where a vertex is the same tissue point in all of them.
 fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>> {
-    let meshes: Vec<&Mesh> = (instance.keyframes.meshes.iter())
-        .map(|&m| &scene.meshes[m])
-        .collect();
+    let meshes: Vec<&Mesh> =
+        (instance.keyframes.meshes.iter()).map(|&m| &scene.meshes[m]).collect();
     let (reference, others) = meshes.split_first()?;
     let same = |mesh: &&Mesh| mesh.shares_topology(reference);
     let moves = |mesh: &&Mesh| mesh.positions != reference.positions;
@@ -252,35 +240,23 @@ fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made>
         rests[index]?;
         let shown = instance.keyframes.meshes.iter().chain([&instance.mesh]);
         let all = shown.flat_map(|&mesh| vertices(&scene.meshes[mesh]));
-        return Some(Made {
-            grid: Grid::one_cell(all),
-            keyframes: Vec::new(),
-        });
+        return Some(Made { grid: Grid::one_cell(all), keyframes: Vec::new() });
     };
-    let patch = |i: usize, meshes| Patch {
-        meshes,
-        texture_from_object: texture_from_world * rest(i),
-    };
+    let patch =
+        |i: usize, meshes| Patch { meshes, texture_from_object: texture_from_world * rest(i) };
     let grid = Grid::around(vertices(own[0]).into_iter());
     let count = own.len();
     let group = instance.keyframes.group;
-    let others = scene
-        .instances
-        .iter()
-        .enumerate()
-        .filter(|(other, placed)| {
-            *other != index && group.is_some() && placed.keyframes.group == group
-        });
+    let others = scene.instances.iter().enumerate().filter(|(other, placed)| {
+        *other != index && group.is_some() && placed.keyframes.group == group
+    });
     let mut patches: Vec<Patch<'_>> = others
         .filter_map(|(i, placed)| Some(patch(i, keyframes(scene, placed)?)))
         .filter(|patch| patch.meshes.len() == count)
         .collect();
     patches.push(patch(index, own));
     let solver = Solver::new(&grid, &patches);
-    let keyframes = (0..count)
-        .into_par_iter()
-        .map(|k| solver.displacements(k))
-        .collect();
+    let keyframes = (0..count).into_par_iter().map(|k| solver.displacements(k)).collect();
     Some(Made { grid, keyframes })
 }
 

@@ -293,12 +293,7 @@ impl Fused {
                 &self.kernels.blur,
                 [width, height.div_ceil(layout::BLUR_SUMS), 1],
                 bytemuck::bytes_of(&turned),
-                &[
-                    buffer(frame),
-                    buffer(&self.constants),
-                    buffer(source),
-                    buffer(sums),
-                ],
+                &[buffer(frame), buffer(&self.constants), buffer(source), buffer(sums)],
             )?;
         }
         Ok(())

@@ -24,11 +24,7 @@ pub use statistics::{DEVELOPED, Level, Statistics, Width, depths};
 /// Settings nearer than this to those proposed are left alone, so that matching what is matched changes
 /// nothing: level in dB, dynamic range and sizes relative. All are finer than statistics of a few
 /// hundred patches of speckle know them.
-const SETTLED: adjust::Change = adjust::Change {
-    level: 0.3,
-    range: 0.01,
-    size: 0.02,
-};
+const SETTLED: adjust::Change = adjust::Change { level: 0.3, range: 0.01, size: 0.02 };
 /// Most rounds. Each proposal would be exact, but for clipping and for the sampling of narrow beams.
 const ROUNDS: usize = 8;
 /// Rounds after which only half of a proposal is taken: clipping may make them overshoot in turns.
@@ -113,10 +109,7 @@ pub enum MatchError {
 }
 
 fn nothing(cause: impl Into<String>, remedy: &str) -> MatchError {
-    MatchError::Nothing {
-        cause: cause.into(),
-        remedy: remedy.to_owned(),
-    }
+    MatchError::Nothing { cause: cause.into(), remedy: remedy.to_owned() }
 }
 
 /// Changes `scene.imaging` until the simulation looks like the acquired volume near the mask's border.
@@ -169,13 +162,8 @@ fn settle(
                 "widen --band, change gain until speckle shows inside the mask, or move the mask",
             ));
         }
-        let (imaging, mut notes) = proposal(
-            &scene.probe,
-            &stage.imaging,
-            &stage.simulated,
-            &acquired,
-            options.adjusted,
-        );
+        let (imaging, mut notes) =
+            proposal(&scene.probe, &stage.imaging, &stage.simulated, &acquired, options.adjusted);
         let places = depths(&scene.probe);
         let places: Vec<f64> = compared.iter().map(|&i| places[i]).collect();
         let change = change(&scene.probe, &imaging, &stage.imaging, &places);
@@ -208,24 +196,9 @@ fn settle(
 fn unmeasured(a: &Statistics, b: &Statistics, adjusted: Adjusted, notes: &mut Vec<String>) {
     let here = |w: Option<Width>| w.is_some_and(|w| !w.open);
     for (wanted, what, simulated, acquired) in [
-        (
-            adjusted.range,
-            "dynamic_range",
-            a.spread.is_some(),
-            b.spread.is_some(),
-        ),
-        (
-            adjusted.size,
-            "psf_scale (axial)",
-            here(a.axial),
-            b.axial.is_some(),
-        ),
-        (
-            adjusted.size,
-            "psf_scale (lateral)",
-            here(a.lateral),
-            b.lateral.is_some(),
-        ),
+        (adjusted.range, "dynamic_range", a.spread.is_some(), b.spread.is_some()),
+        (adjusted.size, "psf_scale (axial)", here(a.axial), b.axial.is_some()),
+        (adjusted.size, "psf_scale (lateral)", here(a.lateral), b.lateral.is_some()),
     ] {
         let side = match (simulated, acquired) {
             (true, true) => continue,
@@ -313,10 +286,7 @@ fn simulate(
         "of the simulation inside the mask",
         "widen --band, let the mask enclose tissue that echoes, or raise the gain",
     )?;
-    Ok(Stage {
-        imaging: scene.imaging.clone(),
-        simulated,
-    })
+    Ok(Stage { imaging: scene.imaging.clone(), simulated })
 }
 
 fn add_simulated(
@@ -331,9 +301,8 @@ fn add_simulated(
     let calibration = Calibration::new(scene);
     let axial = probe.sigma_axial() * imaging.psf_scale[0];
     let depth = |k: usize| k as f64 * probe.sample_pitch();
-    let mut chosen = bands.inside(width, |k| {
-        (MARGIN.0 * calibration.sigma_lateral(depth(k))).max(MARGIN.1 * axial)
-    });
+    let mut chosen = bands
+        .inside(width, |k| (MARGIN.0 * calibration.sigma_lateral(depth(k))).max(MARGIN.1 * axial));
     let floor: Vec<f32> = (0..probe.samples as usize)
         .map(|k| {
             let noise = imaging.noise + imaging.gain + calibration.tgc_db(depth(k)) + ABOVE_NOISE;

@@ -286,13 +286,8 @@ impl Simulator {
         self.frames.wait()?;
         let shapers = world::Kernels::new(&self.device, library)?;
         let world = &self.passes.world;
-        let kernels = Kernels::new(
-            &self.device,
-            library,
-            &self.passes.batches.rounds,
-            world,
-            self.counting,
-        )?;
+        let kernels =
+            Kernels::new(&self.device, library, &self.passes.batches.rounds, world, self.counting)?;
         if let Some(fusion) = &mut self.passes.fusion {
             fusion.reload(&self.device, library, world.tracer())?;
         }
@@ -330,10 +325,7 @@ impl Simulator {
     /// What the scene takes of the device's memory.
     pub fn memory(&self) -> Memory {
         let fusion = self.passes.fusion.as_ref();
-        Memory {
-            volume: fusion.map_or(0, Fused::volume_bytes),
-            ..self.passes.world.memory()
-        }
+        Memory { volume: fusion.map_or(0, Fused::volume_bytes), ..self.passes.world.memory() }
     }
 
     /// Waits for the frames in flight; their timings, oldest first.
@@ -361,10 +353,7 @@ impl Simulator {
     /// # Errors
     /// What Vulkan says.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
-        let (width, height) = (
-            self.passes.frame.image_width,
-            self.passes.frame.image_height,
-        );
+        let (width, height) = (self.passes.frame.image_width, self.passes.frame.image_height);
         let mut bytes = vec![0; 4 * width as usize * height as usize];
         match self.read_out.take() {
             Some(copy) => self.frames.read(copy, &mut bytes)?,
@@ -388,9 +377,7 @@ impl Simulator {
     /// What Vulkan says.
     pub fn counters(&mut self) -> Result<layout::Counters, SimError> {
         let bytes = self.read(|b| &b.counters)?;
-        Ok(bytemuck::pod_read_unaligned(
-            &bytes[..size_of::<layout::Counters>()],
-        ))
+        Ok(bytemuck::pod_read_unaligned(&bytes[..size_of::<layout::Counters>()]))
     }
 
     /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K].
@@ -414,9 +401,7 @@ impl Simulator {
             bytemuck::pod_collect_to_vec(&self.read(|b| &b.segments)?);
         let capacity = self.passes.frame.segment_capacity as usize;
         let lines = segments.chunks(capacity).zip(&counts);
-        Ok(lines
-            .map(|(line, &count)| line[..capacity.min(count as usize)].to_vec())
-            .collect())
+        Ok(lines.map(|(line, &count)| line[..capacity.min(count as usize)].to_vec()).collect())
     }
 
     /// Echoes after the lateral stage, with noise, before the axial kernel: complex pairs, [L][K].

@@ -38,10 +38,8 @@ impl Passes {
         let began = Instant::now();
         self.world.update(cmd, scene)?;
         // A frame of fewer lines than the buffers were made for must not want more segments.
-        let room = Room {
-            segments: self.buffers.segments.size(),
-            at_once: self.batches.rounds.at_once,
-        };
+        let room =
+            Room { segments: self.buffers.segments.size(), at_once: self.batches.rounds.at_once };
         (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, &room);
         cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
@@ -61,12 +59,7 @@ impl Passes {
 
     pub(super) fn clear(&self, cmd: &mut Commands) {
         let b = &self.buffers;
-        for buffer in [
-            &b.surface_echoes,
-            &b.volume_echoes,
-            &b.segment_count,
-            &b.counters,
-        ] {
+        for buffer in [&b.surface_echoes, &b.volume_echoes, &b.segment_count, &b.counters] {
             cmd.fill(buffer, 0);
         }
         cmd.barrier(Stage::Transfer, Stage::Compute);
@@ -145,11 +138,7 @@ impl Passes {
     pub(super) fn scatter(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let (b, w) = (&self.buffers, &self.world);
         // Lists of many paths are shared among workgroups: each clears and flushes its own window.
-        let chunks = self
-            .batches
-            .paths_with_segments(&self.frame)
-            .div_ceil(8)
-            .clamp(1, 16);
+        let chunks = self.batches.paths_with_segments(&self.frame).div_ceil(8).clamp(1, 16);
         let bindings = [
             &b.frame,
             &b.tissues,
@@ -169,11 +158,7 @@ impl Passes {
         cmd.scope("scatter");
         cmd.dispatch_groups(
             &self.kernels.scatter,
-            [
-                self.frame.scanlines,
-                chunks,
-                self.frame.samples.div_ceil(layout::SCATTER_WINDOW),
-            ],
+            [self.frame.scanlines, chunks, self.frame.samples.div_ceil(layout::SCATTER_WINDOW)],
             &[],
             &bindings[..bound],
         )?;
@@ -192,19 +177,13 @@ impl Passes {
             &b.lateral,
             &b.contact,
         ];
-        let threads = [
-            self.frame.samples,
-            self.frame.scanlines.div_ceil(layout::BEAM_LINES),
-        ];
+        let threads = [self.frame.samples, self.frame.scanlines.div_ceil(layout::BEAM_LINES)];
         self.per_sample(cmd, &self.kernels.beam, threads, &bindings)
     }
 
     pub(super) fn axial(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         let b = &self.buffers;
-        let threads = [
-            self.frame.samples.div_ceil(layout::AXIAL_SAMPLES),
-            self.frame.scanlines,
-        ];
+        let threads = [self.frame.samples.div_ceil(layout::AXIAL_SAMPLES), self.frame.scanlines];
         let bindings = [&b.frame, &b.rows, &b.lateral, &b.iq, &b.log_image];
         self.per_sample(cmd, &self.kernels.axial, threads, &bindings)
     }

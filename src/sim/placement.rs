@@ -6,14 +6,7 @@ use super::layout::Rows;
 
 /// Rows of a 3x4 matrix, rounded to single precision.
 pub fn rows(matrix: &DAffine3) -> Rows {
-    std::array::from_fn(|i| {
-        matrix
-            .matrix3
-            .row(i)
-            .extend(matrix.translation[i])
-            .as_vec4()
-            .into()
-    })
+    std::array::from_fn(|i| matrix.matrix3.row(i).extend(matrix.translation[i]).as_vec4().into())
 }
 
 /// The rigid transform next to `matrix`: the proper rotation of its polar decomposition, and its
@@ -28,19 +21,13 @@ pub fn rigid(matrix: &DAffine3) -> DAffine3 {
     rotation *= 1.0 / rotation.determinant().cbrt();
     for _ in 0..64 {
         let next = (rotation + rotation.inverse().transpose()) * 0.5;
-        let change = (next - rotation)
-            .to_cols_array()
-            .iter()
-            .fold(0.0_f64, |m, x| m.max(x.abs()));
+        let change = (next - rotation).to_cols_array().iter().fold(0.0_f64, |m, x| m.max(x.abs()));
         rotation = next;
         if change < 1e-14 {
             break;
         }
     }
-    DAffine3 {
-        matrix3: rotation,
-        translation: matrix.translation,
-    }
+    DAffine3 { matrix3: rotation, translation: matrix.translation }
 }
 
 #[cfg(test)]
@@ -63,10 +50,7 @@ mod tests {
             let symmetric = DMat3::from_diagonal(scale)
                 + DMat3::from_cols(DVec3::Y * shear, DVec3::X * shear, DVec3::ZERO);
             for sign in [1.0, -1.0] {
-                let placed = DAffine3 {
-                    matrix3: rotation * symmetric * sign,
-                    translation,
-                };
+                let placed = DAffine3 { matrix3: rotation * symmetric * sign, translation };
                 let found = rigid(&placed);
                 // 64-bit rounding of a 3x3 inverse with condition 4000.
                 assert!(

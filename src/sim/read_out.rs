@@ -27,9 +27,7 @@ impl ReadOut {
         let size = pixels.size();
         let copy = match self.copy.take().filter(|copy| copy.size() >= size) {
             Some(copy) => copy,
-            None => cmd
-                .device()
-                .buffer("image read out", size, BufferKind::Readback)?,
+            None => cmd.device().buffer("image read out", size, BufferKind::Readback)?,
         };
         cmd.copy((pixels, 0), (&copy, 0), size)?;
         cmd.barrier(Stage::Transfer, Stage::Host);

@@ -63,32 +63,16 @@ fn holds(b: &Buffers, frame: &layout::Frame, rounds: &Rounds, tables: &Tables) -
     let segments = lines * u64::from(frame.segment_capacity);
     let pixels = u64::from(frame.image_width) * u64::from(frame.image_height);
     [
-        (
-            &b.scanlines,
-            tables.scanlines.len() as u64,
-            size_of::<layout::Scanline>(),
-        ),
+        (&b.scanlines, tables.scanlines.len() as u64, size_of::<layout::Scanline>()),
         (&b.rows, tables.rows.len() as u64, size_of::<layout::Row>()),
-        (
-            &b.tissues,
-            tables.tissues.len() as u64,
-            size_of::<layout::Tissue>(),
-        ),
-        (
-            &b.surfaces,
-            tables.surfaces.len() as u64,
-            size_of::<layout::Surface>(),
-        ),
+        (&b.tissues, tables.tissues.len() as u64, size_of::<layout::Tissue>()),
+        (&b.surfaces, tables.surfaces.len() as u64, size_of::<layout::Surface>()),
         (&b.points, tables.points.len() as u64, 16),
         (&b.contact, 2 * u64::from(frame.scanlines) + 1, 4),
         (&b.stacks, lines * layout::START_WORDS as u64, 4),
         (&b.segments, segments, size_of::<layout::Segment>()),
         (&b.segment_count, lines, 4),
-        (
-            &b.interactions,
-            rounds.interactions(),
-            size_of::<layout::Interaction>(),
-        ),
+        (&b.interactions, rounds.interactions(), size_of::<layout::Interaction>()),
         (&b.interaction_count, rounds.main_paths(), 4),
         (&b.iq, samples, 8),
         (&b.pixels, pixels, 4),

@@ -131,11 +131,7 @@ impl Rounds {
             let most = 2 * pieces.div_ceil(workers);
             let push = [begin, count, line, lines, pieces, most, *turn];
             *turn ^= 1;
-            Round {
-                role,
-                push,
-                workers,
-            }
+            Round { role, push, workers }
         };
         if self.mains == 0 {
             return vec![round(ROLE_WHOLE, count, 0, all, count)];
@@ -205,10 +201,7 @@ mod tests {
             assert!(most(&all) <= Some(64 * MOST_GROUPS));
             // Each dispatch leaves the other counter at zero for the next one.
             assert!(
-                taken
-                    .iter()
-                    .zip([0, 1].into_iter().cycle())
-                    .all(|(r, turn)| r.push[6] == turn)
+                taken.iter().zip([0, 1].into_iter().cycle()).all(|(r, turn)| r.push[6] == turn)
             );
             // Main paths are there before their branches.
             let roles: Vec<u32> = taken.iter().map(|r| r.role).collect();

@@ -39,11 +39,7 @@ pub fn dawson(x: f64) -> f64 {
 
 /// Normalised sinc sin(pi x) / (pi x).
 pub fn sinc(x: f64) -> f64 {
-    if x.abs() < 1e-9 {
-        1.0
-    } else {
-        (PI * x).sin() / (PI * x)
-    }
+    if x.abs() < 1e-9 { 1.0 } else { (PI * x).sin() / (PI * x) }
 }
 
 /// |E exp(i k q)| for a half-normal q of scale `tau`: exp(-a^2/2) |1 + i erfi(a/sqrt 2)| with
@@ -76,11 +72,7 @@ mod tests {
     #[test]
     fn dawson_equals_tabulated_values_and_joins_its_asymptote() {
         // Abramowitz and Stegun, table 7.5.
-        for (x, y) in [
-            (0.5, 0.424_436_384),
-            (1.0, 0.538_079_507),
-            (2.0, 0.301_340_389),
-        ] {
+        for (x, y) in [(0.5, 0.424_436_384), (1.0, 0.538_079_507), (2.0, 0.301_340_389)] {
             assert!((dawson(x) - y).abs() < 1e-8, "D({x}) = {}", dawson(x));
         }
         let (below, above) = (dawson(6.0 - 1e-9), dawson(6.0 + 1e-9));
@@ -90,13 +82,7 @@ mod tests {
     #[test]
     fn coherence_at_seven_megahertz() {
         let k = 4.0 * PI * 7.0 / 1.54;
-        for (tau, gamma) in [
-            (0.0, 1.0),
-            (0.02, 0.80),
-            (0.05, 0.34),
-            (0.1, 0.14),
-            (0.3, 0.05),
-        ] {
+        for (tau, gamma) in [(0.0, 1.0), (0.02, 0.80), (0.05, 0.34), (0.1, 0.14), (0.3, 0.05)] {
             let got = half_normal_coherence(k, tau);
             assert!((got - gamma).abs() < 0.006, "tau {tau}: {got}");
         }

@@ -24,10 +24,7 @@ pub(super) struct Room {
 impl Room {
     /// On a device where no buffers have been made yet.
     pub(super) fn of(device: &Device) -> Self {
-        Self {
-            segments: SEGMENT_BUDGET,
-            at_once: device.threads_at_once(),
-        }
+        Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once() }
     }
 }
 
@@ -60,22 +57,14 @@ impl Batches {
         }
         let most = (affordable / per_path).min(rounds::most_paths(frame));
         let paths = most.clamp(1, frame.paths);
-        Self {
-            capacity: paths * per_path,
-            paths,
-            rounds: Rounds::new(frame, paths, room.at_once),
-        }
+        Self { capacity: paths * per_path, paths, rounds: Rounds::new(frame, paths, room.at_once) }
     }
 }
 
 impl Batches {
     /// Paths of one line that write segments of their own.
     pub(super) fn paths_with_segments(&self, frame: &layout::Frame) -> u32 {
-        if one_speaks_for_all(frame) {
-            1
-        } else {
-            self.paths
-        }
+        if one_speaks_for_all(frame) { 1 } else { self.paths }
     }
 }
 
@@ -134,16 +123,8 @@ impl Buffers {
                 size_of::<layout::Scanline>(),
             )?,
             rows: new("rows", u64::from(frame.samples), size_of::<layout::Row>())?,
-            tissues: new(
-                "tissues",
-                tables.tissues.len() as u64,
-                size_of::<layout::Tissue>(),
-            )?,
-            surfaces: new(
-                "surfaces",
-                tables.surfaces.len() as u64,
-                size_of::<layout::Surface>(),
-            )?,
+            tissues: new("tissues", tables.tissues.len() as u64, size_of::<layout::Tissue>())?,
+            surfaces: new("surfaces", tables.surfaces.len() as u64, size_of::<layout::Surface>())?,
             points: new("points", tables.points.len() as u64, 16)?,
             grey: new("grey map", 256, 4)?,
             contact: new("contact", 2 * u64::from(frame.scanlines) + 1, 4)?,
@@ -189,18 +170,10 @@ impl Kernels {
         };
         let trace = format!("trace_{suffix}");
         let role = |role| {
-            Kernel::when_needed(
-                device,
-                &trace,
-                library.words(&trace),
-                &Round::constants(role),
-            )
+            Kernel::when_needed(device, &trace, library.words(&trace), &Round::constants(role))
         };
-        let trace = [
-            role(layout::ROLE_WHOLE)?,
-            role(layout::ROLE_MAIN)?,
-            role(layout::ROLE_BRANCHES)?,
-        ];
+        let trace =
+            [role(layout::ROLE_WHOLE)?, role(layout::ROLE_MAIN)?, role(layout::ROLE_BRANCHES)?];
         // What takes longest is begun first.
         for &role in rounds.roles() {
             trace[role as usize].prepare();

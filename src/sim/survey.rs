@@ -79,12 +79,7 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
         _ => POINT - RIM,
     };
     let half_thickness = f64::from(frame.face_height) / 2.0;
-    [
-        (half_width + RIM) as f32,
-        (half_thickness + RIM) as f32,
-        HEAD as f32,
-        HANDLE as f32,
-    ]
+    [(half_width + RIM) as f32, (half_thickness + RIM) as f32, HEAD as f32, HANDLE as f32]
 }
 
 /// Kernel and buffers of the picture, as large as the largest so far.

@@ -36,10 +36,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
     let calibration = Calibration::new(scene);
     let (probe, simulation, imaging) = (&scene.probe, &scene.simulation, &scene.imaging);
     let (kind, radius, field_of_view, width) = match probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => (layout::KIND_CONVEX, radius, field_of_view, 0.0),
+        Kind::Convex { radius, field_of_view } => (layout::KIND_CONVEX, radius, field_of_view, 0.0),
         Kind::Linear { width } => (layout::KIND_LINEAR, 0.0, 0.0, width),
         Kind::Phased { field_of_view } => (layout::KIND_PHASED, 0.0, field_of_view, 0.0),
     };
@@ -74,22 +71,11 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         min_weight: (simulation.min_weight as f32).max(LEAST_WEIGHT),
         volume_floor: amplitude(simulation.volume_floor) as f32,
         branch_floor: amplitude(simulation.branch_floor) as f32,
-        flags: flag(
-            simulation.rough_transmission,
-            layout::FLAG_ROUGH_TRANSMISSION,
-        ) | flag(simulation.face_reflection, layout::FLAG_FACE_REFLECTION)
-            | flag(
-                simulation.texture_space == TextureSpace::World,
-                layout::FLAG_WORLD_TEXTURE,
-            )
-            | flag(
-                simulation.coherence == Coherence::Coherent,
-                layout::FLAG_COHERENT,
-            )
-            | flag(
-                simulation.scatter_mode == ScatterMode::Voxel,
-                layout::FLAG_VOXEL,
-            )
+        flags: flag(simulation.rough_transmission, layout::FLAG_ROUGH_TRANSMISSION)
+            | flag(simulation.face_reflection, layout::FLAG_FACE_REFLECTION)
+            | flag(simulation.texture_space == TextureSpace::World, layout::FLAG_WORLD_TEXTURE)
+            | flag(simulation.coherence == Coherence::Coherent, layout::FLAG_COHERENT)
+            | flag(simulation.scatter_mode == ScatterMode::Voxel, layout::FLAG_VOXEL)
             | flag(scene.is_masked(), layout::FLAG_MASKED)
             | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT)
             | flag(simulation.sequence == Sequence::Sobol, layout::FLAG_SOBOL),
@@ -105,11 +91,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         volume_scale: volume_scale as f32,
         background: scene.background as u32,
         instances: scene.instances.len() as u32,
-        points: scene
-            .wires
-            .iter()
-            .map(|w| wire_points(w).len() as u32)
-            .sum(),
+        points: scene.wires.iter().map(|w| wire_points(w).len() as u32).sum(),
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,
         noise: calibration.noise() as f32,
@@ -189,9 +171,7 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
             let [lateral, elevation] =
                 [calibration.sigma_lateral(z), calibration.sigma_elevation(z)];
             let gain = calibration.speckle_gain(z) * compensation;
-            let level = calibration
-                .lattice_level(z)
-                .max(f64::from(layout::ALL_LEVELS));
+            let level = calibration.lattice_level(z).max(f64::from(layout::ALL_LEVELS));
             layout::Row {
                 shape: beam_shape([lateral, elevation], gain, level),
                 sigma_lateral: lateral as f32,
@@ -277,20 +257,14 @@ pub fn wire_spacing(wire: &Wire) -> f64 {
     let [a, b] = wire.ends.map(glam::DVec3::from);
     let length = a.distance(b);
     let steps = (length / wire.spacing).round().max(1.0);
-    if length == 0.0 {
-        f64::INFINITY
-    } else {
-        length / steps
-    }
+    if length == 0.0 { f64::INFINITY } else { length / steps }
 }
 
 /// World positions of a wire's points, mm.
 pub fn wire_points(wire: &Wire) -> Vec<[f64; 3]> {
     let [a, b] = wire.ends.map(glam::DVec3::from);
     let steps = (a.distance(b) / wire_spacing(wire)).round() as u32;
-    (0..=steps)
-        .map(|i| a.lerp(b, f64::from(i) / f64::from(steps.max(1))).to_array())
-        .collect()
+    (0..=steps).map(|i| a.lerp(b, f64::from(i) / f64::from(steps.max(1))).to_array()).collect()
 }
 
 /// Every point target: world position, mm, and amplitude.

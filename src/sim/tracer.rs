@@ -44,10 +44,8 @@ impl Tracer {
                 }
             },
             None => {
-                let why = format!(
-                    "tracing with the compute BVH: '{}' has no ray queries",
-                    device.name()
-                );
+                let why =
+                    format!("tracing with the compute BVH: '{}' has no ray queries", device.name());
                 (Self::Bvh, Some(why))
             }
         }

@@ -73,10 +73,7 @@ impl Kernels {
     /// A kernel that the device refuses.
     pub fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
         let kernel = |stem: &str| Kernel::when_needed(device, stem, library.words(stem), &[]);
-        Ok(Self {
-            interpolate: kernel("interpolate")?,
-            refit: kernel("refit")?,
-        })
+        Ok(Self { interpolate: kernel("interpolate")?, refit: kernel("refit")? })
     }
 }
 
@@ -139,11 +136,7 @@ impl World {
             return Err(WorldError::Selector(node.name.clone()));
         }
         // What the first update runs is compiled meanwhile.
-        if scene
-            .instances
-            .iter()
-            .any(|i| i.keyframes.strategy.needs_shared_topology())
-        {
+        if scene.instances.iter().any(|i| i.keyframes.strategy.needs_shared_topology()) {
             kernels.interpolate.prepare();
             if tracer == Tracer::Bvh {
                 kernels.refit.prepare();
@@ -157,11 +150,7 @@ impl World {
             vertex_count: arrays.vertices.len() as u32,
             normals: upload(device, "normals", bytemuck::cast_slice(&arrays.normals))?,
             triangles: upload(device, "triangles", bytemuck::cast_slice(&arrays.triangles))?,
-            fields: upload(
-                device,
-                "fields",
-                bytemuck::cast_slice(&arrays.fields.padded()),
-            )?,
+            fields: upload(device, "fields", bytemuck::cast_slice(&arrays.fields.padded()))?,
         };
         let mut world = Self {
             tracer,
@@ -176,11 +165,7 @@ impl World {
             apart,
             rows: arrays.instances,
             mask: Mask::default(),
-            made_for: scene
-                .instances
-                .iter()
-                .map(|i| i.keyframes.clone())
-                .collect(),
+            made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             kernels: Arc::clone(kernels),
         };
         let mut failed = None;
@@ -254,14 +239,9 @@ impl World {
             &mut self.regions,
             &mut self.top,
         )?;
-        assert!(
-            self.sets.hold(scene),
-            "what shares a structure has come apart"
-        );
+        assert!(self.sets.hold(scene), "what shares a structure has come apart");
         let entries = entry::entries(scene, &self.places, &self.regions, &self.sets);
-        let placed = self
-            .top
-            .place(commands, scene, entries, self.changing.structures())?;
+        let placed = self.top.place(commands, scene, entries, self.changing.structures())?;
         let (places, regions, sets) = (&self.places, &self.regions, &self.sets);
         let (entries, slots) = (self.top.entries(), self.top.slots());
         let rows = entry::rows(scene, places, regions, sets, &self.fields, entries, slots);

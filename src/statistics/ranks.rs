@@ -35,10 +35,7 @@ pub fn friedman(blocks: &[Vec<usize>]) -> Option<Friedman> {
     for block in blocks {
         let mut sorted = block.clone();
         sorted.sort_unstable();
-        assert!(
-            sorted.into_iter().eq(1..=k),
-            "a block ranks 1 to {k} once each: {block:?}"
-        );
+        assert!(sorted.into_iter().eq(1..=k), "a block ranks 1 to {k} once each: {block:?}");
         for (sum, rank) in sums.iter_mut().zip(block) {
             *sum += *rank as u64;
         }
@@ -58,13 +55,7 @@ pub fn friedman(blocks: &[Vec<usize>]) -> Option<Friedman> {
         // Chi-squared with two degrees of freedom is an exponential distribution.
         (_, false) => (-statistic / 2.0).exp(),
     };
-    Some(Friedman {
-        blocks: n,
-        statistic,
-        p,
-        exact,
-        concordance: statistic / (n_ * (k_ - 1.0)),
-    })
+    Some(Friedman { blocks: n, statistic, p, exact, concordance: statistic / (n_ * (k_ - 1.0)) })
 }
 
 /// Sum over things of (2 (rank sum - n (k + 1) / 2))^2: an integer, so that equal is equal.
@@ -98,9 +89,7 @@ fn exact_tail(n: usize, squares: u64) -> f64 {
     // A sum of all three that no order of ranks has is a share of nothing.
     let sums = (0..width).flat_map(|a| (0..width).map(move |b| [a, b]));
     let possible = sums.filter(|[a, b]| a + b <= 3 * n && a + b >= n);
-    let tail = possible
-        .filter(|&s| is_far(s))
-        .map(|[a, b]| ways[a * width + b]);
+    let tail = possible.filter(|&s| is_far(s)).map(|[a, b]| ways[a * width + b]);
     tail.sum::<f64>().min(1.0)
 }
 
@@ -181,15 +170,9 @@ mod tests {
             let squares = (statistic * 4.0 * f64::from(n)).round() as u64;
             let found = exact_tail(n as usize, squares);
             let digit = if p < 0.01 { 5e-5 } else { 5.001e-4 };
-            assert!(
-                (found - p).abs() <= digit,
-                "n {n}, {statistic}: {found}, not {p}"
-            );
+            assert!((found - p).abs() <= digit, "n {n}, {statistic}: {found}, not {p}");
         }
-        assert!(
-            (exact_tail(3, 56) - 0.028).abs() > 0.1,
-            "another statistic is noticed"
-        );
+        assert!((exact_tail(3, 56) - 0.028).abs() > 0.1, "another statistic is noticed");
     }
 
     #[test]
@@ -210,11 +193,7 @@ mod tests {
         let n = EXACT_BLOCKS;
         for share in [0, 8, 16] {
             let even = (n - share) / 3;
-            let counts = [
-                ([1, 2, 3], n - 2 * even),
-                ([2, 3, 1], even),
-                ([3, 1, 2], even),
-            ];
+            let counts = [([1, 2, 3], n - 2 * even), ([2, 3, 1], even), ([3, 1, 2], even)];
             let exact = friedman(&blocks(&counts)).expect("blocks");
             assert!(exact.exact);
             let chi = (-exact.statistic / 2.0).exp();
@@ -244,26 +223,17 @@ mod tests {
             (10, 2, 2.0 * 79.0 / 4096.0),
         ] {
             let found = sign_test(first, second);
-            assert!(
-                (found - p).abs() < 1e-12,
-                "{first} {second}: {found}, not {p}"
-            );
+            assert!((found - p).abs() < 1e-12, "{first} {second}: {found}, not {p}");
         }
         let many = sign_test(5200, 4800);
-        assert!(
-            (many - 6.6e-5).abs() < 1e-6,
-            "{many}: four standard deviations"
-        );
+        assert!((many - 6.6e-5).abs() < 1e-6, "{many}: four standard deviations");
     }
 
     /// The three of Holm's rule by hand: 3 p, then 2 p, then p, never falling, never above 1.
     #[test]
     fn corrected_probabilities_rise() {
         let near = |found: &[f64], by_hand: &[f64]| {
-            found
-                .iter()
-                .zip(by_hand)
-                .all(|(a, b)| (a - b).abs() < 1e-12)
+            found.iter().zip(by_hand).all(|(a, b)| (a - b).abs() < 1e-12)
         };
         assert!(near(&holm(&[0.04, 0.01, 0.03]), &[0.06, 0.03, 0.06]));
         assert!(near(&holm(&[0.5, 0.6, 0.001]), &[1.0, 1.0, 0.003]));

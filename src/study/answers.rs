@@ -107,18 +107,12 @@ impl Answers {
             return fail(&format!("calls itself `{}`", file.format), foreign);
         }
         if file.version != VERSION {
-            let cause = format!(
-                "is of version {}, this program reads {VERSION}",
-                file.version
-            );
+            let cause = format!("is of version {}, this program reads {VERSION}", file.version);
             return fail(&cause, "evaluate it with the program that made the form");
         }
         if file.study != key.id() {
-            let cause = format!(
-                "answers the study {}, and the key is that of {}",
-                file.study,
-                key.id()
-            );
+            let cause =
+                format!("answers the study {}, and the key is that of {}", file.study, key.id());
             return fail(&cause, "give the key that was written with its form");
         }
         let edited = "give the file as the form saved it; to correct an answer, load it into the \
@@ -128,10 +122,7 @@ impl Answers {
             return fail("was changed after it was saved", edited);
         }
         match Self::of(file.content, key) {
-            Ok(answers) => Ok(Self {
-                file: path.to_owned(),
-                ..answers
-            }),
+            Ok(answers) => Ok(Self { file: path.to_owned(), ..answers }),
             Err(cause) => fail(&cause, edited),
         }
     }
@@ -158,9 +149,7 @@ impl Answers {
                     return Err(format!("case {case}: there is no degree {degree}"));
                 }
                 (None, Some(_)) => {
-                    return Err(format!(
-                        "case {case}: no image was chosen, and one was rated"
-                    ));
+                    return Err(format!("case {case}: no image was chosen, and one was rated"));
                 }
                 _ => {}
             }
@@ -196,9 +185,7 @@ impl Answers {
         let open = |r: &&Ranking| r.complete().is_none();
         [
             cases.clone().filter(|c| c.image.is_none()).count(),
-            cases
-                .filter(|c| c.image.is_some() && c.agreement.is_none())
-                .count(),
+            cases.filter(|c| c.image.is_some() && c.agreement.is_none()).count(),
             self.rankings.iter().filter(open).count(),
         ]
     }

@@ -81,52 +81,22 @@ fn what_a_form_does_not_save_is_refused() {
         (json!({ "a": 1 }), "not a file of answers"),
         (json!([1, 2]), "not a file of answers"),
         (outer("format", json!("other")), "calls itself `other`"),
-        (
-            outer("version", json!(2)),
-            "version 2, this program reads 1",
-        ),
-        (
-            outer("study", json!("0000000000000000")),
-            "the key is that of",
-        ),
+        (outer("version", json!(2)), "version 2, this program reads 1"),
+        (outer("study", json!("0000000000000000")), "the key is that of"),
         (edited, "was changed after it was saved"),
         (inner("/cases/0/image", json!(3)), "case 1 has no image 3"),
         (inner("/cases/0/image", json!(0)), "case 1 has no image 0"),
-        (
-            inner("/cases/0/image", json!(-1)),
-            "does not fit: cases[0].image",
-        ),
-        (
-            inner("/cases/0/image", Value::Null),
-            "case 1: no image was chosen",
-        ),
-        (
-            inner("/cases/5/agreement", json!(6)),
-            "case 6: there is no degree 6",
-        ),
+        (inner("/cases/0/image", json!(-1)), "does not fit: cases[0].image"),
+        (inner("/cases/0/image", Value::Null), "case 1: no image was chosen"),
+        (inner("/cases/5/agreement", json!(6)), "case 6: there is no degree 6"),
         (inner("/cases", json!([])), "holds 0 cases, the study has 6"),
-        (
-            inner("/rankings/0/ranks", json!([1, 1, 2])),
-            "the ranks of the cases [1, 3, 5]",
-        ),
-        (
-            inner("/rankings/0/ranks", json!([1, 2, 4])),
-            "the ranks of the cases",
-        ),
-        (
-            inner("/rankings/0/ranks", json!([1, 2])),
-            "the ranks of the cases",
-        ),
-        (
-            inner("/rankings/0/cases", json!([1, 3, 4])),
-            "ranks other cases",
-        ),
+        (inner("/rankings/0/ranks", json!([1, 1, 2])), "the ranks of the cases [1, 3, 5]"),
+        (inner("/rankings/0/ranks", json!([1, 2, 4])), "the ranks of the cases"),
+        (inner("/rankings/0/ranks", json!([1, 2])), "the ranks of the cases"),
+        (inner("/rankings/0/cases", json!([1, 3, 4])), "ranks other cases"),
         (inner("/rankings", json!([])), "ranks other cases"),
         (inner("/response", json!("")), "which form"),
-        (
-            inner("/assessor", json!({ "name": "A" })),
-            "does not fit: assessor",
-        ),
+        (inner("/assessor", json!({ "name": "A" })), "does not fit: assessor"),
     ] {
         let error = read(&file).expect_err(cause);
         assert!(error.message.contains(cause), "{cause}: {error}");
@@ -146,21 +116,14 @@ fn a_form_counts_once() {
         path
     };
     let early = write("early.json", &content());
-    let late = write(
-        "late.json",
-        &with("/saved", json!("2026-01-03T00:00:00.000Z")),
-    );
+    let late = write("late.json", &with("/saved", json!("2026-01-03T00:00:00.000Z")));
     let other = write("other.json", &with("/response", json!("fedcba9876543210")));
     let both = read_all(&[early.clone(), other.clone()], &key).expect("two forms");
     assert_eq!(both.len(), 2);
     for pair in [[&early, &late], [&late, &early]] {
         let error = read_all(&pair.map(PathBuf::clone), &key).expect_err("one form twice");
         assert!(error.message.contains("the same form"), "{error}");
-        assert!(
-            error.remedy.contains("late.json was saved later"),
-            "{}",
-            error.remedy
-        );
+        assert!(error.remedy.contains("late.json was saved later"), "{}", error.remedy);
     }
     let error = read_all(&[early.clone(), early], &key).expect_err("one file twice");
     assert!(error.message.contains("the same form"), "{error}");

@@ -44,10 +44,7 @@ pub struct Case {
 impl Form<'_> {
     /// The HTML file.
     pub fn html(&self) -> String {
-        let cases: String = (1..)
-            .zip(&self.cases)
-            .map(|(n, c)| self.case(n, c))
-            .collect();
+        let cases: String = (1..).zip(&self.cases).map(|(n, c)| self.case(n, c)).collect();
         let rankings = self.groups.iter().filter(|group| group.len() > 1);
         let rankings: Vec<&Vec<usize>> = rankings.collect();
         let about = json!({
@@ -57,10 +54,8 @@ impl Form<'_> {
             "images": self.cases.iter().map(|c| c.images.len()).collect::<Vec<_>>(),
             "rankings": rankings,
         });
-        let ranked: String = (1..)
-            .zip(&rankings)
-            .map(|(n, group)| self.ranking(n, rankings.len(), group))
-            .collect();
+        let ranked: String =
+            (1..).zip(&rankings).map(|(n, group)| self.ranking(n, rankings.len(), group)).collect();
         let paragraphs = self.introduction.split("\n\n").map(str::trim);
         let introduction: String = paragraphs
             .filter(|p| !p.is_empty())
@@ -146,10 +141,7 @@ impl Form<'_> {
                     n if n == group.len() => " (least realistic)",
                     _ => "",
                 };
-                let _ = write!(
-                    options,
-                    r#"<option value="{rank}">{rank}{meaning}</option>"#
-                );
+                let _ = write!(options, r#"<option value="{rank}">{rank}{meaning}</option>"#);
             }
             let _ = write!(
                 images,
@@ -187,9 +179,7 @@ fn titled(title: &str) -> String {
 
 /// Text inside an element.
 fn escaped(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// A page with what belongs to each `{{NAME}}`.

@@ -52,10 +52,7 @@ fn a_key_is_read_back() {
     assert_eq!(key.cases(), 6);
     assert_eq!(key.groups(), [[1, 3, 5], [2, 4, 6]]);
     assert_eq!(key.backgrounds(), ["volume", "scatterers", "none"]);
-    assert_eq!(
-        (key.background(4), key.slice(4)),
-        ("scatterers", "standing")
-    );
+    assert_eq!((key.background(4), key.slice(4)), ("scatterers", "standing"));
     assert_eq!(key.images(6).len(), 2);
     assert_eq!(key.images(1)[0].direction(), -1);
     assert_eq!(key.images(1)[1].direction(), 0);
@@ -77,17 +74,11 @@ fn a_changed_key_is_refused() {
     let headed = [&[column.as_str()], &lines[1..]].concat();
     for (text, cause) in [
         (joined(&swapped), "was changed"),
-        (
-            text.replacen(",volume,", ",none,", 1),
-            "more than one background",
-        ),
+        (text.replacen(",volume,", ",none,", 1), "more than one background"),
         (text.replace("-6,0.5", "-6,0.50"), "was changed"),
         (joined(&lines[..11]), "not shown before each background"),
         (joined(&lines[..12]), "was changed"),
-        (
-            joined(&[&lines[..3], &lines[4..]].concat()),
-            "image 2 of case 2 stands where image 1",
-        ),
+        (joined(&[&lines[..3], &lines[4..]].concat()), "image 2 of case 2 stands where image 1"),
         (joined(&lines[..1]), "there is no image"),
         (joined(&headed), "not the key of a study"),
         (String::new(), "there is no image"),

@@ -34,9 +34,8 @@ impl Rated {
     /// Median degree of agreement, 1 to 5; NaN without one.
     pub fn median_agreement(&self) -> f64 {
         let each = (1..).zip(self.agreement);
-        let all: Vec<f64> = each
-            .flat_map(|(degree, n)| std::iter::repeat_n(f64::from(degree), n))
-            .collect();
+        let all: Vec<f64> =
+            each.flat_map(|(degree, n)| std::iter::repeat_n(f64::from(degree), n)).collect();
         median(&all)
     }
 }
@@ -117,10 +116,7 @@ impl Results {
             for row in choices().map(row).filter(|r| r.parameter == parameter) {
                 counts[(row.direction() + 1) as usize] += 1;
             }
-            Chosen {
-                parameter: parameter.to_owned(),
-                counts,
-            }
+            Chosen { parameter: parameter.to_owned(), counts }
         };
         Self {
             study: key.id().to_owned(),
@@ -130,13 +126,8 @@ impl Results {
             friedman: (backgrounds.len() > 1).then(|| friedman(&blocks)).flatten(),
             pairs: pairs(&backgrounds, &blocks),
             chosen: parameters(key).into_iter().map(count).collect(),
-            unperturbed: choices()
-                .map(row)
-                .filter(|r| r.parameter == UNPERTURBED)
-                .count(),
-            by_chance: choices()
-                .map(|(case, _)| 1.0 / key.images(case).len() as f64)
-                .sum(),
+            unperturbed: choices().map(row).filter(|r| r.parameter == UNPERTURBED).count(),
+            by_chance: choices().map(|(case, _)| 1.0 / key.images(case).len() as f64).sum(),
             choices: choices().count(),
             missing: all.iter().map(|a| (a.file.clone(), a.missing())).collect(),
         }
@@ -163,10 +154,7 @@ fn blocks(key: &Key, all: &[Answers], scenario: Option<&str>) -> Vec<Vec<usize>>
         let ranks = ranking.complete()?;
         let is_meant = scenario.is_none_or(|s| key.scenario(ranking.cases[0]) == s);
         let rank_of = |name: &&str| {
-            let place = ranking
-                .cases
-                .iter()
-                .position(|&c| key.background(c) == *name);
+            let place = ranking.cases.iter().position(|&c| key.background(c) == *name);
             ranks[place.expect("each background is there once")]
         };
         is_meant.then(|| key.backgrounds().iter().map(rank_of).collect())
@@ -191,20 +179,11 @@ fn part(key: &Key, all: &[Answers], scenario: Option<&str>) -> Part {
                 agreement[degree - 1] += 1;
             }
         }
-        Rated {
-            background: background.to_owned(),
-            ranks,
-            agreement,
-        }
+        Rated { background: background.to_owned(), ranks, agreement }
     };
     Part {
         scenario: scenario.map(str::to_owned),
-        rated: key
-            .backgrounds()
-            .into_iter()
-            .enumerate()
-            .map(rated)
-            .collect(),
+        rated: key.backgrounds().into_iter().enumerate().map(rated).collect(),
     }
 }
 

@@ -37,11 +37,8 @@ fn tables_are_those_worked_out_by_hand() {
         panic!("one scenario and all");
     };
     assert_eq!(one.rated, total.rated);
-    let found: Vec<_> = total
-        .rated
-        .iter()
-        .map(|r| (r.background.as_str(), r.ranks.clone(), r.agreement))
-        .collect();
+    let found: Vec<_> =
+        total.rated.iter().map(|r| (r.background.as_str(), r.ranks.clone(), r.agreement)).collect();
     let by_hand = [
         // Degrees of the first form are all 4; of the second 5 4 3 2 1 by case.
         ("volume", vec![3, 0, 0], [0, 0, 1, 3, 0]),
@@ -60,35 +57,18 @@ fn tables_are_those_worked_out_by_hand() {
     assert!((test.p - 7.0 / 36.0).abs() < 1e-12, "{test:?}");
     assert!((test.concordance - 7.0 / 9.0).abs() < 1e-12, "{test:?}");
     let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
-    let pairs: Vec<_> = results
-        .pairs
-        .iter()
-        .map(|p| (p.before, p.p, p.corrected))
-        .collect();
-    let by_hand = [
-        ([3, 0], 0.25, 0.75),
-        ([3, 0], 0.25, 0.75),
-        ([2, 1], 1.0, 1.0),
-    ];
+    let pairs: Vec<_> = results.pairs.iter().map(|p| (p.before, p.p, p.corrected)).collect();
+    let by_hand = [([3, 0], 0.25, 0.75), ([3, 0], 0.25, 0.75), ([2, 1], 1.0, 1.0)];
     for (found, by_hand) in pairs.iter().zip(by_hand) {
         assert_eq!(found.0, by_hand.0);
-        assert!(
-            near(found.1, by_hand.1) && near(found.2, by_hand.2),
-            "{found:?}"
-        );
+        assert!(near(found.1, by_hand.1) && near(found.2, by_hand.2), "{found:?}");
     }
     // Images 1 2 1 2 1 1 of cases 1 to 6, twice: the scene itself is image 2 in odd cases, 1 in even.
     assert_eq!((results.unperturbed, results.choices), (2, 12));
     assert_eq!(results.by_chance, 6.0);
     assert_eq!(results.chosen.len(), 1);
-    assert_eq!(
-        (&*results.chosen[0].parameter, results.chosen[0].counts),
-        ("gain", [10, 0, 0])
-    );
-    assert_eq!(
-        results.missing.iter().map(|m| m.1).collect::<Vec<_>>(),
-        [[0; 3], [0, 1, 1]]
-    );
+    assert_eq!((&*results.chosen[0].parameter, results.chosen[0].counts), ("gain", [10, 0, 0]));
+    assert_eq!(results.missing.iter().map(|m| m.1).collect::<Vec<_>>(), [[0; 3], [0, 1, 1]]);
 }
 
 /// A key in which two backgrounds are exchanged is another study, and would give another table.
@@ -134,10 +114,7 @@ fn texts_hold_the_tables() {
     );
     assert!(plain.contains("once for each of 2 assessors"), "{plain}");
     let markdown = markdown(&results);
-    assert!(
-        markdown.contains("| a, with a comma | none | 0 | 1 | 2 | 2.67 |"),
-        "{markdown}"
-    );
+    assert!(markdown.contains("| a, with a comma | none | 0 | 1 | 2 | 2.67 |"), "{markdown}");
     let csv = csv(&results);
     let line = "Order of the backgrounds,all scenarios,none,mean rank,2.6666666666666665";
     assert!(csv.lines().any(|l| l == line), "{csv}");

@@ -33,12 +33,7 @@ pub(super) struct App {
 impl App {
     pub(super) fn new(scene: Scene, options: Options, proxy: EventLoopProxy<Wake>) -> Self {
         Self {
-            plan: Plan {
-                scene,
-                options,
-                proxy,
-                link: Link::default(),
-            },
+            plan: Plan { scene, options, proxy, link: Link::default() },
             open: None,
             statistics: Times::default(),
             lost: None,
@@ -60,10 +55,9 @@ impl App {
         }
         let messages = self.log.map(|log| log.messages()).unwrap_or_default();
         match messages.first() {
-            Some(first) => Err(ViewError::Validation {
-                count: messages.len(),
-                first: first.clone(),
-            }),
+            Some(first) => {
+                Err(ViewError::Validation { count: messages.len(), first: first.clone() })
+            }
             None => Ok(()),
         }
     }
@@ -140,10 +134,7 @@ impl App {
 }
 
 fn unwritten(file: &Path, error: &dyn std::error::Error) -> ViewError {
-    ViewError::Unwritten {
-        file: file.to_owned(),
-        reason: error.to_string(),
-    }
+    ViewError::Unwritten { file: file.to_owned(), reason: error.to_string() }
 }
 
 impl ApplicationHandler<Wake> for App {

@@ -52,10 +52,7 @@ impl Place {
         Self {
             rect,
             area,
-            scale: [
-                per_mm(rect.width(), texels[0]),
-                per_mm(rect.height(), texels[1]),
-            ],
+            scale: [per_mm(rect.width(), texels[0]), per_mm(rect.height(), texels[1])],
             left: sector.left,
             top: sector.top,
         }
@@ -96,13 +93,7 @@ pub(super) fn show(
     let painter = ui.painter_at(area);
     let Some(frame) = frame else {
         let font = FontId::proportional(16.0);
-        painter.text(
-            area.center(),
-            Align2::CENTER_CENTER,
-            preparing,
-            font,
-            style::FAINT,
-        );
+        painter.text(area.center(), Align2::CENTER_CENTER, preparing, font, style::FAINT);
         return None;
     };
     let place = Place::new(area, frame, ui.pixels_per_point());
@@ -130,25 +121,13 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     painter.text(at, Align2::LEFT_TOP, &model.title, title, style::TEXT);
     let small = FontId::proportional(12.0);
     let below = at + vec2(0.0, 20.0);
-    let left = painter.text(
-        below,
-        Align2::LEFT_TOP,
-        settings,
-        small.clone(),
-        style::FAINT,
-    );
+    let left = painter.text(below, Align2::LEFT_TOP, settings, small.clone(), style::FAINT);
     let at = area.right_top() + vec2(-12.0, 8.0);
     let (word, colour) = match model.frozen {
         true => ("FROZEN", style::WARN),
         false => ("LIVE", style::ACCENT),
     };
-    painter.text(
-        at,
-        Align2::RIGHT_TOP,
-        word,
-        FontId::proportional(15.0),
-        colour,
-    );
+    painter.text(at, Align2::RIGHT_TOP, word, FontId::proportional(15.0), colour);
     let mut line = frame.grade.to_string();
     if let (Some(ms), false) = (frame.grade.pace_ms, model.frozen) {
         line = format!("{line}   {:.1} frames/s", 1e3 / ms.max(1e-3));
@@ -165,13 +144,7 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     if area.width() < NARROW {
         return;
     }
-    painter.text(
-        at + vec2(0.0, 20.0),
-        Align2::RIGHT_TOP,
-        line,
-        small.clone(),
-        style::FAINT,
-    );
+    painter.text(at + vec2(0.0, 20.0), Align2::RIGHT_TOP, line, small.clone(), style::FAINT);
     if let Some((line, is_good)) = contact(frame, model) {
         let colour = if is_good { style::FAINT } else { style::WARN };
         // Above the ruler's first label.
@@ -199,9 +172,7 @@ fn contact(frame: &Frame, model: &Model) -> Option<(String, bool)> {
 /// Millimetres between labels: as few as leave 40 points between them.
 fn label_step(points_per_mm: f32) -> f64 {
     let steps = [5.0, 10.0, 20.0, 50.0, 100.0];
-    let found = steps
-        .into_iter()
-        .find(|step| *step as f32 * points_per_mm >= 40.0);
+    let found = steps.into_iter().find(|step| *step as f32 * points_per_mm >= 40.0);
     found.unwrap_or(200.0)
 }
 
@@ -219,11 +190,7 @@ fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
         let length = if is_labelled { 8.0 } else { 4.0 };
         painter.line_segment([at(mm), at(mm) + vec2(length, 0.0)], line);
         if is_labelled {
-            let text = if i == 0 {
-                "0 mm".into()
-            } else {
-                format!("{mm:.0}")
-            };
+            let text = if i == 0 { "0 mm".into() } else { format!("{mm:.0}") };
             let to = at(mm) + vec2(12.0, 0.0);
             painter.text(to, Align2::LEFT_CENTER, text, font.clone(), style::FAINT);
         }
@@ -238,10 +205,8 @@ fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
 fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     let imaging = &frame.settings.imaging;
     let height = (place.rect.height() * 0.4).clamp(60.0, 240.0);
-    let bar = Rect::from_min_size(
-        pos2(area.left() + 14.0, place.rect.top() + 16.0),
-        vec2(12.0, height),
-    );
+    let bar =
+        Rect::from_min_size(pos2(area.left() + 14.0, place.rect.top() + 16.0), vec2(12.0, height));
     const STEPS: u32 = 48;
     let mut mesh = Mesh::default();
     for i in 0..=STEPS {
@@ -266,13 +231,7 @@ fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     );
     let font = FontId::proportional(10.0);
     let above = bar.center_top() - vec2(0.0, 3.0);
-    painter.text(
-        above,
-        Align2::CENTER_BOTTOM,
-        "0 dB",
-        font.clone(),
-        style::FAINT,
-    );
+    painter.text(above, Align2::CENTER_BOTTOM, "0 dB", font.clone(), style::FAINT);
     let below = bar.center_bottom() + vec2(0.0, 3.0);
     let floor = format!("-{:.0}", imaging.dynamic_range);
     painter.text(below, Align2::CENTER_TOP, floor, font, style::FAINT);
@@ -297,38 +256,21 @@ mod tests {
     fn labels_never_touch() {
         for scale in [0.1_f32, 0.5, 1.0, 2.0, 3.9, 4.0, 9.0] {
             let step = label_step(scale);
-            assert!(
-                step as f32 * scale >= 40.0 || step == 200.0,
-                "{scale}: {step}"
-            );
+            assert!(step as f32 * scale >= 40.0 || step == 200.0, "{scale}: {step}");
         }
-        assert_eq!(
-            (label_step(8.0), label_step(4.0), label_step(1.0)),
-            (5.0, 10.0, 50.0)
-        );
+        assert_eq!((label_step(8.0), label_step(4.0), label_step(1.0)), (5.0, 10.0, 50.0));
     }
 
     #[test]
     fn the_screen_and_the_image_plane_are_each_others_inverse() {
-        let sector = Sector {
-            left: -41.0,
-            top: -3.5,
-            pitch: 0.2,
-        };
-        for (ppp, size) in [
-            (1.0_f32, [1030.0, 690.0]),
-            (1.25, [811.0, 433.0]),
-            (2.0, [515.0, 633.0]),
-        ] {
+        let sector = Sector { left: -41.0, top: -3.5, pitch: 0.2 };
+        for (ppp, size) in
+            [(1.0_f32, [1030.0, 690.0]), (1.25, [811.0, 433.0]), (2.0, [515.0, 633.0])]
+        {
             let area = Rect::from_min_size(pos2(3.0, 7.0), vec2(size[0], size[1]));
             let place = Place::of(area, [410, 700], &sector, ppp);
             assert!(area.contains_rect(place.rect), "{ppp}");
-            for edge in [
-                place.rect.min.x,
-                place.rect.min.y,
-                place.rect.max.x,
-                place.rect.max.y,
-            ] {
+            for edge in [place.rect.min.x, place.rect.min.y, place.rect.max.x, place.rect.max.y] {
                 let pixel = edge * ppp;
                 assert!((pixel - pixel.round()).abs() < 1e-3, "{ppp}: {pixel}");
             }

@@ -74,35 +74,29 @@ fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: R
     let types = ui.ctx().egui_wants_keyboard_input();
     for event in events {
         match event {
-            Event::Key {
-                key,
-                pressed: true,
-                modifiers,
-                ..
-            } if !types => {
+            Event::Key { key, pressed: true, modifiers, .. } if !types => {
                 if let Some(tool) = keys::tool(key, modifiers) {
                     sheet.toggle(tool);
                 }
             }
             Event::PointerMoved(at) => sheet.motion(place.mm(at)),
-            Event::PointerButton {
-                pos,
-                button: PointerButton::Primary,
-                pressed,
-                ..
-            } => match pressed {
-                true if over && room.contains(pos) => {
-                    let at = place.mm(pos);
-                    match note_at(ui, sheet, place, pos) {
-                        Some(mark) if sheet.near(at, reach).is_none() && !sheet.is_drawing() => {
-                            sheet.hold((mark, 0), at);
+            Event::PointerButton { pos, button: PointerButton::Primary, pressed, .. } => {
+                match pressed {
+                    true if over && room.contains(pos) => {
+                        let at = place.mm(pos);
+                        match note_at(ui, sheet, place, pos) {
+                            Some(mark)
+                                if sheet.near(at, reach).is_none() && !sheet.is_drawing() =>
+                            {
+                                sheet.hold((mark, 0), at);
+                            }
+                            _ => sheet.press(at, reach, frame.moment()),
                         }
-                        _ => sheet.press(at, reach, frame.moment()),
                     }
+                    true => {}
+                    false => sheet.release(place.mm(pos), reach),
                 }
-                true => {}
-                false => sheet.release(place.mm(pos), reach),
-            },
+            }
             _ => {}
         }
     }
@@ -129,10 +123,7 @@ fn note_at(ui: &Ui, sheet: &Sheet, place: &Place, at: Pos2) -> Option<usize> {
         What::Note(note) => {
             let galley = laid_out(ui.painter(), &note.text, Color32::WHITE);
             let left = to_screen(place, note.at);
-            Align2::LEFT_CENTER
-                .anchor_size(left, galley.size())
-                .expand(4.0)
-                .contains(at)
+            Align2::LEFT_CENTER.anchor_size(left, galley.size()).expand(4.0).contains(at)
         }
         What::Caliper(_) => false,
     };
@@ -162,22 +153,13 @@ fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
 }
 
 fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
-    let points: Vec<Pos2> = caliper
-        .points
-        .iter()
-        .map(|&p| to_screen(place, p))
-        .collect();
+    let points: Vec<Pos2> = caliper.points.iter().map(|&p| to_screen(place, p)).collect();
     match caliper.kind {
         Kind::Distance | Kind::Angle => dots(painter, &points, colour),
         Kind::Ellipse => {
             dots(painter, &points[..2], colour.gamma_multiply(0.5));
             const SIDES: u32 = 72;
-            let at = |i| {
-                to_screen(
-                    place,
-                    caliper.outline(TAU * f64::from(i) / f64::from(SIDES)),
-                )
-            };
+            let at = |i| to_screen(place, caliper.outline(TAU * f64::from(i) / f64::from(SIDES)));
             let outline: Vec<Pos2> = (0..=SIDES).map(at).collect();
             dots(painter, &outline, colour);
         }
@@ -192,17 +174,9 @@ pub(super) fn dots(painter: &Painter, points: &[Pos2], colour: Color32) {
 
 /// Open in the middle, so that the point itself is seen.
 pub(super) fn cross(painter: &Painter, at: Pos2, colour: Color32) {
-    for (arm, width, tint) in [
-        (7.0, 3.0, Color32::from_black_alpha(150)),
-        (6.0, 1.4, colour),
-    ] {
+    for (arm, width, tint) in [(7.0, 3.0, Color32::from_black_alpha(150)), (6.0, 1.4, colour)] {
         let line = Stroke::new(width, tint);
-        for way in [
-            vec2(1.0, 0.0),
-            vec2(-1.0, 0.0),
-            vec2(0.0, 1.0),
-            vec2(0.0, -1.0),
-        ] {
+        for way in [vec2(1.0, 0.0), vec2(-1.0, 0.0), vec2(0.0, 1.0), vec2(0.0, -1.0)] {
             painter.line_segment([at + 2.0 * way, at + arm * way], line);
         }
     }
@@ -211,13 +185,7 @@ pub(super) fn cross(painter: &Painter, at: Pos2, colour: Color32) {
 fn letter(painter: &Painter, at: Pos2, letter: char, colour: Color32) {
     let font = FontId::proportional(12.0);
     let shadow = Color32::from_black_alpha(200);
-    painter.text(
-        at + vec2(1.0, 1.0),
-        Align2::RIGHT_BOTTOM,
-        letter,
-        font.clone(),
-        shadow,
-    );
+    painter.text(at + vec2(1.0, 1.0), Align2::RIGHT_BOTTOM, letter, font.clone(), shadow);
     painter.text(at, Align2::RIGHT_BOTTOM, letter, font, colour);
 }
 
@@ -229,11 +197,7 @@ fn laid_out(painter: &Painter, text: &str, colour: Color32) -> Arc<egui::Galley>
 pub(super) fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
     let galley = laid_out(painter, text, colour);
     let room = Align2::LEFT_CENTER.anchor_size(at, galley.size());
-    painter.rect_filled(
-        room.expand2(vec2(4.0, 1.0)),
-        2.0,
-        Color32::from_black_alpha(170),
-    );
+    painter.rect_filled(room.expand2(vec2(4.0, 1.0)), 2.0, Color32::from_black_alpha(170));
     painter.galley(room.min, galley, colour);
 }
 
@@ -241,11 +205,7 @@ pub(super) fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
 pub(super) fn reading(reading: &Reading) -> Vec<String> {
     match reading {
         Reading::Distance(mm) => vec![format!("{mm:.1} mm")],
-        Reading::Ellipse {
-            axes: [a, b],
-            circumference,
-            area,
-        } => vec![
+        Reading::Ellipse { axes: [a, b], circumference, area } => vec![
             format!("{a:.1} x {b:.1} mm"),
             format!("C {circumference:.1} mm"),
             format!("A {:.2} cm²", area / 100.0),
@@ -262,10 +222,9 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
     }
     let corner = ui.max_rect().left_top() + vec2(46.0, 64.0);
     let mut removed = None;
-    Area::new(Id::new("results"))
-        .fixed_pos(corner)
-        .constrain_to(ui.max_rect())
-        .show(ui.ctx(), |ui| {
+    Area::new(Id::new("results")).fixed_pos(corner).constrain_to(ui.max_rect()).show(
+        ui.ctx(),
+        |ui| {
             egui::Frame::NONE
                 .fill(Color32::from_black_alpha(190))
                 .inner_margin(6)
@@ -282,7 +241,8 @@ pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
                             }
                         });
                 });
-        });
+        },
+    );
     if let Some(mark) = removed {
         sheet.remove(mark);
     }
@@ -293,25 +253,15 @@ fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mu
     let What::Caliper(caliper) = &mark.what else {
         return;
     };
-    let (kind, name, stands) = (
-        caliper.kind,
-        caliper.label.clone(),
-        mark.of == frame.moment(),
-    );
+    let (kind, name, stands) = (caliper.kind, caliper.label.clone(), mark.of == frame.moment());
     let lines = reading(&caliper.reading());
-    let letter = RichText::new(mark.letter)
-        .strong()
-        .color(colour(mark.letter));
+    let letter = RichText::new(mark.letter).strong().color(colour(mark.letter));
     let is_selected = sheet.selected().is_some_and(|(mark, _)| mark == index);
     let tip = match stands {
         true => "Select: arrow keys move its last point by a pixel, Del removes it",
         false => "Measured on another image: the probe or the scene has moved since",
     };
-    if ui
-        .selectable_label(is_selected, letter)
-        .on_hover_text(tip)
-        .clicked()
-    {
+    if ui.selectable_label(is_selected, letter).on_hover_text(tip).clicked() {
         sheet.select(index);
     }
     named(ui, sheet, index, kind, name);
@@ -329,19 +279,11 @@ fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mu
 
 /// The name of a measurement: chosen or typed.
 fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String) {
-    let shown = if name.is_empty() {
-        kind.name()
-    } else {
-        name.as_str()
-    };
+    let shown = if name.is_empty() { kind.name() } else { name.as_str() };
     let button = ui.menu_button(RichText::new(shown).size(12.0), |ui| {
         ui.set_max_width(120.0);
         let mut typed = name.clone();
-        let field = ui.add(
-            TextEdit::singleline(&mut typed)
-                .hint_text("name")
-                .char_limit(24),
-        );
+        let field = ui.add(TextEdit::singleline(&mut typed).hint_text("name").char_limit(24));
         if field.changed() {
             sheet.set_text(index, typed);
         }
@@ -355,7 +297,5 @@ fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String)
             }
         }
     });
-    button
-        .response
-        .on_hover_text("What is measured: choose a name or type one");
+    button.response.on_hover_text("What is measured: choose a name or type one");
 }

@@ -39,10 +39,7 @@ pub(super) enum CaptureError {
 
 impl CaptureError {
     fn file(path: &Path, cause: impl ToString) -> Self {
-        Self::File {
-            path: path.to_owned(),
-            cause: cause.to_string(),
-        }
+        Self::File { path: path.to_owned(), cause: cause.to_string() }
     }
 }
 
@@ -122,11 +119,7 @@ pub(super) struct Captures {
 impl Captures {
     /// None yet. `wake` is called, from their threads, when one has come to its end.
     pub(super) fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
-        Self {
-            jobs: Vec::new(),
-            done: channel(),
-            wake: Arc::new(wake),
-        }
+        Self { jobs: Vec::new(), done: channel(), wake: Arc::new(wake) }
     }
 
     /// Saves an image as `STEM-NNNN.png` in a folder, which is made where it does not exist.
@@ -271,10 +264,7 @@ mod tests {
         assert_eq!(first.count()[1], 1000);
         first.cancel();
         captures.wait();
-        assert_eq!(
-            (captures.running().count(), woken.load(Ordering::Relaxed)),
-            (0, 2)
-        );
+        assert_eq!((captures.running().count(), woken.load(Ordering::Relaxed)), (0, 2));
         let mut files: Vec<_> = (captures.finished().into_iter())
             .map(|outcome| outcome.expect("nothing fails"))
             .collect();

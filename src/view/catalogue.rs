@@ -40,11 +40,7 @@ fn read(document: &str) -> HashMap<String, Entry> {
     let (mut table, mut units, mut out) = ("", HashMap::new(), HashMap::new());
     for line in document.lines() {
         if line.starts_with('#') {
-            table = line
-                .split('`')
-                .nth(1)
-                .unwrap_or("")
-                .trim_matches(['[', ']']);
+            table = line.split('`').nth(1).unwrap_or("").trim_matches(['[', ']']);
         }
         let cells: Vec<&str> = line.trim_matches('|').split('|').map(str::trim).collect();
         match *cells.as_slice() {
@@ -77,12 +73,8 @@ fn describe(units: &HashMap<String, String>, kind: &str, range: &str, meaning: &
     };
     // Of several quantities the reference gives the plural: "8 levels".
     let singular = kind.trim_start_matches(|c: char| c.is_ascii_digit() || c == ' ');
-    let unit = (units.get(singular))
-        .or_else(|| units.get(singular.trim_end_matches('s')))
-        .cloned();
-    let plain = words
-        .get(3)
-        .filter(|_| kind == "integer" && number(2).is_some());
+    let unit = (units.get(singular)).or_else(|| units.get(singular.trim_end_matches('s'))).cloned();
+    let plain = words.get(3).filter(|_| kind == "integer" && number(2).is_some());
     let choices = range.split('"').skip(1).step_by(2).map(str::to_owned);
     Entry {
         unit: unit.or(plain.map(|w| (*w).to_owned())).unwrap_or_default(),
@@ -104,10 +96,7 @@ mod tests {
         assert_eq!(entry("probe.aperture").range, [0.1, f64::INFINITY]);
         assert_eq!(entry("imaging.noise").range, [f64::NEG_INFINITY, 200.0]);
         let sliders = entry("imaging.tgc_sliders");
-        assert_eq!(
-            (sliders.unit.as_str(), sliders.range),
-            ("dB", [-100.0, 100.0])
-        );
+        assert_eq!((sliders.unit.as_str(), sliders.range), ("dB", [-100.0, 100.0]));
         assert_eq!(entry("imaging.image_height").unit, "pixels");
         assert_eq!(entry("simulation.paths").unit, "");
         assert_eq!(entry("simulation.sequence").choices, ["sobol", "random"]);

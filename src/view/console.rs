@@ -28,45 +28,37 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
     files::row(ui, model, &mut state.files);
     ui.separator();
     let before = model.settings.clone();
-    ScrollArea::vertical()
-        .auto_shrink([false; 2])
-        .show(ui, |ui| {
-            section(ui, "Probe", true, |ui| probe::show(ui, &mut model.settings));
-            section(ui, "Image", true, |ui| image::show(ui, &mut model.settings));
-            let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
-            section(ui, "Animation", false, &mut animate);
-            section(ui, "Probe input", false, |ui| {
-                input::show(ui, model, &mut state.inputs, now);
-            });
-            let (settings, lattice) = (&mut model.settings, model.file.lattice);
-            section(ui, "Simulation", false, |ui| {
-                simulation::show(ui, settings, state, lattice)
-            });
-            if settings.fusion.is_some() {
-                section(ui, "Fusion", false, |ui| fusion::show(ui, model, now));
-            }
-            if model.registration.is_some() {
-                let planes = &mut state.planes.open;
-                section(ui, "Registration", false, |ui| {
-                    registration::show(ui, model, planes)
-                });
-            }
-            let (settings, loaded) = (&mut model.settings, &model.loaded);
-            section(ui, "Tissues", false, |ui| {
-                anatomy::tissues(ui, settings, loaded, &mut state.tissue);
-            });
-            let meshes = &model.meshes;
-            section(ui, "Surfaces", false, |ui| {
-                anatomy::surfaces(ui, settings, loaded, meshes, &mut state.mesh);
-            });
+    ScrollArea::vertical().auto_shrink([false; 2]).show(ui, |ui| {
+        section(ui, "Probe", true, |ui| probe::show(ui, &mut model.settings));
+        section(ui, "Image", true, |ui| image::show(ui, &mut model.settings));
+        let mut animate = |ui: &mut Ui| animation::show(ui, model, now);
+        section(ui, "Animation", false, &mut animate);
+        section(ui, "Probe input", false, |ui| {
+            input::show(ui, model, &mut state.inputs, now);
         });
+        let (settings, lattice) = (&mut model.settings, model.file.lattice);
+        section(ui, "Simulation", false, |ui| simulation::show(ui, settings, state, lattice));
+        if settings.fusion.is_some() {
+            section(ui, "Fusion", false, |ui| fusion::show(ui, model, now));
+        }
+        if model.registration.is_some() {
+            let planes = &mut state.planes.open;
+            section(ui, "Registration", false, |ui| registration::show(ui, model, planes));
+        }
+        let (settings, loaded) = (&mut model.settings, &model.loaded);
+        section(ui, "Tissues", false, |ui| {
+            anatomy::tissues(ui, settings, loaded, &mut state.tissue);
+        });
+        let meshes = &model.meshes;
+        section(ui, "Surfaces", false, |ui| {
+            anatomy::surfaces(ui, settings, loaded, meshes, &mut state.mesh);
+        });
+    });
     model.note(&before, now);
 }
 
 fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
-    CollapsingHeader::new(RichText::new(name).strong())
-        .default_open(open)
-        .show(ui, add);
+    CollapsingHeader::new(RichText::new(name).strong()).default_open(open).show(ui, add);
 }
 
 fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
@@ -78,10 +70,7 @@ fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
         }
         let [back, forward] = model.undoable();
         let undo = ui.add_enabled(back, egui::Button::new("Undo"));
-        if undo
-            .on_hover_text("Take back the last change of a setting (Ctrl+Z)")
-            .clicked()
-        {
+        if undo.on_hover_text("Take back the last change of a setting (Ctrl+Z)").clicked() {
             model.undo(now);
         }
         let redo = ui.add_enabled(forward, egui::Button::new("Redo"));

@@ -222,10 +222,7 @@ impl Engine {
             .name("simulation".into())
             .spawn(move || worker.run())
             .expect("a thread can be started");
-        Self {
-            shared,
-            thread: Some(thread),
-        }
+        Self { shared, thread: Some(thread) }
     }
 
     /// Replaces the order that was not taken yet. While `frozen` nothing is carried out.

@@ -182,10 +182,7 @@ fn lean(delta: Vec2, place: &Place, camera: &Camera, pose: &DAffine3) -> Option<
     let (aa, bb, ab) = (dot(a, a) + SEEN * SEEN, dot(b, b) + SEEN * SEEN, dot(a, b));
     let (da, db) = (dot(a, wanted), dot(b, wanted));
     let determinant = aa * bb - ab * ab;
-    let angles = [
-        (bb * da - ab * db) / determinant,
-        (aa * db - ab * da) / determinant,
-    ];
+    let angles = [(bb * da - ab * db) / determinant, (aa * db - ab * da) / determinant];
     Some(angles.map(|angle| angle.clamp(-LEAN, LEAN)))
 }
 
@@ -203,10 +200,7 @@ fn is_probe(at: Pos2, place: &Place, camera: &Camera, pose: &DAffine3, probe: &P
     head.extend(top.into_iter().rev());
     let handle = [DVec3::ZERO, DVec3::NEG_Z * HANDLE].map(seen);
     let handle = handle.into_iter().flatten().collect();
-    encloses(&head, at)
-        || [head, handle]
-            .iter()
-            .any(|line: &Vec<Pos2>| is_near(line, at))
+    encloses(&head, at) || [head, handle].iter().any(|line: &Vec<Pos2>| is_near(line, at))
 }
 
 fn is_near(line: &[Pos2], at: Pos2) -> bool {
@@ -253,9 +247,8 @@ fn ghost(painter: &Painter, place: &Place, camera: &Camera, pose: &DAffine3, pro
         let points = (0..=16).map(move |i| (f64::from(i) / 16.0 - 0.5, along));
         points.filter_map(|(across, along)| seen(probe.face(across, along).0))
     };
-    let rim: Vec<Pos2> = edge(-0.5)
-        .chain(edge(0.5).collect::<Vec<_>>().into_iter().rev())
-        .collect();
+    let rim: Vec<Pos2> =
+        edge(-0.5).chain(edge(0.5).collect::<Vec<_>>().into_iter().rev()).collect();
     painter.add(Shape::closed_line(rim, line));
     if let (Some(from), Some(to)) = (seen(DVec3::ZERO), seen(DVec3::Z * 30.0)) {
         painter.arrow(from, to - from, line);
@@ -274,9 +267,7 @@ mod tests {
     use super::*;
 
     fn place() -> Place {
-        Place {
-            rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)),
-        }
+        Place { rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)) }
     }
 
     // The eye stands before the image plane: rock moves the handle sideways, tilt towards the eye.
@@ -296,10 +287,7 @@ mod tests {
             let leaned = super::super::model::moved(&leaned, Axis::Tilt, tilt);
             let went = end(&leaned) - end(&pose);
             // The damping takes some of it.
-            assert!(
-                (went - wanted).length() < 0.4 * wanted.length(),
-                "{went:?} {wanted:?}"
-            );
+            assert!((went - wanted).length() < 0.4 * wanted.length(), "{went:?} {wanted:?}");
         }
     }
 

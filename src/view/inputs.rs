@@ -56,10 +56,7 @@ impl Inputs {
             link,
             bell,
             tracker,
-            listen: listen.unwrap_or(Listen {
-                address: IpAddr::from([127, 0, 0, 1]),
-                port: PORT,
-            }),
+            listen: listen.unwrap_or(Listen { address: IpAddr::from([127, 0, 0, 1]), port: PORT }),
             report: None,
             refused: None,
             pads,

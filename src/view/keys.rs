@@ -98,42 +98,20 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         ],
         "rotate about the depth axis (2 deg)",
     ),
-    (
-        "H",
-        &[(Key::H, false, Action::Hold)],
-        "hold the probe to the skin: it slides along it",
-    ),
-    (
-        "Home",
-        &[(Key::Home, false, Action::Home)],
-        "probe back to the scene file's pose",
-    ),
+    ("H", &[(Key::H, false, Action::Hold)], "hold the probe to the skin: it slides along it"),
+    ("Home", &[(Key::Home, false, Action::Home)], "probe back to the scene file's pose"),
     (
         "R Ctrl+R",
-        &[
-            (Key::R, false, Action::Record),
-            (Key::R, true, Action::Replay),
-        ],
+        &[(Key::R, false, Action::Record), (Key::R, true, Action::Replay)],
         "record where the probe goes; replay it",
     ),
-    (
-        "Space",
-        &[(Key::Space, false, Action::Freeze)],
-        "freeze and go live",
-    ),
+    ("Space", &[(Key::Space, false, Action::Freeze)], "freeze and go live"),
     (
         ", .",
-        &[
-            (Key::Comma, false, Action::Frame(-1)),
-            (Key::Period, false, Action::Frame(1)),
-        ],
+        &[(Key::Comma, false, Action::Frame(-1)), (Key::Period, false, Action::Frame(1))],
         "frozen: one image back and on",
     ),
-    (
-        "Enter",
-        &[(Key::Enter, false, Action::Loop)],
-        "frozen: play and stop the loop",
-    ),
+    ("Enter", &[(Key::Enter, false, Action::Loop)], "frozen: play and stop the loop"),
     (
         "L O K N",
         &[
@@ -146,25 +124,15 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
     ),
     (
         "Del",
-        &[
-            (Key::Delete, false, Action::Delete),
-            (Key::Backspace, false, Action::Delete),
-        ],
+        &[(Key::Delete, false, Action::Delete), (Key::Backspace, false, Action::Delete)],
         "remove what is selected; arrows move its point by a pixel",
     ),
     (
         "F2 F3",
-        &[
-            (Key::F2, false, Action::Still),
-            (Key::F3, false, Action::Clip),
-        ],
+        &[(Key::F2, false, Action::Still), (Key::F3, false, Action::Clip)],
         "save the image, save the loop",
     ),
-    (
-        "P",
-        &[(Key::P, false, Action::Play)],
-        "play and pause the animation",
-    ),
+    ("P", &[(Key::P, false, Action::Play)], "play and pause the animation"),
     (
         "+ -",
         &[
@@ -214,11 +182,7 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "this list; close it",
     ),
     // The interface does these itself.
-    (
-        "Ctrl+Plus Ctrl+Minus Ctrl+0",
-        &[],
-        "texts and controls larger, smaller, as usual",
-    ),
+    ("Ctrl+Plus Ctrl+Minus Ctrl+0", &[], "texts and controls larger, smaller, as usual"),
     ("Ctrl+Q", &[(Key::Q, true, Action::Quit)], "quit"),
 ];
 
@@ -234,12 +198,7 @@ pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, n
     }
     let pressed = ctx.input(|input| {
         let presses = input.events.iter().filter_map(|event| match event {
-            Event::Key {
-                key,
-                pressed: true,
-                modifiers,
-                ..
-            } => Some((*key, *modifiers)),
+            Event::Key { key, pressed: true, modifiers, .. } => Some((*key, *modifiers)),
             _ => None,
         });
         presses.collect::<Vec<_>>()
@@ -381,9 +340,7 @@ mod tests {
                     _ => None,
                 })
                 .sum();
-            let count = all
-                .iter()
-                .filter(|b| matches!(b.2, Action::Move(a, _) if a == axis));
+            let count = all.iter().filter(|b| matches!(b.2, Action::Move(a, _) if a == axis));
             assert_eq!((count.count(), steps), (2, 0.0), "{axis:?}");
         }
     }

@@ -50,20 +50,10 @@ pub(super) fn show(
             .show(ui, |ui| console::show(ui, model, state, now));
     }
     // Below each other where there is no room beside each other.
-    let more = if model.registration.is_some() {
-        PLANES
-    } else {
-        0.0
-    };
-    let rows = if ui.available_width() < BAR + more {
-        2
-    } else {
-        1
-    };
-    Panel::bottom("bar")
-        .resizable(false)
-        .exact_size(cine::HEIGHT * rows as f32)
-        .show(ui, |ui| match rows {
+    let more = if model.registration.is_some() { PLANES } else { 0.0 };
+    let rows = if ui.available_width() < BAR + more { 2 } else { 1 };
+    Panel::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {
+        match rows {
             1 => drop(ui.horizontal_centered(|ui| {
                 toggles(ui, model, state, now);
                 ui.separator();
@@ -74,7 +64,8 @@ pub(super) fn show(
                 ui.horizontal(|ui| toggles(ui, model, state, now));
                 ui.horizontal(|ui| cine::show(ui, model, &mut state.tools, now));
             }
-        });
+        }
+    });
     // Where there is no room for both, the panel takes the image's place.
     let alone = state.timing && ui.available_height() < timing::HEIGHT + LEAST_IMAGE;
     if alone {
@@ -105,9 +96,7 @@ pub(super) fn show(
     let survey = room.filter(|_| !planes).map(|width| {
         let panel = Panel::right("survey").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
-        let shown = panel.show(ui, |ui| {
-            survey::show(ui, model, &mut state.survey, pictured)
-        });
+        let shown = panel.show(ui, |ui| survey::show(ui, model, &mut state.survey, pictured));
         shown.inner
     });
     let centre = CentralPanel::default().frame(Space::NONE);
@@ -151,21 +140,14 @@ pub(super) fn show(
     if state.help {
         help(ui.ctx(), &mut state.help);
     }
-    Places {
-        image: place.inner,
-        survey,
-    }
+    Places { image: place.inner, survey }
 }
 
 /// Buttons that open the panels.
 fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     for (open, name, tip) in [
         (&mut state.console, "Console", "Settings (C)"),
-        (
-            &mut state.survey.open,
-            "3D",
-            "Anatomy, probe and fan from outside (V)",
-        ),
+        (&mut state.survey.open, "3D", "Anatomy, probe and fan from outside (V)"),
         (&mut state.timing, "Timings", "Where the time goes (T)"),
         (&mut state.help, "Keys", "What the keyboard does (?)"),
     ] {
@@ -173,8 +155,7 @@ fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     }
     if model.registration.is_some() {
         let tip = "Three planes through the acquired volume, in place of the 3D view (G)";
-        ui.toggle_value(&mut state.planes.open, "Planes")
-            .on_hover_text(tip);
+        ui.toggle_value(&mut state.planes.open, "Planes").on_hover_text(tip);
     }
     let tip = "One scanline against time (M)";
     let strip = ui.selectable_label(model.mmode.is_some(), "M-mode");
@@ -190,16 +171,13 @@ fn help(ctx: &egui::Context, open: &mut bool) {
         .collapsible(false)
         .open(open)
         .show(ctx, |ui| {
-            egui::Grid::new("keys")
-                .num_columns(2)
-                .spacing([16.0, 4.0])
-                .show(ui, |ui| {
-                    for (key, text) in keys::list() {
-                        ui.monospace(key);
-                        ui.label(text);
-                        ui.end_row();
-                    }
-                });
+            egui::Grid::new("keys").num_columns(2).spacing([16.0, 4.0]).show(ui, |ui| {
+                for (key, text) in keys::list() {
+                    ui.monospace(key);
+                    ui.label(text);
+                    ui.end_row();
+                }
+            });
             ui.small("With Shift the probe moves a quarter of a step.");
         });
 }

@@ -24,10 +24,7 @@ pub(super) struct Bell {
 
 impl Bell {
     pub(super) fn new(proxy: EventLoopProxy<Wake>) -> Self {
-        Self {
-            rung: Arc::default(),
-            proxy,
-        }
+        Self { rung: Arc::default(), proxy }
     }
 
     /// Called by any thread after it has put something where the event loop looks.
@@ -112,11 +109,7 @@ pub(super) struct Broadcast {
 
 impl Broadcast {
     pub(super) fn new(link: Link, device: &Arc<Device>) -> Self {
-        Self {
-            link,
-            device: device.clone(),
-            last: None,
-        }
+        Self { link, device: device.clone(), last: None }
     }
 
     /// Offers a finished picture, with its pixels where they have been read, its constants and the pose

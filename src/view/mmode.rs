@@ -35,11 +35,7 @@ pub(super) struct Panel {
 
 impl Default for Panel {
     fn default() -> Self {
-        Self {
-            window: 2.0,
-            span: None,
-            texture: None,
-        }
+        Self { window: 2.0, span: None, texture: None }
     }
 }
 

@@ -41,9 +41,8 @@ fn field(context: &Context, sheet: &mut Sheet, index: usize, mut text: String, a
         .order(Order::Foreground)
         .fixed_pos(at - vec2(4.0, 11.0))
         .show(context, |ui| {
-            let field = TextEdit::singleline(&mut text)
-                .desired_width(150.0)
-                .hint_text("text, Enter");
+            let field =
+                TextEdit::singleline(&mut text).desired_width(150.0).hint_text("text, Enter");
             let response = ui.add(field);
             // The last letters may have come together with Enter.
             sheet.set_text(index, text);
@@ -63,31 +62,19 @@ mod tests {
     use super::super::model::sheet::{Moment, Tool};
 
     fn key(key: Key, pressed: bool) -> Event {
-        Event::Key {
-            key,
-            physical_key: None,
-            pressed,
-            repeat: false,
-            modifiers: Modifiers::NONE,
-        }
+        Event::Key { key, physical_key: None, pressed, repeat: false, modifiers: Modifiers::NONE }
     }
 
     #[test]
     fn letters_that_come_together_with_enter_are_kept() {
         let mut sheet = Sheet::default();
-        let now = Moment {
-            pose: DAffine3::IDENTITY,
-            seconds: 0.0,
-        };
+        let now = Moment { pose: DAffine3::IDENTITY, seconds: 0.0 };
         sheet.take(Some(Tool::Note));
         sheet.press(dvec2(5.0, 10.0), 1.0, now);
         sheet.release(dvec2(5.0, 10.0), 1.0);
         let context = Context::default();
         let mut draw = |events| {
-            let input = RawInput {
-                events,
-                ..RawInput::default()
-            };
+            let input = RawInput { events, ..RawInput::default() };
             let mut output = context.run_ui(input, |ui| {
                 let Some(index) = sheet.editing() else { return };
                 let What::Note(note) = &sheet.marks()[index].what else {

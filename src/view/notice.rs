@@ -22,11 +22,7 @@ pub(super) fn show(ui: &Ui, inputs: &Inputs) {
     let words = painter.layout_no_wrap(text, font, Color32::BLACK);
     let size = words.size() + vec2(20.0, 8.0);
     // Between title and state, in the margin over the image; below them where there is no room.
-    let top = if area.width() > size.x + 2.0 * TEXTS {
-        14.0
-    } else {
-        60.0
-    };
+    let top = if area.width() > size.x + 2.0 * TEXTS { 14.0 } else { 60.0 };
     let centre = area.center_top() + vec2(0.0, top + size.y / 2.0);
     let badge = Rect::from_center_size(centre, size);
     painter.rect_filled(badge, 4.0, style::WARN);

@@ -89,15 +89,7 @@ impl Plan {
         model: &Model,
     ) -> Result<Session, ViewError> {
         let (scene, proxy, link) = (self.scene.clone(), self.proxy.clone(), self.link.clone());
-        Session::new(
-            device,
-            window,
-            &self.options,
-            scene,
-            model.order(),
-            proxy,
-            link,
-        )
+        Session::new(device, window, &self.options, scene, model.order(), proxy, link)
     }
 }
 
@@ -171,16 +163,7 @@ impl Open {
         error: &ViewError,
     ) -> Result<(Self, ValidationLog), ViewError> {
         let Self {
-            frame,
-            pictured,
-            session,
-            model,
-            mut state,
-            input,
-            window,
-            title,
-            opening,
-            ..
+            frame, pictured, session, model, mut state, input, window, title, opening, ..
         } = self;
         // What was handed over is lost with the device; it can be asked for again.
         state.files.opening = opening.is_some();
@@ -196,11 +179,7 @@ impl Open {
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
         window.request_redraw();
-        let made = Self {
-            title,
-            opening,
-            ..Self::with(session, model, state, input, window)
-        };
+        let made = Self { title, opening, ..Self::with(session, model, state, input, window) };
         Ok((made, log))
     }
 

@@ -42,11 +42,7 @@ impl Opening {
             let _ = sender.send(Scene::load(&file, &set));
             let _ = proxy.send_event(Wake);
         });
-        Self {
-            path,
-            overrides,
-            loaded,
-        }
+        Self { path, overrides, loaded }
     }
 
     /// What has been read, suited to the device; nothing while it is not ready.

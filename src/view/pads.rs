@@ -54,10 +54,7 @@ impl Pads {
     /// Looks for pads from now on. The thread ends with the program.
     pub(super) fn start(bell: Bell) -> Self {
         let word = Arc::<Mutex<Word>>::default();
-        let listener = Listener {
-            word: word.clone(),
-            bell,
-        };
+        let listener = Listener { word: word.clone(), bell };
         let thread = std::thread::Builder::new().name("game pads".to_owned());
         // Without another thread there are no pads, and the keyboard is left.
         if let Err(error) = thread.spawn(move || listener.run()) {
@@ -134,9 +131,7 @@ impl Listener {
 
     /// Notes which pads there are.
     fn names(&self, gilrs: &Gilrs) {
-        let names: Vec<String> = (gilrs.gamepads())
-            .map(|(_, pad)| pad.name().to_owned())
-            .collect();
+        let names: Vec<String> = (gilrs.gamepads()).map(|(_, pad)| pad.name().to_owned()).collect();
         let mut word = lock(&self.word);
         if !names.is_empty() {
             word.problem = None;
@@ -206,9 +201,7 @@ mod tests {
         // A thread that could not run for a second.
         word.go(&pad, Duration::from_secs(1));
         let gone: Vec<(Axis, f64)> = steps(word.travel).collect();
-        let [(Axis::Lateral, mm)] = gone[..] else {
-            panic!("{gone:?}")
-        };
+        let [(Axis::Lateral, mm)] = gone[..] else { panic!("{gone:?}") };
         // 30 mm/s for 160 ms, and for the 50 ms that a step stands for at most.
         assert!((mm + 30.0 * 0.21).abs() < 1e-9, "{mm}");
     }

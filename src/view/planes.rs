@@ -21,10 +21,8 @@ const BAR: f32 = 30.0;
 /// Beyond the volume.
 const OUTSIDE: Color32 = Color32::from_rgb(10, 22, 40);
 /// Lines of masks, and of other meshes.
-const LINES: [Color32; 2] = [
-    Color32::from_rgb(255, 200, 60),
-    Color32::from_rgba_premultiplied(22, 46, 52, 60),
-];
+const LINES: [Color32; 2] =
+    [Color32::from_rgb(255, 200, 60), Color32::from_rgba_premultiplied(22, 46, 52, 60)];
 
 /// What of the planes is shown; not saved.
 #[derive(Default)]
@@ -84,23 +82,10 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             *picture = Some(make(ui, plane, &registration, key));
         }
         if let Some(picture) = picture {
-            draw(
-                &ui.painter_at(rect),
-                rect,
-                plane,
-                picture,
-                (&registration, pitch),
-            );
+            draw(&ui.painter_at(rect), rect, plane, picture, (&registration, pitch));
         }
         let response = ui.interact(rect, ui.id().with(plane.name), Sense::click_and_drag());
-        act(
-            ui,
-            &response,
-            rect,
-            plane,
-            (&mut registration, &mut model.settings),
-            pitch,
-        );
+        act(ui, &response, rect, plane, (&mut registration, &mut model.settings), pitch);
     }
     model.registration = Some(registration);
     model.note(&before, now);
@@ -115,11 +100,7 @@ fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut 
             if ui.button("To the mask").on_hover_text(tip).clicked() {
                 registration.centre();
             }
-            if ui
-                .button("Close")
-                .on_hover_text("Back to the 3D view")
-                .clicked()
-            {
+            if ui.button("Close").on_hover_text("Back to the 3D view").clicked() {
                 *open = false;
             }
             let hint = "drag: move  Shift: turn  Ctrl: scale  right: meeting point  wheel: through";
@@ -131,19 +112,11 @@ fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut 
 /// Samples the volume and cuts the meshes.
 fn make(ui: &Ui, plane: &Plane, registration: &Registration, key: Key) -> Picture {
     let levels = registration.slice(plane, key.size, key.pitch);
-    let colours = levels
-        .into_iter()
-        .map(|level| level.map_or(OUTSIDE, Color32::from_gray));
+    let colours = levels.into_iter().map(|level| level.map_or(OUTSIDE, Color32::from_gray));
     let image = ColorImage::new(key.size, colours.collect());
-    let texture = ui
-        .ctx()
-        .load_texture(plane.name, image, TextureOptions::NEAREST);
+    let texture = ui.ctx().load_texture(plane.name, image, TextureOptions::NEAREST);
     let reach = key.pitch * key.size[0].max(key.size[1]) as f64;
-    Picture {
-        texture,
-        outlines: registration.outlines(plane, reach),
-        of: key,
-    }
+    Picture { texture, outlines: registration.outlines(plane, reach), of: key }
 }
 
 fn draw(
@@ -161,11 +134,7 @@ fn draw(
     // Masks over the others.
     for masks in [false, true] {
         let colour = LINES[usize::from(!masks)];
-        for outline in picture
-            .outlines
-            .iter()
-            .filter(|o| scene.is_mask(o.instance) == masks)
-        {
+        for outline in picture.outlines.iter().filter(|o| scene.is_mask(o.instance) == masks) {
             let pieces = outline.pieces.iter().map(|piece| piece.map(place));
             let stroke = Stroke::new(if masks { 1.5 } else { 1.0 }, colour);
             painter.extend(pieces.map(|ends| Shape::line_segment(ends, stroke)));
@@ -177,11 +146,7 @@ fn draw(
     let font = FontId::proportional(11.0);
     let corner = rect.left_top() + vec2(8.0, 4.0);
     painter.text(corner, Align2::LEFT_TOP, plane.name, font, style::TEXT);
-    painter.hline(
-        rect.x_range(),
-        rect.bottom(),
-        Stroke::new(1.0, Color32::from_gray(48)),
-    );
+    painter.hline(rect.x_range(), rect.bottom(), Stroke::new(1.0, Color32::from_gray(48)));
 }
 
 /// Takes what the pointer did in a plane.

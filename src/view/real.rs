@@ -44,10 +44,7 @@ pub(super) fn legend(painter: &egui::Painter, area: Rect, frame: &Frame, model: 
         let mix = |c: u8| (f32::from(grey) + share * (f32::from(c) - f32::from(grey))) as u8;
         Color32::from_rgb(mix(r), mix(g), mix(b))
     };
-    for (colour, words) in [
-        (Color32::from_gray(GREY), "simulated"),
-        (over(GREY), "acquired"),
-    ] {
+    for (colour, words) in [(Color32::from_gray(GREY), "simulated"), (over(GREY), "acquired")] {
         let place = text(right, words);
         let swatch = pos2(place.left() - 20.0, y - 5.0);
         painter.rect_filled(Rect::from_min_size(swatch, vec2(15.0, 10.0)), 2.0, colour);

@@ -23,12 +23,7 @@ pub(super) struct Ring {
 
 impl Ring {
     pub(super) fn new(device: &Arc<Device>, name: &'static str) -> Self {
-        Self {
-            name,
-            images: Vec::new(),
-            sizes: Vec::new(),
-            device: device.clone(),
-        }
+        Self { name, images: Vec::new(), sizes: Vec::new(), device: device.clone() }
     }
 
     /// All images, those that others keep included, bytes.
@@ -81,10 +76,7 @@ mod tests {
         let device = test_device();
         let mut ring = Ring::new(&device, "B-mode");
         let frames = 12;
-        let mut cine = Cine::new(Limit {
-            frames,
-            bytes: 1 << 30,
-        });
+        let mut cine = Cine::new(Limit { frames, bytes: 1 << 30 });
         let before = device.memory().current;
         let mut full = 0;
         for count in 1..40 {
@@ -124,11 +116,7 @@ mod tests {
         for size in [[5, 5], [6, 6], [7, 7]] {
             ring.free(size).unwrap();
         }
-        assert_eq!(
-            ring.images.len(),
-            4,
-            "what is held, and the last three sizes"
-        );
+        assert_eq!(ring.images.len(), 4, "what is held, and the last three sizes");
         assert_eq!(held.extent(), [8, 8, 1]);
     }
 }

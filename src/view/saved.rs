@@ -38,12 +38,7 @@ pub(super) fn show(ui: &Ui, tools: &mut Tools) {
     tools.collect();
     let now = Instant::now();
     tools.notices.saved.retain(|(_, until)| *until > now);
-    let soonest = tools
-        .notices
-        .saved
-        .iter()
-        .map(|(_, until)| *until - now)
-        .min();
+    let soonest = tools.notices.saved.iter().map(|(_, until)| *until - now).min();
     if let Some(left) = soonest {
         ui.ctx().request_repaint_after(left);
     }

@@ -29,9 +29,7 @@ pub(super) fn window(events: &ActiveEventLoop, title: &str) -> Result<Arc<Window
         .with_inner_size(winit::dpi::LogicalSize::new(1280, 720))
         .with_min_inner_size(winit::dpi::LogicalSize::new(640, 400));
     let window = events.create_window(attributes);
-    window
-        .map(Arc::new)
-        .map_err(|e| ViewError::Display(e.to_string()))
+    window.map(Arc::new).map_err(|e| ViewError::Display(e.to_string()))
 }
 
 /// The device that was asked for, for a window.
@@ -53,10 +51,6 @@ impl Session {
         // An event loop that is gone needs no news.
         let wake = move || drop(proxy.send_event(Wake));
         let engine = Engine::start(&device, options.library.clone(), scene, order, link, wake);
-        Ok(Self {
-            engine,
-            painter,
-            device,
-        })
+        Ok(Self { engine, painter, device })
     }
 }

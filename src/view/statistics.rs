@@ -117,9 +117,7 @@ impl Times {
             json!({ "median": found.median, "p99": found.p99 })
         };
         let stages = self.stages();
-        let stages = stages
-            .iter()
-            .map(|name| (name.clone(), both(&self.stage(name))));
+        let stages = stages.iter().map(|name| (name.clone(), both(&self.stage(name))));
         json!({
             "frames": self.samples.len(),
             "stages_ms": stages.collect::<Map<_, _>>(),

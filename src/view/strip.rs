@@ -21,15 +21,11 @@ type Icon = fn(&Painter, Rect, Color32);
 
 /// What the pointer does: sign and meaning.
 const TOOLS: [(Tool, &str, Icon); 4] = [
-    (
-        Tool::Measure(Kind::Distance),
-        "Distance in mm: two clicks, or drag (L)",
-        |p, r, c| {
-            dots(p, &[r.left_bottom(), r.right_top()], c);
-            cross(p, r.left_bottom(), c);
-            cross(p, r.right_top(), c);
-        },
-    ),
+    (Tool::Measure(Kind::Distance), "Distance in mm: two clicks, or drag (L)", |p, r, c| {
+        dots(p, &[r.left_bottom(), r.right_top()], c);
+        cross(p, r.left_bottom(), c);
+        cross(p, r.right_top(), c);
+    }),
     (
         Tool::Measure(Kind::Ellipse),
         "Ellipse, its circumference and area: the ends of one axis, then the width (O)",
@@ -48,14 +44,10 @@ const TOOLS: [(Tool, &str, Icon); 4] = [
             p.line_segment([r.left_bottom(), r.right_bottom()], line);
         },
     ),
-    (
-        Tool::Note,
-        "Text: click to place it, or drag away from what it points at (N)",
-        |p, r, c| {
-            let font = FontId::proportional(17.0);
-            p.text(r.center(), Align2::CENTER_CENTER, "T", font, c);
-        },
-    ),
+    (Tool::Note, "Text: click to place it, or drag away from what it points at (N)", |p, r, c| {
+        let font = FontId::proportional(17.0);
+        p.text(r.center(), Align2::CENTER_CENTER, "T", font, c);
+    }),
 ];
 
 fn bin(p: &Painter, r: Rect, c: Color32) {
@@ -96,14 +88,7 @@ pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
         rect
     };
     for (tool, tip, icon) in TOOLS {
-        if button(
-            ui,
-            next(0.0),
-            tools.sheet.tool() == Some(tool),
-            true,
-            tip,
-            icon,
-        ) {
+        if button(ui, next(0.0), tools.sheet.tool() == Some(tool), true, tip, icon) {
             tools.sheet.toggle(tool);
         }
     }
@@ -123,11 +108,7 @@ pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
 }
 
 fn button(ui: &mut Ui, rect: Rect, on: bool, enabled: bool, tip: &str, icon: Icon) -> bool {
-    let sense = if enabled {
-        Sense::click()
-    } else {
-        Sense::hover()
-    };
+    let sense = if enabled { Sense::click() } else { Sense::hover() };
     let response = ui.interact(rect, Id::new(tip), sense);
     let visuals = match enabled {
         true => ui.style().interact_selectable(&response, on),

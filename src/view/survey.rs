@@ -166,9 +166,7 @@ pub(super) fn show(
     state: &mut State,
     pictured: Option<&Pictured>,
 ) -> Place {
-    let place = Place {
-        rect: ui.max_rect(),
-    };
+    let place = Place { rect: ui.max_rect() };
     let id = ui.id().with("survey");
     let response = ui.interact(place.rect, id, Sense::click_and_drag());
     let before = model.survey.camera;
@@ -300,9 +298,7 @@ mod tests {
 
     #[test]
     fn what_the_eye_looks_at_is_in_the_middle() {
-        let place = Place {
-            rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)),
-        };
+        let place = Place { rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)) };
         let camera = Camera::front(&glam::DAffine3::IDENTITY, DVec3::X, 50.0);
         let seen = place.project(&camera, DVec3::X).expect("in front");
         assert!((seen - place.rect.center()).length() < 1e-3);

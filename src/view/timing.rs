@@ -102,8 +102,7 @@ pub(super) fn show(
                         ),
                         (Page::Memory, "Memory", "What lies in the device's memory"),
                     ] {
-                        ui.selectable_value(&mut state.times, page, name)
-                            .on_hover_text(tip);
+                        ui.selectable_value(&mut state.times, page, name).on_hover_text(tip);
                     }
                 });
                 match state.times {
@@ -121,27 +120,24 @@ fn stages(ui: &mut Ui, times: &Times) {
     // Two columns of stages: a fused frame has more than the panel is high.
     ui.horizontal_top(|ui| {
         for (column, some) in names.chunks(ROWS).enumerate() {
-            egui::Grid::new(("stages", column))
-                .num_columns(3)
-                .spacing([6.0, 1.0])
-                .show(ui, |ui| {
-                    for head in ["", "median", "p99"] {
-                        ui.small(head);
+            egui::Grid::new(("stages", column)).num_columns(3).spacing([6.0, 1.0]).show(ui, |ui| {
+                for head in ["", "median", "p99"] {
+                    ui.small(head);
+                }
+                ui.end_row();
+                for name in some {
+                    ui.horizontal(|ui| {
+                        let (dot, _) =
+                            ui.allocate_exact_size([8.0; 2].into(), egui::Sense::hover());
+                        ui.painter().rect_filled(dot, 2.0, colour(&names, name));
+                        ui.label(name);
+                    });
+                    for cell in pair(&times.stage(name)) {
+                        ui.monospace(cell);
                     }
                     ui.end_row();
-                    for name in some {
-                        ui.horizontal(|ui| {
-                            let (dot, _) =
-                                ui.allocate_exact_size([8.0; 2].into(), egui::Sense::hover());
-                            ui.painter().rect_filled(dot, 2.0, colour(&names, name));
-                            ui.label(name);
-                        });
-                        for cell in pair(&times.stage(name)) {
-                            ui.monospace(cell);
-                        }
-                        ui.end_row();
-                    }
-                });
+                }
+            });
         }
     });
 }
@@ -149,62 +145,51 @@ fn stages(ui: &mut Ui, times: &Times) {
 fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
     let wall = times.live(|s| s.wall);
     let device = times.of(Sample::device);
-    egui::Grid::new("totals")
-        .num_columns(3)
-        .spacing([6.0, 1.0])
-        .show(ui, |ui| {
-            for head in ["", "median", "p99"] {
-                ui.small(head);
+    egui::Grid::new("totals").num_columns(3).spacing([6.0, 1.0]).show(ui, |ui| {
+        for head in ["", "median", "p99"] {
+            ui.small(head);
+        }
+        ui.end_row();
+        for (name, tip, values) in [
+            ("device", "All stages of a frame on the device", &device),
+            ("frame", "From taking an order to the finished image", &wall),
+            (
+                "structures",
+                "What the processor takes to bring acceleration structures up to date",
+                &times.of(|s| s.update),
+            ),
+            (
+                "latency",
+                "From the input, or the reading of the clock, to the image handed to the screen",
+                &times.live(|s| s.latency),
+            ),
+            (
+                "to full quality",
+                "From the last input to the image at the scene's own quality",
+                &times.settled(),
+            ),
+            ("3D view", "A picture of the 3D view on the device", &times.survey()),
+            (
+                "interface",
+                "A frame of this window, from the start of drawing to the screen",
+                &times.interface(),
+            ),
+        ] {
+            ui.label(name).on_hover_text(tip);
+            for cell in pair(values) {
+                ui.monospace(cell);
             }
             ui.end_row();
-            for (name, tip, values) in [
-                ("device", "All stages of a frame on the device", &device),
-                ("frame", "From taking an order to the finished image", &wall),
-                (
-                    "structures",
-                    "What the processor takes to bring acceleration structures up to date",
-                    &times.of(|s| s.update),
-                ),
-                (
-                    "latency",
-                    "From the input, or the reading of the clock, to the image handed to the screen",
-                    &times.live(|s| s.latency),
-                ),
-                (
-                    "to full quality",
-                    "From the last input to the image at the scene's own quality",
-                    &times.settled(),
-                ),
-                (
-                    "3D view",
-                    "A picture of the 3D view on the device",
-                    &times.survey(),
-                ),
-                (
-                    "interface",
-                    "A frame of this window, from the start of drawing to the screen",
-                    &times.interface(),
-                ),
-            ] {
-                ui.label(name).on_hover_text(tip);
-                for cell in pair(values) {
-                    ui.monospace(cell);
-                }
-                ui.end_row();
-            }
-        });
+        }
+    });
     if !wall.is_empty() {
         let median = Statistics::of(wall).median;
         ui.label(format!("{:.1} frames per second", 1e3 / median));
     }
     if let Some(grade) = frame.map(|frame| &frame.grade) {
         let text = format!("{grade}, budget {:.0} ms", grade.budget_ms);
-        ui.add(egui::Label::new(text).truncate())
-            .on_hover_text(grade.counts.to_string());
+        ui.add(egui::Label::new(text).truncate()).on_hover_text(grade.counts.to_string());
     }
-    let device = egui::RichText::new(&state.device)
-        .color(style::FAINT)
-        .small();
-    ui.add(egui::Label::new(device).truncate())
-        .on_hover_text(&state.device);
+    let device = egui::RichText::new(&state.device).color(style::FAINT).small();
+    ui.add(egui::Label::new(device).truncate()).on_hover_text(&state.device);
 }

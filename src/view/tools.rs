@@ -61,10 +61,7 @@ impl Tools {
         wake: impl Fn() + Send + Sync + 'static,
     ) -> Self {
         Self {
-            cine: Cine::new(Limit {
-                frames: FRAMES,
-                bytes: BYTES.min(device.memory_bytes / 16),
-            }),
+            cine: Cine::new(Limit { frames: FRAMES, bytes: BYTES.min(device.memory_bytes / 16) }),
             sheet: Sheet::default(),
             captures: Captures::new(wake),
             // What is said of it names it in full.
@@ -161,11 +158,7 @@ impl Tools {
                 let mut sidecar = self.about(model, &frame);
                 sidecar.extend(settings(model, &frame, Some(&frame.pose)));
                 sidecar.extend(sidecar::marks(self.sheet.marks(), &frame.moment()));
-                let still = Still {
-                    frame,
-                    sidecar,
-                    marked,
-                };
+                let still = Still { frame, sidecar, marked };
                 self.captures.still(folder, stem, still);
             }
             Wanted::Clip => {
@@ -208,11 +201,7 @@ impl Tools {
         sidecar.insert("speed".into(), self.cine.speed().into());
         sidecar.insert("frames".into(), times.into());
         sidecar.insert("settings".into(), all_settings.into());
-        Clip {
-            frames,
-            sidecar,
-            format: self.format,
-        }
+        Clip { frames, sidecar, format: self.format }
     }
 
     /// What pictures and clips say alike.
@@ -265,31 +254,19 @@ fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     // Those of the level that it was made at: they give this very image.
     let mut settings = (*frame.settings).clone();
     let counts = &frame.grade.counts;
-    counts.set(
-        &mut settings.probe,
-        &mut settings.simulation,
-        &mut settings.imaging,
-    );
+    counts.set(&mut settings.probe, &mut settings.simulation, &mut settings.imaging);
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
     let all = output::settings(&settings.probe, &settings.simulation, &settings.imaging);
-    let said = [
-        ("set", set.into()),
-        ("settings", all),
-        ("tracer", settings.tracer.to_string().into()),
-    ];
-    said.into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
-        .collect()
+    let said =
+        [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
+    said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 impl Frame {
     /// The moment that it shows.
     pub(super) fn moment(&self) -> Moment {
-        Moment {
-            pose: self.pose,
-            seconds: self.seconds,
-        }
+        Moment { pose: self.pose, seconds: self.seconds }
     }
 }
 
@@ -313,10 +290,7 @@ mod tests {
 
     #[test]
     fn a_part_of_a_picture_is_that_part() {
-        let shot = Shot {
-            size: [4, 3],
-            rgba: (0..12).flat_map(|i| [i, 0, 0, 255]).collect(),
-        };
+        let shot = Shot { size: [4, 3], rgba: (0..12).flat_map(|i| [i, 0, 0, 255]).collect() };
         let part = cropped(&shot, [1.2, 0.6, 9.0, 3.0]);
         assert_eq!(part.size, [3, 2]);
         let red: Vec<u8> = part.rgba.chunks(4).map(|p| p[0]).collect();

@@ -27,10 +27,7 @@ struct Dicom<'p> {
 
 impl Dicom<'_> {
     fn elements(&self) -> Elements<'_> {
-        Elements {
-            bytes: &self.bytes,
-            big: self.syntax.elements().big,
-        }
+        Elements { bytes: &self.bytes, big: self.syntax.elements().big }
     }
 
     fn error(&self, message: impl Into<String>, remedy: &str) -> VolumeError {
@@ -55,10 +52,7 @@ pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
     };
     let size = [image.columns, image.rows, planes.frames.len()];
     let world_from_voxel = planes.grid.world_from_voxel().map_err(|cause| {
-        dicom.error(
-            cause,
-            "correct the orientation or the positions of the planes",
-        )
+        dicom.error(cause, "correct the orientation or the positions of the planes")
     })?;
     let mut voxels = pixels::decode(&dicom, &image, &planes.frames)?;
     if let Some((slope, intercept)) = image.scale {
@@ -68,10 +62,7 @@ pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
         warn(1, "is in colour: the brightness is read".to_owned(), "");
     }
     if planes.volumes > 1 {
-        let message = format!(
-            "{} volumes in a row; only the first is read",
-            planes.volumes
-        );
+        let message = format!("{} volumes in a row; only the first is read", planes.volumes);
         warn(planes.volumes, message, "save the one that you need");
     }
     if planes.grid.frame == Frame::Unstated {
@@ -104,15 +95,7 @@ pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
 
 /// Bytes of so many frames as they are here, if that is no more than is read.
 fn bytes_of(image: &Image, frames: usize) -> Option<u64> {
-    let factors = [
-        image.rows,
-        image.columns,
-        frames,
-        image.samples,
-        image.kind.bytes(),
-    ];
-    let product = factors
-        .iter()
-        .try_fold(1u64, |p, &n| p.checked_mul(n as u64));
+    let factors = [image.rows, image.columns, frames, image.samples, image.kind.bytes()];
+    let product = factors.iter().try_fold(1u64, |p, &n| p.checked_mul(n as u64));
     product.filter(|&p| p <= MAX_BYTES)
 }

@@ -44,18 +44,12 @@ impl VolumeError {
 
     /// An error on a line of a text header, from 1.
     pub(super) fn line(file: &Path, line: usize, message: impl Into<String>, remedy: &str) -> Self {
-        Self {
-            place: Place::Line(line),
-            ..Self::file(file, message, remedy)
-        }
+        Self { place: Place::Line(line), ..Self::file(file, message, remedy) }
     }
 
     /// An error at a byte, from 0.
     pub(super) fn byte(file: &Path, byte: u64, message: impl Into<String>, remedy: &str) -> Self {
-        Self {
-            place: Place::Byte(byte),
-            ..Self::file(file, message, remedy)
-        }
+        Self { place: Place::Byte(byte), ..Self::file(file, message, remedy) }
     }
 
     fn prefix(&self) -> String {

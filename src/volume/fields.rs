@@ -26,9 +26,7 @@ pub(super) struct Fields<'p> {
 impl Fields<'_> {
     /// The first field that is called by one of `keys`; case does not matter.
     pub fn find(&self, keys: &[&str]) -> Option<&Field> {
-        self.list
-            .iter()
-            .find(|f| keys.iter().any(|k| f.key.eq_ignore_ascii_case(k)))
+        self.list.iter().find(|f| keys.iter().any(|k| f.key.eq_ignore_ascii_case(k)))
     }
 
     /// The field of this key, which has to be there.
@@ -61,11 +59,7 @@ impl Fields<'_> {
         }
         let read = |word: &&str| {
             word.parse().map_err(|_| {
-                self.error(
-                    field,
-                    &format!("`{word}` is no number that fits"),
-                    "correct it",
-                )
+                self.error(field, &format!("`{word}` is no number that fits"), "correct it")
             })
         };
         words.iter().map(read).collect()

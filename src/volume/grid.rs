@@ -64,26 +64,18 @@ impl Grid {
         }
         for (axis, step) in ["first", "second", "third"].iter().zip(self.steps) {
             if step.length() == 0.0 || !step.length().is_finite() {
-                return Err(format!(
-                    "the {axis} axis has a step of length {}",
-                    step.length()
-                ));
+                return Err(format!("the {axis} axis has a step of length {}", step.length()));
             }
         }
         let [a, b, c] = self.steps.map(DVec3::normalize);
         let determinant = DMat3::from_cols(a, b, c).determinant();
         // Also false for a step so short that it has no direction.
         if !determinant.is_finite() || determinant.abs() < MIN_DETERMINANT {
-            return Err(format!(
-                "the direction is singular: its unit axes span {determinant:.4}"
-            ));
+            return Err(format!("the direction is singular: its unit axes span {determinant:.4}"));
         }
         let place = |v: DVec3| v * self.frame.lps_signs() * self.unit;
         let [x, y, z] = self.steps.map(place);
-        Ok(DAffine3::from_mat3_translation(
-            DMat3::from_cols(x, y, z),
-            place(self.origin),
-        ))
+        Ok(DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), place(self.origin)))
     }
 }
 

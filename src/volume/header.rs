@@ -30,8 +30,7 @@ pub(super) struct Header {
 impl Header {
     /// Notes something that does not stop the loading.
     pub fn warn(&mut self, path: &Path, count: usize, message: impl Into<String>, remedy: &str) {
-        self.warnings
-            .push(Warning::warning(path, count, message, remedy));
+        self.warnings.push(Warning::warning(path, count, message, remedy));
     }
 
     /// Reads the voxels of all volumes, of each the first of its values.
@@ -97,10 +96,7 @@ impl Header {
         if layout.volumes > MAX_VOLUMES {
             return Err(VolumeError::file(
                 path,
-                format!(
-                    "{} volumes over time are more than {MAX_VOLUMES}",
-                    layout.volumes
-                ),
+                format!("{} volumes over time are more than {MAX_VOLUMES}", layout.volumes),
                 "correct the sizes in the header, or leave out some",
             ));
         }
@@ -115,22 +111,20 @@ impl Header {
         let all = layout.voxels();
         let all = all.and_then(|voxels| voxels.checked_mul(layout.volumes as u64));
         let total = fits(layout.values(), self.kind.bytes());
-        total
-            .filter(|_| fits(all, held.held_bytes()).is_some())
-            .ok_or_else(|| {
-                let [x, y, z] = layout.size;
-                VolumeError::file(
-                    path,
-                    format!(
-                        "{x} x {y} x {z} voxels of {} values, {} times, are more than {} GB",
-                        layout.channels,
-                        layout.volumes,
-                        MAX_BYTES >> 30
-                    ),
-                    "correct the sizes in the header, crop or resample the volume, or leave out \
+        total.filter(|_| fits(all, held.held_bytes()).is_some()).ok_or_else(|| {
+            let [x, y, z] = layout.size;
+            VolumeError::file(
+                path,
+                format!(
+                    "{x} x {y} x {z} voxels of {} values, {} times, are more than {} GB",
+                    layout.channels,
+                    layout.volumes,
+                    MAX_BYTES >> 30
+                ),
+                "correct the sizes in the header, crop or resample the volume, or leave out \
                      some of several",
-                )
-            })
+            )
+        })
     }
 }
 

@@ -29,13 +29,7 @@ impl Layout {
     /// Axes as they follow in the file, the fastest first, each with its size: up to three of space,
     /// one of time at most. A product beyond all numbers stays at the largest, which no file holds.
     pub fn new(axes: impl IntoIterator<Item = (Axis, usize)>) -> Self {
-        let mut out = Self {
-            size: [1; 3],
-            volumes: 1,
-            channels: 1,
-            steps: [0; 3],
-            pace: 0,
-        };
+        let mut out = Self { size: [1; 3], volumes: 1, channels: 1, steps: [0; 3], pace: 0 };
         let (mut space, mut step) = (0, 1usize);
         for (axis, count) in axes {
             match axis {

@@ -71,11 +71,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
     if let Some(object) = fields.find(&["ObjectType"])
         && !object.value.eq_ignore_ascii_case("Image")
     {
-        return Err(fields.error(
-            object,
-            "is no image",
-            "give a MetaImage of ObjectType Image",
-        ));
+        return Err(fields.error(object, "is no image", "give a MetaImage of ObjectType Image"));
     }
     let axes = fields.need("NDims")?;
     let n: usize = fields.number(axes)?;
@@ -88,11 +84,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
     // ITK and what is built on it write seconds.
     let interval = stated.as_ref().and_then(|s| s.get(3)).copied();
     let spacings = stated.unwrap_or_else(|| vec![1.0; n]);
-    let identity = || {
-        (0..n * n)
-            .map(|i| f64::from(u8::from(i % (n + 1) == 0)))
-            .collect()
-    };
+    let identity = || (0..n * n).map(|i| f64::from(u8::from(i % (n + 1) == 0))).collect();
     let rows = fields.find(&DIRECTION).map(|f| fields.numbers(f, n * n));
     let rows: Vec<f64> = rows.transpose()?.unwrap_or_else(identity);
     let origin = fields.find(&ORIGIN).map(|f| fields.numbers(f, n));
@@ -210,11 +202,7 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
         fields.path.to_owned()
     } else {
         source::detached(fields.path, &place.value).map_err(|cause| {
-            fields.error(
-                place,
-                &cause,
-                "put the data beside the header and name it there",
-            )
+            fields.error(place, &cause, "put the data beside the header and name it there")
         })?
     };
     let skip = match fields.find(&["HeaderSize"]) {
@@ -233,11 +221,7 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
         file,
         offset,
         lines: 0,
-        skip: if local || compressed {
-            Skip::Bytes(0)
-        } else {
-            skip
-        },
+        skip: if local || compressed { Skip::Bytes(0) } else { skip },
         coding: match (compressed, text) {
             (true, _) => Coding::Zlib,
             (false, true) => Coding::Text,
@@ -266,11 +250,7 @@ fn stacked(fields: &Fields) -> Option<Warning> {
 
 /// Fields whose keys mean nothing to a volume, but those of frames.
 pub(super) fn unused_keys<'f>(fields: &'f Fields) -> Vec<&'f Field> {
-    let known = KNOWN
-        .iter()
-        .chain(&ORIGIN)
-        .chain(&DIRECTION)
-        .chain(&BIG_ENDIAN);
+    let known = KNOWN.iter().chain(&ORIGIN).chain(&DIRECTION).chain(&BIG_ENDIAN);
     let known: Vec<_> = known.collect();
     let fields = fields.list.iter();
     fields

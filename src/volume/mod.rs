@@ -93,9 +93,8 @@ pub struct Volume {
 const SHEAR: f64 = 1e-3;
 
 /// Extensions of volume files.
-const EXTENSIONS: [&str; 8] = [
-    ".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom",
-];
+const EXTENSIONS: [&str; 8] =
+    [".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom"];
 
 /// Whether a file is a volume by its extension, readable or not.
 pub fn is_volume(path: &Path) -> bool {
@@ -153,13 +152,11 @@ impl Volume {
         let size = DVec3::from(self.size.map(|n| n as f64));
         let corners = (0..8u32).map(|i| {
             let upper = DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1)));
-            self.world_from_voxel
-                .transform_point3(upper * size - DVec3::splat(0.5))
+            self.world_from_voxel.transform_point3(upper * size - DVec3::splat(0.5))
         });
-        corners.fold(
-            (DVec3::INFINITY, DVec3::NEG_INFINITY),
-            |(low, high), corner| (low.min(corner), high.max(corner)),
-        )
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), corner| {
+            (low.min(corner), high.max(corner))
+        })
     }
 
     /// Value of the first volume's voxel at these indices.
@@ -168,18 +165,13 @@ impl Volume {
     /// When there is no such voxel.
     pub fn value(&self, [i, j, k]: [usize; 3]) -> f64 {
         let [x, y, z] = self.size;
-        assert!(
-            i < x && j < y && k < z,
-            "voxel ({i}, {j}, {k}) of {x} x {y} x {z}"
-        );
+        assert!(i < x && j < y && k < z, "voxel ({i}, {j}, {k}) of {x} x {y} x {z}");
         self.voxels.get(i + x * (j + y * k))
     }
 
     fn warn_of_shear(&self, path: &Path, warnings: &mut Vec<Warning>) {
         let [a, b, c] = self.directions();
-        let largest = [a.dot(b), b.dot(c), c.dot(a)]
-            .iter()
-            .fold(0.0f64, |m, d| m.max(d.abs()));
+        let largest = [a.dot(b), b.dot(c), c.dot(a)].iter().fold(0.0f64, |m, d| m.max(d.abs()));
         if largest > SHEAR {
             let degrees = largest.acos().to_degrees();
             let message = format!("the axes are not perpendicular ({degrees:.2} degrees apart)");

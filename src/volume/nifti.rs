@@ -47,9 +47,7 @@ impl Raw<'_> {
 }
 
 pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
-    let packed = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("gz"));
+    let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let mut payload = Payload {
         file: path.to_owned(),
         offset: 0,
@@ -95,24 +93,14 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     };
     if !placed {
         let message = "neither qform nor sform is set: only the spacing is known, RAS is assumed";
-        out.warn(
-            path,
-            1,
-            message,
-            "register it or export it with its position",
-        );
+        out.warn(path, 1, message, "register it or export it with its position");
     }
     if assumed {
         let message = "xyzt_units states no unit of time; seconds are assumed";
         out.warn(path, 1, message, "export it with its unit");
     }
     if dims.len() == 2 {
-        out.warn(
-            path,
-            1,
-            "is a plane: one slice",
-            "reconstruct a volume from it",
-        );
+        out.warn(path, 1, "is a plane: one slice", "reconstruct a volume from it");
     }
     Ok(out)
 }
@@ -137,10 +125,7 @@ fn raw<'p>(path: &'p Path, payload: &Payload) -> Result<Raw<'p>, VolumeError> {
         }
     };
     if (bytes.len() as u64) < LENGTH {
-        let message = format!(
-            "is cut off: {} of {LENGTH} bytes of the header",
-            bytes.len()
-        );
+        let message = format!("is cut off: {} of {LENGTH} bytes of the header", bytes.len());
         return Err(VolumeError::byte(path, bytes.len() as u64, message, EXPORT));
     }
     if bytes[344..348] != *b"n+1\0" {
@@ -160,13 +145,10 @@ fn dims(raw: &Raw) -> Result<Vec<usize>, VolumeError> {
     axes.map(|axis| {
         let at = 40 + 2 * axis;
         let size = raw.i16(at);
-        usize::try_from(size)
-            .ok()
-            .filter(|&s| s > 0)
-            .ok_or_else(|| {
-                let message = format!("dim[{axis}] is {size}: an axis holds at least one voxel");
-                raw.error(at, message, EXPORT)
-            })
+        usize::try_from(size).ok().filter(|&s| s > 0).ok_or_else(|| {
+            let message = format!("dim[{axis}] is {size}: an axis holds at least one voxel");
+            raw.error(at, message, EXPORT)
+        })
     })
     .collect()
 }
@@ -249,11 +231,7 @@ fn grid(raw: &Raw) -> Result<(Grid, bool), VolumeError> {
             DQuat::IDENTITY
         };
         // pixdim[0] below zero mirrors the third axis.
-        let handed = if qform && raw.f32(76) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let handed = if qform && raw.f32(76) < 0.0 { -1.0 } else { 1.0 };
         let steps = [
             rotation * DVec3::X * spacing.x,
             rotation * DVec3::Y * spacing.y,
@@ -267,11 +245,6 @@ fn grid(raw: &Raw) -> Result<(Grid, bool), VolumeError> {
         // mm, or not stated, which is mm with everybody.
         _ => 1.0,
     };
-    let grid = Grid {
-        steps,
-        origin,
-        frame: Frame::Ras,
-        unit,
-    };
+    let grid = Grid { steps, origin, frame: Frame::Ras, unit };
     Ok((grid, qform || sform))
 }

@@ -117,12 +117,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     }
     if frame == Frame::Unstated {
         let message = "no anatomical frame is stated; LPS is assumed";
-        out.warn(
-            path,
-            1,
-            message,
-            "add `space: left-posterior-superior` or what it is",
-        );
+        out.warn(path, 1, message, "add `space: left-posterior-superior` or what it is");
     }
     Ok(out)
 }
@@ -136,10 +131,7 @@ fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, Vec<String>, 
         let text = text.trim_end();
         if line == 0 {
             let version = text.strip_prefix("NRRD").filter(|v| v.len() == 4);
-            if version
-                .and_then(|v| v.parse::<u32>().ok())
-                .is_none_or(|v| v > 5)
-            {
+            if version.and_then(|v| v.parse::<u32>().ok()).is_none_or(|v| v > 5) {
                 return Err(VolumeError::line(
                     path,
                     1,
@@ -245,20 +237,10 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
         }
         Some(field) => {
             let file = source::detached(fields.path, &field.value).map_err(|cause| {
-                fields.error(
-                    field,
-                    &cause,
-                    "put the data beside the header and name it there",
-                )
+                fields.error(field, &cause, "put the data beside the header and name it there")
             })?;
             (file, 0)
         }
     };
-    Ok(Payload {
-        file,
-        offset,
-        lines,
-        skip,
-        coding,
-    })
+    Ok(Payload { file, offset, lines, skip, coding })
 }

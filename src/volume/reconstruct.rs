@@ -34,10 +34,7 @@ pub struct ReconstructError {
 
 impl ReconstructError {
     fn new(message: impl Into<String>, remedy: &str) -> Self {
-        Self {
-            message: message.into(),
-            remedy: remedy.to_owned(),
-        }
+        Self { message: message.into(), remedy: remedy.to_owned() }
     }
 }
 
@@ -117,10 +114,7 @@ impl Settings {
             every: 1,
             interpolation: Interpolation::Nearest,
             compounding: Compounding::Mean,
-            holes: vec![Filling::Stick {
-                length: 9,
-                count: 1,
-            }],
+            holes: vec![Filling::Stick { length: 9, count: 1 }],
         }
     }
 }
@@ -156,9 +150,7 @@ pub fn reconstruct(
     let source = insert::Source::new(sequence, settings)?;
     let usable = (0..sequence.frames.len()).step_by(settings.every.max(1));
     let usable = usable.filter(|&i| sequence.frames[i].has_image());
-    let frames: Vec<_> = usable
-        .filter_map(|i| Some((i, reference_from_image[i]?)))
-        .collect();
+    let frames: Vec<_> = usable.filter_map(|i| Some((i, reference_from_image[i]?))).collect();
     if frames.is_empty() {
         return Err(ReconstructError::new(
             "no frame has both an image and a pose that is OK",

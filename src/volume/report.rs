@@ -19,12 +19,7 @@ impl fmt::Display for Volume {
         let spacing = self.spacing();
         let [i, j, k] = self.directions().map(vector);
         let (low, high) = self.bounds();
-        writeln!(
-            f,
-            "  {}, {x} x {y} x {z} voxels, {}",
-            self.format.name(),
-            self.stored_as.name()
-        )?;
+        writeln!(f, "  {}, {x} x {y} x {z} voxels, {}", self.format.name(), self.stored_as.name())?;
         if !self.later.is_empty() {
             let count = self.later.len() + 1;
             let pace = match self.interval {
@@ -34,11 +29,7 @@ impl fmt::Display for Volume {
             };
             writeln!(f, "  {count} volumes over time, {pace}")?;
         }
-        writeln!(
-            f,
-            "  spacing {:.4} x {:.4} x {:.4} mm",
-            spacing.x, spacing.y, spacing.z
-        )?;
+        writeln!(f, "  spacing {:.4} x {:.4} x {:.4} mm", spacing.x, spacing.y, spacing.z)?;
         writeln!(f, "  orientation in the file: {}", self.frame.name())?;
         writeln!(f, "  direction of the axes {i}, {j}, {k} in LPS")?;
         writeln!(
@@ -52,11 +43,7 @@ impl fmt::Display for Volume {
         if values.min > values.max {
             write!(f, "  no value is a finite number")
         } else {
-            write!(
-                f,
-                "  values {} to {}, mean {:.3}",
-                values.min, values.max, values.mean
-            )
+            write!(f, "  values {} to {}, mean {:.3}", values.min, values.max, values.mean)
         }
     }
 }

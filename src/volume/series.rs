@@ -36,11 +36,7 @@ impl Volume {
                 let remedy = "give volumes of the same grid and type";
                 return Err((number, VolumeError::file(file, message, remedy)));
             }
-            let new = |w: &Warning| {
-                !warnings
-                    .iter()
-                    .any(|old: &Warning| old.message == w.message)
-            };
+            let new = |w: &Warning| !warnings.iter().any(|old: &Warning| old.message == w.message);
             let new: Vec<_> = found.into_iter().filter(new).collect();
             warnings.extend(new);
             series.later.push(next.voxels);
@@ -104,19 +100,13 @@ impl Volume {
         }
         let (kind, own) = (next.voxels.kind(), self.voxels.kind());
         if kind != own {
-            return Some(format!(
-                "holds values of {}, not {} as",
-                kind.name(),
-                own.name()
-            ));
+            return Some(format!("holds values of {}, not {} as", kind.name(), own.name()));
         }
         // Affine: the largest difference is at a corner.
         let voxel_from_next = self.world_from_voxel.inverse() * next.world_from_voxel;
         let corners = (0..8usize).map(|i| {
             let at = [0, 1, 2].map(|axis| (i >> axis & 1) as f64 * (self.size[axis] - 1) as f64);
-            voxel_from_next
-                .transform_point3(at.into())
-                .distance(at.into())
+            voxel_from_next.transform_point3(at.into()).distance(at.into())
         });
         let off = corners.fold(0.0, f64::max);
         (off > SAME_PLACE).then(|| format!("lies up to {off:.2} voxels from where it does"))

@@ -74,11 +74,7 @@ pub(super) fn open(path: &Path) -> Result<(File, u64), VolumeError> {
     };
     let data = std::fs::metadata(path).map_err(unreadable)?;
     if !data.is_file() {
-        return Err(VolumeError::file(
-            path,
-            "is not an ordinary file",
-            "give a file",
-        ));
+        return Err(VolumeError::file(path, "is not an ordinary file", "give a file"));
     }
     let file = File::open(path).map_err(unreadable)?;
     Ok((file, data.len()))
@@ -199,11 +195,7 @@ impl Payload {
     pub fn read(&self, total: u64) -> Result<(Vec<u8>, bool), VolumeError> {
         let mut stream = self.stream(total)?;
         let from_end = self.skip == Skip::AllButLast && self.coding != Coding::Raw;
-        let keep = if from_end {
-            total + MAX_LEAD + 1
-        } else {
-            total
-        };
+        let keep = if from_end { total + MAX_LEAD + 1 } else { total };
         let mut out = Vec::new();
         out.try_reserve_exact(total as usize).map_err(|_| {
             VolumeError::file(
@@ -239,11 +231,7 @@ impl Payload {
     }
 
     fn short(&self, at: u64, held: u64, total: u64) -> VolumeError {
-        let what = if self.coding == Coding::Text {
-            "numbers"
-        } else {
-            "bytes"
-        };
+        let what = if self.coding == Coding::Text { "numbers" } else { "bytes" };
         VolumeError::byte(
             &self.file,
             at,
@@ -258,11 +246,6 @@ impl Payload {
         if error.kind() == ErrorKind::UnexpectedEof {
             return self.short(at, at, total);
         }
-        VolumeError::byte(
-            &self.file,
-            at,
-            format!("the voxels cannot be read: {error}"),
-            AGAIN,
-        )
+        VolumeError::byte(&self.file, at, format!("the voxels cannot be read: {error}"), AGAIN)
     }
 }

@@ -32,11 +32,7 @@ fn values() -> Vec<i16> {
 
 fn bytes(big: bool) -> Vec<u8> {
     let bytes = |v: i16| {
-        if big {
-            v.to_be_bytes()
-        } else {
-            v.to_le_bytes()
-        }
+        if big { v.to_be_bytes() } else { v.to_le_bytes() }
     };
     values().into_iter().flat_map(bytes).collect()
 }
@@ -156,20 +152,14 @@ impl Folder {
         for at in [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, index] {
             let found = volume.world_from_voxel.transform_point3(at);
             let expected = placement().transform_point3(at);
-            assert!(
-                found.distance(expected) < tolerance,
-                "{name}: {found} {expected}"
-            );
+            assert!(found.distance(expected) < tolerance, "{name}: {found} {expected}");
         }
     }
 
     fn refused(&self, name: &str, bytes: &[u8], cause: &str) -> VolumeError {
         let error = self.load(name, bytes).expect_err(cause);
         let text = error.to_string();
-        assert!(
-            text.contains(cause) && text.contains(name),
-            "{text}, not {cause}"
-        );
+        assert!(text.contains(cause) && text.contains(name), "{text}, not {cause}");
         assert!(!error.remedy.is_empty(), "{text}");
         error
     }
@@ -186,11 +176,7 @@ const RAS: DVec3 = DVec3::new(-1.0, -1.0, 1.0);
 fn every_format_and_encoding_is_the_same_volume() {
     let folder = Folder::new();
     folder.write("a.raw", &[b"x\n".to_vec(), bytes(false)].concat());
-    let text = values()
-        .iter()
-        .map(i16::to_string)
-        .collect::<Vec<_>>()
-        .join("\n");
+    let text = values().iter().map(i16::to_string).collect::<Vec<_>>().join("\n");
     let meta_text = "BinaryData = False\nElementDataFile = LOCAL";
     let beside = "HeaderSize = -1\nElementDataFile = a.raw";
     let detached = "endian: little\nencoding: raw\nline skip: 1\ndata file: ./a.raw";
@@ -203,20 +189,14 @@ fn every_format_and_encoding_is_the_same_volume() {
     folder.same("t.mha", &meta(meta_text, text.as_bytes()), exact);
     folder.same("d.mhd", &meta(beside, b""), exact);
     folder.same("a.nrrd", &nrrd(lps, DVec3::ONE, RAW, &bytes(false)), exact);
-    folder.same(
-        "g.nrrd",
-        &nrrd("RAS", RAS, GZIP, &gzip(&bytes(true))),
-        exact,
-    );
+    folder.same("g.nrrd", &nrrd("RAS", RAS, GZIP, &gzip(&bytes(true))), exact);
     let ascii = nrrd("LAS", las, "encoding: ascii", text.as_bytes());
     folder.same("t.nrrd", &ascii, exact);
     folder.same("d.nhdr", &nrrd("LPS", DVec3::ONE, detached, b""), exact);
     // Placement in NIfTI-1 is single precision: 30 mm to 2e-6, a quaternion to 1e-7 of 8 mm.
-    for (name, big, sform) in [
-        ("a.nii", false, true),
-        ("b.nii", true, true),
-        ("q.nii", false, false),
-    ] {
+    for (name, big, sform) in
+        [("a.nii", false, true), ("b.nii", true, true), ("q.nii", false, false)]
+    {
         folder.same(name, &nifti(big, sform), 1e-5);
     }
     folder.same("a.nii.gz", &gzip(&nifti(true, false)), 1e-5);
@@ -239,17 +219,9 @@ fn bounds_spacing_and_values_are_those_of_whole_voxels() {
         space origin: (1,1,1)\nencoding: text\n\n1 2 3 nan 5 6 7 8 9 10 11 12";
     let (volume, warnings) = folder.load("a.nrrd", file).expect("a volume");
     assert_eq!(volume.size, [2, 2, 1]);
-    assert_eq!(
-        volume.bounds(),
-        (DVec3::new(0.5, 0.0, -0.5), DVec3::new(2.5, 4.0, 2.5))
-    );
+    assert_eq!(volume.bounds(), (DVec3::new(0.5, 0.0, -0.5), DVec3::new(2.5, 4.0, 2.5)));
     assert_eq!(volume.spacing(), DVec3::new(1.0, 2.0, 3.0));
-    let Statistics {
-        min,
-        max,
-        mean,
-        not_finite,
-    } = volume.statistics;
+    let Statistics { min, max, mean, not_finite } = volume.statistics;
     // Of all three volumes.
     assert_eq!((min, max, not_finite), (1.0, 12.0, 1));
     assert!((mean - 74.0 / 11.0).abs() < 1e-12, "{mean}");
@@ -265,22 +237,12 @@ fn extra_keys_channels_and_trailing_bytes_are_warned_of() {
     let folder = Folder::new();
     let more =
         format!("Seq_Frame0000_Status = OK\nStrange = 1\nElementNumberOfChannels = 2\n{LOCAL}");
-    let pairs: Vec<u8> = values()
-        .iter()
-        .flat_map(|v| [*v, 7])
-        .flat_map(i16::to_le_bytes)
-        .collect();
-    let (volume, warnings) = folder
-        .load("a.mha", &meta(&more, &[pairs, vec![0]].concat()))
-        .expect("readable");
+    let pairs: Vec<u8> = values().iter().flat_map(|v| [*v, 7]).flat_map(i16::to_le_bytes).collect();
+    let (volume, warnings) =
+        folder.load("a.mha", &meta(&more, &[pairs, vec![0]].concat())).expect("readable");
     assert_eq!(volume.voxels, Voxels::I16(values()));
     let text: Vec<_> = warnings.iter().map(ToString::to_string).collect();
-    for cause in [
-        "1 keys are not used",
-        "tracked sequence",
-        "2 values per voxel",
-        "data go on",
-    ] {
+    for cause in ["1 keys are not used", "tracked sequence", "2 values per voxel", "data go on"] {
         assert!(text.iter().any(|t| t.contains(cause)), "{cause}: {text:?}");
     }
 }

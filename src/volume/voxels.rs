@@ -183,12 +183,8 @@ impl Voxels {
 }
 
 fn statistics(values: impl Iterator<Item = f64>) -> Statistics {
-    let mut out = Statistics {
-        min: f64::INFINITY,
-        max: f64::NEG_INFINITY,
-        mean: 0.0,
-        not_finite: 0,
-    };
+    let mut out =
+        Statistics { min: f64::INFINITY, max: f64::NEG_INFINITY, mean: 0.0, not_finite: 0 };
     let (mut sum, mut count) = (0.0, 0usize);
     for value in values {
         if value.is_finite() {
@@ -236,12 +232,7 @@ pub(super) fn parse_text(
     loop {
         let byte = bytes.next().transpose();
         let byte = byte.map_err(|e| {
-            VolumeError::byte(
-                &payload.file,
-                at,
-                format!("cannot be read: {e}"),
-                "copy it again",
-            )
+            VolumeError::byte(&payload.file, at, format!("cannot be read: {e}"), "copy it again")
         })?;
         at += 1;
         let separator = byte.is_none_or(|b| b.is_ascii_whitespace() || b == b',');

@@ -65,10 +65,7 @@ impl Header {
         path: &Path,
         volumes: impl IntoIterator<Item = &'v Voxels>,
     ) -> Result<(), VolumeError> {
-        if path
-            .extension()
-            .is_none_or(|e| !e.eq_ignore_ascii_case("mha"))
-        {
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("mha")) {
             return Err(VolumeError::file(
                 path,
                 "is not written: only MetaImage in one file is",
@@ -117,11 +114,7 @@ pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
     let mut kinds = "domain domain domain".to_owned();
     if !volume.later.is_empty() {
         size.push(volume.later.len() + 1);
-        spacing.push(
-            volume
-                .interval
-                .expect("how fast the volumes follow each other"),
-        );
+        spacing.push(volume.interval.expect("how fast the volumes follow each other"));
         origin.push(0.0);
         for axis in 1..=3 {
             directions.insert(4 * axis - 1, 0.0);
@@ -129,13 +122,7 @@ pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
         directions.extend([0.0, 0.0, 0.0, 1.0]);
         kinds.push_str(" time");
     }
-    let text = |values: &[f64]| {
-        values
-            .iter()
-            .map(|&v| number(v))
-            .collect::<Vec<_>>()
-            .join(" ")
-    };
+    let text = |values: &[f64]| values.iter().map(|&v| number(v)).collect::<Vec<_>>().join(" ");
     let mut header = Header::new(&volume.voxels, size.len());
     header.entry("CenterOfRotation", text(&vec![0.0; size.len()]));
     let sizes: Vec<_> = size.iter().map(usize::to_string).collect();

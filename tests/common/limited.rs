@@ -31,10 +31,7 @@ pub fn limited(script: &str, path: &Path) -> Outcome {
         .output()
         .expect("started");
     let text = [output.stdout, output.stderr].concat();
-    Outcome {
-        code: output.status.code(),
-        text: String::from_utf8_lossy(&text).into_owned(),
-    }
+    Outcome { code: output.status.code(), text: String::from_utf8_lossy(&text).into_owned() }
 }
 
 /// Files below a folder that `wanted` takes, in a fixed order.

@@ -10,9 +10,6 @@ pub fn insonify(folder: &Path, args: &[&str]) -> (bool, String) {
     let out = command.current_dir(folder).args(args).output();
     let out = out.expect("the program starts");
     let text = [out.stdout, out.stderr].concat();
-    let text = String::from_utf8_lossy(&text)
-        .split_whitespace()
-        .collect::<Vec<_>>()
-        .join(" ");
+    let text = String::from_utf8_lossy(&text).split_whitespace().collect::<Vec<_>>().join(" ");
     (out.status.success(), text.replace("│ ", ""))
 }

@@ -46,18 +46,11 @@ fn rows(document: &str) -> Vec<Row<'_>> {
             continue;
         }
         let line = line.trim_matches('|');
-        let cells: Vec<_> = line
-            .split('|')
-            .map(|c| c.trim().trim_matches('`'))
-            .collect();
+        let cells: Vec<_> = line.split('|').map(|c| c.trim().trim_matches('`')).collect();
         match head.is_empty() {
             true => head = cells,
             false if cells[0].starts_with("---") => {}
-            false => out.push(Row {
-                table,
-                head: head.clone(),
-                cells,
-            }),
+            false => out.push(Row { table, head: head.clone(), cells }),
         }
     }
     out
@@ -69,9 +62,7 @@ fn of_units(document: &str) -> Vec<String> {
     let all = rows(document);
     let mut faults = Vec::new();
     for row in all.iter().filter(|r| r.head[0] == "Type") {
-        let key = all
-            .iter()
-            .find(|key| key.head[0] == "Key" && key.cells[1] == row.cells[0]);
+        let key = all.iter().find(|key| key.head[0] == "Key" && key.cells[1] == row.cells[0]);
         let Some(key) = key else {
             faults.push(format!("no key is a {}", row.cells[0]));
             continue;
@@ -94,11 +85,7 @@ fn of_keys(document: &str, schema: &BTreeMap<String, Takes>) -> Vec<String> {
     let mut named = Vec::new();
     for row in rows(document).iter().filter(|r| r.head[0] == "Key") {
         let &[key, kind, default, stated, _] = row.cells.as_slice() else {
-            faults.push(format!(
-                "{}: a row has {} cells",
-                row.table,
-                row.cells.len()
-            ));
+            faults.push(format!("{}: a row has {} cells", row.table, row.cells.len()));
             continue;
         };
         let path = match row.table {
@@ -135,10 +122,7 @@ fn of_keys(document: &str, schema: &BTreeMap<String, Takes>) -> Vec<String> {
 
 fn of_presets(document: &str) -> Vec<String> {
     let mut faults = Vec::new();
-    for row in rows(document)
-        .iter()
-        .filter(|r| r.head[0] == "Preset value")
-    {
+    for row in rows(document).iter().filter(|r| r.head[0] == "Preset value") {
         for (preset, &value) in row.head.iter().zip(&row.cells).skip(1) {
             let base = ("probe.preset".to_owned(), (*preset).to_owned());
             let key = (format!("probe.{}", row.cells[0]), value.to_owned());
@@ -164,10 +148,7 @@ fn of_presets(document: &str) -> Vec<String> {
 fn of_tissues(document: &str) -> Vec<String> {
     let mut told = BTreeMap::new();
     for row in rows(document).iter().filter(|r| r.head[0] == "Tissue") {
-        let numbers: Vec<f64> = row.cells[1..]
-            .iter()
-            .filter_map(|c| c.parse().ok())
-            .collect();
+        let numbers: Vec<f64> = row.cells[1..].iter().filter_map(|c| c.parse().ok()).collect();
         told.insert(row.cells[0].to_owned(), numbers);
     }
     let real: BTreeMap<_, _> = table::shipped()
@@ -231,10 +212,7 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
     let mut schema = BTreeMap::new();
     explore("", "", "", &mut schema);
     let depth = |path: &str| schema.keys().filter(|k| k.starts_with(path)).count();
-    assert!(
-        depth("mesh.shape.") >= 10 && depth("tissues.NAME.") >= 11,
-        "{schema:?}"
-    );
+    assert!(depth("mesh.shape.") >= 10 && depth("tissues.NAME.") >= 11, "{schema:?}");
     let real = document();
     assert_eq!(of_keys(&real, &schema), [""; 0]);
 
@@ -244,21 +222,9 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
         format!("{line}\n")
     };
     for (from, to, noticed) in [
-        (
-            row("paths"),
-            String::new(),
-            "simulation.paths is not described",
-        ),
-        (
-            row("sphere.radius"),
-            String::new(),
-            "mesh.shape.sphere.radius is not described",
-        ),
-        (
-            row("paths"),
-            row("paths").replace("paths", "path"),
-            "simulation.path does not exist",
-        ),
+        (row("paths"), String::new(), "simulation.paths is not described"),
+        (row("sphere.radius"), String::new(), "mesh.shape.sphere.radius is not described"),
+        (row("paths"), row("paths").replace("paths", "path"), "simulation.path does not exist"),
         (
             row("max_interactions"),
             row("max_interactions").replace("integer", "number"),
@@ -279,11 +245,7 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
             row("keyframes").replace("list of texts", "text"),
             "mesh.keyframes: text",
         ),
-        (
-            row("cell"),
-            row("cell").replace("0.01 to", "0.02 to"),
-            "simulation.cell: range 0.02",
-        ),
+        (row("cell"), row("cell").replace("0.01 to", "0.02 to"), "simulation.cell: range 0.02"),
         (
             row("sequence"),
             row("sequence").replace(", `\"random\"`", ""),
@@ -291,10 +253,7 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
         ),
     ] {
         let faults = of_keys(&real.replace(&from, &to), &schema);
-        assert!(
-            faults.iter().any(|f| f.starts_with(noticed)),
-            "{noticed}: {faults:?}"
-        );
+        assert!(faults.iter().any(|f| f.starts_with(noticed)), "{noticed}: {faults:?}");
     }
 }
 

@@ -29,11 +29,8 @@ fn listed(error: &SceneError) -> Vec<String> {
 
 /// All keys of the table that stands between `open` and `close`, and of the tables in it.
 pub fn explore(open: &str, close: &str, path: &str, found: &mut BTreeMap<String, Takes>) {
-    let ask = |inner: &str| {
-        load(&format!("{open}{inner}{close}"), &[])
-            .map(|_| ())
-            .expect_err(inner)
-    };
+    let ask =
+        |inner: &str| load(&format!("{open}{inner}{close}"), &[]).map(|_| ()).expect_err(inner);
     let unknown = |error: &SceneError| {
         let field = format!("unknown field `{NO_KEY}`");
         let key = format!("unexpected keys in table: {NO_KEY}");
@@ -51,10 +48,8 @@ pub fn explore(open: &str, close: &str, path: &str, found: &mut BTreeMap<String,
             ("[{ ", " }]", here.clone()),
             ("{ own = { ", " } }", format!("{here}.NAME")),
         ];
-        let replies: Vec<_> = forms
-            .iter()
-            .map(|(a, b, _)| ask(&format!("{name} = {a}{NO_KEY} = 1{b}")))
-            .collect();
+        let replies: Vec<_> =
+            forms.iter().map(|(a, b, _)| ask(&format!("{name} = {a}{NO_KEY} = 1{b}"))).collect();
         if let Some(i) = replies.iter().position(unknown) {
             let (a, b, path) = &forms[i];
             let open = format!("{open}{name} = {a}");
@@ -62,9 +57,7 @@ pub fn explore(open: &str, close: &str, path: &str, found: &mut BTreeMap<String,
         } else if replies[0].message.contains("unknown variant") {
             let choices = listed(&replies[0]);
             let table = |choice: &String| {
-                unknown(&ask(&format!(
-                    "{name} = {{ {choice} = {{ {NO_KEY} = 1 }} }}"
-                )))
+                unknown(&ask(&format!("{name} = {{ {choice} = {{ {NO_KEY} = 1 }} }}")))
             };
             if !choices.iter().all(table) {
                 found.insert(here, Takes::Choices(choices));

@@ -77,12 +77,8 @@ pub fn settings(scene: &Scene) -> String {
     let (instances, graph) = (&scene.instances, &scene.graph);
     write!(out, "{instances:?}{graph:?}{:?}{sizes:?}", scene.wires).expect("memory");
     let (volume, fusion, tracker) = (&scene.volume, &scene.fusion, &scene.tracker);
-    write!(
-        out,
-        "{volume:?}{fusion:?}{tracker:?}{:?}{:?}",
-        scene.contact, scene.live
-    )
-    .expect("memory");
+    write!(out, "{volume:?}{fusion:?}{tracker:?}{:?}{:?}", scene.contact, scene.live)
+        .expect("memory");
     out
 }
 
@@ -106,9 +102,7 @@ pub fn of_values(path: &str, kind: &str, default: &str, stated: &str) -> Vec<Str
         // The shapes of `place` are coarse; a default is compared with the key left out.
         let coarse = [", subdivisions = 1", ", segments = 9"];
         let bare = match path.ends_with("subdivisions") || path.ends_with("segments") {
-            true => coarse
-                .iter()
-                .fold(text.clone(), |t, key| t.replace(key, "")),
+            true => coarse.iter().fold(text.clone(), |t, key| t.replace(key, "")),
             false => text.clone(),
         };
         let same = load(&bare, &[(at.clone(), default.to_owned())])
@@ -134,14 +128,9 @@ pub fn of_values(path: &str, kind: &str, default: &str, stated: &str) -> Vec<Str
             None if kind.starts_with("list of") => format!("[{value}]"),
             None => value,
         };
-        let said = load(&text, &[(at, value)])
-            .err()
-            .and_then(|error| error.remedy)
-            .unwrap_or_default();
-        let numbers: Vec<f64> = said
-            .split_whitespace()
-            .filter_map(|w| w.parse().ok())
-            .collect();
+        let said =
+            load(&text, &[(at, value)]).err().and_then(|error| error.remedy).unwrap_or_default();
+        let numbers: Vec<f64> = said.split_whitespace().filter_map(|w| w.parse().ok()).collect();
         // Ends are written with five digits.
         let close = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-4 * b.abs();
         let told = (
@@ -149,9 +138,7 @@ pub fn of_values(path: &str, kind: &str, default: &str, stated: &str) -> Vec<Str
             numbers.get(1).copied().unwrap_or(f64::INFINITY),
         );
         if !close(least, told.0) || !close(most, told.1) {
-            faults.push(format!(
-                "{path}: range {stated}, but the program says: {said}"
-            ));
+            faults.push(format!("{path}: range {stated}, but the program says: {said}"));
         }
     }
     faults

@@ -17,11 +17,7 @@ fn triangle(z: f32) -> [[f32; 3]; 3] {
 }
 
 fn shifted(z: f32) -> [[f32; 4]; 3] {
-    [
-        [1.0, 0.0, 0.0, 0.0],
-        [0.0, 1.0, 0.0, 0.0],
-        [0.0, 0.0, 1.0, z],
-    ]
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, z]]
 }
 
 /// A device with ray queries, or `None` with a line that says that the test is not run.
@@ -47,9 +43,7 @@ impl Rays {
         let storage = |name| device.buffer(name, 32, BufferKind::Storage).unwrap();
         let origins = storage("origins");
         let values = [[0.0_f32, 0.0, 0.0, 0.0], [100.0, 0.0, 0.0, 0.0]];
-        device
-            .upload(&origins, bytemuck::cast_slice(&values))
-            .unwrap();
+        device.upload(&origins, bytemuck::cast_slice(&values)).unwrap();
         Self {
             kernel: Kernel::new(device, "nearest", &spirv, &[]).unwrap(),
             origins,
@@ -62,17 +56,9 @@ impl Rays {
         commands: &mut insonify::gpu::Commands<'_>,
         tlas: &Tlas,
     ) -> Result<(), GpuError> {
-        let bindings = [
-            Binding::Tlas(tlas),
-            Binding::Buffer(&self.origins),
-            Binding::Buffer(&self.hits),
-        ];
-        commands.dispatch(
-            &self.kernel,
-            [2, 1, 1],
-            bytemuck::bytes_of(&2_u32),
-            &bindings,
-        )
+        let bindings =
+            [Binding::Tlas(tlas), Binding::Buffer(&self.origins), Binding::Buffer(&self.hits)];
+        commands.dispatch(&self.kernel, [2, 1, 1], bytemuck::bytes_of(&2_u32), &bindings)
     }
 
     /// Distance, custom index and triangle of the middle ray; the other must miss.
@@ -90,11 +76,7 @@ fn keyframes_are_swapped_by_rebuild_and_by_refit() {
         return;
     };
     let (near, far) = (triangle(20.0), triangle(50.0));
-    let input = |name, positions| BlasInput {
-        name,
-        positions,
-        triangles: &ONE,
-    };
+    let input = |name, positions| BlasInput { name, positions, triangles: &ONE };
     let keyframes = [input("near", &near[..]), input("far", &far[..])];
     let blas = Blas::build_many(&device, &keyframes, BlasOptions::default()).unwrap();
     assert_eq!((blas[0].name(), blas[1].name()), ("near", "far"));
@@ -144,25 +126,14 @@ fn batches_keep_their_order_and_compaction_saves_memory() {
         })
         .collect();
     let inputs: Vec<BlasInput> = (meshes.iter())
-        .map(|(positions, triangles)| BlasInput {
-            name: "mesh",
-            positions,
-            triangles,
-        })
+        .map(|(positions, triangles)| BlasInput { name: "mesh", positions, triangles })
         .collect();
-    let loose = BlasOptions {
-        compact: false,
-        ..Default::default()
-    };
+    let loose = BlasOptions { compact: false, ..Default::default() };
     let bytes = |all: &[Blas]| all.iter().map(Blas::bytes).sum::<u64>();
     let loose_bytes = bytes(&Blas::build_many(&device, &inputs, loose).unwrap());
     let before = device.memory().current;
     let blas = Blas::build_many(&device, &inputs, BlasOptions::default()).unwrap();
-    assert!(
-        bytes(&blas) <= loose_bytes,
-        "{} {loose_bytes}",
-        bytes(&blas)
-    );
+    assert!(bytes(&blas) <= loose_bytes, "{} {loose_bytes}", bytes(&blas));
     // Alignment to 256 bytes is all that may be added: inputs and scratch are gone.
     let kept = device.memory().current - before;
     assert!(kept <= bytes(&blas) + 256 * 20, "{kept} {}", bytes(&blas));
@@ -170,12 +141,7 @@ fn batches_keep_their_order_and_compaction_saves_memory() {
     let rays = Rays::new(&device);
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
     for (n, blas) in blas.iter().enumerate() {
-        let instance = TlasInstance {
-            blas,
-            transform: shifted(0.5),
-            custom_index: 1,
-            mask: 1,
-        };
+        let instance = TlasInstance { blas, transform: shifted(0.5), custom_index: 1, mask: 1 };
         device
             .once(|commands| {
                 tlas.build(commands, &[instance])?;
@@ -215,20 +181,12 @@ fn a_missing_barrier_between_build_and_trace_is_reported() {
         return;
     };
     let positions = triangle(20.0);
-    let input = BlasInput {
-        name: "t",
-        positions: &positions,
-        triangles: &ONE,
-    };
+    let input = BlasInput { name: "t", positions: &positions, triangles: &ONE };
     let blas = Blas::build_many(&device, &[input], BlasOptions::default()).unwrap();
     let rays = Rays::new(&device);
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
-    let instance = TlasInstance {
-        blas: &blas[0],
-        transform: shifted(0.0),
-        custom_index: 0,
-        mask: 1,
-    };
+    let instance =
+        TlasInstance { blas: &blas[0], transform: shifted(0.0), custom_index: 0, mask: 1 };
     device
         .once(|commands| {
             tlas.build(commands, &[instance])?;
@@ -248,41 +206,20 @@ fn geometry_that_cannot_be_built_is_refused_by_name() {
     };
     let positions = triangle(20.0);
     let build = |triangles: &[[u32; 3]]| {
-        let input = BlasInput {
-            name: "liver",
-            positions: &positions,
-            triangles,
-        };
+        let input = BlasInput { name: "liver", positions: &positions, triangles };
         Blas::build_many(&device, &[input], BlasOptions::default())
     };
     let text = build(&[]).err().unwrap().to_string();
-    assert!(
-        text.contains("'liver'") && text.contains("no triangles"),
-        "{text}"
-    );
+    assert!(text.contains("'liver'") && text.contains("no triangles"), "{text}");
     let text = build(&[[0, 1, 2], [0, 1, 3]]).err().unwrap().to_string();
-    assert!(
-        text.contains("triangle 1 is [0, 1, 3], of 3 vertices"),
-        "{text}"
-    );
+    assert!(text.contains("triangle 1 is [0, 1, 3], of 3 vertices"), "{text}");
 
     let blas = build(&ONE).unwrap();
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
-    let one = TlasInstance {
-        blas: &blas[0],
-        transform: shifted(0.0),
-        custom_index: 0,
-        mask: 1,
-    };
+    let one = TlasInstance { blas: &blas[0], transform: shifted(0.0), custom_index: 0, mask: 1 };
     let error = device.once(|c| tlas.build(c, &[one, one])).unwrap_err();
-    assert!(
-        error.to_string().contains("2 instances, room for 1"),
-        "{error}"
-    );
-    let wide = TlasInstance {
-        custom_index: 1 << 24,
-        ..one
-    };
+    assert!(error.to_string().contains("2 instances, room for 1"), "{error}");
+    let wide = TlasInstance { custom_index: 1 << 24, ..one };
     assert!(device.once(|c| tlas.build(c, &[wide])).is_err());
     let rays = Rays::new(&device);
     let error = device.once(|c| rays.record(c, &tlas)).unwrap_err();
@@ -302,14 +239,8 @@ fn a_device_without_acceleration_structures_runs_kernels_and_refuses_rays() {
     let device = Device::new(&options).unwrap();
     assert!(!device.supports_ray_query() && !device.supports_acceleration_structure());
     let positions = triangle(1.0);
-    let input = BlasInput {
-        name: "t",
-        positions: &positions,
-        triangles: &ONE,
-    };
-    let error = Blas::build_many(&device, &[input], BlasOptions::default())
-        .err()
-        .unwrap();
+    let input = BlasInput { name: "t", positions: &positions, triangles: &ONE };
+    let error = Blas::build_many(&device, &[input], BlasOptions::default()).err().unwrap();
     assert!(matches!(error, GpuError::Unsupported { .. }), "{error}");
     assert!(Tlas::new(&device, "scene", 1).is_err());
     assert!(device.buffer("scratch", 64, BufferKind::Scratch).is_err());
@@ -338,11 +269,7 @@ fn structures_are_built_and_timed_without_ray_queries() {
     if ray_query_device().is_none() {
         return;
     }
-    let options = DeviceOptions {
-        validate: true,
-        without_ray_query: true,
-        ..Default::default()
-    };
+    let options = DeviceOptions { validate: true, without_ray_query: true, ..Default::default() };
     let device = Device::new(&options).unwrap();
     assert!(!device.supports_ray_query() && device.supports_acceleration_structure());
     let spirv = words(include_bytes!("nearest.spv"));
@@ -350,19 +277,10 @@ fn structures_are_built_and_timed_without_ray_queries() {
     assert!(error.to_string().contains("needs ray queries"), "{error}");
 
     let positions: Vec<_> = (0..100_000).flat_map(|i| triangle(i as f32)).collect();
-    let all: Vec<_> = (0..100_000)
-        .map(|i| [3 * i, 3 * i + 1, 3 * i + 2])
-        .collect();
-    let mesh = |triangles| BlasInput {
-        name: "mesh",
-        positions: &positions,
-        triangles,
-    };
+    let all: Vec<_> = (0..100_000).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+    let mesh = |triangles| BlasInput { name: "mesh", positions: &positions, triangles };
     let (many, few) = (mesh(&all[..]), mesh(&all[..20]));
-    let loose = BlasOptions {
-        fast_trace: false,
-        compact: false,
-    };
+    let loose = BlasOptions { fast_trace: false, compact: false };
     let compacted = build_times(&device, &[many, few], BlasOptions::default()).unwrap();
     let large = build_times(&device, &[many], loose).unwrap();
     let small = build_times(&device, &[few], loose).unwrap();
@@ -370,10 +288,7 @@ fn structures_are_built_and_timed_without_ray_queries() {
     println!("{compacted:?}\n{large:?}\n{small:?}\n{changing:?}");
     assert!(compacted.build_ms > 0.0 && compacted.compact_ms > 0.0);
     assert!(compacted.compacted_bytes <= compacted.bytes);
-    assert_eq!(
-        (large.compact_ms, large.compacted_bytes),
-        (0.0, large.bytes)
-    );
+    assert_eq!((large.compact_ms, large.compacted_bytes), (0.0, large.bytes));
     // Five thousand times the triangles: what is timed is the build.
     assert!(large.build_ms > 3.0 * small.build_ms && large.bytes > 1000 * small.bytes);
     assert!(changing.build_ms > 0.0 && changing.refit_ms > 0.0 && changing.bytes > large.bytes);
@@ -381,12 +296,7 @@ fn structures_are_built_and_timed_without_ray_queries() {
     // Top levels and meshes that change need no ray queries either.
     let blas = Blas::build_many(&device, &[few], BlasOptions::default()).unwrap();
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
-    let one = TlasInstance {
-        blas: &blas[0],
-        transform: shifted(0.0),
-        custom_index: 0,
-        mask: 1,
-    };
+    let one = TlasInstance { blas: &blas[0], transform: shifted(0.0), custom_index: 0, mask: 1 };
     device
         .once(|commands| {
             commands.scope("top");

@@ -11,12 +11,8 @@ fn two_frames_in_flight_keep_their_own_parameters_and_times() {
     let device = test_device();
     let kernel = add_kernel(&device, 1);
     let count = 10_000;
-    let parameter = device
-        .buffer("parameter", 4 * count, BufferKind::Storage)
-        .unwrap();
-    let sums: Vec<Buffer> = (0..6)
-        .map(|_| buffer_of(&device, "sum", &vec![0; 10_000]))
-        .collect();
+    let parameter = device.buffer("parameter", 4 * count, BufferKind::Storage).unwrap();
+    let sums: Vec<Buffer> = (0..6).map(|_| buffer_of(&device, "sum", &vec![0; 10_000])).collect();
     let mut frames = Frames::new(&device, "frame").unwrap();
     let mut timings = Vec::new();
     for (frame, sum) in sums.iter().enumerate() {
@@ -24,57 +20,32 @@ fn two_frames_in_flight_keep_their_own_parameters_and_times() {
         let mut commands = frames.begin().unwrap();
         commands.scope("write");
         let values = vec![100 * frame as u32; count as usize];
-        commands
-            .write(&parameter, 0, bytemuck::cast_slice(&values))
-            .unwrap();
+        commands.write(&parameter, 0, bytemuck::cast_slice(&values)).unwrap();
         commands.barrier(Stage::Transfer, Stage::Compute);
         commands.scope("add");
         let push = [count as u32, frame as u32];
         let bindings = [Binding::Buffer(&parameter), Binding::Buffer(sum)];
         commands
-            .dispatch(
-                &kernel,
-                [count as u32, 1, 1],
-                bytemuck::bytes_of(&push),
-                &bindings,
-            )
+            .dispatch(&kernel, [count as u32, 1, 1], bytemuck::bytes_of(&push), &bindings)
             .unwrap();
         commands.submit().unwrap();
         timings.extend(frames.take_timings());
-        assert!(
-            timings.len() <= frame,
-            "no frame is waited for before the one after it"
-        );
+        assert!(timings.len() <= frame, "no frame is waited for before the one after it");
     }
     frames.wait().unwrap();
     timings.extend(frames.take_timings());
     for (frame, sum) in sums.iter().enumerate() {
         let values = device.read_back_as::<u32>(sum).unwrap();
-        assert!(
-            values.iter().all(|&v| v == 101 * frame as u32),
-            "frame {frame}"
-        );
+        assert!(values.iter().all(|&v| v == 101 * frame as u32), "frame {frame}");
     }
     let order: Vec<u64> = timings.iter().map(|t| t.frame).collect();
     assert_eq!(order, [0, 1, 2, 3, 4, 5]);
-    if device
-        .info()
-        .lacks
-        .iter()
-        .all(|l| !l.contains("timestamps"))
-    {
+    if device.info().lacks.iter().all(|l| !l.contains("timestamps")) {
         for timing in &timings {
-            let names: Vec<_> = timing
-                .passes
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect();
+            let names: Vec<_> = timing.passes.iter().map(|(name, _)| name.as_str()).collect();
             assert_eq!(names, ["write", "add"]);
             // 10 s is far beyond any of it: a wrong period or bit mask would exceed it.
-            assert!(
-                timing.passes.iter().all(|&(_, ms)| ms > 0.0 && ms < 1e4),
-                "{timing:?}"
-            );
+            assert!(timing.passes.iter().all(|&(_, ms)| ms > 0.0 && ms < 1e4), "{timing:?}");
             assert!(timing.total_ms() >= timing.passes[1].1);
         }
     }
@@ -93,9 +64,7 @@ fn what_a_submission_uses_may_be_dropped_before_it_has_run() {
         let a = buffer_of(&device, "a", &[21; 4096]);
         let bindings = [Binding::Buffer(&a), Binding::Buffer(&b)];
         let push = [4096, 0_u32];
-        commands
-            .dispatch(&kernel, [4096, 1, 1], bytemuck::bytes_of(&push), &bindings)
-            .unwrap();
+        commands.dispatch(&kernel, [4096, 1, 1], bytemuck::bytes_of(&push), &bindings).unwrap();
     }
     commands.submit().unwrap();
     assert_eq!(device.read_back_as::<u32>(&b).unwrap(), vec![42; 4096]);
@@ -150,10 +119,7 @@ fn a_missing_barrier_between_dispatches_is_reported() {
         let device = test_device();
         two_dispatches(&device, from, to, false);
         let messages = device.validation_messages();
-        assert!(
-            messages.iter().any(|m| m.contains(expected)),
-            "{messages:#?}"
-        );
+        assert!(messages.iter().any(|m| m.contains(expected)), "{messages:#?}");
     }
 }
 
@@ -167,18 +133,11 @@ fn the_layers_report_a_deliberate_mistake() {
         .once(|commands| {
             commands.fill(&a, 5);
             let bindings = [Binding::Buffer(&a), Binding::Buffer(&b)];
-            commands.dispatch(
-                &kernel,
-                [64, 1, 1],
-                bytemuck::bytes_of(&[64, 0_u32]),
-                &bindings,
-            )
+            commands.dispatch(&kernel, [64, 1, 1], bytemuck::bytes_of(&[64, 0_u32]), &bindings)
         })
         .unwrap();
     let messages = device.validation_messages();
-    let by_layers = messages
-        .iter()
-        .any(|m| m.contains("SYNC-HAZARD-READ-AFTER-WRITE"));
+    let by_layers = messages.iter().any(|m| m.contains("SYNC-HAZARD-READ-AFTER-WRITE"));
     let by_bindings = messages.iter().any(|m| m.starts_with("HAZARD"));
     assert!(by_layers && by_bindings, "{messages:#?}");
 }

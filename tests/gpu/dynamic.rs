@@ -16,12 +16,7 @@ use super::sheet::{RAYS, Rays, Vertices, grid, sheet, storage};
 fn placed(mesh: &DynamicBlas) -> TlasInstance<'_> {
     let mut transform = [[0.0; 4]; 3];
     (0..3).for_each(|i| transform[i][i] = 1.0);
-    TlasInstance {
-        blas: mesh.blas(),
-        transform,
-        custom_index: 0,
-        mask: 1,
-    }
+    TlasInstance { blas: mesh.blas(), transform, custom_index: 0, mask: 1 }
 }
 
 fn source<'a>(
@@ -87,9 +82,7 @@ fn a_refitted_mesh_is_where_its_vertices_are() {
     let vertices = storage(&device, "vertices", bytemuck::cast_slice(&all));
     let indices = storage(&device, "triangles", bytemuck::cast_slice(&triangles));
     for fast_trace in [false, true] {
-        device
-            .upload(&vertices, bytemuck::cast_slice(&all))
-            .unwrap();
+        device.upload(&vertices, bytemuck::cast_slice(&all)).unwrap();
         let mut mesh = DynamicBlas::new(&device, "sheet", faces[1], count, fast_trace).unwrap();
         assert!(mesh.bytes() > mesh.blas().bytes());
         let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
@@ -99,14 +92,9 @@ fn a_refitted_mesh_is_where_its_vertices_are() {
         let found = trace(&rays, &mut mesh, &mut tlas, Change::Refit(at(1)));
         assert_eq!(rays.wrong(&found, &poses[1], &triangles), 0, "refitted");
         // Overwritten, and not refitted: the comparison notices.
-        device
-            .upload(&vertices, bytemuck::cast_slice(&poses[2]))
-            .unwrap();
+        device.upload(&vertices, bytemuck::cast_slice(&poses[2])).unwrap();
         let found = trace(&rays, &mut mesh, &mut tlas, Change::None);
-        assert!(
-            rays.wrong(&found, &poses[2], &triangles) > RAYS / 2,
-            "stale"
-        );
+        assert!(rays.wrong(&found, &poses[2], &triangles) > RAYS / 2, "stale");
         let found = trace(&rays, &mut mesh, &mut tlas, Change::Refit(at(0)));
         assert_eq!(rays.wrong(&found, &poses[2], &triangles), 0, "written anew");
     }
@@ -132,10 +120,7 @@ fn a_mesh_is_rebuilt_with_other_triangles() {
     let (room, split) = (vertices.len() as u32, first.len() as u32);
     let mut mesh = DynamicBlas::new(&device, "sheet", split, room, false).unwrap();
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
-    let keyframes = [
-        (&first, [0, split]),
-        (&second, [split, second.len() as u32]),
-    ];
+    let keyframes = [(&first, [0, split]), (&second, [split, second.len() as u32])];
     for &k in &[0, 1, 0, 1, 1] {
         let (triangles, range) = keyframes[k];
         let source = source(buffers.each_ref(), [0, room], range);
@@ -169,9 +154,8 @@ fn frames_in_flight_refit_one_structure() {
     let mut tlas = Tlas::new(&device, "scene", 1).unwrap();
     device.once(|c| mesh.build(c, mesh_source)).unwrap();
     let mut frames = Frames::new(&device, "frame").unwrap();
-    let shown: Vec<(f32, Buffer)> = (0..8)
-        .map(|frame| (frame as f32 / 7.0, rays.hits(&device)))
-        .collect();
+    let shown: Vec<(f32, Buffer)> =
+        (0..8).map(|frame| (frame as f32 / 7.0, rays.hits(&device))).collect();
     for (blend, hits) in &shown {
         let push = Interpolation {
             count,
@@ -183,9 +167,7 @@ fn frames_in_flight_refit_one_structure() {
         };
         let mut commands = frames.begin().unwrap();
         let bindings = [Binding::Buffer(&vertices)];
-        commands
-            .dispatch(&kernel, [count, 1, 1], bytemuck::bytes_of(&push), &bindings)
-            .unwrap();
+        commands.dispatch(&kernel, [count, 1, 1], bytemuck::bytes_of(&push), &bindings).unwrap();
         mesh.refit(&mut commands, mesh_source).unwrap();
         tlas.refit(&mut commands, &[placed(&mesh)]).unwrap();
         commands.barrier(Stage::Build, Stage::Compute);
@@ -198,11 +180,7 @@ fn frames_in_flight_refit_one_structure() {
     for (blend, hits) in &shown {
         let between = poses[0].iter().zip(&poses[1]);
         let between = between.map(|(a, b)| [0, 1, 2].map(|i| a[i] * (1.0 - blend) + b[i] * blend));
-        let pose: Vertices = room[..2 * count as usize]
-            .iter()
-            .copied()
-            .chain(between)
-            .collect();
+        let pose: Vertices = room[..2 * count as usize].iter().copied().chain(between).collect();
         let found = device.read_back_as(hits).unwrap();
         assert_eq!(rays.wrong(&found, &pose, &triangles), 0, "blend {blend}");
     }
@@ -261,9 +239,7 @@ fn missing_barriers_and_stale_top_levels_are_reported() {
         })
         .unwrap();
     last("'nearest' reads 'sheet' that 'build' writes, and no barrier Build -> Compute");
-    device
-        .once(|commands| rays.record(commands, &tlas, &hits))
-        .unwrap();
+    device.once(|commands| rays.record(commands, &tlas, &hits)).unwrap();
     last("STALE: 'nearest' reads 'scene'");
 }
 
@@ -278,88 +254,28 @@ fn what_cannot_be_built_or_refitted_is_refused_by_name() {
     let mut mesh = DynamicBlas::new(&device, "liver", sizes[1], sizes[0], true).unwrap();
     let mut refused = |build: bool, source: DynamicSource<'_>, expected: &str| {
         let error = device
-            .once(|c| {
-                if build {
-                    mesh.build(c, source)
-                } else {
-                    mesh.refit(c, source)
-                }
-            })
+            .once(|c| if build { mesh.build(c, source) } else { mesh.refit(c, source) })
             .err()
             .map_or_else(|| "accepted".into(), |e| e.to_string());
         assert!(error.contains(expected), "{error}");
     };
-    refused(
-        false,
-        whole,
-        "'liver': it is refitted and has not been built",
-    );
-    let fewer = DynamicSource {
-        triangle_count: 5,
-        ..whole
-    };
-    refused(
-        true,
-        DynamicSource {
-            triangle_count: 0,
-            ..whole
-        },
-        "no triangles",
-    );
-    refused(
-        true,
-        DynamicSource {
-            first_triangle: 1,
-            ..whole
-        },
-        "'triangles'",
-    );
-    refused(
-        true,
-        DynamicSource {
-            first_vertex: 1,
-            ..whole
-        },
-        "'vertices'",
-    );
+    refused(false, whole, "'liver': it is refitted and has not been built");
+    let fewer = DynamicSource { triangle_count: 5, ..whole };
+    refused(true, DynamicSource { triangle_count: 0, ..whole }, "no triangles");
+    refused(true, DynamicSource { first_triangle: 1, ..whole }, "'triangles'");
+    refused(true, DynamicSource { first_vertex: 1, ..whole }, "'vertices'");
     refused(true, whole, "accepted");
     refused(false, whole, "accepted");
-    refused(
-        false,
-        fewer,
-        "after a build of 18 from 0 on of 16 vertices: build it anew",
-    );
-    let moved = DynamicSource {
-        first_triangle: 1,
-        triangle_count: 17,
-        ..whole
-    };
+    refused(false, fewer, "after a build of 18 from 0 on of 16 vertices: build it anew");
+    let moved = DynamicSource { first_triangle: 1, triangle_count: 17, ..whole };
     refused(false, moved, "build it anew");
     let copy = storage(&device, "copy", bytemuck::cast_slice(&grid(3, 0)));
-    refused(
-        false,
-        DynamicSource {
-            triangles: &copy,
-            ..whole
-        },
-        "in 'copy'",
-    );
+    refused(false, DynamicSource { triangles: &copy, ..whole }, "in 'copy'");
     let wide = storage(&device, "wide", &[0; 12 * 40]);
-    let wider = DynamicSource {
-        vertices: &wide,
-        vertex_count: 40,
-        ..whole
-    };
+    let wider = DynamicSource { vertices: &wide, vertex_count: 40, ..whole };
     refused(true, wider, "room for 18 of 16");
     let upload = device.buffer("upload", 480, BufferKind::Upload).unwrap();
-    refused(
-        true,
-        DynamicSource {
-            vertices: &upload,
-            ..whole
-        },
-        "is of kind Upload",
-    );
+    refused(true, DynamicSource { vertices: &upload, ..whole }, "is of kind Upload");
     drop((mesh, copy, wide, upload, buffers));
     assert_clean(device);
 }

@@ -18,8 +18,7 @@ pub type Vertices = Vec<[f32; 3]>;
 pub fn sheet(n: u32, phase: f32) -> Vertices {
     let along = |i: u32| 20.0 * i as f32 / n as f32 - 10.0;
     let all = (0..=n).flat_map(|i| (0..=n).map(move |j| (along(i), along(j))));
-    all.map(|(x, y)| [x, y, 50.0 + 6.0 * (0.5 * x + phase).sin() * (0.3 * y).cos()])
-        .collect()
+    all.map(|(x, y)| [x, y, 50.0 + 6.0 * (0.5 * x + phase).sin() * (0.3 * y).cos()]).collect()
 }
 
 /// Its triangles, in absolute indices from `base` on.
@@ -72,18 +71,9 @@ impl Rays {
         tlas: &Tlas,
         hits: &Buffer,
     ) -> Result<(), GpuError> {
-        let bindings = [
-            Binding::Tlas(tlas),
-            Binding::Buffer(&self.origins),
-            Binding::Buffer(hits),
-        ];
+        let bindings = [Binding::Tlas(tlas), Binding::Buffer(&self.origins), Binding::Buffer(hits)];
         let count = RAYS as u32;
-        commands.dispatch(
-            &self.kernel,
-            [count, 1, 1],
-            bytemuck::bytes_of(&count),
-            &bindings,
-        )
+        commands.dispatch(&self.kernel, [count, 1, 1], bytemuck::bytes_of(&count), &bindings)
     }
 
     /// Rays whose hit is not brute force's: distance to 1e-4 mm (50 mm round at 4e-6, over the

@@ -15,10 +15,7 @@ pub const PATIENCE: Duration = Duration::from_secs(20);
 /// Short limits, so that a test can wait for them; but a pose never grows old, however busy the
 /// machine is.
 pub fn settings() -> Settings {
-    let tracker = Tracker {
-        timeout: 3600.0,
-        ..Tracker::default()
-    };
+    let tracker = Tracker { timeout: 3600.0, ..Tracker::default() };
     Settings {
         clients: 4,
         message_timeout: Duration::from_millis(400),
@@ -139,13 +136,7 @@ impl Client {
 /// A query without content.
 pub fn query(kind: &str, device: &str) -> Message {
     let kind = insonify::igtl::wire::Label::new(kind);
-    Message::new(
-        device,
-        Content::Other {
-            kind,
-            bytes: Vec::new(),
-        },
-    )
+    Message::new(device, Content::Other { kind, bytes: Vec::new() })
 }
 
 /// A shift in mm as messages hold it.

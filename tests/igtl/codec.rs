@@ -7,16 +7,8 @@ use insonify::scene::tracker::Axes;
 use proptest::collection::vec;
 use proptest::prelude::*;
 
-const KINDS: [&str; 8] = [
-    "TRANSFORM",
-    "TDATA",
-    "IMAGE",
-    "STATUS",
-    "CAPABILITY",
-    "STT_TDATA",
-    "GET_STATUS",
-    "POLYDATA",
-];
+const KINDS: [&str; 8] =
+    ["TRANSFORM", "TDATA", "IMAGE", "STATUS", "CAPABILITY", "STT_TDATA", "GET_STATUS", "POLYDATA"];
 
 /// A message with any body, under a header that fits it.
 fn framed(version: u16, kind: &str, body: &[u8]) -> Vec<u8> {
@@ -53,39 +45,26 @@ fn tool() -> impl Strategy<Value = Tool> {
 }
 
 fn image() -> impl Strategy<Value = Image> {
-    let scalars = prop_oneof![
-        Just((Scalar::U8, 1)),
-        Just((Scalar::I16, 2)),
-        Just((Scalar::F64, 8))
-    ];
+    let scalars =
+        prop_oneof![Just((Scalar::U8, 1)), Just((Scalar::I16, 2)), Just((Scalar::F64, 8))];
     let sizes = proptest::array::uniform3(0_u16..5);
-    (
-        scalars,
-        sizes,
-        1_u8..4,
-        any::<bool>(),
-        any::<bool>(),
-        matrix(),
+    (scalars, sizes, 1_u8..4, any::<bool>(), any::<bool>(), matrix()).prop_map(
+        |((scalar, bytes), part_size, components, little_endian, ras, m)| {
+            let pixels: usize = part_size.iter().map(|&n| usize::from(n)).product();
+            Image {
+                components,
+                scalar,
+                little_endian,
+                axes: if ras { Axes::Ras } else { Axes::Lps },
+                size: part_size.map(|n| n + 2),
+                steps: [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]]],
+                centre: [m[9], m[10], m[11]],
+                part_offset: [0, 1, 2],
+                part_size,
+                values: (0..pixels * usize::from(components) * bytes).map(|i| i as u8).collect(),
+            }
+        },
     )
-        .prop_map(
-            |((scalar, bytes), part_size, components, little_endian, ras, m)| {
-                let pixels: usize = part_size.iter().map(|&n| usize::from(n)).product();
-                Image {
-                    components,
-                    scalar,
-                    little_endian,
-                    axes: if ras { Axes::Ras } else { Axes::Lps },
-                    size: part_size.map(|n| n + 2),
-                    steps: [[m[0], m[1], m[2]], [m[3], m[4], m[5]], [m[6], m[7], m[8]]],
-                    centre: [m[9], m[10], m[11]],
-                    part_offset: [0, 1, 2],
-                    part_size,
-                    values: (0..pixels * usize::from(components) * bytes)
-                        .map(|i| i as u8)
-                        .collect(),
-                }
-            },
-        )
 }
 
 fn content() -> impl Strategy<Value = Content> {
@@ -94,46 +73,26 @@ fn content() -> impl Strategy<Value = Content> {
         vec(tool(), 0..5).prop_map(Content::Tracking),
         image().prop_map(|image| Content::Image(Box::new(image))),
         (any::<u16>(), any::<i64>(), name(), vec(any::<u8>(), 0..50)).prop_map(
-            |(code, subcode, name, message)| Content::Status {
-                code,
-                subcode,
-                name,
-                message
-            }
+            |(code, subcode, name, message)| Content::Status { code, subcode, name, message }
         ),
         vec(name(), 0..9).prop_map(Content::Capability),
         (any::<u32>(), name()).prop_map(|(resolution, coordinates)| Content::StartTracking {
             resolution,
             coordinates
         }),
-        vec(any::<u8>(), 0..99).prop_map(|bytes| Content::Other {
-            kind: Label::new("POLYDATA"),
-            bytes
-        }),
+        vec(any::<u8>(), 0..99)
+            .prop_map(|bytes| Content::Other { kind: Label::new("POLYDATA"), bytes }),
     ]
 }
 
 fn message() -> impl Strategy<Value = Message> {
-    let entry = (
-        vec(any::<u8>(), 0..20),
-        any::<u16>(),
-        vec(any::<u8>(), 0..20),
-    )
-        .prop_map(|(key, encoding, value)| Entry {
-            key,
-            encoding,
-            value,
-        });
+    let entry = (vec(any::<u8>(), 0..20), any::<u16>(), vec(any::<u8>(), 0..20))
+        .prop_map(|(key, encoding, value)| Entry { key, encoding, value });
     let extension =
         (any::<u32>(), vec(entry, 0..4)).prop_map(|(id, metadata)| Extension { id, metadata });
     let extension = proptest::option::of(extension);
     (name(), any::<u64>(), extension, content()).prop_map(|(device, time, extension, content)| {
-        Message {
-            device,
-            time: Timestamp(time),
-            extension,
-            content,
-        }
+        Message { device, time: Timestamp(time), extension, content }
     })
 }
 

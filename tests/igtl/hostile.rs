@@ -15,12 +15,7 @@ fn assert_serves(server: &Server) {
     let before = server.pose().pose().map_or(0, |pose| pose.number);
     let mut client = Client::connect(server);
     client.transform("Probe", shift(1.0, 2.0, 3.0));
-    until("the pose arrives", || {
-        server
-            .pose()
-            .pose()
-            .is_some_and(|pose| pose.number > before)
-    });
+    until("the pose arrives", || server.pose().pose().is_some_and(|pose| pose.number > before));
     server.publish(grey(8, 8), &DAffine3::IDENTITY);
     client.receive_kind("IMAGE");
 }
@@ -52,11 +47,7 @@ fn a_wrong_checksum_costs_the_message_and_many_the_connection() {
     let wrong = changed(|wire| wire[HEADER + 40] ^= 1);
     client.send_bytes(&wrong);
     until("it is told", || server.status().errors == 1);
-    assert!(
-        last_error(&server).contains("checksum"),
-        "{}",
-        last_error(&server)
-    );
+    assert!(last_error(&server).contains("checksum"), "{}", last_error(&server));
     assert_eq!(server.pose(), Tracked::Never);
     client.transform("Probe", shift(1.0, 0.0, 0.0));
     until("the next one counts", || server.pose() != Tracked::Never);
@@ -64,9 +55,7 @@ fn a_wrong_checksum_costs_the_message_and_many_the_connection() {
         client.send_bytes(&wrong);
     }
     assert!(client.is_ended());
-    until("it is told", || {
-        last_error(&server).contains("16 faulty messages")
-    });
+    until("it is told", || last_error(&server).contains("16 faulty messages"));
     assert_eq!(server.status().errors, 18);
     assert_serves(&server);
 }
@@ -86,11 +75,7 @@ fn giant_sizes_end_the_connection_before_a_byte_of_them_is_kept() {
         client.send_bytes(&sized(kind, size));
         assert!(client.is_ended());
         until("it is told", || server.status().errors > errors);
-        assert!(
-            last_error(&server).contains(&size.to_string()),
-            "{}",
-            last_error(&server)
-        );
+        assert!(last_error(&server).contains(&size.to_string()), "{}", last_error(&server));
     }
     assert_serves(&server);
 }
@@ -124,9 +109,7 @@ fn half_a_message_has_its_time_and_drops_do_not_prolong_it() {
         assert!(client.is_ended());
         let took = began.elapsed();
         assert!(took >= Duration::from_millis(400), "{cut}: {took:?}");
-        until("it is told", || {
-            last_error(&server).contains("within 0.4 s")
-        });
+        until("it is told", || last_error(&server).contains("within 0.4 s"));
     }
     // A byte every 50 ms would take five seconds.
     let mut client = Client::connect(&server);
@@ -158,9 +141,7 @@ fn silence_between_messages_is_no_fault() {
 fn a_hundred_connections_are_told_that_there_is_no_room() {
     let server = serve(settings());
     let mut all: Vec<_> = (0..100).map(|_| Client::connect(&server)).collect();
-    until("all are counted", || {
-        server.status().accepted + server.status().refused == 100
-    });
+    until("all are counted", || server.status().accepted + server.status().refused == 100);
     assert_eq!((server.status().clients, server.status().refused), (4, 96));
     // Those that are in receive the image, the others the refusal and the end.
     server.publish(grey(4, 4), &DAffine3::IDENTITY);
@@ -208,11 +189,7 @@ fn noise_and_false_lengths_end_the_connection() {
     assert!(server.status().errors >= 20, "{:?}", server.status());
     // Metadata that reach past the body, under a right checksum.
     let mut client = Client::connect(&server);
-    let body = [
-        &[0, 12, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 1][..],
-        &[0; 48],
-    ]
-    .concat();
+    let body = [&[0, 12, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0, 0, 0, 1][..], &[0; 48]].concat();
     let mut wire = sized(b"TRANSFORM", body.len() as u64);
     wire[1] = 2;
     wire.truncate(50);
@@ -233,9 +210,7 @@ fn who_leaves_in_the_middle_leaves_nothing_behind() {
         // Unread images make the system reset the connection.
         drop(client);
     }
-    until("all have gone", || {
-        server.status().accepted == 4 && server.status().clients == 0
-    });
+    until("all have gone", || server.status().accepted == 4 && server.status().clients == 0);
     // Between messages anybody may leave; three have left within one.
     assert!(server.status().errors <= 3, "{:?}", server.status());
     assert_serves(&server);
@@ -248,9 +223,7 @@ fn who_asks_and_never_reads_is_sent_away() {
     let mut client = Client::connect(&server);
     let questions = query("GET_IMAGE", "").encode().repeat(1000);
     client.send_bytes(&questions);
-    until("it is sent away", || {
-        server.status().accepted == 1 && server.status().clients == 0
-    });
+    until("it is sent away", || server.status().accepted == 1 && server.status().clients == 0);
     let told = last_error(&server);
     let known = ["asks and does not read", "did not take a message"];
     assert!(known.iter().any(|why| told.contains(why)), "{told}");

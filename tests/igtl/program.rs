@@ -99,10 +99,7 @@ fn a_client_moves_the_probe_and_sees_what_it_sees() {
     let back = image_at(&mut client, shift(0.0, 0.0, 0.0));
     assert_eq!((home.size[1], home.size[2], home.components), (160, 1, 1));
     let moved = away.patient_from_pixel().translation - home.patient_from_pixel().translation;
-    assert!(
-        (moved - glam::DVec3::new(12.0, 0.0, 4.0)).length() < 1e-4,
-        "{moved}"
-    );
+    assert!((moved - glam::DVec3::new(12.0, 0.0, 4.0)).length() < 1e-4, "{moved}");
     let difference = |a: &Image, b: &Image| {
         let pairs = a.values.iter().zip(&b.values);
         pairs.map(|(a, b)| f64::from(a.abs_diff(*b))).sum::<f64>() / a.values.len() as f64
@@ -146,14 +143,8 @@ fn an_address_that_cannot_be_had_is_told_with_what_to_do() {
     let taken = std::net::TcpListener::bind("127.0.0.1:0").expect("a free port");
     let port = taken.local_addr().expect("bound").port().to_string();
     for (more, words) in [
-        (
-            &["--igtl-port", &*port][..],
-            ["another program", "--igtl-port"],
-        ),
-        (
-            &["--igtl-bind", "192.0.2.1"],
-            ["192.0.2.1", "of this machine"],
-        ),
+        (&["--igtl-port", &*port][..], ["another program", "--igtl-port"]),
+        (&["--igtl-bind", "192.0.2.1"], ["192.0.2.1", "of this machine"]),
     ] {
         let out = run("scenes/phantom.toml", more);
         let said = String::from_utf8_lossy(&out.stderr).into_owned();

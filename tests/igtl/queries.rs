@@ -48,32 +48,18 @@ fn capability_and_status_are_told_in_the_query_s_version() {
     client.ask("GET_CAPABIL", "");
     let message = client.receive().expect("an answer");
     assert_eq!(message.extension, None);
-    let Content::Capability(kinds) = message.content else {
-        panic!("no capability")
-    };
-    for kind in [
-        "TRANSFORM",
-        "TDATA",
-        "GET_IMAGE",
-        "STT_TDATA",
-        "STP_TDATA",
-        "GET_STATUS",
-    ] {
+    let Content::Capability(kinds) = message.content else { panic!("no capability") };
+    for kind in ["TRANSFORM", "TDATA", "GET_IMAGE", "STT_TDATA", "STP_TDATA", "GET_STATUS"] {
         assert!(kinds.contains(&Label::new(kind)), "{kind}: {kinds:?}");
     }
 
     client.send(&Message {
-        extension: Some(Extension {
-            id: 41,
-            metadata: Vec::new(),
-        }),
+        extension: Some(Extension { id: 41, metadata: Vec::new() }),
         ..query("GET_STATUS", "me")
     });
     let message = client.receive().expect("an answer");
     assert_eq!(message.extension.map(|e| e.id), Some(41));
-    let Content::Status { code, message, .. } = message.content else {
-        panic!("no status")
-    };
+    let Content::Status { code, message, .. } = message.content else { panic!("no status") };
     assert_eq!((code, &message[..]), (1, &b"no pose has arrived yet\0"[..]));
     client.transform("Probe", shift(0.0, 0.0, 0.0));
     client.ask("GET_STATUS", "me");
@@ -123,18 +109,11 @@ fn tracking_data_come_no_more_often_than_asked_for() {
     let mut client = Client::connect(&server);
     let start = |resolution, coordinates: &str| {
         let coordinates = Label::new(coordinates);
-        let content = Content::StartTracking {
-            resolution,
-            coordinates,
-        };
+        let content = Content::StartTracking { resolution, coordinates };
         Message::new("Probe", content)
     };
     client.send(&start(100, "CAMERA"));
-    assert_eq!(
-        status(&mut client, "RTS_TDATA"),
-        1,
-        "a frame that there is not"
-    );
+    assert_eq!(status(&mut client, "RTS_TDATA"), 1, "a frame that there is not");
     client.send(&start(100, ""));
     assert_eq!(status(&mut client, "RTS_TDATA"), 0);
     let began = Instant::now();
@@ -160,8 +139,5 @@ fn tracking_data_come_no_more_often_than_asked_for() {
     assert_eq!(status(&mut client, "RTS_TDATA"), 0);
     server.publish(grey(3, 2), &DAffine3::IDENTITY);
     let kinds = [client.receive(), client.receive()].map(|m| m.expect("a message").content.kind());
-    assert!(
-        kinds[0].is("TRANSFORM") && kinds[1].is("IMAGE"),
-        "{kinds:?}"
-    );
+    assert!(kinds[0].is("TRANSFORM") && kinds[1].is("IMAGE"), "{kinds:?}");
 }

@@ -81,10 +81,7 @@ fn calibration_and_axes_are_applied() {
         ),
         ..Tracker::default()
     };
-    let server = serve(Settings {
-        tracker,
-        ..settings()
-    });
+    let server = serve(Settings { tracker, ..settings() });
     let mut client = Client::connect(&server);
     client.transform("anything", shift(10.0, 20.0, 30.0));
     until("a pose", || server.pose() != Tracked::Never);
@@ -113,11 +110,7 @@ fn tdata_name_the_tool() {
         reserved: 0,
         matrix: shift(x, 0.0, 0.0),
     };
-    let tools = vec![
-        tool("Stylus", 1.0),
-        tool("ProbeToReference", 2.0),
-        tool("Bed", 3.0),
-    ];
+    let tools = vec![tool("Stylus", 1.0), tool("ProbeToReference", 2.0), tool("Bed", 3.0)];
     client.send(&Message::new("Tracker", Content::Tracking(tools)));
     until("a pose", || server.pose() != Tracked::Never);
     assert_eq!(place(&server).x, 2.0);
@@ -125,13 +118,8 @@ fn tdata_name_the_tool() {
 
 #[test]
 fn a_tool_that_plus_does_not_see_is_lost_at_once() {
-    let settings = Settings {
-        tracker: Tracker {
-            timeout: 3600.0,
-            ..plain().tracker
-        },
-        ..settings()
-    };
+    let settings =
+        Settings { tracker: Tracker { timeout: 3600.0, ..plain().tracker }, ..settings() };
     let server = serve(settings);
     let mut client = Client::connect(&server);
     let mut send = |status: &str, x: f32| {
@@ -141,10 +129,7 @@ fn a_tool_that_plus_does_not_see_is_lost_at_once() {
             value: status.as_bytes().to_vec(),
         };
         client.send(&Message {
-            extension: Some(Extension {
-                id: 1,
-                metadata: vec![entry],
-            }),
+            extension: Some(Extension { id: 1, metadata: vec![entry] }),
             ..Message::new("ProbeToReference", Content::Transform(shift(x, 0.0, 0.0)))
         });
     };
@@ -168,21 +153,12 @@ fn what_is_no_pose_is_told_and_leaves_the_last_one() {
     let mut scaled = shift(0.0, 0.0, 0.0);
     scaled[0] = 1.5;
     let mirrored = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0];
-    let wrong = [
-        [0.0; 12],
-        [f32::NAN; 12],
-        scaled,
-        mirrored,
-        shift(f32::INFINITY, 0.0, 0.0),
-    ];
+    let wrong = [[0.0; 12], [f32::NAN; 12], scaled, mirrored, shift(f32::INFINITY, 0.0, 0.0)];
     for (count, matrix) in (1..).zip(wrong) {
         client.transform("ProbeToReference", matrix);
         until("it is told", || server.status().errors == count);
         let told = server.status().last_error.expect("an error");
-        assert!(
-            told.contains("`ProbeToReference` is no pose of a probe"),
-            "{told}"
-        );
+        assert!(told.contains("`ProbeToReference` is no pose of a probe"), "{told}");
         assert_eq!(server.pose().pose().expect("a pose").number, 1);
     }
 }
@@ -207,13 +183,8 @@ fn every_client_receives_the_image_and_where_it_was_taken() {
         assert_eq!(message.content, Content::Transform(columns));
         let message = client.receive_kind("IMAGE");
         assert!(message.device.is(IMAGE_DEVICE));
-        let Content::Image(image) = message.content else {
-            panic!("no image")
-        };
-        assert_eq!(
-            (image.size, image.components, image.axes),
-            ([6, 4, 1], 1, Axes::Ras)
-        );
+        let Content::Image(image) = message.content else { panic!("no image") };
+        assert_eq!((image.size, image.components, image.axes), ([6, 4, 1], 1, Axes::Ras));
         assert_eq!(image.values, (0..24).collect::<Vec<u8>>());
         let place = image.patient_from_pixel();
         // Columns every 0.5 mm along y, rows along -z; the third axis by the slice's 3 mm makes
@@ -239,13 +210,7 @@ fn colours_are_sent_as_such_and_what_is_transparent_is_black() {
             other => panic!("{other:?}"),
         }
     };
-    let coloured = values(|i| {
-        if i == 0 {
-            [9, 8, 7, 255]
-        } else {
-            [50, 50, 50, 0]
-        }
-    });
+    let coloured = values(|i| if i == 0 { [9, 8, 7, 255] } else { [50, 50, 50, 0] });
     assert_eq!(coloured, (3, vec![9, 8, 7, 0, 0, 0]));
     let grey = values(|i| if i == 0 { [9, 9, 9, 255] } else { [1, 2, 3, 0] });
     assert_eq!(grey, (1, vec![9, 0]));
@@ -253,10 +218,7 @@ fn colours_are_sent_as_such_and_what_is_transparent_is_black() {
 
 #[test]
 fn a_client_that_does_not_read_delays_nobody() {
-    let server = serve(Settings {
-        send_timeout: Duration::from_secs(3),
-        ..settings()
-    });
+    let server = serve(Settings { send_timeout: Duration::from_secs(3), ..settings() });
     let idle = Client::connect(&server);
     let mut reader = Client::connect(&server);
     until("both are in", || server.status().clients == 2);
@@ -291,11 +253,7 @@ fn dropping_the_server_ends_everything() {
     clients[0].send_bytes(&[0, 1, b'T']);
     let began = Instant::now();
     drop(server);
-    assert!(
-        began.elapsed() < Duration::from_secs(3),
-        "{:?}",
-        began.elapsed()
-    );
+    assert!(began.elapsed() < Duration::from_secs(3), "{:?}", began.elapsed());
     assert!(clients.iter_mut().all(Client::is_ended));
     assert!(std::net::TcpStream::connect(address).is_err());
 }

@@ -23,10 +23,7 @@ fn the_table_says_where_tool_and_tracker_are() {
     assert_eq!((given.timeout, given.axes), (0.25, Axes::Ras));
     assert_eq!(given.world_from_reference, DAffine3::IDENTITY, "one frame");
     let moved = given.tool_from_probe.transform_point3(DVec3::X);
-    assert!(
-        (moved - DVec3::new(1.0, 3.0, 30.0)).length() < 1e-12,
-        "{moved}"
-    );
+    assert!((moved - DVec3::new(1.0, 3.0, 30.0)).length() < 1e-12, "{moved}");
 
     let matrix = load(
         "[tracker]\ntool_from_probe.matrix = [0, -1, 0, 1,  1, 0, 0, 2,  0, 0, 1, 30,  0, 0, 0, 1]\n",
@@ -35,10 +32,7 @@ fn the_table_says_where_tool_and_tracker_are() {
     let close = |a: DAffine3, b: DAffine3| a.abs_diff_eq(b, 1e-12);
     assert!(close(matrix.tool_from_probe, given.tool_from_probe));
     // A quarter turn the other way is another calibration.
-    assert!(!close(
-        matrix.tool_from_probe.inverse(),
-        given.tool_from_probe
-    ));
+    assert!(!close(matrix.tool_from_probe.inverse(), given.tool_from_probe));
 }
 
 #[test]
@@ -59,10 +53,7 @@ fn mistakes_are_named() {
             "tool_from_probe = { matrix = [1, 0, 0, 0,  0, 1, 0, 0,  0, 0, 1, 0,  0, 0, 0, 1], translate = [1, 2, 3] }",
             "both a matrix",
         ),
-        (
-            "world_from_reference = { scale = 2 }",
-            "unknown field `scale`",
-        ),
+        ("world_from_reference = { scale = 2 }", "unknown field `scale`"),
     ] {
         let error = load(&format!("[tracker]\n{table}\n")).expect_err(why);
         assert!(error.to_string().contains(why), "{error}");

@@ -43,9 +43,7 @@ fn decoded(name: &str, wire: &[u8]) -> Message {
 
 #[test]
 fn what_pyigtl_writes_is_read_as_it_was_meant() {
-    let quarter = [
-        0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 10.5, -20.25, 30.125,
-    ];
+    let quarter = [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 10.5, -20.25, 30.125];
     for (name, hex) in [("TRANSFORM", TRANSFORM), ("TRANSFORM_2", TRANSFORM_2)] {
         let message = decoded(name, &bytes(hex));
         assert!(message.device.is("ProbeToReference"));
@@ -80,10 +78,7 @@ fn a_changed_body_is_noticed_wherever_it_is_changed() {
         let mut wrong = wire.clone();
         wrong[at] ^= 0x10;
         let error = Message::from_bytes(&wrong).expect_err("changed");
-        assert!(
-            matches!(error, DecodeError::Checksum { .. }),
-            "{at}: {error}"
-        );
+        assert!(matches!(error, DecodeError::Checksum { .. }), "{at}: {error}");
     }
     for end in 0..wire.len() {
         Message::from_bytes(&wire[..end]).expect_err("cut");
@@ -113,64 +108,35 @@ fn the_reference_library_s_messages_are_read_and_written() {
     for (name, stated) in all {
         let wire = wire(name);
         let message = decoded(name, &wire);
-        assert_eq!(
-            message.content.kind().text(),
-            stated["type_id"].as_str().expect("text")
-        );
-        assert_eq!(
-            message.device.text(),
-            stated["device_name"].as_str().expect("text")
-        );
+        assert_eq!(message.content.kind().text(), stated["type_id"].as_str().expect("text"));
+        assert_eq!(message.device.text(), stated["device_name"].as_str().expect("text"));
         let version = if message.extension.is_some() { 2 } else { 1 };
-        assert_eq!(
-            version,
-            stated["version"].as_u64().expect("a number"),
-            "{name}"
-        );
+        assert_eq!(version, stated["version"].as_u64().expect("a number"), "{name}");
         let header = wire.first_chunk().expect("a header");
         let size = Header::decode(header).expect("a header").body_size;
-        assert_eq!(
-            size,
-            stated["body_size"].as_u64().expect("a number"),
-            "{name}"
-        );
+        assert_eq!(size, stated["body_size"].as_u64().expect("a number"), "{name}");
     }
 
     for name in ["transform", "transformFormat2"] {
         let message = decoded(name, &wire(name));
-        let Content::Transform(matrix) = message.content else {
-            panic!("{name}")
-        };
+        let Content::Transform(matrix) = message.content else { panic!("{name}") };
         assert!(near(&matrix, &MATRIX), "{matrix:?}");
         // That library took the number for the whole field: 0.29 s after 1970.
         assert_eq!(message.time.0, 1_234_567_892);
     }
     for name in ["tdata", "tdataFormat2"] {
-        let Content::Tracking(tools) = decoded(name, &wire(name)).content else {
-            panic!("{name}")
-        };
+        let Content::Tracking(tools) = decoded(name, &wire(name)).content else { panic!("{name}") };
         let names: Vec<_> = tools.iter().map(|t| t.name.text().into_owned()).collect();
         assert_eq!(names, ["Tracker0", "Tracker1", "Tracker2"]);
-        assert!(
-            tools
-                .iter()
-                .all(|t| t.kind == 2 && near(&t.matrix, &MATRIX))
-        );
+        assert!(tools.iter().all(|t| t.kind == 2 && near(&t.matrix, &MATRIX)));
     }
     let Content::Image(image) = decoded("image", &wire("image")).content else {
         panic!("no image")
     };
-    assert_eq!(
-        (image.size, image.scalar, image.axes),
-        ([50, 50, 1], Scalar::U8, Axes::Ras)
-    );
+    assert_eq!((image.size, image.scalar, image.axes), ([50, 50, 1], Scalar::U8, Axes::Ras));
     assert!(near(image.steps.as_flattened(), &MATRIX[..9]) && near(&image.centre, &MATRIX[9..]));
-    let Content::Status {
-        code,
-        subcode,
-        name,
-        message,
-    } = decoded("status", &wire("status")).content
+    let Content::Status { code, subcode, name, message } =
+        decoded("status", &wire("status")).content
     else {
         panic!("no status")
     };

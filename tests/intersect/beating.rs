@@ -17,16 +17,10 @@ pub fn beat(k: usize, topology: u32) -> Mesh {
     let mut mesh = shapes::sphere(14.0, topology);
     let phase = TAU * k as f64 / KEYFRAMES as f64;
     let squeeze = DVec3::new(1.0 + 0.3 * phase.sin(), 1.0 - 0.25 * phase.sin(), 1.0);
-    let shift = DVec3::new(
-        6.0 * phase.cos(),
-        4.0 * phase.sin(),
-        2.0 * (2.0 * phase).sin(),
-    );
+    let shift = DVec3::new(6.0 * phase.cos(), 4.0 * phase.sin(), 2.0 * (2.0 * phase).sin());
     for p in &mut mesh.positions {
         let at = DVec3::from(p.map(f64::from));
-        *p = (at * squeeze + shift * (1.0 + 0.03 * at.z))
-            .as_vec3()
-            .into();
+        *p = (at * squeeze + shift * (1.0 + 0.03 * at.z)).as_vec3().into();
     }
     mesh
 }
@@ -36,15 +30,7 @@ pub fn beating(strategy: Strategy) -> Scene {
     let mut scene = scene(vec![
         (beat(0, 2), DAffine3::IDENTITY),
         (shapes::cuboid([12.0, 50.0, 12.0]), turned()),
-        (
-            beat(0, 1),
-            placement(
-                DVec3::splat(1.3),
-                DVec3::Y,
-                0.7,
-                DVec3::new(30.0, 0.0, 20.0),
-            ),
-        ),
+        (beat(0, 1), placement(DVec3::splat(1.3), DVec3::Y, 0.7, DVec3::new(30.0, 0.0, 20.0))),
         (
             shapes::cylinder(6.0, 30.0, 12),
             placement(DVec3::ONE, DVec3::X, 0.4, DVec3::new(-25.0, 5.0, 30.0)),
@@ -58,9 +44,7 @@ pub fn beating(strategy: Strategy) -> Scene {
             false => 2,
         };
         let first = scene.meshes.len();
-        scene
-            .meshes
-            .extend((0..KEYFRAMES).map(|k| beat(k, fine(k))));
+        scene.meshes.extend((0..KEYFRAMES).map(|k| beat(k, fine(k))));
         scene.instances[instance].keyframes = Keyframes {
             meshes: (first..first + KEYFRAMES).collect(),
             strategy,
@@ -82,13 +66,10 @@ pub fn show(scene: &mut Scene, k: usize) {
         let keyframes = &mut instance.keyframes;
         keyframes.blend = match keyframes.strategy {
             // Cubic weights at a third of the way: the outer two are negative.
-            Strategy::Interpolate => [
-                (KEYFRAMES - 1, -2.0 / 27.0),
-                (0, 7.0 / 9.0),
-                (1, 1.0 / 3.0),
-                (2, -1.0 / 27.0),
-            ]
-            .map(|(j, weight)| ((k + j) % KEYFRAMES, weight)),
+            Strategy::Interpolate => {
+                [(KEYFRAMES - 1, -2.0 / 27.0), (0, 7.0 / 9.0), (1, 1.0 / 3.0), (2, -1.0 / 27.0)]
+                    .map(|(j, weight)| ((k + j) % KEYFRAMES, weight))
+            }
             _ => [(k, 1.0), (k, 0.0), (k, 0.0), (k, 0.0)],
         };
         instance.mesh = keyframes.meshes[keyframes.nearest()];
@@ -104,10 +85,8 @@ pub fn strategies(tracer: Tracer) -> impl Iterator<Item = Strategy> {
 /// Whether a line in double precision meets a box.
 fn meets(bounds: [[f32; 3]; 2], line: &Ray) -> bool {
     let [low, high] = bounds.map(|corner| DVec3::from(corner.map(f64::from)));
-    let (a, b) = (
-        (low - line.origin()) / line.direction(),
-        (high - line.origin()) / line.direction(),
-    );
+    let (a, b) =
+        ((low - line.origin()) / line.direction(), (high - line.origin()) / line.direction());
     a.min(b).max_element() <= a.max(b).min_element()
 }
 
@@ -129,20 +108,14 @@ pub struct UnionBox {
 /// Isotropic uniform lines at a keyframe of two that a union box holds, by the rig that is made of
 /// the scene.
 pub fn union_box(spread: f64, rig: impl Fn(&Scene) -> Rig) -> UnionBox {
-    let mut scene = scene(vec![(
-        shapes::cuboid([30.0, 12.0, 20.0]),
-        DAffine3::IDENTITY,
-    )]);
+    let mut scene = scene(vec![(shapes::cuboid([30.0, 12.0, 20.0]), DAffine3::IDENTITY)]);
     let mut moved = scene.meshes[0].clone();
     for p in &mut moved.positions {
         p[0] += spread as f32;
     }
     scene.meshes.push(moved);
-    scene.instances[0].keyframes = Keyframes {
-        meshes: vec![0, 1],
-        strategy: Strategy::Selector,
-        ..Keyframes::default()
-    };
+    scene.instances[0].keyframes =
+        Keyframes { meshes: vec![0, 1], strategy: Strategy::Selector, ..Keyframes::default() };
     let (child, mut outer) = (scene.meshes[0].bounds(), scene.meshes[0].bounds());
     outer[1][0] += spread as f32;
     let mut random = Random::new(5);
@@ -171,9 +144,5 @@ pub fn union_box(spread: f64, rig: impl Fn(&Scene) -> Rig) -> UnionBox {
             missed += f64::from(counts.false_unions);
         }
     }
-    UnionBox {
-        met,
-        missed: missed / met,
-        expected: 1.0 - area(child) / area(outer),
-    }
+    UnionBox { met, missed: missed / met, expected: 1.0 - area(child) / area(outer) }
 }

@@ -20,19 +20,15 @@ pub struct Found {
 /// rounds three products and sums, the shear as many, each by 6e-8 of the largest coordinate that
 /// enters; single-precision matrices add as much.
 pub fn displacement(scene: &Scene, ray: &Ray, reach: f64) -> f64 {
-    let shifts = scene
-        .instances
-        .iter()
-        .map(|i| i.world_from_object.translation.abs().max_element());
+    let shifts =
+        scene.instances.iter().map(|i| i.world_from_object.translation.abs().max_element());
     6e-7 * shifts.fold(ray.origin().abs().max_element() + reach, f64::max)
 }
 
 /// Distance of a point from a triangle (Ericson 2005, section 5.1.5, by edges and plane).
 fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     let n = (b - a).cross(c - a);
-    let inside = [(a, b), (b, c), (c, a)]
-        .iter()
-        .all(|&(s, e)| (e - s).cross(p - s).dot(n) >= 0.0);
+    let inside = [(a, b), (b, c), (c, a)].iter().all(|&(s, e)| (e - s).cross(p - s).dot(n) >= 0.0);
     if inside {
         return ((p - a).dot(n) / n.length()).abs();
     }
@@ -123,22 +119,12 @@ pub fn expected(scene: &Scene, ray: &Ray) -> Option<Hit> {
 
 fn closest(scene: &Scene, ray: &Ray, origin: DVec3) -> Option<Hit> {
     let bounds = [f64::from(ray.t_min), f64::from(ray.t_max)];
-    intersect::closest_hit(
-        scene,
-        origin,
-        ray.direction(),
-        bounds,
-        ray.skip.map(|i| i as usize),
-    )
+    intersect::closest_hit(scene, origin, ray.direction(), bounds, ray.skip.map(|i| i as usize))
 }
 
 /// Compares the device's answer with the reference's.
 pub fn judge(scene: &Scene, ray: &Ray, expected: Option<Hit>, found: Option<Found>) -> Verdict {
-    let reach = expected
-        .map(|e| e.t)
-        .into_iter()
-        .chain(found.map(|f| f.t))
-        .fold(0.0, f64::max);
+    let reach = expected.map(|e| e.t).into_iter().chain(found.map(|f| f.t)).fold(0.0, f64::max);
     let delta = displacement(scene, ray, reach);
     if agrees(scene, ray, delta, expected, found) {
         return Verdict::Same;
@@ -151,11 +137,7 @@ pub fn judge(scene: &Scene, ray: &Ray, expected: Option<Hit>, found: Option<Foun
                 || found.is_some_and(|found| first_touched(scene, ray, delta, hit, found))
         })
     });
-    if moved {
-        Verdict::Displaced
-    } else {
-        Verdict::Wrong
-    }
+    if moved { Verdict::Displaced } else { Verdict::Wrong }
 }
 
 /// Rays that the device answers wrongly.

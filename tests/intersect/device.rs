@@ -108,9 +108,7 @@ impl Rig {
             world.exchange(&self.device, scene).unwrap();
         }
         let device = &self.device;
-        let changed = device
-            .once(|commands| Ok(world.update(commands, scene).unwrap()))
-            .unwrap();
+        let changed = device.once(|commands| Ok(world.update(commands, scene).unwrap())).unwrap();
         changed || other
     }
 
@@ -130,17 +128,10 @@ impl Rig {
             .collect();
         let _turn = TURN.lock().unwrap_or_else(|e| e.into_inner());
         let bytes = bytemuck::cast_slice(&raw);
-        let list = self
-            .device
-            .buffer("rays", bytes.len() as u64, BufferKind::Storage)
-            .unwrap();
+        let list = self.device.buffer("rays", bytes.len() as u64, BufferKind::Storage).unwrap();
         let hits = self
             .device
-            .buffer(
-                "hits",
-                (size_of::<RawHit>() * rays.len()) as u64,
-                BufferKind::Storage,
-            )
+            .buffer("hits", (size_of::<RawHit>() * rays.len()) as u64, BufferKind::Storage)
             .unwrap();
         self.device.upload(&list, bytes).unwrap();
         let mut bindings = self.world.bindings().to_vec();

@@ -17,9 +17,8 @@ const TRIANGLES: usize = 3;
 
 /// Organs within each other in one frame, and one beside them that has its own.
 fn nested() -> Scene {
-    let mut placed: Vec<_> = [20.0, 17.0, 12.0, 5.0]
-        .map(|radius| (shapes::sphere(radius, 2), turned()))
-        .into();
+    let mut placed: Vec<_> =
+        [20.0, 17.0, 12.0, 5.0].map(|radius| (shapes::sphere(radius, 2), turned())).into();
     let aside = turned() * DAffine3::from_translation(DVec3::Z);
     placed.insert(2, (shapes::cuboid([8.0, 40.0, 8.0]), aside));
     scene(placed)

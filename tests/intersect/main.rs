@@ -46,12 +46,7 @@ fn shape(index: usize) -> Scene {
             ),
             (
                 shapes::sphere(9e3, 1),
-                placement(
-                    DVec3::splat(1e-3),
-                    DVec3::X,
-                    2.0,
-                    DVec3::new(2.0, 5.0, 62.0),
-                ),
+                placement(DVec3::splat(1e-3), DVec3::X, 2.0, DVec3::new(2.0, 5.0, 62.0)),
             ),
             (shapes::cuboid([4.0, 4.0, 40.0]), turned()),
         ]),
@@ -67,10 +62,7 @@ fn wrong(
 ) -> [usize; 2] {
     let bad = compare::wrong(scene, rays, expected, found);
     for &i in bad.iter().take(5) {
-        println!(
-            "{:?}: expected {:?}, found {:?}",
-            rays[i], expected[i], found[i]
-        );
+        println!("{:?}: expected {:?}, found {:?}", rays[i], expected[i], found[i]);
     }
     by_aim(&bad)
 }
@@ -152,10 +144,7 @@ fn a_ray_leaves_whatever_it_enters() {
                     continue;
                 };
                 clear += 1;
-                let alternate = hits
-                    .iter()
-                    .enumerate()
-                    .all(|(i, hit)| hit.2 == (i % 2 == 0));
+                let alternate = hits.iter().enumerate().all(|(i, hit)| hit.2 == (i % 2 == 0));
                 if !alternate || !hits.len().is_multiple_of(2) {
                     println!("{ray:?} meets {hits:?}, exactly {exact:?}");
                     odd += 1;
@@ -177,10 +166,7 @@ fn input_that_is_no_ray_misses() {
     let scene = shape(1);
     let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
     let good = Ray::new(DVec3::new(0.1, 0.2, -50.0), DVec3::Z);
-    let mut list = vec![Ray {
-        direction: [0.0; 3],
-        ..good
-    }];
+    let mut list = vec![Ray { direction: [0.0; 3], ..good }];
     for value in bad {
         for axis in 0..3 {
             let (mut origin, mut direction) = (good, good);
@@ -188,28 +174,16 @@ fn input_that_is_no_ray_misses() {
             direction.direction[axis] = value;
             list.extend([origin, direction]);
         }
-        list.push(Ray {
-            t_min: value.abs(),
-            ..good
-        });
-        list.push(Ray {
-            direction: [value; 3],
-            ..good
-        });
+        list.push(Ray { t_min: value.abs(), ..good });
+        list.push(Ray { direction: [value; 3], ..good });
     }
-    list.push(Ray {
-        t_max: f32::NAN,
-        ..good
-    });
+    list.push(Ray { t_max: f32::NAN, ..good });
     for tracer in TRACERS {
         let rig = Rig::new(&scene, tracer);
         for (ray, hit) in list.iter().zip(rig.found(&list)) {
             assert_eq!(hit, None, "{tracer}: {ray:?}");
         }
-        assert!(
-            rig.found(&[good])[0].is_some(),
-            "{tracer} meets what is there"
-        );
+        assert!(rig.found(&[good])[0].is_some(), "{tracer} meets what is there");
         rig.assert_silent();
     }
 }
@@ -232,48 +206,28 @@ fn planted_errors_are_noticed() {
     let mut less = scene.clone();
     less.meshes[0].triangles[17] = [0; 3];
     for tracer in TRACERS {
-        assert!(
-            found_wrong(&Rig::new(&less, tracer)) > 0,
-            "{tracer}: a hole goes unnoticed"
-        );
+        assert!(found_wrong(&Rig::new(&less, tracer)) > 0, "{tracer}: a hole goes unnoticed");
     }
 
     // The comparator itself, on exact answers spoilt by hand.
     let ray = Ray::new(DVec3::new(1.0, 2.0, 0.0), DVec3::Z);
     let hit = compare::expected(&scene, &ray).unwrap();
-    let found = Found {
-        t: hit.t,
-        instance: hit.instance,
-        triangle: hit.triangle,
-    };
+    let found = Found { t: hit.t, instance: hit.instance, triangle: hit.triangle };
     assert_eq!(judge(&scene, &ray, Some(hit), Some(found)), Verdict::Same);
     let spoilt = [
         None,
-        Some(Found {
-            t: hit.t * 1.000_1,
-            ..found
-        }),
-        Some(Found {
-            triangle: (hit.triangle + 100) % 320,
-            ..found
-        }),
+        Some(Found { t: hit.t * 1.000_1, ..found }),
+        Some(Found { triangle: (hit.triangle + 100) % 320, ..found }),
     ];
     for found in spoilt {
-        assert_eq!(
-            judge(&scene, &ray, Some(hit), found),
-            Verdict::Wrong,
-            "{found:?}"
-        );
+        assert_eq!(judge(&scene, &ray, Some(hit), found), Verdict::Wrong, "{found:?}");
     }
 }
 
 /// Steps per ray do not creep up; measured 11.2 and 4.6 on these 20,480 triangles.
 #[test]
 fn traversal_steps_stay_small() {
-    let scene = scene(vec![(
-        shapes::sphere(20.0, 5),
-        DAffine3::from_translation(DVec3::Z * 60.0),
-    )]);
+    let scene = scene(vec![(shapes::sphere(20.0, 5), DAffine3::from_translation(DVec3::Z * 60.0))]);
     let rays: Vec<Ray> = (0..4_000)
         .map(|i| {
             let (l, k) = (i % 100, i / 100);
@@ -289,12 +243,6 @@ fn traversal_steps_stay_small() {
     let mean = |f: fn(&Traced) -> u32| {
         hits.iter().map(|h| f64::from(f(h))).sum::<f64>() / hits.len() as f64
     };
-    let (nodes, triangles) = (
-        mean(|h| h.counts.node_visits),
-        mean(|h| h.counts.triangle_tests),
-    );
-    assert!(
-        nodes < 14.0 && triangles < 6.0,
-        "{nodes:.2} nodes, {triangles:.2} triangles per ray"
-    );
+    let (nodes, triangles) = (mean(|h| h.counts.node_visits), mean(|h| h.counts.triangle_tests));
+    assert!(nodes < 14.0 && triangles < 6.0, "{nodes:.2} nodes, {triangles:.2} triangles per ray");
 }

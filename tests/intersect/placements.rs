@@ -10,11 +10,7 @@ use super::walk::{clear_hits, walk};
 use super::{TRACERS, shape};
 
 fn away_from_seams(rays: Vec<Ray>) -> Vec<Ray> {
-    rays.into_iter()
-        .enumerate()
-        .filter(|(i, _)| !aimed_at_seams(*i))
-        .map(|(_, ray)| ray)
-        .collect()
+    rays.into_iter().enumerate().filter(|(i, _)| !aimed_at_seams(*i)).map(|(_, ray)| ray).collect()
 }
 
 /// T31: a placed mesh is hit where the same mesh with its placement worked in is hit.
@@ -22,24 +18,14 @@ fn away_from_seams(rays: Vec<Ray>) -> Vec<Ray> {
 fn placements_are_transforms_of_the_mesh() {
     let mesh = shapes::ellipsoid([10.0, 15.0, 12.0], 3);
     let placements = [
-        placement(
-            DVec3::ONE,
-            DVec3::new(1.0, -2.0, 0.5),
-            0.9,
-            DVec3::new(20.0, -10.0, 70.0),
-        ),
+        placement(DVec3::ONE, DVec3::new(1.0, -2.0, 0.5), 0.9, DVec3::new(20.0, -10.0, 70.0)),
         placement(
             DVec3::new(0.3, 1.0, 2.5),
             DVec3::new(1.0, 1.0, 1.0),
             2.5,
             DVec3::new(-30.0, 5.0, 50.0),
         ),
-        placement(
-            DVec3::new(1.0, 1.0, -1.2),
-            DVec3::Y,
-            -0.4,
-            DVec3::new(5.0, 5.0, 90.0),
-        ),
+        placement(DVec3::new(1.0, 1.0, -1.2), DVec3::Y, -0.4, DVec3::new(5.0, 5.0, 90.0)),
     ];
     for world_from_object in placements {
         let placed = scene(vec![(mesh.clone(), world_from_object)]);
@@ -60,25 +46,16 @@ fn placements_are_transforms_of_the_mesh() {
                     continue;
                 }
                 compared += 1;
-                assert!(
-                    a.position.distance(b.position) < 1e-4,
-                    "{tracer}: {ray:?}: {a:?} {b:?}"
-                );
+                assert!(a.position.distance(b.position) < 1e-4, "{tracer}: {ray:?}: {a:?} {b:?}");
                 assert!(
                     a.geometric.dot(a.position - centre) > 0.0,
                     "{tracer}: inward normal {a:?}"
                 );
                 // Interpolated between vertices whose rounding of 4e-6 mm lies 0.3 mm apart or more.
-                assert!(
-                    a.shading.distance(b.shading) < 1e-4,
-                    "{tracer}: {a:?} {b:?}"
-                );
+                assert!(a.shading.distance(b.shading) < 1e-4, "{tracer}: {a:?} {b:?}");
                 assert!(a.shading.dot(a.geometric) > 0.5);
             }
-            assert!(
-                compared > 1_000,
-                "only {compared} rays met the mesh head-on"
-            );
+            assert!(compared > 1_000, "only {compared} rays met the mesh head-on");
         }
     }
 }
@@ -89,23 +66,9 @@ fn the_order_of_instances_changes_no_hit() {
     const MARGIN: f64 = 1e-3;
     let sphere = shapes::sphere(12.0, 2);
     let parts = [
-        (
-            sphere.clone(),
-            placement(DVec3::ONE, DVec3::X, 0.0, DVec3::new(0.0, 0.0, 50.0)),
-        ),
-        (
-            sphere.clone(),
-            placement(DVec3::ONE, DVec3::X, 0.0, DVec3::new(0.0, 0.0, 50.0)),
-        ),
-        (
-            sphere,
-            placement(
-                DVec3::new(1.0, 0.7, 1.3),
-                DVec3::Z,
-                0.5,
-                DVec3::new(9.0, 2.0, 55.0),
-            ),
-        ),
+        (sphere.clone(), placement(DVec3::ONE, DVec3::X, 0.0, DVec3::new(0.0, 0.0, 50.0))),
+        (sphere.clone(), placement(DVec3::ONE, DVec3::X, 0.0, DVec3::new(0.0, 0.0, 50.0))),
+        (sphere, placement(DVec3::new(1.0, 0.7, 1.3), DVec3::Z, 0.5, DVec3::new(9.0, 2.0, 55.0))),
         (
             shapes::cuboid([18.0, 6.0, 30.0]),
             placement(DVec3::ONE, DVec3::Y, 0.6, DVec3::new(-4.0, 1.0, 52.0)),
@@ -115,10 +78,8 @@ fn the_order_of_instances_changes_no_hit() {
     let base = scene(parts.to_vec());
     // Seams are the business of the tests above.
     let rays = away_from_seams(rays(&base, 8_000, 32));
-    let exact: Vec<_> = rays
-        .par_iter()
-        .map(|ray| clear_hits(&base, ray, 4.0 * MARGIN, twins))
-        .collect();
+    let exact: Vec<_> =
+        rays.par_iter().map(|ray| clear_hits(&base, ray, 4.0 * MARGIN, twins)).collect();
     for tracer in TRACERS {
         let mut clear = 0;
         let walked: Vec<_> = orders
@@ -131,10 +92,7 @@ fn the_order_of_instances_changes_no_hit() {
                 let skipping: Vec<Ray> = rays
                     .iter()
                     .zip(&first)
-                    .map(|(&ray, hits)| Ray {
-                        skip: hits.first().map(|h| h.1 as u32),
-                        ..ray
-                    })
+                    .map(|(&ray, hits)| Ray { skip: hits.first().map(|h| h.1 as u32), ..ray })
                     .collect();
                 let behind = rig.found(&skipping);
                 (order, first, behind)
@@ -188,11 +146,7 @@ fn instances_move() {
         let mut rig = Rig::new(&before, tracer);
         assert!(!rig.update(&before), "{tracer}: nothing moved");
         assert!(rig.update(&after));
-        assert_eq!(
-            rig.found(&rays),
-            Rig::new(&after, tracer).found(&rays),
-            "{tracer}"
-        );
+        assert_eq!(rig.found(&rays), Rig::new(&after, tracer).found(&rays), "{tracer}");
         assert!(!rig.update(&after));
         rig.assert_silent();
     }

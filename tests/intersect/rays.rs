@@ -45,9 +45,8 @@ impl Random {
 
     pub fn bits(&mut self) -> u32 {
         let old = self.0;
-        self.0 = old
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        self.0 =
+            old.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((((old >> 18) ^ old) >> 27) as u32).rotate_right((old >> 59) as u32)
     }
 
@@ -88,11 +87,7 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
             (mesh, instance)
         })
         .unzip();
-    Scene {
-        meshes,
-        instances,
-        ..Scene::homogeneous(tissue, Probe::abdominal())
-    }
+    Scene { meshes, instances, ..Scene::homogeneous(tissue, Probe::abdominal()) }
 }
 
 /// Rotation, stretch and shift as they occur: organs of 10 to 100 mm, up to 150 mm away.
@@ -116,12 +111,7 @@ pub fn turned() -> DAffine3 {
 
 /// Mirrored, stretched and turned.
 pub fn mirrored() -> DAffine3 {
-    placement(
-        DVec3::new(-1.5, 1.0, 1.0),
-        DVec3::Y,
-        0.7,
-        DVec3::new(-40.0, 10.0, 50.0),
-    )
+    placement(DVec3::new(-1.5, 1.0, 1.0), DVec3::Y, 0.7, DVec3::new(-40.0, 10.0, 50.0))
 }
 
 /// The mesh with its placement worked into the vertices. Normals keep the length that the placement
@@ -130,10 +120,7 @@ pub fn baked(mesh: &Mesh, world_from_object: &DAffine3) -> Mesh {
     let normal = world_from_object.matrix3.inverse().transpose();
     let mut out = mesh.clone();
     for p in &mut out.positions {
-        *p = world_from_object
-            .transform_point3(DVec3::from(p.map(f64::from)))
-            .as_vec3()
-            .into();
+        *p = world_from_object.transform_point3(DVec3::from(p.map(f64::from))).as_vec3().into();
     }
     for n in &mut out.normals {
         *n = (normal * DVec3::from(n.map(f64::from))).as_vec3().into();
@@ -165,9 +152,7 @@ pub fn aimed_at_seams(i: usize) -> bool {
 pub fn rays(scene: &Scene, count: usize, seed: u64) -> Vec<Ray> {
     let mut random = Random::new(seed);
     let triangles = |i: usize| scene.meshes[scene.instances[i].mesh].triangles.len();
-    let seen: Vec<usize> = (0..scene.instances.len())
-        .filter(|&i| triangles(i) > 0)
-        .collect();
+    let seen: Vec<usize> = (0..scene.instances.len()).filter(|&i| triangles(i) > 0).collect();
     (0..count)
         .map(|i| {
             let instance = seen[random.below(seen.len())];

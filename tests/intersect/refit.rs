@@ -20,10 +20,7 @@ fn rest() -> Scene {
     let small = shapes::ellipsoid([12.0, 20.0, 9.0], 3);
     scene(vec![
         (shapes::sphere(20.0, 3), turned()),
-        (
-            small,
-            mirrored() * DAffine3::from_translation(glam::DVec3::Z),
-        ),
+        (small, mirrored() * DAffine3::from_translation(glam::DVec3::Z)),
     ])
 }
 
@@ -39,9 +36,7 @@ fn deform(scene: &mut Scene) {
 
 /// The nodes of `rig`'s world with the boxes that `moved` vertices ask for.
 fn refitted(rig: &Rig, levels: &Levels, moved: &Buffer) -> Buffer {
-    let Binding::Buffer(nodes) = rig.world.structure() else {
-        panic!("not this tracer")
-    };
+    let Binding::Buffer(nodes) = rig.world.structure() else { panic!("not this tracer") };
     let nodes = rig.storage("refitted", &rig.device.read_back(nodes).unwrap());
     let boxes = rig.storage("boxes", &vec![0; nodes.size() as usize / 80 * 24]);
     let order = rig.storage("order", bytemuck::cast_slice(&levels.order));
@@ -67,16 +62,9 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
     let mut moved = rest.clone();
     deform(&mut moved);
     let rays = rays(&moved, 20_000, 17);
-    let expected: Vec<_> = rays
-        .par_iter()
-        .map(|ray| compare::expected(&moved, ray))
-        .collect();
+    let expected: Vec<_> = rays.par_iter().map(|ray| compare::expected(&moved, ray)).collect();
     let mut rig = Rig::split(&rest, Splits::Object);
-    let positions: Vec<[f32; 3]> = moved
-        .meshes
-        .iter()
-        .flat_map(|m| m.positions.clone())
-        .collect();
+    let positions: Vec<[f32; 3]> = moved.meshes.iter().flat_map(|m| m.positions.clone()).collect();
     let vertices = rig.storage("moved", bytemuck::cast_slice(&positions));
     let trees: Vec<MeshBvh> = rest.meshes.iter().map(MeshBvh::build).collect();
     let roots = rig.world.rows().iter().map(|row| row.bvh_root);
@@ -103,10 +91,7 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
         missed.count()
     };
     let stale = missed(&found(None));
-    assert!(
-        stale > rays.len() / 10,
-        "only {stale} notice the stale boxes"
-    );
+    assert!(stale > rays.len() / 10, "only {stale} notice the stale boxes");
     let mut short = levels.clone();
     let largest = short.ranges.iter_mut().max_by_key(|range| range.count);
     largest.expect("a tree has levels").count -= 1;

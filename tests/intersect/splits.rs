@@ -57,10 +57,7 @@ fn cut_triangles_are_met_where_whole_ones_are() {
     );
     // And that is what brute force finds.
     let few = &rays[..20_000];
-    let expected: Vec<_> = few
-        .iter()
-        .map(|ray| compare::expected(&scene, ray))
-        .collect();
+    let expected: Vec<_> = few.iter().map(|ray| compare::expected(&scene, ray)).collect();
     let found: Vec<_> = with[..few.len()].iter().map(|hit| hit.found).collect();
     let wrong = compare::wrong(&scene, few, &expected, &found);
     assert!(wrong.is_empty(), "{wrong:?}");
@@ -87,8 +84,5 @@ fn cuts_make_rays_cheaper() {
         sum.map(|steps| steps / rays.len() as f64)
     });
     println!("nodes and triangles per ray: {whole:.2?} whole, {cut:.2?} cut");
-    assert!(
-        cut[0] < 0.95 * whole[0] && cut[1] < 0.95 * whole[1],
-        "{whole:?} {cut:?}"
-    );
+    assert!(cut[0] < 0.95 * whole[0] && cut[1] < 0.95 * whole[1], "{whole:?} {cut:?}");
 }

@@ -33,15 +33,11 @@ impl Rig {
 
     /// Exchanges the planes of one child of the first mesh's root along x.
     pub fn swap_a_bound(&mut self) {
-        let Binding::Buffer(nodes) = self.world.structure() else {
-            panic!("not this tracer")
-        };
+        let Binding::Buffer(nodes) = self.world.structure() else { panic!("not this tracer") };
         let mut bytes = self.device.read_back(nodes).unwrap();
         let root = 80 * self.world.rows()[0].bvh_root as usize;
         // After corner, exponents, links and kinds: eight lower planes, eight upper planes.
-        let child = (0..8)
-            .find(|i| bytes[root + 24 + i] != 0)
-            .expect("a root has children");
+        let child = (0..8).find(|i| bytes[root + 24 + i] != 0).expect("a root has children");
         bytes.swap(root + 32 + child, root + 40 + child);
         self.spoil(4, &bytes);
     }

@@ -21,13 +21,7 @@ pub fn walk(rig: &Rig, rays: &[Ray], margin: f64) -> Vec<Vec<(f64, usize, bool)>
             .filter_map(|(&(i, ray), hit)| {
                 let Found { t, instance, .. } = hit.found?;
                 found[i].push((t, instance, hit.geometric.dot(ray.direction()) < 0.0));
-                Some((
-                    i,
-                    Ray {
-                        t_min: (t + margin) as f32,
-                        ..ray
-                    },
-                ))
+                Some((i, Ray { t_min: (t + margin) as f32, ..ray }))
             })
             .collect();
     }

@@ -16,24 +16,19 @@ impl Corners {
     /// turned is found in one shape, and must then hold in all.
     pub fn new(mesh: &Mesh, triangles: &[[usize; 3]], expected: &[[f64; 3]]) -> Self {
         assert!(mesh.triangles.len() >= triangles.len());
-        let stored = triangles
-            .iter()
-            .zip(&mesh.triangles)
-            .map(|(&[a, b, c], loaded)| {
-                let off = |corners: [usize; 3]| -> f64 {
-                    let pairs = corners.iter().zip(loaded);
-                    pairs
-                        .map(|(&e, &l)| distance(expected[e], mesh.positions[l as usize]))
-                        .fold(0.0, f64::max)
-                };
-                match off([a, b, c]) <= off([a, c, b]) {
-                    true => [a, b, c],
-                    false => [a, c, b],
-                }
-            });
-        Self {
-            stored: stored.collect(),
-        }
+        let stored = triangles.iter().zip(&mesh.triangles).map(|(&[a, b, c], loaded)| {
+            let off = |corners: [usize; 3]| -> f64 {
+                let pairs = corners.iter().zip(loaded);
+                pairs
+                    .map(|(&e, &l)| distance(expected[e], mesh.positions[l as usize]))
+                    .fold(0.0, f64::max)
+            };
+            match off([a, b, c]) <= off([a, c, b]) {
+                true => [a, b, c],
+                false => [a, c, b],
+            }
+        });
+        Self { stored: stored.collect() }
     }
 
     /// Largest distance of a vertex from where it should be.

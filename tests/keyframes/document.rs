@@ -57,9 +57,7 @@ impl Document {
             let begin = (view["byteOffset"].as_u64().unwrap_or(0) + offset) as usize;
             let bytes = &self.buffers[index_of(&view["buffer"])];
             let one = |i: usize, c: usize| value(&bytes[begin + i * stride + c * size..], kind);
-            (0..count)
-                .map(|i| (0..width).map(|c| one(i, c)).collect())
-                .collect::<Vec<Vec<f64>>>()
+            (0..count).map(|i| (0..width).map(|c| one(i, c)).collect()).collect::<Vec<Vec<f64>>>()
         };
         let mut out = match accessor.get("bufferView") {
             Some(_) => read(accessor, offset, kind, width, count),

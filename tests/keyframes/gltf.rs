@@ -104,11 +104,7 @@ fn key_times(node: usize, pose: &Pose<'_>) -> Vec<f64> {
 fn check(folder: &Path, sample: &Sample) {
     let path = folder.join(sample.file);
     let units = Units::named(sample.units).expect("a unit");
-    let options = Options {
-        units: Some(units),
-        keyframes: sample.keyframes,
-        ..Options::default()
-    };
+    let options = Options { units: Some(units), keyframes: sample.keyframes, ..Options::default() };
     let loaded = load_animated(&path, &options, Choice::Named(sample.animation));
     let (animated, _) = loaded.unwrap_or_else(|issues| panic!("{}: {issues:?}", sample.file));
     assert_eq!(animated.animation, sample.animation);
@@ -116,15 +112,10 @@ fn check(folder: &Path, sample: &Sample) {
     let animations = document.json["animations"].as_array().expect("animations");
     let named = |a: &serde_json::Value| a["name"].as_str() == Some(sample.animation);
     let animation = animations.iter().position(named).unwrap_or(0);
-    let pose = |planted| Pose {
-        document: &document,
-        animation,
-        planted,
-    };
+    let pose = |planted| Pose { document: &document, animation, planted };
     let nodes = document.json["nodes"].as_array().expect("nodes");
-    let bearing: Vec<usize> = (0..nodes.len())
-        .filter(|&n| nodes[n].get("mesh").is_some())
-        .collect();
+    let bearing: Vec<usize> =
+        (0..nodes.len()).filter(|&n| nodes[n].get("mesh").is_some()).collect();
     assert_eq!(bearing.len(), animated.meshes.len());
     let mut caught = vec![false; sample.planted.len()];
     for mesh in &animated.meshes {

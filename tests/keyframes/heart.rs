@@ -18,11 +18,7 @@ fn files(folder: &Path, surface: &str) -> Vec<PathBuf> {
 }
 
 fn options() -> Options {
-    Options {
-        units: Units::named("mm"),
-        cap_openings: true,
-        ..Options::default()
-    }
+    Options { units: Units::named("mm"), cap_openings: true, ..Options::default() }
 }
 
 /// Vertices and triangles of a file of `v` and `f` lines.
@@ -128,10 +124,7 @@ fn turned(mesh: &Mesh, of: &Mesh) -> f64 {
         let sine = cross(*sum, normal);
         dot(sine, sine).sqrt().atan2(dot(*sum, normal)).to_degrees()
     };
-    sums.iter()
-        .zip(&mesh.normals)
-        .map(angle)
-        .fold(0.0, f64::max)
+    sums.iter().zip(&mesh.normals).map(angle).fold(0.0, f64::max)
 }
 
 #[test]
@@ -181,8 +174,7 @@ fn phases_share_one_closed_outward_surface() {
         assert!(unpaired(&open) > 0);
         let mut moved = meshes[9].clone();
         let hub = moved.triangles[triangles.len()];
-        hub.iter()
-            .for_each(|&i| moved.positions[i as usize][0] += 1e-3);
+        hub.iter().for_each(|&i| moved.positions[i as usize][0] += 1e-3);
         assert!(off_centre(&moved, triangles.len()) > allowed);
     }
 }

@@ -34,11 +34,8 @@ impl Store {
     }
 
     fn floats<const N: usize>(&mut self, kind: &str, values: &[[f64; N]]) -> usize {
-        let bytes: Vec<u8> = values
-            .iter()
-            .flatten()
-            .flat_map(|&v| (v as f32).to_le_bytes())
-            .collect();
+        let bytes: Vec<u8> =
+            values.iter().flatten().flat_map(|&v| (v as f32).to_le_bytes()).collect();
         let view = self.view(&bytes);
         self.accessor(
             json!({ "bufferView": view, "componentType": 5126, "count": values.len(), "type": kind }),
@@ -48,34 +45,23 @@ impl Store {
     /// Elements of four bytes.
     fn bytes<const N: usize>(&mut self, kind: &str, normalized: bool, values: &[[u8; N]]) -> usize {
         let view = self.view(values.as_flattened());
-        self.accessor(
-            json!({ "bufferView": view, "componentType": 5121, "count": values.len(),
-            "type": kind, "normalized": normalized }),
-        )
+        self.accessor(json!({ "bufferView": view, "componentType": 5121, "count": values.len(),
+            "type": kind, "normalized": normalized }))
     }
 
     /// Displacements of a few of `count` vertices, as normalised shorts.
     fn sparse(&mut self, count: usize, at: &[u8], values: &[[i16; 3]]) -> usize {
-        let shorts: Vec<u8> = values
-            .iter()
-            .flatten()
-            .flat_map(|v| v.to_le_bytes())
-            .collect();
+        let shorts: Vec<u8> = values.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         let (at_view, new) = (self.view(at), self.view(&shorts));
-        self.accessor(
-            json!({ "componentType": 5122, "normalized": true, "count": count,
+        self.accessor(json!({ "componentType": 5122, "normalized": true, "count": count,
             "type": "VEC3", "sparse": { "count": at.len(),
                 "indices": { "bufferView": at_view, "componentType": 5121 },
-                "values": { "bufferView": new } } }),
-        )
+                "values": { "bufferView": new } } }))
     }
 
     fn finish(mut self, mut json: Value) -> Value {
         self.bytes.resize(self.bytes.len().next_multiple_of(4), 0);
-        let uri = format!(
-            "data:application/octet-stream;base64,{}",
-            to_base64(&self.bytes)
-        );
+        let uri = format!("data:application/octet-stream;base64,{}", to_base64(&self.bytes));
         json["asset"] = json!({ "version": "2.0" });
         json["scene"] = json!(0);
         json["buffers"] = json!([{ "byteLength": self.bytes.len(), "uri": uri }]);
@@ -173,11 +159,7 @@ pub fn tree() -> Value {
 pub fn bending() -> Value {
     let mut store = Store::default();
     let (points, positions, indices) = bar(&mut store, 3);
-    let target = store.sparse(
-        16,
-        &[4, 6, 9],
-        &[[32767, 0, -16000], [-32767, 99, 0], [0, 0, 8000]],
-    );
+    let target = store.sparse(16, &[4, 6, 9], &[[32767, 0, -16000], [-32767, 99, 0], [0, 0, 8000]]);
     let weights: Vec<[u8; 4]> = points
         .iter()
         .map(|p| {
@@ -232,10 +214,7 @@ pub fn written(folder: &Path, json: &Value) -> PathBuf {
 }
 
 fn options() -> Options {
-    Options {
-        units: Units::named("cm"),
-        ..Options::default()
-    }
+    Options { units: Units::named("cm"), ..Options::default() }
 }
 
 /// Scene from the space of a mesh.
@@ -266,11 +245,7 @@ fn moving_nodes_are_where_they_should_be() {
     assert_eq!((mesh.shapes.len(), mesh.times.len()), (1, 0));
     let document = Document::open(&path);
     let off = |planted| {
-        let pose = Pose {
-            document: &document,
-            animation: 1,
-            planted,
-        };
+        let pose = Pose { document: &document, animation: 1, planted };
         let triangles = pose.triangles(3);
         let mut off = 0f64;
         for step in 0..40 {
@@ -304,9 +279,8 @@ fn a_report_tells_what_plays_and_what_does_not() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let mut json = tree();
     // Metres: from the size of a house to that of an organ.
-    let matrix = [
-        -0.01, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 1.0,
-    ];
+    let matrix =
+        [-0.01, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 0.01, 0.0, 0.0, 0.0, 0.0, 1.0];
     json["nodes"][0]["matrix"] = json!(matrix);
     let report = insonify::scene::check::report(&written(folder.path(), &json));
     let text = report.to_string();
@@ -324,16 +298,9 @@ fn skins_and_morph_targets_work_together() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = written(folder.path(), &bending());
     let document = Document::open(&path);
-    let pose = |planted| Pose {
-        document: &document,
-        animation: 0,
-        planted,
-    };
+    let pose = |planted| Pose { document: &document, animation: 0, planted };
     for most in [24, 3] {
-        let options = Options {
-            keyframes: Some(most),
-            ..options()
-        };
+        let options = Options { keyframes: Some(most), ..options() };
         let (animated, _) = load_animated(&path, &options, Choice::First).expect("sound");
         let mesh = &animated.meshes[0];
         let times: &[f64] = match most {
@@ -344,12 +311,7 @@ fn skins_and_morph_targets_work_together() {
         let (off, allowed) = compare(mesh, 0, &pose(None), 10.0);
         println!("off by {off:.1e} mm, {allowed:.1e} allowed");
         assert!(off <= allowed, "{off:e} {allowed:e}");
-        let mistakes = [
-            Planted::Late,
-            Planted::Target,
-            Planted::Unbound,
-            Planted::Carried,
-        ];
+        let mistakes = [Planted::Late, Planted::Target, Planted::Unbound, Planted::Carried];
         for planted in mistakes {
             let (off, allowed) = compare(mesh, 0, &pose(Some(planted)), 10.0);
             assert!(off > allowed, "{planted:?}");

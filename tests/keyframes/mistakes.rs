@@ -18,10 +18,7 @@ struct Mistake {
 fn said(json: &Value, mistake: &Mistake) -> String {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = written(folder.path(), json);
-    let options = Options {
-        units: Units::named("cm"),
-        ..Options::default()
-    };
+    let options = Options { units: Units::named("cm"), ..Options::default() };
     let choice = mistake.animation.map_or(Choice::First, Choice::Named);
     let issues = load_animated(&path, &options, choice).expect_err("a mistake");
     let errors = issues.iter().filter(|i| i.is_error());
@@ -101,17 +98,10 @@ fn of_moving_nodes() {
             Mistake {
                 change: |json| {
                     let scales = json["animations"][1]["samplers"][2]["output"].clone();
-                    overwrite(
-                        json,
-                        &scales,
-                        &[1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0],
-                    );
+                    overwrite(json, &scales, &[1.0, 1.0, 1.0, 1.0, 0.0, 1.0, 1.0, 1.0, 1.0]);
                 },
                 animation: Some("all"),
-                said: &[
-                    "/nodes/2: `turn`: the scale is zero",
-                    "leave it a small scale",
-                ],
+                said: &["/nodes/2: `turn`: the scale is zero", "leave it a small scale"],
             },
             Mistake {
                 change: |json| json["nodes"][3]["scale"] = json!([1, 0, 1]),
@@ -251,10 +241,7 @@ fn of_skins_and_morph_targets() {
                         json!(40_000_000);
                 },
                 animation: None,
-                said: &[
-                    "its animation has more than 16000000 numbers",
-                    "reduce keyframes",
-                ],
+                said: &["its animation has more than 16000000 numbers", "reduce keyframes"],
             },
         ],
     );
@@ -264,10 +251,7 @@ fn of_skins_and_morph_targets() {
 fn of_files_that_are_no_gltf() {
     let issues = load_animated(Path::new("a.obj"), &Options::default(), Choice::First);
     let issues: Vec<Issue> = issues.expect_err("no animation in OBJ");
-    assert!(
-        issues[0].message.contains("only .gltf and .glb files"),
-        "{issues:?}"
-    );
+    assert!(issues[0].message.contains("only .gltf and .glb files"), "{issues:?}");
 }
 
 const TENT: &str = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 2 2 HIGH\nv 2 2 HIGH\n\
@@ -275,9 +259,8 @@ const TENT: &str = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 2 2 HIGH\nv 2 2 HIGH\n\
 
 fn tents(heights: &[&str]) -> Result<(Vec<insonify::scene::Mesh>, Vec<Issue>), Vec<Issue>> {
     let folder = tempfile::tempdir().expect("temporary folder");
-    let paths: Vec<_> = (0..heights.len())
-        .map(|k| folder.path().join(format!("tent_{k}.obj")))
-        .collect();
+    let paths: Vec<_> =
+        (0..heights.len()).map(|k| folder.path().join(format!("tent_{k}.obj"))).collect();
     for (path, height) in paths.iter().zip(heights) {
         std::fs::write(path, TENT.replace("HIGH", height)).expect("written");
     }
@@ -314,9 +297,7 @@ fn of_files_of_different_topology() {
     let (first, second) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
     std::fs::write(&first, TENT.replace("HIGH", "9")).expect("written");
     // The base in three triangles instead of one.
-    let other = TENT
-        .replace("HIGH", "9")
-        .replace("f 1 3 2", "v 1 1 0\nf 6 1 3\nf 6 3 2\nf 6 2 1");
+    let other = TENT.replace("HIGH", "9").replace("f 1 3 2", "v 1 1 0\nf 6 1 3\nf 6 3 2\nf 6 2 1");
     std::fs::write(&second, other).expect("written");
     let (meshes, _) = load_keyframes(&[first, second], &Options::default()).expect("sound");
     assert_eq!(meshes.len(), 2);
@@ -334,21 +315,13 @@ fn of_welding_what_parts() {
     let (meshes, issues) = load_keyframes(&[first, second], &Options::default()).expect("loads");
     assert!(meshes[0].shares_topology(&meshes[1]));
     let heights = |mesh: &insonify::scene::Mesh| {
-        let mut z: Vec<_> = mesh
-            .positions
-            .iter()
-            .map(|p| p[2])
-            .filter(|&z| z > 0.0)
-            .collect();
+        let mut z: Vec<_> = mesh.positions.iter().map(|p| p[2]).filter(|&z| z > 0.0).collect();
         z.dedup();
         z
     };
     assert_eq!(heights(&meshes[0]), [9.0]);
     assert_eq!(heights(&meshes[1]).iter().filter(|z| **z == 8.0).count(), 1);
-    assert!(
-        issues.iter().any(|i| i.message.contains("open edges")),
-        "{issues:?}"
-    );
+    assert!(issues.iter().any(|i| i.message.contains("open edges")), "{issues:?}");
 }
 
 /// Damaged copies of sound files are read or refused, none panics.
@@ -358,18 +331,13 @@ fn of_chance_never_panic() {
     let mut state = 7u64;
     let mut random = move |below: usize| {
         // Knuth's MMIX generator.
-        state = state
-            .wrapping_mul(6364136223846793005)
-            .wrapping_add(1442695040888963407);
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 33) as usize % below
     };
     for sound in [tree(), bending()] {
         let sound = sound.to_string().into_bytes();
         let path = folder.path().join("made.gltf");
-        let options = Options {
-            units: Units::named("cm"),
-            ..Options::default()
-        };
+        let options = Options { units: Units::named("cm"), ..Options::default() };
         let mut refused = 0;
         for _ in 0..1500 {
             let mut bytes = sound.clone();

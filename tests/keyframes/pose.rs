@@ -8,11 +8,7 @@ use crate::document::{Document, index_of};
 /// Rows of an affine matrix.
 pub type Matrix = [[f64; 4]; 3];
 
-const IDENTITY: Matrix = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-];
+const IDENTITY: Matrix = [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
 
 /// A mistake that an evaluation could make.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,16 +68,11 @@ impl Pose<'_> {
 
     /// Key times of a property; none where it rests.
     pub fn times(&self, node: usize, path: &str) -> Vec<f64> {
-        self.sampler(node, path)
-            .map_or(Vec::new(), |keys| keys.times)
+        self.sampler(node, path).map_or(Vec::new(), |keys| keys.times)
     }
 
     fn sample(&self, node: usize, path: &str, time: f64) -> Option<Vec<f64>> {
-        let Keys {
-            sampler,
-            times,
-            values: flat,
-        } = self.sampler(node, path)?;
+        let Keys { sampler, times, values: flat } = self.sampler(node, path)?;
         let time = time - f64::from(u8::from(self.planted(Planted::Late))) * 0.01;
         let spline = sampler["interpolation"] == "CUBICSPLINE";
         let width = flat.len() / times.len() / if spline { 3 } else { 1 };
@@ -97,37 +88,29 @@ impl Pose<'_> {
         if time >= times[last] {
             return Some(key(last, 1));
         }
-        let k = (0..last)
-            .rev()
-            .find(|&k| times[k] <= time)
-            .expect("after the first");
+        let k = (0..last).rev().find(|&k| times[k] <= time).expect("after the first");
         let step = times[k + 1] - times[k];
         let t = (time - times[k]) / step;
         let (a, b) = (key(k, 1), key(k + 1, 1));
         let lerp = |a: &[f64], b: &[f64]| -> Vec<f64> {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| (1.0 - t) * a + t * b)
-                .collect()
+            a.iter().zip(b).map(|(a, b)| (1.0 - t) * a + t * b).collect()
         };
-        Some(
-            match sampler["interpolation"].as_str().unwrap_or("LINEAR") {
-                "STEP" => a,
-                "CUBICSPLINE" => {
-                    let (out, into) = (key(k, 2), key(k + 1, 0));
-                    let (t2, t3) = (t * t, t * t * t);
-                    let at = |i: usize| {
-                        (2.0 * t3 - 3.0 * t2 + 1.0) * a[i]
-                            + step * (t3 - 2.0 * t2 + t) * out[i]
-                            + (-2.0 * t3 + 3.0 * t2) * b[i]
-                            + step * (t3 - t2) * into[i]
-                    };
-                    (0..width).map(at).collect()
-                }
-                _ if path == "rotation" && !self.planted(Planted::Lerp) => slerp(&a, &b, t),
-                _ => lerp(&a, &b),
-            },
-        )
+        Some(match sampler["interpolation"].as_str().unwrap_or("LINEAR") {
+            "STEP" => a,
+            "CUBICSPLINE" => {
+                let (out, into) = (key(k, 2), key(k + 1, 0));
+                let (t2, t3) = (t * t, t * t * t);
+                let at = |i: usize| {
+                    (2.0 * t3 - 3.0 * t2 + 1.0) * a[i]
+                        + step * (t3 - 2.0 * t2 + t) * out[i]
+                        + (-2.0 * t3 + 3.0 * t2) * b[i]
+                        + step * (t3 - t2) * into[i]
+                };
+                (0..width).map(at).collect()
+            }
+            _ if path == "rotation" && !self.planted(Planted::Lerp) => slerp(&a, &b, t),
+            _ => lerp(&a, &b),
+        })
     }
 
     fn local(&self, node: usize, time: f64) -> Matrix {
@@ -150,30 +133,11 @@ impl Pose<'_> {
         }
         let (x, y, z, w) = (q[0], q[1], q[2], q[3]);
         let turn = [
-            [
-                1.0 - 2.0 * (y * y + z * z),
-                2.0 * (x * y - z * w),
-                2.0 * (x * z + y * w),
-            ],
-            [
-                2.0 * (x * y + z * w),
-                1.0 - 2.0 * (x * x + z * z),
-                2.0 * (y * z - x * w),
-            ],
-            [
-                2.0 * (x * z - y * w),
-                2.0 * (y * z + x * w),
-                1.0 - 2.0 * (x * x + y * y),
-            ],
+            [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)],
         ];
-        std::array::from_fn(|r| {
-            [
-                turn[r][0] * s[0],
-                turn[r][1] * s[1],
-                turn[r][2] * s[2],
-                t[r],
-            ]
-        })
+        std::array::from_fn(|r| [turn[r][0] * s[0], turn[r][1] * s[1], turn[r][2] * s[2], t[r]])
     }
 
     fn parent(&self, node: usize) -> Option<usize> {
@@ -192,9 +156,7 @@ impl Pose<'_> {
     /// Scene from node space.
     pub fn global(&self, node: usize, time: f64) -> Matrix {
         let up = self.chain(node);
-        up.iter()
-            .rev()
-            .fold(IDENTITY, |m, &n| product(&m, &self.local(n, time)))
+        up.iter().rev().fold(IDENTITY, |m, &n| product(&m, &self.local(n, time)))
     }
 
     /// Joints of the skin that a node has.
@@ -243,9 +205,7 @@ impl Pose<'_> {
         let joints = self.joints(node)?;
         let json = &self.document.json;
         let skin = &json["skins"][index_of(&json["nodes"][node]["skin"])];
-        let bind = skin
-            .get("inverseBindMatrices")
-            .map(|i| self.document.accessor(i));
+        let bind = skin.get("inverseBindMatrices").map(|i| self.document.accessor(i));
         let matrix = |(j, joint): (usize, &usize)| {
             let global = self.global(*joint, time);
             let bound = match &bind {
@@ -276,10 +236,7 @@ impl Pose<'_> {
             .map_while(|set| {
                 let joints = attributes.get(format!("JOINTS_{set}"))?;
                 let weights = attributes.get(format!("WEIGHTS_{set}"))?;
-                Some((
-                    self.document.accessor(joints),
-                    self.document.accessor(weights),
-                ))
+                Some((self.document.accessor(joints), self.document.accessor(weights)))
             })
             .collect();
         let place = |(v, p): (usize, &Vec<f64>)| {
@@ -303,24 +260,12 @@ impl Pose<'_> {
         let (mut out, mut first) = (Vec::new(), 0);
         for primitive in mesh["primitives"].as_array().expect("primitives") {
             assert_eq!(primitive["mode"].as_u64().unwrap_or(4), 4);
-            let count = self
-                .document
-                .accessor(&primitive["attributes"]["POSITION"])
-                .len();
+            let count = self.document.accessor(&primitive["attributes"]["POSITION"]).len();
             let corners: Vec<usize> = match primitive.get("indices") {
-                Some(i) => self
-                    .document
-                    .accessor(i)
-                    .iter()
-                    .map(|v| v[0] as usize)
-                    .collect(),
+                Some(i) => self.document.accessor(i).iter().map(|v| v[0] as usize).collect(),
                 None => (0..count).collect(),
             };
-            out.extend(
-                corners
-                    .chunks(3)
-                    .map(|t| [t[0] + first, t[1] + first, t[2] + first]),
-            );
+            out.extend(corners.chunks(3).map(|t| [t[0] + first, t[1] + first, t[2] + first]));
             first += count;
         }
         out
@@ -342,15 +287,9 @@ fn slerp(a: &[f64], b: &[f64], t: f64) -> Vec<f64> {
     // Below this the great circle is a line in double precision.
     let (wa, wb) = match angle < 1e-8 {
         true => (1.0 - t, t),
-        false => (
-            ((1.0 - t) * angle).sin() / angle.sin(),
-            (t * angle).sin() / angle.sin(),
-        ),
+        false => (((1.0 - t) * angle).sin() / angle.sin(), (t * angle).sin() / angle.sin()),
     };
-    a.iter()
-        .zip(&b)
-        .map(|(a, b)| wa * a + sign * wb * b)
-        .collect()
+    a.iter().zip(&b).map(|(a, b)| wa * a + sign * wb * b).collect()
 }
 
 fn product(a: &Matrix, b: &Matrix) -> Matrix {

@@ -49,11 +49,7 @@ fn nodes_of_a_file_become_transforms_below_those_of_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = made::written(folder.path(), &made::tree());
     let document = Document::open(&path);
-    let pose = |planted| Pose {
-        document: &document,
-        animation: 1,
-        planted,
-    };
+    let pose = |planted| Pose { document: &document, animation: 1, planted };
     let file = path.file_name().expect("a name").to_string_lossy();
     let text = |more: &str| {
         format!(
@@ -67,11 +63,8 @@ fn nodes_of_a_file_become_transforms_below_those_of_the_scene() {
     let repeat = |t: f64| 0.5 + t % 2.0;
     let fro = |t: f64| 0.5 + (2.0 - (t % 4.0 - 2.0).abs());
     let once = |t: f64| 0.5 + t.min(2.0);
-    let all: [(&str, &dyn Fn(f64) -> f64); 3] = [
-        ("", &repeat),
-        ("loop = \"ping-pong\"", &fro),
-        ("loop = \"once\"", &once),
-    ];
+    let all: [(&str, &dyn Fn(f64) -> f64); 3] =
+        [("", &repeat), ("loop = \"ping-pong\"", &fro), ("loop = \"once\"", &once)];
     for (more, file_time) in all {
         let mut scene = load(folder.path(), &text(more));
         assert_eq!(scene.instances.len(), 1);
@@ -88,10 +81,7 @@ fn nodes_of_a_file_become_transforms_below_those_of_the_scene() {
 fn a_skin_becomes_keyframes_at_their_times() {
     let Some(data) = shared_data() else { return };
     let fox = data.join("gltf-samples/bevy/assets/models/animated/Fox.glb");
-    let options = Options {
-        units: Units::named("mm"),
-        ..Options::default()
-    };
+    let options = Options { units: Units::named("mm"), ..Options::default() };
     let (animated, _) = load_animated(&fox, &options, Choice::Named("Walk")).expect("sound");
     let folder = tempfile::tempdir().expect("a folder");
     let text = format!(

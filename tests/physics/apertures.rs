@@ -71,11 +71,7 @@ impl Array {
     /// the transducer, there and back.
     fn spectrum(&self, f: f64) -> f64 {
         let sinc = |x: f64| {
-            if x == 0.0 {
-                1.0
-            } else {
-                (PI * x).sin() / (PI * x)
-            }
+            if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) }
         };
         let sine = (sinc(f / self.frequency - 1.0) - sinc(f / self.frequency + 1.0)).abs();
         let p = 126f64.ln() / (2.0 / self.bandwidth).ln();

@@ -67,9 +67,7 @@ fn liver(bench: &Bench, scene: &Scene) -> Vec<Vec<bool>> {
     };
     let deep = |k: u32| (DEPTHS[0]..DEPTHS[1]).contains(&(f64::from(k) * probe.sample_pitch()));
     let line = |segments: &Vec<_>| {
-        (0..probe.samples)
-            .map(|k| deep(k) && segments.iter().any(|s| within(k, s)))
-            .collect()
+        (0..probe.samples).map(|k| deep(k) && segments.iter().any(|s| within(k, s))).collect()
     };
     shot.segments.iter().map(line).collect()
 }
@@ -147,9 +145,8 @@ fn levels(bench: &Bench, name: &str, scene: &Scene, physics: Physics, out: &mut 
         Physics::Planted => vec![Some(1e3)],
     };
     for roughness in all {
-        let label = roughness.map_or("the scene's own roughness".to_owned(), |s| {
-            format!("roughness {s}")
-        });
+        let label =
+            roughness.map_or("the scene's own roughness".to_owned(), |s| format!("roughness {s}"));
         let mut scene = rough(scene, roughness);
         let points = PATHS.map(|paths| {
             scene.simulation.paths = paths;
@@ -159,11 +156,7 @@ fn levels(bench: &Bench, name: &str, scene: &Scene, physics: Physics, out: &mut 
             out.compare(what, measured, expected, 0.3);
             [f64::from(paths), measured]
         });
-        plot.curves.push(Curve {
-            label,
-            points: points.to_vec(),
-            line: false,
-        });
+        plot.curves.push(Curve { label, points: points.to_vec(), line: false });
     }
     out.plots.push(plot);
 }

@@ -48,16 +48,8 @@ impl Figure {
 
 impl std::fmt::Display for Figure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self {
-            what,
-            measured,
-            expected,
-            tolerance,
-        } = self;
-        write!(
-            f,
-            "{what}: {measured}, expected {expected} within {tolerance}"
-        )
+        let Self { what, measured, expected, tolerance } = self;
+        write!(f, "{what}: {measured}, expected {expected} within {tolerance}")
     }
 }
 
@@ -96,12 +88,7 @@ impl Outcome {
         expected: f64,
         tolerance: f64,
     ) {
-        self.figures.push(Figure {
-            what: what.into(),
-            measured,
-            expected,
-            tolerance,
-        });
+        self.figures.push(Figure { what: what.into(), measured, expected, tolerance });
     }
 
     /// Every plot and every picture can be shown.
@@ -134,10 +121,7 @@ impl Bench {
     }
 
     pub fn on(device: Arc<gpu::Device>) -> Self {
-        Self {
-            renderers: renderers(&device),
-            device,
-        }
+        Self { renderers: renderers(&device), device }
     }
 }
 
@@ -163,12 +147,7 @@ impl Examined {
 
     /// Why it does not hold, in lines; empty if it does.
     pub fn complaints(&self, check: &Check) -> String {
-        let mut lines: Vec<String> = self
-            .right
-            .failures()
-            .iter()
-            .map(|f| f.to_string())
-            .collect();
+        let mut lines: Vec<String> = self.right.failures().iter().map(|f| f.to_string()).collect();
         if self.right.figures.is_empty() {
             lines.push("nothing was measured".into());
         }
@@ -176,11 +155,7 @@ impl Examined {
             lines.push("a plot or picture cannot be drawn".into());
         }
         if !self.noticed() {
-            let figures = self
-                .planted
-                .figures
-                .iter()
-                .map(|f| format!("\n        {f}"));
+            let figures = self.planted.figures.iter().map(|f| format!("\n        {f}"));
             let figures: String = figures.collect();
             lines.push(format!("not noticed: {}{figures}", check.planted));
         }

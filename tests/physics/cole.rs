@@ -41,11 +41,7 @@ fn targets() -> Vec<Point> {
     let place = |i: u32| {
         let (column, row) = (f64::from(i % 6), f64::from(i / 6));
         // Off lines and samples, by different amounts.
-        [
-            2.0 * column - 5.0 + 0.037 * row,
-            0.0,
-            36.5 + 3.0 * row + 0.0173 * column,
-        ]
+        [2.0 * column - 5.0 + 0.037 * row, 0.0, 36.5 + 3.0 * row + 0.0173 * column]
     };
     (0..60).map(|i| (place(i), 0.1)).collect()
 }
@@ -53,9 +49,8 @@ fn targets() -> Vec<Point> {
 fn scatterers() -> Vec<Point> {
     let mut random = Random(35);
     let mut within = |size: f64| size * (random.uniform() - 0.5);
-    let places: Vec<[f64; 3]> = (0..3000)
-        .map(|_| [within(13.0), within(5.0), 50.0 + within(30.0)])
-        .collect();
+    let places: Vec<[f64; 3]> =
+        (0..3000).map(|_| [within(13.0), within(5.0), 50.0 + within(30.0)]).collect();
     let mut random = Random(36);
     let amplitude = |p| (p, 0.02 * random.gaussian());
     places.into_iter().map(amplitude).collect()
@@ -111,11 +106,7 @@ fn cole(points: &[Point], shift: f64) -> Vec<Vec<f64>> {
 
 /// The part compared.
 fn shown(lines: &[Vec<f64>]) -> Vec<f64> {
-    lines
-        .iter()
-        .flat_map(|l| &l[SHOWN[0]..SHOWN[1]])
-        .copied()
-        .collect()
+    lines.iter().flat_map(|l| &l[SHOWN[0]..SHOWN[1]]).copied().collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -147,8 +138,7 @@ fn beside_cole(bench: &Bench, physics: Physics) -> Outcome {
             if *name == "bvh" {
                 curves.push(Curve::dots("bvh", along(&rf[40])));
                 out.pictures.push(magnitude(&format!("{what}: bvh"), &got));
-                out.pictures
-                    .push(magnitude(&format!("{what}: sum over points"), &exact));
+                out.pictures.push(magnitude(&format!("{what}: sum over points"), &exact));
             }
         }
         let title = format!("Radio-frequency line of {what}");
@@ -175,16 +165,10 @@ fn magnitude(title: &str, rf: &[f64]) -> Picture {
     for row in 0..depth / 4 {
         for column in 0..4 * LINES as usize {
             let at = column / 4 * depth + 4 * row;
-            let largest = rf[at..at + 4]
-                .iter()
-                .fold(1e-30, |m, v| f64::max(m, v.abs()));
+            let largest = rf[at..at + 4].iter().fold(1e-30, |m, v| f64::max(m, v.abs()));
             let level = 1.0 + 20.0 * (largest / top).log10() / 50.0;
             grey.push((255.0 * level.clamp(0.0, 1.0)) as u8);
         }
     }
-    Picture {
-        title: title.into(),
-        width: 4 * LINES,
-        grey,
-    }
+    Picture { title: title.into(), width: 4 * LINES, grey }
 }

@@ -62,22 +62,16 @@ fn slopes(bench: &Bench, physics: Physics) -> Outcome {
                 format!("{name}: slope of {attenuation} dB/(cm MHz) at {frequency} MHz, dB/cm");
             out.compare(what, slope(&points), expected, -0.03 * expected);
             let [first, last] = [points[0][0], points[points.len() - 1][0]];
-            let middle = [
-                (first + last) / 2.0,
-                mean(&points.iter().map(|p| p[1]).collect::<Vec<_>>()),
-            ];
+            let middle =
+                [(first + last) / 2.0, mean(&points.iter().map(|p| p[1]).collect::<Vec<_>>())];
             let at = |z: f64| [z, middle[1] + expected * (z - middle[0])];
             let tissue = format!("{attenuation} dB/(cm MHz) at {frequency} MHz");
-            curves.push(Curve::line(
-                format!("2 alpha f, {tissue}"),
-                vec![at(first), at(last)],
-            ));
+            curves.push(Curve::line(format!("2 alpha f, {tissue}"), vec![at(first), at(last)]));
             curves.push(Curve::dots(format!("{name}, {tissue}"), points));
         }
     }
     let axes = ["depth, cm", "mean power of speckle, dB re mirror"];
-    out.plots
-        .push(Plot::linear("Speckle before compensation", axes, curves));
+    out.plots.push(Plot::linear("Speckle before compensation", axes, curves));
     out
 }
 
@@ -107,11 +101,7 @@ fn echogenicity(bench: &Bench, physics: Physics) -> Outcome {
     for (name, render) in &bench.renderers[1..] {
         for (contrast, density, ratio) in [(-6.0, 1.0, 0.0), (-12.0, 0.3, 0.0), (9.0, 0.3, 1.0)] {
             let mut scene = homogeneous(64, 1.0, 1);
-            let missing = if physics == Physics::Planted {
-                decibel(density)
-            } else {
-                0.0
-            };
+            let missing = if physics == Physics::Planted { decibel(density) } else { 0.0 };
             let other = Tissue {
                 echogenicity: contrast + missing,
                 density_of_scatterers: density,
@@ -143,8 +133,7 @@ fn echogenicity(bench: &Bench, physics: Physics) -> Outcome {
         Curve::dots("query", query),
     ];
     let axes = ["stated contrast, dB", "measured contrast, dB"];
-    out.plots
-        .push(Plot::linear("Contrast of two tissues", axes, curves));
+    out.plots.push(Plot::linear("Contrast of two tissues", axes, curves));
     out
 }
 
@@ -176,10 +165,7 @@ fn anechoic(bench: &Bench, physics: Physics) -> Outcome {
             Physics::Right => f64::NEG_INFINITY,
             Physics::Planted => -15.0,
         };
-        let inside = Tissue {
-            echogenicity: clutter,
-            ..tissue(1.540, 1.630, 0.0)
-        };
+        let inside = Tissue { echogenicity: clutter, ..tissue(1.540, 1.630, 0.0) };
         let (radius, depth) = (7.0, 50.0);
         add_sphere(&mut scene, radius, inside, DVec3::new(0.0, 0.0, depth));
         let frame = render(&scene);
@@ -195,22 +181,12 @@ fn anechoic(bench: &Bench, physics: Physics) -> Outcome {
         out.compare(format!("{name}: CNR"), cnr, (PI / (4.0 - PI)).sqrt(), 0.1);
         out.compare(format!("{name}: gCNR"), gcnr(&i, &o), 1.0, 0.02);
         // Half a millimetre of the middle lines at a time.
-        let level = |z: f64| {
-            [
-                z,
-                decibel(mean(&region(
-                    &frame,
-                    &scene,
-                    [-2.0, 2.0],
-                    [z - 0.25, z + 0.25],
-                ))),
-            ]
-        };
+        let level =
+            |z: f64| [z, decibel(mean(&region(&frame, &scene, [-2.0, 2.0], [z - 0.25, z + 0.25])))];
         let depths = (0..60).map(|k| depth - 15.0 + 0.5 * f64::from(k));
         profiles.push(Curve::dots(*name, depths.map(level).collect()));
         if *name == "bvh" {
-            out.pictures
-                .push(frame.picture("Anechoic sphere of 14 mm, 100 dB", &scene));
+            out.pictures.push(frame.picture("Anechoic sphere of 14 mm, 100 dB", &scene));
             let [top, bottom] = [depth - radius, depth + radius];
             let line = [
                 [top - 8.0, -45.0],
@@ -224,10 +200,6 @@ fn anechoic(bench: &Bench, physics: Physics) -> Outcome {
         }
     }
     let axes = ["depth, mm", "level, dB re mirror"];
-    out.plots.push(Plot::linear(
-        "Through the middle of the sphere",
-        axes,
-        profiles,
-    ));
+    out.plots.push(Plot::linear("Through the middle of the sphere", axes, profiles));
     out
 }

@@ -146,12 +146,7 @@ fn convergence(bench: &Bench, physics: Physics) -> Outcome {
                 &rough[..],
                 -1.0,
             ),
-            (
-                "main path, Sobol",
-                rough_wall(Sampling::MainPath, Sequence::Sobol),
-                &rough[..],
-                -1.0,
-            ),
+            ("main path, Sobol", rough_wall(Sampling::MainPath, Sequence::Sobol), &rough[..], -1.0),
             (
                 "behind a smooth wall, stratified choice",
                 hidden_wall(Sampling::Plain),
@@ -174,11 +169,7 @@ fn convergence(bench: &Bench, physics: Physics) -> Outcome {
                     line: true,
                 });
             }
-            plot.curves.push(Curve {
-                label: format!("{tracer}, {name}"),
-                points,
-                line: false,
-            });
+            plot.curves.push(Curve { label: format!("{tracer}, {name}"), points, line: false });
         }
     }
     out.plots.push(plot);

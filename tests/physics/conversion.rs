@@ -42,13 +42,9 @@ fn compare(scene: &Scene, frame: &layout::Frame, pixels: &[u32], shift: [f64; 2]
             let x = f64::from(frame.image_left) + (f64::from(i) + 0.5) * pitch;
             let z = f64::from(frame.image_top) + (f64::from(j) + 0.5) * pitch;
             let (depth, across) = match probe.kind {
-                Kind::Convex {
-                    radius,
-                    field_of_view,
-                } => (
-                    x.hypot(z + radius) - radius,
-                    x.atan2(z + radius) / field_of_view,
-                ),
+                Kind::Convex { radius, field_of_view } => {
+                    (x.hypot(z + radius) - radius, x.atan2(z + radius) / field_of_view)
+                }
                 Kind::Phased { field_of_view } => (x.hypot(z), x.atan2(z) / field_of_view),
                 Kind::Linear { width } => (z, x / width),
             };
@@ -110,18 +106,8 @@ fn conversion(bench: &Bench, physics: Physics) -> Outcome {
             Physics::Planted => [0.0, 0.5],
         };
         let got = compare(&scene, &frame, &pixels, shift);
-        out.compare(
-            format!("{name}: share of wrong pixels"),
-            got.wrong,
-            0.0,
-            0.0,
-        );
-        out.compare(
-            format!("{name}: coloured pixels outside"),
-            got.spilt,
-            0.0,
-            0.0,
-        );
+        out.compare(format!("{name}: share of wrong pixels"), got.wrong, 0.0, 0.0);
+        out.compare(format!("{name}: coloured pixels outside"), got.spilt, 0.0, 0.0);
         // The same comparison sees half a sample: the function is steep enough.
         let deeper = compare(&scene, &frame, &pixels, [0.5, shift[1]]);
         out.compare(
@@ -131,10 +117,9 @@ fn conversion(bench: &Bench, physics: Physics) -> Outcome {
             0.8,
         );
         let area = match probe.kind {
-            Kind::Convex {
-                radius,
-                field_of_view,
-            } => field_of_view / 2.0 * ((radius + probe.depth).powi(2) - radius * radius),
+            Kind::Convex { radius, field_of_view } => {
+                field_of_view / 2.0 * ((radius + probe.depth).powi(2) - radius * radius)
+            }
             Kind::Phased { field_of_view } => field_of_view / 2.0 * probe.depth.powi(2),
             Kind::Linear { width } => width * probe.depth,
         };

@@ -26,12 +26,7 @@ fn hilbert([start, pitch]: [f64; 2], n: usize, frequency: f64) -> Vec<f64> {
     let pulse =
         |z: f64| (-z * z / (2.0 * sigma * sigma)).exp() * (2.0 * TAU * frequency * z / 1.540).cos();
     let line: Vec<f64> = (0..n)
-        .map(|k| {
-            ECHOES
-                .iter()
-                .map(|(z, a)| a * pulse(start + k as f64 * pitch - z))
-                .sum()
-        })
+        .map(|k| ECHOES.iter().map(|(z, a)| a * pulse(start + k as f64 * pitch - z)).sum())
         .collect();
     envelope(&line)
 }

@@ -38,12 +38,7 @@ fn rough_sphere() -> Scene {
         tissue: 1,
         priority: 0,
         world_from_object: DAffine3::from_translation(DVec3::new(1.3, 0.7, 35.0)),
-        surface: [Surface {
-            roughness: 100.0,
-            thickness: 0.1,
-            specularity: 1.0,
-            gain: 0.0,
-        }; 2],
+        surface: [Surface { roughness: 100.0, thickness: 0.1, specularity: 1.0, gain: 0.0 }; 2],
     });
     scene
 }
@@ -55,11 +50,8 @@ fn shoot(bench: &Bench, scene: &Scene, tracer: Tracer) -> ([Vec<i32>; 2], Pictur
     simulator.frame(scene, 0).expect("a frame");
     let (width, _, pixels) = simulator.pixels().expect("pixels");
     let grey = |p: &[u8]| if p[3] == 0 { 255 } else { p[0] };
-    let picture = Picture {
-        title: format!("{tracer}"),
-        width,
-        grey: pixels.chunks(4).map(grey).collect(),
-    };
+    let picture =
+        Picture { title: format!("{tracer}"), width, grey: pixels.chunks(4).map(grey).collect() };
     (simulator.echoes().expect("echoes"), picture)
 }
 

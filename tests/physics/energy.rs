@@ -133,10 +133,7 @@ fn audit(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let mut plot = Plot {
         title: "Where energy ends up".into(),
-        axes: [
-            "absorbed in layer 0 to 3, back at the probe (4)".into(),
-            "share".into(),
-        ],
+        axes: ["absorbed in layer 0 to 3, back at the probe (4)".into(), "share".into()],
         logarithmic: [false, true],
         curves: vec![Curve {
             label: "fluxes between interfaces".into(),

@@ -66,9 +66,7 @@ fn two_lines(scene: &Scene) -> Vec<f32> {
         let phase = scene.probe.phase_per_mm() * scene.probe.sample_pitch() * kappa;
         let (sin, cos) = phase.sin_cos();
         let at = 2 * (line * 1024 + kappa as usize);
-        for (i, v) in [(1.0 - f) * cos, -(1.0 - f) * sin, f * cos, -f * sin]
-            .into_iter()
-            .enumerate()
+        for (i, v) in [(1.0 - f) * cos, -(1.0 - f) * sin, f * cos, -f * sin].into_iter().enumerate()
         {
             lateral[at + i] += (amplitude * v) as f32;
         }
@@ -77,12 +75,8 @@ fn two_lines(scene: &Scene) -> Vec<f32> {
 }
 
 fn detected_envelopes(bench: &Bench, physics: Physics) -> Outcome {
-    let mut scene = scene(Probe {
-        depth: 25.0,
-        samples: 1024,
-        scanlines: 2,
-        ..Probe::paper_table1()
-    });
+    let mut scene =
+        scene(Probe { depth: 25.0, samples: 1024, scanlines: 2, ..Probe::paper_table1() });
     scene.imaging.dynamic_range = 240.0;
     scene.imaging.gain = -80.0; // white is above any echo
     let mut out = Outcome::default();
@@ -105,10 +99,8 @@ fn detected_envelopes(bench: &Bench, physics: Physics) -> Outcome {
         }
         let n = hilbert.len();
         let detected = undo_log(&scene, &rows, &log[line * 1024..line * 1024 + n]);
-        let magnitude: Vec<f64> = own[..2 * n]
-            .chunks(2)
-            .map(|q| f64::from(q[0]).hypot(f64::from(q[1])))
-            .collect();
+        let magnitude: Vec<f64> =
+            own[..2 * n].chunks(2).map(|q| f64::from(q[0]).hypot(f64::from(q[1]))).collect();
         for (stage, got) in [("detect", &detected), ("axial", &magnitude)] {
             let what = format!("{stage}: RMS difference for {what}");
             out.compare(what, relative_rms(got, &hilbert), 0.0, 0.01);
@@ -190,12 +182,7 @@ fn matched_gain(bench: &Bench, physics: Physics) -> Outcome {
         let volume = decaying(&scene, &frame, &rows);
         let surface = vec![0; volume.len()];
         let (lateral, saturated) = stages.beam(&frame, &rows, &surface, &volume);
-        out.compare(
-            format!("{name}: saturated samples"),
-            f64::from(saturated),
-            0.0,
-            0.0,
-        );
+        out.compare(format!("{name}: saturated samples"), f64::from(saturated), 0.0, 0.0);
         let iq = stages.axial(&frame, &lateral);
         if physics == Physics::Planted {
             rows.iter_mut().for_each(|row| row.tgc = row.tgc.sqrt());
@@ -205,10 +192,7 @@ fn matched_gain(bench: &Bench, physics: Physics) -> Outcome {
         let what = format!("{name}: largest departure from the mean, dB");
         out.compare(what, worst, 0.0, 0.5);
         let places = (0..16).map(|i| f64::from(i) + 0.5);
-        curves.push(Curve::dots(
-            name,
-            places.zip(levels).map(|(x, d)| [x, d]).collect(),
-        ));
+        curves.push(Curve::dots(name, places.zip(levels).map(|(x, d)| [x, d]).collect()));
     }
     out.plots.push(Plot::linear(
         "Mean power of decaying speckle",

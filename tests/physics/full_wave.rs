@@ -76,15 +76,10 @@ fn slab_echoes(bench: &Bench, physics: Physics) -> Outcome {
         m => (1.0 - r * r) * r.powi(2 * m - 1),
     };
     let mut curves = vec![
-        Curve::line(
-            "plane wave in closed form",
-            (0..3).map(|m| [f64::from(m), law(m)]).collect(),
-        ),
+        Curve::line("plane wave in closed form", (0..3).map(|m| [f64::from(m), law(m)]).collect()),
         Curve::dots(
             "k-Wave",
-            (0..3)
-                .map(|m| [m as f64, number(&table["echoes"][m]["amplitude"])])
-                .collect(),
+            (0..3).map(|m| [m as f64, number(&table["echoes"][m]["amplitude"])]).collect(),
         ),
     ];
     for tracer in TRACERS {
@@ -158,18 +153,14 @@ fn cylinder_shadow(bench: &Bench, physics: Physics) -> Outcome {
     for (name, paths) in traced(bench, &scene) {
         let mut bright = vec![];
         let misses = |l: &usize| paths[*l].len() == 1;
-        let passing = (0..paths.len())
-            .filter(misses)
-            .map(|l| offset(&scene, l).abs());
+        let passing = (0..paths.len()).filter(misses).map(|l| offset(&scene, l).abs());
         let edge = passing.fold(f64::INFINITY, f64::min);
         for row in rows {
             let behind = number(&row["behind_axis"]);
             let at = |l: usize| place(&paths[l], behind);
             let own = (0..paths.len()).filter(|&l| paths[l].len() == 3);
             // The caustic: as far as the rays of one side reach on that side.
-            let reach = own
-                .map(|l| at(l) * offset(&scene, l).signum())
-                .fold(0.0, f64::max);
+            let reach = own.map(|l| at(l) * offset(&scene, l).signum()).fold(0.0, f64::max);
             bright.push([behind, reach]);
             let mut figure = |what: &str, measured, expected, tolerance| {
                 let what = format!("{name}: {what} at {behind} mm");

@@ -36,10 +36,7 @@ fn shoot(simulator: &mut Simulator, scene: &Scene) -> Fused {
     let steps = simulator.fusion_steps().expect("read back");
     Fused {
         steps: steps.expect("the scene shows its volume"),
-        levels: rgba
-            .chunks_exact(4)
-            .map(|p| (p[3] > 0).then_some(p[0]))
-            .collect(),
+        levels: rgba.chunks_exact(4).map(|p| (p[3] > 0).then_some(p[0])).collect(),
         width,
     }
 }
@@ -108,11 +105,7 @@ fn boxed(x: [f64; 2], z: [f64; 2], blend: Blend) -> Scene {
     let half = f64::from(LINES) / 2.0;
     let at = |c: f64| (c - half) * PITCH;
     let size = [(x[1] - x[0]) * PITCH, 40.0, (z[1] - z[0]) * PITCH];
-    let middle = DVec3::new(
-        (at(x[0]) + at(x[1])) / 2.0,
-        3.1,
-        (z[0] + z[1]) / 2.0 * PITCH,
-    );
+    let middle = DVec3::new((at(x[0]) + at(x[1])) / 2.0, 3.1, (z[0] + z[1]) / 2.0 * PITCH);
     let body = tissue(1.54, 1.64, 0.3);
     let place = DAffine3::from_translation(middle);
     add_body(&mut scene, shapes::cuboid(size), body, place);
@@ -142,11 +135,8 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
     // A mask with one corner inside the image: open to the left and below.
     let (right, top) = (130_u32, 90_u32);
     for blend in [Blend::Linear, Blend::Smooth] {
-        let scene = boxed(
-            [-40.0, f64::from(right)],
-            [f64::from(top), f64::from(HEIGHT) + 40.0],
-            blend,
-        );
+        let scene =
+            boxed([-40.0, f64::from(right)], [f64::from(top), f64::from(HEIGHT) + 40.0], blend);
         let got = fused(bench, &scene, Tracer::Bvh);
         let at = |i: u32, j: u32| (j * got.width + i) as usize;
         if blend == Blend::Linear {
@@ -157,12 +147,7 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                 !near && m[at(i, j)] != expected
             };
             let count = pixels(&got).filter(|&(i, j)| stray(i, j)).count();
-            out.compare(
-                "pixels away from the border that are not 0 or 1",
-                count as f64,
-                0.0,
-                0.0,
-            );
+            out.compare("pixels away from the border that are not 0 or 1", count as f64, 0.0, 0.0);
             let row = HEIGHT - 40;
             let measured = |i| f64::from(got.steps.blurred[at(i, row)]);
             let expected = |i| ramp(i, right, n, first);
@@ -180,10 +165,7 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                 vec![
                     Curve::dots(
                         "kernel",
-                        around
-                            .clone()
-                            .map(|i| [f64::from(i), measured(i)])
-                            .collect(),
+                        around.clone().map(|i| [f64::from(i), measured(i)]).collect(),
                     ),
                     Curve::line(
                         "share of the box",
@@ -250,8 +232,7 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
             0.0,
             0.0,
         );
-        out.pictures
-            .push(picture(format!("Fused, {blend:?} blend"), &got));
+        out.pictures.push(picture(format!("Fused, {blend:?} blend"), &got));
     }
     out
 }
@@ -262,11 +243,7 @@ fn pixels(got: &Fused) -> impl Iterator<Item = (u32, u32)> + use<> {
 }
 
 fn picture(title: String, got: &Fused) -> Picture {
-    Picture {
-        title,
-        width: got.width,
-        grey: got.levels.iter().map(|l| l.unwrap_or(255)).collect(),
-    }
+    Picture { title, width: got.width, grey: got.levels.iter().map(|l| l.unwrap_or(255)).collect() }
 }
 
 /// T29.
@@ -305,10 +282,7 @@ fn bands(bench: &Bench, physics: Physics) -> Outcome {
             let rise = |i: u32| (f64::from(i) - 0.5, values(i) - values(i - 1));
             let mean: f64 = (1..got.width).map(rise).map(|(x, r)| x * r).sum();
             let variance = (1..got.width).map(rise);
-            (
-                mean,
-                variance.map(|(x, r)| (x - mean).powi(2) * r).sum::<f64>(),
-            )
+            (mean, variance.map(|(x, r)| (x - mean).powi(2) * r).sum::<f64>())
         };
         let ((mean, variance), (middle, own)) = (moments(&shown), moments(&mask));
         let levels = match blur {
@@ -345,10 +319,7 @@ fn bands(bench: &Bench, physics: Physics) -> Outcome {
             format!("Black beside white, bands of a box of {blur} pixels"),
             ["pixel", "grey level"],
             vec![
-                Curve::dots(
-                    "shown",
-                    around.clone().map(|i| [f64::from(i), shown(i)]).collect(),
-                ),
+                Curve::dots("shown", around.clone().map(|i| [f64::from(i), shown(i)]).collect()),
                 Curve::line(
                     "normal of that variance",
                     around.map(|i| [f64::from(i), normal(i)]).collect(),
@@ -372,24 +343,14 @@ fn bands(bench: &Bench, physics: Physics) -> Outcome {
             false => got.steps.simulated[4 * at],
         };
         let wrong = (0..got.levels.len()).filter(|&at| got.levels[at] != Some(expected(at)));
-        out.compare(
-            format!("{what}: pixels that are not it"),
-            wrong.count() as f64,
-            0.0,
-            0.0,
-        );
+        out.compare(format!("{what}: pixels that are not it"), wrong.count() as f64, 0.0, 0.0);
         if !steep {
             let off = (0..got.levels.len()).filter(|&at| {
                 let own = f32::from(got.steps.simulated[4 * at]) / 255.0;
                 (own - got.steps.background[at]).abs() > 1e-4
             });
             let off = off.count() as f64;
-            out.compare(
-                "pixels at which the volume is not the simulation",
-                off,
-                0.0,
-                0.0,
-            );
+            out.compare("pixels at which the volume is not the simulation", off, 0.0, 0.0);
         }
     };
     alone("mask of everything", everywhere, false, true);
@@ -444,10 +405,7 @@ fn balls(bench: &Bench, physics: Physics) -> Outcome {
     ] {
         for tracer in TRACERS {
             let mut scene = linear(96, 40.0, silent(1.54, 1.63, 0.0));
-            scene.probe.kind = insonify::probe::Kind::Convex {
-                radius: 30.0,
-                field_of_view: 1.1,
-            };
+            scene.probe.kind = insonify::probe::Kind::Convex { radius: 30.0, field_of_view: 1.1 };
             scene.probe.depth = 70.0;
             scene.probe.samples = 700;
             scene.imaging.image_height = 160;
@@ -542,12 +500,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
         DVec3::new(12.0, -7.0, 90.0),
     );
     // A mask that no scanline meets: the volume is looked up everywhere.
-    add_sphere(
-        &mut scene,
-        2.0,
-        silent(1.54, 1.64, 0.0),
-        DVec3::new(500.0, 0.0, 0.0),
-    );
+    add_sphere(&mut scene, 2.0, silent(1.54, 1.64, 0.0), DVec3::new(500.0, 0.0, 0.0));
     mask(&mut scene, 1, Blend::Linear);
     // Direction cosines and spacing of the file, placement of the scene.
     let size = [90, 40, 17];
@@ -567,9 +520,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
     let slope = DVec3::new(0.004, -0.006, 0.005);
     let value = |p: DVec3| 0.5 + slope.dot(p - seen);
     let whole = volume(size, world_from_voxel, value);
-    let Voxels::F32(exact) = whole.voxels() else {
-        unreachable!("made of floats")
-    };
+    let Voxels::F32(exact) = whole.voxels() else { unreachable!("made of floats") };
     let code = |steps: f64| exact.iter().map(move |v| (f64::from(*v) * steps).round());
     let forms = [
         ("float", Voxels::F32(exact.clone()), 0.0, 1.0, 2e-6),
@@ -624,12 +575,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
                     }
                 }
             }
-            out.compare(
-                format!("{tracer}, {name}: largest error"),
-                worst,
-                0.0,
-                tolerance,
-            );
+            out.compare(format!("{tracer}, {name}: largest error"), worst, 0.0, tolerance);
             out.compare(
                 format!("{tracer}, {name}: samples outside that are not black"),
                 f64::from(spilt),
@@ -669,12 +615,7 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
     scene.probe.samples = 1800;
     scene.imaging.image_height = 120;
     let place = DAffine3::from_translation(DVec3::new(3.1, 5.3, top));
-    add_box(
-        &mut scene,
-        [200.0, 200.0, chord],
-        silent(fat, 1.34, 0.0),
-        place,
-    );
+    add_box(&mut scene, [200.0, 200.0, chord], silent(fat, 1.34, 0.0), place);
     mask(&mut scene, 1, Blend::Linear);
     let to_world = DAffine3::from_translation(DVec3::new(-100.0, -100.0, -20.0))
         * DAffine3::from_scale(DVec3::new(200.0, 200.0, 200.0));
@@ -722,10 +663,7 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
                     worst = worst.max((f64::from(prescan[2 * k + 1]) - level(z)).abs());
                 }
             }
-            let name = format!(
-                "{tracer}, {}: largest error of the volume's level",
-                said.name()
-            );
+            let name = format!("{tracer}, {}: largest error of the volume's level", said.name());
             out.compare(name, worst, 0.0, 2e-6);
         }
     }

@@ -81,20 +81,14 @@ fn shoot(simulator: &mut Simulator, scene: &Scene) -> Shown {
     simulator.frame(scene, 0).expect("a frame");
     let fused = simulator.pixels().expect("pixels").2;
     let steps = simulator.fusion_steps().expect("read").expect("fused");
-    Shown {
-        background: steps.background,
-        simulated: steps.simulated,
-        fused,
-    }
+    Shown { background: steps.background, simulated: steps.simulated, fused }
 }
 
 /// Levels of the middle column down the image, and their depths, mm.
 fn column(shown: &Shown) -> Vec<[f64; 2]> {
     let width = shown.background.len() / 250;
     let at = |j: usize| f64::from(shown.background[j * width + width / 2]);
-    (0..250)
-        .map(|j| [(j as f64 + 0.5) * DEPTH / 250.0, at(j)])
-        .collect()
+    (0..250).map(|j| [(j as f64 + 0.5) * DEPTH / 250.0, at(j)]).collect()
 }
 
 /// Change along the depths in the image, dB: at their places by the probe's own speed.
@@ -139,10 +133,7 @@ fn slabs(bench: &Bench, physics: Physics) -> Outcome {
     let other = || silent(1.50, 1.58, 0.9);
     let cases = [
         ("slab", scene(plain(), silent(1.60, 1.80, 2.0))),
-        (
-            "slower slab in another host",
-            scene(other(), silent(1.45, 1.38, 1.4)),
-        ),
+        ("slower slab in another host", scene(other(), silent(1.45, 1.38, 1.4))),
         ("fluid", scene(plain(), silent(1.54, 1.63, 0.0))),
         ("bone", scene(plain(), silent(3.2, 6.0, 20.0))),
     ];
@@ -197,10 +188,7 @@ fn slabs(bench: &Bench, physics: Physics) -> Outcome {
                 0.0,
                 0.0,
             );
-            let stained = clear
-                .background
-                .iter()
-                .filter(|&&v| (v - level).abs() > 1e-6);
+            let stained = clear.background.iter().filter(|&&v| (v - level).abs() > 1e-6);
             out.compare(
                 format!("{tracer}, {what}: pixels that change without shadows"),
                 stained.count() as f64,

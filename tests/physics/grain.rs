@@ -92,14 +92,7 @@ pub fn grains(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
             scene.probe.f_number_receive *= std::f64::consts::SQRT_2;
         }
         let rows = transposed(&intensities(&render(&scene), &truth, DEPTHS, 2));
-        compare(
-            &mut out,
-            name,
-            "laterally",
-            &rows,
-            LINE_PITCH,
-            sigma_lateral(&truth, 60.0),
-        );
+        compare(&mut out, name, "laterally", &rows, LINE_PITCH, sigma_lateral(&truth, 60.0));
     }
     out
 }
@@ -110,10 +103,8 @@ fn compare(out: &mut Outcome, name: &str, way: &str, rows: &[Vec<f64>], pitch: f
     let expected = gaussian_fwhm() * sigma;
     let what = format!("{name}: grain of intensity {way}, sigma {sigma:.3}; mm");
     out.compare(what, fwhm(&covariance) * pitch, expected, SIZE * expected);
-    let envelopes: Vec<Vec<f64>> = rows
-        .iter()
-        .map(|r| r.iter().map(|v| v.sqrt()).collect())
-        .collect();
+    let envelopes: Vec<Vec<f64>> =
+        rows.iter().map(|r| r.iter().map(|v| v.sqrt()).collect()).collect();
     let measured = fwhm(&autocovariance(&envelopes, lags)) * pitch;
     let expected = envelope_width() * sigma;
     let what = format!("{name}: grain of envelope {way}, sigma {sigma:.3}; mm");
@@ -152,10 +143,8 @@ pub fn motion(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];
     let shifts = (0..=50).map(|i| f64::from(i) / 20.0);
-    let mut curves = vec![Curve::line(
-        "exp(-d^2 / 2 sigma^2)",
-        shifts.map(|d| [d, law(d)]).collect(),
-    )];
+    let mut curves =
+        vec![Curve::line("exp(-d^2 / 2 sigma^2)", shifts.map(|d| [d, law(d)]).collect())];
     for degrees in [0.0f64, 17.0] {
         let mut scene = homogeneous(48, 1.0, seed);
         if physics == Physics::Planted {
@@ -178,10 +167,7 @@ pub fn motion(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
             out.compare(what, measured, law(shift), 0.05);
             points.push([shift, measured]);
         }
-        curves.push(Curve::dots(
-            format!("measured, lattice at {degrees} degrees"),
-            points,
-        ));
+        curves.push(Curve::dots(format!("measured, lattice at {degrees} degrees"), points));
     }
     out.plots.push(Plot::linear(
         "Speckle left after a lateral shift of the probe",
@@ -203,10 +189,7 @@ fn flat(frame: &Frame, scene: &Scene) -> Vec<f64> {
 #[test]
 fn the_envelopes_covariance_is_narrower() {
     let slope = envelope_covariance(1e-6) / 1e-6;
-    assert!(
-        (slope - 0.25 / (4.0 / std::f64::consts::PI - 1.0)).abs() < 1e-3,
-        "{slope}"
-    );
+    assert!((slope - 0.25 / (4.0 / std::f64::consts::PI - 1.0)).abs() < 1e-3, "{slope}");
     let ratio = envelope_width() / (8.0 * std::f64::consts::LN_2).sqrt();
     assert!((ratio - 0.963).abs() < 0.001, "{ratio}");
 }

@@ -6,9 +6,7 @@ use std::f64::consts::TAU;
 /// negative ones zero.
 pub fn envelope(signal: &[f64]) -> Vec<f64> {
     let n = signal.len();
-    let turn: Vec<(f64, f64)> = (0..n)
-        .map(|i| (TAU * i as f64 / n as f64).sin_cos())
-        .collect();
+    let turn: Vec<(f64, f64)> = (0..n).map(|i| (TAU * i as f64 / n as f64).sin_cos()).collect();
     let spectrum: Vec<(f64, f64)> = (0..=n / 2)
         .map(|f| {
             let double = if f == 0 || 2 * f == n { 1.0 } else { 2.0 } / n as f64;

@@ -34,12 +34,7 @@ fn wall(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Scene {
     let at = place
         * DAffine3::from_rotation_y(tilt)
         * DAffine3::from_translation(DVec3::new(3.1, 5.3, 0.0));
-    add_box(
-        &mut scene,
-        [900.0, 900.0, 900.0],
-        tissue(behind[0], behind[1], 0.0),
-        at,
-    );
+    add_box(&mut scene, [900.0, 900.0, 900.0], tissue(behind[0], behind[1], 0.0), at);
     scene
 }
 
@@ -57,9 +52,7 @@ fn through(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Option<Segment> {
 /// Lines from a point, one at each whole degree, that meet a wall across the depth axis.
 fn fan(before: [f64; 2], behind: [f64; 2]) -> Scene {
     let mut scene = linear(179, 1.0, silent(before[0], before[1], 0.0));
-    scene.probe.kind = Kind::Phased {
-        field_of_view: 179f64.to_radians(),
-    };
+    scene.probe.kind = Kind::Phased { field_of_view: 179f64.to_radians() };
     scene.probe.samples = 64;
     // Near total reflection, and into air, little goes through.
     scene.simulation.min_weight = 1e-12;
@@ -94,12 +87,7 @@ fn incidences() -> impl Iterator<Item = (f64, [f64; 2], [f64; 2], f64)> {
     PAIRS.into_iter().flat_map(|[a, b]| {
         (0..90).map(move |degrees| {
             let tilt = f64::from(degrees).to_radians();
-            (
-                tilt,
-                FLUIDS[a],
-                FLUIDS[b],
-                FLUIDS[b][0] / FLUIDS[a][0] * tilt.sin(),
-            )
+            (tilt, FLUIDS[a], FLUIDS[b], FLUIDS[b][0] / FLUIDS[a][0] * tilt.sin())
         })
     })
 }
@@ -164,8 +152,7 @@ fn fresnel_law(bench: &Bench, physics: Physics) -> Outcome {
     let mut curves = law_curves(|a, b, tilt| Some(fresnel(a, b, tilt)));
     curves.push(Curve::dots("twins", shown));
     let axes = ["incidence, degrees", "transmitted intensity"];
-    out.plots
-        .push(Plot::linear("Transmission through a wall", axes, curves));
+    out.plots.push(Plot::linear("Transmission through a wall", axes, curves));
     out
 }
 
@@ -251,8 +238,7 @@ fn snells_law(bench: &Bench, physics: Physics) -> Outcome {
     let mut curves = law_curves(|a, b, i| snell(a, b, i).map(f64::to_degrees));
     curves.push(Curve::dots("twins", shown));
     let axes = ["incidence, degrees", "refraction, degrees"];
-    out.plots
-        .push(Plot::linear("Refraction at a wall", axes, curves));
+    out.plots.push(Plot::linear("Refraction at a wall", axes, curves));
     out
 }
 
@@ -305,14 +291,8 @@ fn transmission(bench: &Bench, physics: Physics) -> Outcome {
             let what = format!("{name}: weight on entering {}", tissue.name);
             out.compare(what, segment.weight, *expected, 1e-5 * expected);
         }
-        let dots = weights
-            .iter()
-            .zip(got)
-            .map(|((top, _), s)| [*top, decibels(s.weight)]);
-        curves.push(Curve::dots(
-            format!("{name}, on entering a tissue"),
-            dots.collect(),
-        ));
+        let dots = weights.iter().zip(got).map(|((top, _), s)| [*top, decibels(s.weight)]);
+        curves.push(Curve::dots(format!("{name}, on entering a tissue"), dots.collect()));
     }
     out.plots.push(Plot::linear(
         "Weight of a path through the abdominal wall",

@@ -37,29 +37,13 @@ pub fn placements_are_transforms_of_the_mesh() -> Check {
 
 /// Turned; stretched; mirrored.
 fn three_placements() -> [(&'static str, DAffine3); 3] {
-    let turned = placement(
-        DVec3::ONE,
-        DVec3::new(1.0, -2.0, 0.5),
-        0.9,
-        DVec3::new(20.0, -10.0, 70.0),
-    );
-    let stretched = placement(
-        DVec3::new(0.3, 1.0, 2.5),
-        DVec3::ONE,
-        2.5,
-        DVec3::new(-30.0, 5.0, 50.0),
-    );
-    let mirrored = placement(
-        DVec3::new(1.0, 1.0, -1.2),
-        DVec3::Y,
-        -0.4,
-        DVec3::new(5.0, 5.0, 90.0),
-    );
-    [
-        ("turned", turned),
-        ("stretched", stretched),
-        ("mirrored", mirrored),
-    ]
+    let turned =
+        placement(DVec3::ONE, DVec3::new(1.0, -2.0, 0.5), 0.9, DVec3::new(20.0, -10.0, 70.0));
+    let stretched =
+        placement(DVec3::new(0.3, 1.0, 2.5), DVec3::ONE, 2.5, DVec3::new(-30.0, 5.0, 50.0));
+    let mirrored =
+        placement(DVec3::new(1.0, 1.0, -1.2), DVec3::Y, -0.4, DVec3::new(5.0, 5.0, 90.0));
+    [("turned", turned), ("stretched", stretched), ("mirrored", mirrored)]
 }
 
 fn placements(bench: &Bench, physics: Physics) -> Outcome {
@@ -74,11 +58,8 @@ fn placements(bench: &Bench, physics: Physics) -> Outcome {
         let moved = DAffine3::from_translation(DVec3::X * aside) * world_from_object;
         let placed = scene(vec![(mesh.clone(), moved)]);
         let elsewhere = |(i, ray)| (!aimed_at_seams(i)).then_some(ray);
-        let rays: Vec<Ray> = rays(&flat, 20_000, 31)
-            .into_iter()
-            .enumerate()
-            .filter_map(elsewhere)
-            .collect();
+        let rays: Vec<Ray> =
+            rays(&flat, 20_000, 31).into_iter().enumerate().filter_map(elsewhere).collect();
         for tracer in TRACERS {
             let [a, b] =
                 [&placed, &flat].map(|scene| Rig::on(&bench.device, scene, tracer).trace(&rays));
@@ -98,12 +79,7 @@ fn placements(bench: &Bench, physics: Physics) -> Outcome {
             }
             assert!(compared > 1000, "{compared} rays met the mesh head-on");
             let mut figure = |quantity, value, tolerance| {
-                out.compare(
-                    format!("{tracer}: {what}: {quantity}"),
-                    value,
-                    0.0,
-                    tolerance,
-                );
+                out.compare(format!("{tracer}: {what}: {quantity}"), value, 0.0, tolerance);
             };
             figure("largest distance of the points, mm", apart, 1e-4);
             figure("largest difference of shading normals", turned, 1e-4);

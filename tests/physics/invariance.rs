@@ -56,27 +56,14 @@ fn sampling_grid(bench: &Bench, physics: Physics) -> Outcome {
         let frame = render(&scene);
         let level = |band| decibel(mean(&intensities(&frame, &scene, band, 1).concat()));
         let dots: Vec<[f64; 2]> = BANDS.map(|b| [(b[0] + b[1]) / 2.0, level(b)]).to_vec();
-        let density = if scatterers > 0.0 {
-            "thinned lattice"
-        } else {
-            "whole lattice"
-        };
+        let density = if scatterers > 0.0 { "thinned lattice" } else { "whole lattice" };
         let label = format!("{layers} layers, {density}, {samples} samples");
         for [z, measured] in &dots {
-            out.compare(
-                format!("{name}: {label}, at {z} mm; dB"),
-                *measured,
-                LIVER,
-                0.2,
-            );
+            out.compare(format!("{name}: {label}, at {z} mm; dB"), *measured, LIVER, 0.2);
         }
         curves.push(Curve::dots(label, dots));
     }
-    out.plots.push(Plot::linear(
-        "Level of speckle",
-        ["depth, mm", "dB re mirror"],
-        curves,
-    ));
+    out.plots.push(Plot::linear("Level of speckle", ["depth, mm", "dB re mirror"], curves));
     out
 }
 
@@ -114,12 +101,7 @@ fn turned_aside(r: f64) -> Scene {
     let at = DAffine3::from_translation(DVec3::new(0.0, 0.0, 30.0))
         * DAffine3::from_rotation_y(std::f64::consts::FRAC_PI_4)
         * DAffine3::from_translation(DVec3::new(3.1, 5.3, 0.0));
-    add_box(
-        &mut scene,
-        [900.0, 900.0, 400.0],
-        tissue(1.540, impedance, 0.0),
-        at,
-    );
+    add_box(&mut scene, [900.0, 900.0, 400.0], tissue(1.540, impedance, 0.0), at);
     scene
 }
 
@@ -132,11 +114,7 @@ fn schemes(bench: &Bench, physics: Physics) -> Outcome {
     let expected = LIVER + decibel((1.0 - share).powi(2) + share.powi(2));
     for (name, render) in &bench.renderers[1..] {
         let frames = SCHEMES.map(|(sampling, _)| {
-            let mut scene = turned_aside(if physics == Physics::Planted {
-                1.1 * r
-            } else {
-                r
-            });
+            let mut scene = turned_aside(if physics == Physics::Planted { 1.1 * r } else { r });
             scene.simulation.sampling = sampling;
             let frame = render(&scene);
             (scene, frame)
@@ -206,9 +184,8 @@ fn mirrored(bench: &Bench, physics: Physics) -> Outcome {
         let count = 106;
         let at =
             |i: u32| depths[0] + (depths[1] - depths[0]) * (f64::from(i) + 0.5) / f64::from(count);
-        let line: Vec<[f64; 2]> = (0..count)
-            .map(|i| [at(i), LIVER + decibel(law(at(i)))])
-            .collect();
+        let line: Vec<[f64; 2]> =
+            (0..count).map(|i| [at(i), LIVER + decibel(law(at(i)))]).collect();
         let expected = LIVER + decibel(mean(&(0..count).map(|i| law(at(i))).collect::<Vec<_>>()));
         curves.push(Curve::line(format!("law, s = {roughness}"), line));
         for paths in [1, 8, 32] {
@@ -226,11 +203,7 @@ fn mirrored(bench: &Bench, physics: Physics) -> Outcome {
         }
     }
     let axes = ["depth, mm", "dB re mirror"];
-    out.plots.push(Plot::linear(
-        "Speckle mirrored by a rough wall",
-        axes,
-        curves,
-    ));
+    out.plots.push(Plot::linear("Speckle mirrored by a rough wall", axes, curves));
     out
 }
 
@@ -263,18 +236,8 @@ fn organ(m: DAffine3) -> Scene {
     scene.probe.samples = 1024;
     scene.world_from_probe = m;
     let around = m * DAffine3::from_translation(DVec3::new(3.1, 5.3, -7.0));
-    add_box(
-        &mut scene,
-        [80.0, 80.0, 80.0],
-        tissue(1.540, 1.630, 0.5),
-        around,
-    );
-    add_sphere(
-        &mut scene,
-        5.0,
-        tissue(1.580, 1.720, 0.3),
-        DVec3::new(0.4, 0.3, 20.0),
-    );
+    add_box(&mut scene, [80.0, 80.0, 80.0], tissue(1.540, 1.630, 0.5), around);
+    add_sphere(&mut scene, 5.0, tissue(1.580, 1.720, 0.3), DVec3::new(0.4, 0.3, 20.0));
     // Of a draw in which no scatterer lies on the ball to the rounding of 200 mm: such a one may count to either side
     // or to none, and one scatterer is more than all other rounding.
     scene.simulation.seed = 3;

@@ -58,12 +58,7 @@ fn flatness(bench: &Bench, physics: Physics) -> Outcome {
         let mean = flat.iter().sum::<f64>() / flat.len() as f64;
         let from_mean: Vec<f64> = flat.iter().map(|p| p - mean).collect();
         let largest = from_mean.iter().fold(0.0, |m, d| f64::max(m, d.abs()));
-        out.compare(
-            format!("{name}: largest departure from the mean, dB"),
-            largest,
-            0.0,
-            0.5,
-        );
+        out.compare(format!("{name}: largest departure from the mean, dB"), largest, 0.0, 0.5);
         let tilted = powers(&render(&homogeneous(0.53)));
         out.compare(
             format!("{name}: fall of tissue of 0.53 dB/(cm MHz), dB"),
@@ -72,10 +67,7 @@ fn flatness(bench: &Bench, physics: Physics) -> Outcome {
             1.0,
         );
         let depths = (0..9).map(|i| 1.5 + f64::from(i));
-        curves.push(Curve::dots(
-            *name,
-            depths.zip(from_mean).map(|(z, d)| [z, d]).collect(),
-        ));
+        curves.push(Curve::dots(*name, depths.zip(from_mean).map(|(z, d)| [z, d]).collect()));
         if *name == "bvh" {
             out.pictures.push(frame.picture("bvh, 120 dB", &scene));
         }
@@ -115,10 +107,7 @@ fn sliders(bench: &Bench, physics: Physics) -> Outcome {
     };
     let mut curves = vec![Curve::line(
         "interpolated sliders",
-        (0..205)
-            .map(|i| 10 * i)
-            .map(|k| [k as f64, expected(k)])
-            .collect(),
+        (0..205).map(|i| 10 * i).map(|k| [k as f64, expected(k)]).collect(),
     )];
     for (name, render) in &bench.renderers {
         scene.imaging.tgc_sliders = [0.0; 8];
@@ -133,11 +122,7 @@ fn sliders(bench: &Bench, physics: Physics) -> Outcome {
         let dots = (1..25).map(|i| 80 * i).map(|k| [k as f64, gain(k)]);
         curves.push(Curve::dots(*name, dots.collect()));
     }
-    out.plots.push(Plot::linear(
-        "Gain of the sliders",
-        ["sample", "gain, dB"],
-        curves,
-    ));
+    out.plots.push(Plot::linear("Gain of the sliders", ["sample", "gain, dB"], curves));
     out
 }
 
@@ -158,13 +143,9 @@ fn sector(probe: &Probe) -> [f64; 2] {
     let d = probe.depth;
     let fan = |r: f64, angle: f64| angle / 2.0 * ((r + d).powi(2) - r * r);
     match probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => [
-            fan(radius, field_of_view),
-            d + radius * (1.0 - (field_of_view / 2.0).cos()),
-        ],
+        Kind::Convex { radius, field_of_view } => {
+            [fan(radius, field_of_view), d + radius * (1.0 - (field_of_view / 2.0).cos())]
+        }
         Kind::Phased { field_of_view } => [fan(0.0, field_of_view), d],
         Kind::Linear { width } => [width * d, d],
     }
@@ -182,10 +163,7 @@ fn sectors(bench: &Bench, physics: Physics) -> Outcome {
     for (preset, probe) in presets {
         let mut scene = homogeneous(0.5);
         scene.tissues[0].echogenicity = f64::NEG_INFINITY;
-        scene.probe = Probe {
-            elevation_layers: 1,
-            ..probe
-        };
+        scene.probe = Probe { elevation_layers: 1, ..probe };
         let [area, height] = sector(&scene.probe);
         let pixel = match physics {
             Physics::Right => height / 800.0,
@@ -197,8 +175,7 @@ fn sectors(bench: &Bench, physics: Physics) -> Outcome {
             let what = format!("{name}: area of the {preset} sector, mm^2");
             out.compare(what, inside as f64 * pixel * pixel, area, 0.005 * area);
             if *name == "bvh" && preset == "Table I" {
-                out.pictures
-                    .push(frame.picture("bvh: the Table I sector, empty", &scene));
+                out.pictures.push(frame.picture("bvh: the Table I sector, empty", &scene));
             }
         }
     }

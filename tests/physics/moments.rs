@@ -63,9 +63,8 @@ pub fn autocovariance(rows: &[Vec<f64>], most: usize) -> Vec<f64> {
     let m = mean(&all);
     let at = |lag: usize| {
         let pairs = rows.iter().flat_map(|r| r.iter().zip(&r[lag..]));
-        let (sum, count) = pairs.fold((0.0, 0.0), |(s, c), (a, b)| {
-            (s + (a - m) * (b - m), c + 1.0)
-        });
+        let (sum, count) =
+            pairs.fold((0.0, 0.0), |(s, c), (a, b)| (s + (a - m) * (b - m), c + 1.0));
         sum / count
     };
     let zero = at(0);
@@ -74,9 +73,7 @@ pub fn autocovariance(rows: &[Vec<f64>], most: usize) -> Vec<f64> {
 
 /// The same rows, read across: element i of every row makes row i.
 pub fn transposed(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    (0..rows[0].len())
-        .map(|i| rows.iter().map(|r| r[i]).collect())
-        .collect()
+    (0..rows[0].len()).map(|i| rows.iter().map(|r| r[i]).collect()).collect()
 }
 
 /// Generalised contrast-to-noise ratio of two sets of envelopes: one minus what their histograms
@@ -84,9 +81,8 @@ pub fn transposed(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
 pub fn gcnr(inside: &[f64], outside: &[f64]) -> f64 {
     let log = |v: f64| v.max(1e-12).ln();
     let all = || inside.iter().chain(outside).map(|&v| log(v));
-    let (low, high) = all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| {
-        (l.min(v), h.max(v))
-    });
+    let (low, high) =
+        all().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     let histogram = |values: &[f64]| {
         let mut bins = [0.0; 64];
         for &v in values {
@@ -150,9 +146,8 @@ mod tests {
 
     #[test]
     fn slopes_and_correlations() {
-        let line: Vec<[f64; 2]> = (0..9)
-            .map(|i| [f64::from(i), 3.0 - 2.0 * f64::from(i)])
-            .collect();
+        let line: Vec<[f64; 2]> =
+            (0..9).map(|i| [f64::from(i), 3.0 - 2.0 * f64::from(i)]).collect();
         assert!((slope(&line) + 2.0).abs() < 1e-12);
         let rows = vec![vec![1.0, -1.0, 1.0, -1.0]; 3];
         assert_eq!(autocovariance(&rows, 2), [1.0, -1.0, 1.0]);

@@ -30,21 +30,14 @@ impl Range {
     pub fn new(bench: &Bench, scene: &Scene, tracer: Tracer) -> Self {
         let simulator = Simulator::new(&bench.device, &Library::embedded(), scene, tracer)
             .unwrap_or_else(|e| panic!("{tracer}: {e}"));
-        Self {
-            device: Arc::clone(&bench.device),
-            simulator,
-        }
+        Self { device: Arc::clone(&bench.device), simulator }
     }
 
     /// Runs a frame; nothing may be lost on the way, and validation is silent.
     pub fn frame(&mut self, scene: &Scene) -> &mut Simulator {
         self.simulator.frame(scene, 0).expect("a frame");
         let counters = self.simulator.counters().expect("counters");
-        let lost = [
-            counters.saturated,
-            counters.segments_dropped,
-            counters.stack_overflow,
-        ];
+        let lost = [counters.saturated, counters.segments_dropped, counters.stack_overflow];
         assert_eq!(lost, [0; 3], "saturated, dropped, overflown");
         assert_eq!(self.device.validation_messages(), Vec::<String>::new());
         &mut self.simulator
@@ -85,9 +78,9 @@ pub fn echo(scene: &Scene, line: &[[f64; 2]], time: f64, reach: usize) -> [f64; 
     let k = (probe.speed * time / probe.sample_pitch()).floor() as usize;
     let (sin, cos) = (2.0 * std::f64::consts::TAU * probe.frequency * time).sin_cos();
     let window = k.saturating_sub(reach)..(k + reach + 2).min(line.len());
-    line[window].iter().fold([0.0; 2], |[x, y], [re, im]| {
-        [x + re * cos - im * sin, y + re * sin + im * cos]
-    })
+    line[window]
+        .iter()
+        .fold([0.0; 2], |[x, y], [re, im]| [x + re * cos - im * sin, y + re * sin + im * cos])
 }
 
 /// Sum of power times sample over the sum of power of `line` in `range`.

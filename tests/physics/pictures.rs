@@ -16,10 +16,7 @@ fn liver() -> Scene {
     let mut scene = linear(1, 1.0, shipped("liver"));
     scene.probe = Probe::linear();
     scene.simulation = Simulation::default();
-    scene.imaging = Imaging {
-        image_height: 480,
-        ..Imaging::default()
-    };
+    scene.imaging = Imaging { image_height: 480, ..Imaging::default() };
     scene
 }
 

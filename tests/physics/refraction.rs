@@ -23,10 +23,7 @@ const SIDES: u32 = 768;
 
 /// A cylinder along y with the cylinder's own normals, ends left open beyond the slice.
 fn tube() -> Mesh {
-    let mut mesh = Mesh {
-        name: "tube".into(),
-        ..Mesh::default()
-    };
+    let mut mesh = Mesh { name: "tube".into(), ..Mesh::default() };
     for i in 0..SIDES {
         let (sin, cos) = (TAU * (f64::from(i) + 0.3) / f64::from(SIDES)).sin_cos();
         for y in [-41.0, 37.0] {
@@ -140,9 +137,7 @@ fn edge_shadow(bench: &Bench, physics: Physics) -> Outcome {
         logarithmic: [false, false],
         curves: vec![Curve {
             label: "two refractions in closed form".into(),
-            points: (-480..=480)
-                .map(|i| [0.01 * f64::from(i), law(0.01 * f64::from(i))])
-                .collect(),
+            points: (-480..=480).map(|i| [0.01 * f64::from(i), law(0.01 * f64::from(i))]).collect(),
             line: true,
         }],
     };
@@ -181,11 +176,7 @@ fn edge_shadow(bench: &Bench, physics: Physics) -> Outcome {
         out.compare(format!("{name}: caustic, mm"), reach, caustic, 0.02);
         let what = format!("{name}: rays in the shadow from {caustic:.3} to 5 mm");
         out.compare(what, f64::from(lit), 0.0, 0.5);
-        plot.curves.push(Curve {
-            label: name,
-            points,
-            line: false,
-        });
+        plot.curves.push(Curve { label: name, points, line: false });
     }
     out.plots.push(plot);
     if physics == Physics::Right {
@@ -200,11 +191,7 @@ fn picture(bench: &Bench, speed: f64) -> Picture {
     let mut scene = cylinder(160, [-16.0, 16.0], around, tissue(speed, 1.55, 0.5));
     scene.probe.samples = 1024;
     scene.imaging.image_height = 480;
-    shown(
-        bench,
-        "A slower cylinder in speckle, dark beside its back",
-        &scene,
-    )
+    shown(bench, "A slower cylinder in speckle, dark beside its back", &scene)
 }
 
 /// T21.

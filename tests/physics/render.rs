@@ -110,10 +110,7 @@ pub fn twin(scene: &Scene) -> Frame {
     let samples = frame.samples as usize;
     let grey = tables::grey_map(&scene.imaging);
     Frame {
-        iq: iq
-            .chunks(2 * samples)
-            .map(|l| l.chunks(2).map(|v| [v[0], v[1]]).collect())
-            .collect(),
+        iq: iq.chunks(2 * samples).map(|l| l.chunks(2).map(|v| [v[0], v[1]]).collect()).collect(),
         pixels: display::display(frame, &single(levels.clone()), &grey),
         levels: levels.chunks(samples).map(<[f64]>::to_vec).collect(),
     }
@@ -140,11 +137,7 @@ fn on(device: &Arc<gpu::Device>, scene: &Scene, tracer: Tracer) -> Frame {
         simulator.frame(scene, 0)?;
         let counters = simulator.counters()?;
         assert_eq!(
-            [
-                counters.saturated,
-                counters.segments_dropped,
-                counters.stack_overflow
-            ],
+            [counters.saturated, counters.segments_dropped, counters.stack_overflow],
             [0; 3],
             "{tracer}: saturated, dropped, overflown"
         );

@@ -56,12 +56,7 @@ fn pulse((_, render): &Renderer, samples: u32, shift: f64, bandwidth: f64) -> Ve
 fn axial_widths(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let sigma = 1.540 / 2.0 * (2.0 * LN_2).sqrt() / (PI * 0.6 * 7.0);
-    out.compare(
-        "closed form at 7 MHz and 60 %, mm",
-        FWHM * sigma,
-        0.162,
-        5e-4,
-    );
+    out.compare("closed form at 7 MHz and 60 %, mm", FWHM * sigma, 0.162, 5e-4);
     let bandwidth = match physics {
         Physics::Right => 0.6,
         Physics::Planted => 0.65,
@@ -72,10 +67,7 @@ fn axial_widths(bench: &Bench, physics: Physics) -> Outcome {
                 let pulse = pulse(renderer, samples, shift, bandwidth);
                 let heights: Vec<f64> = pulse.iter().map(|p| p[1]).collect();
                 out.compare(
-                    format!(
-                        "{}: {samples} samples, point {shift} off one: length, mm",
-                        renderer.0
-                    ),
+                    format!("{}: {samples} samples, point {shift} off one: length, mm", renderer.0),
                     width(&heights) * 100.0 / f64::from(samples),
                     FWHM * sigma,
                     share * FWHM * sigma,
@@ -83,10 +75,7 @@ fn axial_widths(bench: &Bench, physics: Physics) -> Outcome {
             }
         }
     }
-    out.plots.push(pulse_plot(
-        pulse(&bench.renderers[1], 4096, 0.25, bandwidth),
-        sigma,
-    ));
+    out.plots.push(pulse_plot(pulse(&bench.renderers[1], 4096, 0.25, bandwidth), sigma));
     out
 }
 
@@ -101,10 +90,7 @@ fn pulse_plot(pulse: Vec<[f64; 2]>, sigma: f64) -> Plot {
         "Echo of a point",
         ["depth from the point, mm", "envelope"],
         vec![
-            Curve::line(
-                "exp(-z^2 / 2 sigma_z^2)",
-                closed.map(|z| [z, gaussian(z)]).collect(),
-            ),
+            Curve::line("exp(-z^2 / 2 sigma_z^2)", closed.map(|z| [z, gaussian(z)]).collect()),
             Curve::dots("bvh, 4096 samples", shown.collect()),
         ],
     )
@@ -148,10 +134,7 @@ fn lateral_widths(bench: &Bench, physics: Physics) -> Outcome {
     let scene = points(161, 4.0, &depths.map(|z| [0.0, 0.0, z]));
     let mut curves = vec![Curve::line(
         "product of two Gaussian beams",
-        (60..=150)
-            .map(|i| f64::from(i) * 0.5)
-            .map(|z| [z, lateral(z)])
-            .collect(),
+        (60..=150).map(|i| f64::from(i) * 0.5).map(|z| [z, lateral(z)]).collect(),
     )];
     for (name, render) in &bench.renderers {
         let frame = render(&scene);
@@ -169,8 +152,7 @@ fn lateral_widths(bench: &Bench, physics: Physics) -> Outcome {
         curves.push(Curve::dots(*name, dots));
     }
     let axes = ["depth, mm", "lateral width at half maximum, mm"];
-    out.plots
-        .push(Plot::linear("Lateral width over depth", axes, curves));
+    out.plots.push(Plot::linear("Lateral width over depth", axes, curves));
     out
 }
 
@@ -209,10 +191,7 @@ fn slice_widths(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let mut curves = vec![Curve::line(
         "Gaussian beam of the lens, twice",
-        (70..=170)
-            .map(|i| f64::from(i) * 0.5)
-            .map(|z| [z, elevation(z)])
-            .collect(),
+        (70..=170).map(|i| f64::from(i) * 0.5).map(|z| [z, elevation(z)]).collect(),
     )];
     for (name, render) in &bench.renderers {
         let frame = render(&scene);
@@ -236,7 +215,6 @@ fn slice_widths(bench: &Bench, physics: Physics) -> Outcome {
         curves.push(Curve::dots(*name, dots));
     }
     let axes = ["depth, mm", "slice thickness at half maximum, mm"];
-    out.plots
-        .push(Plot::linear("Slice thickness over depth", axes, curves));
+    out.plots.push(Plot::linear("Slice thickness over depth", axes, curves));
     out
 }

@@ -114,18 +114,11 @@ fn reverberation(bench: &Bench, physics: Physics) -> Outcome {
                 let what = format!("{name}: echo {m} over echo 0");
                 let expected = series(m) / series(0);
                 // 5 %: about four standard errors of the rarest echo.
-                out.compare(
-                    what,
-                    amplitude(m) / amplitude(0),
-                    expected,
-                    0.05 * expected.abs(),
-                );
+                out.compare(what, amplitude(m) / amplitude(0), expected, 0.05 * expected.abs());
             }
             plot.curves.push(Curve {
                 label: name,
-                points: (0..=3)
-                    .map(|m| [f64::from(m), amplitude(m).abs()])
-                    .collect(),
+                points: (0..=3).map(|m| [f64::from(m), amplitude(m).abs()]).collect(),
                 line: false,
             });
         }
@@ -164,12 +157,7 @@ fn mirrored(lines: u32, width: f64, degrees: Option<f64>) -> Scene {
         let at = place
             * DAffine3::from_rotation_y(-degrees.to_radians())
             * DAffine3::from_translation(DVec3::new(1.3, 2.1, 0.0));
-        add_box(
-            &mut scene,
-            [40.0, 40.0, 15.0],
-            silent(1.540, 1.5e9, 0.0),
-            at,
-        );
+        add_box(&mut scene, [40.0, 40.0, 15.0], silent(1.540, 1.5e9, 0.0), at);
     }
     scene
 }
@@ -207,14 +195,8 @@ fn mirror_image(bench: &Bench, physics: Physics) -> Outcome {
         let rest = peak(&without) / peak(&with);
         out.compare(format!("{name}: what is left without"), rest, 0.0, 0.1);
         let decibel = |(k, v): (usize, &f64)| [k as f64 * pitch, 20.0 * v.max(1e-6).log10()];
-        let curve = |line: &[f64]| {
-            line.iter()
-                .enumerate()
-                .map(decibel)
-                .skip(600)
-                .take(800)
-                .collect()
-        };
+        let curve =
+            |line: &[f64]| line.iter().enumerate().map(decibel).skip(600).take(800).collect();
         plot.curves.push(Curve {
             label: format!("{name}, by the mirror"),
             points: curve(&with),
@@ -223,11 +205,7 @@ fn mirror_image(bench: &Bench, physics: Physics) -> Outcome {
         if *name == "twins" {
             plot.curves.insert(
                 0,
-                Curve {
-                    label: "a point there".into(),
-                    points: curve(&truth),
-                    line: true,
-                },
+                Curve { label: "a point there".into(), points: curve(&truth), line: true },
             );
         }
     }

@@ -36,10 +36,7 @@ fn integral(s: f64, least: f64, f: impl Fn(f64) -> f64) -> f64 {
     let steps = 100_000;
     let step = (1.0 - least) / f64::from(steps);
     let at = |i| least + (f64::from(i) + 0.5) * step;
-    (0..steps)
-        .map(at)
-        .map(|c| (s + 1.0) * c.powf(s) * f(c) * step)
-        .sum()
+    (0..steps).map(at).map(|c| (s + 1.0) * c.powf(s) * f(c) * step).sum()
 }
 
 /// Echo of a plane met head on.
@@ -98,10 +95,7 @@ fn lobe(bench: &Bench, physics: Physics) -> Outcome {
             let directions: Vec<_> = up.map(|g| g.direction).collect();
             let name = format!("{tracer}, s = {s}");
             // Mirrored at a normal of tilt t the path leaves at 2 t.
-            let cosines: Vec<f64> = directions
-                .iter()
-                .map(|d| ((1.0 - d.z) / 2.0).sqrt())
-                .collect();
+            let cosines: Vec<f64> = directions.iter().map(|d| ((1.0 - d.z) / 2.0).sqrt()).collect();
             let kept = integral(s, FRAC_1_SQRT_2, |_| 1.0);
             let expected = integral(s, FRAC_1_SQRT_2, |c| c) / kept;
             let [measured, error] = mean(&cosines);
@@ -139,12 +133,7 @@ fn sampler(sampled: f64, [s, n]: [f64; 2], out: &mut Outcome) {
         .collect();
     let [measured, error] = mean(&cosines);
     let expected = (s + 1.0) / (s + 2.0);
-    out.compare(
-        format!("twins, s = {s}: E cos"),
-        measured,
-        expected,
-        4.0 * error,
-    );
+    out.compare(format!("twins, s = {s}: E cos"), measured, expected, 4.0 * error);
     let echoes: Vec<f64> = cosines.iter().map(|&c| facing(c, n)).collect();
     let [measured, error] = mean(&echoes);
     let expected = integral(s, 0.0, |c| facing(c, n));
@@ -160,10 +149,7 @@ fn density(s: f64) -> Curve {
     let at = |i: u32| {
         let degrees = 0.25 * f64::from(i);
         let (sin, cos) = degrees.to_radians().sin_cos();
-        [
-            degrees,
-            (s + 1.0) * cos.powf(s) * sin / kept * 1f64.to_radians(),
-        ]
+        [degrees, (s + 1.0) * cos.powf(s) * sin / kept * 1f64.to_radians()]
     };
     Curve {
         label: "(s + 1) cos^s t sin t, cut at 45 degrees".into(),
@@ -180,9 +166,7 @@ fn histogram(label: &str, cosines: &[f64]) -> Curve {
     let bins = counts.iter().take(BINS as usize).enumerate();
     Curve {
         label: label.into(),
-        points: bins
-            .map(|(i, &n)| [i as f64 + 0.5, f64::from(n) / cosines.len() as f64])
-            .collect(),
+        points: bins.map(|(i, &n)| [i as f64 + 0.5, f64::from(n) / cosines.len() as f64]).collect(),
         line: false,
     }
 }

@@ -25,20 +25,12 @@ pub fn tissue(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
 
 /// The same without scatterers.
 pub fn silent(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
-    Tissue {
-        echogenicity: f64::NEG_INFINITY,
-        ..tissue(speed, impedance, attenuation)
-    }
+    Tissue { echogenicity: f64::NEG_INFINITY, ..tissue(speed, impedance, attenuation) }
 }
 
 /// A perfectly smooth, thin surface.
 pub fn mirror() -> Surface {
-    Surface {
-        roughness: f64::INFINITY,
-        thickness: 0.0,
-        specularity: 1.0,
-        gain: 0.0,
-    }
+    Surface { roughness: f64::INFINITY, thickness: 0.0, specularity: 1.0, gain: 0.0 }
 }
 
 /// `lines` parallel scanlines over `width` mm with the focusing of the paper's Table I, a single
@@ -51,15 +43,8 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
         ..Probe::paper_table1()
     };
     Scene {
-        simulation: Simulation {
-            paths: 1,
-            max_reflections: 0,
-            ..Simulation::default()
-        },
-        imaging: Imaging {
-            noise: f64::NEG_INFINITY,
-            ..Imaging::default()
-        },
+        simulation: Simulation { paths: 1, max_reflections: 0, ..Simulation::default() },
+        imaging: Imaging { noise: f64::NEG_INFINITY, ..Imaging::default() },
         ..Scene::homogeneous(background, probe)
     }
 }
@@ -82,12 +67,7 @@ pub fn add_body(scene: &mut Scene, mesh: Mesh, tissue: Tissue, at: DAffine3) {
 
 /// Adds a box of `size` mm whose front face's middle `at` takes to the place and direction wanted.
 pub fn add_box(scene: &mut Scene, size: [f64; 3], tissue: Tissue, at: DAffine3) {
-    add_body(
-        scene,
-        shapes::plane([size[0], size[1]], size[2]),
-        tissue,
-        at,
-    );
+    add_body(scene, shapes::plane([size[0], size[1]], size[2]), tissue, at);
 }
 
 /// Adds everything below depth `top` mm.
@@ -100,11 +80,7 @@ pub fn add_layer(scene: &mut Scene, top: f64, tissue: Tissue) {
 
 /// Adds one point target.
 pub fn add_point(scene: &mut Scene, at: [f64; 3], amplitude: f64) {
-    scene.wires.push(Wire {
-        ends: [at; 2],
-        spacing: 1.0,
-        amplitude,
-    });
+    scene.wires.push(Wire { ends: [at; 2], spacing: 1.0, amplitude });
 }
 
 /// Adds a ball of `radius` mm around `centre`, made of 20 480 triangles: its faces are up to 2.5e-4 of the radius inside.

@@ -81,13 +81,7 @@ fn union_boxes(bench: &Bench, physics: Physics, out: &mut Outcome) {
     }
     out.plots.push(Plot::linear(
         "False intersections of a union box",
-        [
-            "distance between keyframes, mm",
-            "share of the lines that meet the union",
-        ],
-        vec![
-            Curve::line("1 - SA(child)/SA(union)", line),
-            Curve::dots("bvh", dots),
-        ],
+        ["distance between keyframes, mm", "share of the lines that meet the union"],
+        vec![Curve::line("1 - SA(child)/SA(union)", line), Curve::dots("bvh", dots)],
     ));
 }

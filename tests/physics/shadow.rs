@@ -53,11 +53,7 @@ fn enhancement(bench: &Bench, physics: Physics) -> Outcome {
         let walls = decibel((1.0 - reflected(outside, inside)).powi(4));
         2.0 * (TISSUE - FLUID) * FREQUENCY * chord + walls
     };
-    let loss = if physics == Physics::Planted {
-        0.5
-    } else {
-        1.0
-    };
+    let loss = if physics == Physics::Planted { 0.5 } else { 1.0 };
     let behind = [CENTRE + RADIUS + 1.0, CENTRE + RADIUS + 31.0];
     let mut plain = homogeneous(96, 0.25, 1);
     plain.imaging.tgc_attenuation = TISSUE;
@@ -67,30 +63,17 @@ fn enhancement(bench: &Bench, physics: Physics) -> Outcome {
     add_sphere(&mut scene, RADIUS, fluid, DVec3::new(0.0, 0.0, CENTRE));
     let mut curves = vec![Curve::line(
         "2 (alpha_t - alpha_c) f d",
-        (-60..=60)
-            .map(|i| f64::from(i) / 10.0)
-            .map(|x| [x, expected(x)])
-            .collect(),
+        (-60..=60).map(|i| f64::from(i) / 10.0).map(|x| [x, expected(x)]).collect(),
     )];
     for (name, render) in &bench.renderers[1..] {
         let [with, without] = [&scene, &plain].map(render);
         let power = |lines: [f64; 2]| mean(&region(&with, &scene, lines, behind));
         let beside = (power([-12.0, -6.0]) + power([6.0, 12.0])) / 2.0;
-        let middle: Vec<f64> = (0..96)
-            .map(|l| scene.probe.ray(l, 0).0.x)
-            .filter(|x| x.abs() < 2.0)
-            .collect();
-        let factors: Vec<f64> = middle
-            .iter()
-            .map(|&x| 10f64.powf(expected(x) / 10.0))
-            .collect();
+        let middle: Vec<f64> =
+            (0..96).map(|l| scene.probe.ray(l, 0).0.x).filter(|x| x.abs() < 2.0).collect();
+        let factors: Vec<f64> = middle.iter().map(|&x| 10f64.powf(expected(x) / 10.0)).collect();
         let what = format!("{name}: enhancement behind 1 cm of fluid, dB");
-        out.compare(
-            what,
-            decibel(power([-2.0, 2.0]) / beside),
-            decibel(mean(&factors)),
-            0.5,
-        );
+        out.compare(what, decibel(power([-2.0, 2.0]) / beside), decibel(mean(&factors)), 0.5);
         let mut dots = Vec::new();
         let mut worst: f64 = 0.0;
         for l in 0..96 {
@@ -109,8 +92,7 @@ fn enhancement(bench: &Bench, physics: Physics) -> Outcome {
         curves.push(Curve::dots(*name, dots));
     }
     let axes = ["lateral position, mm", "enhancement, dB"];
-    out.plots
-        .push(Plot::linear("Behind a fluid sphere of 10 mm", axes, curves));
+    out.plots.push(Plot::linear("Behind a fluid sphere of 10 mm", axes, curves));
     out
 }
 
@@ -140,22 +122,15 @@ fn bone_shadow(bench: &Bench, physics: Physics) -> Outcome {
     assert!((r - 0.412).abs() < 1e-3);
     let walls = decibel((1.0 - r).powi(if physics == Physics::Planted { 2 } else { 4 }));
     let law = |d: f64| [d, walls - 2.0 * 5.0 * 7.0 * d / 10.0];
-    let mut curves = vec![Curve::line(
-        "20 log10((1 - R)^2) - 2 alpha f d",
-        vec![law(0.0), law(4.0)],
-    )];
+    let mut curves =
+        vec![Curve::line("20 log10((1 - R)^2) - 2 alpha f d", vec![law(0.0), law(4.0)])];
     for (name, render) in &bench.renderers[1..] {
         let mut dots = Vec::new();
         for thickness in [1.0, 3.0] {
             let mut scene = homogeneous(64, 1.0, 1);
             scene.tissues[0].density = soft / scene.tissues[0].speed;
             let at = DAffine3::from_translation(DVec3::new(25.0, 5.3, 30.0));
-            add_box(
-                &mut scene,
-                [50.0, 50.0, thickness],
-                silent(3.515, hard, 5.0),
-                at,
-            );
+            add_box(&mut scene, [50.0, 50.0, thickness], silent(3.515, hard, 5.0), at);
             let frame = render(&scene);
             let depths = [40.0, 90.0];
             let [behind, beside] =

@@ -112,21 +112,13 @@ pub fn fully_developed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     // Lines lie 3.8 sigma apart, every sixth sample 4.3 sigma: intensities correlate by less than 1e-3.
     let apart = intensities(&frame, &scene, DEPTHS, 6).concat();
     out.compare(
-        format!(
-            "{name}: Kolmogorov-Smirnov distance of {} samples",
-            apart.len()
-        ),
+        format!("{name}: Kolmogorov-Smirnov distance of {} samples", apart.len()),
         exponential_distance(&apart, power),
         0.0,
         critical_distance(apart.len()),
     );
     // Liver is 45 dB under a perfect mirror; 22 000 cells make 0.03 dB, the depth's calibration less than 0.1.
-    out.compare(
-        format!("{name}: RMS level, dB re mirror"),
-        decibel(power),
-        -45.0,
-        0.2,
-    );
+    out.compare(format!("{name}: RMS level, dB re mirror"), decibel(power), -45.0, 0.2);
     out.plots.push(histogram(&e, power));
     out
 }
@@ -182,12 +174,8 @@ pub fn log_compressed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         let range = scene.imaging.dynamic_range;
         let frame = render(&scene);
         let [a, b] = DEPTHS.map(|z| (z / scene.probe.sample_pitch()) as usize);
-        let levels: Vec<f64> = frame
-            .levels
-            .iter()
-            .flat_map(|l| &l[a..b])
-            .map(|v| v * range)
-            .collect();
+        let levels: Vec<f64> =
+            frame.levels.iter().flat_map(|l| &l[a..b]).map(|v| v * range).collect();
         let expected = 10.0 / std::f64::consts::LN_10 * PI / 6f64.sqrt();
         let what = format!("{name}: deviation at {echogenicity} dB, gain {gain} dB; dB");
         out.compare(what, deviation(&levels), expected, 0.15);
@@ -232,11 +220,7 @@ fn kurtosis_law(scene: &Scene, density: f64) -> f64 {
     const STEPS: u32 = 60;
     let h = scene.simulation.cell;
     let at = |z: f64| {
-        let sigmas = [
-            sigma_axial(scene),
-            sigma_lateral(scene, z),
-            sigma_elevation(scene, z),
-        ];
+        let sigmas = [sigma_axial(scene), sigma_lateral(scene, z), sigma_elevation(scene, z)];
         let cells = sigmas.iter().map(|s| TAU.sqrt() * s / h).product::<f64>();
         let q = sigmas.iter().map(|&s| averaged(h, s)).product::<f64>();
         (3.0 / density - 2.0 * q) / cells
@@ -247,14 +231,8 @@ fn kurtosis_law(scene: &Scene, density: f64) -> f64 {
 }
 
 /// Edge of a cell, mm, and density. The last two tell the law from that with q = 1, which has 2.10 instead of 2.22.
-const SPARSE: [[f64; 2]; 6] = [
-    [0.15, 0.05],
-    [0.15, 0.1],
-    [0.15, 0.2],
-    [0.15, 1.0],
-    [0.3, 0.4],
-    [0.3, 1.0],
-];
+const SPARSE: [[f64; 2]; 6] =
+    [[0.15, 0.05], [0.15, 0.1], [0.15, 0.2], [0.15, 1.0], [0.3, 0.4], [0.3, 1.0]];
 
 /// The tolerance is the table's; chance makes up to 2 % where scatterers are sparsest.
 pub fn sparse(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
@@ -265,11 +243,7 @@ pub fn sparse(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         let mut scene = homogeneous(112, 1.0, seed);
         scene.probe.samples = 4096;
         scene.simulation.cell = h;
-        let factor = if physics == Physics::Planted {
-            2.0
-        } else {
-            1.0
-        };
+        let factor = if physics == Physics::Planted { 2.0 } else { 1.0 };
         scene.tissues[0].density_of_scatterers = f64::min(1.0, density * factor);
         let frame = render(&scene);
         let measured = kurtosis(&intensities(&frame, &scene, DEPTHS, 1).concat());

@@ -36,20 +36,14 @@ fn joined(frame: &Frame) -> Vec<f32> {
 
 impl Stages {
     pub fn new(device: &Arc<Device>) -> Self {
-        Self {
-            device: device.clone(),
-            library: Library::embedded(),
-        }
+        Self { device: device.clone(), library: Library::embedded() }
     }
 
     /// Content of the bindings after a run; no validation message may have come.
     fn run(&self, stem: &str, inputs: Vec<Input>, threads: [u32; 2]) -> Vec<Vec<u8>> {
         let kernel = Kernel::new(&self.device, stem, self.library.words(stem), &[])
             .expect("the kernel fits the device");
-        let job = Job {
-            inputs,
-            push: vec![],
-        };
+        let job = Job { inputs, push: vec![] };
         let extent = Extent::Threads([threads[0], threads[1], 1]);
         let outcome = harness::run(&self.device, &kernel, &job, &extent).expect("the kernel runs");
         assert_eq!(self.device.validation_messages(), Vec::<String>::new());
@@ -73,11 +67,8 @@ impl Stages {
             input("lateral", &vec![0f32; surface.len()]),
             input("contact", &joined(frame)),
         ];
-        let after = self.run(
-            "beam",
-            inputs,
-            [frame.samples, frame.scanlines.div_ceil(layout::BEAM_LINES)],
-        );
+        let after =
+            self.run("beam", inputs, [frame.samples, frame.scanlines.div_ceil(layout::BEAM_LINES)]);
         let counters: Vec<Counters> = values(&after[4]);
         (values(&after[5]), counters[0].saturated)
     }
@@ -90,10 +81,7 @@ impl Stages {
 
     /// Log-compressed envelope of samples as they are.
     pub fn detect(&self, frame: &Frame, rows: &[Row], iq: &[f32]) -> Vec<f32> {
-        let sharp = Frame {
-            axial_sigma: 0.0,
-            ..*frame
-        };
+        let sharp = Frame { axial_sigma: 0.0, ..*frame };
         self.detected(&sharp, rows, iq).1
     }
 
@@ -106,10 +94,7 @@ impl Stages {
             input("iq", &vec![0f32; lateral.len()]),
             input("log image", &vec![0f32; lateral.len() / 2]),
         ];
-        let threads = [
-            frame.samples.div_ceil(layout::AXIAL_SAMPLES),
-            frame.scanlines,
-        ];
+        let threads = [frame.samples.div_ceil(layout::AXIAL_SAMPLES), frame.scanlines];
         let after = self.run("axial", inputs, threads);
         (values(&after[3]), values(&after[4]))
     }
@@ -129,11 +114,7 @@ impl Stages {
 
 /// A convex, a linear and a phased array.
 pub fn every_kind() -> [(&'static str, Probe); 3] {
-    [
-        ("convex", Probe::paper_table1()),
-        ("linear", Probe::linear()),
-        ("phased", Probe::phased()),
-    ]
+    [("convex", Probe::paper_table1()), ("linear", Probe::linear()), ("phased", Probe::phased())]
 }
 
 #[cfg(test)]
@@ -147,11 +128,7 @@ mod tests {
     /// The accumulators' end is reported once per sample, whichever of its four numbers reached it.
     #[test]
     fn saturation_is_counted() {
-        let scene = scene(Probe {
-            scanlines: 3,
-            samples: 50,
-            ..Probe::linear()
-        });
+        let scene = scene(Probe { scanlines: 3, samples: 50, ..Probe::linear() });
         let (frame, rows) = (tables::frame(&scene, 0), tables::rows(&scene));
         let (mut surface, mut volume) = (vec![0; 300], vec![0; 300]);
         surface[0] = 1 << 30;
@@ -165,11 +142,7 @@ mod tests {
     /// What the log image must be at the ends of the envelope's range.
     #[test]
     fn detection_of_nothing_and_of_everything() {
-        let scene = scene(Probe {
-            scanlines: 1,
-            samples: 4,
-            ..Probe::linear()
-        });
+        let scene = scene(Probe { scanlines: 1, samples: 4, ..Probe::linear() });
         let (frame, rows) = (tables::frame(&scene, 0), tables::rows(&scene));
         let iq = [0.0, 0.0, 1e9, 0.0, f32::NAN, 0.0, f32::INFINITY, 0.0];
         let log = Stages::new(&test_device()).detect(&frame, &rows, &iq);

@@ -39,10 +39,7 @@ fn statistics_hold_for_sixteen_seeds() {
         assert!(beyond <= usize::from(distance), "{what}: {figures:#?}");
         let errors: Vec<f64> = figures.iter().map(|f| f.measured - f.expected).collect();
         let bias = mean(&errors).abs();
-        assert!(
-            distance || bias <= 0.5 * figures[0].tolerance,
-            "{what}: on average off by {bias}"
-        );
+        assert!(distance || bias <= 0.5 * figures[0].tolerance, "{what}: on average off by {bias}");
         println!(
             "{what}: off by {bias:.4} on average, {:.4} at most; {:.4} allowed",
             errors.iter().map(|e| e.abs()).fold(0.0, f64::max),

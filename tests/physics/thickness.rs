@@ -110,10 +110,7 @@ fn delays(bench: &Bench, physics: Physics) -> Outcome {
                 })
                 .collect();
             let without = |left_out: Option<usize>| {
-                let kept = powers
-                    .iter()
-                    .enumerate()
-                    .filter(|(i, _)| Some(*i) != left_out);
+                let kept = powers.iter().enumerate().filter(|(i, _)| Some(*i) != left_out);
                 kept.fold(vec![0.0; SAMPLES as usize], |mut sum: Vec<f64>, (_, p)| {
                     sum.iter_mut().zip(p).for_each(|(s, p)| *s += p);
                     sum
@@ -121,9 +118,8 @@ fn delays(bench: &Bench, physics: Physics) -> Outcome {
             };
             let total = without(None);
             let measured = moments(&total);
-            let left: Vec<[f64; 2]> = (0..powers.len())
-                .map(|i| moments(&without(Some(i))))
-                .collect();
+            let left: Vec<[f64; 2]> =
+                (0..powers.len()).map(|i| moments(&without(Some(i)))).collect();
             for (i, what) in ["mean place", "variance"].into_iter().enumerate() {
                 // Standard error by the jackknife over seeds.
                 let n = f64::from(SEEDS);
@@ -133,10 +129,7 @@ fn delays(bench: &Bench, physics: Physics) -> Outcome {
                 out.compare(what, measured[i], expected[i], 4.0 * error);
             }
             let sum: f64 = total.iter().sum();
-            let points = total
-                .iter()
-                .enumerate()
-                .map(|(k, p)| [k as f64 - PLACE, p / sum]);
+            let points = total.iter().enumerate().map(|(k, p)| [k as f64 - PLACE, p / sum]);
             plot.curves.push(Curve {
                 label: tracer.to_string(),
                 points: points.skip(75).take(40).collect(),
@@ -153,17 +146,11 @@ fn profile(tau: f64, samples: f64) -> Plot {
     let density = |x: f64| (2.0 / PI).sqrt() / samples * (-0.5 * (x / samples).powi(2)).exp();
     Plot {
         title: format!("Where a surface of {tau} mm echoes"),
-        axes: [
-            "behind the surface, samples".into(),
-            "share of energy".into(),
-        ],
+        axes: ["behind the surface, samples".into(), "share of energy".into()],
         logarithmic: [false, false],
         curves: vec![Curve {
             label: "half-normal".into(),
-            points: (0..160)
-                .map(|i| 0.2 * f64::from(i))
-                .map(|x| [x, density(x)])
-                .collect(),
+            points: (0..160).map(|i| 0.2 * f64::from(i)).map(|x| [x, density(x)]).collect(),
             line: true,
         }],
     }
@@ -216,10 +203,8 @@ fn coherence(bench: &Bench, physics: Physics) -> Outcome {
         }],
     };
     for tracer in TRACERS {
-        for (name, measure) in [
-            ("summed", summed as fn(&Bench, _, _, _) -> f64),
-            ("split", split),
-        ] {
+        for (name, measure) in [("summed", summed as fn(&Bench, _, _, _) -> f64), ("split", split)]
+        {
             let measured = THICKNESSES
                 .map(|(tau, seeds)| [tau, measure(bench, tracer, thicker(physics, tau), seeds)]);
             for [tau, part] in measured {
@@ -249,12 +234,7 @@ fn summed(bench: &Bench, tracer: Tracer, tau: f64, seeds: u32) -> f64 {
     let mut range = Range::new(bench, &scene, tracer);
     let sum = (1..=seeds).fold([0.0; 2], |sum, seed| {
         scene.simulation.seed = seed;
-        let part = echo(
-            &scene,
-            &range.shoot(&scene).surface[0],
-            PLACE * PITCH / SPEED,
-            40,
-        );
+        let part = echo(&scene, &range.shoot(&scene).surface[0], PLACE * PITCH / SPEED, 40);
         [sum[0] + part[0], sum[1] + part[1]]
     });
     sum[0].hypot(sum[1]) / f64::from(seeds)
@@ -307,11 +287,7 @@ fn energies(bench: &Bench, physics: Physics, out: &mut Outcome) {
             out.compare(what, decibel, 0.0, 0.5);
             points.push([f64::from(paths), decibel]);
         }
-        plot.curves.push(Curve {
-            label: tracer.to_string(),
-            points,
-            line: false,
-        });
+        plot.curves.push(Curve { label: tracer.to_string(), points, line: false });
     }
     out.plots.push(plot);
 }

@@ -55,11 +55,7 @@ fn plate_in_water(renderer: &Renderer, depth: f64, physics: Physics, out: &mut O
 fn plate_behind_fat(renderer: &Renderer, physics: Physics, out: &mut Outcome) {
     let with_fat = physics == Physics::Right;
     let tissue = silent(1.540, 1.600, 0.0);
-    let first = if with_fat {
-        silent(1.440, 1.340, 0.0)
-    } else {
-        tissue.clone()
-    };
+    let first = if with_fat { silent(1.440, 1.340, 0.0) } else { tissue.clone() };
     let mut scene = linear(1, 1.0, first);
     add_layer(&mut scene, 10.0, tissue);
     add_layer(&mut scene, 40.0, silent(1.540, 1.700, 0.0));

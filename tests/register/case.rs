@@ -104,13 +104,7 @@ impl Case {
             middle + shift + 12.0 * DVec3::new(0.6, 0.64, -0.48),
         ) * DAffine3::from_translation(-middle);
         let truth = motion * present;
-        Self {
-            folder,
-            mesh,
-            world_from_model,
-            truth,
-            present,
-        }
+        Self { folder, mesh, world_from_model, truth, present }
     }
 
     pub fn write(&self, name: &str, text: &str) {
@@ -122,9 +116,7 @@ impl Case {
     }
 
     pub fn load(&self, name: &str) -> Scene {
-        Scene::load(&self.folder.path().join(name), &[])
-            .expect("sound")
-            .0
+        Scene::load(&self.folder.path().join(name), &[]).expect("sound").0
     }
 
     /// LPS from the model's own space.

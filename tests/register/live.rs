@@ -58,9 +58,7 @@ const TIME: f64 = 0.5;
 
 /// The scene with these settings, at [`TIME`].
 fn load(folder: &Path, settings: &[(&str, &str)]) -> Scene {
-    let settings = settings
-        .iter()
-        .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
+    let settings = settings.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned()));
     let settings: Vec<_> = settings.collect();
     let loaded = Scene::load(&folder.join("scene.toml"), &settings);
     let mut scene = loaded.expect("sound").0;
@@ -97,11 +95,7 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
     let cases: [&[(&str, &str)]; 4] = [
         &[("model.translate", "[-2, 0.5, 3]"), ("model.rotate", turn)],
         &[("model.scale", "1.2"), ("model.translate", "[0, 0, -4]")],
-        &[
-            ("volume.translate", "[4, 0, -2]"),
-            ("volume.scale", "0.9"),
-            ("volume.white", "120"),
-        ],
+        &[("volume.translate", "[4, 0, -2]"), ("volume.scale", "0.9"), ("volume.white", "120")],
         &[("fusion.mask", "[\"block\", \"plate\"]")],
     ];
     for tracer in [Tracer::Bvh, Tracer::RayQuery] {
@@ -128,10 +122,7 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
             let display = plain.volume.as_ref().expect("a volume").display();
             scene.volume.as_mut().expect("a volume").show(&display);
             scene.fusion.clone_from(&plain.fusion);
-            assert!(
-                pixels(&mut simulator, &scene) == before,
-                "{tracer} {settings:?}: back"
-            );
+            assert!(pixels(&mut simulator, &scene) == before, "{tracer} {settings:?}: back");
         }
     }
     assert_eq!(device.validation_messages(), Vec::<String>::new());

@@ -29,10 +29,7 @@ fn a_volume_is_laid_onto_the_model_from_landmarks_ten_millimetres_off() {
         case.points(sigma, share);
         let text = case.register(&[&SURFACE[..], &landmarks, &["-o", "new.toml"]].concat());
         let (off, angle, scale) = case.error(&case.placement("new.toml"));
-        assert!(
-            off < most && angle < 0.3 && scale < 1e-9,
-            "{off} {angle} {scale}: {text}"
-        );
+        assert!(off < most && angle < 0.3 && scale < 1e-9, "{off} {angle} {scale}: {text}");
         assert!(text.contains("landmarks: 6, rms"), "{text}");
     }
     // Planted: the comparison sees the placement before, the landmarks alone, and the inverse.
@@ -45,10 +42,7 @@ fn a_volume_is_laid_onto_the_model_from_landmarks_ten_millimetres_off() {
     assert!(case.error(&inverse).0 > 50.0);
     // And from where the scene has it, hundreds of mm off, nothing is guessed.
     let (ok, text) = case.run(&SURFACE);
-    assert!(
-        !ok && text.contains("mm off the surface") && text.contains("--landmarks"),
-        "{text}"
-    );
+    assert!(!ok && text.contains("mm off the surface") && text.contains("--landmarks"), "{text}");
     let text = case.register(&[&SURFACE[..], &["--start", "centroids", "-o", "new.toml"]].concat());
     let (off, angle, _) = case.error(&case.placement("new.toml"));
     assert!(off < 0.5 && angle < 0.5, "{off} {angle}: {text}");
@@ -66,9 +60,7 @@ fn the_voxel_of_the_bump_comes_to_lie_on_the_bump() {
     let voxel = DVec3::new(from_first.y, -from_first.x, from_first.z) / 7.0;
     let off = |scene: &Scene| {
         let shown = scene.volume.as_ref().expect("placed").world_from_voxel;
-        let model = scene.instances[0]
-            .world_from_object
-            .transform_point3(apex());
+        let model = scene.instances[0].world_from_object.transform_point3(apex());
         shown.transform_point3(voxel).distance(model)
     };
     assert!(off(&case.load("scene.toml")) > 8.0);
@@ -89,22 +81,11 @@ fn the_voxel_of_the_bump_comes_to_lie_on_the_bump() {
         assert!(p.angle_between(q).to_degrees() < 0.3, "{name}");
     }
     let text = case.read("womb.toml");
-    let changed = text
-        .lines()
-        .zip(SCENE.lines())
-        .filter(|(a, b)| a != b)
-        .count();
-    assert!(
-        changed > 0 && text.contains("motion = { kind = \"sine\""),
-        "{text}"
-    );
+    let changed = text.lines().zip(SCENE.lines()).filter(|(a, b)| a != b).count();
+    assert!(changed > 0 && text.contains("motion = { kind = \"sine\""), "{text}");
     // At another time the parent has moved on, and the model's own placement makes up for it.
     case.register(
-        &[
-            &SURFACE[..],
-            &["--move", "model", "--time", "1 s", "-o", "later.toml"],
-        ]
-        .concat(),
+        &[&SURFACE[..], &["--move", "model", "--time", "1 s", "-o", "later.toml"]].concat(),
     );
     let mut scene = case.load("later.toml");
     assert!(off(&scene) > 1.0);
@@ -116,17 +97,10 @@ fn the_voxel_of_the_bump_comes_to_lie_on_the_bump() {
 fn a_scale_is_found_where_it_may_change() {
     let case = Case::new(model(), 1.07, DVec3::ZERO);
     case.points(0.3, 0.2);
-    let args = [
-        &SURFACE[..],
-        &["--transformation", "similarity", "-o", "new.toml"],
-    ]
-    .concat();
+    let args = [&SURFACE[..], &["--transformation", "similarity", "-o", "new.toml"]].concat();
     let text = case.register(&args);
     let (off, angle, scale) = case.error(&case.placement("new.toml"));
-    assert!(
-        off < 0.5 && angle < 0.3 && scale < 0.005,
-        "{off} {angle} {scale}: {text}"
-    );
+    assert!(off < 0.5 && angle < 0.3 && scale < 0.005, "{off} {angle} {scale}: {text}");
     // Planted: a rigid fit keeps the scene's scale, and both the comparison and the program see it.
     let text = case.register(&[&SURFACE[..], &["-o", "rigid.toml"]].concat());
     let (off, _, scale) = case.error(&case.placement("rigid.toml"));
@@ -139,14 +113,9 @@ fn a_segmented_mesh_does_as_well_in_either_frame() {
     let case = Case::new(model(), 1.0, DVec3::ZERO);
     let placed = case.lps_from_model();
     let lps = obj(&case.mesh, |p| placed.transform_point3(p));
-    let ras = obj(&case.mesh, |p| {
-        placed.transform_point3(p) * DVec3::new(-1.0, -1.0, 1.0)
-    });
+    let ras = obj(&case.mesh, |p| placed.transform_point3(p) * DVec3::new(-1.0, -1.0, 1.0));
     case.write("lps.obj", &lps);
-    case.write(
-        "said.obj",
-        &format!("# written by 3D Slicer SPACE=RAS\n{ras}"),
-    );
+    case.write("said.obj", &format!("# written by 3D Slicer SPACE=RAS\n{ras}"));
     case.write("ras.obj", &ras);
     let common = ["--surface", "model", "-o", "new.toml", "--samples", "2000"];
     for args in [
@@ -160,10 +129,7 @@ fn a_segmented_mesh_does_as_well_in_either_frame() {
     }
     // Planted: without the frame it is somewhere else, and the volume's box says so.
     let (ok, text) = case.run(&[&common[..], &["--volume-surface", "ras.obj"]].concat());
-    assert!(
-        text.contains("0 % of the points lie in the volume; with x and y turned"),
-        "{text}"
-    );
+    assert!(text.contains("0 % of the points lie in the volume; with x and y turned"), "{text}");
     assert!(!ok || case.error(&case.placement("new.toml")).0 > 10.0);
 }
 
@@ -175,11 +141,7 @@ fn the_scene_file_keeps_all_else_and_says_how_well_it_fits() {
     for args in [&[][..], &["--dry-run"]] {
         let text = case.register(&[&SURFACE[..], args].concat());
         assert!(text.contains("volume.translate = ["), "{text}");
-        assert_eq!(
-            text.contains("nothing is written"),
-            args.is_empty(),
-            "{text}"
-        );
+        assert_eq!(text.contains("nothing is written"), args.is_empty(), "{text}");
         assert_eq!(case.read("scene.toml"), SCENE);
     }
     let text = case.register(&[&SURFACE[..], &["--json", "r.json", "-o", "new.toml"]].concat());
@@ -188,56 +150,29 @@ fn the_scene_file_keeps_all_else_and_says_how_well_it_fits() {
     let report: serde_json::Value = serde_json::from_str(&case.read("r.json")).expect("JSON");
     let surface = &report["surface"];
     assert_eq!(surface["points"], 2500);
-    assert!(
-        (surface["rms_mm"].as_f64().expect("a number") - 0.3).abs() < 0.05,
-        "{report}"
-    );
+    assert!((surface["rms_mm"].as_f64().expect("a number") - 0.3).abs() < 0.05, "{report}");
     // Strays that lie near the surface by chance stay.
     let trimmed = surface["trimmed_share"].as_f64().expect("a number");
-    assert!(
-        (0.8 * strays..=strays).contains(&trimmed),
-        "{trimmed} of {strays}"
-    );
-    let note: Vec<_> = written
-        .lines()
-        .filter(|l| l.contains("registered"))
-        .collect();
-    let rms = format!(
-        "rms {:.3} mm",
-        surface["rms_mm"].as_f64().expect("a number")
-    );
+    assert!((0.8 * strays..=strays).contains(&trimmed), "{trimmed} of {strays}");
+    let note: Vec<_> = written.lines().filter(|l| l.contains("registered")).collect();
+    let rms = format!("rms {:.3} mm", surface["rms_mm"].as_f64().expect("a number"));
     assert!(note.len() == 1 && note[0].starts_with("# registered: model, points.csv: 2500 points"));
     assert!(note[0].contains(&rms) && text.contains(&rms), "{note:?}");
     // Only the placement has changed.
     let other = |text: &str| -> Vec<String> {
         let ours = ["translate = [", "rotate = {", "# registered"];
-        let lines = text
-            .lines()
-            .filter(|l| !ours.iter().any(|o| l.starts_with(o)));
+        let lines = text.lines().filter(|l| !ours.iter().any(|o| l.starts_with(o)));
         lines.map(str::to_owned).collect()
     };
     assert_eq!(other(&written), other(SCENE));
-    assert!(
-        written.contains("# Placed by eye.\n# registered"),
-        "{written}"
-    );
-    assert!(
-        written
-            .lines()
-            .any(|l| l.starts_with("translate = [") && l.ends_with("# later"))
-    );
+    assert!(written.contains("# Placed by eye.\n# registered"), "{written}");
+    assert!(written.lines().any(|l| l.starts_with("translate = [") && l.ends_with("# later")));
     // What is read again is what was found, to the digits written.
     let vector = |key: &str| {
         let all = report[key].as_array().expect("a list").iter();
-        DVec3::from_slice(
-            &all.map(|x| x.as_f64().expect("a number"))
-                .collect::<Vec<_>>(),
-        )
+        DVec3::from_slice(&all.map(|x| x.as_f64().expect("a number")).collect::<Vec<_>>())
     };
-    let angle = report["rotate_angle_deg"]
-        .as_f64()
-        .expect("a number")
-        .to_radians();
+    let angle = report["rotate_angle_deg"].as_f64().expect("a number").to_radians();
     let said = DAffine3::from_scale_rotation_translation(
         DVec3::splat(0.9),
         DQuat::from_axis_angle(vector("rotate_axis").normalize(), angle),
@@ -245,11 +180,7 @@ fn the_scene_file_keeps_all_else_and_says_how_well_it_fits() {
     );
     let read = case.placement("new.toml");
     let far = DVec3::splat(300.0);
-    assert!(
-        read.transform_point3(far)
-            .distance(said.transform_point3(far))
-            < 1e-9
-    );
+    assert!(read.transform_point3(far).distance(said.transform_point3(far)) < 1e-9);
     // In place, again: the same, with one note.
     case.write("scene.toml", &written);
     case.register(&[&SURFACE[..], &["--in-place"]].concat());
@@ -267,11 +198,7 @@ fn a_shipped_surface_is_found() {
     let case = Case::new(mesh, 1.0, DVec3::ZERO);
     case.landmarks();
     case.points(0.3, 0.2);
-    let args = [
-        &SURFACE[..],
-        &["--landmarks", "landmarks.csv", "-o", "new.toml"],
-    ]
-    .concat();
+    let args = [&SURFACE[..], &["--landmarks", "landmarks.csv", "-o", "new.toml"]].concat();
     let text = case.register(&args);
     let (off, angle, _) = case.error(&case.placement("new.toml"));
     assert!(off < 1.0 && angle < 1.0, "{off} {angle}: {text}");

@@ -13,11 +13,7 @@ fn mistakes_are_explained_and_nothing_is_written() {
     case.landmarks();
     case.write("few.csv", "1,2,3\n4,5,6\n");
     case.write("letters.csv", "x,y,z\n1,2,three\n");
-    let lines: Vec<_> = case
-        .read("landmarks.csv")
-        .lines()
-        .map(str::to_owned)
-        .collect();
+    let lines: Vec<_> = case.read("landmarks.csv").lines().map(str::to_owned).collect();
     case.write("two.csv", &lines[..3].join("\n"));
     let line = "name,model_x,model_y,model_z,volume_x,volume_y,volume_z\n\
         a,0,0,0,0,0,0\nb,10,0,0,10,0,0\nc,20,0,0,20,0,0\nd,30,0,0,30,0,0\n";
@@ -29,50 +25,27 @@ fn mistakes_are_explained_and_nothing_is_written() {
     case.write("m.csv", model_side);
     case.write("v.csv", &model_side.replace("q,", "p,"));
     case.write("empty.obj", "# nothing\n");
-    case.write(
-        "unknown.obj",
-        "# SPACE=IJK\nv 0 0 0\nv 90 0 0\nv 0 90 0\nf 1 2 3\n",
-    );
+    case.write("unknown.obj", "# SPACE=IJK\nv 0 0 0\nv 90 0 0\nv 0 90 0\nf 1 2 3\n");
     let points = |more: &[&'static str]| [&SURFACE[..], more].concat();
     let surface = |name: &'static str| vec!["--surface", name, "--points", "points.csv"];
     for (args, cause, remedy) in [
         (vec!["--surface", "model"], "required", "--points"),
         (vec!["--points", "points.csv"], "required", "--surface"),
-        (
-            points(&["--volume-surface", "empty.obj"]),
-            "cannot be used with",
-            "--volume-surface",
-        ),
-        (
-            points(&["--in-place", "-o", "x.toml"]),
-            "cannot be used with",
-            "--in-place",
-        ),
+        (points(&["--volume-surface", "empty.obj"]), "cannot be used with", "--volume-surface"),
+        (points(&["--in-place", "-o", "x.toml"]), "cannot be used with", "--in-place"),
         (
             points(&["--start", "centroids", "--landmarks", "two.csv"]),
             "cannot be used with",
             "--landmarks",
         ),
-        (
-            surface("modle"),
-            "there is no mesh `modle` in the scene",
-            "did you mean `model`?",
-        ),
-        (
-            surface("gone.obj"),
-            "gone.obj: cannot be read",
-            "check the path",
-        ),
+        (surface("modle"), "there is no mesh `modle` in the scene", "did you mean `model`?"),
+        (surface("gone.obj"), "gone.obj: cannot be read", "check the path"),
         (
             vec!["--surface", "model", "--points", "gone.csv"],
             "gone.csv: cannot be read",
             "check the path",
         ),
-        (
-            vec!["--surface", "model", "--points", "few.csv"],
-            "2 points are given",
-            "--landmarks",
-        ),
+        (vec!["--surface", "model", "--points", "few.csv"], "2 points are given", "--landmarks"),
         (
             vec!["--surface", "model", "--points", "letters.csv"],
             "letters.csv:2: z: `three` is not a number",
@@ -88,51 +61,19 @@ fn mistakes_are_explained_and_nothing_is_written() {
             "frame `IJK`",
             "LPS or RAS",
         ),
-        (
-            points(&["--landmarks", "two.csv"]),
-            "2 landmarks are given",
-            "at least three",
-        ),
-        (
-            points(&["--landmarks", "line.csv"]),
-            "lie on a line",
-            "far from that line",
-        ),
-        (
-            points(&["--landmarks", "mirrored.csv"]),
-            "the landmarks are mirrored",
-            "wrong side",
-        ),
-        (
-            points(&["--landmarks", "points.csv"]),
-            "has no column `model_x`",
-            "model_x,model_y",
-        ),
-        (
-            points(&["--model-landmarks", "m.csv"]),
-            "required",
-            "--volume-landmarks",
-        ),
+        (points(&["--landmarks", "two.csv"]), "2 landmarks are given", "at least three"),
+        (points(&["--landmarks", "line.csv"]), "lie on a line", "far from that line"),
+        (points(&["--landmarks", "mirrored.csv"]), "the landmarks are mirrored", "wrong side"),
+        (points(&["--landmarks", "points.csv"]), "has no column `model_x`", "model_x,model_y"),
+        (points(&["--model-landmarks", "m.csv"]), "required", "--volume-landmarks"),
         (
             points(&["--model-landmarks", "m.csv", "--volume-landmarks", "v.csv"]),
             "several points called `p`",
             "label of its own",
         ),
+        (points(&["--move", "wombat"]), "no mesh or transform `wombat`", "did you mean `womb`?"),
         (
-            points(&["--move", "wombat"]),
-            "no mesh or transform `wombat`",
-            "did you mean `womb`?",
-        ),
-        (
-            [
-                "--surface",
-                "model.obj",
-                "--move",
-                "womb",
-                "--points",
-                "points.csv",
-            ]
-            .to_vec(),
+            ["--surface", "model.obj", "--move", "womb", "--points", "points.csv"].to_vec(),
             "does not carry the surface `model.obj`",
             "--move",
         ),
@@ -144,18 +85,13 @@ fn mistakes_are_explained_and_nothing_is_written() {
     }
     let bare = "background = \"water\"\n[[mesh]]\nname = \"model\"\ntissue = \"liver\"\nfile = \"model.obj\"\n";
     case.write("bare.toml", bare);
-    let (ok, text) = insonify(
-        case.folder.path(),
-        &[&["register", "bare.toml"], &SURFACE[..]].concat(),
-    );
+    let (ok, text) =
+        insonify(case.folder.path(), &[&["register", "bare.toml"], &SURFACE[..]].concat());
     assert!(
         !ok && text.contains("bare.toml has no volume") && text.contains("add [volume]"),
         "{text}"
     );
-    case.write(
-        "flat.toml",
-        &SCENE.replace("translate = [1, 2, 3]", "scale = [1, 1, 0.5]"),
-    );
+    case.write("flat.toml", &SCENE.replace("translate = [1, 2, 3]", "scale = [1, 1, 0.5]"));
     let (ok, text) = insonify(
         case.folder.path(),
         &[&["register", "flat.toml", "--move", "model"], &SURFACE[..]].concat(),

@@ -58,9 +58,7 @@ fn header(times: usize) -> String {
 fn values(time: usize) -> Vec<i16> {
     let count: usize = SIZE.iter().product();
     let hash = |i: usize| (i + 977 * time).wrapping_mul(2_654_435_761) >> 7;
-    (0..count)
-        .map(|i| (hash(i) % (500 + 300 * time)) as i16 - 200)
-        .collect()
+    (0..count).map(|i| (hash(i) % (500 + 300 * time)) as i16 - 200).collect()
 }
 
 fn bytes(values: &[i16]) -> Vec<u8> {
@@ -123,36 +121,11 @@ fn each_volume_has_its_time() {
         (format!("{ALL}loop = \"once\"\n"), 4.0, Loop::Once, 0.0),
         (format!("{ALL}rate = \"20 Hz\"\n"), 20.0, Loop::Repeat, 0.0),
         (format!("{FILES}rate = 20\n"), 20.0, Loop::Repeat, 0.0),
-        (
-            format!("{FILES}period = \"200 ms\"\n"),
-            20.0,
-            Loop::Repeat,
-            0.0,
-        ),
-        (
-            format!("{FILES}period = 0.7\n"),
-            4.0 / 0.7,
-            Loop::Repeat,
-            0.0,
-        ),
-        (
-            format!("{FILES}rate = 7\nloop = \"once\"\n"),
-            7.0,
-            Loop::Once,
-            0.0,
-        ),
-        (
-            format!("{ALL}loop = \"ping-pong\"\n"),
-            4.0,
-            Loop::PingPong,
-            0.0,
-        ),
-        (
-            format!("{FILES}rate = 7\nloop = \"ping-pong\"\n"),
-            7.0,
-            Loop::PingPong,
-            0.0,
-        ),
+        (format!("{FILES}period = \"200 ms\"\n"), 20.0, Loop::Repeat, 0.0),
+        (format!("{FILES}period = 0.7\n"), 4.0 / 0.7, Loop::Repeat, 0.0),
+        (format!("{FILES}rate = 7\nloop = \"once\"\n"), 7.0, Loop::Once, 0.0),
+        (format!("{ALL}loop = \"ping-pong\"\n"), 4.0, Loop::PingPong, 0.0),
+        (format!("{FILES}rate = 7\nloop = \"ping-pong\"\n"), 7.0, Loop::PingPong, 0.0),
         (format!("{ALL}phase = 0.5\n"), 4.0, Loop::Repeat, 0.5),
     ] {
         let mut scene = load(folder.path(), &keys).expect("sound");
@@ -169,9 +142,7 @@ fn each_volume_has_its_time() {
             let found = acquired.now;
             assert_eq!(found, expected(at, rate, 4, mode, 0.0), "{keys}{time} s");
             planted += usize::from(found != expected(at, rate, 4, mode, 1.0));
-            let Voxels::I16(shown) = acquired.voxels() else {
-                panic!("of 16 bits")
-            };
+            let Voxels::I16(shown) = acquired.voxels() else { panic!("of 16 bits") };
             assert_eq!(*shown, values(found));
         }
         // One volume late is noticed.
@@ -211,14 +182,7 @@ fn a_frame_is_that_of_its_volume_alone_to_the_last_bit() {
         // It begins where the scene stands, and goes to and fro as the scene does.
         scene.set_time(0.5);
         let mut simulator = simulator(&device, &scene);
-        for (time, k) in [
-            (0.5, 2),
-            (0.0, 0),
-            (0.74, 2),
-            (0.75, 3),
-            (1.0, 0),
-            (-0.1, 3),
-        ] {
+        for (time, k) in [(0.5, 2), (0.0, 0), (0.74, 2), (0.75, 3), (1.0, 0), (-0.1, 3)] {
             scene.set_time(time);
             let found = shoot(&mut simulator, &scene);
             assert!(found == alone[k], "{keys}{time} s is not volume {k}");
@@ -240,10 +204,7 @@ fn a_frame_is_that_of_its_volume_alone_to_the_last_bit() {
         let mut other = self::simulator(&device, &still);
         assert!(here == dumped(&mut other, &still), "of another time");
         scene.set_time(0.0);
-        assert!(
-            here != dumped(&mut simulator, &scene),
-            "the same at all times"
-        );
+        assert!(here != dumped(&mut simulator, &scene), "the same at all times");
     }
     // Levels of its own would make a volume flicker: 1 uses a third of what 3 does.
     let own = load(folder.path(), "file = \"t0.mha\"\n").expect("sound");
@@ -266,38 +227,23 @@ fn the_background_switches_at_its_time_and_back() {
     let bytes = simulator.memory().volume;
     assert!(bytes >= 2 * count as u64, "{bytes}");
     let mut balls = Vec::new();
-    for (time, level) in [
-        (0.0, 0),
-        (0.49, 0),
-        (0.5, 255),
-        (0.99, 255),
-        (1.0, 0),
-        (1.5, 255),
-        (0.2, 0),
-    ] {
+    for (time, level) in
+        [(0.0, 0), (0.49, 0), (0.5, 255), (0.99, 255), (1.0, 0), (1.5, 255), (0.2, 0)]
+    {
         scene.set_time(time);
         simulator.frame(&scene, 0).expect("a frame");
         let (width, height, pixels) = simulator.pixels().expect("pixels");
         let at = |x: u32, y: u32| pixels[4 * (y * width + x) as usize];
-        let corners = [
-            (3, 3),
-            (width - 4, 3),
-            (3, height - 4),
-            (width - 4, height - 4),
-        ];
+        let corners = [(3, 3), (width - 4, 3), (3, height - 4), (width - 4, height - 4)];
         assert_eq!(corners.map(|(x, y)| at(x, y)), [level; 4], "{time} s");
         // The ball spans 16 pixels to either side of its middle, which no change reaches.
         let (x, y) = (width / 2, height * 11 / 24);
-        let ball: Vec<_> = (x - 8..x + 8)
-            .flat_map(|x| (y - 8..y + 8).map(move |y| (x, y)))
-            .collect();
+        let ball: Vec<_> =
+            (x - 8..x + 8).flat_map(|x| (y - 8..y + 8).map(move |y| (x, y))).collect();
         balls.push(ball.iter().map(|&(x, y)| at(x, y)).collect::<Vec<_>>());
     }
     assert!(balls.iter().all(|ball| *ball == balls[0]));
-    assert!(
-        balls[0].iter().any(|&v| v != balls[0][0]),
-        "nothing is simulated"
-    );
+    assert!(balls[0].iter().any(|&v| v != balls[0][0]), "nothing is simulated");
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
@@ -315,10 +261,7 @@ fn volumes_beyond_the_devices_limit_are_averaged_alike() {
     };
     let place = DAffine3::from_translation(DVec3::new(-14.0, -5.0, -1.0))
         * DAffine3::from_scale(DVec3::new(28.0 / long as f64, 10.0, 30.0));
-    let clock = Clock {
-        period: 3.0,
-        ..Clock::default()
-    };
+    let clock = Clock { period: 3.0, ..Clock::default() };
     let series = Acquired {
         size: [long, 2, 2],
         volumes: (0..3).map(volume).collect(),

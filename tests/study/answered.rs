@@ -67,17 +67,11 @@ fn tables_are_written_and_printed() {
         assert!(said.contains(part), "{part}: {said}");
     }
     let table = std::fs::read_to_string(folder.path().join("t.csv")).expect("written");
-    assert!(
-        table.contains("Friedman's test,,backgrounds,p,0.125\n"),
-        "{table}"
-    );
+    assert!(table.contains("Friedman's test,,backgrounds,p,0.125\n"), "{table}");
     let more = ["-o", "t.md", "--ratings", "r.csv"];
     assert!(evaluate(folder.path(), &[&both[..], &more].concat()).0);
     let table = std::fs::read_to_string(folder.path().join("t.md")).expect("written");
-    assert!(
-        table.contains("| secondscene | scatterers | 0 | 2 | 2.00 |"),
-        "{table}"
-    );
+    assert!(table.contains("| secondscene | scatterers | 0 | 2 | 2.00 |"), "{table}");
     let rows = std::fs::read_to_string(folder.path().join("r.csv")).expect("written");
     assert_eq!(rows.lines().count(), 9);
 }
@@ -100,38 +94,21 @@ fn mistakes_are_explained_and_nothing_is_written() {
         },
         ..row.clone()
     });
-    write(
-        "swapped.csv",
-        Key::new(swapped.collect()).expect("a study").text(),
-    );
+    write("swapped.csv", Key::new(swapped.collect()).expect("a study").text());
     write("a.json", saved(&key, "a").to_string());
-    let edited = saved(&key, "b")
-        .to_string()
-        .replacen("\"agreement\":4", "\"agreement\":5", 1);
+    let edited = saved(&key, "b").to_string().replacen("\"agreement\":4", "\"agreement\":5", 1);
     write("b.json", edited);
     for (args, parts) in [
         (
             &["a.json", "-k", "swapped.csv"][..],
             &["the key is that of", "written with its form"][..],
         ),
-        (
-            &["a.json", "-k", "edited.csv"],
-            &["edited.csv", "as `insonify study make` wrote it"],
-        ),
-        (
-            &["b.json", "-k", "key.csv"],
-            &["b.json", "changed after it was saved"],
-        ),
+        (&["a.json", "-k", "edited.csv"], &["edited.csv", "as `insonify study make` wrote it"]),
+        (&["b.json", "-k", "key.csv"], &["b.json", "changed after it was saved"]),
         (&["a.json", "a.json", "-k", "key.csv"], &["the same form"]),
         (&["key.csv", "-k", "key.csv"], &["not a file of answers"]),
-        (
-            &["none.json", "-k", "key.csv"],
-            &["none.json", "cannot be read"],
-        ),
-        (
-            &["a.json", "-k", "key.csv", "-o", "t.xls"],
-            &["`xls`", "NAME.csv or NAME.md"],
-        ),
+        (&["none.json", "-k", "key.csv"], &["none.json", "cannot be read"]),
+        (&["a.json", "-k", "key.csv", "-o", "t.xls"], &["`xls`", "NAME.csv or NAME.md"]),
         (&["a.json", "-k", "key.csv", "-o", "no/t.md"], &["no/t.md"]),
         (&["-k", "key.csv"], &["<ANSWERS>"]),
     ] {

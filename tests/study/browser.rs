@@ -111,10 +111,7 @@ impl Browser {
 
     /// Opens a file.
     pub fn open(&self, page: &Path) {
-        self.post(
-            "/url",
-            &json!({ "url": format!("file://{}", page.display()) }),
-        );
+        self.post("/url", &json!({ "url": format!("file://{}", page.display()) }));
     }
 
     /// What a script returns.
@@ -132,10 +129,7 @@ impl Browser {
     }
 
     fn element(&self, css: &str) -> String {
-        let found = self.post(
-            "/element",
-            &json!({ "using": "css selector", "value": css }),
-        );
+        let found = self.post("/element", &json!({ "using": "css selector", "value": css }));
         let id = found.as_object().and_then(|o| o.values().next());
         let id = id.and_then(Value::as_str).expect("an element");
         format!("/element/{id}")

@@ -15,13 +15,9 @@ use crate::{IMAGES, desk, program};
 fn downloaded(browser: &Browser, to: &Path) -> PathBuf {
     let begun = std::time::Instant::now();
     loop {
-        let all = std::fs::read_dir(browser.saved())
-            .expect("a folder")
-            .flatten();
-        let whole: Vec<PathBuf> = all
-            .map(|e| e.path())
-            .filter(|p| p.extension().is_some_and(|e| e == "json"))
-            .collect();
+        let all = std::fs::read_dir(browser.saved()).expect("a folder").flatten();
+        let whole: Vec<PathBuf> =
+            all.map(|e| e.path()).filter(|p| p.extension().is_some_and(|e| e == "json")).collect();
         if let [file] = whole.as_slice() {
             std::fs::rename(file, to).expect("moved");
             return to.to_owned();
@@ -39,11 +35,7 @@ const LOADED: &str =
 /// Shows a page by its button at the bottom.
 fn go(browser: &Browser, page: &str) {
     let ids = browser.run("return [...document.querySelectorAll('.page')].map(p => p.id)");
-    let place = ids
-        .as_array()
-        .expect("pages")
-        .iter()
-        .position(|id| id == page);
+    let place = ids.as_array().expect("pages").iter().position(|id| id == page);
     let nth = place.expect("a page") + 1;
     browser.click(&format!("#pages li:nth-child({nth}) button"));
     assert_eq!(browser.run(SHOWN), json!([page]));
@@ -109,40 +101,27 @@ fn an_assessor_fills_the_form() {
     browser.press(RIGHT);
     assert_eq!(browser.run(alt), json!("Case 1, image 2"));
     browser.press(ENTER);
-    assert_eq!(
-        browser.run("return document.getElementById('large').open"),
-        json!(false)
-    );
+    assert_eq!(browser.run("return document.getElementById('large').open"), json!(false));
     assert_eq!(checked(&browser, "image-1"), json!("2"));
     // The chosen image stands beside the statement; the first Next leads there.
     let same = "return document.getElementById('chosen-1').src === document.getElementById('image-1-2').src";
     assert_eq!(browser.run(same), json!(true));
     browser.click("#next");
     assert_eq!(browser.run(SHOWN), json!(["case-1"]));
-    assert_eq!(
-        browser.run("return document.activeElement.name"),
-        json!("agreement-1")
-    );
+    assert_eq!(browser.run("return document.activeElement.name"), json!("agreement-1"));
     browser.press(SPACE);
     assert_eq!(checked(&browser, "agreement-1"), json!("1"));
     // Another image is another question.
     browser.click("#case-1 input[name='image-1'][value='3']");
     assert_eq!(checked(&browser, "agreement-1"), Value::Null);
-    assert!(
-        notice(&browser).contains("please rate it"),
-        "{}",
-        notice(&browser)
-    );
+    assert!(notice(&browser).contains("please rate it"), "{}", notice(&browser));
     browser.click("#case-1 input[name='agreement-1'][value='2']");
     browser.type_into("#remark-1", "Grainy \u{1f600} \"so\"");
 
     let groups = key.groups();
     go(&browser, "ranking-1");
     let locked = browser.run("return document.querySelector('#ranking-1 .locked').textContent");
-    assert!(
-        locked.as_str().expect("text").contains("opens when"),
-        "{locked}"
-    );
+    assert!(locked.as_str().expect("text").contains("opens when"), "{locked}");
     for case in 2..=key.cases() {
         go(&browser, &format!("case-{case}"));
         let (image, degree) = (case % 4 + 1, 6 - case);
@@ -152,11 +131,7 @@ fn an_assessor_fills_the_form() {
     // What was answered outlives the page.
     browser.open(&page);
     browser.wait(LOADED);
-    assert!(
-        notice(&browser).contains("here again"),
-        "{}",
-        notice(&browser)
-    );
+    assert!(notice(&browser).contains("here again"), "{}", notice(&browser));
     for (number, group) in (1..).zip(&groups) {
         go(&browser, &format!("ranking-{number}"));
         let [first, second] = [0, 1].map(|i| format!("#rank-{number}-{}", group[i]));
@@ -175,18 +150,11 @@ fn an_assessor_fills_the_form() {
     let answers = Answers::read(&file, &key).expect("as the form saved it");
     assert_eq!(answers.assessor.name, "A. B\u{e4}r");
     assert_eq!(answers.cases[0].remark, "Grainy \u{1f600} \"so\"");
-    let chosen: Vec<_> = answers
-        .cases
-        .iter()
-        .map(|c| (c.image, c.agreement))
-        .collect();
+    let chosen: Vec<_> = answers.cases.iter().map(|c| (c.image, c.agreement)).collect();
     let made = [(3, 2), (3, 4), (4, 3), (1, 2)].map(|(a, b)| (Some(a), Some(b)));
     assert_eq!(chosen, made);
     for (ranking, group) in answers.rankings.iter().zip(&groups) {
-        assert_eq!(
-            (&ranking.cases, ranking.complete()),
-            (group, Some(vec![2, 1]))
-        );
+        assert_eq!((&ranking.cases, ranking.complete()), (group, Some(vec![2, 1])));
     }
     assert_eq!(answers.missing(), [0; 3]);
     let args = ["study", "answers", "saved.json", "--key", "first/key.csv"];
@@ -200,11 +168,8 @@ fn an_assessor_fills_the_form() {
     assert_eq!(checked(&browser, "image-1"), Value::Null);
     let text = std::fs::read_to_string(&file).expect("a file");
     let changed = desk.path("changed.json");
-    std::fs::write(
-        &changed,
-        text.replacen("\"agreement\": 2", "\"agreement\": 5", 1),
-    )
-    .expect("written");
+    std::fs::write(&changed, text.replacen("\"agreement\": 2", "\"agreement\": 5", 1))
+        .expect("written");
     for (file, said) in [
         (&changed, "was changed after it was saved"),
         (&page, "was not loaded"),
@@ -213,30 +178,21 @@ fn an_assessor_fills_the_form() {
         browser.type_into("#load", &file.display().to_string());
         let script = "return document.getElementById('notice').textContent.includes";
         browser.wait(&format!("{script}({})", json!(said)));
-        let expected = if file.ends_with("saved.json") {
-            json!("3")
-        } else {
-            Value::Null
-        };
+        let expected = if file.ends_with("saved.json") { json!("3") } else { Value::Null };
         assert_eq!(checked(&browser, "image-1"), expected);
     }
     go(&browser, "end");
     browser.click("#save");
     let again = downloaded(&browser, &desk.path("again.json"));
     let again = Answers::read(&again, &key).expect("as the form saved it");
-    assert_eq!(
-        (again.response, again.cases),
-        (answers.response, answers.cases)
-    );
+    assert_eq!((again.response, again.cases), (answers.response, answers.cases));
 }
 
 /// A grey picture of one pixel.
 fn pixel(grey: u8) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());
     let image = image::GrayImage::from_pixel(1, 1, image::Luma([grey]));
-    image
-        .write_to(&mut out, image::ImageFormat::Png)
-        .expect("into memory");
+    image.write_to(&mut out, image::ImageFormat::Png).expect("into memory");
     out.into_inner()
 }
 
@@ -282,17 +238,8 @@ fn a_form_of_full_size_shows_every_image() {
     );
     assert_eq!(counts, json!([27, 9, 27, 621 + 27 * 5]));
     let ids = browser.run("return [...document.querySelectorAll('[id]')].map(e => e.id)");
-    let ids: Vec<_> = ids
-        .as_array()
-        .expect("a list")
-        .iter()
-        .map(Value::to_string)
-        .collect();
-    assert_eq!(
-        ids.iter().collect::<BTreeSet<_>>().len(),
-        ids.len(),
-        "ids are unique"
-    );
+    let ids: Vec<_> = ids.as_array().expect("a list").iter().map(Value::to_string).collect();
+    assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "ids are unique");
     let about = browser.run("return document.querySelector('#case-7 .about').textContent");
     assert_eq!(about, json!("Case of a <test> & number 7"));
     // Last case, last image, by the buttons that an assessor has.

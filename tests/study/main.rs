@@ -110,17 +110,7 @@ impl Desk {
 
     /// Whether `study make` went well, and what it said.
     fn make(&self, args: &[&str]) -> (bool, String) {
-        let all = [
-            &[
-                "study",
-                "make",
-                "plan.toml",
-                "--tracer",
-                "bvh",
-                "--validate",
-            ],
-            args,
-        ];
+        let all = [&["study", "make", "plan.toml", "--tracer", "bvh", "--validate"], args];
         program::insonify(self.0.path(), &all.concat())
     }
 
@@ -200,32 +190,19 @@ fn images_are_what_the_key_says() {
     assert_eq!((key.cases(), key.rows().len()), (4, IMAGES));
     let mut seen = Vec::new();
     for row in key.rows() {
-        let scene = if row.scenario == "firstscene" {
-            "one.toml"
-        } else {
-            "two.toml"
-        };
-        let set = row
-            .set
-            .split_whitespace()
-            .flat_map(|entry| ["--set", entry]);
+        let scene = if row.scenario == "firstscene" { "one.toml" } else { "two.toml" };
+        let set = row.set.split_whitespace().flat_map(|entry| ["--set", entry]);
         let args = ["render", scene, "-o", "single.png", "--tracer", "bvh"];
         let args: Vec<_> = args.into_iter().chain(set).collect();
         let (went_well, said) = program::insonify(desk.0.path(), &args);
         assert!(went_well, "{said}");
-        let rendered = image::open(desk.path("single.png"))
-            .expect("a PNG")
-            .into_luma8();
+        let rendered = image::open(desk.path("single.png")).expect("a PNG").into_luma8();
         let shown = image(desk, "first", row);
         assert!(rendered == shown, "{row:?}");
         assert!(!seen.contains(&shown), "{row:?} is an image of its own");
         seen.push(shown);
     }
-    let mut all: Vec<_> = key
-        .rows()
-        .iter()
-        .map(|r| (&r.scenario, &r.background, &r.set))
-        .collect();
+    let mut all: Vec<_> = key.rows().iter().map(|r| (&r.scenario, &r.background, &r.set)).collect();
     all.sort();
     all.dedup();
     assert_eq!(all.len(), IMAGES);
@@ -245,34 +222,20 @@ fn larger_images_are_reduced() {
         let mean = |i: &image::GrayImage| {
             i.pixels().map(|p| f64::from(p.0[0])).sum::<f64>() / f64::from(i.width() * i.height())
         };
-        assert!(
-            (mean(&a) - mean(&b)).abs() < 1.0,
-            "{} {}",
-            mean(&a),
-            mean(&b)
-        );
+        assert!((mean(&a) - mean(&b)).abs() < 1.0, "{} {}", mean(&a), mean(&b));
     }
 }
 
 /// What the form's folder must not hold: names of the plan, of parameters and of backgrounds.
 fn told(folder: &Path) -> Vec<String> {
     let template = ["page.html", "style.css", "script.js"].map(|name| {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("src/study/form")
-            .join(name);
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/form").join(name);
         std::fs::read_to_string(path).expect("the template")
     });
     let template = template.concat().to_lowercase();
     let mut words: Vec<String> = ["volume", "scatterers", "none", "firstscene", "secondscene"]
         .into_iter()
-        .chain([
-            "ownslice",
-            "movedslice",
-            "one.toml",
-            "two.toml",
-            "speckle",
-            "surface",
-        ])
+        .chain(["ownslice", "movedslice", "one.toml", "two.toml", "speckle", "surface"])
         .map(str::to_owned)
         .collect();
     for parameter in insonify::scene::sweep::Parameter::ALL {
@@ -287,17 +250,9 @@ fn told(folder: &Path) -> Vec<String> {
         // The images themselves hold any letters.
         let mut bare = String::new();
         for (i, part) in text.split("base64,").enumerate() {
-            bare.push_str(if i == 0 {
-                part
-            } else {
-                part.split_once('"').expect("an end").1
-            });
+            bare.push_str(if i == 0 { part } else { part.split_once('"').expect("an end").1 });
         }
-        let ours = if name.ends_with(".html") {
-            template.as_str()
-        } else {
-            ""
-        };
+        let ours = if name.ends_with(".html") { template.as_str() } else { "" };
         for word in &words {
             if bare.matches(word.as_str()).count() > ours.matches(word.as_str()).count() {
                 found.push(format!("{name}: {word}"));
@@ -312,11 +267,7 @@ fn the_form_tells_nothing_of_the_key() {
     let desk = desk();
     assert_eq!(told(&desk.path("first/form")), [""; 0]);
     let html = std::fs::read_to_string(desk.path("first/form/form.html")).expect("a form");
-    assert_eq!(
-        html.matches("from above").count(),
-        1,
-        "only where its cases are compared"
-    );
+    assert_eq!(html.matches("from above").count(), 1, "only where its cases are compared");
     // The key itself would be noticed.
     assert!(told(&desk.path("first")).len() > 5);
     for (name, bytes) in files(&desk.path("first/form")) {

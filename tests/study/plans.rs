@@ -19,23 +19,13 @@ fn mistakes_are_explained() {
     };
     let without = SCENE.split("[volume]").next().expect("a scene");
     std::fs::write(desk.path("two.toml"), without).expect("written");
-    let line = 1 + PLAN
-        .lines()
-        .position(|l| l.contains("two.toml"))
-        .expect("there");
+    let line = 1 + PLAN.lines().position(|l| l.contains("two.toml")).expect("there");
     let said = told(PLAN, &[]);
-    for part in [
-        &*format!("plan.toml:{line}:"),
-        "no acquired volume",
-        "leave `volume` out",
-    ] {
+    for part in [&*format!("plan.toml:{line}:"), "no acquired volume", "leave `volume` out"] {
         assert!(said.contains(part), "{part}: {said}");
     }
     let said = told(&PLAN.replace("\"volume\", \"scatterers\"", "\"none\""), &[]);
-    assert!(
-        said.contains("no mask") && said.contains("leave `none` out"),
-        "{said}"
-    );
+    assert!(said.contains("no mask") && said.contains("leave `none` out"), "{said}");
     let said = told(&PLAN.replace("two.toml", "three.toml"), &[]);
     assert!(said.contains("three.toml"), "{said}");
     let said = told(&PLAN.replace("translate", "tarnslate"), &[]);
@@ -45,10 +35,7 @@ fn mistakes_are_explained() {
     std::fs::write(desk.path("plan.toml"), PLAN.replace("two.toml", "one.toml")).expect("written");
     for more in [&[][..], &["--resume"]] {
         let (went_well, said) = desk.make(&[&["-o", "full"], more].concat());
-        assert!(
-            !went_well && said.contains("no study that was begun"),
-            "{said}"
-        );
+        assert!(!went_well && said.contains("no study that was begun"), "{said}");
     }
     assert_eq!(files(&desk.path("full")).len(), 1);
 }
@@ -58,9 +45,7 @@ fn the_plan_in_the_manual_loads() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/studies.md");
     let page = std::fs::read_to_string(path).expect("the page");
     let mut examples = page.split("```toml\n").skip(1);
-    let example = examples
-        .find(|e| e.contains("[[scenario]]"))
-        .expect("a plan");
+    let example = examples.find(|e| e.contains("[[scenario]]")).expect("a plan");
     let example = example.split("```").next().expect("its text");
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("plan.toml");
@@ -75,10 +60,7 @@ fn the_plan_in_the_manual_loads() {
     let bare: Vec<&str> = example.lines().filter(is_default).collect();
     let bare = load(&bare.join("\n")).expect("sound");
     assert_eq!(bare.question, plan.question);
-    assert_eq!(
-        (bare.image_height, bare.backgrounds),
-        (plan.image_height, plan.backgrounds)
-    );
+    assert_eq!((bare.image_height, bare.backgrounds), (plan.image_height, plan.backgrounds));
     assert!(load(&example.replace("rotate", "rotation")).is_err());
 }
 

@@ -9,15 +9,7 @@ use crate::{Desk, IMAGES, VOLUME, files, paths};
 fn spawned(desk: &Desk, folder: &str) -> Child {
     Command::new(env!("CARGO_BIN_EXE_insonify"))
         .current_dir(desk.0.path())
-        .args([
-            "study",
-            "make",
-            "plan.toml",
-            "--tracer",
-            "bvh",
-            "-o",
-            folder,
-        ])
+        .args(["study", "make", "plan.toml", "--tracer", "bvh", "-o", folder])
         .stdout(Stdio::null())
         .stderr(Stdio::null())
         .spawn()
@@ -51,10 +43,7 @@ fn a_killed_run_is_gone_on_with() {
     let (went_well, said) = desk.make(&["-o", "killed"]);
     assert!(!went_well && said.contains("add --resume"), "{said}");
     let (went_well, said) = desk.make(&["-o", "killed", "--resume", "--seed", "3"]);
-    assert!(
-        !went_well && said.contains("another order: 0, not 3"),
-        "{said}"
-    );
+    assert!(!went_well && said.contains("another order: 0, not 3"), "{said}");
     desk.made(&["-o", "killed", "--resume"]);
     assert!(files(&folder) == files(&crate::desk().path("first")));
     // Once more changes nothing.
@@ -64,8 +53,5 @@ fn a_killed_run_is_gone_on_with() {
     let voxels = [VOLUME.as_bytes(), &[77; 60]].concat();
     std::fs::write(desk.path("volume.mha"), voxels).expect("written");
     let (went_well, said) = desk.make(&["-o", "killed", "--resume"]);
-    assert!(
-        !went_well && said.contains("comes out differently now"),
-        "{said}"
-    );
+    assert!(!went_well && said.contains("comes out differently now"), "{said}");
 }

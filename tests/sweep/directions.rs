@@ -41,9 +41,7 @@ fn transposed(levels: &[Vec<f64>]) -> Vec<Vec<f64>> {
 /// Mean over the columns of the brightest level about the plate's surface.
 fn plate(image: &GrayImage) -> f64 {
     let columns = transposed(&between(image, 29.0, 31.0));
-    let peaks = columns
-        .iter()
-        .map(|c| c.iter().fold(0.0, |a: f64, b| a.max(*b)));
+    let peaks = columns.iter().map(|c| c.iter().fold(0.0, |a: f64, b| a.max(*b)));
     peaks.sum::<f64>() / columns.len() as f64
 }
 
@@ -82,10 +80,7 @@ fn each_parameter_changes_its_image_the_way_it_should() {
     let slope = figures("tgc_attenuation", |image| {
         mean(&between(image, 22.0, 28.0)) - mean(&between(image, 2.0, 8.0))
     });
-    assert!(
-        slope[1] > slope[0] + 4.0 && slope[2] > slope[1] + 4.0,
-        "{slope:?}"
-    );
+    assert!(slope[1] > slope[0] + 4.0 && slope[2] > slope[1] + 4.0, "{slope:?}");
     let [thin, own, dense] = figures("density_scale", |image| {
         let levels = speckle(image);
         let mean = mean(&levels);
@@ -95,10 +90,7 @@ fn each_parameter_changes_its_image_the_way_it_should() {
     });
     assert!(thin > 1.2 * own, "few scatterers make holes: {thin} {own}");
     // Some eight in a resolution cell are nearly as many as one can see.
-    assert!(
-        (0.8 * own..own).contains(&dense),
-        "many are many: {dense} {own}"
-    );
+    assert!((0.8 * own..own).contains(&dense), "many are many: {dense} {own}");
     let found = figures("psf_lateral", lateral);
     assert!(rises(found, 1.2), "{found:?}");
     let found = figures("psf_axial", axial);
@@ -107,15 +99,9 @@ fn each_parameter_changes_its_image_the_way_it_should() {
     assert!(rises(found, 1.1), "{found:?}");
     // A rougher surface returns less straight back; a smoother one than this is a mirror already.
     let [rough, own, smooth] = figures("roughness_scale", plate);
-    assert!(
-        rough < 0.95 * own && (smooth / own - 1.0).abs() < 0.05,
-        "{rough} {own} {smooth}"
-    );
+    assert!(rough < 0.95 * own && (smooth / own - 1.0).abs() < 0.05, "{rough} {own} {smooth}");
     let behind = figures("thickness_scale", |image| mean(&between(image, 30.6, 32.0)));
     assert!(behind[2] > 2.0 * behind[1] + 5.0, "{behind:?}");
     let [sharp, own, _] = figures("thickness_scale", plate);
-    assert!(
-        sharp > 1.02 * own,
-        "a plane without thickness is a mirror: {sharp} {own}"
-    );
+    assert!(sharp > 1.02 * own, "a plane without thickness is a mirror: {sharp} {own}");
 }

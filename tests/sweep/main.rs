@@ -183,10 +183,7 @@ fn a_sheet_holds_the_scene_and_each_parameter_below_and_above() {
         assert!((mean - row.mean_grey).abs() < 1e-3, "{row:?}: {mean}");
     }
     // The comparison sees a pixel's shift.
-    let shifted = Row {
-        x: rows[3].x + 1,
-        ..folder.rows("all/sheet.csv").swap_remove(3)
-    };
+    let shifted = Row { x: rows[3].x + 1, ..folder.rows("all/sheet.csv").swap_remove(3) };
     assert!(cell(&sheet, &shifted) != cell(&sheet, &rows[3]));
 }
 
@@ -199,10 +196,7 @@ fn single_images_are_what_render_makes_of_the_entry_that_is_named() {
     // One of each kind of setting: probe, image, lattice, scatterers, beam, surfaces.
     for row in [1, 3, 8, 11, 12, 13, 16, 17, 19, 22].map(|i| &rows[i]) {
         let image = folder.render(&row.set);
-        assert!(
-            image == folder.image(&format!("all/{}", row.file)),
-            "{row:?}"
-        );
+        assert!(image == folder.image(&format!("all/{}", row.file)), "{row:?}");
         assert!(image != scene, "{row:?} changes the image");
     }
 }
@@ -234,10 +228,7 @@ fn a_seed_shuffles_and_says_nothing_on_the_sheet() {
     let plain_rows = folder.rows("plain/sheet.csv");
     assert_eq!(images(&rows), images(&plain_rows));
     for (number, row) in (1..).zip(&rows) {
-        assert_eq!(
-            (row.image, row.file.as_str()),
-            (number, &*format!("{number:02}.png"))
-        );
+        assert_eq!((row.image, row.file.as_str()), (number, &*format!("{number:02}.png")));
         let same = plain_rows.iter().find(|r| r.set == row.set).expect("there");
         let [shuffled, unshuffled] = [("first", row), ("plain", same)]
             .map(|(to, row)| folder.bytes(&format!("{to}/{}", row.file)));
@@ -258,10 +249,7 @@ fn a_seed_shuffles_and_says_nothing_on_the_sheet() {
     // In rows of four without a gap, where a labelled sheet has its panel second.
     assert_eq!(rows[1].y, rows[0].y);
     let step = rows[1].x - rows[0].x;
-    assert_eq!(
-        [rows[2].x - rows[1].x, plain_rows[1].x - plain_rows[0].x],
-        [step, 2 * step]
-    );
+    assert_eq!([rows[2].x - rows[1].x, plain_rows[1].x - plain_rows[0].x], [step, 2 * step]);
 }
 
 #[test]
@@ -271,20 +259,9 @@ fn steps_surroundings_and_blends_are_what_render_makes() {
         (
             "steps",
             "step",
-            &[
-                "volume",
-                "simulation",
-                "mask",
-                "composed",
-                "blurred-mask",
-                "fused",
-            ][..],
+            &["volume", "simulation", "mask", "composed", "blurred-mask", "fused"][..],
         ),
-        (
-            "surroundings",
-            "surroundings",
-            &["volume", "none", "scatterers"],
-        ),
+        ("surroundings", "surroundings", &["volume", "none", "scatterers"]),
         ("blends", "blend", &["linear", "smooth", "multiband"]),
     ] {
         folder.sweep(&["--show", show, "-o", show]);
@@ -311,10 +288,7 @@ fn steps_surroundings_and_blends_are_what_render_makes() {
         ("03-mask", "7_mask"),
         ("05-blurred-mask", "8_blurred_mask"),
     ] {
-        assert!(
-            step(name) == folder.image(&format!("dump/{dumped}.png")),
-            "{name}"
-        );
+        assert!(step(name) == folder.image(&format!("dump/{dumped}.png")), "{name}");
     }
 }
 
@@ -332,10 +306,7 @@ fn mistakes_are_explained() {
         assert!(said.contains(part), "{part}: {said}");
     }
     let said = told(&["--set", "sweep.gain=[3]", "--show", "steps"]);
-    assert!(
-        said.contains("no acquired volume") && said.contains("[volume]"),
-        "{said}"
-    );
+    assert!(said.contains("no acquired volume") && said.contains("[volume]"), "{said}");
     let said = told(&["--set", "sweep.gain=[3]", "-o", "no/where/sheet.png"]);
     assert!(said.contains("no/where"), "{said}");
     assert!(!Path::new("no").exists());

@@ -78,9 +78,7 @@ fn lifted_off_the_skin_the_image_is_dark_and_pressed_it_is_back() {
     desk.settle(IMAGE);
     desk.press(Key::PageDown);
     desk.press(Key::PageDown);
-    desk.wait_for("the image to come back", |d| {
-        difference(&d.grab(IMAGE), &still) < 1.5
-    });
+    desk.wait_for("the image to come back", |d| difference(&d.grab(IMAGE), &still) < 1.5);
     desk.quit();
 }
 
@@ -93,9 +91,7 @@ fn the_pointer_slides_leans_and_turns_the_probe() {
     let still = desk.settle(IMAGE);
     let home = |desk: &mut Desk| {
         desk.press(Key::Home);
-        desk.wait_for("the image at home", |d| {
-            difference(&d.grab(IMAGE), &still) < 1.5
-        });
+        desk.wait_for("the image at home", |d| difference(&d.grab(IMAGE), &still) < 1.5);
         desk.settle(IMAGE);
     };
 
@@ -103,9 +99,7 @@ fn the_pointer_slides_leans_and_turns_the_probe() {
     // the face stays in contact.
     let (handle, to) = (DVec3::new(0.0, 0.0, -12.0), DVec3::new(12.0, 0.0, -12.0));
     desk.pull(seen(handle), seen(to));
-    desk.wait_for("the cyst to move", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the cyst to move", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     let slid = desk.settle(IMAGE);
     assert!(brightness(&slid) > 10.0, "it has not left the skin");
     home(&mut desk);
@@ -114,18 +108,14 @@ fn the_pointer_slides_leans_and_turns_the_probe() {
     desk.hold(Key::Shift, true);
     desk.pull(seen(handle), seen(DVec3::new(9.0, 0.0, -12.0)));
     desk.hold(Key::Shift, false);
-    desk.wait_for("the image to tilt", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the image to tilt", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     desk.settle(IMAGE);
     home(&mut desk);
 
     // Beside the body the drag turns the view, and the image stays.
     let view = desk.rest(VIEW);
     desk.pull((920, 60), (860, 90));
-    desk.wait_for("the view to turn", |d| {
-        difference(&d.grab(VIEW), &view) > 0.5
-    });
+    desk.wait_for("the view to turn", |d| difference(&d.grab(VIEW), &view) > 0.5);
     assert!(difference(&desk.settle(IMAGE), &still) < 1.5);
     desk.quit();
 }
@@ -147,9 +137,7 @@ fn held_to_the_skin_the_keys_slide_along_it() {
     for _ in 0..5 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the image to slide", |d| {
-        difference(&d.grab(IMAGE), &middle) > 4.0
-    });
+    desk.wait_for("the image to slide", |d| difference(&d.grab(IMAGE), &middle) > 4.0);
     assert!(brightness(&desk.settle(IMAGE)) > 10.0, "it is on the skin");
     desk.quit();
 }

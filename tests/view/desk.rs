@@ -71,15 +71,7 @@ impl Display {
     pub fn sized([width, height]: [u16; 2]) -> Option<Self> {
         let screen = format!("{width}x{height}x24");
         let started = Command::new("Xvfb")
-            .args([
-                "-displayfd",
-                "1",
-                "-screen",
-                "0",
-                &screen,
-                "-nolisten",
-                "tcp",
-            ])
+            .args(["-displayfd", "1", "-screen", "0", &screen, "-nolisten", "tcp"])
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn();
@@ -92,9 +84,7 @@ impl Display {
         };
         let mut number = String::new();
         let out = server.stdout.take().expect("piped");
-        BufReader::new(out)
-            .read_line(&mut number)
-            .expect("a number");
+        BufReader::new(out).read_line(&mut number).expect("a number");
         assert!(!number.trim().is_empty(), "Xvfb ended at once");
         let name = format!(":{}", number.trim());
         Some(Self { server, name })
@@ -120,9 +110,7 @@ impl Drop for Display {
 pub fn program(scene: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
     command.arg("view").arg(scene).args(arguments);
-    command
-        .env_remove("WAYLAND_DISPLAY")
-        .env_remove("WAYLAND_SOCKET");
+    command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
     command
 }
 
@@ -166,14 +154,7 @@ impl Desk {
         let mut command = display.program(&file, arguments);
         prepare(folder.path(), &mut command);
         let program = command.spawn().expect("started");
-        let mut desk = Self {
-            program,
-            x,
-            root,
-            window: 0,
-            _display: display,
-            folder,
-        };
+        let mut desk = Self { program, x, root, window: 0, _display: display, folder };
         desk.wait_for("a window", Desk::find);
         desk.focus();
         Some(desk)
@@ -197,9 +178,7 @@ impl Desk {
         let place = xproto::ConfigureWindowAux::new().x(0).y(0);
         self.x.configure_window(self.window, &place).unwrap();
         let now = x11rb::CURRENT_TIME;
-        self.x
-            .set_input_focus(InputFocus::PARENT, self.window, now)
-            .unwrap();
+        self.x.set_input_focus(InputFocus::PARENT, self.window, now).unwrap();
         self.x.flush().unwrap();
         std::thread::sleep(Duration::from_millis(100));
     }
@@ -208,14 +187,10 @@ impl Desk {
     pub fn grab(&self, [x, y, width, height]: [u16; 4]) -> Vec<u8> {
         let (format, all) = (ImageFormat::Z_PIXMAP, u32::MAX);
         let (left, top) = (x as i16, y as i16);
-        let cookie = self
-            .x
-            .get_image(format, self.root, left, top, width, height, all);
+        let cookie = self.x.get_image(format, self.root, left, top, width, height, all);
         let data = cookie.unwrap().reply().expect("a part of the display").data;
         // Blue, green, red and one unused.
-        data.chunks_exact(4)
-            .flat_map(|p| [p[2], p[1], p[0]])
-            .collect()
+        data.chunks_exact(4).flat_map(|p| [p[2], p[1], p[0]]).collect()
     }
 
     /// Waits until a part has not changed for half a second and the program has nothing left to do.
@@ -265,10 +240,7 @@ impl Desk {
         tasks.any(|task| {
             // A thread may have ended meanwhile.
             let text = std::fs::read_to_string(task.path().join("stat")).unwrap_or_default();
-            let state = text
-                .rsplit(')')
-                .next()
-                .and_then(|rest| rest.trim_start().chars().next());
+            let state = text.rsplit(')').next().and_then(|rest| rest.trim_start().chars().next());
             matches!(state, Some('R' | 'D'))
         })
     }
@@ -288,12 +260,7 @@ impl Desk {
     fn code(&self, key: Key) -> u8 {
         let setup = self.x.setup();
         let (first, count) = (setup.min_keycode, setup.max_keycode - setup.min_keycode + 1);
-        let map = self
-            .x
-            .get_keyboard_mapping(first, count)
-            .unwrap()
-            .reply()
-            .unwrap();
+        let map = self.x.get_keyboard_mapping(first, count).unwrap().reply().unwrap();
         let each = usize::from(map.keysyms_per_keycode);
         let found = map.keysyms.chunks(each).position(|k| k[0] == key.symbol());
         first + found.expect("the keyboard has the key") as u8
@@ -311,9 +278,7 @@ impl Desk {
         request.extend(x.to_ne_bytes());
         request.extend(y.to_ne_bytes());
         request.extend([0; 8]);
-        let sent = self
-            .x
-            .send_request_without_reply(&[IoSlice::new(&request)], vec![]);
+        let sent = self.x.send_request_without_reply(&[IoSlice::new(&request)], vec![]);
         sent.unwrap();
         self.x.flush().unwrap();
         // As fast as a hand; the server delivers each on its own.
@@ -411,9 +376,8 @@ impl Desk {
 
     /// Gives the window another size.
     pub fn resize(&self, width: u16, height: u16) {
-        let size = xproto::ConfigureWindowAux::new()
-            .width(u32::from(width))
-            .height(u32::from(height));
+        let size =
+            xproto::ConfigureWindowAux::new().width(u32::from(width)).height(u32::from(height));
         self.x.configure_window(self.window, &size).unwrap();
         self.x.flush().unwrap();
     }
@@ -438,10 +402,7 @@ impl Desk {
         let text = std::fs::read_to_string(path).expect("the program runs");
         // Fields are counted behind the name, which is in brackets and may hold anything.
         let rest = text.rsplit(')').next().expect("a name");
-        let fields: Vec<u64> = rest
-            .split_whitespace()
-            .map(|f| f.parse().unwrap_or(0))
-            .collect();
+        let fields: Vec<u64> = rest.split_whitespace().map(|f| f.parse().unwrap_or(0)).collect();
         let ticks = fields[11] + fields[12];
         Duration::from_millis(10 * ticks)
     }

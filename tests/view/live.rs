@@ -14,15 +14,7 @@ fn what_moves_is_coarse_and_what_rests_is_the_scenes_own() {
     // No device makes an image in a millisecond that shows a whole scene.
     let budget = "live.budget=\"1 ms\"";
     let captures = folder.path().to_str().expect("UTF-8").to_owned();
-    let arguments = [
-        "--validate",
-        "--set",
-        budget,
-        "--json",
-        &json,
-        "--captures",
-        &captures,
-    ];
+    let arguments = ["--validate", "--set", budget, "--json", &json, "--captures", &captures];
     let Some(mut desk) = Desk::open(SCENE, &arguments) else {
         return;
     };
@@ -31,13 +23,9 @@ fn what_moves_is_coarse_and_what_rests_is_the_scenes_own() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the image to move", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     desk.press(Key::Home);
-    desk.wait_for("the first image, with its noise", |d| {
-        d.grab(IMAGE) == still
-    });
+    desk.wait_for("the first image, with its noise", |d| d.grab(IMAGE) == still);
     desk.press(Key::F2);
     let still = sidecar(&mut desk, folder.path(), "cyst-and-wires-0001.json");
     assert_eq!(still["quality"]["level"], 0);

@@ -63,42 +63,28 @@ fn a_window_opens_follows_the_keys_and_closes() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the image to move", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     desk.settle(IMAGE);
     desk.press(Key::Home);
-    desk.wait_for("the image to come back", |d| {
-        difference(&d.grab(IMAGE), &still) < 1.5
-    });
+    desk.wait_for("the image to come back", |d| difference(&d.grab(IMAGE), &still) < 1.5);
 
     // Panels.
     let open = desk.settle(CONSOLE);
     desk.press(Key::Letter('c'));
-    desk.wait_for("the console to close", |d| {
-        difference(&d.grab(CONSOLE), &open) > 5.0
-    });
+    desk.wait_for("the console to close", |d| difference(&d.grab(CONSOLE), &open) > 5.0);
     desk.press(Key::Letter('c'));
-    desk.wait_for("the console to open", |d| {
-        difference(&d.grab(CONSOLE), &open) < 1.0
-    });
+    desk.wait_for("the console to open", |d| difference(&d.grab(CONSOLE), &open) < 1.0);
     let lower = [0, 540, 900, 160];
     let before = desk.settle(lower);
     desk.press(Key::Letter('t'));
     desk.wait_for("the timings", |d| difference(&d.grab(lower), &before) > 5.0);
     desk.press(Key::Letter('t'));
-    desk.wait_for("the timings to go", |d| {
-        difference(&d.grab(lower), &before) < 1.5
-    });
+    desk.wait_for("the timings to go", |d| difference(&d.grab(lower), &before) < 1.5);
     let before = desk.settle(IMAGE);
     desk.press(Key::Help);
-    desk.wait_for("the list of keys", |d| {
-        difference(&d.grab(IMAGE), &before) > 5.0
-    });
+    desk.wait_for("the list of keys", |d| difference(&d.grab(IMAGE), &before) > 5.0);
     desk.press(Key::Escape);
-    desk.wait_for("the list to go", |d| {
-        difference(&d.grab(IMAGE), &before) < 1.5
-    });
+    desk.wait_for("the list to go", |d| difference(&d.grab(IMAGE), &before) < 1.5);
 
     // Frozen, nothing follows the probe; live, it is where it was moved.
     let before = desk.settle(IMAGE);
@@ -109,9 +95,7 @@ fn a_window_opens_follows_the_keys_and_closes() {
     std::thread::sleep(Duration::from_millis(700));
     assert!(difference(&desk.grab(IMAGE), &before) < 0.5, "frozen");
     desk.press(Key::Space);
-    desk.wait_for("the image to follow", |d| {
-        difference(&d.grab(IMAGE), &before) > 4.0
-    });
+    desk.wait_for("the image to follow", |d| difference(&d.grab(IMAGE), &before) > 4.0);
 
     desk.quit();
 }
@@ -126,9 +110,7 @@ fn a_window_of_another_size_is_filled() {
         desk.resize(width, height);
         // The console lies at the right edge from top to bottom.
         let corner = [width - 20, height - 40, 16, 30];
-        desk.wait_for("the console at the edge", |d| {
-            brightness(&d.grab(corner)) > 15.0
-        });
+        desk.wait_for("the console at the edge", |d| brightness(&d.grab(corner)) > 15.0);
     }
     desk.hide();
     std::thread::sleep(Duration::from_millis(300));
@@ -149,10 +131,7 @@ fn a_window_in_which_nothing_happens_costs_nothing() {
     std::thread::sleep(Duration::from_secs(3));
     let used = desk.processor_time() - before;
     // One frame of the interface alone takes ten milliseconds and more; a clock tick is ten.
-    assert!(
-        used <= Duration::from_millis(20),
-        "{used:?} of processor time in 3 s"
-    );
+    assert!(used <= Duration::from_millis(20), "{used:?} of processor time in 3 s");
     desk.quit();
 }
 
@@ -171,9 +150,7 @@ fn the_pointer_sets_what_the_console_shows() {
     std::thread::sleep(Duration::from_millis(500));
     assert!(difference(&desk.grab(IMAGE), &before) < 0.5, "frozen");
     desk.click(button);
-    desk.wait_for("the image to follow", |d| {
-        difference(&d.grab(IMAGE), &before) > 2.0
-    });
+    desk.wait_for("the image to follow", |d| difference(&d.grab(IMAGE), &before) > 2.0);
     desk.quit();
 }
 
@@ -186,11 +163,8 @@ fn a_screenshot_is_the_window() {
     let scene = folder.path().join("scene.toml");
     std::fs::write(&scene, SCENE).expect("written");
     let file = folder.path().join("window.png");
-    let status = desk
-        .program(&scene, &["--validate", "--screenshot"])
-        .arg(&file)
-        .status()
-        .expect("started");
+    let status =
+        desk.program(&scene, &["--validate", "--screenshot"]).arg(&file).status().expect("started");
     assert!(status.success());
     let picture = image::open(&file).expect("a picture").to_rgb8();
     assert_eq!(picture.dimensions(), (1280, 720));
@@ -212,10 +186,7 @@ fn without_a_display_the_remedy_is_said() {
     let folder = tempfile::tempdir().expect("a folder");
     let scene = folder.path().join("scene.toml");
     std::fs::write(&scene, SCENE).expect("written");
-    let output = desk::program(&scene, &[])
-        .env_remove("DISPLAY")
-        .output()
-        .expect("started");
+    let output = desk::program(&scene, &[]).env_remove("DISPLAY").output().expect("started");
     assert_eq!(output.status.code(), Some(1));
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(text.contains("insonify render"), "{text}");

@@ -100,21 +100,15 @@ fn the_strip_opens_runs_and_stands() {
     let strip = [200, 530, 690, 160];
     let before = brightness(&desk.grab(strip));
     desk.press(Key::Letter('m'));
-    desk.wait_for("a strip", |d| {
-        (brightness(&d.grab(strip)) - before).abs() > 3.0
-    });
+    desk.wait_for("a strip", |d| (brightness(&d.grab(strip)) - before).abs() > 3.0);
     let now = desk.grab(strip);
-    desk.wait_for("the strip to run", |d| {
-        difference(&d.grab(strip), &now) > 1.0
-    });
+    desk.wait_for("the strip to run", |d| difference(&d.grab(strip), &now) > 1.0);
     desk.press(Key::Space);
     desk.settle(strip);
     let frozen = desk.grab(strip);
     std::thread::sleep(Duration::from_millis(700));
     assert!(difference(&desk.grab(strip), &frozen) < 0.1, "frozen");
     desk.press(Key::Letter('m'));
-    desk.wait_for("the strip to go", |d| {
-        difference(&d.grab(strip), &frozen) > 3.0
-    });
+    desk.wait_for("the strip to go", |d| difference(&d.grab(strip), &frozen) > 3.0);
     desk.quit();
 }

@@ -60,15 +60,11 @@ fn open() -> Option<Desk> {
     let mut desk = Desk::open_on(Display::open()?, SCENE, &arguments, |folder, _| {
         volume(folder);
     })?;
-    desk.wait_for("an image", |d| {
-        brightness(&d.grab([60, 100, 400, 500])) > 10.0
-    });
+    desk.wait_for("an image", |d| brightness(&d.grab([60, 100, 400, 500])) > 10.0);
     // The 3D view has tests of its own.
     desk.press(Key::Letter('v'));
     // Grey as far as the volume reaches.
-    desk.wait_for("the image alone", |d| {
-        brightness(&d.grab([600, 80, 100, 60])) > 80.0
-    });
+    desk.wait_for("the image alone", |d| brightness(&d.grab([600, 80, 100, 60])) > 80.0);
     Some(desk)
 }
 
@@ -168,9 +164,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         let at = names.iter().position(|n| *n == section).unwrap();
         let header = (LEFT + 40, rows[at]);
         desk.click(header);
-        desk.wait_for(&format!("sliders of {section}"), |d| {
-            sliders(d).len() > slider
-        });
+        desk.wait_for(&format!("sliders of {section}"), |d| sliders(d).len() > slider);
         let before = (desk.scene(), desk.settle(IMAGE));
         let (x, y) = sliders(&desk)[slider];
         desk.drag((x + 30, y), (x + 70, y));
@@ -186,14 +180,10 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         assert!(set != lines(&before.0), "{section}: {saved}");
         assert!(saved.starts_with("# All that"), "{saved}");
         if !["Tissues", "Surfaces"].contains(&section) {
-            desk.wait_for("another image", |d| {
-                difference(&d.grab(IMAGE), &before.1) > 0.05
-            });
+            desk.wait_for("another image", |d| difference(&d.grab(IMAGE), &before.1) > 0.05);
         }
         desk.hold_control(Key::Letter('z'));
-        desk.wait_for("the image before", |d| {
-            difference(&d.grab(IMAGE), &before.1) < 0.02
-        });
+        desk.wait_for("the image before", |d| difference(&d.grab(IMAGE), &before.1) < 0.02);
         desk.hold_control(Key::Letter('s'));
         desk.wait_for("what was before to be saved", |d| lines(&d.scene()) != set);
         desk.click(header);
@@ -271,12 +261,7 @@ fn each_key_does_what_the_list_says_and_its_opposite_takes_it_back() {
     desk.press(Key::Home);
     desk.wait_for("home", |d| difference(&d.grab(IMAGE), &home) < 0.2);
     // Panels; the loop, the calipers and the strip have tests of their own.
-    for (name, key) in [
-        ("console", 'c'),
-        ("timings", 't'),
-        ("M-mode", 'm'),
-        ("real", 'b'),
-    ] {
+    for (name, key) in [("console", 'c'), ("timings", 't'), ("M-mode", 'm'), ("real", 'b')] {
         let all = [0, 0, 1280, 680];
         let before = desk.settle(all);
         desk.press(letter(key));
@@ -311,10 +296,7 @@ fn with_all_panels_open_a_window_in_which_nothing_happens_costs_nothing() {
     std::thread::sleep(Duration::from_secs(3));
     let used = desk.processor_time() - before;
     // One frame of the interface alone takes ten milliseconds and more; a clock tick is ten.
-    assert!(
-        used <= Duration::from_millis(20),
-        "{used:?} of processor time in 3 s"
-    );
+    assert!(used <= Duration::from_millis(20), "{used:?} of processor time in 3 s");
     desk.quit();
 }
 
@@ -369,9 +351,7 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
         let line = [at.0 - 20, at.1 - 8, 100, 16];
         let plain = desk.grab(line);
         desk.click(at);
-        desk.wait_for("the row to be chosen", |d| {
-            difference(&d.grab(line), &plain) > 1.0
-        });
+        desk.wait_for("the row to be chosen", |d| difference(&d.grab(line), &plain) > 1.0);
         desk.still(IMAGE);
     };
     choose(&mut desk, "wrong");
@@ -380,9 +360,7 @@ fn settings_of_another_file_are_taken_and_another_scene_opens() {
     desk.click(row("preset"));
     desk.wait_for("it to be forgotten", |d| !warned(d));
     desk.click(take);
-    desk.wait_for("more gain", |d| {
-        brightness(&d.grab(IMAGE)) > brightness(&before) + 5.0
-    });
+    desk.wait_for("more gain", |d| brightness(&d.grab(IMAGE)) > brightness(&before) + 5.0);
     desk.hold_control(Key::Letter('z'));
     desk.wait_for("the settings before", |d| d.grab(IMAGE) == before);
 

@@ -78,11 +78,8 @@ fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
     };
     // Somewhere in the first plane, off its middle at (708, 138).
     let (from, to) = ((760, 150), (800, 150));
-    for (name, held) in [
-        ("move", None),
-        ("turn", Some(Key::Shift)),
-        ("scale", Some(Key::Control)),
-    ] {
+    for (name, held) in [("move", None), ("turn", Some(Key::Shift)), ("scale", Some(Key::Control))]
+    {
         let to = if name == "turn" { (740, 190) } else { to };
         if let Some(held) = held {
             desk.hold(held, true);
@@ -93,35 +90,24 @@ fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
         }
         desk.wait_for(name, |d| difference(&d.grab(IMAGE), &home) > 1.0);
         desk.settle(IMAGE);
-        assert!(
-            difference(&desk.grab(PLANES), &planes) > 1.0,
-            "{name}: planes"
-        );
+        assert!(difference(&desk.grab(PLANES), &planes) > 1.0, "{name}: planes");
         desk.hold_control(Key::Letter('s'));
         desk.wait_for("it to be saved", |d| place(d) != DAffine3::IDENTITY);
         let (scale, turn, shift) = place(&desk).to_scale_rotation_translation();
         let [scaled, turned] = [scale.x != 1.0, turn.to_axis_angle().1 > 0.01];
-        assert_eq!(
-            [scaled, turned],
-            [name == "scale", name == "turn"],
-            "{name} {scale} {turn}"
-        );
+        assert_eq!([scaled, turned], [name == "scale", name == "turn"], "{name} {scale} {turn}");
         // Along the plane alone.
         assert!(shift.y.abs() < 1e-9, "{name} {shift}");
         // All of one drag is one step.
         desk.hold_control(Key::Letter('z'));
         desk.wait_for("the image before", |d| d.grab(IMAGE) == home);
         desk.hold_control(Key::Letter('s'));
-        desk.wait_for("what was before to be saved", |d| {
-            place(d) == DAffine3::IDENTITY
-        });
+        desk.wait_for("what was before to be saved", |d| place(d) == DAffine3::IDENTITY);
         desk.settle(IMAGE);
     }
     // The 3D view is there again, and the image as it was.
     desk.press(Key::Letter('g'));
-    desk.wait_for("the 3D view", |d| {
-        difference(&d.grab(PLANES), &planes) > 5.0
-    });
+    desk.wait_for("the 3D view", |d| difference(&d.grab(PLANES), &planes) > 5.0);
     assert_eq!(desk.settle(IMAGE), home);
     desk.quit();
 }

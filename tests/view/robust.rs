@@ -56,9 +56,7 @@ fn at_twice_the_scale_clicks_meet_what_they_show() {
     std::thread::sleep(Duration::from_millis(700));
     assert!(difference(&desk.grab(image), &before) < 0.5, "frozen");
     desk.click(button);
-    desk.wait_for("the image to follow", |d| {
-        difference(&d.grab(image), &before) > 2.0
-    });
+    desk.wait_for("the image to follow", |d| difference(&d.grab(image), &before) > 2.0);
     // The whole of a large screen.
     desk.resize(3840, 2160);
     desk.wait_for("the console at the edge", |d| {
@@ -72,9 +70,7 @@ fn a_zoomed_interface_keeps_its_clicks() {
     let Some(mut desk) = Desk::open(SCENE, &["--validate", "--scale", "1.5"]) else {
         return;
     };
-    desk.wait_for("an image", |d| {
-        brightness(&d.grab([60, 150, 500, 400])) > 10.0
-    });
+    desk.wait_for("an image", |d| brightness(&d.grab([60, 150, 500, 400])) > 10.0);
     // What moves in the 3D view has tests of its own.
     desk.press(Key::Letter('v'));
     let part = [60, 150, 500, 400];
@@ -84,20 +80,14 @@ fn a_zoomed_interface_keeps_its_clicks() {
     let live = desk.grab(state);
     let button = (1280 - 504 + 45, 18);
     desk.click(button);
-    desk.wait_for("the word that it is frozen", |d| {
-        difference(&d.grab(state), &live) > 1.0
-    });
+    desk.wait_for("the word that it is frozen", |d| difference(&d.grab(state), &live) > 1.0);
     desk.press(Key::Right);
     desk.press(Key::Right);
     std::thread::sleep(Duration::from_millis(500));
     assert!(difference(&desk.grab(part), &before) < 0.5, "frozen");
     desk.click(button);
-    desk.wait_for("the word that it is live", |d| {
-        difference(&d.grab(state), &live) < 0.5
-    });
-    desk.wait_for("the image to follow", |d| {
-        difference(&d.grab(part), &before) > 2.0
-    });
+    desk.wait_for("the word that it is live", |d| difference(&d.grab(state), &live) < 0.5);
+    desk.wait_for("the image to follow", |d| difference(&d.grab(part), &before) > 2.0);
     // Back to the usual size by the keyboard: the console's edge moves to the right.
     let edge = [1280 - 420, 300, 60, 200];
     let wide = desk.settle(edge);
@@ -112,11 +102,8 @@ fn layer() -> Option<tempfile::TempDir> {
     let folder = tempfile::tempdir().expect("a folder");
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/view/loss.c");
     let library = folder.path().join("libloss.so");
-    let built = Command::new("cc")
-        .args(["-shared", "-fPIC", "-o"])
-        .arg(&library)
-        .arg(source)
-        .status();
+    let built =
+        Command::new("cc").args(["-shared", "-fPIC", "-o"]).arg(&library).arg(source).status();
     match built {
         Ok(status) => assert!(status.success(), "the layer does not compile"),
         Err(error) => {
@@ -156,9 +143,7 @@ fn a_lost_device_is_opened_again_and_a_second_loss_says_what_to_do() {
     desk.press(Key::Right);
     desk.wait_for("the loss", |_| !lose.exists());
     desk.press(Key::Home);
-    desk.wait_for("the image on another device", |d| {
-        difference(&d.grab(IMAGE), &before) < 1.5
-    });
+    desk.wait_for("the image on another device", |d| difference(&d.grab(IMAGE), &before) < 1.5);
     // It is the live one. While the other device is being opened there is none.
     for _ in 0..6 {
         desk.press(Key::Right);

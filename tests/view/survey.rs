@@ -16,9 +16,7 @@ fn the_eye_goes_around_and_the_image_stays() {
     let [image, front] = [desk.settle(IMAGE), desk.rest(VIEW)];
 
     desk.drag((640, 520), (760, 480));
-    desk.wait_for("the other side", |d| {
-        difference(&d.grab(VIEW), &front) > 3.0
-    });
+    desk.wait_for("the other side", |d| difference(&d.grab(VIEW), &front) > 3.0);
     let side = desk.rest(VIEW);
     assert_eq!(difference(&desk.grab(IMAGE), &image), 0.0, "no new image");
 
@@ -36,9 +34,7 @@ fn the_eye_goes_around_and_the_image_stays() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the probe in it", |d| {
-        difference(&d.grab(VIEW), &before) > 1.0
-    });
+    desk.wait_for("the probe in it", |d| difference(&d.grab(VIEW), &before) > 1.0);
     desk.quit();
 }
 
@@ -54,9 +50,7 @@ fn tissues_are_hidden_and_the_view_closes() {
     desk.click((549, 17));
     desk.wait_for("the section", |d| difference(&d.grab(VIEW), &whole) > 0.2);
     desk.click((549, 17));
-    desk.wait_for("the whole cyst", |d| {
-        difference(&d.grab(VIEW), &whole) < 0.1
-    });
+    desk.wait_for("the whole cyst", |d| difference(&d.grab(VIEW), &whole) < 0.1);
     // The list, and "None" in it.
     desk.click((506, 17));
     let open = desk.rest(VIEW);
@@ -64,9 +58,7 @@ fn tissues_are_hidden_and_the_view_closes() {
     desk.wait_for("no cyst", |d| difference(&d.grab(VIEW), &open) > 0.2);
     desk.rest(VIEW);
     desk.press(Key::Letter('v'));
-    desk.wait_for("the image in the view's place", |d| {
-        difference(&d.grab(VIEW), &whole) > 5.0
-    });
+    desk.wait_for("the image in the view's place", |d| difference(&d.grab(VIEW), &whole) > 5.0);
     desk.press(Key::Letter('v'));
     desk.wait_for("the view", |d| difference(&d.grab(VIEW), &whole) < 20.0);
     assert!(difference(&desk.settle(CONSOLE), &console) < 1.0);

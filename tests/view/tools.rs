@@ -35,11 +35,7 @@ pub fn sidecar(desk: &mut Desk, folder: &Path, name: &str) -> Value {
 #[test]
 fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     let (_folder, captures) = folder();
-    let arguments = [
-        "--validate",
-        "--captures",
-        captures.to_str().expect("UTF-8"),
-    ];
+    let arguments = ["--validate", "--captures", captures.to_str().expect("UTF-8")];
     let Some(mut desk) = Desk::open(SCENE, &arguments) else {
         return;
     };
@@ -49,17 +45,11 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
         desk.press(Key::Right);
         desk.press(Key::Right);
         let before = shown[shown.len() - 1].clone();
-        desk.wait_for("another image", |d| {
-            difference(&d.grab(IMAGE), &before) > 2.0
-        });
+        desk.wait_for("another image", |d| difference(&d.grab(IMAGE), &before) > 2.0);
         shown.push(desk.settle(IMAGE));
     }
     desk.press(Key::Space);
-    assert_eq!(
-        difference(&desk.settle(IMAGE), &shown[3]),
-        0.0,
-        "the newest"
-    );
+    assert_eq!(difference(&desk.settle(IMAGE), &shown[3]), 0.0, "the newest");
 
     // Back through the loop: what came first is there to the last bit, and so is all between.
     let mut back = vec![desk.grab(IMAGE)];
@@ -72,9 +62,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
         assert!(back.contains(earlier));
     }
     desk.press(Key::Letter('.'));
-    desk.wait_for("the next one", |d| {
-        difference(&d.grab(IMAGE), &shown[0]) > 0.5
-    });
+    desk.wait_for("the next one", |d| difference(&d.grab(IMAGE), &shown[0]) > 0.5);
 
     // The track of the bar: beyond its left end is the first image again.
     desk.drag((560, 702), (300, 702));
@@ -97,10 +85,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     let rendered = image::open(rendered).expect("a picture");
     assert!(saved == rendered, "the pixels differ");
     assert_eq!(still["file"], "cyst-and-wires-0001.png");
-    assert_eq!(
-        still["quality"]["level"], 0,
-        "at rest it is the scene's own"
-    );
+    assert_eq!(still["quality"]["level"], 0, "at rest it is the scene's own");
     assert_eq!(still["image"]["height"], 400);
     // 400 pixels of so many mm are the depth of the probe, give or take the last.
     let pitch = still["image"]["pixel_pitch_mm"].as_f64().expect("a number");
@@ -115,10 +100,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     let frames = gif(&captures.join("cyst-and-wires-0002.gif"));
     assert_eq!(frames.len(), back.len());
     assert_eq!(clip["frames"].as_array().map(Vec::len), Some(back.len()));
-    assert!(
-        frames[0].as_raw() == saved.to_rgba8().as_raw(),
-        "it begins with the first"
-    );
+    assert!(frames[0].as_raw() == saved.to_rgba8().as_raw(), "it begins with the first");
     // The same as single pictures, which the list at the bar's right end offers.
     desk.click((907, 702));
     desk.click((900, 679));
@@ -131,17 +113,13 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     }
 
     desk.press(Key::Enter);
-    desk.wait_for("the loop to play", |d| {
-        difference(&d.grab(IMAGE), &shown[0]) > 2.0
-    });
+    desk.wait_for("the loop to play", |d| difference(&d.grab(IMAGE), &shown[0]) > 2.0);
     desk.press(Key::Enter);
     desk.settle(IMAGE);
 
     // Live, the image is the newest but for its noise.
     desk.press(Key::Space);
-    desk.wait_for("the newest", |d| {
-        difference(&d.grab(IMAGE), &shown[3]) < 1.5
-    });
+    desk.wait_for("the newest", |d| difference(&d.grab(IMAGE), &shown[3]) < 1.5);
     desk.quit();
 }
 
@@ -150,10 +128,7 @@ fn gif(path: &Path) -> Vec<image::RgbaImage> {
     let file = std::io::BufReader::new(std::fs::File::open(path).expect("there"));
     let frames = GifDecoder::new(file).expect("a GIF").into_frames();
     let frames = frames.collect_frames().expect("whole");
-    frames
-        .into_iter()
-        .map(|frame| frame.into_buffer())
-        .collect()
+    frames.into_iter().map(|frame| frame.into_buffer()).collect()
 }
 
 #[test]
@@ -188,13 +163,7 @@ const WHITE: u8 = 170;
 fn spots(pixels: &[u8], width: usize) -> Vec<Spot> {
     let grey: Vec<u8> = (pixels.chunks_exact(3))
         // What is drawn over the image has a colour; wires have none.
-        .map(|p| {
-            if p.iter().all(|&c| c == p[0]) {
-                p[0]
-            } else {
-                0
-            }
-        })
+        .map(|p| if p.iter().all(|&c| c == p[0]) { p[0] } else { 0 })
         .collect();
     let mut seen = vec![false; grey.len()];
     let mut out = Vec::new();
@@ -240,11 +209,8 @@ struct Wires {
 /// Finds them by their arrangement alone: a column in the middle of the image, and rows that cross it.
 fn wires(pixels: &[u8], width: usize, middle: f64) -> Result<Wires, String> {
     let all = spots(pixels, width);
-    let mut column: Vec<Spot> = all
-        .iter()
-        .copied()
-        .filter(|s| (s[0] - middle).abs() < 4.0)
-        .collect();
+    let mut column: Vec<Spot> =
+        all.iter().copied().filter(|s| (s[0] - middle).abs() < 4.0).collect();
     column.sort_by(|a, b| a[1].total_cmp(&b[1]));
     if column.len() != 15 {
         return Err(format!("{} wires on the axis", column.len()));
@@ -262,11 +228,7 @@ fn wires(pixels: &[u8], width: usize, middle: f64) -> Result<Wires, String> {
             .collect::<Option<Vec<Spot>>>()
             .ok_or_else(|| format!("a gap in the row at {centre:?}"))
     };
-    Ok(Wires {
-        near: row(column[3], 1.0, 3)?,
-        far: row(column[8], 2.0, 2)?,
-        column,
-    })
+    Ok(Wires { near: row(column[3], 1.0, 3)?, far: row(column[8], 2.0, 2)?, column })
 }
 
 /// Accuracy of a distance between two wires: what is asked of a scanner's calipers.
@@ -338,11 +300,7 @@ fn measures_the_phantom(scale: f64) {
     let measured = said["measurements"].as_array().expect("a list");
     assert_eq!(measured.len(), 5, "{measured:#?}");
 
-    let distances = [
-        ("lateral", 60.0),
-        ("axial", 110.0),
-        ("oblique", 60.0_f64.hypot(50.0)),
-    ];
+    let distances = [("lateral", 60.0), ("axial", 110.0), ("oblique", 60.0_f64.hypot(50.0))];
     for ((name, expected), entry) in distances.into_iter().zip(measured) {
         let length = entry["length_mm"].as_f64().expect("a number");
         let off = 100.0 * (length / expected - 1.0);

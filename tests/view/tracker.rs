@@ -51,25 +51,17 @@ fn a_tracker_moves_the_probe_and_sees_what_the_window_shows() {
     let home = shift(0.0, 0.0, 0.0);
     let seen = image_at(&mut client, home);
     assert_eq!(seen.components, 1);
-    assert_eq!(
-        difference(&desk.grab(IMAGE), &still),
-        0.0,
-        "for a look alone nothing is made anew"
-    );
+    assert_eq!(difference(&desk.grab(IMAGE), &still), 0.0, "for a look alone nothing is made anew");
 
     // Both follow the tool.
     let away = shift(12.0, 0.0, 4.0);
     client.transform("Probe", away);
-    desk.wait_for("the image to move", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     let moved = image_at(&mut client, away);
     let apart = |a: &[u8], b: &[u8]| difference(a, b);
     assert!(apart(&moved.values, &seen.values) > 4.0);
     client.transform("Probe", home);
-    desk.wait_for("the image to come back", |d| {
-        difference(&d.grab(IMAGE), &still) < 1.5
-    });
+    desk.wait_for("the image to come back", |d| difference(&d.grab(IMAGE), &still) < 1.5);
     let back = image_at(&mut client, home);
     // Between frames only electronic noise differs.
     assert!(apart(&back.values, &seen.values) < 1.5);
@@ -87,9 +79,7 @@ fn the_device_that_moved_last_has_the_probe() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the keys to take the probe", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the keys to take the probe", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     // The tracker goes on reporting a tool that lies still, half a millimetre to and fro.
     let keys = desk.settle(IMAGE);
     for i in 0..30 {
@@ -100,18 +90,12 @@ fn the_device_that_moved_last_has_the_probe() {
     assert!(apart < 0.5, "the tracker has taken the probe back: {apart}");
     // Taken up, it has the probe: 5 mm and back.
     client.transform("Probe", shift(5.0, 0.0, 0.0));
-    desk.wait_for("the tracker to take it up", |d| {
-        difference(&d.grab(IMAGE), &keys) > 2.0
-    });
+    desk.wait_for("the tracker to take it up", |d| difference(&d.grab(IMAGE), &keys) > 2.0);
     client.transform("Probe", shift(0.0, 0.0, 0.0));
-    desk.wait_for("the tracker to take it back", |d| {
-        difference(&d.grab(IMAGE), &still) < 1.5
-    });
+    desk.wait_for("the tracker to take it back", |d| difference(&d.grab(IMAGE), &still) < 1.5);
     desk.press(Key::Right);
     desk.press(Key::Right);
-    desk.wait_for("the keys to take it again", |d| {
-        difference(&d.grab(IMAGE), &still) > 2.0
-    });
+    desk.wait_for("the keys to take it again", |d| difference(&d.grab(IMAGE), &still) > 2.0);
     desk.quit();
 }
 
@@ -140,9 +124,7 @@ fn a_lost_tracker_is_shown_with_its_name_and_since_when() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the image to move", |d| {
-        difference(&d.grab(IMAGE), &before) > 4.0
-    });
+    desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &before) > 4.0);
     assert!(amber(&desk.grab(NOTICE)) > 0.05);
     desk.wait_for("the notice to go", |d| {
         client.transform("Probe", shift(1.0, 0.0, 0.0));
@@ -163,10 +145,7 @@ fn listening_costs_nothing_while_nothing_comes() {
     let used = desk.processor_time() - before;
     // A frame of the interface alone takes ten milliseconds and more. The listener looks for clients
     // a hundred times a second.
-    assert!(
-        used <= Duration::from_millis(50),
-        "{used:?} of processor time in 3 s"
-    );
+    assert!(used <= Duration::from_millis(50), "{used:?} of processor time in 3 s");
     drop(client);
     desk.quit();
 }
@@ -196,9 +175,7 @@ fn clients_that_mean_harm_do_none() {
         // Giant bodies, announced and begun.
         for size in [u64::MAX, 1 << 40, 70_001] {
             let mut client = Client::at(address);
-            client.send_bytes(&changed(|wire| {
-                wire[42..50].copy_from_slice(&size.to_be_bytes())
-            }));
+            client.send_bytes(&changed(|wire| wire[42..50].copy_from_slice(&size.to_be_bytes())));
             assert!(client.is_ended(), "{size}");
         }
         // Half a message, and then nothing.
@@ -212,13 +189,9 @@ fn clients_that_mean_harm_do_none() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the image to move", |d| {
-        difference(&d.grab(IMAGE), &still) > 4.0
-    });
+    desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &still) > 4.0);
     desk.press(Key::Home);
-    desk.wait_for("the image to come back", |d| {
-        difference(&d.grab(IMAGE), &still) < 1.5
-    });
+    desk.wait_for("the image to come back", |d| difference(&d.grab(IMAGE), &still) < 1.5);
     drop((crowd, kept));
 
     // Poses as fast as they can be sent: the window still hears the keyboard, and loses none of them.
@@ -234,9 +207,7 @@ fn clients_that_mean_harm_do_none() {
     });
     desk.press(Key::Letter('t'));
     client.transform("Probe", shift(0.0, 0.0, 0.0));
-    desk.wait_for("the image of the last pose", |d| {
-        difference(&d.grab(IMAGE), &still) < 1.5
-    });
+    desk.wait_for("the image of the last pose", |d| difference(&d.grab(IMAGE), &still) < 1.5);
     let grown = desk.memory().saturating_sub(memory);
     // Eight clients with a picture each, and what the allocator keeps.
     assert!(grown < 64 << 20, "{grown} bytes more");

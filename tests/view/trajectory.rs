@@ -20,15 +20,11 @@ fn what_was_recorded_is_replayed() {
     for _ in 0..6 {
         desk.press(Key::Right);
     }
-    desk.wait_for("the image to move", |d| {
-        difference(&d.grab(IMAGE), &home) > 4.0
-    });
+    desk.wait_for("the image to move", |d| difference(&d.grab(IMAGE), &home) > 4.0);
     let away = desk.settle(IMAGE);
     desk.press(Key::Letter('r'));
     desk.press(Key::Home);
-    desk.wait_for("the image to come back", |d| {
-        difference(&d.grab(IMAGE), &home) < 1.5
-    });
+    desk.wait_for("the image to come back", |d| difference(&d.grab(IMAGE), &home) < 1.5);
     desk.hold_control(Key::Letter('r'));
     desk.wait_for("the replay to end where the recording did", |d| {
         difference(&d.grab(IMAGE), &away) < 1.5
@@ -36,9 +32,7 @@ fn what_was_recorded_is_replayed() {
     // It has ended: nothing is drawn any more.
     desk.settle(IMAGE);
     desk.press(Key::Home);
-    desk.wait_for("the keys to have the probe", |d| {
-        difference(&d.grab(IMAGE), &home) < 1.5
-    });
+    desk.wait_for("the keys to have the probe", |d| difference(&d.grab(IMAGE), &home) < 1.5);
     desk.quit();
 }
 
@@ -54,9 +48,7 @@ fn a_trajectory_of_a_file_is_gone_along_from_the_start() {
     desk.wait_for("an image", |d| brightness(&d.grab(IMAGE)) > 10.0);
     let end = desk.settle(IMAGE);
     desk.press(Key::Home);
-    desk.wait_for("the beginning, which is home", |d| {
-        difference(&d.grab(IMAGE), &end) > 4.0
-    });
+    desk.wait_for("the beginning, which is home", |d| difference(&d.grab(IMAGE), &end) > 4.0);
     for _ in 0..6 {
         desk.press(Key::Right);
     }
@@ -96,14 +88,8 @@ fn a_trajectory_is_rendered_pose_by_pose_without_a_window() {
     let rows = frames("rows.gif", &["--trajectory", &way]);
     assert_eq!(rows.len(), 3);
     assert!(rows.iter().all(|f| f.delay().numer_denom_ms() == (250, 1)));
-    assert_eq!(
-        frames("rate.gif", &["--trajectory", &way, "--fps", "10"]).len(),
-        6
-    );
-    assert_eq!(
-        frames("count.gif", &["--trajectory", &way, "--frames", "4"]).len(),
-        4
-    );
+    assert_eq!(frames("rate.gif", &["--trajectory", &way, "--fps", "10"]).len(), 6);
+    assert_eq!(frames("count.gif", &["--trajectory", &way, "--frames", "4"]).len(), 4);
     // The same file gives the same frames.
     let again = frames("again.gif", &["--trajectory", &way]);
     for (a, b) in rows.iter().zip(&again) {
@@ -119,12 +105,7 @@ fn a_trajectory_is_rendered_pose_by_pose_without_a_window() {
         let output = render(&scene, &path(name), &more);
         assert!(output.status.success(), "{output:?}");
     }
-    let pixels = |name: &str| {
-        image::open(path(name))
-            .expect("a picture")
-            .to_luma8()
-            .into_raw()
-    };
+    let pixels = |name: &str| image::open(path(name)).expect("a picture").to_luma8().into_raw();
     assert_eq!(pixels("end.png"), pixels("moved.png"));
     assert!(difference(&pixels("end.png"), &pixels("home.png")) > 4.0);
 }
@@ -145,21 +126,11 @@ fn a_trajectory_that_cannot_be_read_is_refused_with_its_line_and_what_to_do() {
             "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n0,2,0,0\n",
             ["way.csv:3", "occurs twice", "must increase"],
         ),
-        (
-            "time_s,x_mm\n0,0\n",
-            ["way.csv", "`y_mm` is missing", "together"],
-        ),
-        (
-            "time_s,x_mm,y_mm,z_mm\n0,0,0\n",
-            ["way.csv:2", "3 values", "one for each column"],
-        ),
+        ("time_s,x_mm\n0,0\n", ["way.csv", "`y_mm` is missing", "together"]),
+        ("time_s,x_mm,y_mm,z_mm\n0,0,0\n", ["way.csv:2", "3 values", "one for each column"]),
     ] {
         std::fs::write(&way, text).expect("written");
-        let render = render(
-            &scene,
-            &folder.path().join("a.png"),
-            &["--trajectory", named],
-        );
+        let render = render(&scene, &folder.path().join("a.png"), &["--trajectory", named]);
         let view = desk::program(&scene, &["--trajectory", named]).output();
         for output in [render, view.expect("started")] {
             let said = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -24,11 +24,7 @@ const VESSEL: (f32, f64) = (1.1, 2.0);
 /// All parts, in rising priority: where two overlap, the later one wins.
 pub fn parts() -> Vec<Part> {
     let (portal, hepatic) = liver_vessels();
-    let walled: Vec<Piece> = portal
-        .iter()
-        .copied()
-        .filter(|q| q.radii[0] > WALLED)
-        .collect();
+    let walled: Vec<Piece> = portal.iter().copied().filter(|q| q.radii[0] > WALLED).collect();
     let p = &Point::world();
     let layer = |depth: f32| body::fascial_layer(p, depth);
     let gallbladder = organs::gallbladder(p);
@@ -55,12 +51,7 @@ pub fn parts() -> Vec<Part> {
         part("colon-content", "stool", ORGAN, organs::colon_content(p)),
         part("colon-gas", "air", ORGAN, organs::colon_gas(p)),
         part("kidney", "kidney", ORGAN, organs::kidney(p)),
-        part(
-            "renal-pyramids",
-            "renal_pyramid",
-            FINE,
-            organs::renal_pyramids(p),
-        ),
+        part("renal-pyramids", "renal_pyramid", FINE, organs::renal_pyramids(p)),
         part("renal-sinus", "renal_sinus", FINE, organs::renal_sinus(p)),
         part("liver", "liver", ORGAN, organs::liver(p)),
         part("gallbladder-wall", "vessel_wall", FINE, outer_gallbladder),
@@ -69,12 +60,7 @@ pub fn parts() -> Vec<Part> {
         part("aorta-wall", "vessel_wall", (2.2, 0.5), outer_aorta),
         part("aorta", "blood", (2.2, 0.5), inner_aorta),
         part("hepatic-veins", "blood", VESSEL, lumen(p, &hepatic, 0.0)),
-        part(
-            "portal-wall",
-            "vessel_wall",
-            VESSEL,
-            lumen(p, &walled, PORTAL_WALL),
-        ),
+        part("portal-wall", "vessel_wall", VESSEL, lumen(p, &walled, PORTAL_WALL)),
         part("portal-vein", "blood", VESSEL, lumen(p, &portal, 0.0)),
         part("cyst", "cyst_fluid", FINE, organs::cyst(p)),
         part("lesion", "tumour", FINE, organs::lesion(p)),
@@ -92,10 +78,7 @@ const PORTAL_WALL: f32 = 0.9;
 const WALLED: f32 = 2.3;
 
 /// Box around the liver, mm.
-const LIVER_BOX: (Vec3, Vec3) = (
-    Vec3::new(-136.0, -80.0, -64.0),
-    Vec3::new(60.0, 76.0, 104.0),
-);
+const LIVER_BOX: (Vec3, Vec3) = (Vec3::new(-136.0, -80.0, -64.0), Vec3::new(60.0, 76.0, 104.0));
 
 /// Portal and hepatic trees, grown apart: radii 6 to 1.4 mm, six generations.
 fn liver_vessels() -> (Vec<Piece>, Vec<Piece>) {
@@ -105,21 +88,13 @@ fn liver_vessels() -> (Vec<Piece>, Vec<Piece>) {
     let mut random = Random(424);
     let points = region.points(7.0, 11.0, &mut random);
     let trunk = organs::portal_trunk();
-    let growth = Growth {
-        region: &region,
-        avoid: &[],
-        min_radius: 1.4,
-        generations: 6,
-    };
+    let growth = Growth { region: &region, avoid: &[], min_radius: 1.4, generations: 6 };
     let heading = organs::PORTA - trunk[trunk.len() - 2].ends[0];
     let mut portal = trunk;
     portal.extend(growth.grow(organs::PORTA, heading, 6.0, points.clone(), &mut random));
 
     // Three hepatic veins: right, middle, left; they run between the portal sectors.
-    let growth = Growth {
-        avoid: &portal,
-        ..growth
-    };
+    let growth = Growth { avoid: &portal, ..growth };
     let mut hepatic = Vec::new();
     let roots = [
         (Vec3::new(-0.9, 0.1, -0.4), 5.0, (f32::NEG_INFINITY, -80.0)),

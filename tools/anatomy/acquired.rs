@@ -45,9 +45,7 @@ impl Exam {
         output::write(&path, &self.scene)?;
         let name = format!("insonify-pelvis-{}", std::process::id());
         let folder = keep.map_or_else(|| std::env::temp_dir().join(name), PathBuf::from);
-        let made = self
-            .pelvis_scene(budget, &folder)
-            .and_then(|scene| self.swept(&scene));
+        let made = self.pelvis_scene(budget, &folder).and_then(|scene| self.swept(&scene));
         if keep.is_none() {
             // What is left behind in a temporary folder harms nobody.
             let _ = std::fs::remove_dir_all(&folder);

@@ -13,11 +13,8 @@ use crate::part::{Part, part};
 use crate::pelvis::{self, BOWEL, Bowel, tubes};
 
 /// The block that is modelled.
-pub const EXTENT: Extent = Extent {
-    low: Vec3::new(-90.0, -38.0, -14.0),
-    high: Vec3::new(90.0, 38.0, 100.0),
-    step: 2.0,
-};
+pub const EXTENT: Extent =
+    Extent { low: Vec3::new(-90.0, -38.0, -14.0), high: Vec3::new(90.0, 38.0, 100.0), step: 2.0 };
 
 /// Radius of the probe's face, whose middle is the origin, mm.
 const FACE: f32 = 11.0;
@@ -45,11 +42,7 @@ fn side(p: &Point, inset: f32) -> Tree {
 
 /// External iliac artery (true) or vein of both sides, less `wall`.
 fn iliac(p: &Point, artery: bool, wall: f32) -> Tree {
-    let (out, deep, radius) = if artery {
-        (57.5, 40.5, 3.8)
-    } else {
-        (58.5, 51.0, 5.2)
-    };
+    let (out, deep, radius) = if artery { (57.5, 40.5, 3.8) } else { (58.5, 51.0, 5.2) };
     let one = |side: f32| {
         cone(
             p,
@@ -65,11 +58,7 @@ fn iliac(p: &Point, artery: bool, wall: f32) -> Tree {
 /// The broad ligaments: flat, from the uterus to the side walls.
 fn ligaments(p: &Point) -> Tree {
     let one = |side: f32| {
-        let axes = [
-            Vec3::new(0.97, 0.0, side * 0.24),
-            Vec3::Y,
-            Vec3::new(side * -0.24, 0.0, 0.97),
-        ];
+        let axes = [Vec3::new(0.97, 0.0, side * 0.24), Vec3::Y, Vec3::new(side * -0.24, 0.0, 0.97)];
         let q = p.from(Vec3::new(side * 44.0, 0.0, 36.0)).along(axes);
         ellipsoid(&q, Vec3::new(31.0, 31.0, 6.0))
     };
@@ -101,28 +90,9 @@ fn veins(p: &Point, edges: [f32; 2]) -> Tree {
 
 /// Bowel behind the uterus; the right one holds gas.
 const LOOPS: [Bowel; 3] = [
-    Bowel(
-        &[
-            [-70.0, -24.0, 70.0],
-            [-44.0, 0.0, 74.0],
-            [-16.0, 6.0, 80.0],
-            [2.0, 26.0, 84.0],
-        ],
-        8.5,
-    ),
-    Bowel(
-        &[
-            [20.0, -26.0, 82.0],
-            [29.0, 0.0, 76.0],
-            [52.0, 8.0, 71.0],
-            [72.0, 24.0, 70.0],
-        ],
-        8.0,
-    ),
-    Bowel(
-        &[[-6.0, -30.0, 84.0], [4.0, 0.0, 87.0], [14.0, 30.0, 86.0]],
-        9.0,
-    ),
+    Bowel(&[[-70.0, -24.0, 70.0], [-44.0, 0.0, 74.0], [-16.0, 6.0, 80.0], [2.0, 26.0, 84.0]], 8.5),
+    Bowel(&[[20.0, -26.0, 82.0], [29.0, 0.0, 76.0], [52.0, 8.0, 71.0], [72.0, 24.0, 70.0]], 8.0),
+    Bowel(&[[-6.0, -30.0, 84.0], [4.0, 0.0, 87.0], [14.0, 30.0, 86.0]], 9.0),
 ];
 
 fn bowel(p: &Point, wall: f32) -> Tree {

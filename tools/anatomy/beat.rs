@@ -49,11 +49,7 @@ pub fn phases() -> [Phase; KEYFRAMES] {
         (0.25, 0.42, 0.40),
         (0.10, 0.16, 0.75),
     ]
-    .map(|(ejected, filled, open)| Phase {
-        ejected,
-        filled,
-        open,
-    })
+    .map(|(ejected, filled, open)| Phase { ejected, filled, open })
 }
 
 /// Share of the cavity's section that goes at full ejection.

@@ -144,10 +144,7 @@ pub fn vertebrae(p: &Point) -> Tree {
         intersection(round, q.2.abs() - 13.5, 5.0)
     });
     let arch = BODIES.map(|z: f32| {
-        let spinous = (
-            Vec3::new(0.0, 76.0, z - 6.0),
-            Vec3::new(0.0, 94.0, z - 14.0),
-        );
+        let spinous = (Vec3::new(0.0, 76.0, z - 6.0), Vec3::new(0.0, 94.0, z - 14.0));
         let side = |s: f32| {
             let pedicle = Vec3::new(13.0 * s, 60.0, z + 4.0);
             let joint = Vec3::new(14.0 * s, 74.0, z - 2.0);
@@ -180,11 +177,7 @@ pub fn discs(p: &Point) -> Tree {
 pub fn back_muscles(p: &Point) -> Tree {
     let column = |x: f32, y: f32, a: f32, b: f32, lean: f32| {
         // Psoas and quadratus diverge downwards.
-        let q = Point(
-            p.0.clone() - x + p.2.clone() * lean,
-            p.1.clone() - y,
-            p.2.clone(),
-        );
+        let q = Point(p.0.clone() - x + p.2.clone() * lean, p.1.clone() - y, p.2.clone());
         elliptic_cylinder(&q, a, b)
     };
     let psoas = column(-36.0, 50.0, 13.0, 15.0, -0.12);
@@ -193,9 +186,7 @@ pub fn back_muscles(p: &Point) -> Tree {
     let quadratus = column(-62.0, 76.0, 26.0, 9.0, -0.1);
     let erector = column(-36.0, 80.0, 30.0, 16.0, 0.0);
     let left_erector = column(36.0, 80.0, 30.0, 16.0, 0.0);
-    let all = union_all(
-        vec![psoas, quadratus, erector, left_psoas, left_erector],
-        4.0,
-    ) + undulation(p, 1.0, 40.0, 3.1);
+    let all = union_all(vec![psoas, quadratus, erector, left_psoas, left_erector], 4.0)
+        + undulation(p, 1.0, 40.0, 3.1);
     intersection(all, wall(p) + MUSCLE + 1.0, 4.0)
 }

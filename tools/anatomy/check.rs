@@ -46,11 +46,7 @@ const MIN_DOUBLE_AREA: f32 = 1e-6;
 /// Signed volume by the divergence theorem, mm3.
 pub fn volume(surface: &Surface) -> f64 {
     let p = |i: u32| -> DVec3 { surface.positions[i as usize].as_dvec3() };
-    let six: f64 = surface
-        .triangles
-        .iter()
-        .map(|&[a, b, c]| p(a).dot(p(b).cross(p(c))))
-        .sum();
+    let six: f64 = surface.triangles.iter().map(|&[a, b, c]| p(a).dot(p(b).cross(p(c)))).sum();
     six / 6.0
 }
 
@@ -82,10 +78,7 @@ pub fn check(surface: &Surface) -> Result<(), Defect> {
     if repeated > 0 {
         return Err(Defect::Edges(repeated));
     }
-    let open = directed
-        .keys()
-        .filter(|(a, b)| !directed.contains_key(&(*b, *a)))
-        .count();
+    let open = directed.keys().filter(|(a, b)| !directed.contains_key(&(*b, *a))).count();
     if open > 0 {
         return Err(Defect::Open(open));
     }
@@ -173,9 +166,7 @@ mod tests {
 
         // A second tetrahedron, point-mirrored, hangs on vertex 0 of the first.
         let mut pinched = tetrahedron();
-        pinched
-            .positions
-            .extend([Vec3::X, Vec3::Y, Vec3::Z].map(|v| -v));
+        pinched.positions.extend([Vec3::X, Vec3::Y, Vec3::Z].map(|v| -v));
         let mirrored = |i: u32| if i == 0 { 0 } else { i + 3 };
         for t in tetrahedron().triangles {
             let [a, b, c] = t.map(mirrored);

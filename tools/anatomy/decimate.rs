@@ -20,11 +20,7 @@ struct Quadric {
 }
 
 impl Quadric {
-    const ZERO: Self = Self {
-        a: DMat3::ZERO,
-        b: DVec3::ZERO,
-        c: 0.0,
-    };
+    const ZERO: Self = Self { a: DMat3::ZERO, b: DVec3::ZERO, c: 0.0 };
 
     fn plane(normal: DVec3, point: DVec3, weight: f64) -> Self {
         let d = -normal.dot(point);
@@ -36,11 +32,7 @@ impl Quadric {
     }
 
     fn add(&self, other: &Self) -> Self {
-        Self {
-            a: self.a + other.a,
-            b: self.b + other.b,
-            c: self.c + other.c,
-        }
+        Self { a: self.a + other.a, b: self.b + other.b, c: self.c + other.c }
     }
 
     fn error(&self, p: DVec3) -> f64 {
@@ -143,8 +135,7 @@ impl Mesh {
             mesh.positions.extend(positions);
             mesh.weights.resize(mesh.positions.len(), weight);
             let triangles = surface.triangles.iter();
-            mesh.triangles
-                .extend(triangles.map(|t| Some(t.map(|i| i + first))));
+            mesh.triangles.extend(triangles.map(|t| Some(t.map(|i| i + first))));
         }
         let n = mesh.positions.len();
         mesh.quadrics = vec![Quadric::ZERO; n];
@@ -176,11 +167,7 @@ impl Mesh {
         let soft = 1e-3 * trace + 1e-12;
         let matrix = q.a + DMat3::from_diagonal(DVec3::splat(soft));
         let best = matrix.inverse() * (middle * soft - q.b);
-        let target = if best.distance_squared(middle) < length2 {
-            best
-        } else {
-            middle
-        };
+        let target = if best.distance_squared(middle) < length2 { best } else { middle };
         // Quadrics are area-weighted: error over area is a mean squared distance.
         let area = trace.max(1e-9);
         let error = q.error(target) / area + EVENNESS * length2;
@@ -210,31 +197,27 @@ impl Mesh {
         if shared != 2 || na.len() + nb.len() < 8 {
             return false;
         }
-        [(a, b), (b, a)]
-            .into_iter()
-            .all(|(v, other)| self.fan_survives(v, other, target))
+        [(a, b), (b, a)].into_iter().all(|(v, other)| self.fan_survives(v, other, target))
     }
 
     /// Whether the triangles of `v` that stay keep their side and shape when it moves.
     fn fan_survives(&self, v: u32, other: u32, target: DVec3) -> bool {
         let stays = |t: &[u32; 3]| !t.contains(&other);
         let fan = self.around[v as usize].iter();
-        fan.map(|&t| self.triangles[t as usize].expect("alive"))
-            .filter(stays)
-            .all(|t| {
-                let at = |moved: bool| {
-                    t.map(|w| match moved && w == v {
-                        true => target,
-                        false => self.positions[w as usize],
-                    })
-                };
-                let normal = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p);
-                let (old, new) = (normal(at(false)), normal(at(true)));
-                let [p, q, r] = at(true);
-                let edges = p.distance_squared(q) + q.distance_squared(r) + r.distance_squared(p);
-                let quality = 2.0 * 3f64.sqrt() * new.length() / edges;
-                old.dot(new) > MIN_TURN * old.length() * new.length() && quality > MIN_QUALITY
-            })
+        fan.map(|&t| self.triangles[t as usize].expect("alive")).filter(stays).all(|t| {
+            let at = |moved: bool| {
+                t.map(|w| match moved && w == v {
+                    true => target,
+                    false => self.positions[w as usize],
+                })
+            };
+            let normal = |[p, q, r]: [DVec3; 3]| (q - p).cross(r - p);
+            let (old, new) = (normal(at(false)), normal(at(true)));
+            let [p, q, r] = at(true);
+            let edges = p.distance_squared(q) + q.distance_squared(r) + r.distance_squared(p);
+            let quality = 2.0 * 3f64.sqrt() * new.length() / edges;
+            old.dot(new) > MIN_TURN * old.length() * new.length() && quality > MIN_QUALITY
+        })
     }
 
     /// Merges `b` into `a`; returns how many triangles went.

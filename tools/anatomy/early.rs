@@ -39,11 +39,7 @@ const LEFT: Ovary = Ovary {
     ],
 };
 
-const LUTEUM: Luteum = Luteum {
-    middle: Vec3::new(42.5, 1.0, 47.0),
-    radius: 7.6,
-    wall: 3.8,
-};
+const LUTEUM: Luteum = Luteum { middle: Vec3::new(42.5, 1.0, 47.0), radius: 7.6, wall: 3.8 };
 
 fn gestation() -> Gestation {
     Gestation {

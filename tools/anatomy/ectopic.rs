@@ -44,11 +44,7 @@ const LEFT: Ovary = Ovary {
     ],
 };
 
-const LUTEUM: Luteum = Luteum {
-    middle: Vec3::new(50.0, 1.0, 48.0),
-    radius: 6.6,
-    wall: 3.0,
-};
+const LUTEUM: Luteum = Luteum { middle: Vec3::new(50.0, 1.0, 48.0), radius: 6.6, wall: 3.0 };
 
 fn gestation() -> Gestation {
     Gestation {
@@ -72,39 +68,20 @@ fn parts() -> Vec<Part> {
         smooth + undulation(p, 0.35, 13.0, 1.9)
     };
     // From the horn of the uterus to the mass.
-    let isthmus = cone(
-        p,
-        Vec3::new(-1.0, 0.0, 47.0),
-        3.0,
-        Vec3::new(14.0, 0.0, 43.0),
-        5.0,
-    );
+    let isthmus = cone(p, Vec3::new(-1.0, 0.0, 47.0), 3.0, Vec3::new(14.0, 0.0, 43.0), 5.0);
     let tube = union(ring(RING + TUBE), isthmus, 4.0);
     let lining =
         |r: Vec3, uneven: f32| ellipsoid(&p.from(middle), r) + undulation(p, uneven, 15.0, 0.4);
-    let blood = ellipsoid(
-        &p.from(Vec3::new(5.0, 3.0, 56.5)),
-        Vec3::new(33.0, 27.0, 6.8),
-    );
+    let blood = ellipsoid(&p.from(Vec3::new(5.0, 3.0, 56.5)), Vec3::new(33.0, 27.0, 6.8));
     let blood = adnexa::within(p, blood + undulation(p, 1.2, 26.0, 0.7));
     let junction = lining(LINING[0] + 2.4, 0.7);
     let mut out = adnexa::around(p, [middle.x - radii.x, middle.x + radii.x]);
     out.push(part("blood", "free_blood", ORGAN, blood));
     out.extend(adnexa::organs(p, [&RIGHT, &LEFT], &LUTEUM, UTERUS));
     out.extend([
-        part(
-            "junction",
-            "junction",
-            ORGAN,
-            intersection(junction, uterus + 4.0, 3.0),
-        ),
+        part("junction", "junction", ORGAN, intersection(junction, uterus + 4.0, 3.0)),
         part("endometrium", "decidua", ORGAN, lining(LINING[0], 0.7)),
-        part(
-            "pseudosac",
-            "luteal_fluid",
-            (0.4, 1.5),
-            lining(LINING[1], 0.25),
-        ),
+        part("pseudosac", "luteal_fluid", (0.4, 1.5), lining(LINING[1], 0.25)),
         part("tube", "tube", ORGAN, tube),
         part("ring", "decidua", ORGAN, ring(RING)),
         part("filling", "filling", ORGAN, gestation.sac(p, 0.0)),

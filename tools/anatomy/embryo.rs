@@ -17,11 +17,8 @@ use crate::part::{Part, part};
 use crate::{model, output};
 
 /// The box that holds the embryo with its cord.
-const EXTENT: Extent = Extent {
-    low: Vec3::new(-16.0, -7.0, -10.0),
-    high: Vec3::new(10.0, 7.0, 8.0),
-    step: 0.4,
-};
+const EXTENT: Extent =
+    Extent { low: Vec3::new(-16.0, -7.0, -10.0), high: Vec3::new(10.0, 7.0, 8.0), step: 0.4 };
 
 /// Triangles of all its meshes.
 const BUDGET: usize = 6_000;
@@ -164,27 +161,12 @@ impl Gestation {
         for (node, part) in parts() {
             add(part.name, part.tissue, node.name(), &file(part.name));
         }
-        add(
-            "heart-wall",
-            "embryonic_heart",
-            "heartbeat",
-            &round(HEART_RADII[0]),
-        );
+        add("heart-wall", "embryonic_heart", "heartbeat", &round(HEART_RADII[0]));
         add("heart", "blood", "heartbeat", &round(HEART_RADII[1]));
         let yolk = self.yolk.1;
         let faint = "\nsurface_gain = \"-10 dB\"";
-        add(
-            "yolk-sac",
-            "yolk_wall",
-            "vesicle",
-            &(round(Vec3::splat(yolk)) + faint),
-        );
-        add(
-            "yolk",
-            "amniotic_fluid",
-            "vesicle",
-            &(round(Vec3::splat(yolk - YOLK_WALL)) + faint),
-        );
+        add("yolk-sac", "yolk_wall", "vesicle", &(round(Vec3::splat(yolk)) + faint));
+        add("yolk", "amniotic_fluid", "vesicle", &(round(Vec3::splat(yolk - YOLK_WALL)) + faint));
         out
     }
 }
@@ -248,9 +230,7 @@ impl Node {
 }
 
 fn chain(p: &Point, bends: &[(Vec3, f32)], k: f32) -> Tree {
-    let pieces = bends
-        .windows(2)
-        .map(|w| cone(p, w[0].0, w[0].1, w[1].0, w[1].1));
+    let pieces = bends.windows(2).map(|w| cone(p, w[0].0, w[0].1, w[1].0, w[1].1));
     union_all(pieces.collect(), k)
 }
 
@@ -272,25 +252,11 @@ fn body(p: &Point) -> Tree {
         let bends = bends.map(|(v, r)| (at(v.x, side * v.y, v.z), r));
         chain(p, &bends, 0.5)
     };
-    let arm = [
-        (at(0.8, 2.2, -0.6), 1.1),
-        (at(-0.6, 3.9, -2.2), 0.85),
-        (at(0.4, 3.2, -4.0), 0.8),
-    ];
-    let leg = [
-        (at(-4.9, 1.8, -0.8), 1.2),
-        (at(-5.2, 3.0, -2.8), 0.85),
-        (at(-4.4, 2.4, -4.2), 0.75),
-    ];
-    let limbs = union_all(
-        vec![
-            limb(1.0, arm),
-            limb(-1.0, arm),
-            limb(1.0, leg),
-            limb(-1.0, leg),
-        ],
-        0.3,
-    );
+    let arm = [(at(0.8, 2.2, -0.6), 1.1), (at(-0.6, 3.9, -2.2), 0.85), (at(0.4, 3.2, -4.0), 0.8)];
+    let leg =
+        [(at(-4.9, 1.8, -0.8), 1.2), (at(-5.2, 3.0, -2.8), 0.85), (at(-4.4, 2.4, -4.2), 0.75)];
+    let limbs =
+        union_all(vec![limb(1.0, arm), limb(-1.0, arm), limb(1.0, leg), limb(-1.0, leg)], 0.3);
     union(union(chain(p, &back, 1.2), belly, 1.0), limbs, 0.5)
 }
 
@@ -337,19 +303,8 @@ fn parts() -> Vec<(Node, Part)> {
         (Node::Body, part("cord", soft, (0.5, 0.6), cord(p))),
         (Node::Body, part("body", soft, (0.5, 1.0), body(p))),
         (Node::Head, part("head", soft, (0.5, 1.0), head(p))),
-        (
-            Node::Body,
-            part(
-                "neural-tube",
-                "neural_tube",
-                (0.3, 0.6),
-                chain(p, &tube, 0.3),
-            ),
-        ),
-        (
-            Node::Head,
-            part("vesicles", "amniotic_fluid", (0.35, 0.6), vesicles(p)),
-        ),
+        (Node::Body, part("neural-tube", "neural_tube", (0.3, 0.6), chain(p, &tube, 0.3))),
+        (Node::Head, part("vesicles", "amniotic_fluid", (0.35, 0.6), vesicles(p))),
     ]
 }
 

@@ -19,11 +19,8 @@ use crate::model::Extent;
 use crate::part::{Part, part};
 
 /// The box that holds the fetus with its cord.
-pub const EXTENT: Extent = Extent {
-    low: Vec3::new(-34.0, -16.0, -23.0),
-    high: Vec3::new(25.0, 16.0, 24.0),
-    step: 0.7,
-};
+pub const EXTENT: Extent =
+    Extent { low: Vec3::new(-34.0, -16.0, -23.0), high: Vec3::new(25.0, 16.0, 24.0), step: 0.7 };
 
 /// Crown to rump.
 const CROWN_RUMP: f32 = 43.0;
@@ -106,13 +103,7 @@ fn trunk(p: &Point) -> Tree {
         vec![
             cone(p, NECK, 4.1, point(-1.5, 0.0, 0.8), 7.0),
             cone(p, point(-1.5, 0.0, 0.8), 7.0, point(-8.0, 0.0, -0.6), BELLY),
-            cone(
-                p,
-                point(-8.0, 0.0, -0.6),
-                BELLY,
-                point(-14.5, 0.0, -0.9),
-                6.4,
-            ),
+            cone(p, point(-8.0, 0.0, -0.6), BELLY, point(-14.5, 0.0, -0.9), 6.4),
             cone(p, point(-14.5, 0.0, -0.9), 6.4, point(-16.0, 0.0, 0.0), 5.5),
         ],
         1.5,
@@ -154,10 +145,7 @@ fn spine(p: &Point) -> Tree {
         ahead -= length;
     }
     // A sharp union: the centres do not touch.
-    centres
-        .into_iter()
-        .reduce(|a, b| a.min(b))
-        .expect("vertebrae")
+    centres.into_iter().reduce(|a, b| a.min(b)).expect("vertebrae")
 }
 
 /// Ribs: thin bows from the spine forwards, seven on each side.
@@ -311,18 +299,8 @@ pub const LIMBS: [(&str, &str, f32, &Limb); 4] = [
 ];
 
 const LIMB_MESHES: [LimbNames; 4] = [
-    [
-        "left-upper-arm",
-        "left-humerus",
-        "left-lower-arm",
-        "left-radius",
-    ],
-    [
-        "right-upper-arm",
-        "right-humerus",
-        "right-lower-arm",
-        "right-radius",
-    ],
+    ["left-upper-arm", "left-humerus", "left-lower-arm", "left-radius"],
+    ["right-upper-arm", "right-humerus", "right-lower-arm", "right-radius"],
     ["left-thigh", "left-femur", "left-calf", "left-tibia"],
     ["right-thigh", "right-femur", "right-calf", "right-tibia"],
 ];
@@ -336,10 +314,7 @@ pub fn parts() -> Vec<(Node, Part)> {
     let mut out = Vec::new();
     let mut add = |node: Node, part: Part| out.push((node, part));
     add(Node::Body, part("cord", soft, (0.7, 0.6), cord(p)));
-    add(
-        Node::Body,
-        part("cord-vessels", "blood", (0.3, 0.3), cord_vessels(p)),
-    );
+    add(Node::Body, part("cord-vessels", "blood", (0.3, 0.3), cord_vessels(p)));
     let mut bones = Vec::new();
     for (i, ((.., side, limb), names)) in LIMBS.into_iter().zip(LIMB_MESHES).enumerate() {
         for (j, part) in limb.parts(p, side, names).into_iter().enumerate() {
@@ -364,33 +339,15 @@ pub fn parts() -> Vec<(Node, Part)> {
     );
     add(Node::Body, part("heart", "blood", (0.45, 0.8), heart));
     let stomach = blob(point(-6.4, 3.8, 0.8), point(1.4, 1.2, 1.7));
-    add(
-        Node::Body,
-        part("stomach", "amniotic_fluid", organ, stomach),
-    );
+    add(Node::Body, part("stomach", "amniotic_fluid", organ, stomach));
     let bladder = blob(point(-14.8, 0.0, -4.0), point(1.5, 1.4, 1.3));
     add(Node::Body, part("bladder", "urine", organ, bladder));
-    add(
-        Node::Head,
-        part("skull", "membranous_bone", (0.7, 1.0), vault(p, 0.0)),
-    );
-    add(
-        Node::Head,
-        part("brain", "fetal_brain", (0.7, 1.0), vault(p, VAULT)),
-    );
-    add(
-        Node::Head,
-        part("choroid-plexus", "choroid_plexus", organ, choroid(p)),
-    );
-    add(
-        Node::Head,
-        part("face-bones", "membranous_bone", (0.35, 1.0), face_bones(p)),
-    );
+    add(Node::Head, part("skull", "membranous_bone", (0.7, 1.0), vault(p, 0.0)));
+    add(Node::Head, part("brain", "fetal_brain", (0.7, 1.0), vault(p, VAULT)));
+    add(Node::Head, part("choroid-plexus", "choroid_plexus", organ, choroid(p)));
+    add(Node::Head, part("face-bones", "membranous_bone", (0.35, 1.0), face_bones(p)));
     add(Node::Body, part("ribs", "fetal_bone", (0.25, 0.5), ribs(p)));
-    add(
-        Node::Body,
-        part("spine", "fetal_bone", (0.22, 3.0), spine(p)),
-    );
+    add(Node::Body, part("spine", "fetal_bone", (0.22, 3.0), spine(p)));
     out.extend(bones);
     out
 }

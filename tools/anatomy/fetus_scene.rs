@@ -54,9 +54,7 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
     out += DECIDUAL;
     out += FETAL;
     out.push('\n');
-    out += &contents(None, |name| {
-        Some(if name == "sac" { CHORION } else { "" }.to_owned())
-    });
+    out += &contents(None, |name| Some(if name == "sac" { CHORION } else { "" }.to_owned()));
     out.truncate(out.trim_end().len());
     let path = output.join("fetus.toml");
     output::write(&path, &(out + "\n"))?;

@@ -27,11 +27,7 @@ impl Point {
 
     /// The coordinates relative to `o`.
     pub fn from(&self, o: Vec3) -> Self {
-        Self(
-            self.0.clone() - o.x,
-            self.1.clone() - o.y,
-            self.2.clone() - o.z,
-        )
+        Self(self.0.clone() - o.x, self.1.clone() - o.y, self.2.clone() - o.z)
     }
 
     /// Projection on a direction.
@@ -73,14 +69,9 @@ pub fn half_space(p: &Point, o: Vec3, normal: Vec3) -> Tree {
 pub fn cone(p: &Point, a: Vec3, ra: f32, b: Vec3, rb: f32) -> Tree {
     let axis = b - a;
     let rel = p.from(a);
-    let h = (rel.dot(axis) * axis.length_squared().recip())
-        .max(0.0)
-        .min(1.0);
-    let off = Point(
-        rel.0 - h.clone() * axis.x,
-        rel.1 - h.clone() * axis.y,
-        rel.2 - h.clone() * axis.z,
-    );
+    let h = (rel.dot(axis) * axis.length_squared().recip()).max(0.0).min(1.0);
+    let off =
+        Point(rel.0 - h.clone() * axis.x, rel.1 - h.clone() * axis.y, rel.2 - h.clone() * axis.z);
     off.length_of(Vec3::ONE) - (h * (rb - ra) + ra)
 }
 
@@ -143,10 +134,7 @@ const BLOCK: f32 = 16.0;
 impl Field {
     /// Compiles `tree`.
     pub fn new(tree: &Tree) -> Self {
-        Self {
-            shape: JitShape::from(tree.clone()),
-            local: VmShape::from(tree.clone()),
-        }
+        Self { shape: JitShape::from(tree.clone()), local: VmShape::from(tree.clone()) }
     }
 
     /// Field values at `points`, mm.

@@ -16,11 +16,8 @@ use crate::model::Extent;
 use crate::part::{Part, part};
 
 /// The box that holds the heart and what is modelled of the chest.
-pub const EXTENT: Extent = Extent {
-    low: Vec3::new(-125.0, -64.0, -6.0),
-    high: Vec3::new(105.0, 64.0, 206.0),
-    step: 3.0,
-};
+pub const EXTENT: Extent =
+    Extent { low: Vec3::new(-125.0, -64.0, -6.0), high: Vec3::new(105.0, 64.0, 206.0), step: 3.0 };
 
 /// Level of the left ventricle's widest section.
 pub const EQUATOR: f64 = 83.0;
@@ -62,10 +59,7 @@ fn left_ventricle(p: &Point) -> Tree {
 
 /// Right ventricle's cavity: the part of a wide egg that the left one leaves.
 fn right_ventricle(p: &Point) -> Tree {
-    let free = ellipsoid(
-        &p.from(Vec3::new(-25.0, -3.0, 86.0)),
-        Vec3::new(37.0, 40.0, 48.0),
-    );
+    let free = ellipsoid(&p.from(Vec3::new(-25.0, -3.0, 86.0)), Vec3::new(37.0, 40.0, 48.0));
     let trabeculae = undulation(p, 0.8, 17.0, 2.1);
     let crescent = difference(free, egg(p, WALL), 4.0) + trabeculae;
     intersection(crescent, below(p, TRICUSPID - 0.4), 2.0)
@@ -73,13 +67,8 @@ fn right_ventricle(p: &Point) -> Tree {
 
 fn left_atrium(p: &Point) -> Tree {
     let body = ellipsoid(&p.from(ATRIA[0]), Vec3::new(19.0, 16.5, 19.0));
-    let funnel = cone(
-        p,
-        Vec3::new(0.0, 0.0, MITRAL as f32),
-        15.6,
-        Vec3::new(1.0, 2.0, 126.0),
-        14.5,
-    );
+    let funnel =
+        cone(p, Vec3::new(0.0, 0.0, MITRAL as f32), 15.6, Vec3::new(1.0, 2.0, 126.0), 14.5);
     // The stems of two pulmonary veins.
     let vein = |x: f32| {
         let (from, to) = (Vec3::new(0.6 * x, 4.0, 142.0), Vec3::new(x, 6.0, 153.0));
@@ -120,20 +109,8 @@ const AORTIC_WALL: f32 = 2.0;
 /// Root of the aorta, 30 mm wide, in front of the four-chamber plane, widened by `wall`.
 fn aorta(p: &Point, wall: f32) -> Tree {
     let at = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
-    let root = cone(
-        p,
-        at(-9.0, -27.0, 110.0),
-        12.0 + wall,
-        at(-15.0, -33.0, 132.0),
-        13.5 + wall,
-    );
-    let trunk = cone(
-        p,
-        at(-15.0, -33.0, 132.0),
-        13.0 + wall,
-        at(-20.0, -34.0, 168.0),
-        13.0 + wall,
-    );
+    let root = cone(p, at(-9.0, -27.0, 110.0), 12.0 + wall, at(-15.0, -33.0, 132.0), 13.5 + wall);
+    let trunk = cone(p, at(-15.0, -33.0, 132.0), 13.0 + wall, at(-20.0, -34.0, 168.0), 13.0 + wall);
     union(root, trunk, 4.0)
 }
 
@@ -149,10 +126,7 @@ fn papillary_muscles(p: &Point) -> Tree {
 
 /// The muscle with all that it encloses; its outer surface is the epicardium.
 fn outer(p: &Point) -> Tree {
-    let right = ellipsoid(
-        &p.from(Vec3::new(-25.0, -3.0, 86.0)),
-        Vec3::new(41.5, 44.5, 52.5),
-    );
+    let right = ellipsoid(&p.from(Vec3::new(-25.0, -3.0, 86.0)), Vec3::new(41.5, 44.5, 52.5));
     let right = intersection(right, below(p, TRICUSPID + 7.0), 6.0);
     let left = intersection(egg(p, WALL), below(p, MITRAL + 9.0), 6.0);
     let ventricles = union(left, right, 7.0);
@@ -174,31 +148,11 @@ pub fn parts() -> Vec<Part> {
         part("right-ventricle", "blood", chamber, right_ventricle(p)),
         part("left-atrium", "blood", chamber, left_atrium(p)),
         part("right-atrium", "blood", chamber, right_atrium(p)),
-        part(
-            "aortic-wall",
-            "vessel_wall",
-            (3.4, 0.4),
-            aorta(p, AORTIC_WALL),
-        ),
+        part("aortic-wall", "vessel_wall", (3.4, 0.4), aorta(p, AORTIC_WALL)),
         part("aorta", "blood", (3.4, 0.4), aorta(p, 0.0)),
-        part(
-            "mitral-opening",
-            "blood",
-            small,
-            opening(p, mitral, ORIFICE[0]),
-        ),
-        part(
-            "tricuspid-opening",
-            "blood",
-            small,
-            opening(p, centre, ORIFICE[1]),
-        ),
-        part(
-            "papillary-muscles",
-            "myocardium",
-            small,
-            papillary_muscles(p),
-        ),
+        part("mitral-opening", "blood", small, opening(p, mitral, ORIFICE[0])),
+        part("tricuspid-opening", "blood", small, opening(p, centre, ORIFICE[1])),
+        part("papillary-muscles", "myocardium", small, papillary_muscles(p)),
     ]
 }
 
@@ -226,10 +180,8 @@ pub fn chest() -> Vec<Part> {
         let band = ellipsoid(&section, Vec3::new(6.5, 3.6, 1.0));
         intersection(band, block.clone() + 4.0, 2.0)
     };
-    let pericardium = ellipsoid(
-        &p.from(Vec3::new(-15.5, 0.0, 104.0)),
-        Vec3::new(57.0, 110.0, 106.0),
-    );
+    let pericardium =
+        ellipsoid(&p.from(Vec3::new(-15.5, 0.0, 104.0)), Vec3::new(57.0, 110.0, 106.0));
     let depth = (p.2.clone() - 104.0).abs() - 86.0;
     let lungs = difference(
         intersection(block.clone() + 3.0, depth, 5.0),
@@ -241,12 +193,7 @@ pub fn chest() -> Vec<Part> {
         part("skin", "skin", (1.0, 0.02), layer(1.0, 3.2, 0.3)),
         part("fat", "fat", flat, layer(3.0, 8.0, 0.3)),
         part("intercostals", "muscle", flat, layer(7.8, 18.0, 1.9)),
-        part(
-            "ribs",
-            "cortical_bone",
-            (3.0, 0.1),
-            rib(-16.0).min(rib(16.0)),
-        ),
+        part("ribs", "cortical_bone", (3.0, 0.1), rib(-16.0).min(rib(16.0))),
         part("lungs", "lung", (5.0, 0.1), lungs),
     ]
 }

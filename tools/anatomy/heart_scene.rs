@@ -47,11 +47,7 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
             output::write(&path, &output::obj(name, AXES, surface))?;
         }
         apart(&moved[..count], &parts).map_err(|e| format!("keyframe {k}: {e}"))?;
-        volumes.push(
-            CHAMBERS
-                .map(|i| check::volume(&moved[i]) / 1000.0)
-                .collect(),
-        );
+        volumes.push(CHAMBERS.map(|i| check::volume(&moved[i]) / 1000.0).collect());
     }
     report(&volumes);
     for (part, surface) in parts[count..].iter().zip(still) {
@@ -95,10 +91,7 @@ fn report(volumes: &[Vec<f64>]) {
     println!("volumes, ml:     LV     RV     LA     RA");
     for (k, at) in volumes.iter().enumerate() {
         let row: String = at.iter().map(|v| format!(" {v:6.1}")).collect();
-        println!(
-            "{:5.0} ms    {row}",
-            1e3 * PERIOD * k as f64 / KEYFRAMES as f64
-        );
+        println!("{:5.0} ms    {row}", 1e3 * PERIOD * k as f64 / KEYFRAMES as f64);
     }
     for (i, name) in ["left", "right"].into_iter().enumerate() {
         let of = |better: fn(f64, f64) -> f64| {

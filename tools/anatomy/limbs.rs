@@ -38,15 +38,8 @@ const MIDDLE: DVec3 = DVec3::new(0.0, 0.0, 75.0);
 const SEGMENT: f64 = 26.0;
 
 /// The tube: radius, mm, at shares of the length of the centre line. The tip is a foot.
-const SKIN: [(f64, f64); 7] = [
-    (0.0, 6.0),
-    (0.12, 8.5),
-    (0.3, 8.0),
-    (0.5, 6.2),
-    (0.68, 6.6),
-    (0.9, 4.2),
-    (1.0, 3.6),
-];
+const SKIN: [(f64, f64); 7] =
+    [(0.0, 6.0), (0.12, 8.5), (0.3, 8.0), (0.5, 6.2), (0.68, 6.6), (0.9, 4.2), (1.0, 3.6)];
 
 /// Radius of the bone, mm, over the same length; it ends before the skin does.
 const BONE: [(f64, f64); 5] = [(0.0, 2.2), (0.1, 1.6), (0.5, 1.9), (0.9, 1.3), (1.0, 1.6)];
@@ -60,13 +53,7 @@ pub fn make(budget: usize, spread: f64, output: &Path) -> Result<(), String> {
     let around = ((budget as f64 / 5.6).sqrt() / 2.0).round().max(6.0) as usize * 2;
     let rows = |share: f64| (share * budget as f64 / (2 * around) as f64).round() as usize;
     let tubes = [
-        (
-            "skin",
-            "fetal_soft_tissue",
-            &SKIN[..],
-            (0.0, 1.0),
-            rows(0.62),
-        ),
+        ("skin", "fetal_soft_tissue", &SKIN[..], (0.0, 1.0), rows(0.62)),
         ("bone", "fetal_bone", &BONE[..], (0.08, 0.92), rows(0.38)),
     ];
     let mut total = 0;
@@ -136,9 +123,7 @@ translate = [0, 0, 140]
 
 /// Radius at share `u` of the length, smooth between the entries.
 fn radius(radii: &[(f64, f64)], u: f64) -> f64 {
-    let i = radii
-        .partition_point(|(at, _)| *at <= u)
-        .clamp(1, radii.len() - 1);
+    let i = radii.partition_point(|(at, _)| *at <= u).clamp(1, radii.len() - 1);
     let ((a, ra), (b, rb)) = (radii[i - 1], radii[i]);
     let x = ((u - a) / (b - a)).clamp(0.0, 1.0);
     ra + (rb - ra) * x * x * (3.0 - 2.0 * x)
@@ -209,8 +194,7 @@ fn tube(
     let last = out.positions.len() as u32 - 1;
     for i in 0..around {
         out.triangles.push([0, index(1, i + 1), index(1, i)]);
-        out.triangles
-            .push([last, index(rings, i), index(rings, i + 1)]);
+        out.triangles.push([last, index(rings, i), index(rings, i + 1)]);
         for ring in 1..rings {
             let [a, b] = [index(ring, i), index(ring, i + 1)];
             let [d, c] = [index(ring + 1, i), index(ring + 1, i + 1)];

@@ -44,10 +44,7 @@ pub fn mesh(field: &Field, low: Vec3, high: Vec3, cell: f32) -> Result<Surface, 
 fn contour(field: &Field, low: Vec3, high: Vec3, cell: f32) -> Surface {
     let depth = ((high - low).max_element() / cell).log2().ceil().max(2.0) as u8;
     let half = 0.5 * cell * f32::from(depth).exp2();
-    let mut settings = Settings {
-        depth,
-        ..Settings::default()
-    };
+    let mut settings = Settings { depth, ..Settings::default() };
     let centre = low + half;
     for i in 0..3 {
         settings.world_to_model[(i, i)] = half;
@@ -58,17 +55,9 @@ fn contour(field: &Field, low: Vec3, high: Vec3, cell: f32) -> Surface {
     let tree = Octree::build(&shape, &settings).expect("nobody cancels");
     let dual = tree.walk_dual();
     Surface {
-        positions: dual
-            .vertices
-            .iter()
-            .map(|v| Vec3::new(v.x, v.y, v.z))
-            .collect(),
+        positions: dual.vertices.iter().map(|v| Vec3::new(v.x, v.y, v.z)).collect(),
         normals: Vec::new(),
-        triangles: dual
-            .triangles
-            .iter()
-            .map(|t| [t.x as u32, t.y as u32, t.z as u32])
-            .collect(),
+        triangles: dual.triangles.iter().map(|t| [t.x as u32, t.y as u32, t.z as u32]).collect(),
     }
 }
 

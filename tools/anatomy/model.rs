@@ -55,9 +55,7 @@ pub fn surfaces(parts: &[Part], extent: Extent, budget: usize) -> Result<Vec<Sur
     }
     let total = count(&surfaces);
     if (total as f64 / budget as f64 - 1.0).abs() > 0.2 {
-        return Err(format!(
-            "{total} triangles: thinning stopped short of {budget}"
-        ));
+        return Err(format!("{total} triangles: thinning stopped short of {budget}"));
     }
     Ok(surfaces)
 }

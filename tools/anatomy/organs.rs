@@ -13,28 +13,15 @@ use crate::vessels::{Piece, along};
 /// Liver without the vessels in it: 15 cm from dome to tip in the midclavicular line (Kratzer et
 /// al., J Ultrasound Med 2003: 14 +- 1.7 cm), a wedge that thins towards the left and downwards.
 pub fn liver(p: &Point) -> Tree {
-    let right = ellipsoid(
-        &p.from(Vec3::new(-74.0, -8.0, 26.0)),
-        Vec3::new(78.0, 88.0, 92.0),
-    );
-    let left = ellipsoid(
-        &p.from(Vec3::new(4.0, -44.0, 34.0)),
-        Vec3::new(62.0, 36.0, 40.0),
-    );
+    let right = ellipsoid(&p.from(Vec3::new(-74.0, -8.0, 26.0)), Vec3::new(78.0, 88.0, 92.0));
+    let left = ellipsoid(&p.from(Vec3::new(4.0, -44.0, 34.0)), Vec3::new(62.0, 36.0, 40.0));
     let lobes = union(right, left, 25.0);
     // The visceral face looks down, back and to the left; its meeting with the front is the
     // sharp lower edge.
-    let visceral = half_space(
-        p,
-        Vec3::new(-73.0, -56.0, -40.0),
-        Vec3::new(0.2, 0.36, -0.84),
-    );
+    let visceral = half_space(p, Vec3::new(-73.0, -56.0, -40.0), Vec3::new(0.2, 0.36, -0.84));
     let wedge = intersection(lobes, visceral + undulation(p, 2.0, 60.0, 0.3), 12.0);
     // The midline's hollow before the vena cava and the spine.
-    let spine = ellipsoid(
-        &p.from(Vec3::new(4.0, 52.0, 20.0)),
-        Vec3::new(40.0, 48.0, 160.0),
-    );
+    let spine = ellipsoid(&p.from(Vec3::new(4.0, 52.0, 20.0)), Vec3::new(40.0, 48.0, 160.0));
     let wedge = difference(wedge, spine, 14.0);
     let fitted = intersection(wedge, cavity(p) + 1.6, 6.0);
     let kidney_bed = kidney(p) - 4.0;
@@ -92,24 +79,15 @@ fn kidney_point(hilum: f32, across: f32, along: f32) -> Vec3 {
 pub fn kidney(p: &Point) -> Tree {
     let q = in_kidney(p);
     let bean = ellipsoid(&q, Vec3::new(26.0, 23.0, 54.0));
-    let notch = ellipsoid(
-        &q.from(Vec3::new(29.0, 0.0, 0.0)),
-        Vec3::new(10.0, 8.0, 13.0),
-    );
+    let notch = ellipsoid(&q.from(Vec3::new(29.0, 0.0, 0.0)), Vec3::new(10.0, 8.0, 13.0));
     difference(bean, notch, 8.0) + undulation(p, 0.8, 28.0, 2.0)
 }
 
 /// Fat and collecting system of the renal sinus, open at the hilum.
 pub fn renal_sinus(p: &Point) -> Tree {
     let q = in_kidney(p);
-    let middle = ellipsoid(
-        &q.from(Vec3::new(5.0, 0.0, 0.0)),
-        Vec3::new(11.0, 8.0, 32.0),
-    );
-    let hilum = ellipsoid(
-        &q.from(Vec3::new(16.0, 0.0, 0.0)),
-        Vec3::new(13.0, 6.5, 11.0),
-    );
+    let middle = ellipsoid(&q.from(Vec3::new(5.0, 0.0, 0.0)), Vec3::new(11.0, 8.0, 32.0));
+    let hilum = ellipsoid(&q.from(Vec3::new(16.0, 0.0, 0.0)), Vec3::new(13.0, 6.5, 11.0));
     union(middle, hilum, 8.0) + undulation(p, 1.6, 17.0, 0.2)
 }
 

@@ -20,10 +20,7 @@ impl Grid {
             a.distance(b)
         });
         let cell = 1.5 * lengths.sum::<f64>() / surface.triangles.len().max(1) as f64;
-        let mut grid = Self {
-            cell,
-            cells: HashMap::new(),
-        };
+        let mut grid = Self { cell, cells: HashMap::new() };
         for (i, t) in surface.triangles.iter().enumerate() {
             let ends = corners(surface, t);
             for at in grid.touched(&ends) {

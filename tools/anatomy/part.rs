@@ -24,11 +24,5 @@ pub fn part(
     (cell, weight): (f32, f64),
     field: Tree,
 ) -> Part {
-    Part {
-        name,
-        tissue,
-        cell,
-        weight,
-        field,
-    }
+    Part { name, tissue, cell, weight, field }
 }

@@ -52,31 +52,14 @@ pub struct Bowel(pub &'static [[f32; 3]], pub f32);
 /// Loops of small bowel that lie on the uterus, the last one with gas.
 const SMALL: [Bowel; 3] = [
     Bowel(
-        &[
-            [-31.0, -50.0, 35.0],
-            [-34.0, -14.0, 34.0],
-            [-31.0, 8.0, 33.5],
-            [-38.0, 46.0, 33.0],
-        ],
+        &[[-31.0, -50.0, 35.0], [-34.0, -14.0, 34.0], [-31.0, 8.0, 33.5], [-38.0, 46.0, 33.0]],
         7.2,
     ),
     Bowel(
-        &[
-            [-48.0, -50.0, 42.0],
-            [-47.0, -6.0, 44.0],
-            [-48.0, 22.0, 42.0],
-            [-54.0, 50.0, 42.0],
-        ],
+        &[[-48.0, -50.0, 42.0], [-47.0, -6.0, 44.0], [-48.0, 22.0, 42.0], [-54.0, 50.0, 42.0]],
         8.0,
     ),
-    Bowel(
-        &[
-            [-63.0, -48.0, 52.0],
-            [-60.0, 4.0, 54.0],
-            [-62.0, 48.0, 52.0],
-        ],
-        9.5,
-    ),
+    Bowel(&[[-63.0, -48.0, 52.0], [-60.0, 4.0, 54.0], [-62.0, 48.0, 52.0]], 9.5),
 ];
 
 /// Rectum and sigmoid behind the uterus.
@@ -105,22 +88,14 @@ pub fn tubes(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
 
 fn loops(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
     let clear = womb::uterus(p) - (1.2 + wall);
-    intersection(
-        difference(tubes(p, bowel, wall), clear, 3.0),
-        womb::skin(p) + (25.0 + wall),
-        4.0,
-    )
+    intersection(difference(tubes(p, bowel, wall), clear, 3.0), womb::skin(p) + (25.0 + wall), 4.0)
 }
 
 /// Gas has risen to the front of the loops that hold it.
 fn small_gas(p: &Point) -> Tree {
     let level = p.2.clone() - p.0.clone() * 0.9 - 106.0 + undulation(p, 0.6, 13.0, 2.4);
     let beside = p.0.clone() + 54.5;
-    intersection(
-        intersection(loops(p, &SMALL, BOWEL.0 + 0.5), level, 2.0),
-        beside,
-        2.0,
-    )
+    intersection(intersection(loops(p, &SMALL, BOWEL.0 + 0.5), level, 2.0), beside, 2.0)
 }
 
 fn rectal_gas(p: &Point) -> Tree {
@@ -131,17 +106,8 @@ fn rectal_gas(p: &Point) -> Tree {
 /// The promontory and the upper sacrum.
 fn sacrum(p: &Point) -> Tree {
     let bone = union(
-        ellipsoid(
-            &p.from(Vec3::new(-70.0, 0.0, 130.0)),
-            Vec3::new(17.0, 27.0, 19.0),
-        ),
-        cone(
-            p,
-            Vec3::new(-62.0, 0.0, 138.0),
-            15.0,
-            Vec3::new(-10.0, 0.0, 172.0),
-            18.0,
-        ),
+        ellipsoid(&p.from(Vec3::new(-70.0, 0.0, 130.0)), Vec3::new(17.0, 27.0, 19.0)),
+        cone(p, Vec3::new(-62.0, 0.0, 138.0), 15.0, Vec3::new(-10.0, 0.0, 172.0), 18.0),
         6.0,
     );
     within(p, bone + undulation(p, 0.8, 23.0, 0.4))
@@ -185,21 +151,13 @@ pub fn arcuate(p: &Point, middle: Vec3, radii: Vec3, arcs: &[(f32, f32, f32)]) -
 
 /// An intramural fibroid of 15 mm in the back wall.
 fn fibroid(p: &Point) -> Tree {
-    let ball = ellipsoid(
-        &p.from(Vec3::new(-37.0, 3.0, 94.5)),
-        Vec3::new(8.2, 7.4, 6.4),
-    );
+    let ball = ellipsoid(&p.from(Vec3::new(-37.0, 3.0, 94.5)), Vec3::new(8.2, 7.4, 6.4));
     ball + undulation(p, 0.4, 11.0, 0.3)
 }
 
 fn cervical(p: &Point, radius: f32) -> Tree {
-    cone(
-        p,
-        Vec3::new(42.0, 0.0, 86.5),
-        radius,
-        Vec3::new(76.0, 0.0, 105.0),
-        radius,
-    ) + undulation(p, 0.4, 19.0, 2.0)
+    cone(p, Vec3::new(42.0, 0.0, 86.5), radius, Vec3::new(76.0, 0.0, 105.0), radius)
+        + undulation(p, 0.4, 19.0, 2.0)
 }
 
 /// Flat, from the cervix down, of these half-axes: along, across, thick.
@@ -234,18 +192,8 @@ pub fn parts() -> Vec<Part> {
         part("bowel-wall", "bowel", organ, loops(p, &SMALL, 0.0)),
         part("chyme", "chyme", organ, loops(p, &SMALL, BOWEL.0)),
         part("bowel-gas", "air", organ, small_gas(p)),
-        part(
-            "vagina",
-            "muscle",
-            organ,
-            vagina(p, Vec3::new(26.0, 16.0, 5.5)),
-        ),
-        part(
-            "vaginal-line",
-            "fascia",
-            fine,
-            vagina(p, Vec3::new(22.0, 12.0, 1.5)),
-        ),
+        part("vagina", "muscle", organ, vagina(p, Vec3::new(26.0, 16.0, 5.5))),
+        part("vaginal-line", "fascia", fine, vagina(p, Vec3::new(22.0, 12.0, 1.5))),
         part("bladder-wall", "bladder", organ, womb::bladder(p, 0.0)),
         part("bladder", "urine", organ, womb::bladder(p, 2.2)),
         part("uterus", "myometrium", organ, womb::uterus(p)),

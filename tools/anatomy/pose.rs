@@ -24,12 +24,7 @@ impl Pose {
     fn aimed(title: &'static str, skin: Vec3, target: Vec3, lateral: Vec3, press: f32) -> Self {
         let direction = (target - skin).normalize();
         let lateral = (lateral - direction * lateral.dot(direction)).normalize();
-        Self {
-            title,
-            position: skin + direction * press,
-            direction,
-            lateral,
-        }
+        Self { title, position: skin + direction * press, direction, lateral }
     }
 
     /// The point `lateral` mm along the array, `depth` mm into the body and `elevation` mm off

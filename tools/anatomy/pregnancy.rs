@@ -30,17 +30,11 @@ pub fn make(budget: usize, output: &Path, keep: Option<&Path>) -> Result<(), Str
     let exam = Exam {
         name: "pregnancy",
         scene: fused(&output::command("pregnancy", budget, "", output)),
-        pelvis: format!(
-            "{}{PELVIS}{PELVIC}{DECIDUAL}",
-            head("Pelvis without a sac", "gel", "")
-        ),
+        pelvis: format!("{}{PELVIS}{PELVIC}{DECIDUAL}", head("Pelvis without a sac", "gel", "")),
         parts: pelvis::parts(),
         faint: pelvis::faint,
         axes: fetus_scene::WORLD_AXES,
-        extent: Extent {
-            step: 2.0,
-            ..womb::EXTENT
-        },
+        extent: Extent { step: 2.0, ..womb::EXTENT },
         sweep: SWEEP,
         voxel: VOXEL,
     };

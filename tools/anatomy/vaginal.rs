@@ -49,12 +49,7 @@ pub struct Case {
 pub fn make(case: &Case, budget: usize, output: &Path, keep: Option<&Path>) -> Result<(), String> {
     embryo::make(output)?;
     let p = &crate::field::Point::world();
-    let sac = crate::part::part(
-        "sac",
-        "amniotic_fluid",
-        (1.2, 1.0),
-        case.gestation.sac(p, 0.0),
-    );
+    let sac = crate::part::part("sac", "amniotic_fluid", (1.2, 1.0), case.gestation.sac(p, 0.0));
     let mask = case.pelvis.iter().find(|part| part.name == case.mask);
     let mask = mask.expect("the mask is a part of the pelvis").clone();
     let mask = Part { cell: 1.2, ..mask };
@@ -110,14 +105,7 @@ slice_thickness = "4 mm"
 
 /// The scene with the volume.
 fn fused(case: &Case, tissue: &str, command: &str) -> String {
-    let Case {
-        name,
-        about,
-        mask,
-        mother,
-        gestation,
-        ..
-    } = case;
+    let Case { name, about, mask, mother, gestation, .. } = case;
     let matched = format!(
         "# As coarse, as smooth and as bright as the volume, whose voxels are means over pixels.\n{}",
         case.matched
@@ -136,11 +124,7 @@ fn fused(case: &Case, tissue: &str, command: &str) -> String {
          # In rising priority: where two overlap, the later one wins. So joints need no seams.\n{rim}{sac}{}",
         gestation.biometry(),
         embryo::TISSUES,
-        if gestation.amnion {
-            embryo::AMNIOTIC
-        } else {
-            ""
-        },
+        if gestation.amnion { embryo::AMNIOTIC } else { "" },
         gestation.transforms("breathing"),
         gestation.meshes(2)
     );

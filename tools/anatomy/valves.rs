@@ -21,20 +21,12 @@ pub struct Valve {
 
 /// The mitral valve.
 pub fn mitral() -> Valve {
-    Valve {
-        centre: DVec3::new(0.0, 0.0, MITRAL),
-        radius: ORIFICE[0] + 1.0,
-        gape: 10.5,
-    }
+    Valve { centre: DVec3::new(0.0, 0.0, MITRAL), radius: ORIFICE[0] + 1.0, gape: 10.5 }
 }
 
 /// The tricuspid valve, drawn with two leaflets: the view shows no more.
 pub fn tricuspid() -> Valve {
-    Valve {
-        centre: TRICUSPID_CENTRE.extend(TRICUSPID),
-        radius: ORIFICE[1] + 1.0,
-        gape: 9.5,
-    }
+    Valve { centre: TRICUSPID_CENTRE.extend(TRICUSPID), radius: ORIFICE[1] + 1.0, gape: 9.5 }
 }
 
 /// Thickness of a leaflet, mm (normal: under 4 mm at the tip, 1-2 mm in the body).
@@ -86,8 +78,7 @@ impl Valve {
                 };
                 // Thinner towards the free edge.
                 let half = 0.5 * THICKNESS * (1.0 - 0.3 * s);
-                out.positions
-                    .push((at(a, s) + up * (side * half)).as_vec3());
+                out.positions.push((at(a, s) + up * (side * half)).as_vec3());
                 out.normals.push((up * side).as_vec3());
             }
         }

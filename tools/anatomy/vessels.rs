@@ -38,11 +38,7 @@ impl Region {
             low + REGION_STEP * cell.as_vec3()
         };
         let points: Vec<Vec3> = (0..size.x * size.y * size.z).map(at).collect();
-        Self {
-            low,
-            size,
-            values: field.values(&points),
-        }
+        Self { low, size, values: field.values(&points) }
     }
 
     /// The value at the grid point nearest to `p`; positive outside the grid.
@@ -125,15 +121,7 @@ impl Growth<'_> {
         random: &mut Random,
     ) -> Vec<Piece> {
         let mut pieces = Vec::new();
-        self.branch(
-            from,
-            towards.normalize(),
-            radius,
-            points,
-            0,
-            random,
-            &mut pieces,
-        );
+        self.branch(from, towards.normalize(), radius, points, 0, random, &mut pieces);
         pieces
     }
 
@@ -163,10 +151,7 @@ impl Growth<'_> {
             let end_radius = 0.94 * radius;
             for (i, pair) in path.windows(2).enumerate() {
                 let at = |i: usize| radius + (end_radius - radius) * i as f32 / PIECES as f32;
-                pieces.push(Piece {
-                    ends: [pair[0], pair[1]],
-                    radii: [at(i), at(i + 1)],
-                });
+                pieces.push(Piece { ends: [pair[0], pair[1]], radii: [at(i), at(i + 1)] });
             }
             let tip = path[PIECES];
             (tip, (tip - path[PIECES - 1]).normalize(), end_radius)
@@ -257,36 +242,20 @@ fn split(points: Vec<Vec3>, tip: Vec3) -> [Vec<Vec3>; 2] {
         let next: Vec3 = points.iter().map(|p| across(p) * across(p).dot(axis)).sum();
         axis = next.normalize_or(axis);
     }
-    points
-        .into_iter()
-        .partition::<Vec<_>, _>(|p| across(p).dot(axis) < 0.0)
-        .into()
+    points.into_iter().partition::<Vec<_>, _>(|p| across(p).dot(axis) < 0.0).into()
 }
 
 /// The lumen of all pieces, widened by `wall` mm.
 pub fn lumen(p: &Point, pieces: &[Piece], wall: f32) -> Tree {
-    let tubes = pieces.iter().map(|q| {
-        cone(
-            p,
-            q.ends[0],
-            q.radii[0] + wall,
-            q.ends[1],
-            q.radii[1] + wall,
-        )
-    });
+    let tubes =
+        pieces.iter().map(|q| cone(p, q.ends[0], q.radii[0] + wall, q.ends[1], q.radii[1] + wall));
     // The fillet rounds the forks and stays below the finest radius.
     union_all(tubes.collect(), 1.2)
 }
 
 /// A vessel along given points with given radii.
 pub fn along(points: &[(Vec3, f32)]) -> Vec<Piece> {
-    points
-        .windows(2)
-        .map(|w| Piece {
-            ends: [w[0].0, w[1].0],
-            radii: [w[0].1, w[1].1],
-        })
-        .collect()
+    points.windows(2).map(|w| Piece { ends: [w[0].0, w[1].0], radii: [w[0].1, w[1].1] }).collect()
 }
 
 #[cfg(test)]
@@ -299,12 +268,7 @@ mod tests {
         let field = Field::new(&ellipsoid(&Point::world(), Vec3::splat(50.0)));
         let region = Region::new(&field, Vec3::splat(-52.0), Vec3::splat(52.0));
         let random = &mut Random(1);
-        let growth = Growth {
-            region: &region,
-            avoid: &[],
-            min_radius: 1.5,
-            generations: 5,
-        };
+        let growth = Growth { region: &region, avoid: &[], min_radius: 1.5, generations: 5 };
         let points = region.points(8.0, 12.0, random);
         let pieces = growth.grow(Vec3::new(0.0, 0.0, -40.0), Vec3::Z, 6.0, points, random);
         assert!(pieces.len() > 20 * PIECES);

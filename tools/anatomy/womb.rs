@@ -11,11 +11,8 @@ use crate::model::Extent;
 use crate::part::{Part, part};
 
 /// The block that is modelled.
-pub const EXTENT: Extent = Extent {
-    low: Vec3::new(-96.0, -60.0, -14.0),
-    high: Vec3::new(96.0, 60.0, 190.0),
-    step: 3.0,
-};
+pub const EXTENT: Extent =
+    Extent { low: Vec3::new(-96.0, -60.0, -14.0), high: Vec3::new(96.0, 60.0, 190.0), step: 3.0 };
 
 /// Middle of the sac.
 pub const SAC: Vec3 = Vec3::new(0.0, 0.0, 70.0);
@@ -54,22 +51,13 @@ pub fn sac(p: &Point, wider: f32) -> Tree {
 /// Body and cervix; the cervix points down and back.
 pub fn uterus(p: &Point) -> Tree {
     let body = ellipsoid(&p.from(SAC - Vec3::X), Vec3::new(55.0, 43.0, 40.0));
-    let cervix = cone(
-        p,
-        Vec3::new(34.0, 0.0, 82.0),
-        24.0,
-        Vec3::new(74.0, 0.0, 104.0),
-        15.0,
-    );
+    let cervix = cone(p, Vec3::new(34.0, 0.0, 82.0), 24.0, Vec3::new(74.0, 0.0, 104.0), 15.0);
     union(body, cervix, 14.0) + undulation(p, 1.0, 43.0, 2.2)
 }
 
 /// A half-full bladder between the wall and the lower uterus, shrunk by `wall`.
 pub fn bladder(p: &Point, wall: f32) -> Tree {
-    let whole = ellipsoid(
-        &p.from(Vec3::new(57.0, 0.0, 44.0)),
-        Vec3::new(27.0, 30.0, 17.0) - wall,
-    );
+    let whole = ellipsoid(&p.from(Vec3::new(57.0, 0.0, 44.0)), Vec3::new(27.0, 30.0, 17.0) - wall);
     let clear = difference(whole, uterus(p) - (1.0 + wall), 5.0);
     intersection(clear, skin(p) + LAYERS[3] + 1.0 + wall, 5.0)
 }
@@ -81,15 +69,8 @@ pub fn decidua(p: &Point) -> Tree {
 
 /// A disc of 15 mm on the back wall of the sac, from which it bulges inwards.
 fn placenta(p: &Point) -> Tree {
-    let lens = ellipsoid(
-        &p.from(SAC + Vec3::new(-10.0, 0.0, 26.0)),
-        Vec3::new(28.0, 24.0, 13.0),
-    );
-    intersection(
-        lens + undulation(p, 0.7, 17.0, 0.5),
-        sac(p, DECIDUA + 2.0),
-        3.0,
-    )
+    let lens = ellipsoid(&p.from(SAC + Vec3::new(-10.0, 0.0, 26.0)), Vec3::new(28.0, 24.0, 13.0));
+    intersection(lens + undulation(p, 0.7, 17.0, 0.5), sac(p, DECIDUA + 2.0), 3.0)
 }
 
 /// All parts up to the fluid, in rising priority.

@@ -25,56 +25,30 @@ pub fn alone(machine: &Machine, arguments: &Arguments) -> Result<()> {
         ));
     }
     let rows = run(machine, &arguments.subdivisions)?;
-    write_json(
-        &machine.output,
-        "builds",
-        &json!({ "machine": machine.provenance, "rows": rows }),
-    )
+    write_json(&machine.output, "builds", &json!({ "machine": machine.provenance, "rows": rows }))
 }
 
 /// Builds and refits of spheres; median of five.
 pub fn run(machine: &Machine, subdivisions: &[u32]) -> Result<Value> {
     let mut table = Table::new(
         "Bottom-level structures built by the device, ms",
-        &[
-            "triangles",
-            "fast trace",
-            "compaction",
-            "fast build",
-            "refit",
-            "MB",
-            "MB compacted",
-        ],
+        &["triangles", "fast trace", "compaction", "fast build", "refit", "MB", "MB compacted"],
     );
     let mut rows = Vec::new();
     for &subdivisions in subdivisions {
         let mesh = shapes::sphere(30.0, subdivisions);
-        let input = [BlasInput {
-            name: "sphere",
-            positions: &mesh.positions,
-            triangles: &mesh.triangles,
-        }];
+        let input =
+            [BlasInput { name: "sphere", positions: &mesh.positions, triangles: &mesh.triangles }];
         let build = |options| build_times(&machine.device, &input, options).into_diagnostic();
-        let quick = BlasOptions {
-            fast_trace: false,
-            compact: false,
-        };
+        let quick = BlasOptions { fast_trace: false, compact: false };
         let mut times = [(); 4].map(|()| Vec::new());
         let mut bytes = [0.0; 2];
         for _ in 0..5 {
             let best = build(BlasOptions::default())?;
             let fast = build(quick)?;
             let refit = refit_times(&machine.device, &input, true).into_diagnostic()?;
-            let found = [
-                best.build_ms,
-                best.compact_ms,
-                fast.build_ms,
-                refit.refit_ms,
-            ];
-            times
-                .iter_mut()
-                .zip(found)
-                .for_each(|(times, ms)| times.push(ms));
+            let found = [best.build_ms, best.compact_ms, fast.build_ms, refit.refit_ms];
+            times.iter_mut().zip(found).for_each(|(times, ms)| times.push(ms));
             bytes = [best.bytes, best.compacted_bytes].map(|b| b as f64 / 1e6);
         }
         let [trace, compact, fast, refit] = times.map(|t| crate::measure::Statistics::of(t).median);

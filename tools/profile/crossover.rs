@@ -51,18 +51,13 @@ fn limb(subdivisions: u32, distance: f64, strategy: Strategy) -> Result<Scene> {
     let fewer = [("probe.scanlines", "96"), ("probe.elevation_layers", "3")];
     let fewer = fewer.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let (mut scene, _) = Scene::load(&file, &fewer)?;
-    let keyframed = scene
-        .instances
-        .iter()
-        .position(|i| !i.keyframes.meshes.is_empty());
+    let keyframed = scene.instances.iter().position(|i| !i.keyframes.meshes.is_empty());
     let mut limb = scene.instances[keyframed.expect("the limb")].clone();
     scene.instances.retain(|i| i.keyframes.meshes.is_empty());
     scene.graph = Graph::default();
     let first = scene.meshes.len();
     let rest = shapes::ellipsoid(LIMB, subdivisions);
-    scene
-        .meshes
-        .extend((0..KEYFRAMES).map(|k| placed(&rest, k, distance)));
+    scene.meshes.extend((0..KEYFRAMES).map(|k| placed(&rest, k, distance)));
     limb.keyframes = Keyframes {
         meshes: (first..first + KEYFRAMES).collect(),
         strategy,
@@ -81,11 +76,7 @@ fn placed(rest: &Mesh, k: usize, distance: f64) -> Mesh {
         turn,
         DVec3::new(0.0, 0.0, 65.0) + corner * DVec3::new(distance, 0.3 * distance, distance),
     );
-    let moved = |p: &[f32; 3]| {
-        at.transform_point3(DVec3::from(p.map(f64::from)))
-            .as_vec3()
-            .into()
-    };
+    let moved = |p: &[f32; 3]| at.transform_point3(DVec3::from(p.map(f64::from))).as_vec3().into();
     let turned = |n: &[f32; 3]| (turn * DVec3::from(n.map(f64::from))).as_vec3().into();
     Mesh {
         positions: rest.positions.iter().map(moved).collect(),
@@ -177,10 +168,8 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
         format!("Change of keyframe, {tracer}: structures, ms (median, p99)"),
         &["triangles", "strategy", "AS ms", "AS p99", "frame ms", "MB"],
     );
-    let mut curves: Vec<Curve> = strategies
-        .iter()
-        .map(|s| Curve::line(s.to_string(), Vec::new()))
-        .collect();
+    let mut curves: Vec<Curve> =
+        strategies.iter().map(|s| Curve::line(s.to_string(), Vec::new())).collect();
     let mut rows = Vec::new();
     for &subdivisions in &arguments.subdivisions {
         let scene = |s| limb(subdivisions, 20.0, s);
@@ -192,9 +181,7 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
             let structures = Statistics::of(samples.iter().map(|s| s.structures));
             let frame = Statistics::of(samples.iter().map(|s| s.frame));
             let megabytes = rig.simulator.memory().total() as f64 / 1e6;
-            curve
-                .points
-                .push([triangles as f64, structures.median.max(1e-4)]);
+            curve.points.push([triangles as f64, structures.median.max(1e-4)]);
             table.add(vec![
                 triangles.to_string(),
                 strategy.to_string(),
@@ -299,10 +286,7 @@ fn crossing(rows: &[Value], triangles: usize, lasting: &str) {
     let of = |row: &&Value| row["triangles"] == triangles;
     let cheaper = |row: &&Value| row["rebuild"].as_f64() < row[lasting].as_f64();
     let text = match rows.iter().filter(of).find(cheaper) {
-        Some(row) => format!(
-            "rebuild is cheaper than {lasting} from {} mm on",
-            row["distance_mm"]
-        ),
+        Some(row) => format!("rebuild is cheaper than {lasting} from {} mm on", row["distance_mm"]),
         None => format!("{lasting} is cheaper than rebuild at every distance"),
     };
     insonify::output::line(format_args!("{triangles} triangles: {text}"));
@@ -329,9 +313,7 @@ fn ratio(scene: &Scene) -> f64 {
 /// False intersections of the union box per ray, over all keyframes.
 fn false_unions(machine: &Machine, scene: Scene) -> Result<f64> {
     let mut rig = Rig::new(machine, scene, Tracer::Bvh)?;
-    rig.simulator
-        .count(&machine.library, true)
-        .into_diagnostic()?;
+    rig.simulator.count(&machine.library, true).into_diagnostic()?;
     let (mut missed, mut rays) = (0.0, 0.0);
     for k in 0..KEYFRAMES {
         show(&mut rig.scene, k);

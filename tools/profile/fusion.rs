@@ -63,11 +63,7 @@ impl Way {
     fn new(machine: &Machine, scene: &Scene, tracer: Tracer) -> Result<Self> {
         let mut rig = Rig::new(machine, scene.clone(), tracer)?;
         rig.frame()?;
-        Ok(Self {
-            rig,
-            stages: vec![Vec::new(); STAGES.len()],
-            frames: Vec::new(),
-        })
+        Ok(Self { rig, stages: vec![Vec::new(); STAGES.len()], frames: Vec::new() })
     }
 
     fn measure(&mut self) -> Result<()> {
@@ -106,10 +102,8 @@ pub struct Measured {
 
 /// Measures both in turns and prints what each stage costs.
 pub fn run(machine: &Machine, scenes: &Scenes, tracer: Tracer, frames: u32) -> Result<Measured> {
-    let mut ways = [
-        Way::new(machine, &scenes.simulated, tracer)?,
-        Way::new(machine, &scenes.fused, tracer)?,
-    ];
+    let mut ways =
+        [Way::new(machine, &scenes.simulated, tracer)?, Way::new(machine, &scenes.fused, tracer)?];
     for round in 0..frames {
         // Now the one first, now the other.
         let first = usize::from(round % 2 == 1);
@@ -141,9 +135,7 @@ pub fn run(machine: &Machine, scenes: &Scenes, tracer: Tracer, frames: u32) -> R
     explain(&counters, frame);
     let by_stage = |i: usize| -> Value {
         let pairs = STAGES.iter().zip(&stages[i]);
-        pairs
-            .map(|(name, ms)| ((*name).to_owned(), json!(ms)))
-            .collect()
+        pairs.map(|(name, ms)| ((*name).to_owned(), json!(ms))).collect()
     };
     let count = |c: &Counters| {
         json!({

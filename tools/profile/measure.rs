@@ -36,11 +36,7 @@ impl Rig {
 
     /// With a simulator made for `scene`.
     pub fn of(simulator: Simulator, scene: Scene) -> Self {
-        Self {
-            simulator,
-            scene,
-            index: 0,
-        }
+        Self { simulator, scene, index: 0 }
     }
 
     /// Images the scene as it stands, alone on the device: its passes, and what the processor did, ms.

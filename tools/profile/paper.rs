@@ -111,17 +111,10 @@ struct Paper {
     deviations: Option<[f64; 2]>,
 }
 
-const TABLE_II: Paper = Paper {
-    triangles: 934.0,
-    ms: [85.6, 87.7],
-    deviations: None,
-};
+const TABLE_II: Paper = Paper { triangles: 934.0, ms: [85.6, 87.7], deviations: None };
 /// The deviation is that of the static hearts.
-const TABLE_III: Paper = Paper {
-    triangles: 7.3,
-    ms: [65.0, 64.1],
-    deviations: Some([0.63, f64::NAN]),
-};
+const TABLE_III: Paper =
+    Paper { triangles: 7.3, ms: [65.0, 64.1], deviations: Some([0.63, f64::NAN]) };
 
 pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
     let plan = arguments.plan();
@@ -161,11 +154,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
                     deviations: None,
                     triangles: one.triangles,
                 },
-                paper: Paper {
-                    triangles: 929.0,
-                    ms: fusion::PAPER,
-                    deviations: None,
-                },
+                paper: Paper { triangles: 929.0, ms: fusion::PAPER, deviations: None },
             });
         }
         if let Some(scenes) = fetus.as_ref().filter(|_| wanted(Which::Two)) {
@@ -212,21 +201,12 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         output::line(file.display());
     }
     let provenance = &machine.provenance;
-    write_json(
-        &machine.output,
-        "paper",
-        &json!({ "machine": provenance, "runs": all }),
-    )
+    write_json(&machine.output, "paper", &json!({ "machine": provenance, "runs": all }))
 }
 
 fn json_of(entry: &Entry) -> (String, Value) {
     let [first, second] = entry.keys;
-    let Pair {
-        first: a,
-        second: b,
-        deviations,
-        triangles,
-    } = entry.pair;
+    let Pair { first: a, second: b, deviations, triangles } = entry.pair;
     let mut values = json!({ first: a, second: b, "triangles": triangles });
     if let Some(deviations) = deviations {
         values["deviations_ms"] = json!(deviations);
@@ -361,11 +341,6 @@ fn keyframed(
     let [first, a] = of(0);
     Ok([1, 2].map(|way| {
         let [second, b] = of(way);
-        Pair {
-            first,
-            second,
-            deviations: Some([a, b]),
-            triangles: scene.triangles(),
-        }
+        Pair { first, second, deviations: Some([a, b]), triangles: scene.triangles() }
     }))
 }

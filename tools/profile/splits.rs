@@ -27,11 +27,8 @@ enum Builder {
 }
 
 impl Builder {
-    const ALL: [Self; 3] = [
-        Self::Lasting(Splits::Object),
-        Self::Lasting(Splits::Spatial),
-        Self::Rebuild,
-    ];
+    const ALL: [Self; 3] =
+        [Self::Lasting(Splits::Object), Self::Lasting(Splits::Spatial), Self::Rebuild];
 
     fn name(self) -> &'static str {
         match self {
@@ -54,11 +51,7 @@ pub fn run(machine: &Machine, files: &[PathBuf], frames: u32) -> Result<()> {
     let mut scenes = Vec::new();
     let shipped = ["heart", "limbs"]
         .map(|name| Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml")));
-    for file in if files.is_empty() {
-        &shipped[..]
-    } else {
-        files
-    } {
+    for file in if files.is_empty() { &shipped[..] } else { files } {
         scenes.push(Scene::load(file, &[])?.0);
     }
     if files.is_empty() {
@@ -83,10 +76,7 @@ pub fn run(machine: &Machine, files: &[PathBuf], frames: u32) -> Result<()> {
     );
     let mut rows = Vec::new();
     for scene in &scenes {
-        let keyframed = scene
-            .instances
-            .iter()
-            .any(|i| !i.keyframes.meshes.is_empty());
+        let keyframed = scene.instances.iter().any(|i| !i.keyframes.meshes.is_empty());
         for builder in Builder::ALL {
             if builder == Builder::Rebuild && !keyframed {
                 continue;

@@ -57,11 +57,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         }
     }
     let provenance = &machine.provenance;
-    write_json(
-        &machine.output,
-        &arguments.name,
-        &json!({ "machine": provenance, "runs": all }),
-    )
+    write_json(&machine.output, &arguments.name, &json!({ "machine": provenance, "runs": all }))
 }
 
 /// Measures and prints one scene with one tracer.
@@ -178,14 +174,9 @@ struct Sizes {
 impl Sizes {
     fn of(simulator: &Simulator) -> Self {
         let (frame, rows) = (simulator.constants(), &simulator.tables().rows);
-        let [scanlines, layers, samples, width, height] = [
-            frame.scanlines,
-            frame.layers,
-            frame.samples,
-            frame.image_width,
-            frame.image_height,
-        ]
-        .map(f64::from);
+        let [scanlines, layers, samples, width, height] =
+            [frame.scanlines, frame.layers, frame.samples, frame.image_width, frame.image_height]
+                .map(f64::from);
         let taps = |sigma: f32, deviations: f64, most: f64| {
             2.0 * (deviations * f64::from(sigma)).ceil().min(most) + 1.0
         };
@@ -195,10 +186,7 @@ impl Sizes {
             per_line: samples,
             samples: scanlines * samples,
             pixels: width * height,
-            taps: [
-                lateral.sum::<f64>() / samples,
-                taps(frame.axial_sigma, 4.0, 32.0),
-            ],
+            taps: [lateral.sum::<f64>() / samples, taps(frame.axial_sigma, 4.0, 32.0)],
         }
     }
 }
@@ -214,13 +202,7 @@ struct Work {
 /// work depends on the way through a tree. An operation is an addition, a multiplication or a
 /// comparison; a logarithm, exponential, cosine or root counts as ten.
 fn work(stage: &str, sizes: &Sizes, counters: &Counters) -> Option<Work> {
-    let Sizes {
-        lines,
-        per_line,
-        samples,
-        pixels,
-        taps: [lateral, axial],
-    } = *sizes;
+    let Sizes { lines, per_line, samples, pixels, taps: [lateral, axial] } = *sizes;
     let (bytes, operations) = match stage {
         // Segments read, both integers of a sample flushed per line; a cell is hashed and placed, an
         // accepted one weighed and deposited.

@@ -30,10 +30,7 @@ pub struct Arguments {
 
 /// Strategies that can show the scene by this tracer.
 pub fn possible(scene: &Scene, tracer: Tracer) -> Vec<Strategy> {
-    let mut keyframed = scene
-        .instances
-        .iter()
-        .filter(|i| !i.keyframes.meshes.is_empty());
+    let mut keyframed = scene.instances.iter().filter(|i| !i.keyframes.meshes.is_empty());
     let shared = keyframed.all(|i| scene.shares_topology(i));
     let can = |s: &Strategy| {
         (shared || !s.needs_shared_topology())
@@ -83,11 +80,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         let mut runs = Vec::new();
         for strategy in possible(&scene, tracer) {
             let rig = Rig::new(machine, by(&scene, strategy), tracer)?;
-            runs.push(Run {
-                strategy,
-                rig,
-                samples: Vec::new(),
-            });
+            runs.push(Run { strategy, rig, samples: Vec::new() });
         }
         for i in 0..arguments.warm_up + arguments.frames {
             let seconds = period / keyframes as f64 * (f64::from(i) + 0.5);
@@ -98,14 +91,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
                 }
             }
         }
-        results.push(report(
-            machine,
-            &scene,
-            tracer,
-            &mut runs,
-            arguments.frames,
-            period,
-        )?);
+        results.push(report(machine, &scene, tracer, &mut runs, arguments.frames, period)?);
     }
     let all = json!({
         "machine": machine.provenance,
@@ -126,11 +112,7 @@ fn report(
     period: f64,
 ) -> Result<Value> {
     let mut table = Table::new(
-        format!(
-            "{}, {} triangles, {tracer}, {frames} frames",
-            scene.name,
-            scene.triangles()
-        ),
+        format!("{}, {} triangles, {tracer}, {frames} frames", scene.name, scene.triangles()),
         &[
             "strategy",
             "AS ms",
@@ -171,11 +153,8 @@ fn report(
             per_ray(1),
             per_ray(2),
         ]);
-        let points = run
-            .samples
-            .iter()
-            .zip(0..)
-            .map(|(s, i)| [f64::from(i), s.structures.max(1e-4)]);
+        let points =
+            run.samples.iter().zip(0..).map(|(s, i)| [f64::from(i), s.structures.max(1e-4)]);
         curves.push(Curve::line(run.strategy.to_string(), points.collect()));
         rows.push(json!({
             "strategy": run.strategy.to_string(),
@@ -202,24 +181,16 @@ fn report(
 
 /// False intersections of the union and of the box, and nodes visited, per ray: over eight frames.
 fn count(machine: &Machine, run: &mut Run, period: f64) -> Result<[f64; 3]> {
-    run.rig
-        .simulator
-        .count(&machine.library, true)
-        .into_diagnostic()?;
+    run.rig.simulator.count(&machine.library, true).into_diagnostic()?;
     let mut sums = [0.0; 4];
     for i in 0..8 {
         run.rig.frame_at(period * f64::from(i) / 8.0)?;
         let c = run.rig.simulator.counters().into_diagnostic()?;
-        for (sum, n) in sums
-            .iter_mut()
-            .zip([c.rays, c.false_unions, c.false_boxes, c.node_visits])
+        for (sum, n) in sums.iter_mut().zip([c.rays, c.false_unions, c.false_boxes, c.node_visits])
         {
             *sum += f64::from(n);
         }
     }
-    run.rig
-        .simulator
-        .count(&machine.library, false)
-        .into_diagnostic()?;
+    run.rig.simulator.count(&machine.library, false).into_diagnostic()?;
     Ok([1, 2, 3].map(|i| sums[i] / sums[0]))
 }

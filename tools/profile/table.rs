@@ -16,11 +16,7 @@ pub struct Table {
 
 impl Table {
     pub fn new(title: impl Into<String>, headings: &[&'static str]) -> Self {
-        Self {
-            title: title.into(),
-            headings: headings.to_vec(),
-            rows: Vec::new(),
-        }
+        Self { title: title.into(), headings: headings.to_vec(), rows: Vec::new() }
     }
 
     pub fn add(&mut self, row: Vec<String>) {
@@ -38,10 +34,7 @@ impl Table {
             })
             .collect();
         let line = |cells: Vec<&str>| {
-            let padded = cells
-                .iter()
-                .zip(&widths)
-                .map(|(c, w)| format!(" {c:<w$} |"));
+            let padded = cells.iter().zip(&widths).map(|(c, w)| format!(" {c:<w$} |"));
             format!("|{}", padded.collect::<String>())
         };
         output::line(format_args!("\n{}\n", self.title));

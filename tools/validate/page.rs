@@ -219,24 +219,13 @@ mod tests {
         out.compare("bvh: length, mm", measured, 2.0, 0.1);
         let line = Curve::line("law", vec![[0.0, 0.0], [1.0, 2.0]]);
         let dots = Curve::dots("bvh", vec![[0.5, measured]]);
-        out.plots
-            .push(Plot::linear("Length", ["x", "y"], vec![line, dots]));
-        out.pictures.push(Picture {
-            title: "all grey".into(),
-            width: 2,
-            grey: vec![128; 4],
-        });
+        out.plots.push(Plot::linear("Length", ["x", "y"], vec![line, dots]));
+        out.pictures.push(Picture { title: "all grey".into(), width: 2, grey: vec![128; 4] });
         out
     }
 
     fn check(name: &'static str, run: fn(&Bench, Physics) -> Outcome) -> Check {
-        Check {
-            row: "T5",
-            name,
-            claim: "Two millimetres.",
-            planted: "Three.",
-            run,
-        }
+        Check { row: "T5", name, claim: "Two millimetres.", planted: "Three.", run }
     }
 
     /// What is right, what is wrong, and what would not notice: the page says of each what its test says.
@@ -249,11 +238,7 @@ mod tests {
             check("wrong", |_, _| one_figure(3.0)),
             check("blind", |_, _| one_figure(2.05)),
             check("undefined", |_, physics| {
-                one_figure(if physics == Physics::Right {
-                    f64::NAN
-                } else {
-                    3.0
-                })
+                one_figure(if physics == Physics::Right { f64::NAN } else { 3.0 })
             }),
         ];
         let bench = Bench::new();
@@ -267,16 +252,8 @@ mod tests {
             assert_eq!(found.holds(), proven, "{name}");
             let html = page(&origin, &["T5"], &[(c, found)]);
             assert_eq!(html.contains("All 1 checks hold."), proven, "{name}");
-            assert_eq!(
-                html.contains("1 of 1 checks do not hold."),
-                !proven,
-                "{name}"
-            );
-            assert_eq!(
-                html.contains("<td class='no'>does not hold</td>"),
-                !proven,
-                "{name}"
-            );
+            assert_eq!(html.contains("1 of 1 checks do not hold."), !proven, "{name}");
+            assert_eq!(html.contains("<td class='no'>does not hold</td>"), !proven, "{name}");
             assert_eq!(html.contains("not noticed"), name == "blind", "{name}");
             assert!(html.contains("a &lt; b") && html.contains("<polyline"));
             assert!(html.contains("data:image/png;base64,iVBORw0KGgo"));
@@ -300,19 +277,12 @@ mod tests {
 
     #[test]
     fn bytes_and_numbers_are_written_as_usual() {
-        let cases: [(&[u8], &str); 4] = [
-            (b"", ""),
-            (b"f", "Zg=="),
-            (b"fo", "Zm8="),
-            (b"foobar", "Zm9vYmFy"),
-        ];
+        let cases: [(&[u8], &str); 4] =
+            [(b"", ""), (b"f", "Zg=="), (b"fo", "Zm8="), (b"foobar", "Zm9vYmFy")];
         for (bytes, text) in cases {
             assert_eq!(base64(bytes), text);
         }
         let numbers = [0.0, 1.5, -0.162_01, 123_456.0, 1e-7, f64::NAN].map(number);
-        assert_eq!(
-            numbers,
-            ["0", "1.5", "-0.16201", "123456", "1.00e-7", "NaN"]
-        );
+        assert_eq!(numbers, ["0", "1.5", "-0.16201", "123456", "1.00e-7", "NaN"]);
     }
 }

@@ -15,9 +15,7 @@ pub fn print(probe: &Probe, made: &Matching) {
         let grey = |s: &Statistics| number(s.levels[i].level.map(|l| 255.0 * l), 1);
         row(&format!("brightness at {:.0} mm", places[i]), made, grey);
     }
-    row("spread (grey levels)", made, |s| {
-        number(s.spread.map(|s| 255.0 * s), 1)
-    });
+    row("spread (grey levels)", made, |s| number(s.spread.map(|s| 255.0 * s), 1));
     row("size axial (mm)", made, |s| mm(s.axial));
     row("size lateral (mm)", made, |s| mm(s.lateral));
     row("patches of speckle", made, |s| format!("{:.0}", s.cells));
@@ -28,20 +26,15 @@ pub fn print(probe: &Probe, made: &Matching) {
         (format!("{mean:+.1}"), format!("{rms:.1}"))
     };
     let (before, after) = (error(&made.before), error(&made.after));
-    for (what, before, after) in [
-        ("mean difference (dB)", before.0, after.0),
-        ("rms difference (dB)", before.1, after.1),
-    ] {
+    for (what, before, after) in
+        [("mean difference (dB)", before.0, after.0), ("rms difference (dB)", before.1, after.1)]
+    {
         output::line(format!("{what:<24} {:>9} {before:>9} {after:>9}", ""));
     }
 }
 
 fn row(what: &str, made: &Matching, value: impl Fn(&Statistics) -> String) {
-    let stages = [
-        &made.acquired,
-        &made.before.simulated,
-        &made.after.simulated,
-    ];
+    let stages = [&made.acquired, &made.before.simulated, &made.after.simulated];
     let [acquired, before, after] = stages.map(value);
     output::line(format!("{what:<24} {acquired:>9} {before:>9} {after:>9}"));
 }

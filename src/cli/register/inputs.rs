@@ -34,17 +34,11 @@ pub fn landmarks(
     world_from_lps: &DAffine3,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Landmark>> {
-    let mut out = match (
-        &args.landmarks,
-        &args.model_landmarks,
-        &args.volume_landmarks,
-    ) {
+    let mut out = match (&args.landmarks, &args.model_landmarks, &args.volume_landmarks) {
         (Some(file), ..) => points::load_landmarks(file, args.frame())?,
         (None, Some(model), Some(volume)) => {
-            let (of_model, of_volume) = (
-                points::load(model, None)?,
-                points::load(volume, args.frame())?,
-            );
+            let (of_model, of_volume) =
+                (points::load(model, None)?, points::load(volume, args.frame())?);
             let (pairs, single) = points::pair((model, &of_model), (volume, &of_volume))?;
             warnings.extend(single.iter().map(|name| {
                 format!("landmark `{name}` is in one of the two files only, and does not count")
@@ -64,9 +58,7 @@ pub fn outside(points: &[DVec3], volume: &Acquired) -> Option<String> {
     let voxel_from_lps = volume.world_from_voxel.inverse() * volume.world_from_lps;
     let most = DVec3::from(volume.size.map(|n| n as f64)) - 0.5;
     let share = |signs: DVec3| {
-        let voxels = points
-            .iter()
-            .map(|p| voxel_from_lps.transform_point3(signs * *p));
+        let voxels = points.iter().map(|p| voxel_from_lps.transform_point3(signs * *p));
         let inside = voxels.filter(|v| v.cmpge(DVec3::splat(-0.5)).all() && v.cmple(most).all());
         inside.count() as f64 / points.len().max(1) as f64
     };
@@ -78,10 +70,7 @@ pub fn outside(points: &[DVec3], volume: &Acquired) -> Option<String> {
         true => "with x and y turned round most do: they are in the other frame, see --frame",
         false => "are they of this volume, in its own frame and in mm?",
     };
-    Some(format!(
-        "only {:.0} % of the points lie in the volume; {hint}",
-        100.0 * here
-    ))
+    Some(format!("only {:.0} % of the points lie in the volume; {hint}", 100.0 * here))
 }
 
 /// The model's surface in the world, as the scene stands.
@@ -91,10 +80,7 @@ pub fn surface(args: &Register, scene: &Scene) -> Result<Surface> {
     for name in &args.surface {
         let instances = instances(scene, name);
         if instances.is_empty() {
-            triangles.extend(placed(
-                &mesh_file(&file(scene, name)?)?,
-                &DAffine3::IDENTITY,
-            ));
+            triangles.extend(placed(&mesh_file(&file(scene, name)?)?, &DAffine3::IDENTITY));
         }
         for i in instances {
             if !scene.instances[i].shown {
@@ -105,10 +91,7 @@ pub fn surface(args: &Register, scene: &Scene) -> Result<Surface> {
                 ));
             }
             let instance = &still.instances[i];
-            triangles.extend(placed(
-                &still.meshes[instance.mesh],
-                &instance.world_from_object,
-            ));
+            triangles.extend(placed(&still.meshes[instance.mesh], &instance.world_from_object));
         }
     }
     Ok(Surface::new(&triangles)?)
@@ -151,31 +134,15 @@ pub fn names(args: &Register) -> Vec<String> {
     };
     let model = args.surface.iter().map(|name| {
         let path = PathBuf::from(name);
-        if mesh::is_mesh(&path) {
-            file(&path)
-        } else {
-            name.clone()
-        }
+        if mesh::is_mesh(&path) { file(&path) } else { name.clone() }
     });
-    let volume = [
-        &args.points,
-        &args.volume_surface,
-        &args.landmarks,
-        &args.volume_landmarks,
-    ];
-    model
-        .chain(volume.into_iter().flatten().map(file))
-        .collect()
+    let volume = [&args.points, &args.volume_surface, &args.landmarks, &args.volume_landmarks];
+    model.chain(volume.into_iter().flatten().map(file)).collect()
 }
 
 /// The instances of the `[[mesh]]` called `name`, or of that name themselves.
 fn instances(scene: &Scene, name: &str) -> Vec<usize> {
-    let origins = scene
-        .origins
-        .instances
-        .iter()
-        .zip(&scene.instances)
-        .enumerate();
+    let origins = scene.origins.instances.iter().zip(&scene.instances).enumerate();
     let of = origins.filter(|(_, (origin, instance))| origin.mesh == name || instance.name == name);
     of.map(|(i, _)| i).collect()
 }
@@ -186,10 +153,7 @@ fn file(scene: &Scene, name: &str) -> Result<PathBuf> {
     match mesh::is_mesh(&path) {
         true => Ok(path),
         false => Err(miette!(
-            help = suggest::among(
-                name,
-                scene.origins.instances.iter().map(|o| o.mesh.as_str())
-            ),
+            help = suggest::among(name, scene.origins.instances.iter().map(|o| o.mesh.as_str())),
             "there is no mesh `{name}` in the scene, and it is no mesh file"
         )),
     }
@@ -199,12 +163,7 @@ fn mesh_file(path: &Path) -> Result<Mesh> {
     let (mesh, issues) = mesh::load(path, &mesh::Options::default()).map_err(|issues| {
         let first = issues.into_iter().find(insonify::scene::Issue::is_error);
         let (message, remedy) = first.map_or_else(Default::default, |i| (i.message, i.remedy));
-        Report::from(RegisterError {
-            file: Some(path.to_owned()),
-            line: 0,
-            cause: message,
-            remedy,
-        })
+        Report::from(RegisterError { file: Some(path.to_owned()), line: 0, cause: message, remedy })
     })?;
     for issue in issues {
         eprintln!("{issue}");

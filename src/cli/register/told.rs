@@ -38,9 +38,7 @@ pub fn print(made: &Registered) {
         ));
     }
     let (shift, angle, scale) = made.motion();
-    output::line(format!(
-        "moved by {shift:.2} mm and {angle:.2} degrees, scale {scale:.4}"
-    ));
+    output::line(format!("moved by {shift:.2} mm and {angle:.2} degrees, scale {scale:.4}"));
 }
 
 fn distances(fit: &Fit) -> String {

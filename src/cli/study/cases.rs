@@ -39,12 +39,7 @@ pub fn cases(plan: &Plan, loaded: &[Loaded], seed: u32) -> Vec<Case> {
     let case = |(number, place): (u32, usize)| {
         let (scenario, slice, background) = all[place];
         let count = loaded[scenario].variants.len() + 1;
-        Case {
-            scenario,
-            slice,
-            background,
-            images: order(count, seed, number),
-        }
+        Case { scenario, slice, background, images: order(count, seed, number) }
     };
     numbered.map(case).collect()
 }
@@ -79,9 +74,7 @@ impl Case {
         let variant = self.images[image - 1].checked_sub(1);
         let variant = variant.map(|i| &loaded.variants[i]);
         let entries = entries.iter().chain(variant.map(|v| &v.setting));
-        let set: Vec<String> = entries
-            .map(|(path, value)| format!("{path}={value}"))
-            .collect();
+        let set: Vec<String> = entries.map(|(path, value)| format!("{path}={value}")).collect();
         let text = |f: &dyn Fn(&Variant) -> String| variant.map(f).unwrap_or_default();
         Row {
             study: String::new(),
@@ -90,9 +83,7 @@ impl Case {
             scenario: scenario.name.clone(),
             slice: scenario.slices[self.slice].name.clone(),
             background: self.background.name().to_owned(),
-            parameter: variant
-                .map_or(UNPERTURBED, |v| v.parameter.key())
-                .to_owned(),
+            parameter: variant.map_or(UNPERTURBED, |v| v.parameter.key()).to_owned(),
             value: text(&|v| v.value.to_string()),
             own: text(&|v| v.parameter.value(&loaded.scene).to_string()),
             unit: text(&|v| v.parameter.unit().to_owned()),
@@ -118,10 +109,8 @@ pub fn check_backgrounds(plan: &Plan, scenario: usize, scene: &Scene) -> Result<
             ),
             _ => continue,
         };
-        let message = format!(
-            "{file} has {lacks}, and is to be shown before `{}`",
-            background.name()
-        );
+        let message =
+            format!("{file} has {lacks}, and is to be shown before `{}`", background.name());
         return Err(plan.fault(&format!("scenario.{scenario}.scene"), message, remedy));
     }
     Ok(())

@@ -20,10 +20,7 @@ pub struct Folder {
 impl Folder {
     /// A folder for so many cases of at most so many images.
     pub fn new(root: &Path, cases: usize, images: usize) -> Self {
-        Self {
-            root: root.to_owned(),
-            digits: [cases, images].map(|n| n.to_string().len().max(2)),
-        }
+        Self { root: root.to_owned(), digits: [cases, images].map(|n| n.to_string().len().max(2)) }
     }
 
     /// What is handed to assessors, with the images one by one.
@@ -52,9 +49,9 @@ impl Folder {
         match std::fs::read(&path) {
             Ok(bytes) => Ok(Some(bytes)),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(e) => Err(e)
-                .into_diagnostic()
-                .wrap_err_with(|| format!("reading {}", path.display())),
+            Err(e) => {
+                Err(e).into_diagnostic().wrap_err_with(|| format!("reading {}", path.display()))
+            }
         }
     }
 
@@ -99,9 +96,7 @@ impl Folder {
             }
             None => {}
         }
-        self.remove_unfinished()
-            .into_diagnostic()
-            .wrap_err_with(|| format!("tidying {root}"))?;
+        self.remove_unfinished().into_diagnostic().wrap_err_with(|| format!("tidying {root}"))?;
         let text = serde_json::to_string_pretty(settings).expect("plain values") + "\n";
         self.write(&self.settings(), text.as_bytes())
     }
@@ -169,8 +164,6 @@ pub fn settings(plan: &Plan, common: &Common, seed: u32, device: &str) -> Result
 /// Name of the first setting in which the two differ.
 fn difference<'a>(begun: &Value, now: &'a Value) -> Option<&'a str> {
     let now = now.as_object().expect("a table of settings");
-    let other = now
-        .iter()
-        .find(|(name, value)| begun.get(name) != Some(value));
+    let other = now.iter().find(|(name, value)| begun.get(name) != Some(value));
     other.map(|(name, _)| name.as_str())
 }

@@ -168,14 +168,10 @@ impl Maker<'_> {
         if let Some(variant) = variant.checked_sub(1) {
             let variant = &loaded.variants[variant];
             variant.apply(&mut scene);
-            self.common
-                .settle_simulation(&mut scene.simulation, self.device);
+            self.common.settle_simulation(&mut scene.simulation, self.device);
             caption = format!("{caption}, {}", variant.parameter.caption(variant.value));
         }
-        png(&reduced(
-            studio.image(&scene, &caption)?,
-            self.plan.image_height,
-        ))
+        png(&reduced(studio.image(&scene, &caption)?, self.plan.image_height))
     }
 
     fn warn_of_masks(&self, case: &Case, scene: &Scene) {
@@ -207,9 +203,7 @@ fn png(image: &GrayImage) -> Result<Vec<u8>> {
     let encoder =
         PngEncoder::new_with_quality(&mut out, CompressionType::Best, FilterType::Adaptive);
     let (width, height) = image.dimensions();
-    encoder
-        .write_image(image, width, height, image::ExtendedColorType::L8)
-        .into_diagnostic()?;
+    encoder.write_image(image, width, height, image::ExtendedColorType::L8).into_diagnostic()?;
     Ok(out)
 }
 
@@ -218,10 +212,7 @@ fn write(plan: &Plan, cases: &[Case], mut rows: Vec<Row>, folder: &Folder) -> Re
     let question = &plan.question;
     let titles = |case: &Case| {
         let scenario = &plan.scenarios[case.scenario];
-        [
-            scenario.title.clone(),
-            scenario.slices[case.slice].title.clone(),
-        ]
+        [scenario.title.clone(), scenario.slices[case.slice].title.clone()]
     };
     let all_titles: Vec<[String; 2]> = cases.iter().map(titles).collect();
     let wording = json!([
@@ -234,8 +225,7 @@ fn write(plan: &Plan, cases: &[Case], mut rows: Vec<Row>, folder: &Folder) -> Re
         all_titles
     ]);
     let wording = crc32(wording.to_string().as_bytes());
-    rows.iter_mut()
-        .for_each(|row| row.wording.clone_from(&wording));
+    rows.iter_mut().for_each(|row| row.wording.clone_from(&wording));
     let key = Key::new(rows).map_err(|cause| miette!("the key: {cause}"))?;
     let (mut shown, mut listed) = (Vec::new(), Vec::new());
     for (number, [title, slice]) in (1..).zip(all_titles) {
@@ -248,11 +238,7 @@ fn write(plan: &Plan, cases: &[Case], mut rows: Vec<Row>, folder: &Folder) -> Re
                 "case": number, "image": row.image, "file": file, "crc": row.crc,
             }));
         }
-        shown.push(form::Case {
-            title,
-            slice,
-            images,
-        });
+        shown.push(form::Case { title, slice, images });
     }
     let html = Form {
         study: key.id(),

@@ -148,10 +148,7 @@ impl Studio {
     /// How a fused image comes about, as figures 10 and 12 of the paper show it.
     pub fn steps(&mut self, scene: &Scene) -> Result<Vec<Picture>> {
         let mut scene = scene.clone();
-        let fusion = scene
-            .fusion
-            .as_mut()
-            .expect("a volume is shown by a fusion");
+        let fusion = scene.fusion.as_mut().expect("a volume is shown by a fusion");
         fusion.surroundings = Surroundings::Volume;
         let (blend, blur) = (fusion.blend.name(), fusion.blur);
         let blurred = match fusion.blend {
@@ -182,11 +179,7 @@ impl Studio {
         let sharp_border = [("blur", "1"), ("blend", Blend::Linear.name())];
         let sharp_border = sharp_border.map(|(key, value)| (format!("fusion.{key}"), plain(value)));
         Ok(vec![
-            step(
-                "volume",
-                plain("acquired volume"),
-                levels(&steps.background),
-            ),
+            step("volume", plain("acquired volume"), levels(&steps.background)),
             step("simulation", plain("simulation alone"), simulated),
             step("mask", plain("mask"), levels(&steps.mask)),
             Picture {
@@ -267,17 +260,10 @@ impl Studio {
         for lost in common::lost(&counters) {
             eprintln!("warning: {name}: {lost}");
         }
-        Ok(Frame {
-            width,
-            height,
-            rgba,
-        })
+        Ok(Frame { width, height, rgba })
     }
 }
 
 fn fusion(scene: &Scene) -> &insonify::scene::Fusion {
-    scene
-        .fusion
-        .as_ref()
-        .expect("a volume is shown by a fusion")
+    scene.fusion.as_ref().expect("a volume is shown by a fusion")
 }

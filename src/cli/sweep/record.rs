@@ -47,9 +47,7 @@ impl Record {
     pub fn new(image: usize, picture: &Picture, place: [u32; 2], file: Option<String>) -> Self {
         let grey = &picture.grey;
         let entries = picture.settings.iter();
-        let set: Vec<String> = entries
-            .map(|(path, value)| format!("{path}={value}"))
-            .collect();
+        let set: Vec<String> = entries.map(|(path, value)| format!("{path}={value}")).collect();
         let three = |x: f64| (x * 1000.0).round() / 1000.0;
         Self {
             image,
@@ -80,7 +78,5 @@ pub fn write(path: &Path, records: &[Record]) -> Result<()> {
         }
         Ok(writer.flush()?)
     };
-    whole()
-        .into_diagnostic()
-        .wrap_err_with(|| format!("writing {}", path.display()))
+    whole().into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
 }

@@ -43,25 +43,15 @@ pub(super) fn read(
 ) -> Result<Vec<Point>, RegisterError> {
     let file: Markups = serde_json::from_str(text).map_err(|e| {
         let remedy = "save the markups of 3D Slicer as .mrk.json or .fcsv";
-        RegisterError::line(
-            path,
-            e.line() as u64,
-            format!("is no markups file: {e}"),
-            remedy,
-        )
+        RegisterError::line(path, e.line() as u64, format!("is no markups file: {e}"), remedy)
     })?;
     let mut out = Vec::new();
     for markup in file.markups {
-        let said = markup
-            .coordinate_system
-            .as_deref()
-            .map_or(Ok(Frame::Lps), frame_named);
+        let said = markup.coordinate_system.as_deref().map_or(Ok(Frame::Lps), frame_named);
         let said = said.map_err(|cause| unknown_frame(path, 0, &cause))?;
         let signs = agreed(path, said, stated)?.lps_signs();
         let units = markup.coordinate_units.unwrap_or_else(|| "mm".into());
-        let all = units
-            .as_array()
-            .map_or(std::slice::from_ref(&units), Vec::as_slice);
+        let all = units.as_array().map_or(std::slice::from_ref(&units), Vec::as_slice);
         if let Some(other) = all.iter().find(|u| *u != "mm") {
             return Err(RegisterError::file(
                 path,
@@ -87,10 +77,7 @@ pub(super) fn read(
             if out.len() >= MAX_POINTS {
                 return Err(too_many(path, 0));
             }
-            out.push(Point {
-                name: point.label,
-                position: signs * DVec3::from(position),
-            });
+            out.push(Point { name: point.label, position: signs * DVec3::from(position) });
         }
     }
     Ok(out)

@@ -44,11 +44,7 @@ impl<'p> Table<'p> {
             }
         }
         let mut reader = ReaderBuilder::new();
-        reader
-            .has_headers(false)
-            .flexible(true)
-            .comment(Some(b'#'))
-            .trim(Trim::All);
+        reader.has_headers(false).flexible(true).comment(Some(b'#')).trim(Trim::All);
         let mut rows = Vec::new();
         for record in reader.from_reader(text.as_bytes()).into_records() {
             let cells = record.map_err(|e| {
@@ -63,11 +59,7 @@ impl<'p> Table<'p> {
             }
         }
         let numeric = |row: &Row| {
-            let numbers = row
-                .cells
-                .iter()
-                .take(3)
-                .filter(|c| c.parse::<f64>().is_ok());
+            let numbers = row.cells.iter().take(3).filter(|c| c.parse::<f64>().is_ok());
             numbers.count() == 3
         };
         let columns = match (columns, rows.first()) {
@@ -83,12 +75,7 @@ impl<'p> Table<'p> {
                 "give a line x,y,z for each, in mm",
             ));
         }
-        Ok(Self {
-            path,
-            columns,
-            rows,
-            frame,
-        })
+        Ok(Self { path, columns, rows, frame })
     }
 
     pub fn column(&self, name: &str) -> Option<usize> {

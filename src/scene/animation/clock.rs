@@ -33,12 +33,7 @@ pub struct Clock {
 impl Default for Clock {
     /// A second, again and again.
     fn default() -> Self {
-        Self {
-            period: 1.0,
-            phase: 0.0,
-            mode: Loop::Repeat,
-            rate: None,
-        }
+        Self { period: 1.0, phase: 0.0, mode: Loop::Repeat, rate: None }
     }
 }
 
@@ -80,11 +75,7 @@ mod tests {
 
     #[test]
     fn every_mode_reaches_the_end_in_one_period_and_goes_its_way() {
-        let clock = |mode| Clock {
-            period: 4.0,
-            mode,
-            ..Clock::default()
-        };
+        let clock = |mode| Clock { period: 4.0, mode, ..Clock::default() };
         for (mode, expected) in [
             (Loop::Repeat, [0.75, 0.0, 0.25, 0.0, 0.5, 0.75]),
             (Loop::Once, [0.0, 0.0, 0.25, 1.0, 1.0, 1.0]),
@@ -98,11 +89,7 @@ mod tests {
 
     #[test]
     fn the_phase_is_where_time_zero_stands() {
-        let clock = Clock {
-            period: 2.0,
-            phase: 0.25,
-            ..Clock::default()
-        };
+        let clock = Clock { period: 2.0, phase: 0.25, ..Clock::default() };
         assert_eq!(clock.fraction(0.0), 0.25);
         assert_eq!(clock.fraction(1.0), 0.75);
     }
@@ -130,10 +117,7 @@ mod tests {
 
     #[test]
     fn a_period_that_ends_within_rounding_has_ended() {
-        let clock = Clock {
-            period: 0.8,
-            ..Clock::default()
-        };
+        let clock = Clock { period: 0.8, ..Clock::default() };
         for beat in 1..100 {
             let t = (0..8 * beat).map(|_| 0.1).sum::<f64>();
             assert!(clock.fraction(t) < 1e-9, "{beat}: {}", clock.fraction(t));

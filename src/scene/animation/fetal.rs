@@ -88,12 +88,7 @@ impl Fetal {
 
     /// A number from 0 to 1 that depends on all that is given and the seed.
     fn random(&self, slot: i64, movement: u32, number: u32) -> f64 {
-        let parts = [
-            u64::from(self.seed),
-            slot as u64,
-            u64::from(movement),
-            u64::from(number),
-        ];
+        let parts = [u64::from(self.seed), slot as u64, u64::from(movement), u64::from(number)];
         let bits = parts.into_iter().fold(0, |state, part| mix(state ^ part));
         (bits >> 11) as f64 / (1u64 << 53) as f64
     }
@@ -121,11 +116,7 @@ mod tests {
         Fetal {
             seed,
             translation: DVec3::new(2.0, 3.0, 0.5),
-            turn: Turn {
-                centre: DVec3::new(0.0, 0.0, 20.0),
-                axis: DVec3::Y,
-                angle: 0.3,
-            },
+            turn: Turn { centre: DVec3::new(0.0, 0.0, 20.0), axis: DVec3::Y, angle: 0.3 },
             duration: 4.0,
             pause: 6.0,
             rate: None,
@@ -207,10 +198,7 @@ mod tests {
 
     #[test]
     fn without_pauses_one_burst_follows_the_other() {
-        let fetal = Fetal {
-            pause: 0.0,
-            ..fetal(6)
-        };
+        let fetal = Fetal { pause: 0.0, ..fetal(6) };
         for slot in -3..4 {
             let ((burst, movements), next) = (fetal.burst(slot), fetal.burst(slot + 1).0);
             assert!((burst.end - next.start).abs() < 1e-9);
@@ -220,10 +208,7 @@ mod tests {
 
     #[test]
     fn time_is_held_between_updates() {
-        let fetal = Fetal {
-            rate: Some(10.0),
-            ..fetal(7)
-        };
+        let fetal = Fetal { rate: Some(10.0), ..fetal(7) };
         // In the middle of a burst, where nothing rests.
         let (burst, _) = fetal.burst(0);
         let update = (5.0 * (burst.start + burst.end)).floor() / 10.0 + 0.03;

@@ -22,11 +22,7 @@ pub struct Turn {
 impl Default for Turn {
     /// None.
     fn default() -> Self {
-        Self {
-            centre: DVec3::ZERO,
-            axis: DVec3::Z,
-            angle: 0.0,
-        }
+        Self { centre: DVec3::ZERO, axis: DVec3::Z, angle: 0.0 }
     }
 }
 
@@ -102,24 +98,14 @@ impl Motion {
     pub fn at(&self, seconds: f64) -> DAffine3 {
         match self {
             Self::Still => DAffine3::IDENTITY,
-            Self::Sine {
-                clock,
-                translation,
-                turn,
-                scale,
-            } => {
+            Self::Sine { clock, translation, turn, scale } => {
                 let sine = (TAU * clock.fraction(seconds)).sin();
                 let moved = DAffine3::from_translation(*translation * sine) * turn.by(sine);
                 moved * scaled(scale.map(|factor| factor.powf(sine)), turn.centre)
             }
             Self::Orbit { clock, turn } => turn.by(clock.fraction(seconds)),
             Self::Fetal(fetal) => fetal.at(seconds),
-            Self::Track {
-                clock,
-                start,
-                rest,
-                track,
-            } => {
+            Self::Track { clock, start, rest, track } => {
                 let time = start + clock.period * clock.fraction(seconds);
                 track.at(*rest, time).matrix()
             }
@@ -129,10 +115,7 @@ impl Motion {
 
 /// Factors along the axes, about a point.
 fn scaled(factors: DVec3, centre: DVec3) -> DAffine3 {
-    DAffine3 {
-        matrix3: DMat3::from_diagonal(factors),
-        translation: centre - factors * centre,
-    }
+    DAffine3 { matrix3: DMat3::from_diagonal(factors), translation: centre - factors * centre }
 }
 
 #[cfg(test)]
@@ -146,25 +129,15 @@ mod tests {
     }
 
     fn clock(period: f64) -> Clock {
-        Clock {
-            period,
-            ..Clock::default()
-        }
+        Clock { period, ..Clock::default() }
     }
 
     #[test]
     fn sine_is_the_sine() {
         let motion = Motion::Sine {
-            clock: Clock {
-                phase: 0.125,
-                ..clock(2.0)
-            },
+            clock: Clock { phase: 0.125, ..clock(2.0) },
             translation: DVec3::new(3.0, 0.0, -1.0),
-            turn: Turn {
-                centre: DVec3::new(0.0, 5.0, 0.0),
-                axis: DVec3::X,
-                angle: 0.4,
-            },
+            turn: Turn { centre: DVec3::new(0.0, 5.0, 0.0), axis: DVec3::X, angle: 0.4 },
             scale: DVec3::ONE,
         };
         for i in 0..50 {
@@ -191,10 +164,7 @@ mod tests {
         let motion = Motion::Sine {
             clock: clock(4.0),
             translation: DVec3::ZERO,
-            turn: Turn {
-                centre: DVec3::new(10.0, 0.0, -2.0),
-                ..Turn::default()
-            },
+            turn: Turn { centre: DVec3::new(10.0, 0.0, -2.0), ..Turn::default() },
             scale: factors,
         };
         let point = DVec3::new(12.0, 4.0, -1.0);
@@ -206,36 +176,20 @@ mod tests {
 
     #[test]
     fn an_orbit_is_a_circle_and_an_arc_swings_back() {
-        let turn = Turn {
-            centre: DVec3::new(10.0, 0.0, 0.0),
-            axis: DVec3::Z,
-            angle: TAU,
-        };
-        let motion = Motion::Orbit {
-            clock: clock(4.0),
-            turn,
-        };
+        let turn = Turn { centre: DVec3::new(10.0, 0.0, 0.0), axis: DVec3::Z, angle: TAU };
+        let motion = Motion::Orbit { clock: clock(4.0), turn };
         let point = DVec3::new(13.0, 0.0, 1.0);
         for (t, x, y) in [(0.0, 13.0, 0.0), (1.0, 10.0, 3.0), (6.0, 7.0, 0.0)] {
             close(motion.at(t).transform_point3(point), DVec3::new(x, y, 1.0));
         }
         let arc = Motion::Orbit {
-            clock: Clock {
-                mode: Loop::PingPong,
-                ..clock(4.0)
-            },
-            turn: Turn {
-                angle: TAU / 4.0,
-                ..turn
-            },
+            clock: Clock { mode: Loop::PingPong, ..clock(4.0) },
+            turn: Turn { angle: TAU / 4.0, ..turn },
         };
         for (t, x, y) in [(4.0, 10.0, 3.0), (8.0, 13.0, 0.0)] {
             close(arc.at(t).transform_point3(point), DVec3::new(x, y, 1.0));
         }
-        close(
-            arc.at(6.0).transform_point3(point),
-            arc.at(2.0).transform_point3(point),
-        );
+        close(arc.at(6.0).transform_point3(point), arc.at(2.0).transform_point3(point));
     }
 
     #[test]

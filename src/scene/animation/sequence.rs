@@ -70,13 +70,7 @@ impl Sequence {
             Loop::Repeat => closed.then_some(1.0),
             Loop::PingPong => Some(2.0),
         };
-        Self {
-            clock,
-            interpolation,
-            stations,
-            cycle,
-            count,
-        }
+        Self { clock, interpolation, stations, cycle, count }
     }
 
     /// Periods of the keyframes.
@@ -96,9 +90,7 @@ impl Sequence {
         let (time, keyframe) = self.stations[i.rem_euclid(n) as usize];
         match i.div_euclid(n) {
             0 => Some((time, keyframe)),
-            turns => self
-                .cycle
-                .map(|cycle| (time + turns as f64 * cycle, keyframe)),
+            turns => self.cycle.map(|cycle| (time + turns as f64 * cycle, keyframe)),
         }
     }
 
@@ -167,10 +159,7 @@ mod tests {
     use super::*;
 
     fn clock(mode: Loop) -> Clock {
-        Clock {
-            mode,
-            ..Clock::default()
-        }
+        Clock { mode, ..Clock::default() }
     }
 
     fn steps(sequence: &Sequence, times: &[f64]) -> Vec<usize> {
@@ -199,14 +188,8 @@ mod tests {
 
     #[test]
     fn a_keyframe_is_never_late_by_rounding() {
-        let sequence = Sequence::even(
-            Clock {
-                period: 0.8,
-                ..Clock::default()
-            },
-            8,
-            Interpolation::Linear,
-        );
+        let sequence =
+            Sequence::even(Clock { period: 0.8, ..Clock::default() }, 8, Interpolation::Linear);
         let mut t = 0.0;
         for i in 0..800 {
             assert_eq!(sequence.step(t), i % 8, "{i}");
@@ -266,10 +249,7 @@ mod tests {
                     + (2.0 * a - 5.0 * b + 4.0 * c - d) * t * t
                     + (3.0 * b - a - 3.0 * c + d) * t * t * t);
             let found = value(&sequence, &shapes, (segment as f64 + t) / 5.0);
-            assert!(
-                (found - expected).abs() < 1e-9,
-                "{segment} {t}: {found} {expected}"
-            );
+            assert!((found - expected).abs() < 1e-9, "{segment} {t}: {found} {expected}");
         }
     }
 
@@ -277,10 +257,7 @@ mod tests {
     fn own_times_are_kept_and_a_cubic_passes_a_line_at_any_spacing() {
         let times = [0.5, 1.0, 3.0, 3.5];
         let own = |mode, interpolation| {
-            let clock = Clock {
-                period: 4.0,
-                ..clock(mode)
-            };
+            let clock = Clock { period: 4.0, ..clock(mode) };
             Sequence::timed(clock, &times, interpolation)
         };
         let linear = own(Loop::Repeat, Interpolation::Linear);
@@ -308,18 +285,11 @@ mod tests {
         for mode in [Loop::Repeat, Loop::Once, Loop::PingPong] {
             for interpolation in [Interpolation::Linear, Interpolation::Cubic] {
                 let one = Sequence::even(clock(mode), 1, interpolation);
-                assert_eq!(
-                    (one.step(0.7), one.blend(0.7)[0]),
-                    (0, (0, 1.0)),
-                    "{mode:?}"
-                );
+                assert_eq!((one.step(0.7), one.blend(0.7)[0]), (0, (0, 1.0)), "{mode:?}");
                 let two = Sequence::even(clock(mode), 2, interpolation);
                 for i in 0..30 {
                     let found = value(&two, &[2.0, 6.0], f64::from(i) / 10.0);
-                    assert!(
-                        (2.0 - 1e-9..=6.0 + 1e-9).contains(&found),
-                        "{mode:?} {found}"
-                    );
+                    assert!((2.0 - 1e-9..=6.0 + 1e-9).contains(&found), "{mode:?} {found}");
                 }
             }
         }

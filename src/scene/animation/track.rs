@@ -17,11 +17,7 @@ pub struct Trs {
 
 impl Default for Trs {
     fn default() -> Self {
-        Self {
-            translation: DVec3::ZERO,
-            rotation: DQuat::IDENTITY,
-            scale: DVec3::ONE,
-        }
+        Self { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
     }
 }
 
@@ -119,9 +115,7 @@ impl Sample for DQuat {
     fn weighted(parts: [(Self, f64); 4]) -> Self {
         let sum = parts
             .iter()
-            .fold(Self::from_array([0.0; 4]), |sum, &(value, weight)| {
-                sum + value * weight
-            });
+            .fold(Self::from_array([0.0; 4]), |sum, &(value, weight)| sum + value * weight);
         match sum.length_squared() > 0.0 {
             true => sum.normalize(),
             // Tangents may cancel the values exactly; there is no direction then.
@@ -157,10 +151,7 @@ impl<T: Sample> Channel<T> {
             return Err(TrackError::Empty);
         }
         if values.len() != each * times.len() {
-            return Err(TrackError::Count {
-                times: times.len(),
-                values: values.len(),
-            });
+            return Err(TrackError::Count { times: times.len(), values: values.len() });
         }
         for (i, &time) in times.iter().enumerate() {
             let own = &values[each * i..each * (i + 1)];
@@ -171,11 +162,7 @@ impl<T: Sample> Channel<T> {
                 return Err(TrackError::Order(i));
             }
         }
-        Ok(Self {
-            times,
-            values,
-            curve,
-        })
+        Ok(Self { times, values, curve })
     }
 
     /// Times of the keyframes, s.
@@ -244,10 +231,7 @@ impl Channel<DQuat> {
         };
         for (i, value) in values.iter_mut().skip(first).step_by(each).enumerate() {
             // Neither tiny nor huge components may spoil the length.
-            let largest = value
-                .to_array()
-                .into_iter()
-                .fold(0.0, |m: f64, c| m.max(c.abs()));
+            let largest = value.to_array().into_iter().fold(0.0, |m: f64, c| m.max(c.abs()));
             if largest == 0.0 {
                 return Err(TrackError::ZeroQuaternion(i));
             }

@@ -75,11 +75,7 @@ impl Scene {
                 if !instance.keyframes.meshes.is_empty() {
                     conditions.extend(switch.map(|node| (node, k)));
                 }
-                out.push(Pose {
-                    instance: i,
-                    mesh: &self.meshes[mesh],
-                    conditions,
-                });
+                out.push(Pose { instance: i, mesh: &self.meshes[mesh], conditions });
             }
         }
         out
@@ -150,10 +146,7 @@ mod tests {
     fn every_keyframe_counts_whatever_the_time() {
         // At rest the two differ; in the last keyframe they agree.
         let text = BEAT.to_owned()
-            + &mesh(
-                "x",
-                "parent = \"beat\"\nkeyframes = [\"a.obj\", \"b.obj\", \"c.obj\"]",
-            )
+            + &mesh("x", "parent = \"beat\"\nkeyframes = [\"a.obj\", \"b.obj\", \"c.obj\"]")
             + &mesh("y", "file = \"c.obj\"");
         let (scene, said) = load(&text);
         assert_eq!(scene.coincident_triangles(), 12);
@@ -167,18 +160,8 @@ mod tests {
                 + &mesh("x", "parent = \"beat\"\nkeyframes = [\"a.obj\", \"b.obj\"]")
                 + &mesh("y", &format!("parent = \"beat\"\nkeyframes = {second}"))
         };
-        assert_eq!(
-            load(&pair("[\"b.obj\", \"a.obj\"]"))
-                .0
-                .coincident_triangles(),
-            0
-        );
-        assert_eq!(
-            load(&pair("[\"c.obj\", \"b.obj\"]"))
-                .0
-                .coincident_triangles(),
-            12
-        );
+        assert_eq!(load(&pair("[\"b.obj\", \"a.obj\"]")).0.coincident_triangles(), 0);
+        assert_eq!(load(&pair("[\"c.obj\", \"b.obj\"]")).0.coincident_triangles(), 12);
     }
 
     #[test]

@@ -44,14 +44,8 @@ pub fn describe(
     let off = scene.masks_off_the_image();
     for &mask in &fusion.masks {
         let name = &scene.instances[mask].name;
-        let volume = facts(mask)
-            .volume
-            .map_or("open".to_owned(), |ml| format!("{ml:.3} ml"));
-        let seen = if off.contains(&mask) {
-            "off the image"
-        } else {
-            "on the image"
-        };
+        let volume = facts(mask).volume.map_or("open".to_owned(), |ml| format!("{ml:.3} ml"));
+        let seen = if off.contains(&mask) { "off the image" } else { "on the image" };
         lines.push(format!("  mask {name}: {volume}, {seen}"));
         if off.contains(&mask) {
             issues.push(Issue::warning(
@@ -89,9 +83,8 @@ fn placed(acquired: &Acquired) -> Vec<String> {
         let upper = DVec3::from([0, 1, 2].map(|axis| f64::from(i >> axis & 1)));
         m.transform_point3(upper * size - DVec3::splat(0.5))
     });
-    let (low, high) = corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| {
-        (l.min(c), h.max(c))
-    });
+    let (low, high) =
+        corners.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), c| (l.min(c), h.max(c)));
     let axes = [m.matrix3.x_axis, m.matrix3.y_axis, m.matrix3.z_axis];
     let [i, j, k] = axes.map(|axis| vector(axis.normalize()));
     let bytes = acquired.texture_bytes();
@@ -100,15 +93,8 @@ fn placed(acquired: &Acquired) -> Vec<String> {
         false => String::new(),
     };
     let mut lines = vec![
-        format!(
-            "  in the world: axes {i}, {j}, {k}, box {} to {} mm",
-            vector(low),
-            vector(high)
-        ),
-        format!(
-            "  shown from {} (black) to {} (white)",
-            acquired.black, acquired.white
-        ),
+        format!("  in the world: axes {i}, {j}, {k}, box {} to {} mm", vector(low), vector(high)),
+        format!("  shown from {} (black) to {} (white)", acquired.black, acquired.white),
         format!("  {:.1} MB on the device{averaged}", bytes as f64 / 1e6),
     ];
     if let Some(sequence) = &acquired.sequence {
@@ -159,10 +145,7 @@ mod tests {
         }
         assert!(text.ends_with("0 errors, 0 warnings"), "{text}");
         let text = scene(200).to_string();
-        assert!(
-            text.contains("mask ball: 0.519 ml, off the image"),
-            "{text}"
-        );
+        assert!(text.contains("mask ball: 0.519 ml, off the image"), "{text}");
         assert!(text.ends_with("0 errors, 1 warnings"), "{text}");
     }
 }

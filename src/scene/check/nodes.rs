@@ -62,9 +62,7 @@ pub fn periods(clock: &Clock) -> String {
         Loop::Once => ", once",
         Loop::PingPong => ", to and fro",
     };
-    let rate = clock
-        .rate
-        .map_or(String::new(), |rate| format!(", {rate} Hz"));
+    let rate = clock.rate.map_or(String::new(), |rate| format!(", {rate} Hz"));
     format!("period {} s{mode}{rate}", clock.period)
 }
 
@@ -135,10 +133,7 @@ mod tests {
             super::describe(&scene)[3].clone()
         };
         let equal = keyframes(shapes::sphere(6.0, 1));
-        assert!(
-            equal.ends_with("`first`: 2 keyframes of equal triangles"),
-            "{equal}"
-        );
+        assert!(equal.ends_with("`first`: 2 keyframes of equal triangles"), "{equal}");
         let unequal = keyframes(shapes::sphere(6.0, 2));
         assert!(unequal.ends_with("of different triangles"), "{unequal}");
     }

@@ -31,10 +31,7 @@ impl Report {
     }
 
     fn count(&self, severity: Severity) -> usize {
-        self.issues
-            .iter()
-            .filter(|i| i.severity == severity)
-            .count()
+        self.issues.iter().filter(|i| i.severity == severity).count()
     }
 }
 
@@ -49,20 +46,13 @@ impl fmt::Display for Report {
             writeln!(f, "{issue}")?;
         }
         let errors = self.count(Severity::Error) + usize::from(self.error.is_some());
-        write!(
-            f,
-            "{errors} errors, {} warnings",
-            self.count(Severity::Warning)
-        )
+        write!(f, "{errors} errors, {} warnings", self.count(Severity::Warning))
     }
 }
 
 /// Checks a scene (.toml) or a mesh file.
 pub fn report(path: &Path) -> Report {
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .unwrap_or_default();
+    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
     match extension.to_ascii_lowercase().as_str() {
         "toml" => scene(path),
         _ if mesh::is_mesh(path) => mesh_file(path),
@@ -75,37 +65,21 @@ pub fn report(path: &Path) -> Report {
 }
 
 fn refuse(path: &Path, message: &str, remedy: &str) -> Report {
-    Report {
-        issues: vec![Issue::error(path, 1, message, remedy)],
-        ..Report::default()
-    }
+    Report { issues: vec![Issue::error(path, 1, message, remedy)], ..Report::default() }
 }
 
 fn mesh_file(path: &Path) -> Report {
-    let Inspected {
-        facts,
-        parts,
-        issues,
-        ..
-    } = mesh::inspect(path, &Options::default());
+    let Inspected { facts, parts, issues, .. } = mesh::inspect(path, &Options::default());
     let mut lines = Vec::new();
     if facts.triangles > 0 {
         lines.push(path.display().to_string());
         lines.push(format!("  {}", describe(&facts)));
-        let named: Vec<_> = parts
-            .iter()
-            .filter(|p| !p.is_empty())
-            .map(String::as_str)
-            .collect();
+        let named: Vec<_> = parts.iter().filter(|p| !p.is_empty()).map(String::as_str).collect();
         if named.len() > 1 {
             lines.push(format!("  parts: {}", named.join(", ")));
         }
     }
-    let mut report = Report {
-        lines,
-        issues,
-        error: None,
-    };
+    let mut report = Report { lines, issues, error: None };
     animations(path, &mut report);
     report
 }
@@ -121,9 +95,7 @@ fn animations(path: &Path, report: &mut Report) {
         let choice = Choice::Number(k);
         let issues = match mesh::load_animated(path, &Options::default(), choice) {
             Ok((animated, issues)) => {
-                report
-                    .lines
-                    .push(format!("  animation {}", play(&animated)));
+                report.lines.push(format!("  animation {}", play(&animated)));
                 issues
             }
             Err(issues) => issues,
@@ -139,9 +111,7 @@ fn animations(path: &Path, report: &mut Report) {
     }
     if names.len() > ANIMATIONS {
         let more = names.len() - ANIMATIONS;
-        report
-            .lines
-            .push(format!("  {more} more animations were not tried"));
+        report.lines.push(format!("  {more} more animations were not tried"));
     }
 }
 
@@ -176,10 +146,7 @@ fn scene(path: &Path) -> Report {
     let (scene, mut issues) = match Scene::load(path, &[]) {
         Ok(loaded) => loaded,
         Err(error) => {
-            return Report {
-                error: Some(error),
-                ..Report::default()
-            };
+            return Report { error: Some(error), ..Report::default() };
         }
     };
     let background = &scene.tissues[scene.background].name;
@@ -205,24 +172,15 @@ fn scene(path: &Path) -> Report {
     let (fused, idle) = fusion::describe(path, &scene, facts);
     lines.extend(fused);
     issues.extend(idle);
-    lines.push(format!(
-        "coincident triangles: {}",
-        scene.coincident_triangles()
-    ));
-    Report {
-        lines,
-        issues,
-        error: None,
-    }
+    lines.push(format!("coincident triangles: {}", scene.coincident_triangles()));
+    Report { lines, issues, error: None }
 }
 
 /// Facts in world space, and a point just outside the surface.
 fn world_facts(scene: &Scene, instance: &Instance) -> (Facts, DVec3) {
     let mesh = &scene.meshes[instance.mesh];
     let place = |p: &[f32; 3]| {
-        let world = instance
-            .world_from_object
-            .transform_point3(DVec3::from(p.map(f64::from)));
+        let world = instance.world_from_object.transform_point3(DVec3::from(p.map(f64::from)));
         world.as_vec3().to_array()
     };
     let soup = mesh::weld(&mesh::Soup {
@@ -290,14 +248,8 @@ mod tests {
         let report = report(&path);
         let text = report.to_string();
         assert!(report.passed(), "{text}");
-        assert!(
-            text.contains("encloses bile, priority 2; outside it liver"),
-            "{text}"
-        );
-        assert!(
-            text.contains("encloses liver, priority 1; outside it water"),
-            "{text}"
-        );
+        assert!(text.contains("encloses bile, priority 2; outside it liver"), "{text}");
+        assert!(text.contains("encloses liver, priority 1; outside it water"), "{text}");
         // 4/3 pi r^3 is 523.599 ml; the polyhedron of 1280 triangles falls 0.9 % short.
         assert!(text.contains("519.093 ml"), "{text}");
     }
@@ -306,9 +258,6 @@ mod tests {
     fn strangers_are_refused_plainly() {
         let report = report(Path::new("a.docx"));
         assert!(!report.passed());
-        assert!(
-            report.issues[0].message.contains("neither a scene"),
-            "{report}"
-        );
+        assert!(report.issues[0].message.contains("neither a scene"), "{report}");
     }
 }

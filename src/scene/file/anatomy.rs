@@ -97,11 +97,7 @@ pub(super) fn meshes(
                 surface,
             });
         }
-        out.placed.push(Placed {
-            rest,
-            instances: first..out.instances.len(),
-            playing,
-        });
+        out.placed.push(Placed { rest, instances: first..out.instances.len(), playing });
     }
     out.meshes = shelf.meshes;
     Ok(out)
@@ -159,22 +155,8 @@ pub(super) fn wires(
             within(document, &format!("wire.{i}"), v, -1e5, 1e5, "mm")?;
         }
         let spacing = table.spacing.map_or(0.1, |q| q.0);
-        within(
-            document,
-            &format!("wire.{i}.spacing"),
-            spacing,
-            MIN_SPACING,
-            1e4,
-            "mm",
-        )?;
-        within(
-            document,
-            &format!("wire.{i}.amplitude"),
-            table.amplitude.0,
-            -300.0,
-            60.0,
-            "dB",
-        )?;
+        within(document, &format!("wire.{i}.spacing"), spacing, MIN_SPACING, 1e4, "mm")?;
+        within(document, &format!("wire.{i}.amplitude"), table.amplitude.0, -300.0, 60.0, "dB")?;
         out.push(Wire {
             ends: [from, to],
             spacing,

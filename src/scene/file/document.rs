@@ -52,11 +52,7 @@ impl Source {
         }
         let text =
             std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
-        let source = Self {
-            path: path.to_owned(),
-            text,
-            overrides: Vec::new(),
-        };
+        let source = Self { path: path.to_owned(), text, overrides: Vec::new() };
         Ok(source.with(overrides))
     }
 
@@ -83,20 +79,12 @@ impl Source {
             });
             start = end + 1;
         }
-        Self {
-            path: self.path.clone(),
-            text: self.text.clone(),
-            overrides: all,
-        }
+        Self { path: self.path.clone(), text: self.text.clone(), overrides: all }
     }
 
     /// A text that is to become the file `path`; no overrides.
     pub fn of(path: &Path, text: String) -> Self {
-        Self {
-            path: path.to_owned(),
-            text,
-            overrides: Vec::new(),
-        }
+        Self { path: path.to_owned(), text, overrides: Vec::new() }
     }
 
     /// The file's text, without the overrides.
@@ -199,8 +187,7 @@ impl Document<'_> {
         remedy: impl Into<String>,
     ) -> SceneError {
         let segments: Vec<_> = path.split('.').collect();
-        self.source
-            .error(self.span(&segments), message.into(), Some(remedy.into()))
+        self.source.error(self.span(&segments), message.into(), Some(remedy.into()))
     }
 
     /// Whether the top-level `table` has a key other than `but`.
@@ -290,16 +277,11 @@ fn into_value<'s>(
         DeValue::Table(table) => return insert(table, rest, value, key_span),
         DeValue::Array(array) => array,
         _ => {
-            return Err((
-                format!("`{name}` has no parts"),
-                "set it as a whole".to_owned(),
-            ));
+            return Err((format!("`{name}` has no parts"), "set it as a whole".to_owned()));
         }
     };
     let names: Vec<String> = array.iter().filter_map(name_of).collect();
-    let by_name = array
-        .iter()
-        .position(|v| name_of(v).as_deref() == Some(rest[0]));
+    let by_name = array.iter().position(|v| name_of(v).as_deref() == Some(rest[0]));
     let index = by_name.or_else(|| rest[0].parse().ok().filter(|&i: &usize| i < array.len()));
     let Some(index) = index else {
         let remedy = match names.is_empty() {
@@ -319,11 +301,5 @@ fn into_value<'s>(
 }
 
 fn name_of(value: &Spanned<DeValue<'_>>) -> Option<String> {
-    value
-        .get_ref()
-        .as_table()?
-        .get("name")?
-        .get_ref()
-        .as_str()
-        .map(str::to_owned)
+    value.get_ref().as_table()?.get("name")?.get_ref().as_str().map(str::to_owned)
 }

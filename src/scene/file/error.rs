@@ -92,13 +92,7 @@ mod tests {
     fn places_count_lines_and_characters() {
         let text = "a = 1\nb = \"\u{e4}\" # c\nd = 2";
         let at = text.find("# c").expect("there");
-        let error = SceneError::at(
-            Path::new("s.toml"),
-            text,
-            at..at + 1,
-            "bad".to_owned(),
-            None,
-        );
+        let error = SceneError::at(Path::new("s.toml"), text, at..at + 1, "bad".to_owned(), None);
         assert_eq!((error.line, error.column), (2, 9));
         assert_eq!(error.to_string(), "s.toml:2:9: bad");
     }

@@ -59,11 +59,7 @@ pub(super) fn volume(
             1 => "give a volume file that `insonify check` accepts".to_owned(),
             _ => error.remedy.clone(),
         };
-        document.fail(
-            &table.key(number),
-            format!("the volume cannot be used: {error}"),
-            remedy,
-        )
+        document.fail(&table.key(number), format!("the volume cannot be used: {error}"), remedy)
     })?;
     warnings.extend(found);
     let sequence = sequence(document, table, volume.later.len() + 1, volume.interval)?;
@@ -75,10 +71,7 @@ pub(super) fn volume(
         Voxels::U8(_) => (0.0, 255.0),
         _ => (volume.statistics.min, volume.statistics.max),
     };
-    let (black, white) = (
-        table.black.unwrap_or(range.0),
-        table.white.unwrap_or(range.1),
-    );
+    let (black, white) = (table.black.unwrap_or(range.0), table.white.unwrap_or(range.1));
     for (key, level) in [("black", black), ("white", white)] {
         if !level.is_finite() {
             return Err(document.fail(
@@ -113,12 +106,7 @@ pub(super) fn volume(
 /// Checks what the table says of time.
 fn timing(document: &Document<'_>, table: &VolumeTable) -> Result<(), SceneError> {
     let period = table.period.map_or(1.0, |p| p.0);
-    motion::clock(
-        document,
-        "volume",
-        period,
-        (table.phase, table.mode, table.rate),
-    )?;
+    motion::clock(document, "volume", period, (table.phase, table.mode, table.rate))?;
     match table.period.is_some() && table.rate.is_some() {
         true => Err(document.fail(
             "volume.rate",
@@ -222,14 +210,7 @@ pub(super) fn fusion(
         ));
     }
     let blur = table.blur.unwrap_or(BLUR);
-    within(
-        document,
-        "fusion.blur",
-        f64::from(blur),
-        1.0,
-        512.0,
-        "pixels",
-    )?;
+    within(document, "fusion.blur", f64::from(blur), 1.0, 512.0, "pixels")?;
     let masks = table.mask.iter().enumerate();
     let masks = masks.map(|(i, name)| {
         let path = format!("fusion.mask.{i}");

@@ -34,13 +34,7 @@ pub(super) fn build(
             children[*parent].push(e);
         }
     }
-    let family = Family {
-        document,
-        file,
-        entries: &entries,
-        parents: &parents,
-        children,
-    };
+    let family = Family { document, file, entries: &entries, parents: &parents, children };
     let mut choices = Choices::default();
     for (e, entry) in entries.iter().enumerate() {
         match entry.kind {
@@ -152,10 +146,7 @@ impl Family<'_> {
         }
         Err(self.document.fail(
             &format!("{}.keyframes", self.entries[e].path),
-            format!(
-                "nothing switches the keyframes of `{}`",
-                self.entries[e].name
-            ),
+            format!("nothing switches the keyframes of `{}`", self.entries[e].name),
             "add a [[selector]] with a period, and name it as the mesh's `parent`",
         ))
     }
@@ -233,11 +224,7 @@ impl Family<'_> {
                     "selector `{name}` has {alternatives} alternatives, but `{with}` under it has \
                      {count} keyframes"
                 );
-                return fail(
-                    path,
-                    message,
-                    "they are chosen together and must be as many",
-                );
+                return fail(path, message, "they are chosen together and must be as many");
             }
             (Some((count, _)), _) => count,
         };
@@ -281,10 +268,7 @@ impl Family<'_> {
                 let placed = &anatomy.placed[i];
                 let (rest, instance) = (placed.rest, placed.instances.start);
                 match placed.playing {
-                    Some(_) => NodeKind::Transform {
-                        rest,
-                        motion: Motion::Still,
-                    },
+                    Some(_) => NodeKind::Transform { rest, motion: Motion::Still },
                     None => NodeKind::Mesh { instance, rest },
                 }
             }

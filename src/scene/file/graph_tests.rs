@@ -14,17 +14,9 @@ pub(super) fn case() -> Case {
     for (name, edge) in [("a", "10"), ("b", "20"), ("c", "30")] {
         write(&case, &format!("{name}.obj"), &cube.replace("10", edge));
     }
-    write(
-        &case,
-        "odd.obj",
-        &cube.replace("f 4 3 2 1", "f 3 2 1\nf 4 3 1"),
-    );
+    write(&case, "odd.obj", &cube.replace("f 4 3 2 1", "f 3 2 1\nf 4 3 1"));
     let few = cube.replace("f 4 3 2 1\n", "f 1 3 2\nf 1 4 3\n");
-    write(
-        &case,
-        "odd.obj",
-        &few.replace("f 5 6 7 8\n", "f 5 6 8\nf 6 7 8\n"),
-    );
+    write(&case, "odd.obj", &few.replace("f 5 6 7 8\n", "f 5 6 8\nf 6 7 8\n"));
     case
 }
 
@@ -53,10 +45,8 @@ fn named<'s>(scene: &'s Scene, name: &str) -> &'s Instance {
 #[test]
 fn nodes_nest_in_any_order_of_the_file() {
     // The child before its parents; the parent's shift comes after the child's.
-    let text = mesh(
-        "m",
-        "parent = \"inner\"\nfile = \"cube.obj\"\ntranslate = [1, 0, 0]",
-    ) + "[[transform]]\nname = \"inner\"\nparent = \"g\"\nrotate = { axis = [0, 0, 1], angle = \"90 deg\" }\n\
+    let text = mesh("m", "parent = \"inner\"\nfile = \"cube.obj\"\ntranslate = [1, 0, 0]")
+        + "[[transform]]\nname = \"inner\"\nparent = \"g\"\nrotate = { axis = [0, 0, 1], angle = \"90 deg\" }\n\
            [[group]]\nname = \"g\"\nparent = \"outer\"\n\
            [[transform]]\nname = \"outer\"\ntranslate = [0, 0, 5]\nscale = 2\n\
            motion = { kind = \"orbit\", period = \"4 s\", rotate = { axis = [0, 0, 1], angle = \"360 deg\" } }\n"
@@ -67,10 +57,7 @@ fn nodes_nest_in_any_order_of_the_file() {
     for (t, expected) in [(0.0, [0.0, 2.0, 5.0]), (1.0, [-2.0, 0.0, 5.0])] {
         scene.set_time(t);
         let origin = named(&scene, "m").world_from_object.translation;
-        assert!(
-            (origin - DVec3::from(expected)).length() < 1e-12,
-            "{origin}"
-        );
+        assert!((origin - DVec3::from(expected)).length() < 1e-12, "{origin}");
         let still = named(&scene, "still").world_from_object.translation;
         assert_eq!(still, DVec3::new(7.0, 0.0, 0.0));
     }
@@ -84,10 +71,7 @@ fn a_selector_switches_keyframes_and_alternatives_in_the_order_of_the_file() {
         + "[[group]]\nname = \"second\"\nparent = \"beat\"\n"
         + BEAT
         + &mesh("third", "parent = \"beat\"\nfile = \"c.obj\"")
-        + &mesh(
-            "in second",
-            "parent = \"second\"\nfile = \"b.obj\"\ntranslate = [99, 0, 0]",
-        )
+        + &mesh("in second", "parent = \"second\"\nfile = \"b.obj\"\ntranslate = [99, 0, 0]")
         + &beating("x", "a b c").replace("keyframes", "translate = [0, 99, 0]\nkeyframes")
         + &beating("y", "c b a").replace("keyframes", "translate = [0, -99, 0]\nkeyframes");
     let (mut scene, _) = case().load(&text, &[]).expect("sound");
@@ -132,11 +116,7 @@ fn every_motion_is_read() {
             + &mesh("m", "parent = \"t\"\nfile = \"cube.obj\"")
     };
     let case = case();
-    write(
-        &case,
-        "way.csv",
-        "\u{feff}# a way\ntime_s, x_mm ,y_mm,z_mm\r\n1,0,0,0\n\n3,8,0,0\n",
-    );
+    write(&case, "way.csv", "\u{feff}# a way\ntime_s, x_mm ,y_mm,z_mm\r\n1,0,0,0\n\n3,8,0,0\n");
     write(
         &case,
         "turn.toml",
@@ -145,9 +125,7 @@ fn every_motion_is_read() {
     let at = |more: &str, t: f64| {
         let (mut scene, _) = case.load(&motion(more), &[]).expect(more);
         scene.set_time(t);
-        scene.instances[0]
-            .world_from_object
-            .transform_point3(DVec3::X)
+        scene.instances[0].world_from_object.transform_point3(DVec3::X)
     };
     let turn = "rotate = { axis = [0, 0, 2], angle = \"180 deg\" }";
     for (more, t, expected) in [
@@ -163,11 +141,7 @@ fn every_motion_is_read() {
             3.0,
             [3.0, -2.0, 0.0],
         ),
-        (
-            "kind = \"file\", file = \"way.csv\"".to_owned(),
-            0.5,
-            [3.0, 0.0, 0.0],
-        ),
+        ("kind = \"file\", file = \"way.csv\"".to_owned(), 0.5, [3.0, 0.0, 0.0]),
         (
             "kind = \"file\", file = \"way.csv\", rate = \"1 Hz\", loop = \"once\"".to_owned(),
             1.9,
@@ -178,41 +152,23 @@ fn every_motion_is_read() {
             1.9,
             [1.0, 0.0, 0.0],
         ),
-        (
-            "kind = \"file\", file = \"turn.toml\"".to_owned(),
-            1.0,
-            [0.0, 1.0, 0.0],
-        ),
-        (
-            "kind = \"fetal\", translate = [0, 0, 0], seed = 3".to_owned(),
-            9.0,
-            [1.0, 0.0, 0.0],
-        ),
+        ("kind = \"file\", file = \"turn.toml\"".to_owned(), 1.0, [0.0, 1.0, 0.0]),
+        ("kind = \"fetal\", translate = [0, 0, 0], seed = 3".to_owned(), 9.0, [1.0, 0.0, 0.0]),
     ] {
         let found = at(&more, t);
-        assert!(
-            (found - DVec3::from(expected)).length() < 1e-12,
-            "{more}: {found}"
-        );
+        assert!((found - DVec3::from(expected)).length() < 1e-12, "{more}: {found}");
     }
     let fetal =
         |seed: u32| format!("kind = \"fetal\", {turn}, translate = [2, 1, 0], seed = {seed}");
     assert_ne!(at(&fetal(1), 3.0), at(&fetal(2), 3.0));
     let (scene, _) = case.load(&motion(&fetal(1)), &[]).expect("sound");
-    assert!(matches!(
-        scene.graph.nodes[0].kind,
-        NodeKind::Transform { .. }
-    ));
+    assert!(matches!(scene.graph.nodes[0].kind, NodeKind::Transform { .. }));
 }
 
 #[test]
 fn placements_and_motions_scale_each_axis() {
     let case = case();
-    write(
-        &case,
-        "pulse.csv",
-        "time_s,sx,sy,sz\n0,1,1,1\n1,1.2,1,0.8\n2,1,1,1\n",
-    );
+    write(&case, "pulse.csv", "time_s,sx,sy,sz\n0,1,1,1\n1,1.2,1,0.8\n2,1,1,1\n");
     let text = "[[transform]]\nname = \"flat\"\nscale = [1, 2, 0.5]\n\
          [[transform]]\nname = \"pulse\"\nparent = \"flat\"\nmotion = { kind = \"file\", file = \"pulse.csv\" }\n\
          [[transform]]\nname = \"palpated\"\n\
@@ -229,13 +185,8 @@ fn placements_and_motions_scale_each_axis() {
     ] {
         scene.set_time(t);
         for (name, expected) in [("a", a), ("b", b)] {
-            let corner = named(&scene, name)
-                .world_from_object
-                .transform_point3(DVec3::ONE);
-            assert!(
-                corner.distance(expected.into()) < 1e-12,
-                "{name} at {t} s: {corner}"
-            );
+            let corner = named(&scene, name).world_from_object.transform_point3(DVec3::ONE);
+            assert!(corner.distance(expected.into()) < 1e-12, "{name} at {t} s: {corner}");
         }
     }
 }

@@ -61,11 +61,7 @@ pub(super) fn motion(
     path: &str,
 ) -> Result<Motion, SceneError> {
     fit(document, table, path)?;
-    let parts = Parts {
-        document,
-        table,
-        path,
-    };
+    let parts = Parts { document, table, path };
     let settings = (table.phase, table.mode, table.rate);
     Ok(match table.kind {
         MotionKind::Sine => {
@@ -88,14 +84,7 @@ pub(super) fn motion(
             parts.moves()?;
             let lasting = |key: &str, given: Option<Duration>, default: f64, least: f64| {
                 let value = given.map_or(default, |d| d.0);
-                within(
-                    document,
-                    &format!("{path}.{key}"),
-                    value,
-                    least,
-                    3600.0,
-                    "s",
-                )?;
+                within(document, &format!("{path}.{key}"), value, least, 3600.0, "s")?;
                 Ok(value)
             };
             Motion::Fetal(Fetal {

@@ -32,31 +32,16 @@ pub(super) fn entries<'f>(
 ) -> Result<Vec<Entry<'f>>, SceneError> {
     let mut out = Vec::new();
     let mut add = |kind, path: String, name: &'f String, parent: &'f Option<String>| {
-        out.push(Entry {
-            path,
-            name,
-            parent: parent.as_deref(),
-            kind,
-        });
+        out.push(Entry { path, name, parent: parent.as_deref(), kind });
     };
     for (i, t) in file.group.iter().enumerate() {
         add(Kind::Group, format!("group.{i}"), &t.name, &t.parent);
     }
     for (i, t) in file.transform.iter().enumerate() {
-        add(
-            Kind::Transform(i),
-            format!("transform.{i}"),
-            &t.name,
-            &t.parent,
-        );
+        add(Kind::Transform(i), format!("transform.{i}"), &t.name, &t.parent);
     }
     for (i, t) in file.selector.iter().enumerate() {
-        add(
-            Kind::Selector(i),
-            format!("selector.{i}"),
-            &t.name,
-            &t.parent,
-        );
+        add(Kind::Selector(i), format!("selector.{i}"), &t.name, &t.parent);
     }
     for (i, t) in file.mesh.iter().enumerate() {
         add(Kind::Mesh(i), format!("mesh.{i}"), &t.name, &t.parent);
@@ -137,8 +122,5 @@ pub(super) fn depths(
             depths[e] = Some(depth);
         }
     }
-    Ok(depths
-        .into_iter()
-        .map(|d| d.expect("all visited"))
-        .collect())
+    Ok(depths.into_iter().map(|d| d.expect("all visited")).collect())
 }

@@ -59,25 +59,14 @@ mod tests {
             let s = &scene.simulation;
             assert_eq!(
                 (s.sampling, s.coherence, s.scatter_mode, s.texture_space),
-                (
-                    Sampling::Plain,
-                    Coherence::Coherent,
-                    ScatterMode::Voxel,
-                    TextureSpace::World
-                )
+                (Sampling::Plain, Coherence::Coherent, ScatterMode::Voxel, TextureSpace::World)
             );
             assert!(s.rough_transmission && !s.beam_footprint);
             assert_eq!(scene.instances[0].keyframes.strategy, strategy);
         }
-        assert_eq!(
-            paper(Path::new("nowhere.toml"), true).len(),
-            SIMULATION.len()
-        );
-        std::fs::write(
-            &path,
-            "[volume]\nfile = \"v.mha\"\n[fusion]\nmask = [\"m\"]\n",
-        )
-        .expect("written");
+        assert_eq!(paper(Path::new("nowhere.toml"), true).len(), SIMULATION.len());
+        std::fs::write(&path, "[volume]\nfile = \"v.mha\"\n[fusion]\nmask = [\"m\"]\n")
+            .expect("written");
         assert_eq!(paper(&path, true).len(), SIMULATION.len() + FUSION.len());
     }
 }

@@ -26,10 +26,7 @@ pub(super) fn simulation(
     table: SimulationTable,
     frequency: f64,
 ) -> Result<Simulation, SceneError> {
-    let mut out = Simulation {
-        cell: Simulation::default_cell(frequency),
-        ..Simulation::default()
-    };
+    let mut out = Simulation { cell: Simulation::default_cell(frequency), ..Simulation::default() };
     overlay!(table => out:
         paths, sampling, sequence, max_interactions, max_reflections, min_weight, coherence,
         rough_transmission, face_reflection, beam_footprint, emission_lobe, scatter_mode, scatterers_per_resolution_cell,
@@ -37,29 +34,14 @@ pub(super) fn simulation(
         origin_jitter, beam_width, cell, volume_floor, branch_floor, speckle_gain, surface_gain);
     for (key, value, (least, most), unit) in [
         ("paths", f64::from(out.paths), (1.0, 65_535.0), ""),
-        (
-            "max_interactions",
-            f64::from(out.max_interactions),
-            (1.0, 256.0),
-            "",
-        ),
-        (
-            "max_reflections",
-            f64::from(out.max_reflections),
-            (0.0, 256.0),
-            "",
-        ),
+        ("max_interactions", f64::from(out.max_interactions), (1.0, 256.0), ""),
+        ("max_reflections", f64::from(out.max_reflections), (0.0, 256.0), ""),
         ("min_weight", out.min_weight, (0.0, 1.0), ""),
         ("origin_jitter", out.origin_jitter, (0.0, 100.0), "mm"),
         ("emission_lobe", out.emission_lobe, (1.0, INF), ""),
         ("beam_width", out.beam_width, (0.01, INF), "mm"),
         ("cell", out.cell, (0.01, 10.0), "mm"),
-        (
-            "scatterers_per_resolution_cell",
-            out.scatterers_per_resolution_cell,
-            (0.0, 1000.0),
-            "",
-        ),
+        ("scatterers_per_resolution_cell", out.scatterers_per_resolution_cell, (0.0, 1000.0), ""),
         ("volume_floor", out.volume_floor, LEVEL, "dB"),
         ("branch_floor", out.branch_floor, LEVEL, "dB"),
         ("speckle_gain", out.speckle_gain, LEVEL, "dB"),
@@ -68,14 +50,7 @@ pub(super) fn simulation(
         ("roughness_scale", out.roughness_scale, (1e-6, 1e6), ""),
         ("thickness_scale", out.thickness_scale, (0.0, 100.0), ""),
     ] {
-        within(
-            document,
-            &format!("simulation.{key}"),
-            value,
-            least,
-            most,
-            unit,
-        )?;
+        within(document, &format!("simulation.{key}"), value, least, most, unit)?;
     }
     out.cell /= out.crowding();
     Ok(out)
@@ -92,50 +67,19 @@ pub(super) fn imaging(document: &Document<'_>, table: ImagingTable) -> Result<Im
     for (key, value, (least, most), unit) in [
         ("gain", out.gain, (-200.0, 200.0), "dB"),
         ("dynamic_range", out.dynamic_range, (1.0, 200.0), "dB"),
-        (
-            "tgc_attenuation",
-            out.tgc_attenuation,
-            (0.0, 100.0),
-            "dB/(cm MHz)",
-        ),
+        ("tgc_attenuation", out.tgc_attenuation, (0.0, 100.0), "dB/(cm MHz)"),
         ("tgc_limit", out.tgc_limit, (0.0, 200.0), "dB"),
         ("noise", out.noise, LEVEL, "dB"),
         ("grey_gamma", out.grey_gamma, (0.01, 100.0), ""),
-        (
-            "image_height",
-            f64::from(out.image_height),
-            (16.0, 8192.0),
-            "pixels",
-        ),
+        ("image_height", f64::from(out.image_height), (16.0, 8192.0), "pixels"),
     ] {
-        within(
-            document,
-            &format!("imaging.{key}"),
-            value,
-            least,
-            most,
-            unit,
-        )?;
+        within(document, &format!("imaging.{key}"), value, least, most, unit)?;
     }
     for (i, &level) in out.tgc_sliders.iter().enumerate() {
-        within(
-            document,
-            &format!("imaging.tgc_sliders.{i}"),
-            level,
-            -100.0,
-            100.0,
-            "dB",
-        )?;
+        within(document, &format!("imaging.tgc_sliders.{i}"), level, -100.0, 100.0, "dB")?;
     }
     for (i, &scale) in out.psf_scale.iter().enumerate() {
-        within(
-            document,
-            &format!("imaging.psf_scale.{i}"),
-            scale,
-            0.01,
-            100.0,
-            "",
-        )?;
+        within(document, &format!("imaging.psf_scale.{i}"), scale, 0.01, 100.0, "")?;
     }
     Ok(out)
 }

@@ -26,11 +26,7 @@ pub(super) fn placement(
         Some(translate) => shift(document, &format!("{path}.translate"), translate)?,
         None => DVec3::ZERO,
     };
-    Ok(DAffine3::from_scale_rotation_translation(
-        scale,
-        rotation,
-        translation,
-    ))
+    Ok(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
 }
 
 /// Unit axis and angle, rad.

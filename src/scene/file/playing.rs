@@ -109,12 +109,7 @@ pub(super) fn read(
             name,
         });
     }
-    Ok(Some(Playing {
-        clock,
-        start,
-        nodes: found.nodes,
-        meshes,
-    }))
+    Ok(Some(Playing { clock, start, nodes: found.nodes, meshes }))
 }
 
 impl Played {

@@ -63,20 +63,13 @@ mod tests {
         std::fs::write(case.path(), text).expect("written");
         let found = load_preset(&case.path(), 5.0).expect("sound");
         assert_eq!((&found.probe, &found.simulation), (&None, &None));
-        let gain = Imaging {
-            gain: 5.0,
-            ..Imaging::default()
-        };
+        let gain = Imaging { gain: 5.0, ..Imaging::default() };
         assert_eq!(found.imaging, Some(gain));
 
         let text = "[probe.pose]\nposition = [1, 2, 3]\n[simulation]\npaths = 3\n";
         std::fs::write(case.path(), text).expect("written");
         let found = load_preset(&case.path(), 5.0).expect("sound");
-        assert_eq!(
-            (&found.probe, &found.imaging),
-            (&None, &None),
-            "a pose is no probe"
-        );
+        assert_eq!((&found.probe, &found.imaging), (&None, &None), "a pose is no probe");
         let simulation = found.simulation.expect("there");
         assert_eq!((simulation.paths, simulation.cell), (3, 1.05 / 5.0));
     }

@@ -50,12 +50,7 @@ pub(super) fn build(
         ("f_number_receive", out.f_number_receive, (0.1, 100.0), ""),
         ("aperture", out.aperture, (0.1, far), "mm"),
         ("elevation_focus", out.elevation_focus, (0.1, 1e4), "mm"),
-        (
-            "elevation_height",
-            out.elevation_height,
-            (0.1, 1000.0),
-            "mm",
-        ),
+        ("elevation_height", out.elevation_height, (0.1, 1000.0), "mm"),
         ("slice_thickness", out.slice_thickness, (0.0, 1000.0), "mm"),
     ] {
         within(document, &format!("probe.{key}"), value, least, most, unit)?;
@@ -76,10 +71,7 @@ fn kind(document: &Document<'_>, table: &ProbeTable, preset: Kind) -> Result<Kin
     };
     let name = table.kind.unwrap_or(of_preset);
     let (radius, field_of_view, width) = match preset {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => (Some(radius), Some(field_of_view), None),
+        Kind::Convex { radius, field_of_view } => (Some(radius), Some(field_of_view), None),
         Kind::Linear { width } => (None, None, Some(width)),
         Kind::Phased { field_of_view } => (None, Some(field_of_view), None),
     };
@@ -102,11 +94,8 @@ fn kind(document: &Document<'_>, table: &ProbeTable, preset: Kind) -> Result<Kin
         )),
         false => Ok(()),
     };
-    let (given_radius, given_view, given_width) = (
-        table.radius.map(|q| q.0),
-        table.field_of_view.map(|q| q.0),
-        table.width.map(|q| q.0),
-    );
+    let (given_radius, given_view, given_width) =
+        (table.radius.map(|q| q.0), table.field_of_view.map(|q| q.0), table.width.map(|q| q.0));
     Ok(match name {
         KindName::Convex => {
             unfit("width", given_width.is_some())?;
@@ -118,9 +107,7 @@ fn kind(document: &Document<'_>, table: &ProbeTable, preset: Kind) -> Result<Kin
         KindName::Linear => {
             unfit("radius", given_radius.is_some())?;
             unfit("field_of_view", given_view.is_some())?;
-            Kind::Linear {
-                width: key("width", given_width, width, 1000.0, "mm")?,
-            }
+            Kind::Linear { width: key("width", given_width, width, 1000.0, "mm")? }
         }
         KindName::Phased => {
             unfit("radius", given_radius.is_some())?;
@@ -154,8 +141,7 @@ pub(super) fn look(
 ) -> Result<DAffine3, [&'static str; 3]> {
     let unit = |key, v: DVec3| {
         let remedy = "give a vector such as [0, 0, 1]";
-        v.try_normalize()
-            .ok_or([key, "this direction has no length", remedy])
+        v.try_normalize().ok_or([key, "this direction has no length", remedy])
     };
     let z = unit("direction", direction)?;
     let lateral = unit("lateral", lateral)?;
@@ -171,8 +157,5 @@ pub(super) fn look(
     if !position.is_finite() {
         return Err(["position", "the position is not finite", "give lengths"]);
     }
-    Ok(DAffine3::from_mat3_translation(
-        DMat3::from_cols(x, z.cross(x), z),
-        position,
-    ))
+    Ok(DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), position))
 }

@@ -179,9 +179,7 @@ fn into_value(
         Value::Array(array) => array,
         _ => return Err(whole(name)),
     };
-    let names = array
-        .iter()
-        .map(|v| v.as_inline_table().and_then(|t| name_of(t)));
+    let names = array.iter().map(|v| v.as_inline_table().and_then(|t| name_of(t)));
     let index = element(name, rest[0], &names.collect::<Vec<_>>())?;
     let inner = array.get_mut(index).expect("one of them");
     match (rest, value) {
@@ -314,10 +312,8 @@ impl Moved {
             (Some(folder), Some(name)) => folder.join(name),
             _ => full,
         };
-        let (mut theirs, mut ours) = (
-            full.components().peekable(),
-            self.new.components().peekable(),
-        );
+        let (mut theirs, mut ours) =
+            (full.components().peekable(), self.new.components().peekable());
         while theirs.peek().is_some() && theirs.peek() == ours.peek() {
             theirs.next();
             ours.next();

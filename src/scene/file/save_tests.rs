@@ -52,23 +52,15 @@ fn only_what_is_set_changes() {
     let expected = COMMENTED
         .replace("\"14 dB\"", "\"9.5 dB\"")
         .replace("2, # axial", "1.25, # axial")
-        .replace(
-            "1.5,\n    1,\n]\n",
-            "0.75,\n    1,\n]\ndynamic_range = \"55 dB\"\n",
-        )
+        .replace("1.5,\n    1,\n]\n", "0.75,\n    1,\n]\ndynamic_range = \"55 dB\"\n")
         .replace("parent = \"beat\"\n", "parent = \"beat\"\npriority = 3\n")
         + "\n[probe.pose]\nposition = [1, 2, 3]\n";
     assert_eq!(text, expected);
     let (saved, _) = Scene::load(&case.path(), &[]).expect("sound");
     std::fs::write(case.path(), COMMENTED).expect("written");
-    let set = set
-        .into_iter()
-        .map(|(path, value)| (path, value.expect("set")));
+    let set = set.into_iter().map(|(path, value)| (path, value.expect("set")));
     let (overridden, _) = Scene::load(&case.path(), &set.collect::<Vec<_>>()).expect("sound");
-    assert_eq!(
-        saved.imaging, overridden.imaging,
-        "as the command line sets it"
-    );
+    assert_eq!(saved.imaging, overridden.imaging, "as the command line sets it");
     assert_eq!(saved.world_from_probe, overridden.world_from_probe);
 }
 
@@ -81,12 +73,7 @@ fn tables_in_any_spelling_are_found() {
         ("", "[imaging]\ngain = 5\n"),
     ] {
         std::fs::write(case.path(), text).expect("written");
-        save(
-            &case.path(),
-            &case.path(),
-            &settings(&[("imaging.gain", "5")]),
-        )
-        .expect("saved");
+        save(&case.path(), &case.path(), &settings(&[("imaging.gain", "5")])).expect("saved");
         let saved = std::fs::read_to_string(case.path()).expect("there");
         assert_eq!(saved.trim_start(), expected, "{text}");
     }
@@ -118,10 +105,7 @@ fn names_with_dots_are_quoted() {
     let case = Case::new();
     let text = "[[mesh]]\nname = \"a.b\"\ntissue = \"fat\"\nfile = \"cube.obj\"\n";
     std::fs::write(case.path(), text).expect("written");
-    let set = settings(&[
-        ("mesh.\"a.b\".roughness", "7"),
-        ("tissues.\"x y\".based_on", "fat"),
-    ]);
+    let set = settings(&[("mesh.\"a.b\".roughness", "7"), ("tissues.\"x y\".based_on", "fat")]);
     save(&case.path(), &case.path(), &set).expect("saved");
     let saved = std::fs::read_to_string(case.path()).expect("there");
     let more = "roughness = 7\n\n[tissues.\"x y\"]\nbased_on = \"fat\"\n";
@@ -155,11 +139,7 @@ fn a_failure_leaves_the_file_alone() {
         (case.path(), ("mesh.c.priority", "1"), "no mesh `c`"),
         (case.path(), ("imaging.gain.x", "1"), "no such part"),
         (case.path(), ("imaging.gian", "1"), "gian"),
-        (
-            case.path(),
-            ("imaging.gain", "\"5 mm\""),
-            "`mm` does not fit",
-        ),
+        (case.path(), ("imaging.gain", "\"5 mm\""), "`mm` does not fit"),
         (case.path(), ("imaging.gain", "loud"), "loud"),
         (case.path(), ("imaging.gain", "999"), "gain is 999"),
         (case.path(), ("tissues.fat.speed", "99"), "speed is 99"),
@@ -170,9 +150,7 @@ fn a_failure_leaves_the_file_alone() {
         let text = std::fs::read_to_string(case.path()).expect("there");
         assert_eq!(text, COMMENTED, "{cause}");
     }
-    let left = std::fs::read_dir(case.folder.path())
-        .expect("a folder")
-        .count();
+    let left = std::fs::read_dir(case.folder.path()).expect("a folder").count();
     assert_eq!(left, 2, "the scene and its mesh, nothing beside");
 }
 
@@ -226,10 +204,7 @@ fn a_note_stands_above_its_key_and_replaces_its_like() {
             "    # registered long ago\n",
             "    # registered long ago\n    # registered: well\n",
         )
-        .replace(
-            "[0, 0, 1], angle = \"3 deg\"",
-            "[1, 0, 0], angle = \"4 deg\"",
-        )
+        .replace("[0, 0, 1], angle = \"3 deg\"", "[1, 0, 0], angle = \"4 deg\"")
         .replace("cube.obj\"\n", "cube.obj\"\nscale = 2\n");
     assert_eq!(text.expect("saved"), expected);
     let text = noted(PLACED, &[], ("transform.b.translate", "registered anew"));
@@ -237,18 +212,12 @@ fn a_note_stands_above_its_key_and_replaces_its_like() {
     assert_eq!(text.expect("saved"), expected);
     let set = [("mesh.a.translate", "[1, 0, 0]")];
     let text = noted(PLACED, &set, ("mesh.a.translate", "registered"));
-    let expected = PLACED.replace(
-        "cube.obj\"\n",
-        "cube.obj\"\n# registered\ntranslate = [1, 0, 0]\n",
-    );
+    let expected =
+        PLACED.replace("cube.obj\"\n", "cube.obj\"\n# registered\ntranslate = [1, 0, 0]\n");
     assert_eq!(text.expect("saved"), expected);
     // Into an inline table no comment fits.
     let inline = "# Keyed.\ntracker = { device = \"a\" }\n";
-    let text = noted(
-        inline,
-        &[("tracker.device", "b")],
-        ("tracker.device", "registered"),
-    );
+    let text = noted(inline, &[("tracker.device", "b")], ("tracker.device", "registered"));
     let expected = "# Keyed.\n# registered\ntracker = { device = \"b\" }\n";
     assert_eq!(text.expect("saved"), expected);
     let error = noted(PLACED, &[], ("transform.b.scale", "registered")).expect_err("no such key");
@@ -270,22 +239,11 @@ fn a_table_is_replaced_key_by_key_in_any_spelling() {
             "\n[transform.rotate]\n# up\naxis = [1, 0, 0]\nangle = \"4 deg\" # little\n",
         ),
     ] {
-        let set = [
-            ("transform.b.rotate", turn),
-            ("transform.b.translate", "[1, 0, 0]"),
-        ];
-        let text = noted(
-            &format!("{head}{before}"),
-            &set,
-            ("transform.b.translate", "seen"),
-        );
+        let set = [("transform.b.rotate", turn), ("transform.b.translate", "[1, 0, 0]")];
+        let text = noted(&format!("{head}{before}"), &set, ("transform.b.translate", "seen"));
         let text = text.expect("saved");
         let moved = "# seen\ntranslate = [1, 0, 0]\n";
-        assert_eq!(
-            text.replacen(moved, "", 1),
-            format!("{head}{after}"),
-            "{text}"
-        );
+        assert_eq!(text.replacen(moved, "", 1), format!("{head}{after}"), "{text}");
         let case = Case::new();
         case.load(&text, &[]).expect("sound");
     }

@@ -98,10 +98,7 @@ impl Shelf {
             }
         };
         let options = Self::options(table);
-        let known = self
-            .read
-            .iter()
-            .find(|r| r.files == files && r.options == options);
+        let known = self.read.iter().find(|r| r.files == files && r.options == options);
         let meshes = match known {
             Some(read) => read.meshes.clone(),
             None => {
@@ -110,11 +107,7 @@ impl Shelf {
                 warnings.extend(issues.into_iter().map(|w| w.of(name)));
                 let found = found.into_iter().map(|mesh| self.add(name, mesh));
                 let meshes: Vec<_> = found.collect();
-                self.read.push(Read {
-                    files: files.clone(),
-                    options,
-                    meshes: meshes.clone(),
-                });
+                self.read.push(Read { files: files.clone(), options, meshes: meshes.clone() });
                 meshes
             }
         };
@@ -147,10 +140,8 @@ impl Shelf {
         given: &str,
     ) -> SceneError {
         let errors: Vec<_> = issues.iter().filter(|i| i.is_error()).collect();
-        let causes: Vec<_> = errors
-            .iter()
-            .map(|e| format!("{}: {}", e.file.display(), e.message))
-            .collect();
+        let causes: Vec<_> =
+            errors.iter().map(|e| format!("{}: {}", e.file.display(), e.message)).collect();
         let at = match errors.iter().any(|e| e.message.starts_with("no node")) {
             true => "node",
             false => given,
@@ -164,10 +155,7 @@ impl Shelf {
 
     /// Keeps a mesh; its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
-        self.meshes.push(Mesh {
-            name: name.to_owned(),
-            ..mesh
-        });
+        self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
         self.meshes.len() - 1
     }
 }
@@ -197,10 +185,7 @@ fn built(
     if let Some((key, _)) = extra.iter().find(|e| e.1) {
         return Err(document.fail(
             &format!("{path}.{key}"),
-            format!(
-                "mesh `{}`: `{key}` applies to files, not to shapes",
-                table.name
-            ),
+            format!("mesh `{}`: `{key}` applies to files, not to shapes", table.name),
             "remove it",
         ));
     }
@@ -225,40 +210,23 @@ fn build(document: &Document<'_>, shape: &Shape, path: &str) -> Result<Mesh, Sce
     };
     let count = |key: &str, v: u32, least: u32, most: u32| {
         let (least, most) = (f64::from(least), f64::from(most));
-        within(
-            document,
-            &format!("{path}.{key}"),
-            f64::from(v),
-            least,
-            most,
-            "",
-        )?;
+        within(document, &format!("{path}.{key}"), f64::from(v), least, most, "")?;
         Ok(v)
     };
     let fine = shapes::MAX_SUBDIVISIONS;
     Ok(match shape {
-        Shape::Sphere {
-            radius,
-            subdivisions,
-        } => shapes::sphere(
+        Shape::Sphere { radius, subdivisions } => shapes::sphere(
             long("sphere.radius", radius.0)?,
             count("sphere.subdivisions", *subdivisions, 0, fine)?,
         ),
-        Shape::Ellipsoid {
-            radii,
-            subdivisions,
-        } => {
+        Shape::Ellipsoid { radii, subdivisions } => {
             for r in radii {
                 long("ellipsoid.radii", r.0)?;
             }
             let n = count("ellipsoid.subdivisions", *subdivisions, 0, fine)?;
             shapes::ellipsoid(radii.map(|r| r.0), n)
         }
-        Shape::Cylinder {
-            radius,
-            length,
-            segments,
-        } => shapes::cylinder(
+        Shape::Cylinder { radius, length, segments } => shapes::cylinder(
             long("cylinder.radius", radius.0)?,
             long("cylinder.length", length.0)?,
             count("cylinder.segments", *segments, 3, 4096)?,

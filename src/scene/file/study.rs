@@ -58,14 +58,8 @@ pub struct Question {
 }
 
 fn agreement() -> [String; 5] {
-    [
-        "Strongly disagree",
-        "Disagree",
-        "Neither agree nor disagree",
-        "Agree",
-        "Strongly agree",
-    ]
-    .map(str::to_owned)
+    ["Strongly disagree", "Disagree", "Neither agree nor disagree", "Agree", "Strongly agree"]
+        .map(str::to_owned)
 }
 
 /// One scene of a study.
@@ -180,14 +174,7 @@ impl Plan {
         check.texts(&table)?;
         check.backgrounds(&table.backgrounds)?;
         let height = table.image_height.unwrap_or(HEIGHT);
-        within(
-            &document,
-            "image_height",
-            f64::from(height),
-            1.0,
-            4096.0,
-            "pixels",
-        )?;
+        within(&document, "image_height", f64::from(height), 1.0, 4096.0, "pixels")?;
         check.names("scenario", table.scenario.iter().map(|s| &*s.name))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut scenarios = Vec::new();
@@ -285,11 +272,7 @@ impl Check<'_> {
     fn backgrounds(&self, backgrounds: &[Surroundings]) -> Result<(), SceneError> {
         if backgrounds.is_empty() {
             let message = "there is no background".to_owned();
-            return self.fail(
-                "backgrounds",
-                message,
-                "name one of `volume`, `scatterers`, `none`",
-            );
+            return self.fail("backgrounds", message, "name one of `volume`, `scatterers`, `none`");
         }
         for (i, background) in backgrounds.iter().enumerate() {
             if backgrounds[..i].contains(background) {
@@ -310,16 +293,8 @@ impl Check<'_> {
         let names: Vec<&str> = names.collect();
         if names.is_empty() {
             let message = format!("there is no {noun}");
-            let table = if noun == "slice" {
-                "scenario.slice"
-            } else {
-                noun
-            };
-            return self.fail(
-                path,
-                message,
-                &format!("add one: [[{table}]] with its name"),
-            );
+            let table = if noun == "slice" { "scenario.slice" } else { noun };
+            return self.fail(path, message, &format!("add one: [[{table}]] with its name"));
         }
         for (i, name) in names.iter().enumerate() {
             let at = format!("{path}.{i}.name");
@@ -342,10 +317,7 @@ fn slice_of(source: &Source, path: &str, table: &SliceTable) -> Result<Slice, Sc
         Some(_) if moved => {
             return Err(document.fail(
                 path,
-                format!(
-                    "`{}` has a pose, and a shift from the scene's own",
-                    table.name
-                ),
+                format!("`{}` has a pose, and a shift from the scene's own", table.name),
                 "give either `pose`, or `translate` and `rotate`",
             ));
         }
@@ -355,11 +327,7 @@ fn slice_of(source: &Source, path: &str, table: &SliceTable) -> Result<Slice, Sc
             Pose::Relative(placement(&document, path, shift)?)
         }
     };
-    Ok(Slice {
-        name: table.name.clone(),
-        title: table.title.clone(),
-        pose,
-    })
+    Ok(Slice { name: table.name.clone(), title: table.title.clone(), pose })
 }
 
 #[cfg(test)]

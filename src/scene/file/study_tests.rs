@@ -62,10 +62,7 @@ fn poses_are_where_the_plan_says_and_entries_repeat_them() {
     ] {
         let (pose, (path, value)) = plan.scenarios[0].slices[slice].pose(&scene);
         assert!(pose.translation.abs_diff_eq(tip, 1e-4), "{slice}: {pose}");
-        assert!(
-            pose.matrix3.z_axis.abs_diff_eq(depth, 1e-6),
-            "{slice}: {pose}"
-        );
+        assert!(pose.matrix3.z_axis.abs_diff_eq(depth, 1e-6), "{slice}: {pose}");
         assert!(!value.contains(' '), "{value}");
         let case = Case::new();
         std::fs::write(case.path(), "").expect("written");
@@ -92,30 +89,14 @@ fn mistakes_have_line_and_remedy() {
         (with("name = \"a\"", "name = \"\""), 7, "no name"),
         (with("\"moved\"", "\"own\""), 12, "two of the name `own`"),
         (with("1 cm", "1 parsec"), 13, "parsec"),
-        (
-            with("[0, 0, 1], angle", "[0, 0, 0], angle"),
-            14,
-            "no length",
-        ),
-        (
-            with("direction = [0, 1, 0]", "direction = [0, 0, 2]"),
-            17,
-            "parallel",
-        ),
-        (
-            with("pose = {", "translate = [1, 0, 0]\npose = {"),
-            15,
-            "a pose, and a shift",
-        ),
+        (with("[0, 0, 1], angle", "[0, 0, 0], angle"), 14, "no length"),
+        (with("direction = [0, 1, 0]", "direction = [0, 0, 2]"), 17, "parallel"),
+        (with("pose = {", "translate = [1, 0, 0]\npose = {"), 15, "a pose, and a shift"),
         (first("backgrounds = []"), 1, "no background"),
         (first("backgrounds = [\"none\", \"none\"]"), 1, "twice"),
         (first("backgrounds = [\"volumes\"]"), 1, "volumes"),
         (first("image_height = 0"), 1, "image_height is 0"),
-        (
-            first(&format!("introduction = \"{}\"", "a".repeat(5000))),
-            1,
-            "5000 bytes",
-        ),
+        (first(&format!("introduction = \"{}\"", "a".repeat(5000))), 1, "5000 bytes"),
         (
             whole.clone()
                 + &(0..1000)

@@ -41,9 +41,7 @@ pub(super) fn variants(
     for parameter in Parameter::ALL {
         let around = || parameter.around(parameter.value(scene)).to_vec();
         let stated = table.values(parameter);
-        let values = stated
-            .or_else(|| suggested.then(around))
-            .unwrap_or_default();
+        let values = stated.or_else(|| suggested.then(around)).unwrap_or_default();
         for (i, value) in values.into_iter().enumerate() {
             let setting = parameter.setting(scene, value);
             let made = settled(document, parameter, value, setting).map_err(|error| {
@@ -74,12 +72,5 @@ fn settled(
     let (probe, _) = probe::build(&document, &file.probe)?;
     let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
     let imaging = parameters::imaging(&document, file.imaging)?;
-    Ok(Variant {
-        parameter,
-        value,
-        setting,
-        probe,
-        simulation,
-        imaging,
-    })
+    Ok(Variant { parameter, value, setting, probe, simulation, imaging })
 }

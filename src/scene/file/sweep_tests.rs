@@ -21,10 +21,8 @@ shape = { sphere = { radius = 8, subdivisions = 1 } }
 
 fn sweep(case: &Case, text: &str, set: &[(&str, &str)]) -> (Scene, Vec<Variant>) {
     case.load(text, set).expect("sound");
-    let set: Vec<_> = set
-        .iter()
-        .map(|(path, value)| ((*path).to_owned(), (*value).to_owned()))
-        .collect();
+    let set: Vec<_> =
+        set.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
     let (scene, variants, _) = Scene::load_sweep(&case.path(), &set).expect("sound");
     (scene, variants)
 }
@@ -32,10 +30,7 @@ fn sweep(case: &Case, text: &str, set: &[(&str, &str)]) -> (Scene, Vec<Variant>)
 #[test]
 fn every_parameter_stands_below_and_above_its_own_value_and_nothing_else_differs() {
     let case = Case::new();
-    for set in [
-        &[][..],
-        &[("probe.depth", "60 mm"), ("simulation.cell", "0.2")],
-    ] {
+    for set in [&[][..], &[("probe.depth", "60 mm"), ("simulation.cell", "0.2")]] {
         let (scene, variants) = sweep(&case, SCENE, set);
         let order: Vec<_> = variants.iter().map(|v| v.parameter).collect();
         let expected: Vec<_> = Parameter::ALL.iter().flat_map(|&p| [p, p]).collect();
@@ -74,12 +69,7 @@ fn the_file_says_which_values_and_empty_lists_leave_out() {
     let frequency = Parameter::Frequency;
     assert_eq!(
         found,
-        [
-            (frequency, 5.0),
-            (frequency, 6.5),
-            (frequency, 9.0),
-            (Parameter::AxialPsf, 3.0)
-        ]
+        [(frequency, 5.0), (frequency, 6.5), (frequency, 9.0), (Parameter::AxialPsf, 3.0)]
     );
     assert_eq!(variants[3].setting.1, "[3,0.8,1.1]");
     assert_eq!(variants[3].imaging.psf_scale, [3.0, 0.8, 1.1]);
@@ -92,46 +82,23 @@ fn values_out_of_range_are_refused_with_their_key() {
     let case = Case::new();
     let line = SCENE.lines().count() + 2;
     for (entry, column, cause, remedy) in [
-        (
-            "gain = [-6, 500]",
-            13,
-            "gain cannot be 500 dB",
-            "between -200 and 200 dB",
-        ),
-        (
-            "psf_lateral = [0]",
-            16,
-            "psf_lateral cannot be 0",
-            "between 0.01 and 100",
-        ),
-        (
-            "density_scale = [nan]",
-            18,
-            "density_scale cannot be NaN",
-            "expected f64",
-        ),
+        ("gain = [-6, 500]", 13, "gain cannot be 500 dB", "between -200 and 200 dB"),
+        ("psf_lateral = [0]", 16, "psf_lateral cannot be 0", "between 0.01 and 100"),
+        ("density_scale = [nan]", 18, "density_scale cannot be NaN", "expected f64"),
         (
             "roughness_scale = [0]",
             20,
             "roughness_scale cannot be 0",
             "between 0.000001 and 1000000",
         ),
-        (
-            "frequency = [\"5 mm\"]",
-            14,
-            "unit `mm` does not fit",
-            "MHz",
-        ),
+        ("frequency = [\"5 mm\"]", 14, "unit `mm` does not fit", "MHz"),
         ("gian = [5]", 1, "unknown field", "`gain`"),
     ] {
         let text = format!("{SCENE}[sweep]\n{entry}\n");
         case.fails(&text, (line, column), cause, remedy);
     }
     // An override is at fault where it is one.
-    let error = case
-        .load(SCENE, &[("sweep.gain", "[500]")])
-        .map(|_| ())
-        .expect_err("out of range");
+    let error = case.load(SCENE, &[("sweep.gain", "[500]")]).map(|_| ()).expect_err("out of range");
     assert!(error.to_string().starts_with("--set:1:"), "{error}");
 }
 
@@ -160,8 +127,5 @@ fn every_way_to_fuse_is_listed() {
     let blends = Blend::ALL.iter().map(|b| b.name());
     assert_eq!(offered("blend"), suggest::among("zzzzzzzz", blends));
     let surroundings = Surroundings::ALL.iter().map(|s| s.name());
-    assert_eq!(
-        offered("surroundings"),
-        suggest::among("zzzzzzzz", surroundings)
-    );
+    assert_eq!(offered("surroundings"), suggest::among("zzzzzzzz", surroundings));
 }

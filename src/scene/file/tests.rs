@@ -26,10 +26,7 @@ impl Case {
         set: &[(&str, &str)],
     ) -> Result<(Scene, Vec<Warning>), SceneError> {
         std::fs::write(self.path(), text).expect("written");
-        let set: Vec<_> = set
-            .iter()
-            .map(|(k, v)| ((*k).to_owned(), (*v).to_owned()))
-            .collect();
+        let set: Vec<_> = set.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         Scene::load(&self.path(), &set)
     }
 
@@ -40,10 +37,7 @@ impl Case {
         assert_eq!((error.line, error.column), place, "{error}; {help}");
         assert!(error.to_string().contains("s.toml"), "{error}");
         assert!(error.message.contains(cause), "{error}");
-        assert!(
-            format!("{}{help}", error.message).contains(remedy),
-            "{error}; {help}"
-        );
+        assert!(format!("{}{help}", error.message).contains(remedy), "{error}; {help}");
     }
 }
 
@@ -97,32 +91,17 @@ fn a_whole_scene_is_understood() {
     assert!(matches!(scene.probe.kind, Kind::Convex { radius, .. } if radius == 50.0));
     let pose = scene.world_from_probe;
     assert_eq!(pose.transform_vector3(glam::DVec3::X), glam::DVec3::X);
-    assert_eq!(
-        pose.transform_point3(glam::DVec3::Z),
-        glam::DVec3::new(10.0, 0.0, -4.0)
-    );
+    assert_eq!(pose.transform_point3(glam::DVec3::Z), glam::DVec3::new(10.0, 0.0, -4.0));
     assert!((pose.matrix3.determinant() - 1.0).abs() < 1e-12);
     assert_eq!(scene.simulation.paths, 4);
     assert_eq!(scene.imaging.tgc_sliders[3], 1.0);
     let liver = &scene.instances[0];
     // 10 units of a centimetre, halved by the instance.
-    assert_eq!(
-        scene.meshes[liver.mesh]
-            .positions
-            .iter()
-            .map(|p| p[0])
-            .fold(0.0, f32::max),
-        100.0
-    );
-    let corner = liver
-        .world_from_object
-        .transform_point3(glam::DVec3::splat(100.0));
+    assert_eq!(scene.meshes[liver.mesh].positions.iter().map(|p| p[0]).fold(0.0, f32::max), 100.0);
+    let corner = liver.world_from_object.transform_point3(glam::DVec3::splat(100.0));
     assert_eq!(corner, glam::DVec3::new(1050.0, 50.0, 50.0));
     assert_eq!(liver.surface[0].roughness, f64::INFINITY);
-    assert_eq!(
-        (liver.surface[0].thickness, liver.surface[1].thickness),
-        (0.1, 0.2)
-    );
+    assert_eq!((liver.surface[0].thickness, liver.surface[1].thickness), (0.1, 0.2));
     let cyst = &scene.instances[1];
     assert_eq!(scene.tissues[cyst.tissue].speed, 1.53);
     assert_eq!(scene.tissues[cyst.tissue].density, 1.015);
@@ -137,21 +116,12 @@ fn overrides_name_what_has_dots_in_its_name() {
     let case = Case::new();
     let text = "[[mesh]]\nname = \"Cube.001\"\nfile = \"cube.obj\"\ntissue = \"liver\"\n\
         [[mesh]]\nname = \"left one\"\nfile = \"cube.obj\"\ntissue = \"liver\"\n";
-    let set = [
-        ("mesh.\"Cube.001\".tissue", "fat"),
-        ("mesh.left one.tissue", "kidney"),
-    ];
+    let set = [("mesh.\"Cube.001\".tissue", "fat"), ("mesh.left one.tissue", "kidney")];
     let (scene, _) = case.load(text, &set).expect("sound");
-    let named = scene
-        .instances
-        .iter()
-        .map(|i| scene.tissues[i.tissue].name.as_str());
+    let named = scene.instances.iter().map(|i| scene.tissues[i.tissue].name.as_str());
     assert_eq!(named.collect::<Vec<_>>(), ["fat", "kidney"]);
     let wrong = [("mesh.\"Cube.002\".tissue", "fat")];
-    let error = case
-        .load(text, &wrong)
-        .map(|_| ())
-        .expect_err("no such mesh");
+    let error = case.load(text, &wrong).map(|_| ()).expect_err("no such mesh");
     assert!(error.to_string().contains("Cube.002"), "{error}");
 }
 
@@ -196,17 +166,11 @@ fn wrong_overrides_are_shown_as_such() {
         ("mesh.9.tissue", "fat", "no mesh `9`", "liver"),
         ("probe.depth", "[1,", "depth", ""),
     ] {
-        let error = case
-            .load(SCENE, &[(path, value)])
-            .map(|_| ())
-            .expect_err(path);
+        let error = case.load(SCENE, &[(path, value)]).map(|_| ()).expect_err(path);
         let help = error.remedy.clone().unwrap_or_default();
         assert_eq!(error.file, Path::new("--set"), "{error}");
         assert!(error.message.contains(cause), "{error}");
-        assert!(
-            format!("{}{help}", error.message).contains(remedy),
-            "{error} {help}"
-        );
+        assert!(format!("{}{help}", error.message).contains(remedy), "{error} {help}");
     }
 }
 
@@ -215,127 +179,32 @@ fn mistakes_are_placed_and_come_with_a_remedy() {
     let case = Case::new();
     let cube = "[[mesh]]\nname = \"a\"\nfile = \"cube.obj\"\ntissue = \"liver\"\n";
     let f = |text: &str, place, cause, remedy| case.fails(text, place, cause, remedy);
-    f(
-        "[simulation]\npathz = 3\n",
-        (2, 1),
-        "unknown field `pathz`",
-        "`paths`",
-    );
-    f(
-        "[probe]\ndepth = \"5 MHz\"\n",
-        (2, 9),
-        "`MHz` does not fit",
-        "`mm`, `cm`",
-    );
+    f("[simulation]\npathz = 3\n", (2, 1), "unknown field `pathz`", "`paths`");
+    f("[probe]\ndepth = \"5 MHz\"\n", (2, 9), "`MHz` does not fit", "`mm`, `cm`");
     f("[probe]\ndepth = 0\n", (2, 9), "depth is 0 mm", "between");
-    f(
-        "[probe]\nfield_of_view = 65\n",
-        (2, 17),
-        "needs its unit",
-        "`deg`",
-    );
-    f(
-        "[probe]\npreset = \"abdominl\"\n",
-        (2, 10),
-        "unknown preset",
-        "`abdominal`",
-    );
-    f(
-        "[probe]\npreset = \"linear\"\nradius = 3\n",
-        (3, 10),
-        "does not belong",
-        "width",
-    );
-    f(
-        "[probe]\nkind = \"linear\"\n",
-        (2, 8),
-        "needs `width`",
-        "add `width`",
-    );
-    f(
-        "[probe.pose]\ndirection = [0, 0, 0]\n",
-        (2, 13),
-        "no length",
-        "[0, 0, 1]",
-    );
-    f(
-        "[probe.pose]\nlateral = [0, 0, 3]\n",
-        (2, 11),
-        "parallel",
-        "across",
-    );
-    f(
-        "[probe.pose]\ndirection = [0, nan, 1]\n",
-        (2, 13),
-        "no length",
-        "vector",
-    );
-    f(
-        "[simulation]\nsampling = \"main-pth\"\n",
-        (2, 12),
-        "unknown variant",
-        "`main-path`",
-    );
-    f(
-        "background = \"livr\"\n",
-        (1, 14),
-        "unknown tissue `livr`",
-        "`liver`",
-    );
-    f(
-        &cube.replace("cube", "cub"),
-        (3, 8),
-        "cub.obj: cannot be read",
-        "check the path",
-    );
-    f(
-        &cube.replace("\"liver\"", "\"muslce\""),
-        (4, 10),
-        "unknown tissue",
-        "`muscle`",
-    );
-    f(
-        &format!("{cube}node = \"x\"\n"),
-        (5, 8),
-        "no node or object `x`",
-        "choose one of",
-    );
-    f(
-        &format!("{cube}units = \"um\"\n"),
-        (3, 8),
-        "is 0.0100 mm large",
-        "units = ",
-    );
-    f(
-        &format!("{cube}{cube}"),
-        (6, 8),
-        "two meshes named `a`",
-        "own name",
-    );
-    f(
-        "[[mesh]]\nname = \"a\"\ntissue = \"fat\"\n",
-        (1, 1),
-        "neither `file` nor",
-        "give one",
-    );
-    f(
-        "[tissues.x]\nspeed = 1.5\n",
-        (1, 1),
-        "has no density",
-        "based_on",
-    );
+    f("[probe]\nfield_of_view = 65\n", (2, 17), "needs its unit", "`deg`");
+    f("[probe]\npreset = \"abdominl\"\n", (2, 10), "unknown preset", "`abdominal`");
+    f("[probe]\npreset = \"linear\"\nradius = 3\n", (3, 10), "does not belong", "width");
+    f("[probe]\nkind = \"linear\"\n", (2, 8), "needs `width`", "add `width`");
+    f("[probe.pose]\ndirection = [0, 0, 0]\n", (2, 13), "no length", "[0, 0, 1]");
+    f("[probe.pose]\nlateral = [0, 0, 3]\n", (2, 11), "parallel", "across");
+    f("[probe.pose]\ndirection = [0, nan, 1]\n", (2, 13), "no length", "vector");
+    f("[simulation]\nsampling = \"main-pth\"\n", (2, 12), "unknown variant", "`main-path`");
+    f("background = \"livr\"\n", (1, 14), "unknown tissue `livr`", "`liver`");
+    f(&cube.replace("cube", "cub"), (3, 8), "cub.obj: cannot be read", "check the path");
+    f(&cube.replace("\"liver\"", "\"muslce\""), (4, 10), "unknown tissue", "`muscle`");
+    f(&format!("{cube}node = \"x\"\n"), (5, 8), "no node or object `x`", "choose one of");
+    f(&format!("{cube}units = \"um\"\n"), (3, 8), "is 0.0100 mm large", "units = ");
+    f(&format!("{cube}{cube}"), (6, 8), "two meshes named `a`", "own name");
+    f("[[mesh]]\nname = \"a\"\ntissue = \"fat\"\n", (1, 1), "neither `file` nor", "give one");
+    f("[tissues.x]\nspeed = 1.5\n", (1, 1), "has no density", "based_on");
     f(
         "[tissues.x]\nbased_on = \"liver\"\nimpedance = \"1.75 MRayl\"\n",
         (3, 13),
         "differs from density times speed",
         "2 %",
     );
-    f(
-        "[tissues.liver]\nspeed = 1540\n",
-        (2, 9),
-        "speed is 1540 mm/us",
-        "between",
-    );
+    f("[tissues.liver]\nspeed = 1540\n", (2, 9), "speed is 1540 mm/us", "between");
     f("a = [1,\n", (1, 8), "unclosed array", "");
     f(
         "[tissues.a]\nbased_on = \"b\"\n[tissues.b]\nbased_on = \"a\"\n",
@@ -360,13 +229,9 @@ fn coincident_triangles_are_counted_and_named() {
     let (scene, warnings) = case.load(text, &[]).expect("sound");
     assert_eq!(scene.meshes.len(), 1);
     assert_eq!(scene.coincident_triangles(), 12);
-    assert!(
-        warnings[0].message.contains("12 triangles of `a` and `b`"),
-        "{warnings:?}"
-    );
-    let (scene, warnings) = case
-        .load(&format!("{text}translate = [1, 0, 0]\n"), &[])
-        .expect("sound");
+    assert!(warnings[0].message.contains("12 triangles of `a` and `b`"), "{warnings:?}");
+    let (scene, warnings) =
+        case.load(&format!("{text}translate = [1, 0, 0]\n"), &[]).expect("sound");
     // The four sides along x still lie in the same planes but not triangle on triangle.
     assert_eq!((scene.coincident_triangles(), warnings.len()), (0, 0));
 }

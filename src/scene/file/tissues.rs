@@ -31,11 +31,7 @@ impl<'a> Tissues<'a> {
             let tissue = resolve(document, tables, name, &mut chain)?;
             own.push(tissue);
         }
-        Ok(Self {
-            document,
-            own,
-            used: Vec::new(),
-        })
+        Ok(Self { document, own, used: Vec::new() })
     }
 
     /// Index in the scene's table of the tissue that is named at `path`.
@@ -45,12 +41,7 @@ impl<'a> Tissues<'a> {
         }
         let own = self.own.iter().find(|t| t.name == name).cloned();
         let tissue = own.or_else(|| Tissue::shipped(name)).ok_or_else(|| {
-            unknown(
-                self.document,
-                path,
-                name,
-                self.own.iter().map(|t| t.name.as_str()),
-            )
+            unknown(self.document, path, name, self.own.iter().map(|t| t.name.as_str()))
         })?;
         self.used.push(tissue);
         Ok(self.used.len() - 1)
@@ -137,10 +128,7 @@ fn resolve(
         let product = tissue.impedance();
         let off = (stated.0 - product).abs() / stated.0;
         // Written so that a zero or infinite impedance fails as well.
-        if !matches!(
-            off.partial_cmp(&IMPEDANCE_TOLERANCE),
-            Some(std::cmp::Ordering::Less)
-        ) {
+        if !matches!(off.partial_cmp(&IMPEDANCE_TOLERANCE), Some(std::cmp::Ordering::Less)) {
             return Err(document.fail(
                 &format!("{path}.impedance"),
                 format!(
@@ -173,11 +161,7 @@ fn overlay(
         name: name.to_owned(),
         speed: need("speed", table.speed.map(|q| q.0), b.map(|t| t.speed))?,
         density: need("density", table.density.map(|q| q.0), b.map(|t| t.density))?,
-        attenuation: need(
-            "attenuation",
-            table.attenuation.map(|q| q.0),
-            b.map(|t| t.attenuation),
-        )?,
+        attenuation: need("attenuation", table.attenuation.map(|q| q.0), b.map(|t| t.attenuation))?,
         echogenicity: need(
             "echogenicity",
             table.echogenicity.map(|q| q.0),
@@ -197,9 +181,7 @@ fn overlay(
         },
     };
     Ok(Tissue {
-        density_of_scatterers: table
-            .density_of_scatterers
-            .unwrap_or(tissue.density_of_scatterers),
+        density_of_scatterers: table.density_of_scatterers.unwrap_or(tissue.density_of_scatterers),
         mean_over_sigma: table.mean_over_sigma.unwrap_or(tissue.mean_over_sigma),
         texture_depth: table.texture_depth.unwrap_or(tissue.texture_depth),
         texture_length: table.texture_length.map_or(tissue.texture_length, |q| q.0),
@@ -213,18 +195,8 @@ fn validate(document: &Document<'_>, t: &Tissue, path: &str) -> Result<(), Scene
         ("speed", t.speed, (0.1, 10.0), "mm/us"),
         ("density", t.density, (1e-4, 25.0), "g/cm3"),
         ("attenuation", t.attenuation, (0.0, 1000.0), "dB/(cm MHz)"),
-        (
-            "echogenicity",
-            t.echogenicity,
-            (f64::NEG_INFINITY, 60.0),
-            "dB",
-        ),
-        (
-            "density_of_scatterers",
-            t.density_of_scatterers,
-            (0.0, 1.0),
-            "",
-        ),
+        ("echogenicity", t.echogenicity, (f64::NEG_INFINITY, 60.0), "dB"),
+        ("density_of_scatterers", t.density_of_scatterers, (0.0, 1.0), ""),
         ("mean_over_sigma", t.mean_over_sigma, (-100.0, 100.0), ""),
         ("texture_depth", t.texture_depth, (0.0, 0.5), ""),
         ("texture_length", t.texture_length, (0.01, 1000.0), "mm"),

@@ -56,11 +56,7 @@ fn transform(
     table: &RigidTable,
 ) -> Result<DAffine3, SceneError> {
     let Some(rows) = table.matrix else {
-        return placement(
-            document,
-            path,
-            (table.translate, table.rotate.as_ref(), None),
-        );
+        return placement(document, path, (table.translate, table.rotate.as_ref(), None));
     };
     let path = format!("{path}.matrix");
     let fail = |why: String, remedy| Err(document.fail(&path, why, remedy));

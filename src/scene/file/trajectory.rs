@@ -20,9 +20,8 @@ const MAX_ROWS: usize = 200_000;
 const FAR: f64 = 1e5;
 
 /// The columns that there can be.
-const NAMES: [&str; 11] = [
-    "time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "sx", "sy", "sz",
-];
+const NAMES: [&str; 11] =
+    ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "sx", "sy", "sz"];
 
 /// One column with the places of its values in the text, bytes.
 struct Column {
@@ -99,10 +98,7 @@ fn column(name: &str, has: impl Fn(&str) -> bool) -> Result<&'static str, (Strin
         (format!("unknown column `{name}`"), remedy)
     })?;
     match has(known) {
-        true => Err((
-            format!("there are two columns `{name}`"),
-            "remove one".to_owned(),
-        )),
+        true => Err((format!("there are two columns `{name}`"), "remove one".to_owned())),
         false => Ok(known),
     }
 }
@@ -127,9 +123,8 @@ fn of_csv<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
             .collect::<Vec<_>>()
     };
     let body = text.strip_prefix('\u{feff}').unwrap_or(text);
-    let mut lines = body
-        .lines()
-        .filter(|l| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
+    let mut lines =
+        body.lines().filter(|l| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
     let header = lines.next().map(cells).ok_or_else(|| {
         let remedy = format!("begin with a header line of {}", NAMES.join(","));
         fail(path, text, 0..0, "the trajectory is empty", remedy)
@@ -140,10 +135,7 @@ fn of_csv<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
         let name = column(name, |n| columns.contains_key(n))
             .map_err(|(message, remedy)| fail(path, text, at.clone(), message, remedy))?;
         order.push(name);
-        let empty = Column {
-            values: Vec::new(),
-            places: Vec::new(),
-        };
+        let empty = Column { values: Vec::new(), places: Vec::new() };
         columns.insert(name, empty);
     }
     for (row, line) in lines.enumerate() {
@@ -167,11 +159,7 @@ fn of_csv<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
             column.places.push(at);
         }
     }
-    Ok(Table {
-        path,
-        text,
-        columns,
-    })
+    Ok(Table { path, text, columns })
 }
 
 fn of_toml<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
@@ -194,11 +182,7 @@ fn of_toml<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
         };
         columns.insert(name, column);
     }
-    Ok(Table {
-        path,
-        text,
-        columns,
-    })
+    Ok(Table { path, text, columns })
 }
 
 impl Table<'_> {

@@ -112,32 +112,17 @@ pub(super) fn parse<D: Dimension>(text: &str) -> Result<f64, String> {
         .filter(|&i| text.is_char_boundary(i))
         .find(|&i| text[..i].trim_end().parse::<f64>().is_ok())
         .ok_or_else(|| {
-            format!(
-                "`{text}` is not {}; write it like \"1.5 {}\"",
-                D::WHAT,
-                D::UNITS[0].0
-            )
+            format!("`{text}` is not {}; write it like \"1.5 {}\"", D::WHAT, D::UNITS[0].0)
         })?;
-    let value: f64 = text[..end]
-        .trim_end()
-        .parse()
-        .map_err(|_| "not a number".to_owned())?;
+    let value: f64 = text[..end].trim_end().parse().map_err(|_| "not a number".to_owned())?;
     let compact = |s: &str| s.split_whitespace().collect::<String>();
     let unit = compact(&text[end..]);
     if unit.is_empty() {
-        return Err(format!(
-            "`{text}` has no unit; {} takes {}",
-            D::WHAT,
-            allowed::<D>()
-        ));
+        return Err(format!("`{text}` has no unit; {} takes {}", D::WHAT, allowed::<D>()));
     }
     let factor = D::UNITS.iter().find(|u| compact(u.0) == unit);
     let (_, factor) = factor.ok_or_else(|| {
-        format!(
-            "unit `{unit}` does not fit: {} takes {}",
-            D::WHAT,
-            allowed::<D>()
-        )
+        format!("unit `{unit}` does not fit: {} takes {}", D::WHAT, allowed::<D>())
     })?;
     Ok(value * factor)
 }
@@ -172,11 +157,7 @@ impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
 
             fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 let unit = D::UNITS[0].0;
-                write!(
-                    f,
-                    "{}: a number in {unit} or a string like \"1.5 {unit}\"",
-                    D::WHAT
-                )
+                write!(f, "{}: a number in {unit} or a string like \"1.5 {unit}\"", D::WHAT)
             }
 
             fn visit_f64<E: Error>(self, value: f64) -> Result<Self::Value, E> {
@@ -202,13 +183,9 @@ mod tests {
 
     #[test]
     fn every_unit_is_converted() {
-        for (text, value) in [
-            ("60 mm", 60.0),
-            ("6cm", 60.0),
-            ("0.5 m", 500.0),
-            ("1e3 um", 1.0),
-            ("-2.5 mm", -2.5),
-        ] {
+        for (text, value) in
+            [("60 mm", 60.0), ("6cm", 60.0), ("0.5 m", 500.0), ("1e3 um", 1.0), ("-2.5 mm", -2.5)]
+        {
             assert_eq!(parse::<InLength>(text), Ok(value), "{text}");
         }
         assert_eq!(parse::<InFrequency>("5 MHz"), Ok(5.0));
@@ -231,20 +208,9 @@ mod tests {
     #[test]
     fn wrong_units_name_the_right_ones() {
         let wrong = parse::<InFrequency>("5 mm").expect_err("wrong unit");
-        assert!(
-            wrong.contains("`mm` does not fit") && wrong.contains("`MHz`, `kHz`"),
-            "{wrong}"
-        );
-        assert!(
-            parse::<InLength>("60")
-                .expect_err("no unit")
-                .contains("has no unit")
-        );
-        assert!(
-            parse::<InLength>("wide")
-                .expect_err("no number")
-                .contains("write it like")
-        );
+        assert!(wrong.contains("`mm` does not fit") && wrong.contains("`MHz`, `kHz`"), "{wrong}");
+        assert!(parse::<InLength>("60").expect_err("no unit").contains("has no unit"));
+        assert!(parse::<InLength>("wide").expect_err("no number").contains("write it like"));
         assert!(parse::<InLength>("").is_err());
     }
 

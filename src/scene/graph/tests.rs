@@ -9,20 +9,12 @@ fn instance(keyframes: &[usize]) -> Instance {
     Instance {
         name: "mesh".into(),
         mesh: 99,
-        keyframes: Keyframes {
-            meshes: keyframes.to_vec(),
-            ..Keyframes::default()
-        },
+        keyframes: Keyframes { meshes: keyframes.to_vec(), ..Keyframes::default() },
         shown: true,
         tissue: 0,
         priority: 0,
         world_from_object: DAffine3::IDENTITY,
-        surface: [Surface {
-            roughness: 0.0,
-            thickness: 0.0,
-            specularity: 1.0,
-            gain: 0.0,
-        }; 2],
+        surface: [Surface { roughness: 0.0, thickness: 0.0, specularity: 1.0, gain: 0.0 }; 2],
     }
 }
 
@@ -30,24 +22,13 @@ fn scene(instances: Vec<Instance>, nodes: Vec<Node>) -> Scene {
     Scene {
         meshes: vec![Mesh::default(); 8],
         instances,
-        graph: Graph {
-            nodes,
-            ..Graph::default()
-        },
-        ..Scene::homogeneous(
-            Tissue::shipped("water").expect("shipped"),
-            Probe::abdominal(),
-        )
+        graph: Graph { nodes, ..Graph::default() },
+        ..Scene::homogeneous(Tissue::shipped("water").expect("shipped"), Probe::abdominal())
     }
 }
 
 fn node(parent: Option<usize>, alternative: Option<usize>, kind: NodeKind) -> Node {
-    Node {
-        name: String::new(),
-        parent,
-        alternative,
-        kind,
-    }
+    Node { name: String::new(), parent, alternative, kind }
 }
 
 fn mesh(instance: usize, rest: DAffine3) -> NodeKind {
@@ -55,10 +36,7 @@ fn mesh(instance: usize, rest: DAffine3) -> NodeKind {
 }
 
 fn selector(period: f64, count: usize) -> NodeKind {
-    let clock = Clock {
-        period,
-        ..Clock::default()
-    };
+    let clock = Clock { period, ..Clock::default() };
     NodeKind::Selector(Sequence::even(clock, count, Interpolation::Linear))
 }
 
@@ -68,33 +46,13 @@ fn nested_transforms_multiply_from_the_world_down() {
     let quarter = DAffine3::from_rotation_z(std::f64::consts::FRAC_PI_2);
     let double = DAffine3::from_scale(DVec3::splat(2.0));
     let orbit = Motion::Orbit {
-        clock: Clock {
-            period: 4.0,
-            ..Clock::default()
-        },
-        turn: Turn {
-            angle: std::f64::consts::TAU,
-            ..Turn::default()
-        },
+        clock: Clock { period: 4.0, ..Clock::default() },
+        turn: Turn { angle: std::f64::consts::TAU, ..Turn::default() },
     };
     let nodes = vec![
-        node(
-            None,
-            None,
-            NodeKind::Transform {
-                rest: shift,
-                motion: orbit,
-            },
-        ),
+        node(None, None, NodeKind::Transform { rest: shift, motion: orbit }),
         node(Some(0), None, NodeKind::Group),
-        node(
-            Some(1),
-            None,
-            NodeKind::Transform {
-                rest: quarter,
-                motion: Motion::Still,
-            },
-        ),
+        node(Some(1), None, NodeKind::Transform { rest: quarter, motion: Motion::Still }),
         node(Some(2), None, mesh(0, double * shift)),
     ];
     let mut scene = scene(vec![instance(&[])], nodes);
@@ -156,11 +114,7 @@ fn keyframes_follow_the_selector_by_their_strategy() {
         node(Some(0), None, mesh(1, DAffine3::IDENTITY)),
         node(Some(0), Some(2), mesh(2, DAffine3::IDENTITY)),
     ];
-    let mut all = vec![
-        instance(&[4, 5, 6, 7]),
-        instance(&[0, 1, 2, 3]),
-        instance(&[]),
-    ];
+    let mut all = vec![instance(&[4, 5, 6, 7]), instance(&[0, 1, 2, 3]), instance(&[])];
     all[1].keyframes.strategy = Strategy::Interpolate;
     let mut scene = scene(all, nodes);
     // A quarter of the way from keyframe 2 to keyframe 3.
@@ -195,11 +149,9 @@ fn topology_is_shared_where_triangles_and_vertex_counts_agree() {
         ..Mesh::default()
     };
     let mut scene = scene(vec![instance(&[0, 1])], Vec::new());
-    for (other, shared) in [
-        (of(&[[0, 1, 2]], 3), true),
-        (of(&[[0, 2, 1]], 3), false),
-        (of(&[[0, 1, 2]], 4), false),
-    ] {
+    for (other, shared) in
+        [(of(&[[0, 1, 2]], 3), true), (of(&[[0, 2, 1]], 3), false), (of(&[[0, 1, 2]], 4), false)]
+    {
         scene.meshes = vec![of(&[[0, 1, 2]], 3), other];
         assert_eq!(scene.shares_topology(&scene.instances[0]), shared);
     }
@@ -207,17 +159,11 @@ fn topology_is_shared_where_triangles_and_vertex_counts_agree() {
 
 #[test]
 fn only_what_time_squeezes_has_a_shape_at_rest() {
-    let clock = Clock {
-        period: 4.0,
-        ..Clock::default()
-    };
+    let clock = Clock { period: 4.0, ..Clock::default() };
     let sine = |scale: DVec3, angle: f64| Motion::Sine {
         clock,
         translation: DVec3::X,
-        turn: Turn {
-            angle,
-            ..Turn::default()
-        },
+        turn: Turn { angle, ..Turn::default() },
         scale,
     };
     let transform = |rest, motion| NodeKind::Transform { rest, motion };

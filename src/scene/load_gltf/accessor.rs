@@ -46,16 +46,10 @@ impl<'a> Reader<'a> {
         count: usize,
     ) -> Result<Run<'a>, Issue> {
         let stride = view.stride().unwrap_or(size);
-        let needed = count.checked_sub(1).map_or(Some(0), |n| {
-            stride
-                .checked_mul(n)?
-                .checked_add(size)?
-                .checked_add(offset)
-        });
-        let buffer = self
-            .buffers
-            .get(view.buffer().index())
-            .and_then(Option::as_ref);
+        let needed = count
+            .checked_sub(1)
+            .map_or(Some(0), |n| stride.checked_mul(n)?.checked_add(size)?.checked_add(offset));
+        let buffer = self.buffers.get(view.buffer().index()).and_then(Option::as_ref);
         let bytes = buffer.and_then(|b| {
             let end = view.offset().checked_add(view.length())?;
             b.get(view.offset()..end)
@@ -96,10 +90,7 @@ impl<'a> Reader<'a> {
 
     /// Vertex indices.
     pub fn indices(&self, accessor: &gltf::Accessor<'_>) -> Result<Vec<u32>, Issue> {
-        let integer = matches!(
-            accessor.data_type(),
-            DataType::U8 | DataType::U16 | DataType::U32
-        );
+        let integer = matches!(accessor.data_type(), DataType::U8 | DataType::U16 | DataType::U32);
         if accessor.dimensions() != Dimensions::Scalar || !integer {
             return Err(self.fault(accessor, "indices must be unsigned scalars"));
         }
@@ -127,13 +118,8 @@ impl<'a> Reader<'a> {
     ) -> Result<Vec<T>, Issue> {
         let mut out = vec![absent; accessor.count()];
         if let Some(view) = accessor.view() {
-            let run = self.run(
-                accessor,
-                &view,
-                accessor.offset(),
-                accessor.size(),
-                accessor.count(),
-            )?;
+            let run =
+                self.run(accessor, &view, accessor.offset(), accessor.size(), accessor.count())?;
             for (slot, bytes) in out.iter_mut().zip(run.elements()) {
                 *slot = decode(bytes);
             }
@@ -159,13 +145,7 @@ impl<'a> Reader<'a> {
             sparse::IndexType::U32 => 4,
         };
         let at = self.run(accessor, &places.view(), places.offset(), width, count)?;
-        let new = self.run(
-            accessor,
-            &values.view(),
-            values.offset(),
-            accessor.size(),
-            count,
-        )?;
+        let new = self.run(accessor, &values.view(), values.offset(), accessor.size(), count)?;
         for (place, bytes) in at.elements().zip(new.elements()) {
             let slot = out.get_mut(unsigned(place) as usize);
             *slot.ok_or_else(|| self.fault(accessor, "sparse indices are out of range"))? =
@@ -176,10 +156,7 @@ impl<'a> Reader<'a> {
 }
 
 fn unsigned(bytes: &[u8]) -> u32 {
-    bytes
-        .iter()
-        .rev()
-        .fold(0, |sum, &b| sum << 8 | u32::from(b))
+    bytes.iter().rev().fold(0, |sum, &b| sum << 8 | u32::from(b))
 }
 
 /// One component; normalised integers by the equations of glTF 2.0, 3.11.
@@ -193,9 +170,5 @@ fn number(kind: DataType, normalized: bool, bytes: &[u8]) -> f64 {
         DataType::I16 => (f64::from(raw as u16 as i16), 32767.0),
         DataType::U16 => (f64::from(raw), 65535.0),
     };
-    if normalized {
-        (value / most).max(-1.0)
-    } else {
-        value
-    }
+    if normalized { (value / most).max(-1.0) } else { value }
 }

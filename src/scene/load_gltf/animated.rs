@@ -128,12 +128,7 @@ impl<'a> Meshes<'a> {
         let (mm, path) = (self.mm, self.surfaces.reader.path);
         let mut morph = Morph::new(&self.surfaces.reader, node)?;
         let mut skin = match node.skin() {
-            Some(skin) => Some(Skin::new(
-                &self.surfaces.reader,
-                &skin,
-                mm,
-                &mut self.budget,
-            )?),
+            Some(skin) => Some(Skin::new(&self.surfaces.reader, &skin, mm, &mut self.budget)?),
             None => None,
         };
         let mut triangles = Vec::new();
@@ -167,10 +162,7 @@ impl<'a> Meshes<'a> {
                 let mut known = HashMap::new();
                 let mut globals = Vec::with_capacity(skin.joints.len());
                 for &joint in &skin.joints {
-                    globals.push(
-                        self.tree
-                            .global(joint, time, &mut known, &mut self.budget)?,
-                    );
+                    globals.push(self.tree.global(joint, time, &mut known, &mut self.budget)?);
                 }
                 let mirrored = skin.place(&mut shape, &globals, &mut self.budget)?;
                 // A mirroring transform turns the winding around (glTF 2.0, 3.7.4).
@@ -185,11 +177,7 @@ impl<'a> Meshes<'a> {
         self.parts.push(Part {
             name: name.to_owned(),
             node: node.skin().is_none().then(|| node.index()),
-            soup: Soup {
-                name: name.to_owned(),
-                positions: positions.remove(0),
-                triangles,
-            },
+            soup: Soup { name: name.to_owned(), positions: positions.remove(0), triangles },
             others,
             times,
             enlarged: 1.0,
@@ -238,12 +226,7 @@ impl<'a> Meshes<'a> {
         }
         let mut issues = self.surfaces.issues;
         issues.extend(file.remarks(&self.visited));
-        Ok(AnimatedParts {
-            animation: chosen.name.clone(),
-            nodes,
-            parts: self.parts,
-            issues,
-        })
+        Ok(AnimatedParts { animation: chosen.name.clone(), nodes, parts: self.parts, issues })
     }
 }
 

@@ -34,11 +34,7 @@ fn width(component: u64) -> usize {
 /// Checks alignment and extent of all accessors, and their values against `min` and `max`.
 /// `buffers` may lack those that nothing needed.
 pub(super) fn check(root: &Map<String, Value>, buffers: &[Option<Vec<u8>>]) -> Vec<Finding> {
-    let list = |name| {
-        root.get(name)
-            .and_then(Value::as_array)
-            .map_or(&[][..], Vec::as_slice)
-    };
+    let list = |name| root.get(name).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let mut out = Vec::new();
     let mut budget = MOST_VALUES;
     for (i, accessor) in list("accessors").iter().enumerate() {
@@ -96,9 +92,7 @@ impl<'a> Layout<'a> {
     fn of(accessor: &'a Value, views: &[Value]) -> Option<Self> {
         let number = |value: &Value, key: &str| {
             let value = value.get(key)?;
-            let whole = value
-                .as_u64()
-                .or_else(|| value.as_f64().map(|v| v as u64))?;
+            let whole = value.as_u64().or_else(|| value.as_f64().map(|v| v as u64))?;
             usize::try_from(whole).ok()
         };
         let view = views.get(number(accessor, "bufferView")?)?;
@@ -116,9 +110,7 @@ impl<'a> Layout<'a> {
             width,
             count: number(accessor, "count")?,
             buffer: number(view, "buffer")?,
-            offset: number(view, "byteOffset")
-                .unwrap_or(0)
-                .checked_add(in_view)?,
+            offset: number(view, "byteOffset").unwrap_or(0).checked_add(in_view)?,
             in_view,
             view_length: number(view, "byteLength")?,
             stride: number(view, "byteStride").unwrap_or(element),
@@ -134,10 +126,7 @@ impl<'a> Layout<'a> {
     fn value(&self, bytes: &[u8], element: usize, component: usize) -> Option<f64> {
         let at = self.offset + element * self.stride + component * self.width;
         let raw = bytes.get(at..at + self.width)?;
-        let word = raw
-            .iter()
-            .rev()
-            .fold(0u32, |sum, &b| sum << 8 | u32::from(b));
+        let word = raw.iter().rev().fold(0u32, |sum, &b| sum << 8 | u32::from(b));
         Some(match self.component {
             5120 => f64::from(word as u8 as i8),
             5122 => f64::from(word as u16 as i16),
@@ -171,10 +160,7 @@ fn compare(accessor: &Value, layout: &Layout<'_>, bytes: &[u8], remark: &mut imp
             .and_then(|a| a.iter().map(Value::as_f64).collect());
         let differs = |stated: &Vec<f64>| {
             // Stated bounds are decimal text of single-precision values.
-            stated
-                .iter()
-                .zip(&found)
-                .any(|(s, f)| *s as f32 != *f as f32)
+            stated.iter().zip(&found).any(|(s, f)| *s as f32 != *f as f32)
         };
         if stated.as_ref().is_some_and(differs) {
             remark(format!(

@@ -19,11 +19,7 @@ pub(super) struct Budget<'p> {
 
 impl<'p> Budget<'p> {
     pub fn new(path: &'p Path) -> Self {
-        Self {
-            path,
-            held: HELD,
-            steps: STEPS,
-        }
+        Self { path, held: HELD, steps: STEPS }
     }
 
     /// Takes room for `count` numbers, and the time to read them: they may be read for many nodes.

@@ -21,10 +21,7 @@ pub(super) fn load(
     binary: Option<&[u8]>,
     needed: &[usize],
 ) -> Buffers {
-    let mut out = Buffers {
-        bytes: Vec::new(),
-        issues: Vec::new(),
-    };
+    let mut out = Buffers { bytes: Vec::new(), issues: Vec::new() };
     let mut total = 0u64;
     for buffer in gltf.buffers() {
         total = total.saturating_add(buffer.length() as u64);
@@ -41,8 +38,7 @@ pub(super) fn load(
                 false => Issue::warning,
             };
             let name = format!("buffer {}", buffer.index());
-            out.issues
-                .push(make(path, 1, message, remedy.to_owned()).of(&name));
+            out.issues.push(make(path, 1, message, remedy.to_owned()).of(&name));
         });
         out.bytes.push(bytes.ok());
     }
@@ -74,11 +70,7 @@ fn one(
     };
     if bytes.len() < buffer.length() {
         return Err((
-            format!(
-                "is cut off: {} bytes declared, {} there",
-                buffer.length(),
-                bytes.len()
-            ),
+            format!("is cut off: {} bytes declared, {} there", buffer.length(), bytes.len()),
             "export or copy it again",
         ));
     }

@@ -51,11 +51,7 @@ impl Chosen {
                 Issue::error(path, 1, format!("has no animation `{name}`"), remedy)
             })?,
         };
-        Ok(Self {
-            number,
-            name: names.remove(number),
-            others: names,
-        })
+        Ok(Self { number, name: names.remove(number), others: names })
     }
 
     /// Message for an animation that moves nothing of what was chosen.
@@ -71,11 +67,6 @@ impl Chosen {
                 format!("choose one of {}", others.join(", "))
             }
         };
-        Issue::error(
-            path,
-            1,
-            format!("animation `{}` moves {what}", self.name),
-            remedy,
-        )
+        Issue::error(path, 1, format!("animation `{}` moves {what}", self.name), remedy)
     }
 }

@@ -17,30 +17,18 @@ pub(super) struct Container<'a> {
 
 /// Takes a file apart. Whatever could mean that bytes were lost is an error.
 pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Container<'a>, Issue> {
-    let is_glb = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("glb"));
+    let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
     if !bytes.starts_with(MAGIC) {
         if is_glb {
-            return Err(fault(
-                path,
-                "is not a GLB file: it does not begin with `glTF`",
-            ));
+            return Err(fault(path, "is not a GLB file: it does not begin with `glTF`"));
         }
-        return Ok(Container {
-            json: bytes,
-            binary: None,
-            issues: Vec::new(),
-        });
+        return Ok(Container { json: bytes, binary: None, issues: Vec::new() });
     }
     let (Some(version), Some(length)) = (word(bytes, 4), word(bytes, 8)) else {
         return Err(fault(path, "is cut off inside its header"));
     };
     if version != 2 {
-        return Err(fault(
-            path,
-            format!("is GLB version {version}; version 2 can be read"),
-        ));
+        return Err(fault(path, format!("is GLB version {version}; version 2 can be read")));
     }
     if length as usize > bytes.len() || length < 12 {
         let held = bytes.len();
@@ -49,17 +37,10 @@ pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Container<'a>, Is
             format!("its header declares {length} bytes, the file holds {held}"),
         ));
     }
-    let mut container = Container {
-        json: &[],
-        binary: None,
-        issues: Vec::new(),
-    };
+    let mut container = Container { json: &[], binary: None, issues: Vec::new() };
     let extra = bytes.len() - length as usize;
     if extra > 0 {
-        container.warn(
-            path,
-            format!("{extra} bytes after the declared length are ignored"),
-        );
+        container.warn(path, format!("{extra} bytes after the declared length are ignored"));
     }
     container.chunks(path, &bytes[..length as usize])?;
     if container.json.is_empty() {
@@ -75,23 +56,14 @@ impl<'a> Container<'a> {
         let mut seen_json = false;
         while at < bytes.len() {
             let (Some(length), Some(kind)) = (word(bytes, at), word(bytes, at + 4)) else {
-                return Err(fault(
-                    path,
-                    format!("is cut off in the header of chunk {index}"),
-                ));
+                return Err(fault(path, format!("is cut off in the header of chunk {index}")));
             };
             let end = (at + 8).saturating_add(length as usize);
             let Some(data) = bytes.get(at + 8..end) else {
-                return Err(fault(
-                    path,
-                    format!("chunk {index} reaches beyond the file"),
-                ));
+                return Err(fault(path, format!("chunk {index} reaches beyond the file")));
             };
             if length % 4 != 0 {
-                self.warn(
-                    path,
-                    format!("the length of chunk {index} is not a multiple of 4"),
-                );
+                self.warn(path, format!("the length of chunk {index} is not a multiple of 4"));
             }
             match (kind, index) {
                 (JSON, 0) => {
@@ -114,10 +86,7 @@ impl<'a> Container<'a> {
                     }
                     self.binary = Some(data);
                 }
-                _ => self.warn(
-                    path,
-                    format!("chunk {index} is of an unknown kind and ignored"),
-                ),
+                _ => self.warn(path, format!("chunk {index} is of an unknown kind and ignored")),
             }
             at = end;
             index += 1;
@@ -126,8 +95,7 @@ impl<'a> Container<'a> {
     }
 
     fn warn(&mut self, path: &Path, message: String) {
-        self.issues
-            .push(Issue::warning(path, 1, message, "export it again"));
+        self.issues.push(Issue::warning(path, 1, message, "export it again"));
     }
 }
 

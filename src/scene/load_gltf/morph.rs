@@ -28,18 +28,9 @@ impl Morph {
     /// Starts with the resting weights of a node: its own, those of its mesh, or zero.
     pub fn new(reader: &Reader<'_>, node: &gltf::Node<'_>) -> Result<Self, Issue> {
         let mesh = node.mesh();
-        let stored = node
-            .weights()
-            .or(mesh.as_ref().and_then(gltf::Mesh::weights));
-        let rest: Vec<f64> = stored
-            .unwrap_or_default()
-            .iter()
-            .map(|&w| f64::from(w))
-            .collect();
-        let counts = mesh
-            .iter()
-            .flat_map(gltf::Mesh::primitives)
-            .map(|p| p.morph_targets().len());
+        let stored = node.weights().or(mesh.as_ref().and_then(gltf::Mesh::weights));
+        let rest: Vec<f64> = stored.unwrap_or_default().iter().map(|&w| f64::from(w)).collect();
+        let counts = mesh.iter().flat_map(gltf::Mesh::primitives).map(|p| p.morph_targets().len());
         let (least, most) = counts.fold((usize::MAX, 0), |(a, b), n| (a.min(n), b.max(n)));
         let fault = |cause: String| {
             let place = format!("/nodes/{}", node.index());
@@ -57,11 +48,7 @@ impl Morph {
         if rest.iter().any(|w| !w.is_finite()) {
             return Err(fault("has weights that are not finite".to_owned()));
         }
-        Ok(Self {
-            base: Vec::new(),
-            targets: Vec::new(),
-            rest,
-        })
+        Ok(Self { base: Vec::new(), targets: Vec::new(), rest })
     }
 
     /// Appends the vertices of a primitive; `mm` is the length of their unit.
@@ -89,11 +76,7 @@ impl Morph {
             budget.hold(count.saturating_mul(3))?;
             let kind = "displacements must be of type VEC3";
             let displacements = reader.vectors(&accessor, Dimensions::Vec3, kind)?;
-            self.targets.push(Target {
-                weight,
-                first,
-                displacements: scaled(displacements, mm),
-            });
+            self.targets.push(Target { weight, first, displacements: scaled(displacements, mm) });
         }
         self.base.extend(scaled(positions, mm));
         Ok(())

@@ -78,22 +78,13 @@ pub(super) fn reduce(root: &Map<String, Value>, animation: Option<usize>) -> Red
         .map(|animation| motion(animation, &mut accessors))
         .into_iter()
         .collect();
-    let mut transform = vec![
-        "name",
-        "children",
-        "mesh",
-        "matrix",
-        "translation",
-        "rotation",
-        "scale",
-    ];
+    let mut transform =
+        vec!["name", "children", "mesh", "matrix", "translation", "rotation", "scale"];
     if animation.is_some() {
         transform.extend(["skin", "weights"]);
     }
-    let nodes: Vec<Value> = list(root, "nodes")
-        .iter()
-        .map(|node| Value::Object(pick(node, &transform)))
-        .collect();
+    let nodes: Vec<Value> =
+        list(root, "nodes").iter().map(|node| Value::Object(pick(node, &transform))).collect();
     let scenes: Vec<Value> = list(root, "scenes")
         .iter()
         .map(|scene| {
@@ -102,15 +93,8 @@ pub(super) fn reduce(root: &Map<String, Value>, animation: Option<usize>) -> Red
             Value::Object(out)
         })
         .collect();
-    let keep = [
-        "bufferView",
-        "byteOffset",
-        "componentType",
-        "normalized",
-        "count",
-        "type",
-        "sparse",
-    ];
+    let keep =
+        ["bufferView", "byteOffset", "componentType", "normalized", "count", "type", "sparse"];
     let kept: Vec<Value> = accessors
         .kept
         .iter()
@@ -141,12 +125,7 @@ pub(super) fn reduce(root: &Map<String, Value>, animation: Option<usize>) -> Red
         json["scene"] = scene.clone();
     }
     integers(&mut json);
-    Reduced {
-        json,
-        accessors: accessors.kept,
-        buffers,
-        without_data,
-    }
+    Reduced { json, accessors: accessors.kept, buffers, without_data }
 }
 
 /// Whether an accessor has bytes: without any it stands for zeros, which enclose nothing.
@@ -165,9 +144,7 @@ fn influences(
     let attributes = primitive.get("attributes").and_then(Value::as_object);
     let mut out = Map::new();
     for (name, accessor) in attributes.into_iter().flatten() {
-        let set = name
-            .strip_prefix("JOINTS_")
-            .or(name.strip_prefix("WEIGHTS_"));
+        let set = name.strip_prefix("JOINTS_").or(name.strip_prefix("WEIGHTS_"));
         if set.is_some_and(|s| s.parse::<u8>().is_ok()) && stored(root, accessor) {
             out.insert(name.clone(), json!(accessors.number(accessor)));
         }
@@ -236,35 +213,22 @@ impl Renumbering {
 }
 
 fn list<'a>(root: &'a Map<String, Value>, name: &str) -> &'a [Value] {
-    root.get(name)
-        .and_then(Value::as_array)
-        .map_or(&[], Vec::as_slice)
+    root.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 fn list_of<'a>(value: &'a Value, name: &str) -> &'a [Value] {
-    value
-        .get(name)
-        .and_then(Value::as_array)
-        .map_or(&[], Vec::as_slice)
+    value.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 fn pick(value: &Value, keys: &[&str]) -> Map<String, Value> {
     let object = value.as_object();
-    let found = object
-        .into_iter()
-        .flatten()
-        .filter(|(key, _)| keys.contains(&key.as_str()));
-    found
-        .map(|(key, value)| (key.clone(), value.clone()))
-        .collect()
+    let found = object.into_iter().flatten().filter(|(key, _)| keys.contains(&key.as_str()));
+    found.map(|(key, value)| (key.clone(), value.clone())).collect()
 }
 
 fn stripped(root: &Map<String, Value>, name: &str) -> Vec<Value> {
     let keys = ["buffer", "byteOffset", "byteLength", "byteStride", "uri"];
-    list(root, name)
-        .iter()
-        .map(|v| Value::Object(pick(v, &keys)))
-        .collect()
+    list(root, name).iter().map(|v| Value::Object(pick(v, &keys))).collect()
 }
 
 fn buffers_of(root: &Map<String, Value>, accessors: &[Value]) -> Vec<usize> {
@@ -277,11 +241,7 @@ fn buffers_of(root: &Map<String, Value>, accessors: &[Value]) -> Vec<usize> {
         .iter()
         .flat_map(|a| {
             let sparse = a.get("sparse");
-            let part = |name| {
-                sparse
-                    .and_then(|s| s.get(name))
-                    .and_then(|p| p.get("bufferView"))
-            };
+            let part = |name| sparse.and_then(|s| s.get(name)).and_then(|p| p.get("bufferView"));
             [a.get("bufferView"), part("indices"), part("values")]
         })
         .filter_map(buffer)

@@ -93,10 +93,7 @@ fn targets(node: &gltf::Node<'_>) -> Result<usize, String> {
     let primitives = mesh.iter().flat_map(gltf::Mesh::primitives);
     match primitives.map(|p| p.morph_targets().len()).max() {
         Some(targets) if targets > 0 => Ok(targets),
-        _ => Err(format!(
-            "weighs morph targets of node {}, which has none",
-            node.index()
-        )),
+        _ => Err(format!("weighs morph targets of node {}, which has none", node.index())),
     }
 }
 
@@ -134,10 +131,7 @@ impl Keys<'_> {
     fn vectors(&self, what: &str, factor: f64) -> Result<Channel<DVec3>, Issue> {
         let kind = format!("{what} must be of type VEC3");
         let values = self.reader.vectors(&self.output, Dimensions::Vec3, &kind)?;
-        let values = values
-            .into_iter()
-            .map(|v| DVec3::from_array(v) * factor)
-            .collect();
+        let values = values.into_iter().map(|v| DVec3::from_array(v) * factor).collect();
         Channel::new(self.times.clone(), values, self.curve).map_err(|e| self.bad(&e))
     }
 
@@ -152,9 +146,7 @@ impl Keys<'_> {
     /// in-tangents, then all values, then all out-tangents (glTF 2.0, appendix C.5).
     fn weights(&self, targets: usize) -> Result<Vec<Channel<f64>>, Issue> {
         let kind = "weights must be of type SCALAR";
-        let values: Vec<[f64; 1]> = self
-            .reader
-            .vectors(&self.output, Dimensions::Scalar, kind)?;
+        let values: Vec<[f64; 1]> = self.reader.vectors(&self.output, Dimensions::Scalar, kind)?;
         let each = match self.curve {
             Curve::CubicSpline => 3,
             Curve::Step | Curve::Linear => 1,

@@ -37,11 +37,7 @@ pub(super) const ROOT: &Table = &[
     ("extensionsUsed", false, List(&Text, 1, MANY, true)),
     ("extensionsRequired", false, List(&Text, 1, MANY, true)),
     ("accessors", false, List(&Object(ACCESSOR), 1, MANY, false)),
-    (
-        "animations",
-        false,
-        List(&Object(ANIMATION), 1, MANY, false),
-    ),
+    ("animations", false, List(&Object(ANIMATION), 1, MANY, false)),
     ("asset", true, Object(ASSET)),
     ("buffers", false, List(&Object(BUFFER), 1, MANY, false)),
     ("bufferViews", false, List(&Object(VIEW), 1, MANY, false)),
@@ -70,11 +66,7 @@ const ACCESSOR: &Table = &[
     ("componentType", true, IntIn(COMPONENTS)),
     ("normalized", false, Bool),
     ("count", true, SOME),
-    (
-        "type",
-        true,
-        TextIn(&["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"]),
-    ),
+    ("type", true, TextIn(&["SCALAR", "VEC2", "VEC3", "VEC4", "MAT2", "MAT3", "MAT4"])),
     ("max", false, List(&ANY, 1, 16, false)),
     ("min", false, List(&ANY, 1, 16, false)),
     ("sparse", false, Object(SPARSE)),
@@ -93,16 +85,10 @@ const SPARSE_INDICES: &Table = &[
     ("componentType", true, IntIn(&[5121, 5123, 5125])),
 ];
 
-const SPARSE_VALUES: &Table = &[
-    ("bufferView", true, Id("bufferViews")),
-    ("byteOffset", false, COUNT),
-];
+const SPARSE_VALUES: &Table =
+    &[("bufferView", true, Id("bufferViews")), ("byteOffset", false, COUNT)];
 
-const BUFFER: &Table = &[
-    ("uri", false, Uri),
-    ("byteLength", true, SOME),
-    ("name", false, Text),
-];
+const BUFFER: &Table = &[("uri", false, Uri), ("byteLength", true, SOME), ("name", false, Text)];
 
 const VIEW: &Table = &[
     ("buffer", true, Id("buffers")),
@@ -126,10 +112,7 @@ const NODE: &Table = &[
     ("name", false, Text),
 ];
 
-const SCENE: &Table = &[
-    ("nodes", false, List(&Id("nodes"), 1, MANY, true)),
-    ("name", false, Text),
-];
+const SCENE: &Table = &[("nodes", false, List(&Id("nodes"), 1, MANY, true)), ("name", false, Text)];
 
 const MESH: &Table = &[
     ("primitives", true, List(&Object(PRIMITIVE), 1, MANY, false)),
@@ -142,11 +125,7 @@ const PRIMITIVE: &Table = &[
     ("indices", false, Id("accessors")),
     ("material", false, Id("materials")),
     ("mode", false, Int(0, 6)),
-    (
-        "targets",
-        false,
-        List(&Map(&Id("accessors")), 1, MANY, false),
-    ),
+    ("targets", false, List(&Map(&Id("accessors")), 1, MANY, false)),
 ];
 
 const SKIN: &Table = &[
@@ -158,11 +137,7 @@ const SKIN: &Table = &[
 
 const ANIMATION: &Table = &[
     ("channels", true, List(&Object(CHANNEL), 1, MANY, false)),
-    (
-        "samplers",
-        true,
-        List(&Object(ANIMATION_SAMPLER), 1, MANY, false),
-    ),
+    ("samplers", true, List(&Object(ANIMATION_SAMPLER), 1, MANY, false)),
     ("name", false, Text),
 ];
 
@@ -172,11 +147,7 @@ const TARGET: &Table = &[("node", false, Id("nodes")), ("path", true, Text)];
 
 const ANIMATION_SAMPLER: &Table = &[
     ("input", true, Id("accessors")),
-    (
-        "interpolation",
-        false,
-        TextIn(&["LINEAR", "STEP", "CUBICSPLINE"]),
-    ),
+    ("interpolation", false, TextIn(&["LINEAR", "STEP", "CUBICSPLINE"])),
     ("output", true, Id("accessors")),
 ];
 
@@ -208,21 +179,14 @@ const IMAGE: &Table = &[
     ("name", false, Text),
 ];
 
-const TEXTURE: &Table = &[
-    ("sampler", false, Id("samplers")),
-    ("source", false, Id("images")),
-    ("name", false, Text),
-];
+const TEXTURE: &Table =
+    &[("sampler", false, Id("samplers")), ("source", false, Id("images")), ("name", false, Text)];
 
 const WRAPS: &[i64] = &[33071, 33648, 10497];
 
 const SAMPLER: &Table = &[
     ("magFilter", false, IntIn(&[9728, 9729])),
-    (
-        "minFilter",
-        false,
-        IntIn(&[9728, 9729, 9984, 9985, 9986, 9987]),
-    ),
+    ("minFilter", false, IntIn(&[9728, 9729, 9984, 9985, 9986, 9987])),
     ("wrapS", false, IntIn(WRAPS)),
     ("wrapT", false, IntIn(WRAPS)),
     ("name", false, Text),
@@ -250,14 +214,8 @@ const PBR: &Table = &[
 
 const TEXTURE_INFO: &Table = &[("index", true, Id("textures")), ("texCoord", false, COUNT)];
 
-const NORMAL_TEXTURE: &Table = &[
-    ("index", true, Id("textures")),
-    ("texCoord", false, COUNT),
-    ("scale", false, ANY),
-];
+const NORMAL_TEXTURE: &Table =
+    &[("index", true, Id("textures")), ("texCoord", false, COUNT), ("scale", false, ANY)];
 
-const OCCLUSION_TEXTURE: &Table = &[
-    ("index", true, Id("textures")),
-    ("texCoord", false, COUNT),
-    ("strength", false, UNIT),
-];
+const OCCLUSION_TEXTURE: &Table =
+    &[("index", true, Id("textures")), ("texCoord", false, COUNT), ("strength", false, UNIT)];

@@ -59,12 +59,7 @@ impl Skin {
                     .collect::<Result<_, _>>()?
             }
         };
-        Ok(Self {
-            joints,
-            inverse_bind,
-            ends: Vec::new(),
-            influences: Vec::new(),
-        })
+        Ok(Self { joints, inverse_bind, ends: Vec::new(), influences: Vec::new() })
     }
 
     /// Appends the vertices of a primitive.
@@ -85,10 +80,8 @@ impl Skin {
         };
         let mut sets = Vec::new();
         for set in 0.. {
-            let pair = (
-                primitive.get(&Semantic::Joints(set)),
-                primitive.get(&Semantic::Weights(set)),
-            );
+            let pair =
+                (primitive.get(&Semantic::Joints(set)), primitive.get(&Semantic::Weights(set)));
             let (joints, weights) = match pair {
                 (Some(joints), Some(weights)) => (joints, weights),
                 (None, None) => break,
@@ -108,10 +101,7 @@ impl Skin {
             sets.push((reader.joints(&joints)?, weights));
         }
         if sets.is_empty() {
-            return Err(fault(
-                1,
-                "has a skin, but no JOINTS_0 and WEIGHTS_0".to_owned(),
-            ));
+            return Err(fault(1, "has a skin, but no JOINTS_0 and WEIGHTS_0".to_owned()));
         }
         let (mut missing, mut unbound) = (0, 0);
         for vertex in 0..vertices {
@@ -119,8 +109,7 @@ impl Skin {
                 .iter()
                 .flat_map(|(joints, weights)| joints[vertex].into_iter().zip(weights[vertex]));
             let begin = self.influences.len();
-            self.influences
-                .extend(all.filter(|&(_, weight)| weight != 0.0));
+            self.influences.extend(all.filter(|&(_, weight)| weight != 0.0));
             let own = &mut self.influences[begin..];
             missing += usize::from(own.iter().any(|&(j, _)| j as usize >= self.joints.len()));
             let sum: f64 = own.iter().map(|&(_, weight)| weight).sum();

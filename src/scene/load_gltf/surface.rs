@@ -23,11 +23,7 @@ pub(super) struct Surfaces<'a> {
 impl<'a> Surfaces<'a> {
     pub fn new(file: &'a File<'_>) -> Self {
         Self {
-            reader: Reader {
-                path: file.path,
-                buffers: &file.buffers,
-                accessors: &file.accessors,
-            },
+            reader: Reader { path: file.path, buffers: &file.buffers, accessors: &file.accessors },
             issues: Vec::new(),
             elements: 0,
         }
@@ -35,8 +31,7 @@ impl<'a> Surfaces<'a> {
 
     pub fn warn(&mut self, count: usize, message: &str) {
         let message = format!("{message} ({count})");
-        self.issues
-            .push(Issue::warning(self.reader.path, count, message, ""));
+        self.issues.push(Issue::warning(self.reader.path, count, message, ""));
     }
 
     /// Nothing for points and lines.
@@ -46,10 +41,7 @@ impl<'a> Surfaces<'a> {
         primitive: &gltf::Primitive<'_>,
     ) -> Result<Option<Surface>, Issue> {
         let mode = primitive.mode();
-        if matches!(
-            mode,
-            Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip
-        ) {
+        if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
             self.warn(1, "points or lines are ignored");
             return Ok(None);
         }
@@ -76,10 +68,7 @@ impl<'a> Surfaces<'a> {
         if left_over > 0 {
             self.warn(left_over, "indices that complete no triangle are ignored");
         }
-        Ok(Some(Surface {
-            positions,
-            triangles,
-        }))
+        Ok(Some(Surface { positions, triangles }))
     }
 
     fn in_range(&self, name: &str, corners: &[u32], vertices: usize) -> Result<(), Issue> {
@@ -102,25 +91,14 @@ pub(super) fn assemble(mode: Mode, corners: &[u32]) -> (Vec<[u32; 3]>, usize) {
     match mode {
         Mode::TriangleStrip => {
             let strip = corners.windows(3).enumerate();
-            let turned = strip.map(|(i, w)| {
-                if i % 2 == 0 {
-                    [w[0], w[1], w[2]]
-                } else {
-                    [w[0], w[2], w[1]]
-                }
-            });
-            (
-                turned.collect(),
-                if corners.len() < 3 { corners.len() } else { 0 },
-            )
+            let turned = strip
+                .map(|(i, w)| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] });
+            (turned.collect(), if corners.len() < 3 { corners.len() } else { 0 })
         }
         Mode::TriangleFan => {
             let rim = corners.get(1..).unwrap_or_default().windows(2);
             let fan = rim.map(|w| [w[0], w[1], corners[0]]);
-            (
-                fan.collect(),
-                if corners.len() < 3 { corners.len() } else { 0 },
-            )
+            (fan.collect(), if corners.len() < 3 { corners.len() } else { 0 })
         }
         _ => {
             let (whole, rest) = corners.as_chunks();

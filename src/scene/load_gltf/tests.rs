@@ -31,17 +31,11 @@ fn triangle(parts: &Parts) -> [[f32; 3]; 3] {
 fn node_transforms_are_applied_and_mirroring_turns_the_winding() {
     let moved = r#"{"mesh":0,"translation":[1,2,3],"scale":[2,2,2]}"#;
     let parts = load(&file(moved, 4, TRIANGLE)).expect("readable");
-    assert_eq!(
-        triangle(&parts),
-        [[1.0, 2.0, 3.0], [3.0, 2.0, 3.0], [1.0, 4.0, 3.0]]
-    );
+    assert_eq!(triangle(&parts), [[1.0, 2.0, 3.0], [3.0, 2.0, 3.0], [1.0, 4.0, 3.0]]);
 
     let mirrored = load(&file(r#"{"mesh":0,"scale":[-1,1,1]}"#, 4, TRIANGLE)).expect("readable");
     // Seen from +z it still turns counter-clockwise.
-    assert_eq!(
-        triangle(&mirrored),
-        [[0.0; 3], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]
-    );
+    assert_eq!(triangle(&mirrored), [[0.0; 3], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]]);
 }
 
 #[test]
@@ -50,10 +44,7 @@ fn metres_are_read_unless_a_unit_is_stated() {
     let path = folder.path().join("x.gltf");
     std::fs::write(&path, file(r#"{"mesh":0}"#, 4, TRIANGLE)).expect("written");
     let size = |units| {
-        let options = mesh::Options {
-            units,
-            ..Default::default()
-        };
+        let options = mesh::Options { units, ..Default::default() };
         mesh::inspect(&path, &options).facts.size()
     };
     assert_eq!(size(None), 1000.0);
@@ -75,11 +66,7 @@ fn planted_faults_are_errors() {
     let sound = file(r#"{"mesh":0}"#, 4, TRIANGLE);
     assert!(load(&sound).is_ok());
     for (from, to, cause) in [
-        (
-            "\"byteLength\":36,\"uri\"",
-            "\"byteLength\":360,\"uri\"",
-            "cut off",
-        ),
+        ("\"byteLength\":36,\"uri\"", "\"byteLength\":360,\"uri\"", "cut off"),
         ("\"count\":3", "\"count\":4", "beyond"),
         ("\"count\":3", "\"count\":4000000000", "too many"),
         ("data:", "http://somewhere/", "not beside"),
@@ -118,41 +105,13 @@ fn a_sound_file_has_no_findings() {
 #[test]
 fn planted_breaches_of_the_specification_are_named_where_they_are() {
     for (from, to, finding) in [
-        (
-            "\"asset\"",
-            "\"assett\":1,\"asset\"",
-            "warning: x.gltf: /assett: is not a property",
-        ),
-        (
-            "{\"version\":\"2.0\"}",
-            "{\"version\":\"3.0\"}",
-            "error: x.gltf: /asset/version: is 3.0",
-        ),
-        (
-            "\"nodes\":[0]",
-            "\"nodes\":[1]",
-            "error: x.gltf: /scenes/0/nodes/0: names nodes[1]",
-        ),
-        (
-            "{\"mesh\":0}",
-            "{\"mesh\":\"0\"}",
-            "error: x.gltf: /nodes/0/mesh: is not an index",
-        ),
-        (
-            "5126",
-            "5127",
-            "error: x.gltf: /accessors/0/componentType: is 5127",
-        ),
-        (
-            "\"max\":[1,1,0]",
-            "\"max\":[1,2,0]",
-            "warning: x.gltf: /accessors/0: its max is stated",
-        ),
-        (
-            "\"max\":[1,1,0]",
-            "\"max\":[1,1]",
-            "error: x.gltf: /accessors/0/max: should have 3",
-        ),
+        ("\"asset\"", "\"assett\":1,\"asset\"", "warning: x.gltf: /assett: is not a property"),
+        ("{\"version\":\"2.0\"}", "{\"version\":\"3.0\"}", "error: x.gltf: /asset/version: is 3.0"),
+        ("\"nodes\":[0]", "\"nodes\":[1]", "error: x.gltf: /scenes/0/nodes/0: names nodes[1]"),
+        ("{\"mesh\":0}", "{\"mesh\":\"0\"}", "error: x.gltf: /nodes/0/mesh: is not an index"),
+        ("5126", "5127", "error: x.gltf: /accessors/0/componentType: is 5127"),
+        ("\"max\":[1,1,0]", "\"max\":[1,2,0]", "warning: x.gltf: /accessors/0: its max is stated"),
+        ("\"max\":[1,1,0]", "\"max\":[1,1]", "error: x.gltf: /accessors/0/max: should have 3"),
         (
             "\"byteLength\":36}",
             "\"byteLength\":37}",
@@ -196,9 +155,7 @@ fn broken_containers_are_errors() {
     };
     let load = |bytes: &[u8]| {
         let result = read(Path::new("x.glb"), bytes, None);
-        result
-            .map(|_| ())
-            .map_err(|issues| issues[0].message.clone())
+        result.map(|_| ()).map_err(|issues| issues[0].message.clone())
     };
     assert_eq!(load(&glb(2, 0, 0, b"JSON")), Ok(()));
     for (bytes, cause) in [

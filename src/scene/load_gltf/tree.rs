@@ -35,12 +35,7 @@ impl Tree {
             placements.push(placement(node.transform(), motion, mm));
             names.push(node.name().unwrap_or_default().to_owned());
         }
-        Self {
-            parents,
-            placements,
-            names,
-            motions,
-        }
+        Self { parents, placements, names, motions }
     }
 
     /// A node and those above it, upwards.
@@ -65,10 +60,7 @@ impl Tree {
         known: &mut HashMap<usize, DAffine3>,
         budget: &mut Budget<'_>,
     ) -> Result<DAffine3, Issue> {
-        let above: Vec<usize> = self
-            .chain(node)
-            .take_while(|n| !known.contains_key(n))
-            .collect();
+        let above: Vec<usize> = self.chain(node).take_while(|n| !known.contains_key(n)).collect();
         budget.work(1 + above.len())?;
         for &n in above.iter().rev() {
             let parent = self.parents[n].map_or(DAffine3::IDENTITY, |p| known[&p]);
@@ -87,10 +79,7 @@ impl Tree {
         let mut out: Vec<AnimatedNode> = Vec::new();
         let mut place = HashMap::new();
         for node in nodes {
-            let new: Vec<usize> = self
-                .chain(node)
-                .take_while(|n| !place.contains_key(n))
-                .collect();
+            let new: Vec<usize> = self.chain(node).take_while(|n| !place.contains_key(n)).collect();
             for &n in new.iter().rev() {
                 self.placements[n].invertible().map_err(|cause| {
                     let remedy = "leave it a small scale, or hide it in the modeller";
@@ -117,11 +106,7 @@ fn placement(transform: Transform, motion: Option<&mut Motion>, mm: f64) -> Plac
             affine.translation *= mm;
             Placement::Fixed(affine)
         }
-        Transform::Decomposed {
-            translation,
-            rotation,
-            scale,
-        } => {
+        Transform::Decomposed { translation, rotation, scale } => {
             let rest = Trs {
                 translation: DVec3::from(translation.map(f64::from)) * mm,
                 rotation: DQuat::from_array(rotation.map(f64::from)).normalize(),

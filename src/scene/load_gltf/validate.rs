@@ -13,15 +13,8 @@ use crate::scene::suggest;
 mod rules;
 
 /// Top-level lists that the geometry depends on.
-const GEOMETRY: [&str; 7] = [
-    "asset",
-    "accessors",
-    "bufferViews",
-    "buffers",
-    "meshes",
-    "nodes",
-    "scenes",
-];
+const GEOMETRY: [&str; 7] =
+    ["asset", "accessors", "bufferViews", "buffers", "meshes", "nodes", "scenes"];
 
 /// Top-level lists that motion depends on besides.
 const MOTION: [&str; 2] = ["animations", "skins"];
@@ -51,11 +44,7 @@ pub(super) struct Findings<'a> {
 /// Checks types, ranges and references of every property, then the rules between them. `animated`:
 /// whether animations and skins are read, so that faults there stop the loading, too.
 pub(super) fn validate(root: &Map<String, Value>, animated: bool) -> Vec<Finding> {
-    let mut findings = Findings {
-        root,
-        animated,
-        list: Vec::new(),
-    };
+    let mut findings = Findings { root, animated, list: Vec::new() };
     findings.object(root, ROOT, "");
     rules::check(&mut findings);
     findings.list
@@ -77,12 +66,7 @@ pub(super) fn issues(path: &Path, mut findings: Vec<Finding>) -> Vec<Issue> {
         .collect();
     let more = findings.len().saturating_sub(SHOWN);
     if more > 0 {
-        out.push(Issue::warning(
-            path,
-            more,
-            format!("{more} further faults against glTF 2.0"),
-            "",
-        ));
+        out.push(Issue::warning(path, more, format!("{more} further faults against glTF 2.0"), ""));
     }
     out
 }
@@ -188,17 +172,11 @@ impl<'a> Findings<'a> {
                 _ => self.fault(at, format!("is {value}, not one of {allowed:?}")),
             },
             Kind::Id(list) => {
-                let held = self
-                    .root
-                    .get(*list)
-                    .and_then(Value::as_array)
-                    .map_or(0, Vec::len);
+                let held = self.root.get(*list).and_then(Value::as_array).map_or(0, Vec::len);
                 match integer(value) {
                     Some(i) if (0..held as i64).contains(&i) => {}
-                    Some(i) => self.fault(
-                        at,
-                        format!("names {list}[{i}], which does not exist ({held} do)"),
-                    ),
+                    Some(i) => self
+                        .fault(at, format!("names {list}[{i}], which does not exist ({held} do)")),
                     None => self.fault(at, "is not an index"),
                 }
             }
@@ -270,18 +248,13 @@ fn is_uri(uri: &str) -> bool {
     let scheme = uri.split_once(':').map(|(scheme, _)| scheme);
     let sound_scheme = scheme.is_none_or(|s| {
         s.starts_with(|c: char| c.is_ascii_alphabetic())
-            && s.chars()
-                .all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+            && s.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
     });
     let bytes = uri.as_bytes();
-    let escapes = bytes
-        .iter()
-        .enumerate()
-        .filter(|(_, b)| **b == b'%')
-        .all(|(i, _)| {
-            let two = bytes.get(i + 1..i + 3);
-            two.is_some_and(|hex| hex.iter().all(u8::is_ascii_hexdigit))
-        });
+    let escapes = bytes.iter().enumerate().filter(|(_, b)| **b == b'%').all(|(i, _)| {
+        let two = bytes.get(i + 1..i + 3);
+        two.is_some_and(|hex| hex.iter().all(u8::is_ascii_hexdigit))
+    });
     let legal = |c: char| !c.is_control() && !"\"<>\\^`{|}".contains(c);
     sound_scheme && escapes && uri.chars().all(legal) && !uri.starts_with("//:")
 }

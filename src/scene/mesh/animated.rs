@@ -141,12 +141,8 @@ pub fn load_animated(
     let most = options.keyframes.unwrap_or(KEYFRAMES);
     let bytes = read_bounded(path)?;
     let node = options.node.as_deref();
-    let AnimatedParts {
-        animation,
-        nodes,
-        parts,
-        mut issues,
-    } = load_gltf::read_animated(path, &bytes, node, animation, units.0, most)?;
+    let AnimatedParts { animation, nodes, parts, mut issues } =
+        load_gltf::read_animated(path, &bytes, node, animation, units.0, most)?;
     drop(bytes);
     if parts.is_empty() {
         let remedy = "export a triangle mesh with faces";
@@ -154,26 +150,14 @@ pub fn load_animated(
     }
     let mut meshes = Vec::new();
     for part in parts {
-        let Part {
-            name,
-            node,
-            soup,
-            others,
-            times,
-            enlarged,
-        } = part;
+        let Part { name, node, soup, others, times, enlarged } = part;
         let place = |k: usize| match times.get(k) {
             Some(time) if k > 0 => (path, format!("{name} at {time:.3} s")),
             _ => (path, name.clone()),
         };
         let (shapes, more) = shapes(&soup, others, place, units, enlarged, options.cap_openings);
         issues.extend(gathered(more));
-        meshes.push(AnimatedMesh {
-            name,
-            node,
-            shapes,
-            times,
-        });
+        meshes.push(AnimatedMesh { name, node, shapes, times });
     }
     if issues.iter().any(Issue::is_error) {
         return Err(issues);
@@ -182,18 +166,9 @@ pub fn load_animated(
         Placement::Moving { track, .. } => track.span(),
         Placement::Fixed(_) => None,
     });
-    let shaped = meshes
-        .iter()
-        .filter_map(|m| Some((*m.times.first()?, *m.times.last()?)));
-    let span = placed
-        .chain(shaped)
-        .reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
-    let found = Animated {
-        animation,
-        span: span.unwrap_or_default(),
-        nodes,
-        meshes,
-    };
+    let shaped = meshes.iter().filter_map(|m| Some((*m.times.first()?, *m.times.last()?)));
+    let span = placed.chain(shaped).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let found = Animated { animation, span: span.unwrap_or_default(), nodes, meshes };
     Ok((found, issues))
 }
 

@@ -39,11 +39,7 @@ impl Recipe {
             issues.extend(more);
         }
         let split = normals::split(&soup, CREASE);
-        let recipe = Self {
-            welded,
-            rings,
-            split,
-        };
+        let recipe = Self { welded, rings, split };
         (recipe, soup, issues)
     }
 

@@ -45,24 +45,11 @@ const ANECHOIC: Speckle = (f64::NEG_INFINITY, 1.0, 0.0, 4.0);
 const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
     (
         "water",
-        [
-            (1.524, "at 37 C, unverified"),
-            (0.993, "at 37 C, unverified"),
-            (0.0022, I4H),
-        ],
+        [(1.524, "at 37 C, unverified"), (0.993, "at 37 C, unverified"), (0.0022, I4H)],
         ANECHOIC,
         FLUID,
     ),
-    (
-        "gel",
-        [
-            (1.524, "as water, unverified"),
-            (0.998, UNVERIFIED),
-            (0.0022, I4H),
-        ],
-        ANECHOIC,
-        FLUID,
-    ),
+    ("gel", [(1.524, "as water, unverified"), (0.998, UNVERIFIED), (0.0022, I4H)], ANECHOIC, FLUID),
     (
         "amniotic_fluid",
         [(1.525, ZANA), (1.008, ZANA), (0.0075, ZANA)],
@@ -93,26 +80,12 @@ const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
     ),
     (
         "blood",
-        [
-            (1.575, ITIS_UNVERIFIED),
-            (1.050, ITIS_UNVERIFIED),
-            (0.16, A),
-        ],
+        [(1.575, ITIS_UNVERIFIED), (1.050, ITIS_UNVERIFIED), (0.16, A)],
         (-32.0, 1.0, 0.0, 4.0),
         FLUID,
     ),
-    (
-        "fat",
-        [(1.450, I4H), (0.920, B), (0.63, BURGER)],
-        (0.0, 0.5, 0.35, 5.0),
-        SOFT,
-    ),
-    (
-        "skin",
-        [(1.655, B), (1.131, B), (0.35, A)],
-        (6.0, 1.0, 0.1, 3.0),
-        SOFT,
-    ),
+    ("fat", [(1.450, I4H), (0.920, B), (0.63, BURGER)], (0.0, 0.5, 0.35, 5.0), SOFT),
+    ("skin", [(1.655, B), (1.131, B), (0.35, A)], (6.0, 1.0, 0.1, 3.0), SOFT),
     (
         "muscle",
         [(1.588, ITIS), (1.090, ITIS_UNVERIFIED), (1.09, BURGER)],
@@ -135,12 +108,7 @@ const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
         (-4.0, 1.0, 0.2, 4.0),
         SOFT,
     ),
-    (
-        "spleen",
-        [(1.567, UNVERIFIED), (1.054, UNVERIFIED), (0.40, A)],
-        (1.0, 1.0, 0.1, 4.0),
-        SOFT,
-    ),
+    ("spleen", [(1.567, UNVERIFIED), (1.054, UNVERIFIED), (0.40, A)], (1.0, 1.0, 0.1, 4.0), SOFT),
     (
         "myocardium",
         [
@@ -181,39 +149,22 @@ const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
         (-1.0, 1.0, 0.2, 4.0),
         SOFT,
     ),
-    (
-        "fetal_bone",
-        [(2.400, CHOICE), (1.450, CHOICE), (7.0, CHOICE)],
-        (3.0, 0.5, 0.0, 4.0),
-        BONE,
-    ),
+    ("fetal_bone", [(2.400, CHOICE), (1.450, CHOICE), (7.0, CHOICE)], (3.0, 0.5, 0.0, 4.0), BONE),
     (
         "cortical_bone",
-        [
-            (3.515, ITIS_UNVERIFIED),
-            (1.908, ITIS_UNVERIFIED),
-            (5.0, BURGER),
-        ],
+        [(3.515, ITIS_UNVERIFIED), (1.908, ITIS_UNVERIFIED), (5.0, BURGER)],
         (3.0, 0.5, 0.0, 4.0),
         BONE,
     ),
     (
         "lung",
-        [
-            (0.949, ITIS_UNVERIFIED),
-            (0.394, ITIS_UNVERIFIED),
-            (40.0, A),
-        ],
+        [(0.949, ITIS_UNVERIFIED), (0.394, ITIS_UNVERIFIED), (40.0, A)],
         (6.0, 0.5, 0.3, 4.0),
         (100.0, 0.3, 2.0),
     ),
     (
         "air",
-        [
-            (0.343, "textbook, 20 C"),
-            (0.0012, "textbook, 20 C"),
-            (7.5, A),
-        ],
+        [(0.343, "textbook, 20 C"), (0.0012, "textbook, 20 C"), (7.5, A)],
         ANECHOIC,
         (100.0, 0.1, 2.0),
     ),
@@ -223,12 +174,7 @@ const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
         (0.0, 1.0, 0.0, 4.0),
         FLUID,
     ),
-    (
-        "tumour",
-        [(1.565, CHOICE), (1.070, CHOICE), (0.6, CHOICE)],
-        (-6.0, 1.0, 0.2, 5.0),
-        SOFT,
-    ),
+    ("tumour", [(1.565, CHOICE), (1.070, CHOICE), (0.6, CHOICE)], (-6.0, 1.0, 0.2, 5.0), SOFT),
 ];
 
 /// Every shipped tissue.
@@ -254,12 +200,7 @@ fn tissue(row: &(&str, Bulk, Speckle, Skin)) -> Tissue {
         mean_over_sigma: 0.0,
         texture_depth,
         texture_length,
-        surface: Surface {
-            roughness: skin.0,
-            thickness: skin.1,
-            specularity: skin.2,
-            gain: 0.0,
-        },
+        surface: Surface { roughness: skin.0, thickness: skin.1, specularity: skin.2, gain: 0.0 },
         source: format!(
             "speed: {}\ndensity: {}\nattenuation: {}\nechogenicity, texture, surface: tuned by eye",
             speed.1, density.1, attenuation.1
@@ -289,11 +230,7 @@ mod tests {
     fn every_tissue_is_physical_named_once_and_sourced() {
         let all = shipped();
         for (i, t) in all.iter().enumerate() {
-            assert!(
-                all[..i].iter().all(|other| other.name != t.name),
-                "{}",
-                t.name
-            );
+            assert!(all[..i].iter().all(|other| other.name != t.name), "{}", t.name);
             assert!(t.speed > 0.3 && t.speed < 4.5, "{}", t.name);
             assert!(t.density > 0.001 && t.density < 2.1, "{}", t.name);
             assert!((0.0..=40.0).contains(&t.attenuation), "{}", t.name);

@@ -12,12 +12,7 @@ use crate::scene::mesh::Soup;
 /// turns a closed mesh whose volume is negative.
 pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
     let mut issues = Vec::new();
-    let Agreement {
-        turned,
-        contradictions,
-        bodies,
-        inward,
-    } = agree(soup);
+    let Agreement { turned, contradictions, bodies, inward } = agree(soup);
     if turned > 0 {
         issues.push(Issue::warning(
             path,

@@ -32,10 +32,9 @@ pub fn levels(trees: &[(&MeshBvh, u32)]) -> Levels {
     }
     let mut levels = Levels::default();
     for nodes in by_level.into_iter().rev() {
-        levels.ranges.push(RefitLevel {
-            first: levels.order.len() as u32,
-            count: nodes.len() as u32,
-        });
+        levels
+            .ranges
+            .push(RefitLevel { first: levels.order.len() as u32, count: nodes.len() as u32 });
         levels.order.extend(nodes);
     }
     levels
@@ -99,9 +98,7 @@ impl MeshBvh {
             sum += f64::from(all.half_area());
             boxes[i] = all;
         }
-        sum / boxes
-            .first()
-            .map_or(0.0, |root| f64::from(root.half_area()))
+        sum / boxes.first().map_or(0.0, |root| f64::from(root.half_area()))
     }
 }
 
@@ -116,11 +113,7 @@ mod tests {
     fn pulsed(mesh: &Mesh) -> Vec<[f32; 3]> {
         let moved = |p: &[f32; 3]| {
             let swell = 1.0 + 0.2 * (0.3 * p[0] + 0.2 * p[1]).sin();
-            [
-                p[0] * swell + 0.2 * p[2],
-                p[1] * swell,
-                p[2] * (1.6 - 0.5 * swell),
-            ]
+            [p[0] * swell + 0.2 * p[2], p[1] * swell, p[2] * (1.6 - 0.5 * swell)]
         };
         mesh.positions.iter().map(moved).collect()
     }
@@ -136,11 +129,7 @@ mod tests {
 
     #[test]
     fn levels_hold_every_node_once_and_children_before_parents() {
-        let meshes = [
-            shapes::sphere(10.0, 4),
-            Mesh::default(),
-            shapes::cylinder(3.0, 20.0, 16),
-        ];
+        let meshes = [shapes::sphere(10.0, 4), Mesh::default(), shapes::cylinder(3.0, 20.0, 16)];
         let trees = meshes.each_ref().map(MeshBvh::build);
         let (scene, roots) = SceneBvh::of(&trees, &[0, 0, 0], 3);
         let levels = levels(&trees.iter().zip(roots).collect::<Vec<_>>());
@@ -193,9 +182,9 @@ mod tests {
         match of {
             Child::Empty => Vec::new(),
             Child::Triangles(first, count) => (first..first + count).collect(),
-            Child::Inner(node) => (0..8)
-                .flat_map(|c| below(nodes, child(&nodes[node as usize], c)))
-                .collect(),
+            Child::Inner(node) => {
+                (0..8).flat_map(|c| below(nodes, child(&nodes[node as usize], c))).collect()
+            }
         }
     }
 
@@ -208,10 +197,7 @@ mod tests {
         let triangles: Vec<_> = order.map(|&t| mesh.triangles[t as usize]).collect();
         let levels = levels(&[(&tree, roots[0])]);
         for vertices in [mesh.positions.clone(), pulsed(&mesh), shuffled(&mesh)] {
-            let geometry = Geometry {
-                vertices: &vertices,
-                triangles: &triangles,
-            };
+            let geometry = Geometry { vertices: &vertices, triangles: &triangles };
             let mut nodes = scene.nodes.clone();
             let mut boxes = vec![[[0.0; 3]; 2]; nodes.len()];
             for &range in &levels.ranges {
@@ -224,10 +210,7 @@ mod tests {
             root[10] -= 1;
             assert!(outside(&nodes, roots[0], geometry) > 0);
         }
-        let still = Geometry {
-            vertices: &pulsed(&mesh),
-            triangles: &triangles,
-        };
+        let still = Geometry { vertices: &pulsed(&mesh), triangles: &triangles };
         let stale = outside(&scene.nodes, roots[0], still);
         assert!(stale > 1000, "without a refit {stale} are outside");
     }

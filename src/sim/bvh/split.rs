@@ -59,11 +59,8 @@ pub(super) fn tree(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Bvh2 {
         triangle: t as u32,
     };
     let parts: Vec<Part> = triangles.iter().enumerate().map(whole).collect();
-    let builder = Builder {
-        positions,
-        triangles,
-        least_overlap: LEAST_OVERLAP * around(&parts).half_area(),
-    };
+    let builder =
+        Builder { positions, triangles, least_overlap: LEAST_OVERLAP * around(&parts).half_area() };
     let spare = (MOST_MORE * parts.len() as f64) as usize;
     flat(builder.build(parts, spare, 0))
 }
@@ -205,33 +202,20 @@ impl Builder<'_> {
         for &part in parts {
             let [in_left, in_right] = self.clip(&part, axis, plane);
             if !in_right.valid() {
-                let bounds = if in_left.valid() {
-                    in_left
-                } else {
-                    part.bounds
-                };
+                let bounds = if in_left.valid() { in_left } else { part.bounds };
                 left.push(Part { bounds, ..part });
                 continue;
             }
             if !in_left.valid() {
-                right.push(Part {
-                    bounds: in_right,
-                    ..part
-                });
+                right.push(Part { bounds: in_right, ..part });
                 continue;
             }
             let cut = low.cost() + high.cost();
             let all_left = low.grown(&part.bounds).cost() + high.without_one().cost();
             let all_right = low.without_one().cost() + high.grown(&part.bounds).cost();
             if cut <= all_left && cut <= all_right {
-                left.push(Part {
-                    bounds: in_left,
-                    ..part
-                });
-                right.push(Part {
-                    bounds: in_right,
-                    ..part
-                });
+                left.push(Part { bounds: in_left, ..part });
+                right.push(Part { bounds: in_right, ..part });
             } else if all_left <= all_right {
                 (low, high) = (low.grown(&part.bounds), high.without_one());
                 left.push(part);
@@ -272,20 +256,14 @@ impl Builder<'_> {
         sides[1].min[axis] = plane;
         sides.map(|side| {
             let inside = side.intersection(bounds);
-            if inside.valid() {
-                inside
-            } else {
-                Aabb::INVALID
-            }
+            if inside.valid() { inside } else { Aabb::INVALID }
         })
     }
 }
 
 fn centres(parts: &[Part]) -> Aabb {
     let centres = parts.iter().map(|part| part.bounds.center());
-    centres.fold(Aabb::INVALID, |all, centre| {
-        all.union(&Aabb::from_point(centre))
-    })
+    centres.fold(Aabb::INVALID, |all, centre| all.union(&Aabb::from_point(centre)))
 }
 
 /// The best way to divide parts by the middles of their boxes; none where all lie at one place.

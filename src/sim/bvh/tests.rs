@@ -5,26 +5,17 @@ use super::*;
 /// A wavy square of `2 n^2` triangles, 10 mm wide, with slivers and flat parts.
 fn sheet(n: u32) -> Mesh {
     let at = |i: u32, j: u32| {
-        let (x, y) = (
-            10.0 * i as f32 / n as f32,
-            10.0 * (j as f32 / n as f32).powi(3),
-        );
+        let (x, y) = (10.0 * i as f32 / n as f32, 10.0 * (j as f32 / n as f32).powi(3));
         [x, y, (x * 1.3).sin().max(0.0) * y]
     };
     let vertex = |i: u32, j: u32| i * (n + 1) + j;
     Mesh {
-        positions: (0..=n)
-            .flat_map(|i| (0..=n).map(move |j| at(i, j)))
-            .collect(),
+        positions: (0..=n).flat_map(|i| (0..=n).map(move |j| at(i, j))).collect(),
         triangles: (0..n)
             .flat_map(|i| (0..n).map(move |j| (i, j)))
             .flat_map(|(i, j)| {
-                let [a, b, c, d] = [
-                    vertex(i, j),
-                    vertex(i + 1, j),
-                    vertex(i + 1, j + 1),
-                    vertex(i, j + 1),
-                ];
+                let [a, b, c, d] =
+                    [vertex(i, j), vertex(i + 1, j), vertex(i + 1, j + 1), vertex(i, j + 1)];
                 [[a, b, c], [a, c, d]]
             })
             .collect(),
@@ -82,10 +73,7 @@ fn trees_of_two_meshes_share_one_buffer() {
     let mut scene = SceneBvh::new(4);
     let roots = [0, 1, 2].map(|m| scene.add(&trees[m], [0, 50, 50][m]));
     assert_eq!(roots[1], NONE, "an empty mesh has no root");
-    let order: Vec<u32> = [0, 2]
-        .iter()
-        .flat_map(|&m| trees[m].triangle_order.clone())
-        .collect();
+    let order: Vec<u32> = [0, 2].iter().flat_map(|&m| trees[m].triangle_order.clone()).collect();
     let mut seen = vec![0; order.len()];
     walk(&scene.nodes, roots[2], &meshes[2], &order, &mut seen);
     assert!(seen[..50].iter().all(|&n| n == 0) && seen[50..].iter().all(|&n| n == 1));
@@ -163,9 +151,7 @@ fn too_deep_a_tree_is_refused() {
     tree.depth = STACK - 1;
     let mut scene = SceneBvh::new(1);
     scene.add(&tree, 0);
-    let error = scene
-        .place(&places(&[(0, 0.0)], &[tree]), false)
-        .unwrap_err();
+    let error = scene.place(&places(&[(0, 0.0)], &[tree]), false).unwrap_err();
     assert!(matches!(error, BvhError::TooDeep(33)), "{error}");
 }
 
@@ -186,9 +172,7 @@ fn a_world_box_holds_its_turned_mesh() {
     );
     let found = world_box(tree.bounds, &matrix);
     for p in &mesh.positions {
-        let p = matrix
-            .transform_point3(DVec3::from(p.map(f64::from)))
-            .as_vec3a();
+        let p = matrix.transform_point3(DVec3::from(p.map(f64::from))).as_vec3a();
         assert!(p.cmpge(found.min).all() && p.cmple(found.max).all());
     }
 }

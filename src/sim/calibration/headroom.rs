@@ -80,10 +80,8 @@ impl Calibration<'_> {
     /// of a wire, weighted with a Gaussian of at most sigma = max(sigma_x, sigma_e, dz), sum to at
     /// most 1 + sqrt(2 pi) sigma / spacing; the two loudest wires may cross there.
     pub fn point_bound(&self, z: f64) -> f64 {
-        let widest = self
-            .sigma_lateral(z)
-            .max(self.sigma_elevation(z))
-            .max(self.scene.probe.sample_pitch());
+        let widest =
+            self.sigma_lateral(z).max(self.sigma_elevation(z)).max(self.scene.probe.sample_pitch());
         let mut sums: Vec<f64> = self
             .scene
             .wires

@@ -40,9 +40,7 @@ impl Skins {
                 .clone(),
             object_from_world: placed.world_from_object.inverse(),
         });
-        Skin {
-            bodies: bodies.collect(),
-        }
+        Skin { bodies: bodies.collect() }
     }
 }
 
@@ -117,11 +115,7 @@ impl Tree {
             if let Some([t, ..]) = intersect::triangle(corners, origin, direction) {
                 let [a, b, c] = corners;
                 let normal = (b - a).cross(c - a);
-                found.push(Crossing {
-                    t,
-                    entry: direction.dot(normal) < 0.0,
-                    normal,
-                });
+                found.push(Crossing { t, entry: direction.dot(normal) < 0.0, normal });
             }
         });
         found.sort_by(|a, b| a.t.total_cmp(&b.t));
@@ -143,10 +137,7 @@ impl Skin {
         let mut crossings: Vec<Crossing> = Vec::new();
         for body in &self.bodies {
             let object = &body.object_from_world;
-            let (o, d) = (
-                object.transform_point3(origin),
-                object.transform_vector3(direction),
-            );
+            let (o, d) = (object.transform_point3(origin), object.transform_vector3(direction));
             let found = body.tree.crossings(o, d).into_iter();
             crossings.extend(found.map(|crossing| Crossing {
                 // Normals go by the inverse transpose.

@@ -38,21 +38,11 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     let array = |name, element, values: &[u8], each: usize| {
         let path = dir.join(format!("{name}.npy"));
         let shape = [values.len() / (4 * each), each];
-        npy::write(
-            &path,
-            element,
-            &shape[..if each == 1 { 1 } else { 2 }],
-            values,
-        )
-        .map_err(|e| DumpError::file(&path, e))
+        npy::write(&path, element, &shape[..if each == 1 { 1 } else { 2 }], values)
+            .map_err(|e| DumpError::file(&path, e))
     };
 
-    array(
-        "frame",
-        Word,
-        bytemuck::bytes_of(&frame),
-        words::<layout::Frame>(),
-    )?;
+    array("frame", Word, bytemuck::bytes_of(&frame), words::<layout::Frame>())?;
     let paths = [0, simulator.passes.batches.paths.min(frame.paths)];
     array("push", Word, bytemuck::cast_slice(&paths), 1)?;
     let tables = simulator.tables();
@@ -62,40 +52,15 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         bytemuck::cast_slice(&tables.scanlines),
         words::<layout::Scanline>(),
     )?;
-    array(
-        "rows",
-        Float,
-        bytemuck::cast_slice(&tables.rows),
-        words::<layout::Row>(),
-    )?;
-    array(
-        "tissues",
-        Word,
-        bytemuck::cast_slice(&tables.tissues),
-        words::<layout::Tissue>(),
-    )?;
-    array(
-        "surfaces",
-        Float,
-        bytemuck::cast_slice(&tables.surfaces),
-        words::<layout::Surface>(),
-    )?;
+    array("rows", Float, bytemuck::cast_slice(&tables.rows), words::<layout::Row>())?;
+    array("tissues", Word, bytemuck::cast_slice(&tables.tissues), words::<layout::Tissue>())?;
+    array("surfaces", Float, bytemuck::cast_slice(&tables.surfaces), words::<layout::Surface>())?;
     array("points", Float, bytemuck::cast_slice(&tables.points), 4)?;
     array("grey", Word, bytemuck::cast_slice(&tables.grey), 1)?;
-    array(
-        "instances",
-        Word,
-        bytemuck::cast_slice(&instances),
-        words::<layout::Instance>(),
-    )?;
+    array("instances", Word, bytemuck::cast_slice(&instances), words::<layout::Instance>())?;
     array("vertices", Float, bytemuck::cast_slice(&arrays.vertices), 3)?;
     array("normals", Float, bytemuck::cast_slice(&arrays.normals), 3)?;
-    array(
-        "triangles",
-        Word,
-        bytemuck::cast_slice(&arrays.triangles),
-        3,
-    )?;
+    array("triangles", Word, bytemuck::cast_slice(&arrays.triangles), 3)?;
     array("nodes", Word, bytemuck::cast_slice(nodes), 20)?;
     array("fields", Float, &fields, 4)?;
 

@@ -55,13 +55,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     let frame = *simulator.constants();
     let (lines, samples) = (frame.scanlines as usize, frame.samples as usize);
     let pitch = scene.probe.sample_pitch();
-    let axis = |name, unit, start, step, size| Axis {
-        name,
-        unit,
-        start,
-        step,
-        size,
-    };
+    let axis = |name, unit, start, step, size| Axis { name, unit, start, step, size };
     let scanline = || axis("scanline", "1", 0.0, 1.0, lines);
     let depth = || axis("depth", "mm", 0.0, pitch, samples);
     let complex = || axis("complex", "real, imaginary", 0.0, 1.0, 2);
@@ -82,52 +76,27 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     write(
         "0_echoes",
         "deposited echoes relative to a perfect mirror, complex baseband, before any kernel",
-        &[
-            axis("kind", "surface, volume", 0.0, 1.0, 2),
-            scanline(),
-            depth(),
-            complex(),
-        ],
+        &[axis("kind", "surface, volume", 0.0, 1.0, 2), scanline(), depth(), complex()],
         &undone,
     )?;
     let lateral = simulator.lateral()?;
     let factor = rf::oversampling(&scene.probe);
-    let rf = rf::lines(
-        &scene.probe,
-        frame.axial_sigma,
-        lines,
-        samples,
-        &lateral,
-        factor,
-    );
+    let rf = rf::lines(&scene.probe, frame.axial_sigma, lines, samples, &lateral, factor);
     write(
         "1_rf",
         "radio-frequency line before TGC",
-        &[
-            scanline(),
-            axis("depth", "mm", 0.0, pitch / factor as f64, samples * factor),
-        ],
+        &[scanline(), axis("depth", "mm", 0.0, pitch / factor as f64, samples * factor)],
         &rf,
     )?;
     let iq = simulator.iq()?;
-    write(
-        "2_iq",
-        "complex baseband before TGC",
-        &[scanline(), depth(), complex()],
-        &iq[..count],
-    )?;
+    write("2_iq", "complex baseband before TGC", &[scanline(), depth(), complex()], &iq[..count])?;
     let envelope: Vec<f32> = iq
         .chunks_exact(2)
         .take(lines * samples)
         .enumerate()
         .map(|(i, z)| z[0].hypot(z[1]) * rows[i % samples].tgc)
         .collect();
-    write(
-        "3_envelope",
-        "envelope after TGC",
-        &[scanline(), depth()],
-        &envelope,
-    )?;
+    write("3_envelope", "envelope after TGC", &[scanline(), depth()], &envelope)?;
     let log = simulator.log_image()?;
     write(
         "4_log",
@@ -137,21 +106,13 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     )?;
     let (width, height, rgba) = simulator.pixels()?;
     png(&dir.join("5_bmode.png"), width, height, &rgba)?;
-    let (x, z, pixel) = (
-        f64::from(frame.image_left),
-        f64::from(frame.image_top),
-        f64::from(frame.pixel_pitch),
-    );
+    let (x, z, pixel) =
+        (f64::from(frame.image_left), f64::from(frame.image_top), f64::from(frame.pixel_pitch));
     let axes = [
         axis("depth", "mm", z + pixel / 2.0, pixel, height as usize),
         axis("lateral", "mm", x + pixel / 2.0, pixel, width as usize),
     ];
-    sidecar(
-        dir,
-        "5_bmode",
-        "scan-converted B-mode image, pixel centres in probe space",
-        &axes,
-    )?;
+    sidecar(dir, "5_bmode", "scan-converted B-mode image, pixel centres in probe space", &axes)?;
     let Some(steps) = simulator.fusion_steps()? else {
         return Ok(());
     };
@@ -162,26 +123,14 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         pixels.flatten().collect()
     };
     for (name, meaning, rgba) in [
-        (
-            "6_background",
-            "scan-converted acquired volume",
-            grey(&steps.background),
-        ),
-        (
-            "7_mask",
-            "scan-converted mask, white outside the masking meshes",
-            grey(&steps.mask),
-        ),
+        ("6_background", "scan-converted acquired volume", grey(&steps.background)),
+        ("7_mask", "scan-converted mask, white outside the masking meshes", grey(&steps.mask)),
         (
             "8_blurred_mask",
             "box-blurred mask: the weight of the acquired volume",
             grey(&steps.blurred),
         ),
-        (
-            "9_simulation",
-            "the simulation alone; 5_bmode is the fused image",
-            steps.simulated,
-        ),
+        ("9_simulation", "the simulation alone; 5_bmode is the fused image", steps.simulated),
     ] {
         png(&dir.join(format!("{name}.png")), width, height, &rgba)?;
         sidecar(dir, name, meaning, &axes)?;

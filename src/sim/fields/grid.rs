@@ -31,32 +31,20 @@ impl Grid {
         let spacing = (extent.max_element() / (LONGEST - 3.0)).max(1e-3);
         // Rounded up: the centre stays where it is.
         let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
-        Self {
-            origin: (low + high - cells * spacing) / 2.0,
-            spacing,
-            size: cells.as_uvec3() + 1,
-        }
+        Self { origin: (low + high - cells * spacing) / 2.0, spacing, size: cells.as_uvec3() + 1 }
     }
 
     /// One cell, a cube, around `points`: enough for an affine map.
     pub fn one_cell(points: impl Iterator<Item = DVec3>) -> Self {
         let (low, high) = ends(points);
         let edge = (1.001 * (high - low).max_element()).max(1e-3);
-        Self {
-            origin: (low + high - edge) / 2.0,
-            spacing: edge,
-            size: UVec3::splat(2),
-        }
+        Self { origin: (low + high - edge) / 2.0, spacing: edge, size: UVec3::splat(2) }
     }
 
     /// The grid that [`Self::header`] told of, as far as single precision keeps it.
     pub fn from_header(vectors: &[[f32; 3]]) -> Self {
         let [origin, scale, size] = std::array::from_fn(|i| DVec3::from(vectors[i].map(f64::from)));
-        Self {
-            origin,
-            spacing: scale.x.recip(),
-            size: size.as_uvec3(),
-        }
+        Self { origin, spacing: scale.x.recip(), size: size.as_uvec3() }
     }
 
     /// Number of nodes.

@@ -52,9 +52,8 @@ pub(super) struct Solver<'a> {
 
 impl<'a> Solver<'a> {
     pub(super) fn new(grid: &'a Grid, patches: &'a [Patch<'a>]) -> Self {
-        let samples: Vec<Sample> = (patches.iter().enumerate())
-            .flat_map(|(i, patch)| patch.samples(grid, i))
-            .collect();
+        let samples: Vec<Sample> =
+            (patches.iter().enumerate()).flat_map(|(i, patch)| patch.samples(grid, i)).collect();
         let area: f64 = samples.iter().map(|s| s.area).sum();
         let sum: DVec3 = samples.iter().map(|s| s.area * s.place).sum();
         let centre = sum / area;
@@ -154,9 +153,7 @@ impl<'a> Solver<'a> {
         let inner = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a * b).sum::<DVec3>();
         let precondition = |r: &[DVec3]| -> Vec<DVec3> {
             let pairs = r.iter().zip(&self.stencil);
-            pairs
-                .map(|(r, row)| r / row[around(glam::IVec3::ZERO)])
-                .collect()
+            pairs.map(|(r, row)| r / row[around(glam::IVec3::ZERO)]).collect()
         };
         let mut u = vec![DVec3::ZERO; load.len()];
         let mut residual = load;
@@ -204,14 +201,11 @@ fn around(step: glam::IVec3) -> usize {
 impl Patch<'_> {
     fn point(&self, keyframe: usize, vertex: u32) -> DVec3 {
         let p = self.meshes[keyframe].positions[vertex as usize];
-        self.texture_from_object
-            .transform_point3(DVec3::from(p.map(f64::from)))
+        self.texture_from_object.transform_point3(DVec3::from(p.map(f64::from)))
     }
 
     fn displacement(&self, sample: &Sample, keyframe: usize) -> DVec3 {
-        let moved = sample
-            .corners
-            .map(|v| self.point(keyframe, v) - self.point(0, v));
+        let moved = sample.corners.map(|v| self.point(keyframe, v) - self.point(0, v));
         sample.shares.x * moved[0] + sample.shares.y * moved[1] + sample.shares.z * moved[2]
     }
 
@@ -226,31 +220,18 @@ impl Patch<'_> {
                 continue;
             }
             let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-            let parts = (longest / (SAMPLE_PITCH * grid.spacing))
-                .ceil()
-                .clamp(1.0, MOST_PARTS);
+            let parts = (longest / (SAMPLE_PITCH * grid.spacing)).ceil().clamp(1.0, MOST_PARTS);
             let area = (b - a).cross(c - a).length() / 2.0 / (parts * parts);
             let count = parts as u32;
             for (i, j) in (0..count).flat_map(|i| (0..count - i).map(move |j| (i, j))) {
                 // The part that points as the triangle does, and the one beside it that does not.
                 for third in 1..=(if i + j + 1 < count { 2 } else { 1 }) {
                     let inside = f64::from(third) / 3.0;
-                    let (u, v) = (
-                        (f64::from(i) + inside) / parts,
-                        (f64::from(j) + inside) / parts,
-                    );
+                    let (u, v) = ((f64::from(i) + inside) / parts, (f64::from(j) + inside) / parts);
                     let shares = DVec3::new(1.0 - u - v, u, v);
                     let place = shares.x * a + shares.y * b + shares.z * c;
                     if let Some((cell, weights)) = grid.weights(place) {
-                        samples.push(Sample {
-                            cell,
-                            weights,
-                            place,
-                            area,
-                            patch,
-                            corners,
-                            shares,
-                        });
+                        samples.push(Sample { cell, weights, place, area, patch, corners, shares });
                     }
                 }
             }

@@ -51,9 +51,7 @@ fn affine_error(map: DMat3, planted: DMat3) -> f64 {
         rotation,
         DVec3::new(5.0, -8.0, 40.0),
     );
-    add(&mut scene, shapes::cuboid([20.0, 9.0, 14.0]), at, |p| {
-        planted * p - p
-    });
+    add(&mut scene, shapes::cuboid([20.0, 9.0, 14.0]), at, |p| planted * p - p);
     let fields = Fields::build(&scene);
     let mut worst = 0.0_f64;
     for i in 0..343 {
@@ -75,10 +73,7 @@ fn homogeneous_strain_and_rotation_are_exact() {
     for map in [turn, strain, turn * strain] {
         let error = affine_error(map, map);
         assert!(error < 1e-5, "{error}");
-        assert!(
-            affine_error(map, map * 1.0001) > 1e-4,
-            "a strain of 1e-4 is caught"
-        );
+        assert!(affine_error(map, map * 1.0001) > 1e-4, "a strain of 1e-4 is caught");
     }
 }
 
@@ -88,18 +83,8 @@ fn homogeneous_strain_and_rotation_are_exact() {
 fn shell_errors(grouped: bool) -> [f64; 2] {
     let mut scene = scene();
     let shrink = |p: DVec3| -0.2 * p;
-    add(
-        &mut scene,
-        shapes::sphere(10.0, 3),
-        DAffine3::IDENTITY,
-        shrink,
-    );
-    add(
-        &mut scene,
-        shapes::sphere(18.0, 4),
-        DAffine3::IDENTITY,
-        |_| DVec3::ZERO,
-    );
+    add(&mut scene, shapes::sphere(10.0, 3), DAffine3::IDENTITY, shrink);
+    add(&mut scene, shapes::sphere(18.0, 4), DAffine3::IDENTITY, |_| DVec3::ZERO);
     // The outer one moves, lest it need no field; so little that nothing is seen of it.
     scene.meshes[3].positions[0][0] += 1e-6;
     if !grouped {
@@ -130,10 +115,7 @@ fn a_wall_between_two_surfaces_is_harmonic() {
     let [worst, mean] = shell_errors(true);
     assert!(worst < 0.31 && mean < 0.09, "{worst} {mean}");
     let [worst, _] = shell_errors(false);
-    assert!(
-        worst > 0.5,
-        "without the inner surface nothing moves: {worst}"
-    );
+    assert!(worst > 0.5, "without the inner surface nothing moves: {worst}");
 }
 
 #[test]
@@ -149,19 +131,12 @@ fn offsets_follow_keyframes_strategies_and_settings() {
     let fields = Fields::build(&scene);
     let offsets = |scene: &Scene| [0, 1, 2, 3].map(|i| fields.offset(scene, i));
     let slots = fields.slots[0].expect("deforms");
-    assert_eq!(
-        offsets(&scene)[..3],
-        [slots.stride, NONE, NONE],
-        "rigid, or of another topology"
-    );
+    assert_eq!(offsets(&scene)[..3], [slots.stride, NONE, NONE], "rigid, or of another topology");
     let blended = fields.slots[3].expect("deforms");
     assert_eq!(offsets(&scene)[3], blended.first + 2 * blended.stride);
     assert_eq!(fields.blend(&scene, 0), None);
     let blend = fields.blend(&scene, 3).expect("between keyframes");
-    assert_eq!(
-        blend.sources[0],
-        (blended.first + blended.stride + HEADER, 1.0)
-    );
+    assert_eq!(blend.sources[0], (blended.first + blended.stride + HEADER, 1.0));
     assert_eq!((blend.target + blend.count) as usize, fields.values.len());
     scene.instances[0].keyframes.blend[0].0 = 0;
     assert_eq!(offsets(&scene)[0], 0);

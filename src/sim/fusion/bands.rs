@@ -53,11 +53,7 @@ impl Bands {
         library: &Library,
         pixels: u64,
     ) -> Result<Self, GpuError> {
-        Ok(Self {
-            kernels: Kernels::new(device, library)?,
-            pixels,
-            levels: Vec::new(),
-        })
+        Ok(Self { kernels: Kernels::new(device, library)?, pixels, levels: Vec::new() })
     }
 
     /// Makes room for `levels` levels above the finest.
@@ -69,10 +65,7 @@ impl Bands {
             let new = |name: &str, each: u64| {
                 device.buffer(name, (each * pixels).max(16), BufferKind::Storage)
             };
-            self.levels.push(Level {
-                sums: new("band sums", 12)?,
-                change: new("band change", 4)?,
-            });
+            self.levels.push(Level { sums: new("band sums", 12)?, change: new("band change", 4)? });
         }
         Ok(())
     }
@@ -121,10 +114,7 @@ impl Bands {
                 &self.kernels.reduce,
                 threads(level + 1),
                 bytemuck::bytes_of(&size_at(size, level)),
-                &[
-                    buffer(&self.levels[level].sums),
-                    buffer(&self.levels[level + 1].sums),
-                ],
+                &[buffer(&self.levels[level].sums), buffer(&self.levels[level + 1].sums)],
             )?;
         }
         for level in (0..=top).rev() {

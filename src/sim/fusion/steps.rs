@@ -53,32 +53,18 @@ impl Simulator {
         use Element::{Float, Word};
         let mut dumped = vec![
             ("fusion", Word, 1, bytemuck::bytes_of(&constants).to_vec()),
-            (
-                "acquired",
-                Float,
-                1,
-                fused.texture.read(&self.device, acquired.now)?,
-            ),
+            ("acquired", Float, 1, fused.texture.read(&self.device, acquired.now)?),
             ("prescan", Float, 2, read(&fused.prescan, 8 * samples)?),
             ("mask", Float, 2, read(&fused.mask, 8 * pixels)?),
             ("sums", Float, 2, read(&fused.sums, 8 * pixels)?),
             ("background", Float, 1, read(&fused.background, 4 * pixels)?),
-            (
-                "simulated",
-                Word,
-                1,
-                read(&passes.buffers.pixels, 4 * pixels)?,
-            ),
+            ("simulated", Word, 1, read(&passes.buffers.pixels, 4 * pixels)?),
         ];
         if fused.banded {
             let change = read(fused.bands.change(), 4 * pixels)?;
             dumped.push(("change", Float, 1, change));
         }
-        if let Some(shadows) = fused
-            .shadows
-            .buffers()
-            .filter(|_| fusion.background_shadows)
-        {
+        if let Some(shadows) = fused.shadows.buffers().filter(|_| fusion.background_shadows) {
             let size = 16 * layout::MAX_PIECES * lines(frame) as usize;
             dumped.push(("pieces", Float, 4, read(&shadows.pieces, size)?));
             dumped.push(("shaded", Float, 2, read(&shadows.shaded, 8 * samples)?));

@@ -72,13 +72,7 @@ impl Texture {
                 BUDGET >> 20
             )
         });
-        Ok(Self {
-            images,
-            texel_from_voxel: voxel_from_texel.inverse(),
-            scale,
-            offset,
-            warning,
-        })
+        Ok(Self { images, texel_from_voxel: voxel_from_texel.inverse(), scale, offset, warning })
     }
 }
 
@@ -119,13 +113,7 @@ fn make(
     texels: Texels,
 ) -> Result<(Image, Texels), GpuError> {
     let extent = size.map(|n| n as u32);
-    let image = Image::new(
-        device,
-        "acquired volume",
-        ImageDim::D3,
-        extent,
-        texels.format,
-    )?;
+    let image = Image::new(device, "acquired volume", ImageDim::D3, extent, texels.format)?;
     device.upload_image(&image, &texels.bytes)?;
     Ok((image, texels))
 }
@@ -205,12 +193,7 @@ fn texels(voxels: &Voxels, acquired: &Acquired) -> Texels {
         1 => (ImageFormat::R8Unorm, 255.0),
         _ => (ImageFormat::R16Unorm, 65535.0),
     };
-    Texels {
-        format,
-        bytes,
-        scale,
-        offset: lowest,
-    }
+    Texels { format, bytes, scale, offset: lowest }
 }
 
 /// The voxels as floats; what is no finite number is black.

@@ -55,10 +55,7 @@ fn texels_stand_for_the_stored_values() {
         let wide = made.format == ImageFormat::R16Unorm;
         for i in 0..4 {
             let stored = match wide {
-                true => f64::from(u16::from_le_bytes([
-                    made.bytes[2 * i],
-                    made.bytes[2 * i + 1],
-                ])),
+                true => f64::from(u16::from_le_bytes([made.bytes[2 * i], made.bytes[2 * i + 1]])),
                 false => f64::from(made.bytes[i]),
             };
             assert_eq!(stored + made.offset, voxels.get(i));

@@ -30,11 +30,7 @@ impl Tinting {
         library: &Library,
         pixels: u64,
     ) -> Result<Self, GpuError> {
-        Ok(Self {
-            kernel: Self::kernel(device, library)?,
-            size: 4 * pixels,
-            tinted: None,
-        })
+        Ok(Self { kernel: Self::kernel(device, library)?, size: 4 * pixels, tinted: None })
     }
 
     pub(super) fn kernel(device: &Arc<Device>, library: &Library) -> Result<Kernel, GpuError> {

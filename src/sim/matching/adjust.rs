@@ -102,12 +102,7 @@ pub(super) fn proposal(
     if adjusted.size {
         for (i, name, here, there) in [
             (0, "psf_scale (axial)", simulated.axial, acquired.axial),
-            (
-                1,
-                "psf_scale (lateral)",
-                simulated.lateral,
-                acquired.lateral,
-            ),
+            (1, "psf_scale (lateral)", simulated.lateral, acquired.lateral),
         ] {
             if let (Some(here), Some(there)) = (here.filter(|w| !w.open), there) {
                 let why = match there.open {
@@ -130,11 +125,9 @@ pub(super) fn proposal(
         })
         .collect();
     let mean = |value: &dyn Fn(f64, f64) -> f64| {
-        let sums = wanted
-            .iter()
-            .fold((0.0, 0.0), |(s, n), &(z, gain, variance)| {
-                (s + value(z, gain) / variance, n + 1.0 / variance)
-            });
+        let sums = wanted.iter().fold((0.0, 0.0), |(s, n), &(z, gain, variance)| {
+            (s + value(z, gain) / variance, n + 1.0 / variance)
+        });
         sums.0 / sums.1
     };
     if adjusted.tgc {

@@ -1,25 +1,13 @@
 use super::super::statistics::{Level, Width};
 use super::*;
 
-const ALL: Adjusted = Adjusted {
-    gain: true,
-    tgc: true,
-    range: true,
-    size: true,
-};
+const ALL: Adjusted = Adjusted { gain: true, tgc: true, range: true, size: true };
 
 /// A band in which `level` is the brightness at a depth; of 60 patches at each.
 fn band(probe: &Probe, level: impl Fn(f64) -> Option<f64>) -> Statistics {
     let places = depths(probe);
-    let levels = places.iter().map(|&z| Level {
-        level: level(z),
-        area: 6.0,
-    });
-    let width = Width {
-        relative: 1.2,
-        mm: 0.2,
-        open: false,
-    };
+    let levels = places.iter().map(|&z| Level { level: level(z), area: 6.0 });
+    let width = Width { relative: 1.2, mm: 0.2, open: false };
     Statistics {
         levels: levels.collect(),
         spread: Some(0.08),
@@ -54,14 +42,8 @@ fn settings_that_are_linear_between_the_sliders_are_found() {
     let simulated = band(&probe, |z| Some(shown(&probe, &now, echo, z)));
     let mut acquired = band(&probe, |z| Some(shown(&probe, &there, echo, z)));
     acquired.spread = simulated.spread.map(|s| s * 60.0 / 40.0);
-    acquired.axial = simulated.axial.map(|w| Width {
-        relative: 1.5 * w.relative,
-        ..w
-    });
-    acquired.lateral = simulated.lateral.map(|w| Width {
-        relative: 0.8 * w.relative,
-        ..w
-    });
+    acquired.axial = simulated.axial.map(|w| Width { relative: 1.5 * w.relative, ..w });
+    acquired.lateral = simulated.lateral.map(|w| Width { relative: 0.8 * w.relative, ..w });
     let (found, notes) = proposal(&probe, &now, &simulated, &acquired, ALL);
     assert_eq!(notes, Vec::<String>::new());
     assert_eq!(found.dynamic_range, 40.0);
@@ -73,21 +55,11 @@ fn settings_that_are_linear_between_the_sliders_are_found() {
     }
     // From there nothing changes: the curve is that of the same data.
     let simulated = band(&probe, |z| Some(shown(&probe, &found, echo, z)));
-    let same = Statistics {
-        spread: simulated.spread,
-        ..acquired.clone()
-    };
-    let same = Statistics {
-        axial: simulated.axial,
-        lateral: simulated.lateral,
-        ..same
-    };
+    let same = Statistics { spread: simulated.spread, ..acquired.clone() };
+    let same = Statistics { axial: simulated.axial, lateral: simulated.lateral, ..same };
     let (again, _) = proposal(&probe, &found, &simulated, &same, ALL);
     let moved = change(&probe, &again, &found, &depths(&probe));
-    assert!(
-        moved.level <= 0.2 && moved.range == 0.0 && moved.size == 0.0,
-        "{moved:?}"
-    );
+    assert!(moved.level <= 0.2 && moved.range == 0.0 && moved.size == 0.0, "{moved:?}");
 }
 
 #[test]
@@ -105,42 +77,20 @@ fn without_data_the_curve_goes_on_flat() {
 #[test]
 fn what_may_not_change_stays_and_bounds_are_said() {
     let probe = Probe::linear();
-    let now = Imaging {
-        tgc_sliders: [2.0; 8],
-        ..Imaging::default()
-    };
+    let now = Imaging { tgc_sliders: [2.0; 8], ..Imaging::default() };
     let simulated = band(&probe, |_| Some(0.4));
     let mut acquired = band(&probe, |_| Some(0.5));
     acquired.spread = Some(0.01);
-    acquired.axial = Some(Width {
-        relative: 24.0,
-        mm: 4.0,
-        open: true,
-    });
-    let gain_only = Adjusted {
-        gain: true,
-        tgc: false,
-        range: false,
-        size: false,
-    };
+    acquired.axial = Some(Width { relative: 24.0, mm: 4.0, open: true });
+    let gain_only = Adjusted { gain: true, tgc: false, range: false, size: false };
     let (found, notes) = proposal(&probe, &now, &simulated, &acquired, gain_only);
-    let expected = Imaging {
-        gain: now.gain + 6.0,
-        ..now.clone()
-    };
+    let expected = Imaging { gain: now.gain + 6.0, ..now.clone() };
     assert_eq!((found, notes.len()), (expected, 0));
     let (found, notes) = proposal(&probe, &now, &simulated, &acquired, ALL);
     assert_eq!((found.dynamic_range, found.psf_scale[0]), (200.0, 4.0));
+    assert!(notes.iter().any(|n| n.contains("dynamic_range would be 480.0 and")), "{notes:?}");
     assert!(
-        notes
-            .iter()
-            .any(|n| n.contains("dynamic_range would be 480.0 and")),
-        "{notes:?}"
-    );
-    assert!(
-        notes
-            .iter()
-            .any(|n| n.contains("psf_scale (axial)") && n.contains("averaged away")),
+        notes.iter().any(|n| n.contains("psf_scale (axial)") && n.contains("averaged away")),
         "{notes:?}"
     );
 }

@@ -164,10 +164,7 @@ fn lower_envelope(f: &[f64]) -> Vec<f64> {
     }
     let mut current = 0;
     let at = |q: usize| {
-        while lowest
-            .get(current + 1)
-            .is_some_and(|next| next.1 < q as f64)
-        {
+        while lowest.get(current + 1).is_some_and(|next| next.1 < q as f64) {
             current += 1;
         }
         lowest.get(current).map_or(f64::INFINITY, |&(p, _)| {

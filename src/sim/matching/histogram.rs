@@ -12,10 +12,7 @@ pub(super) struct Histogram {
 
 impl Default for Histogram {
     fn default() -> Self {
-        Self {
-            counts: vec![0; CLASSES],
-            total: 0,
-        }
+        Self { counts: vec![0; CLASSES], total: 0 }
     }
 }
 

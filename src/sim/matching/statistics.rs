@@ -133,9 +133,7 @@ fn bins(probe: &Probe) -> usize {
 /// Middle of each depth at which brightness is measured, mm along the scanlines.
 pub fn depths(probe: &Probe) -> Vec<f64> {
     let n = bins(probe);
-    (0..n)
-        .map(|i| probe.depth * (i as f64 + 0.5) / n as f64)
-        .collect()
+    (0..n).map(|i| probe.depth * (i as f64 + 0.5) / n as f64).collect()
 }
 
 impl Gathered {
@@ -200,19 +198,13 @@ impl Gathered {
         let area: f64 = self.areas.iter().sum();
         let depth = self.moment / area.max(f64::MIN_POSITIVE);
         let (sigma_axial, sigma_lateral) = (probe.sigma_axial(), probe.sigma_lateral(depth));
-        let (axial, lateral) = (
-            correlation(&self.axial, LONGEST[0]),
-            correlation(&self.lateral, LONGEST[1]),
-        );
+        let (axial, lateral) =
+            (correlation(&self.axial, LONGEST[0]), correlation(&self.lateral, LONGEST[1]));
         let found: Vec<f64> = [axial, lateral].iter().flatten().map(|c| c.far).collect();
         let far = found.iter().sum::<f64>() / found.len() as f64;
         let spread = far * DEVELOPED / DEVELOPED_DIFFERENCE;
         let width = |c: Option<Correlation>, sigma: f64| {
-            c.map(|c| Width {
-                relative: c.half,
-                mm: c.half * sigma,
-                open: c.open,
-            })
+            c.map(|c| Width { relative: c.half, mm: c.half * sigma, open: c.open })
         };
         let (axial, lateral) = (width(axial, sigma_axial), width(lateral, sigma_lateral));
         // The integral of a Gaussian that is 1/2 at h is h sqrt(pi / ln 2). What has no end counts as the
@@ -222,10 +214,7 @@ impl Gathered {
             half.min(LARGEST * sigma) * 2.129
         };
         let cell = extent(axial, sigma_axial) * extent(lateral, sigma_lateral);
-        let level = |(values, &area): (&Histogram, &f64)| Level {
-            level: values.midmean(),
-            area,
-        };
+        let level = |(values, &area): (&Histogram, &f64)| Level { level: values.midmean(), area };
         Statistics {
             levels: self.levels.iter().zip(&self.areas).map(level).collect(),
             spread: (spread > 0.0).then_some(spread),
@@ -272,18 +261,13 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
     let distances: Vec<f64> = lags.iter().map(|lag| lag.distances / lag.count()).collect();
     let (mut half, mut tail, mut found) = (1.2, 0.0, None);
     for _ in 0..50 {
-        let differences = lags
-            .iter()
-            .map(|lag| lag.differences.middle(&lag.beyond, tail));
+        let differences = lags.iter().map(|lag| lag.differences.middle(&lag.beyond, tail));
         let differences: Vec<f64> = differences.collect();
         let (from, to) = ((FAR.0 * half).min(LATEST * longest), FAR.1 * half);
         let is_far = |&i: &usize| (from..=to).contains(&distances[i]);
         let far = (0..lags.len()).filter(is_far);
         let (sum, count) = far.fold((0.0, 0.0), |(sum, count), i| {
-            (
-                sum + differences[i] * lags[i].count(),
-                count + lags[i].count(),
-            )
+            (sum + differences[i] * lags[i].count(), count + lags[i].count())
         });
         let far = sum / count;
         if sum <= 0.0 {
@@ -303,11 +287,7 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
             sums[1] += weight * u * u;
         }
         let next = (2f64.ln() * sums[1] / sums[0]).sqrt();
-        found = Some(Correlation {
-            half: next,
-            far,
-            open: FAR.0 * next > longest,
-        });
+        found = Some(Correlation { half: next, far, open: FAR.0 * next > longest });
         if (next - half).abs() < 1e-4 * half && (tail / (far * BELOW_BLACK) - 1.0).abs() < 1e-4 {
             break;
         }

@@ -3,12 +3,7 @@ use super::*;
 /// A linear array sampled finely, and speckle on it made from its definition: Gaussian noise through
 /// a Gaussian point-spread function `scale` times that of the probe, log-compressed.
 fn probe() -> Probe {
-    Probe {
-        scanlines: 128,
-        samples: 800,
-        depth: 40.0,
-        ..Probe::linear()
-    }
+    Probe { scanlines: 128, samples: 800, depth: 40.0, ..Probe::linear() }
 }
 
 /// Numbers in 0..1 (Marsaglia's xorshift64*).
@@ -46,9 +41,8 @@ fn speckle(probe: &Probe, scale: [f64; 2], seed: u64) -> Vec<f64> {
         for l in 0..lines {
             for k in 0..samples {
                 let near = k.saturating_sub(reach)..(k + reach + 1).min(samples);
-                along[l * samples + k] = near
-                    .map(|i| weight(k.abs_diff(i), axial) * noise[l * samples + i])
-                    .sum();
+                along[l * samples + k] =
+                    near.map(|i| weight(k.abs_diff(i), axial) * noise[l * samples + i]).sum();
             }
         }
         for k in 0..samples {
@@ -109,11 +103,7 @@ fn spread_and_size_are_those_of_the_speckle() {
     let reference = measured(&probe, &shown(&probe, &plain, 60.0, |_| -25.0));
     let spread = reference.spread.expect("far pairs") * 60.0;
     let tolerance = allowed(&reference);
-    assert!(
-        reference.cells > 3000.0 && tolerance < 0.06,
-        "{}",
-        reference.cells
-    );
+    assert!(reference.cells > 3000.0 && tolerance < 0.06, "{}", reference.cells);
     let close = |a: f64, b: f64, tolerance: f64| (a / b - 1.0).abs() < tolerance;
     assert!(close(spread, DEVELOPED, tolerance), "{spread} dB");
     for scale in [[2.0, 1.5], [1.0, 3.0], [1.4, 2.1]] {
@@ -126,10 +116,7 @@ fn spread_and_size_are_those_of_the_speckle() {
         let axial = ratio(found.axial, reference.axial);
         let lateral = ratio(found.lateral, reference.lateral);
         assert!(close(axial, scale[0], both), "{axial} {scale:?} {both}");
-        assert!(
-            close(lateral, scale[1] / 1.5, both),
-            "{lateral} {scale:?} {both}"
-        );
+        assert!(close(lateral, scale[1] / 1.5, both), "{lateral} {scale:?} {both}");
         // A size that is off by a quarter is seen.
         assert!(!close(axial, 1.25 * scale[0], both), "{both}");
         let spread = found.spread.expect("far pairs") * 40.0;
@@ -164,10 +151,7 @@ fn slow_changes_and_clipping_are_not_taken_for_speckle() {
     }
     // With 8 dB less, half of the deepest samples are black: nothing is said of them.
     let darker = shown(&probe, &echoes, 30.0, |z| -19.5 - 12.0 * z / probe.depth);
-    assert_eq!(
-        measured(&probe, &darker).levels.last().expect("some").level,
-        None
-    );
+    assert_eq!(measured(&probe, &darker).levels.last().expect("some").level, None);
 }
 
 #[test]
@@ -180,10 +164,8 @@ fn structure_that_goes_on_has_no_size() {
     let levels: Vec<f32> = (0..lines * samples).map(ramp).collect();
     let found = measured(&probe, &levels);
     assert!(found.lateral.expect("pairs").open);
-    let speckled = measured(
-        &probe,
-        &shown(&probe, &speckle(&probe, [3.0, 3.0], 4), 60.0, |_| -25.0),
-    );
+    let speckled =
+        measured(&probe, &shown(&probe, &speckle(&probe, [3.0, 3.0], 4), 60.0, |_| -25.0));
     for width in [speckled.axial, speckled.lateral] {
         assert!(!width.expect("pairs").open);
     }

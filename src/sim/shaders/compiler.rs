@@ -19,11 +19,7 @@ pub fn compile(dir: &Path, variant: &Variant) -> Result<Vec<u32>, Error> {
     let files = source::files(dir, &variant.file)?;
     let compiler = shaderc::Compiler::new().map_err(|e| failed(e.to_string()))?;
     let mut options = CompileOptions::new().map_err(|e| failed(e.to_string()))?;
-    let version = if variant.ray_query() {
-        EnvVersion::Vulkan1_2
-    } else {
-        EnvVersion::Vulkan1_1
-    };
+    let version = if variant.ray_query() { EnvVersion::Vulkan1_2 } else { EnvVersion::Vulkan1_1 };
     options.set_target_env(TargetEnv::Vulkan, version as u32);
     options.set_optimization_level(if variant.keep_names {
         OptimizationLevel::Zero
@@ -35,14 +31,8 @@ pub fn compile(dir: &Path, variant: &Variant) -> Result<Vec<u32>, Error> {
         options.add_macro_definition(define, None);
     }
     options.set_include_callback(|name, _, from, _| match files.get(name) {
-        Some(text) => Ok(ResolvedInclude {
-            resolved_name: name.to_owned(),
-            content: text.clone(),
-        }),
-        None => Err(format!(
-            "{from} includes {name}, which is not in {}",
-            dir.display()
-        )),
+        Some(text) => Ok(ResolvedInclude { resolved_name: name.to_owned(), content: text.clone() }),
+        None => Err(format!("{from} includes {name}, which is not in {}", dir.display())),
     });
     let artifact = compiler
         .compile_into_spirv(

@@ -70,10 +70,8 @@ pub struct Library {
 impl Library {
     /// The kernels that the program was built with.
     pub fn embedded() -> Self {
-        let words = EMBEDDED
-            .iter()
-            .map(|(stem, bytes)| ((*stem).to_owned(), words_of(bytes)))
-            .collect();
+        let words =
+            EMBEDDED.iter().map(|(stem, bytes)| ((*stem).to_owned(), words_of(bytes))).collect();
         Self {
             words,
             #[cfg(feature = "compile")]

@@ -22,11 +22,7 @@ impl Library {
     /// Kernels that `dir` lacks stay the embedded ones.
     pub fn with_sources(dir: impl Into<PathBuf>) -> Result<Self, Error> {
         let mut library = Self::embedded();
-        library.watched = Some(Watched {
-            dir: dir.into(),
-            seen: None,
-            loaded: BTreeMap::new(),
-        });
+        library.watched = Some(Watched { dir: dir.into(), seen: None, loaded: BTreeMap::new() });
         library.poll()?;
         Ok(library)
     }
@@ -51,11 +47,7 @@ impl Library {
             }
             let hash = source::hash(&watched.dir, &variant, "")?;
             if watched.loaded.get(&variant.stem) != Some(&hash) {
-                fresh.push((
-                    compiler::compile(&watched.dir, &variant)?,
-                    variant.stem,
-                    hash,
-                ));
+                fresh.push((compiler::compile(&watched.dir, &variant)?, variant.stem, hash));
             }
         }
         let mut changed = Vec::new();
@@ -92,12 +84,7 @@ mod tests {
         );
         fs::write(&path, text).unwrap();
         let time = SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(seconds);
-        fs::File::options()
-            .write(true)
-            .open(&path)
-            .unwrap()
-            .set_modified(time)
-            .unwrap();
+        fs::File::options().write(true).open(&path).unwrap().set_modified(time).unwrap();
     }
 
     #[test]
@@ -110,10 +97,7 @@ mod tests {
 
         write(dir.path(), "b[0] = nonsense;", 2);
         let message = library.poll().unwrap_err().to_string();
-        assert!(
-            message.contains("copy.comp:4") && message.contains("nonsense"),
-            "{message}"
-        );
+        assert!(message.contains("copy.comp:4") && message.contains("nonsense"), "{message}");
         assert_eq!(library.words("copy"), first);
         assert!(library.poll().unwrap().is_empty(), "the error is told once");
 

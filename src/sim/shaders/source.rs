@@ -37,11 +37,7 @@ impl Variant {
 
     /// Lowest Vulkan version that accepts the module, as spirv-val names it.
     pub fn target(&self) -> &'static str {
-        if self.ray_query() {
-            "vulkan1.2"
-        } else {
-            "vulkan1.1"
-        }
+        if self.ray_query() { "vulkan1.2" } else { "vulkan1.1" }
     }
 
     /// Flags in the manner of glslc; part of the hash.
@@ -174,8 +170,5 @@ fn read(path: &Path) -> Result<String, Error> {
 }
 
 pub(super) fn file_error(path: impl Into<PathBuf>, cause: std::io::Error) -> Error {
-    Error::File {
-        path: path.into(),
-        cause,
-    }
+    Error::File { path: path.into(), cause }
 }

@@ -33,12 +33,7 @@ pub fn compiler(lock: &str) -> String {
     lines
         .find(|l| *l == "name = \"shaderc-sys\"")
         .and_then(|_| lines.next())
-        .map(|l| {
-            format!(
-                "shaderc-sys {}",
-                l.trim_start_matches("version = ").trim_matches('"')
-            )
-        })
+        .map(|l| format!("shaderc-sys {}", l.trim_start_matches("version = ").trim_matches('"')))
         .expect("Cargo.lock lists shaderc-sys")
 }
 
@@ -71,15 +66,11 @@ pub fn differences(glsl: &Path, spirv: &Path, compiler: &str) -> Result<Vec<Stri
             continue;
         };
         if entry.source != source::hash(glsl, variant, compiler)? {
-            found.push(format!(
-                "{stem}.spv: older than its sources or compiler; {REMEDY}"
-            ));
+            found.push(format!("{stem}.spv: older than its sources or compiler; {REMEDY}"));
         }
         match fs::read(spirv.join(format!("{stem}.spv"))) {
             Ok(bytes) if fnv1a(&bytes) == entry.spirv => {}
-            Ok(_) => found.push(format!(
-                "{stem}.spv: not the bytes that were stamped; {REMEDY}"
-            )),
+            Ok(_) => found.push(format!("{stem}.spv: not the bytes that were stamped; {REMEDY}")),
             Err(error) => found.push(format!("{stem}.spv: {error}; {REMEDY}")),
         }
     }

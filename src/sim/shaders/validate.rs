@@ -10,11 +10,7 @@ use super::Error;
 /// Parses and validates a module with naga, which reads only the portable subset: no ray query
 /// and nothing beyond push constants.
 pub fn naga(stem: &str, spirv: &[u8]) -> Result<(), Error> {
-    let invalid = |message| Error::Invalid {
-        stem: stem.to_owned(),
-        validator: "naga",
-        message,
-    };
+    let invalid = |message| Error::Invalid { stem: stem.to_owned(), validator: "naga", message };
     let module = naga::front::spv::parse_u8_slice(spirv, &naga::front::spv::Options::default())
         .map_err(|e| invalid(chain(&e)))?;
     Validator::new(ValidationFlags::all(), Capabilities::IMMEDIATES)
@@ -37,11 +33,8 @@ fn chain(error: &dyn std::error::Error) -> String {
 /// Runs spirv-val on a module for the Vulkan version `target` (`vulkan1.1`). `Ok(false)` when
 /// spirv-val is not installed (Debian: spirv-tools).
 pub fn spirv_val(stem: &str, spirv: &[u8], target: &str) -> Result<bool, Error> {
-    let invalid = |message| Error::Invalid {
-        stem: stem.to_owned(),
-        validator: "spirv-val",
-        message,
-    };
+    let invalid =
+        |message| Error::Invalid { stem: stem.to_owned(), validator: "spirv-val", message };
     let child = Command::new("spirv-val")
         .args(["--target-env", target, "-"])
         .stdin(Stdio::piped())
@@ -55,9 +48,7 @@ pub fn spirv_val(stem: &str, spirv: &[u8], target: &str) -> Result<bool, Error> 
     };
     // A module that is refused early closes the pipe; the exit status tells.
     let _ = child.stdin.take().map(|mut pipe| pipe.write_all(spirv));
-    let output = child
-        .wait_with_output()
-        .map_err(|e| invalid(e.to_string()))?;
+    let output = child.wait_with_output().map_err(|e| invalid(e.to_string()))?;
     if output.status.success() {
         return Ok(true);
     }

@@ -101,29 +101,15 @@ impl Bench {
         // Rays do not ask where tissue has gone.
         let fields = Fields::none(scene);
         let apart = vec![false; scene.instances.len()];
-        let world = World::with_fields(
-            device,
-            &kernels,
-            scene,
-            tracer,
-            Splits::default(),
-            fields,
-            apart,
-        )?;
+        let world =
+            World::with_fields(device, &kernels, scene, tracer, Splits::default(), fields, apart)?;
         Ok(Self { kernel, world })
     }
 
     fn trace(&self, device: &Arc<Device>, rays: &[Ray]) -> Result<Vec<RayHit>, GpuError> {
         let (mask, slots) = self.world.ray_mask();
         let slots = slots.into();
-        let rays: Vec<Ray> = rays
-            .iter()
-            .map(|ray| Ray {
-                mask,
-                slots,
-                ..*ray
-            })
-            .collect();
+        let rays: Vec<Ray> = rays.iter().map(|ray| Ray { mask, slots, ..*ray }).collect();
         let bytes = bytemuck::cast_slice(&rays);
         let list = device.buffer("trial rays", bytes.len() as u64, BufferKind::Storage)?;
         let size = size_of::<RayHit>() * rays.len();
@@ -185,11 +171,7 @@ fn next_rays(rays: &[Ray], hits: &[RayHit]) -> Vec<Ray> {
         .map(|(i, (before, hit))| {
             let widen = |v: [f32; 3]| DVec3::from(v.map(f64::from));
             let (d, n) = (widen(before.direction), widen(hit.geometric));
-            let turned = if i % 3 == 0 {
-                d - 2.0 * d.dot(n) * n
-            } else {
-                d
-            };
+            let turned = if i % 3 == 0 { d - 2.0 * d.dot(n) * n } else { d };
             let largest = hit.position.iter().fold(1.0, |m: f32, x| m.max(x.abs()));
             ray(hit.position, turned.normalize(), CLEARANCE * largest)
         })

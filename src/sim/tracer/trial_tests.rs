@@ -9,11 +9,7 @@ use crate::sim::layout::NONE;
 use crate::sim::shaders::Library;
 
 fn hit(instance: u32, t: f32) -> RayHit {
-    RayHit {
-        instance,
-        t,
-        ..RayHit::zeroed()
-    }
+    RayHit { instance, t, ..RayHit::zeroed() }
 }
 
 #[test]
@@ -38,10 +34,7 @@ fn a_surface_that_is_missed_or_found_again_counts() {
     assert!(!agree(&hit(2, 31.0), &hit(NONE, 0.0)), "missed");
     assert!(!agree(&hit(2, 31.0), &hit(2, 0.0)), "the surface just left");
     assert!(!agree(&hit(2, 31.0), &hit(2, f32::NAN)));
-    let trial = |different| Trial {
-        rays: 10_000,
-        different,
-    };
+    let trial = |different| Trial { rays: 10_000, different };
     assert!(trial(3).passed());
     assert!(!trial(4).passed());
 }

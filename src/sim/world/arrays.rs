@@ -161,12 +161,7 @@ impl Arrays {
             arrays.regions.push(region);
         }
         arrays.put_owners(&owners);
-        let Self {
-            places,
-            regions,
-            sets,
-            ..
-        } = &arrays;
+        let Self { places, regions, sets, .. } = &arrays;
         let entries = entry::entries(scene, places, regions, sets);
         let slots = match &mut arrays.bvh {
             Some(bvh) => {
@@ -201,10 +196,7 @@ impl Arrays {
 
     /// Bytes of the largest of the buffers that cut triangles make larger.
     fn largest_buffer(&self) -> u64 {
-        let nodes = self
-            .bvh
-            .as_ref()
-            .map_or(0, |bvh| size_of_val(&bvh.nodes[..]));
+        let nodes = self.bvh.as_ref().map_or(0, |bvh| size_of_val(&bvh.nodes[..]));
         nodes.max(size_of_val(&self.triangles[..])) as u64
     }
 
@@ -268,11 +260,7 @@ impl Arrays {
             triangles = order().map(|t| triangles[t]).collect();
             from = order().map(|t| from[t]).collect();
         }
-        Joint {
-            triangles,
-            from,
-            tree,
-        }
+        Joint { triangles, from, tree }
     }
 
     /// Appends the sets' lists behind all triangles.
@@ -288,8 +276,7 @@ impl Arrays {
             .collect();
         let word = |i: usize| words.get(i).copied().unwrap_or(0);
         let rows = (0..words.len()).step_by(3);
-        self.triangles
-            .extend(rows.map(|i| [word(i), word(i + 1), word(i + 2)]));
+        self.triangles.extend(rows.map(|i| [word(i), word(i + 1), word(i + 2)]));
     }
 
     fn add(&mut self, mesh: &Mesh, tree: Option<MeshBvh>, need: Need) -> Place {
@@ -339,8 +326,7 @@ impl Arrays {
         let grown = self.vertices.len() + if own_vertices { vertices } else { 0 };
         self.vertices.resize(grown, [0.0; 3]);
         self.normals.resize(grown, [0.0; 3]);
-        self.triangles
-            .resize(self.triangles.len() + triangles, [0; 3]);
+        self.triangles.resize(self.triangles.len() + triangles, [0; 3]);
         place
     }
 }
@@ -349,9 +335,7 @@ impl Arrays {
 pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> Vec<[u32; 3]> {
     let moved = |triangle: &[u32; 3]| triangle.map(|v| v + first_vertex);
     match order {
-        Some(order) => (order.iter())
-            .map(|&i| moved(&mesh.triangles[i as usize]))
-            .collect(),
+        Some(order) => (order.iter()).map(|&i| moved(&mesh.triangles[i as usize])).collect(),
         None => mesh.triangles.iter().map(moved).collect(),
     }
 }

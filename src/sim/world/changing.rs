@@ -64,11 +64,7 @@ impl Changing {
             structures.push(blas.map(|blas| blas.blas().clone()));
             bodies.push(body);
         }
-        Ok(Self {
-            refit: Refit::new(device, kernels, scene, tracer, regions)?,
-            bodies,
-            structures,
-        })
+        Ok(Self { refit: Refit::new(device, kernels, scene, tracer, regions)?, bodies, structures })
     }
 
     /// Takes other kernels.
@@ -113,9 +109,7 @@ impl Changing {
             region.version += 1;
             let strategy = instance.keyframes.strategy;
             let fresh = match strategy.needs_shared_topology() {
-                true => self
-                    .refit
-                    .shape(commands, scene, i, geometry, region, top)?,
+                true => self.refit.shape(commands, scene, i, geometry, region, top)?,
                 false => {
                     let place = &places[instance.mesh];
                     upload(commands, scene, instance, place, geometry, region, top)?;
@@ -129,9 +123,7 @@ impl Changing {
             return Ok(false);
         }
         commands.barrier(Stage::Transfer, Stage::Compute);
-        self.refit.record(
-            commands, scene, places, regions, geometry, fields, &due, top,
-        )?;
+        self.refit.record(commands, scene, places, regions, geometry, fields, &due, top)?;
         for (i, fresh) in due {
             let (Some(body), Some(region)) = (&mut self.bodies[i], &regions[i]) else {
                 continue;
@@ -172,10 +164,7 @@ fn body(
         DynamicBlas::new(device, &instance.name, triangles as u32, count, fast_trace)
     };
     let blas = query.then(new);
-    Ok(Body {
-        made: None,
-        blas: blas.transpose()?,
-    })
+    Ok(Body { made: None, blas: blas.transpose()? })
 }
 
 /// Box around the present shape. Weighted boxes hold the weighted vertices: interval arithmetic.
@@ -224,20 +213,11 @@ fn upload(
     };
     if !cached {
         let at = 12 * u64::from(first_vertex);
-        commands.write(
-            &geometry.vertices,
-            at,
-            bytemuck::cast_slice(&mesh.positions),
-        )?;
+        commands.write(&geometry.vertices, at, bytemuck::cast_slice(&mesh.positions))?;
         commands.write(&geometry.normals, at, bytemuck::cast_slice(&mesh.normals))?;
     }
     let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
-    put_triangles(
-        commands,
-        geometry,
-        region,
-        &ordered(mesh, order, first_vertex),
-    )?;
+    put_triangles(commands, geometry, region, &ordered(mesh, order, first_vertex))?;
     if let Some(tree) = tree {
         put_tree(commands, &tree, region, top)?;
         region.order = Some(tree.triangle_order);
@@ -267,9 +247,5 @@ pub(super) fn put_tree(
     };
     bvh.deepen(tree);
     let placed: Vec<_> = tree.nodes_at(region.root, region.first_triangle).collect();
-    commands.write(
-        nodes,
-        80 * u64::from(region.root),
-        bytemuck::cast_slice(&placed),
-    )
+    commands.write(nodes, 80 * u64::from(region.root), bytemuck::cast_slice(&placed))
 }

@@ -90,11 +90,7 @@ pub(super) fn entries(
             let hidden = hidden.count();
             if set.members[0] == i && hidden < set.members.len() {
                 let shape = set.shape(scene);
-                let geometry = Geometry::Joined {
-                    set: number,
-                    shape,
-                    partial: hidden > 0,
-                };
+                let geometry = Geometry::Joined { set: number, shape, partial: hidden > 0 };
                 entries.push(entry(geometry, set.shapes[shape].bounds, ALWAYS));
             }
             continue;
@@ -210,15 +206,9 @@ pub(super) fn mask(scene: &Scene, entries: &[Entry]) -> Mask {
         instance.shown && shows(instance, entry)
     };
     // What instances share is always entered, whichever of them is shown.
-    let bits = entries
-        .iter()
-        .filter(seen)
-        .fold(ALWAYS, |bits, e| bits | e.mask);
+    let bits = entries.iter().filter(seen).fold(ALWAYS, |bits, e| bits | e.mask);
     let hidden = entries.iter().filter(|e| !seen(e));
-    Mask {
-        bits: bits.into(),
-        ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0),
-    }
+    Mask { bits: bits.into(), ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0) }
 }
 
 /// Whether the top level can follow from `old` to `new` by a refit, as the instances that changed ask.

@@ -108,20 +108,14 @@ impl Sets {
             }
             alike.entry(key).or_default().push(i);
         }
-        let mut sets = Self {
-            all: Vec::new(),
-            of: vec![None; scene.instances.len()],
-        };
+        let mut sets = Self { all: Vec::new(), of: vec![None; scene.instances.len()] };
         let mut found: Vec<_> = alike.into_values().filter(|m| m.len() > 1).collect();
         found.sort();
         for members in found {
             for &i in &members {
                 sets.of[i] = Some(sets.all.len());
             }
-            sets.all.push(Set {
-                members,
-                shapes: Vec::new(),
-            });
+            sets.all.push(Set { members, shapes: Vec::new() });
         }
         sets
     }

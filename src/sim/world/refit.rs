@@ -75,18 +75,12 @@ impl Refit {
                 })
             }
         };
-        Ok(Self {
-            bodies,
-            kernels: Arc::clone(kernels),
-            boxes,
-        })
+        Ok(Self { bodies, kernels: Arc::clone(kernels), boxes })
     }
 
     /// Device memory, bytes.
     pub(super) fn bytes(&self) -> u64 {
-        self.boxes
-            .as_ref()
-            .map_or(0, |b| b.boxes.size() + b.order.size())
+        self.boxes.as_ref().map_or(0, |b| b.boxes.size() + b.order.size())
     }
 
     /// Records the triangles and the tree of the base that serves instance `index` now, unless the
@@ -196,11 +190,7 @@ fn keyframe(instance: &Instance) -> usize {
     let is = |mesh: &usize| *mesh == instance.mesh;
     match keyframes.strategy {
         Strategy::Interpolate => keyframes.nearest(),
-        _ => keyframes
-            .meshes
-            .iter()
-            .position(is)
-            .expect("a keyframe is shown"),
+        _ => keyframes.meshes.iter().position(is).expect("a keyframe is shown"),
     }
 }
 
@@ -235,12 +225,7 @@ fn body(
     tracer: Tracer,
     order: &mut Vec<u32>,
 ) -> Body {
-    let meshes: Vec<_> = instance
-        .keyframes
-        .meshes
-        .iter()
-        .map(|&m| &scene.meshes[m])
-        .collect();
+    let meshes: Vec<_> = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]).collect();
     let mut bases: BTreeMap<usize, Base> = BTreeMap::new();
     let mut serving = Vec::new();
     for (k, mesh) in meshes.iter().enumerate() {
@@ -248,20 +233,13 @@ fn body(
             let cost = base.tree.degradation(meshes[b], &mesh.positions);
             (cost <= DEGRADED).then_some((b, cost))
         };
-        let best = bases
-            .iter()
-            .filter_map(fits)
-            .min_by(|a, b| a.1.total_cmp(&b.1));
+        let best = bases.iter().filter_map(fits).min_by(|a, b| a.1.total_cmp(&b.1));
         serving.push(best.map_or(k, |(b, _)| b));
         if best.is_none() {
             bases.insert(k, base(mesh, region, tracer, order));
         }
     }
-    Body {
-        bases,
-        serving,
-        held: None,
-    }
+    Body { bases, serving, held: None }
 }
 
 fn base(mesh: &crate::scene::Mesh, region: &Place, tracer: Tracer, order: &mut Vec<u32>) -> Base {
@@ -275,8 +253,5 @@ fn base(mesh: &crate::scene::Mesh, region: &Place, tracer: Tracer, order: &mut V
         }
         order.extend(all.order);
     }
-    Base {
-        tree,
-        levels: ranges,
-    }
+    Base { tree, levels: ranges }
 }

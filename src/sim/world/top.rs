@@ -59,11 +59,7 @@ impl Top {
                 }
             }
         };
-        Ok(Self {
-            structure,
-            entries: None,
-            slots: Vec::new(),
-        })
+        Ok(Self { structure, entries: None, slots: Vec::new() })
     }
 
     /// Records the top level over `entries`, if they are not those of the last call. `changing` holds
@@ -87,11 +83,7 @@ impl Top {
                 commands.write(nodes, 0, bytemuck::cast_slice(changed))?;
                 self.slots = bvh.slots.clone();
             }
-            Structure::Query {
-                meshes,
-                joined,
-                tlas,
-            } => {
+            Structure::Query { meshes, joined, tlas } => {
                 let instances: Vec<_> = entries
                     .iter()
                     .map(|entry| TlasInstance {
@@ -148,11 +140,7 @@ impl Top {
     pub(super) fn bytes(&self) -> u64 {
         match &self.structure {
             Structure::Bvh { nodes, .. } => nodes.size(),
-            Structure::Query {
-                meshes,
-                joined,
-                tlas,
-            } => {
+            Structure::Query { meshes, joined, tlas } => {
                 let all = meshes.iter().flatten().chain(joined.iter().flatten());
                 tlas.bytes() + all.map(Blas::bytes).sum::<u64>()
             }
@@ -178,9 +166,7 @@ fn build_meshes(
         })
         .collect();
     let mut built = Blas::build_many(device, &inputs, BlasOptions::default())?.into_iter();
-    Ok(all()
-        .map(|mesh| walked(&mesh).then(|| built.next()).flatten())
-        .collect())
+    Ok(all().map(|mesh| walked(&mesh).then(|| built.next()).flatten()).collect())
 }
 
 /// Structures of sets, whose triangles lie as they do in the arrays: member after member.
@@ -199,11 +185,7 @@ fn build_joined(
                 triangles.extend(ordered(mesh, None, positions.len() as u32));
                 positions.extend_from_slice(&mesh.positions);
             }
-            let input = BlasInput {
-                name: "joined",
-                positions: &positions,
-                triangles: &triangles,
-            };
+            let input = BlasInput { name: "joined", positions: &positions, triangles: &triangles };
             shapes.extend(Blas::build_many(device, &[input], BlasOptions::default())?);
         }
         built.push(shapes);

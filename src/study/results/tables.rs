@@ -102,9 +102,7 @@ impl Results {
             head: numbered.chain(["median".to_owned()]).collect(),
             rows: self.by_background(|rated| {
                 let counts = rated.agreement.iter().map(|&n| Cell::Count(n));
-                counts
-                    .chain([Cell::Number(rated.median_agreement())])
-                    .collect()
+                counts.chain([Cell::Number(rated.median_agreement())]).collect()
             }),
             note: "1 is the least agreement, 5 the most (Likert 1932).".to_owned(),
         }
@@ -119,9 +117,7 @@ impl Results {
         let plain = row("none changed", [0, self.unperturbed, 0]);
         Table {
             title: "Chosen images, by the parameter that was changed".to_owned(),
-            head: ["below", "as it is", "above", "chosen"]
-                .map(str::to_owned)
-                .to_vec(),
+            head: ["below", "as it is", "above", "chosen"].map(str::to_owned).to_vec(),
             rows: [plain].into_iter().chain(each).collect(),
             note: format!(
                 "Images chosen: {}, of them with no parameter changed: {}; by lot it would be {:.1}.",
@@ -159,9 +155,7 @@ impl Results {
         };
         Table {
             title: "Friedman's test".to_owned(),
-            head: ["blocks", "statistic", "p", "Kendall's W"]
-                .map(str::to_owned)
-                .to_vec(),
+            head: ["blocks", "statistic", "p", "Kendall's W"].map(str::to_owned).to_vec(),
             rows: self.friedman.into_iter().map(row).collect(),
             note: format!(
                 "p {kind} (Friedman 1937); W is 1 where all blocks agree (Kendall and Babington \
@@ -220,12 +214,10 @@ pub fn plain(results: &Results) -> String {
         for row in &grid {
             let cells = row.iter().zip(&widths).enumerate();
             let cells =
-                cells.map(
-                    |(i, (cell, &width))| match i < grid[0].len() - table.head.len() {
-                        true => format!("{cell:<width$}"),
-                        false => format!("{cell:>width$}"),
-                    },
-                );
+                cells.map(|(i, (cell, &width))| match i < grid[0].len() - table.head.len() {
+                    true => format!("{cell:<width$}"),
+                    false => format!("{cell:>width$}"),
+                });
             let line = cells.collect::<Vec<_>>().join("  ");
             let _ = writeln!(out, "  {}", line.trim_end());
         }
@@ -236,11 +228,7 @@ pub fn plain(results: &Results) -> String {
 
 /// As Markdown.
 pub fn markdown(results: &Results) -> String {
-    let escape = |text: &str| {
-        text.replace('\\', "\\\\")
-            .replace('|', "\\|")
-            .replace('\n', " ")
-    };
+    let escape = |text: &str| text.replace('\\', "\\\\").replace('|', "\\|").replace('\n', " ");
     let mut out = format!("# Results of a study\n{}\n", escape(&results.heading()));
     for table in results.tables() {
         let grid = grid(&table);
@@ -287,8 +275,5 @@ fn grid(table: &Table) -> Vec<Vec<String>> {
         let values = values.iter().map(|v| v.shown());
         names[first..].iter().cloned().chain(values).collect()
     };
-    [head]
-        .into_iter()
-        .chain(table.rows.iter().map(row))
-        .collect()
+    [head].into_iter().chain(table.rows.iter().map(row)).collect()
 }

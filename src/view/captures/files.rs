@@ -27,10 +27,7 @@ impl Claim {
         for number in 1.. {
             let base = format!("{stem}-{number:04}");
             let is_taken = |end: &str| folder.join(format!("{base}{end}")).exists();
-            if ["", ".png", ".gif", "-marked.png"]
-                .into_iter()
-                .any(is_taken)
-            {
+            if ["", ".png", ".gif", "-marked.png"].into_iter().any(is_taken) {
                 continue;
             }
             let path = folder.join(format!("{base}.json"));
@@ -100,9 +97,7 @@ pub(super) fn name(path: &Path) -> Value {
 /// Writes a file that must not exist.
 pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
     let opened = OpenOptions::new().write(true).create_new(true).open(path);
-    opened
-        .and_then(|mut file| file.write_all(bytes))
-        .map_err(|e| CaptureError::file(path, e))
+    opened.and_then(|mut file| file.write_all(bytes)).map_err(|e| CaptureError::file(path, e))
 }
 
 /// 8-bit grey, the red channel of `rgba`, with its scale: pixels of `pitch` mm; and a text under the
@@ -165,9 +160,8 @@ mod tests {
         let at = folder.path().join("made/for it");
         let names = |at: &Path| {
             let all = std::fs::read_dir(at).unwrap();
-            let mut names: Vec<_> = all
-                .map(|e| e.unwrap().file_name().into_string().unwrap())
-                .collect();
+            let mut names: Vec<_> =
+                all.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
             names.sort();
             names
         };
@@ -177,11 +171,7 @@ mod tests {
         write_new(&second.add_folder().unwrap().join("0000.png"), b"2").unwrap();
         first.keep(&Sidecar::new()).unwrap();
         drop(second);
-        assert_eq!(
-            names(&at),
-            ["a-0001.json", "a-0001.png"],
-            "what is not kept is gone"
-        );
+        assert_eq!(names(&at), ["a-0001.json", "a-0001.png"], "what is not kept is gone");
         // A picture without its sidecar is not written over, either.
         std::fs::write(at.join("a-0002.gif"), "").unwrap();
         let third = Claim::new(&at, "a").unwrap();
@@ -198,10 +188,7 @@ mod tests {
             Ok(_) => panic!("a folder in a file"),
             Err(error) => error.to_string(),
         };
-        assert!(
-            text.contains("cannot be written") && text.contains("Name a folder"),
-            "{text}"
-        );
+        assert!(text.contains("cannot be written") && text.contains("Name a folder"), "{text}");
     }
 
     #[test]
@@ -214,16 +201,9 @@ mod tests {
         let chunks = chunks(&png);
         let kinds: Vec<&str> = chunks.iter().map(|c| c.0).collect();
         assert_eq!(kinds, ["IHDR", "pHYs", "iTXt", "IDAT", "IEND"]);
-        assert_eq!(
-            chunks[1].1,
-            [0, 0, 0x13, 0x88, 0, 0, 0x13, 0x88, 1],
-            "5000 a metre"
-        );
+        assert_eq!(chunks[1].1, [0, 0, 0x13, 0x88, 0, 0, 0x13, 0x88, 1], "5000 a metre");
         let (keyword, rest) = chunks[2].1.split_at(13);
-        assert_eq!(
-            (keyword, rest),
-            (&b"insonify\0\0\0\0\0"[..], text.as_bytes())
-        );
+        assert_eq!((keyword, rest), (&b"insonify\0\0\0\0\0"[..], text.as_bytes()));
     }
 
     /// Type and content of each, with the sum that the format's own program computes (PNG, third
@@ -237,11 +217,7 @@ mod tests {
             let body = &png[4..8 + length];
             let sum = body.iter().fold(u32::MAX, |sum, &byte| {
                 (0..8).fold(sum ^ u32::from(byte), |c, _| {
-                    if c & 1 == 1 {
-                        0xedb8_8320 ^ (c >> 1)
-                    } else {
-                        c >> 1
-                    }
+                    if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 }
                 })
             });
             assert_eq!(!sum, word(&png[8 + length..]));

@@ -16,38 +16,21 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
         return;
     }
     ui.horizontal(|ui| {
-        let word = if model.clock.is_playing() {
-            "Pause"
-        } else {
-            "Play"
-        };
-        if ui
-            .button(word)
-            .on_hover_text("Let the scene's time pass (P)")
-            .clicked()
-        {
+        let word = if model.clock.is_playing() { "Pause" } else { "Play" };
+        if ui.button(word).on_hover_text("Let the scene's time pass (P)").clicked() {
             model.clock.play(!model.clock.is_playing(), now);
             model.touch(now);
         }
         let mut seconds = model.clock.at(now);
-        let time = DragValue::new(&mut seconds)
-            .speed(0.02)
-            .fixed_decimals(2)
-            .suffix(" s");
-        if ui
-            .add(time)
-            .on_hover_text("The scene's time: drag or type")
-            .changed()
-        {
+        let time = DragValue::new(&mut seconds).speed(0.02).fixed_decimals(2).suffix(" s");
+        if ui.add(time).on_hover_text("The scene's time: drag or type").changed() {
             model.clock.seek(seconds, now);
             model.touch(now);
         }
     });
     let mut speed = model.clock.speed();
-    let slider = Slider::new(&mut speed, 0.05..=4.0)
-        .logarithmic(true)
-        .max_decimals(2)
-        .text("speed");
+    let slider =
+        Slider::new(&mut speed, 0.05..=4.0).logarithmic(true).max_decimals(2).text("speed");
     let tip = "Seconds of the scene per second";
     if ui.add(slider).on_hover_text(tip).changed() {
         model.clock.set_speed(speed, now);
@@ -66,8 +49,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
             let together = |other: &&Placed| switch.is_some() && other.switch == *switch;
             let meshes = || {
                 let own = std::slice::from_ref(&model.meshes[index]);
-                own.iter()
-                    .chain(model.meshes[index + 1..].iter().filter(together))
+                own.iter().chain(model.meshes[index + 1..].iter().filter(together))
             };
             let shares = meshes().all(|mesh| mesh.shares_topology);
             ui.horizontal(|ui| {

@@ -32,11 +32,7 @@ pub(super) fn row(ui: &mut Ui, key: &str, label: &str, add: impl FnOnce(&mut Ui,
 
 /// The two columns that the controls below fill.
 pub(super) fn grid(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
-    egui::Grid::new(id)
-        .num_columns(2)
-        .spacing([8.0, 4.0])
-        .min_col_width(96.0)
-        .show(ui, add);
+    egui::Grid::new(id).num_columns(2).spacing([8.0, 4.0]).min_col_width(96.0).show(ui, add);
 }
 
 /// A slider over the `usual` values; typing takes all that a scene file may give.
@@ -63,18 +59,14 @@ pub(super) fn number(
     value: &mut f64,
     usual: RangeInclusive<f64>,
 ) {
-    row(ui, key, label, |ui, entry| {
-        slider(ui, key, entry, value, usual)
-    });
+    row(ui, key, label, |ui, entry| slider(ui, key, entry, value, usual));
 }
 
 /// An angle, shown in degrees and held in radians.
 pub(super) fn angle(ui: &mut Ui, key: &str, label: &str, value: &mut f64, most: f64) {
     row(ui, key, label, |ui, entry| {
         let mut degrees = value.to_degrees();
-        let slider = Slider::new(&mut degrees, 10.0..=most)
-            .max_decimals(1)
-            .suffix(" deg");
+        let slider = Slider::new(&mut degrees, 10.0..=most).max_decimals(1).suffix(" deg");
         if explained(ui.add(slider), key, entry).changed() {
             *value = degrees.to_radians();
         }
@@ -118,11 +110,7 @@ pub(super) fn number_or(
     row(ui, key, label, |ui, entry| {
         let mut is_off = *value == off;
         if ui.checkbox(&mut is_off, word).changed() {
-            *value = if is_off {
-                off
-            } else {
-                (usual.start() + usual.end()) / 2.0
-            };
+            *value = if is_off { off } else { (usual.start() + usual.end()) / 2.0 };
         }
         if !is_off {
             let number = DragValue::new(value)
@@ -147,9 +135,7 @@ pub(super) fn choice<T>(ui: &mut Ui, key: &str, label: &str, value: &mut T)
 where
     T: for<'de> Deserialize<'de> + PartialEq,
 {
-    row(ui, key, label, |ui, entry| {
-        words(ui, key, value, entry, |_| true)
-    });
+    row(ui, key, label, |ui, entry| words(ui, key, value, entry, |_| true));
 }
 
 /// The list of words alone, those that are `possible`; `id` tells several of one key apart.
@@ -165,14 +151,12 @@ pub(super) fn words<T>(
     let of = |word: &str| T::deserialize(StrDeserializer::<Error>::new(word)).ok();
     let chosen = entry.choices.iter().find(|w| of(w).as_ref() == Some(value));
     let shown = chosen.map_or("", String::as_str);
-    let list = ComboBox::from_id_salt(id)
-        .selected_text(shown)
-        .show_ui(ui, |ui| {
-            for word in &entry.choices {
-                if let Some(choice) = of(word).filter(&possible) {
-                    ui.selectable_value(value, choice, word);
-                }
+    let list = ComboBox::from_id_salt(id).selected_text(shown).show_ui(ui, |ui| {
+        for word in &entry.choices {
+            if let Some(choice) = of(word).filter(&possible) {
+                ui.selectable_value(value, choice, word);
             }
-        });
+        }
+    });
     explained(list.response, id, entry);
 }

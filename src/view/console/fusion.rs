@@ -12,37 +12,19 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
         return;
     };
     grid(ui, "fusion", |ui| {
-        choice(
-            ui,
-            "fusion.surroundings",
-            "Around the mask",
-            &mut fusion.surroundings,
-        );
+        choice(ui, "fusion.surroundings", "Around the mask", &mut fusion.surroundings);
         count(ui, "fusion.blur", "Blur", &mut fusion.blur, 1..=128);
         choice(ui, "fusion.blend", "Blend", &mut fusion.blend);
-        choice(
-            ui,
-            "fusion.mask_speed",
-            "Mask speed",
-            &mut fusion.mask_speed,
-        );
-        switch(
-            ui,
-            "fusion.background_shadows",
-            "Shadows",
-            &mut fusion.background_shadows,
-        );
+        choice(ui, "fusion.mask_speed", "Mask speed", &mut fusion.mask_speed);
+        switch(ui, "fusion.background_shadows", "Shadows", &mut fusion.background_shadows);
     });
     let mut real = model.real;
-    ui.checkbox(&mut real.shown, "Which pixels are real")
-        .on_hover_text(
-            "Colours what of the image comes from the acquired volume; mixed pixels by their share \
+    ui.checkbox(&mut real.shown, "Which pixels are real").on_hover_text(
+        "Colours what of the image comes from the acquired volume; mixed pixels by their share \
              of it (B). Saved images are not coloured.",
-        );
+    );
     if real.shown {
-        let slider = Slider::new(&mut real.opacity, 0.05..=1.0)
-            .max_decimals(2)
-            .text("opacity");
+        let slider = Slider::new(&mut real.opacity, 0.05..=1.0).max_decimals(2).text("opacity");
         ui.add(slider).on_hover_text(
             "Of the colour over a pixel that is all acquired; 1 hides its grey level",
         );

@@ -82,11 +82,7 @@ fn network(ui: &mut Ui, inputs: &mut Inputs) {
     ui.horizontal(|ui| {
         let tip = "Trackers and 3D Slicer connect here: they move the probe and receive the image. \
                    Programs on this machine only, unless --igtl-bind says otherwise.";
-        if ui
-            .checkbox(&mut on, "OpenIGTLink, port")
-            .on_hover_text(tip)
-            .changed()
-        {
+        if ui.checkbox(&mut on, "OpenIGTLink, port").on_hover_text(tip).changed() {
             inputs.switch(on);
         }
         let is_off = inputs.report.is_none();
@@ -126,11 +122,7 @@ fn replay(model: &Model, now: Instant) -> String {
             format!("{at:.1} of {:.1} s", replay.length())
         }
         (_, _, Some(kept)) => {
-            let unsaved = if kept.unsaved.is_some() {
-                ", not saved"
-            } else {
-                ""
-            };
+            let unsaved = if kept.unsaved.is_some() { ", not saved" } else { "" };
             format!("{:.1} s, {}{unsaved}", kept.seconds(), kept.name)
         }
         _ => "nothing recorded".to_owned(),
@@ -141,11 +133,7 @@ fn replay(model: &Model, now: Instant) -> String {
 fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.horizontal(|ui| {
         let is_recording = model.ways.recorder.is_some();
-        let word = if is_recording {
-            "Stop recording"
-        } else {
-            "Record"
-        };
+        let word = if is_recording { "Stop recording" } else { "Record" };
         let tip = "Record where the probe goes, whatever moves it (R)";
         if ui.button(word).on_hover_text(tip).clicked() {
             model.record(now);
@@ -155,11 +143,7 @@ fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
             ui.ctx().request_repaint_after(Duration::from_millis(500));
         }
         let is_replaying = model.ways.replay.is_some();
-        let word = if is_replaying {
-            "Stop replay"
-        } else {
-            "Replay"
-        };
+        let word = if is_replaying { "Stop replay" } else { "Replay" };
         let tip = "Let the probe go along the trajectory; whatever else moves it takes it (Ctrl+R)";
         let button = egui::Button::new(word);
         let enabled = is_replaying || model.ways.kept.is_some() && !is_recording;
@@ -167,8 +151,7 @@ fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
             model.replay(now);
         }
         let tip = "Begin again at its end; for the next replay";
-        ui.checkbox(&mut model.ways.looped, "loop")
-            .on_hover_text(tip);
+        ui.checkbox(&mut model.ways.looped, "loop").on_hover_text(tip);
     });
     let tip = "As fast as the scene's time passes, from the time at which the recording began; else at \
                the recorded pace. For the next replay";
@@ -182,26 +165,14 @@ fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs) {
         let field = TextEdit::singleline(&mut inputs.path).desired_width(180.0);
         ui.add(field)
             .on_hover_text("Trajectory file (.csv): time_s, x_mm, y_mm, z_mm, qw, qx, qy, qz");
-        let unsaved = model
-            .ways
-            .kept
-            .as_ref()
-            .is_some_and(|k| k.unsaved.is_some());
+        let unsaved = model.ways.kept.as_ref().is_some_and(|k| k.unsaved.is_some());
         let replaces = std::path::Path::new(&inputs.path).exists();
-        let word = if replaces && unsaved {
-            "Replace"
-        } else {
-            "Save"
-        };
+        let word = if replaces && unsaved { "Replace" } else { "Save" };
         let button = ui.add_enabled(unsaved, egui::Button::new(word));
         if button.on_hover_text("Write what was recorded").clicked() {
             inputs.save(&mut model.ways);
         }
-        if ui
-            .button("Load")
-            .on_hover_text("Read a trajectory")
-            .clicked()
-        {
+        if ui.button("Load").on_hover_text("Read a trajectory").clicked() {
             inputs.load(&mut model.ways);
         }
     });

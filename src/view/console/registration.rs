@@ -17,19 +17,10 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
             .on_hover_text("Three planes through the volume with the meshes' lines (G)");
         ui.label("Moves:");
         for (moves, name, tip) in [
-            (
-                Moves::Volume,
-                "Volume",
-                "The volume moves; model and probe stay",
-            ),
-            (
-                Moves::Model,
-                "Model",
-                "All meshes move; volume and probe stay",
-            ),
+            (Moves::Volume, "Volume", "The volume moves; model and probe stay"),
+            (Moves::Model, "Model", "All meshes move; volume and probe stay"),
         ] {
-            ui.selectable_value(&mut registration.moves, moves, name)
-                .on_hover_text(tip);
+            ui.selectable_value(&mut registration.moves, moves, name).on_hover_text(tip);
         }
     });
     let table = match registration.moves {
@@ -43,11 +34,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
         registration.put(&mut model.settings, changed);
     }
     let tip = "Volume and model where the scene file has them";
-    if ui
-        .button("Place as in the file")
-        .on_hover_text(tip)
-        .clicked()
-    {
+    if ui.button("Place as in the file").on_hover_text(tip).clicked() {
         let (settings, loaded) = (&mut model.settings, &model.loaded);
         settings.model = loaded.model;
         if let (Some(volume), Some(as_loaded)) = (&mut settings.volume, &loaded.volume) {
@@ -82,12 +69,7 @@ fn placement(ui: &mut Ui, table: &str, place: &mut DAffine3) {
     });
     row(ui, &format!("{table}.scale"), "Scale", |ui, entry| {
         let value = DragValue::new(&mut factor).speed(0.002).max_decimals(4);
-        any |= explained(
-            ui.add(value.range(entry.range[0]..=entry.range[1])),
-            "",
-            entry,
-        )
-        .changed();
+        any |= explained(ui.add(value.range(entry.range[0]..=entry.range[1])), "", entry).changed();
     });
     if any {
         let turn = DVec3::from(turn.map(f64::to_radians));
@@ -126,10 +108,8 @@ fn masks(ui: &mut Ui, model: &mut Model) {
             let closed = registration.is_closed(index);
             // A scene without a mask would be no fusion.
             let last = chosen && fusion.masks.len() == 1;
-            let response = ui.add_enabled(
-                closed && !last,
-                egui::Checkbox::new(&mut chosen, &mesh.name),
-            );
+            let response =
+                ui.add_enabled(closed && !last, egui::Checkbox::new(&mut chosen, &mesh.name));
             let response = response.on_disabled_hover_text(match closed {
                 true => "One mesh has to be a mask",
                 false => "Not closed: it has no inside",

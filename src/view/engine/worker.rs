@@ -182,13 +182,7 @@ impl Worker {
     /// What there is to make of an order now.
     fn taken(&self, order: Order, index: u32) -> Taken {
         let now = Instant::now();
-        Taken {
-            pose: order.pose(now),
-            seconds: order.clock.at(now),
-            order,
-            index,
-            level: None,
-        }
+        Taken { pose: order.pose(now), seconds: order.clock.at(now), order, index, level: None }
     }
 
     /// Hands news over; whether there will be more.
@@ -399,11 +393,7 @@ impl Worker {
         };
         simulator.tint_on(tinted.clone());
         // The scene's own picture is that of `render`, with the noise of its first frame.
-        let index = if level == 0 && at_rest {
-            0
-        } else {
-            taken.index
-        };
+        let index = if level == 0 && at_rest { 0 } else { taken.index };
         let submitted = simulator.frame(scene, index);
         simulator.show_on(None);
         simulator.tint_on(None);
@@ -412,8 +402,7 @@ impl Worker {
         let wall = began.elapsed();
         // The first frame at all compiles what the driver has put off.
         if self.left.is_some() {
-            self.pace
-                .finished(level, (wall - prepared).as_secs_f64() * 1e3);
+            self.pace.finished(level, (wall - prepared).as_secs_f64() * 1e3);
         }
         let pixels = match order.reads_back {
             true => {
@@ -423,13 +412,7 @@ impl Worker {
             }
             false => None,
         };
-        self.left = Some(Imaged {
-            order: order.clone(),
-            index: taken.index,
-            pose,
-            seconds,
-            level,
-        });
+        self.left = Some(Imaged { order: order.clone(), index: taken.index, pose, seconds, level });
         let mut state = self.shared.lock();
         state.looks_new = state.look.is_some();
         drop(state);

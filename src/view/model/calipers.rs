@@ -83,11 +83,7 @@ impl Caliper {
     /// When there are not as many points as `kind` takes.
     pub fn new(kind: Kind, points: Vec<DVec2>) -> Self {
         assert_eq!(points.len(), kind.points());
-        let mut made = Self {
-            kind,
-            points,
-            label: String::new(),
-        };
+        let mut made = Self { kind, points, label: String::new() };
         made.settle();
         made
     }
@@ -125,11 +121,7 @@ impl Caliper {
             Kind::Angle => {
                 let arms = [p[0] - p[1], p[2] - p[1]];
                 let is_drawn = arms.iter().all(|arm| arm.length() > 0.0);
-                let angle = if is_drawn {
-                    arms[0].angle_to(arms[1])
-                } else {
-                    0.0
-                };
+                let angle = if is_drawn { arms[0].angle_to(arms[1]) } else { 0.0 };
                 Reading::Angle(angle.abs().to_degrees())
             }
         }
@@ -229,10 +221,7 @@ mod tests {
             ([[3.0, 1.0], [0.0, 1.0], [9.0, 1.0]], 0.0),
             ([[0.0, 1.0], [0.0, 1.0], [9.0, 1.0]], 0.0),
             // On both sides of the cut of the arc tangent.
-            (
-                [[-1.0, 0.1], [0.0, 0.0], [-1.0, -0.1]],
-                2.0 * 0.1_f64.atan().to_degrees(),
-            ),
+            ([[-1.0, 0.1], [0.0, 0.0], [-1.0, -0.1]], 2.0 * 0.1_f64.atan().to_degrees()),
         ] {
             let Reading::Angle(degrees) = made(Kind::Angle, &points).reading() else {
                 panic!("an angle");
@@ -246,12 +235,7 @@ mod tests {
         // The third point need not lie on the second axis: what counts is how far it is from the first.
         let drawn = made(Kind::Ellipse, &[[10.0, 20.0], [10.0, 50.0], [18.0, 24.0]]);
         assert_eq!(drawn.points[2], dvec2(18.0, 35.0));
-        let Reading::Ellipse {
-            axes,
-            circumference,
-            area,
-        } = drawn.reading()
-        else {
+        let Reading::Ellipse { axes, circumference, area } = drawn.reading() else {
             panic!("an ellipse");
         };
         assert_eq!(axes, [30.0, 16.0]);
@@ -260,10 +244,7 @@ mod tests {
         let sides = 20_000;
         let at = |i| drawn.outline(2.0 * PI * f64::from(i) / f64::from(sides));
         let length: f64 = (0..sides).map(|i| at(i).distance(at(i + 1))).sum();
-        assert!(
-            (length - circumference).abs() < 1e-6,
-            "{length} {circumference}"
-        );
+        assert!((length - circumference).abs() < 1e-6, "{length} {circumference}");
         // Ends carry the second axis with them, without changing it.
         let mut moved = drawn.clone();
         moved.drag(1, dvec2(40.0, 20.0));
@@ -294,10 +275,7 @@ mod tests {
             let sum: f64 = (0..steps).map(speed).sum();
             let integral = sum * 2.0 * PI / f64::from(steps);
             let found = circumference(a, b);
-            assert!(
-                (found - integral).abs() < 1e-9 * integral,
-                "{a} {b}: {found} {integral}"
-            );
+            assert!((found - integral).abs() < 1e-9 * integral, "{a} {b}: {found} {integral}");
         }
     }
 }

@@ -70,11 +70,7 @@ impl Camera {
     pub fn orbit(&mut self, panel: DVec2, by: DVec2) {
         let angle = -by / panel.min_element().max(1.0) * std::f64::consts::PI;
         // Upside down, what is dragged still follows the hand.
-        let upright = if self.above().dot(self.up) < 0.0 {
-            -1.0
-        } else {
-            1.0
-        };
+        let upright = if self.above().dot(self.up) < 0.0 { -1.0 } else { 1.0 };
         let around = DQuat::from_axis_angle(self.up, angle.x * upright);
         let over = DQuat::from_axis_angle(DVec3::X, angle.y);
         self.turn = (around * self.turn * over).normalize();
@@ -121,10 +117,7 @@ impl Camera {
     pub fn ray(&self, panel: DVec2, place: DVec2) -> Ray {
         let off = (place - panel / 2.0) * self.pitch(panel);
         let direction = self.forward() + off.x * self.right() - off.y * self.above();
-        Ray {
-            origin: self.eye(),
-            direction: direction.normalize(),
-        }
+        Ray { origin: self.eye(), direction: direction.normalize() }
     }
 
     /// Where a point of the world (mm) is seen in the panel, or beside it; nothing where it is not in
@@ -161,13 +154,9 @@ mod tests {
     #[test]
     fn from_the_front_the_plane_lies_as_the_image_does() {
         let camera = camera();
-        let [middle, right, deeper, nearer] = [
-            [0.0, 0.0, 60.0],
-            [20.0, 0.0, 60.0],
-            [0.0, 0.0, 80.0],
-            [20.0, 15.0, 60.0],
-        ]
-        .map(|p| seen(&camera, p));
+        let [middle, right, deeper, nearer] =
+            [[0.0, 0.0, 60.0], [20.0, 0.0, 60.0], [0.0, 0.0, 80.0], [20.0, 15.0, 60.0]]
+                .map(|p| seen(&camera, p));
         assert!((middle - PANEL / 2.0).length() < 1e-9);
         // 20 mm at the target's distance, by the perspective.
         let length = 20.0 / (camera.distance * camera.pitch(PANEL));

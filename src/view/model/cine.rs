@@ -96,10 +96,7 @@ impl<T> Cine<T> {
 
     /// Drops all frames.
     pub fn clear(&mut self) {
-        *self = Self {
-            speed: self.speed,
-            ..Self::new(self.limit)
-        };
+        *self = Self { speed: self.speed, ..Self::new(self.limit) };
     }
 
     /// Shows the newest frame again, and plays and saves all.
@@ -242,9 +239,7 @@ impl<T> Cine<T> {
             let shown = self.shown_for(index).as_secs_f64();
             if left < shown || index == last {
                 self.cursor = index;
-                return Some(Duration::from_secs_f64(
-                    (shown - left).max(1e-3) / self.speed,
-                ));
+                return Some(Duration::from_secs_f64((shown - left).max(1e-3) / self.speed));
             }
             left -= shown;
         }
@@ -274,10 +269,7 @@ mod tests {
         (cine, now)
     }
 
-    const MANY: Limit = Limit {
-        frames: 256,
-        bytes: 1 << 20,
-    };
+    const MANY: Limit = Limit { frames: 256, bytes: 1 << 20 };
 
     #[test]
     fn the_oldest_give_way() {
@@ -288,11 +280,7 @@ mod tests {
         let (mut cine, now) = filled(small, 9);
         assert_eq!((cine.len(), cine.bytes()), (4, 40));
         cine.push(9, 1000, now);
-        assert_eq!(
-            (cine.len(), cine.shown()),
-            (1, Some(&9)),
-            "one is always held"
-        );
+        assert_eq!((cine.len(), cine.shown()), (1, Some(&9)), "one is always held");
         cine.clear();
         assert!(cine.is_empty() && cine.shown().is_none() && cine.bytes() == 0);
         assert_eq!(cine.marked().len(), 0);
@@ -328,15 +316,7 @@ mod tests {
         let forty = MS(40);
         assert_eq!(times, [(2, forty), (3, forty), (4, forty), (5, LAST)]);
         cine.play(true, now);
-        for (ms, frame) in [
-            (0, 2),
-            (39, 2),
-            (41, 3),
-            (81, 4),
-            (121, 5),
-            (215, 5),
-            (225, 2),
-        ] {
+        for (ms, frame) in [(0, 2), (39, 2), (41, 3), (81, 4), (121, 5), (215, 5), (225, 2)] {
             let wait = cine.tick(now + MS(ms)).expect("it plays");
             assert_eq!(cine.shown(), Some(&frame), "{ms} ms");
             assert!(wait <= LAST, "{ms} ms");
@@ -363,10 +343,7 @@ mod tests {
         cine.push('b', 1, now + Duration::from_secs(300));
         assert_eq!(cine.time_between(0, 1), Duration::from_secs(1));
         cine.mark_last(0);
-        assert_eq!(
-            cine.marked().map(|(f, d)| (*f, d)).collect::<Vec<_>>(),
-            [('a', LAST)]
-        );
+        assert_eq!(cine.marked().map(|(f, d)| (*f, d)).collect::<Vec<_>>(), [('a', LAST)]);
         cine.play(true, now);
         assert!(!cine.is_playing(), "one frame stands");
     }

@@ -18,13 +18,7 @@ pub struct Clock {
 impl Clock {
     /// A clock that shows `seconds` now.
     pub fn new(seconds: f64, playing: bool, now: Instant) -> Self {
-        Self {
-            seconds,
-            anchor: now,
-            speed: 1.0,
-            playing,
-            held: false,
-        }
+        Self { seconds, anchor: now, speed: 1.0, playing, held: false }
     }
 
     /// The scene's time, s.

@@ -26,10 +26,7 @@ pub(super) fn changes(
     lattice: f64,
 ) -> Vec<Entry> {
     let mut out = probe_changes(&from.probe, &to.probe);
-    out.extend(differing(
-        simulation(&from.simulation),
-        simulation(&to.simulation),
-    ));
+    out.extend(differing(simulation(&from.simulation), simulation(&to.simulation)));
     out.extend(cell(from, to, lattice));
     out.extend(differing(imaging(&from.imaging), imaging(&to.imaging)));
     out.extend(differing(live(&from.live), live(&to.live)));
@@ -39,20 +36,13 @@ pub(super) fn changes(
     if let (Some(from), Some(to)) = (&from.volume, &to.volume) {
         out.extend(differing(volume(from), volume(to)));
     }
-    out.extend(differing(
-        placed("model", &from.model),
-        placed("model", &to.model),
-    ));
+    out.extend(differing(placed("model", &from.model), placed("model", &to.model)));
     out.extend(tissue_changes(&from.tissues, &to.tissues, &origins.bases));
     // Instances of one table have the same settings: the first speaks for all.
     let mut done: Vec<&Origin> = Vec::new();
     for (i, origin) in origins.instances.iter().enumerate() {
         if !done.iter().any(|o| o.mesh == origin.mesh) {
-            out.extend(surface_changes(
-                &origin.mesh,
-                &from.surfaces[i],
-                &to.surfaces[i],
-            ));
+            out.extend(surface_changes(&origin.mesh, &from.surfaces[i], &to.surfaces[i]));
         }
         if from.strategies[i] != to.strategies[i]
             && let Some(strategy) = to.strategies[i]
@@ -105,11 +95,7 @@ pub(super) fn is_same_lattice(a: f64, b: f64) -> bool {
 /// are more scatterers than cells.
 fn cell(from: &Settings, to: &Settings, file: f64) -> Option<Entry> {
     let inputs = |s: &Settings| {
-        let s = (
-            s.simulation.cell,
-            s.simulation.density_scale,
-            s.probe.frequency,
-        );
+        let s = (s.simulation.cell, s.simulation.density_scale, s.probe.frequency);
         [s.0, s.1, s.2]
     };
     if inputs(from) == inputs(to) {
@@ -135,10 +121,7 @@ fn probe_changes(from: &Probe, to: &Probe) -> Vec<Entry> {
     let Some((preset, _)) = Probe::PRESETS.iter().find(|(_, make)| make() == *to) else {
         return differing(probe(from), probe(to));
     };
-    let mut out: Vec<Entry> = probe(to)
-        .into_iter()
-        .map(|(path, _)| (path, None))
-        .collect();
+    let mut out: Vec<Entry> = probe(to).into_iter().map(|(path, _)| (path, None)).collect();
     out.push(("probe.preset".into(), Some(format!("\"{preset}\""))));
     out
 }
@@ -163,10 +146,9 @@ fn probe(p: &Probe) -> Vec<Entry> {
         slice_thickness,
     } = p;
     let (word, radius, view, width) = match *kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => ("convex", Some(radius), Some(field_of_view), None),
+        Kind::Convex { radius, field_of_view } => {
+            ("convex", Some(radius), Some(field_of_view), None)
+        }
         Kind::Linear { width } => ("linear", None, None, Some(width)),
         Kind::Phased { field_of_view } => ("phased", None, Some(field_of_view), None),
     };
@@ -247,10 +229,7 @@ fn simulation(s: &Simulation) -> Vec<Entry> {
         of("emission_lobe", *emission_lobe),
         of("beam_width", *beam_width),
         word("simulation.scatter_mode", scatter_mode),
-        of(
-            "scatterers_per_resolution_cell",
-            *scatterers_per_resolution_cell,
-        ),
+        of("scatterers_per_resolution_cell", *scatterers_per_resolution_cell),
         word("simulation.texture_space", texture_space),
         of("volume_floor", *volume_floor),
         of("branch_floor", *branch_floor),
@@ -306,25 +285,13 @@ fn live(l: &Live) -> Vec<Entry> {
 }
 
 fn fusion(f: &Fusion, origins: &Origins) -> Vec<Entry> {
-    let Fusion {
-        masks,
-        surroundings,
-        blur,
-        blend,
-        mask_speed,
-        background_shadows,
-    } = f;
+    let Fusion { masks, surroundings, blur, blend, mask_speed, background_shadows } = f;
     let masks = masks.iter().filter_map(|&i| origins.instances.get(i));
     // An animated file has several instances of one name.
-    let mut names: Vec<String> = masks
-        .map(|o| Value::from(o.mesh.as_str()).to_string())
-        .collect();
+    let mut names: Vec<String> = masks.map(|o| Value::from(o.mesh.as_str()).to_string()).collect();
     names.dedup();
     vec![
-        (
-            "fusion.mask".into(),
-            Some(format!("[{}]", names.join(", "))),
-        ),
+        ("fusion.mask".into(), Some(format!("[{}]", names.join(", ")))),
         word("fusion.surroundings", surroundings),
         whole("fusion.blur", *blur),
         word("fusion.blend", blend),
@@ -334,11 +301,7 @@ fn fusion(f: &Fusion, origins: &Origins) -> Vec<Entry> {
 }
 
 fn volume(d: &Display) -> Vec<Entry> {
-    let Display {
-        world_from_lps,
-        black,
-        white,
-    } = d;
+    let Display { world_from_lps, black, white } = d;
     let mut out = placed("volume", world_from_lps);
     out.extend([
         number("volume.black", "volume.black", *black),
@@ -430,12 +393,7 @@ fn surface_changes(mesh: &str, from: &[Surface; 2], to: &[Surface; 2]) -> Vec<En
 }
 
 fn surface(path: &str, s: &Surface) -> Vec<Entry> {
-    let Surface {
-        roughness,
-        thickness,
-        specularity,
-        gain,
-    } = s;
+    let Surface { roughness, thickness, specularity, gain } = s;
     let of =
         |key: &str, value: f64| number(&format!("{path}.{key}"), &format!("mesh.{key}"), value);
     vec![

@@ -31,12 +31,7 @@ pub struct Hold {
 impl Hold {
     /// Free to leave the skin; nothing where the scene names none.
     pub fn of(scene: &Scene) -> Option<Self> {
-        Some(Self {
-            body: Body::of(scene)?,
-            stays: false,
-            press: PRESS,
-            spot: None,
-        })
+        Some(Self { body: Body::of(scene)?, stays: false, press: PRESS, spot: None })
     }
 
     /// The skin is where the model is: world from model.
@@ -277,10 +272,7 @@ mod tests {
         }
         let angle = (model.pose.transform_vector3(DVec3::Z)).angle_between(DVec3::Z);
         // 40 steps of 2 mm along the tangent: each atan(2 / 80).
-        assert!(
-            (angle - 40.0 * (2.0f64 / 80.0).atan()).abs() < 0.01,
-            "{angle}"
-        );
+        assert!((angle - 40.0 * (2.0f64 / 80.0).atan()).abs() < 0.01, "{angle}");
         model.move_probe(Axis::Depth, 3.0, now);
         assert!((height(&model.pose) + 4.5).abs() < 0.01);
         model.move_probe(Axis::Depth, -9.0, now);
@@ -308,22 +300,11 @@ mod tests {
     fn the_skin_is_picked_whole_or_behind_the_image_plane() {
         let now = Instant::now();
         let (_, mut model) = ball(CONTACT);
-        let ray = |x: f64, z: f64| Ray {
-            origin: DVec3::new(x, -300.0, z),
-            direction: DVec3::Y,
-        };
+        let ray = |x: f64, z: f64| Ray { origin: DVec3::new(x, -300.0, z), direction: DVec3::Y };
         let near = model.spot_seen(&ray(10.0, 60.0), Seen::Whole, now).unwrap();
         assert!(near.point.y < -70.0);
-        assert_eq!(
-            model.spot_seen(&ray(10.0, 60.0), Seen::BehindPlane, now),
-            None,
-            "cut"
-        );
-        assert_eq!(
-            model.spot_seen(&ray(10.0, -60.0), Seen::Whole, now),
-            None,
-            "beside"
-        );
+        assert_eq!(model.spot_seen(&ray(10.0, 60.0), Seen::BehindPlane, now), None, "cut");
+        assert_eq!(model.spot_seen(&ray(10.0, -60.0), Seen::Whole, now), None, "beside");
         let slanted = Ray {
             origin: DVec3::new(0.0, -300.0, -150.0),
             direction: DVec3::new(0.0, 300.0, 145.0).normalize(),
@@ -340,10 +321,7 @@ mod tests {
         let now = Instant::now();
         let (scene, mut model) = ball(CONTACT);
         for x in 0..50 {
-            let ray = Ray {
-                origin: DVec3::new(f64::from(x), -300.0, 0.0),
-                direction: DVec3::Y,
-            };
+            let ray = Ray { origin: DVec3::new(f64::from(x), -300.0, 0.0), direction: DVec3::Y };
             model.slide_in_plane(&ray, now);
             let at = model.pose.translation;
             assert!(at.y.abs() < 0.1, "{at}");
@@ -365,10 +343,7 @@ mod tests {
         let now = Instant::now();
         let (_, mut model) = ball("");
         model.stay_on_skin(true, now);
-        let ray = Ray {
-            origin: -DVec3::Z * 50.0,
-            direction: DVec3::Z,
-        };
+        let ray = Ray { origin: -DVec3::Z * 50.0, direction: DVec3::Z };
         assert!(model.hold.is_none());
         assert_eq!(model.spot_seen(&ray, Seen::Whole, now), None);
         model.move_probe(Axis::Lateral, 1.0, now);

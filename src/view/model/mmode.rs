@@ -32,10 +32,7 @@ pub struct Strip {
 impl Strip {
     /// An empty strip of a scanline.
     pub fn new(line: u32) -> Self {
-        Self {
-            line,
-            ..Self::default()
-        }
+        Self { line, ..Self::default() }
     }
 
     /// The scanline.
@@ -83,10 +80,7 @@ impl Strip {
             let y = (at.z - sector.top) / sector.pitch;
             pixels.level(x, y)
         });
-        self.columns.push_back(Column {
-            seconds,
-            levels: levels.collect(),
-        });
+        self.columns.push_back(Column { seconds, levels: levels.collect() });
     }
 
     /// Time of the newest column, s.
@@ -177,11 +171,7 @@ mod tests {
     use crate::probe::{Kind, Probe};
     use crate::view::engine::{Pixels, Sector};
 
-    const SECTOR: Sector = Sector {
-        left: -20.0,
-        top: 0.0,
-        pitch: 0.5,
-    };
+    const SECTOR: Sector = Sector { left: -20.0, top: 0.0, pitch: 0.5 };
 
     fn probe() -> Probe {
         Probe {
@@ -197,10 +187,7 @@ mod tests {
         let row = (mm / 0.5) as usize;
         let mut rgba = vec![0; 80 * 100 * 4];
         rgba[row * 320..(row + 1) * 320].fill(255);
-        Pixels {
-            size: [80, 100],
-            rgba,
-        }
+        Pixels { size: [80, 100], rgba }
     }
 
     /// Depth of the brightest row of a strip at a moment, mm.
@@ -239,15 +226,9 @@ mod tests {
         assert!(strip.raster(1.0, 1.0, 10).iter().all(|&l| l == 0));
         strip.add(0.55, &probe(), SECTOR, &bright_at(25.0));
         let raster = strip.raster(1.0, 1.0, 10);
-        let seen: Vec<bool> = (0..10)
-            .map(|x| (0..ROWS).any(|row| raster[row * 10 + x] > 0))
-            .collect();
-        assert_eq!(
-            seen,
-            [
-                false, false, false, false, false, true, true, true, true, true
-            ]
-        );
+        let seen: Vec<bool> =
+            (0..10).map(|x| (0..ROWS).any(|row| raster[row * 10 + x] > 0)).collect();
+        assert_eq!(seen, [false, false, false, false, false, true, true, true, true, true]);
         // Back in time, another line, another probe: a new strip.
         strip.add(0.1, &probe(), SECTOR, &bright_at(25.0));
         assert_eq!((strip.columns.len(), strip.newest()), (1, Some(0.1)));
@@ -258,20 +239,9 @@ mod tests {
         strip.aim(4);
         assert_eq!(strip.newest(), None);
         strip.add(0.2, &probe(), SECTOR, &bright_at(25.0));
-        strip.add(
-            0.3,
-            &Probe {
-                depth: 60.0,
-                ..probe()
-            },
-            SECTOR,
-            &bright_at(25.0),
-        );
+        strip.add(0.3, &Probe { depth: 60.0, ..probe() }, SECTOR, &bright_at(25.0));
         assert_eq!((strip.columns.len(), strip.depth()), (1, Some(60.0)));
-        let few = Probe {
-            scanlines: 2,
-            ..probe()
-        };
+        let few = Probe { scanlines: 2, ..probe() };
         strip.add(0.4, &few, SECTOR, &bright_at(25.0));
         assert_eq!(strip.line(), 1);
     }
@@ -287,18 +257,12 @@ mod tests {
 
     #[test]
     fn spans_are_measured() {
-        let span = Span {
-            from: [1.0, 30.0],
-            to: [1.8, 14.0],
-        };
+        let span = Span { from: [1.0, 30.0], to: [1.8, 14.0] };
         assert!((span.seconds() - 0.8).abs() < 1e-12);
         assert_eq!(span.millimetres(), 16.0);
         assert!((span.per_minute().unwrap() - 75.0).abs() < 1e-9);
         assert!((span.speed().unwrap() + 20.0).abs() < 1e-9);
-        let still = Span {
-            to: span.from,
-            ..span
-        };
+        let still = Span { to: span.from, ..span };
         assert_eq!((still.per_minute(), still.speed()), (None, None));
     }
 

@@ -77,11 +77,7 @@ impl Pad {
                     _ => return None,
                 };
                 // Triggers without a mapping rest at -1 or at 0.
-                let least = if matches!(stick, Stick::LeftZ | Stick::RightZ) {
-                    0.0
-                } else {
-                    -1.0
-                };
+                let least = if matches!(stick, Stick::LeftZ | Stick::RightZ) { 0.0 } else { -1.0 };
                 *to = value.clamp(least, 1.0);
                 None
             }

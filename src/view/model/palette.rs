@@ -81,11 +81,7 @@ fn distinct(index: usize) -> [u8; 3] {
     ];
     linear.map(|c| {
         let c = c.clamp(0.0, 1.0);
-        let c = if c <= 0.003_130_8 {
-            12.92 * c
-        } else {
-            1.055 * c.powf(1.0 / 2.4) - 0.055
-        };
+        let c = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
         (255.0 * c).round() as u8
     })
 }

@@ -21,14 +21,8 @@ pub enum Axis {
 
 impl Axis {
     /// All of them.
-    pub const ALL: [Self; 6] = [
-        Self::Lateral,
-        Self::Elevation,
-        Self::Depth,
-        Self::Rotate,
-        Self::Rock,
-        Self::Tilt,
-    ];
+    pub const ALL: [Self; 6] =
+        [Self::Lateral, Self::Elevation, Self::Depth, Self::Rotate, Self::Rock, Self::Tilt];
 
     /// Whether it is a shift, in mm; else a turn, in rad.
     pub fn shifts(self) -> bool {

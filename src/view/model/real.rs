@@ -27,9 +27,6 @@ impl Default for Real {
 impl Real {
     /// What the simulation has to colour.
     pub fn tint(&self) -> Option<Tint> {
-        self.shown.then_some(Tint {
-            colour: COLOUR,
-            opacity: self.opacity as f32,
-        })
+        self.shown.then_some(Tint { colour: COLOUR, opacity: self.opacity as f32 })
     }
 }

@@ -32,18 +32,9 @@ pub struct Plane {
 impl Plane {
     /// The three through one point, depth downwards where they have it.
     pub const ALL: [Self; 3] = [
-        Self {
-            name: "x z",
-            axes: [DVec3::X, DVec3::Z],
-        },
-        Self {
-            name: "y z",
-            axes: [DVec3::Y, DVec3::Z],
-        },
-        Self {
-            name: "x y",
-            axes: [DVec3::X, DVec3::Y],
-        },
+        Self { name: "x z", axes: [DVec3::X, DVec3::Z] },
+        Self { name: "y z", axes: [DVec3::Y, DVec3::Z] },
+        Self { name: "x y", axes: [DVec3::X, DVec3::Y] },
     ];
 
     /// Away from the eye.
@@ -104,8 +95,7 @@ impl Registration {
             let mut shapes = i.keyframes.meshes.iter().chain([&i.mesh]);
             shapes.all(|&m| open_edges(&self.scene.meshes[m]) == 0)
         };
-        self.closed
-            .get_or_init(|| self.scene.instances.iter().map(closed).collect())[index]
+        self.closed.get_or_init(|| self.scene.instances.iter().map(closed).collect())[index]
     }
 
     /// The scene as it was followed last.
@@ -175,9 +165,7 @@ impl Registration {
     pub fn place(&self, settings: &Settings) -> DAffine3 {
         match self.moves {
             Moves::Model => settings.model,
-            Moves::Volume => settings
-                .volume
-                .map_or(DAffine3::IDENTITY, |v| v.world_from_lps),
+            Moves::Volume => settings.volume.map_or(DAffine3::IDENTITY, |v| v.world_from_lps),
         }
     }
 
@@ -194,9 +182,7 @@ impl Registration {
             return Vec::new();
         };
         let voxel_from_world = volume.world_from_voxel.inverse();
-        let [right, down] = plane
-            .axes
-            .map(|a| voxel_from_world.transform_vector3(a * pitch));
+        let [right, down] = plane.axes.map(|a| voxel_from_world.transform_vector3(a * pitch));
         let middle = voxel_from_world.transform_point3(self.middle);
         let [width, height] = size;
         let half = [width, height].map(|n| (n as f64 - 1.0) / 2.0);
@@ -231,10 +217,7 @@ impl Registration {
             });
             let pieces: Vec<_> = pieces.collect();
             if !pieces.is_empty() {
-                out.push(Outline {
-                    instance: index,
-                    pieces,
-                });
+                out.push(Outline { instance: index, pieces });
             }
         }
         out
@@ -258,13 +241,9 @@ fn corners(volume: &Acquired) -> [DVec3; 2] {
     let size = volume.size.map(|n| n as f64);
     let all = (0..8_usize).map(|corner| {
         let at = |axis: usize| if corner >> axis & 1 == 1 { size[axis] } else { 0.0 } - 0.5;
-        volume
-            .world_from_voxel
-            .transform_point3(DVec3::new(at(0), at(1), at(2)))
+        volume.world_from_voxel.transform_point3(DVec3::new(at(0), at(1), at(2)))
     });
-    all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| {
-        [low.min(p), high.max(p)]
-    })
+    all.fold([DVec3::INFINITY, DVec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
 }
 
 #[cfg(test)]

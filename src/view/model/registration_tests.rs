@@ -52,11 +52,7 @@ fn seen(model: &mut Model, at: DVec3) -> (DVec3, Option<f64>) {
     let mut registration = model.registration.take().expect("a volume");
     registration.follow(&model.settings, 0.0);
     registration.centre();
-    let grey = registration
-        .scene()
-        .volume
-        .as_ref()
-        .and_then(|v| grey(v, at));
+    let grey = registration.scene().volume.as_ref().and_then(|v| grey(v, at));
     let middle = registration.middle;
     model.registration = Some(registration);
     (middle, grey)
@@ -68,10 +64,7 @@ fn grey_levels_are_trilinear_and_end_with_the_volume() {
     // Linear in x and z: any place has it exactly.
     for (x, z) in [(0.0, 0.0), (3.25, -7.75), (-10.0, 15.0), (9.9, 0.5)] {
         let grey = grey(&volume, DVec3::new(x, 4.5, z)).expect("inside");
-        assert!(
-            (grey - (x + 10.0 * z + 200.0) / 400.0).abs() < 1e-12,
-            "{x} {z}"
-        );
+        assert!((grey - (x + 10.0 * z + 200.0) / 400.0).abs() < 1e-12, "{x} {z}");
     }
     // The last voxel reaches half a step farther.
     assert_eq!(
@@ -100,12 +93,7 @@ fn a_slice_shows_the_volume_around_the_middle() {
         assert_eq!(*level, Some(expected), "{i}");
     }
     registration.middle.y = 100.0;
-    assert!(
-        registration
-            .slice(&plane, size, pitch)
-            .iter()
-            .all(Option::is_none)
-    );
+    assert!(registration.slice(&plane, size, pitch).iter().all(Option::is_none));
 }
 
 #[test]
@@ -120,17 +108,11 @@ fn a_mesh_is_cut_into_a_closed_line() {
         let pieces = &lines[0].pieces;
         // A sphere of 5 mm around (0, 0, -3) from here, of facets.
         let off = if plane.name == "x y" { 3.0 } else { 0.0 };
-        let (centre, radius) = (
-            [0.0, if off == 0.0 { -3.0 } else { 0.0 }],
-            f64::sqrt(25.0 - off * off),
-        );
+        let (centre, radius) =
+            ([0.0, if off == 0.0 { -3.0 } else { 0.0 }], f64::sqrt(25.0 - off * off));
         for end in pieces.iter().flatten() {
             let far = f64::hypot(end[0] - centre[0], end[1] - centre[1]);
-            assert!(
-                (far / radius - 1.0).abs() < 0.05,
-                "{} {end:?} {far}",
-                plane.name
-            );
+            assert!((far / radius - 1.0).abs() < 0.05, "{} {end:?} {far}", plane.name);
         }
         // Every end is that of two pieces.
         for end in pieces.iter().flatten() {
@@ -159,9 +141,7 @@ fn volume_and_model_move_against_each_other_and_undo_takes_it_back() {
         model.note(&before, now);
     };
     // The volume: what was at the place is 3 mm on.
-    change(&mut model, now, &|r, s| {
-        r.shift(s, DVec3::new(0.0, 0.0, 3.0))
-    });
+    change(&mut model, now, &|r, s| r.shift(s, DVec3::new(0.0, 0.0, 3.0)));
     assert_eq!(seen(&mut model, place + 3.0 * DVec3::Z), (home, grey));
     now += Duration::from_secs(2);
     // About the planes' meeting point, which is the mask's middle.
@@ -169,10 +149,7 @@ fn volume_and_model_move_against_each_other_and_undo_takes_it_back() {
     let turned = DVec3::new(4.0, 0.0, -2.0);
     let (middle, after) = seen(&mut model, home + turned);
     assert!((middle - home).length() < 1e-12);
-    assert!(
-        (after.expect("inside") - grey.expect("inside")).abs() < 1e-12,
-        "{after:?} {grey:?}"
-    );
+    assert!((after.expect("inside") - grey.expect("inside")).abs() < 1e-12, "{after:?} {grey:?}");
     model.undo(now);
     assert_eq!(seen(&mut model, place + 3.0 * DVec3::Z).1, grey);
     model.undo(now);

@@ -44,10 +44,7 @@ impl File {
 impl Model {
     /// Whether settings differ from those of the file; `with_pose`: or the pose does.
     pub fn is_modified(&self, with_pose: bool) -> bool {
-        let as_now = |tracer| Settings {
-            tracer,
-            ..self.loaded.clone()
-        };
+        let as_now = |tracer| Settings { tracer, ..self.loaded.clone() };
         as_now(self.settings.tracer) != self.settings || (with_pose && self.pose != self.home)
     }
 
@@ -63,12 +60,7 @@ impl Model {
         let overrides = file.overrides.iter().cloned();
         let mut out: Vec<Entry> = overrides.map(|(path, value)| (path, Some(value))).collect();
         let from = &self.loaded;
-        out.extend(entries::changes(
-            from,
-            settings,
-            &file.origins,
-            file.lattice,
-        ));
+        out.extend(entries::changes(from, settings, &file.origins, file.lattice));
         if let Some(pose) = pose {
             out.extend(entries::pose(pose));
         }
@@ -86,10 +78,7 @@ impl Model {
         if !changes.is_empty() || to != self.file.path {
             save(&self.file.path, &to, &changes)?;
         }
-        let (before, now) = (
-            entries::lattice(&self.loaded),
-            entries::lattice(&self.settings),
-        );
+        let (before, now) = (entries::lattice(&self.loaded), entries::lattice(&self.settings));
         if !entries::is_same_lattice(before, now) {
             self.file.lattice = now;
         }
@@ -134,10 +123,7 @@ impl Model {
         for (i, origin) in origins.iter().enumerate() {
             let surface = settings.surfaces[i];
             let strategy = settings.strategies[i];
-            let is_new = [
-                surface != before.surfaces[i],
-                strategy != before.strategies[i],
-            ];
+            let is_new = [surface != before.surfaces[i], strategy != before.strategies[i]];
             for (j, other) in origins.iter().enumerate() {
                 if is_new[0] && other.mesh == origin.mesh {
                     settings.surfaces[j] = surface;

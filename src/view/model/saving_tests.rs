@@ -83,9 +83,7 @@ impl Desk {
 
     fn scene(&self, name: &str, overrides: &[(String, String)]) -> Scene {
         let loaded = Scene::load(&self.folder.path().join(name), overrides);
-        loaded
-            .unwrap_or_else(|e| panic!("{e}\n{}", self.text(name)))
-            .0
+        loaded.unwrap_or_else(|e| panic!("{e}\n{}", self.text(name))).0
     }
 
     fn model(&self, overrides: &[(&str, &str)]) -> Model {
@@ -226,9 +224,8 @@ fn values(seed: u64) -> impl FnMut(&str) -> f64 {
     move |key| {
         let [least, most] = catalogue::entry(key).range;
         // Knuth's MMIX generator: any sequence will do.
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
+        state =
+            state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         let share = (state >> 11) as f64 / (1_u64 << 53) as f64;
         match (state >> 7) % 8 {
             0 => least,
@@ -248,45 +245,27 @@ fn hold(desk: &Desk, mut wanted: Settings, what: &str) {
     let mut found = desk.saved();
     for (wanted, found) in wanted.tissues.iter_mut().zip(&found.tissues) {
         if wanted.source != found.source {
-            assert!(
-                found.source.starts_with("changed by the scene file"),
-                "{what}"
-            );
+            assert!(found.source.starts_with("changed by the scene file"), "{what}");
             wanted.source.clone_from(&found.source);
         }
     }
     let cells = (wanted.simulation.cell, found.simulation.cell);
     assert!((cells.0 / cells.1 - 1.0).abs() < 1e-14, "{what}: {cells:?}");
     found.simulation.cell = cells.0;
-    assert!(
-        found == wanted,
-        "{what}\n{found:#?}\n{wanted:#?}\n{}",
-        desk.text("scene.toml")
-    );
+    assert!(found == wanted, "{what}\n{found:#?}\n{wanted:#?}\n{}", desk.text("scene.toml"));
 }
 
 #[test]
 fn every_setting_is_saved_and_loaded() {
-    let tables = [
-        "probe.",
-        "simulation.",
-        "imaging.",
-        "live.",
-        "fusion.",
-        "tissues.NAME.",
-        "mesh.",
-    ];
+    let tables =
+        ["probe.", "simulation.", "imaging.", "live.", "fusion.", "tissues.NAME.", "mesh."];
     for key in catalogue::keys() {
         let nested = ["probe.pose.", "mesh.shape.", "mesh.rotate."];
         let is_setting = tables.iter().any(|t| key.starts_with(t))
             && !nested.iter().any(|t| key.starts_with(t))
             && !ANATOMY.contains(&key);
         let is_changed = CHANGES.iter().any(|c| c.0 == key);
-        assert_eq!(
-            is_setting || key == "selector.strategy",
-            is_changed,
-            "{key}"
-        );
+        assert_eq!(is_setting || key == "selector.strategy", is_changed, "{key}");
     }
     for (key, change) in CHANGES {
         for seed in 0..4 {
@@ -296,9 +275,7 @@ fn every_setting_is_saved_and_loaded() {
             change(&mut model.settings, &mut values(seed));
             model.note(&before, Instant::now());
             assert!(seed > 0 || model.is_modified(false), "{key}");
-            model
-                .save(None, false)
-                .unwrap_or_else(|e| panic!("{key}: {e}"));
+            model.save(None, false).unwrap_or_else(|e| panic!("{key}: {e}"));
             hold(&desk, model.settings.clone(), key);
             assert!(!model.is_modified(true));
         }
@@ -314,10 +291,7 @@ fn all_settings_at_once_are_saved_and_loaded_again_and_again() {
         for (key, change) in CHANGES {
             // Every other one, so that what was set before has to stay.
             if (seed + key.len() as u64).is_multiple_of(2) {
-                change(
-                    &mut model.settings,
-                    &mut values(seed * 1000 + key.len() as u64),
-                );
+                change(&mut model.settings, &mut values(seed * 1000 + key.len() as u64));
             }
         }
         // A lattice that nobody asks for leaves the range of its key.
@@ -351,10 +325,7 @@ fn only_what_differs_is_written() {
     let expected = format!("{SCENE}\n[imaging]\ngain = \"7.5 dB\"\n");
     assert_eq!(desk.text("scene.toml"), expected);
     model.settings.tracer = Tracer::Bvh;
-    assert!(
-        !model.is_modified(false),
-        "the tracer is no matter of the file"
-    );
+    assert!(!model.is_modified(false), "the tracer is no matter of the file");
 }
 
 #[test]
@@ -365,10 +336,7 @@ fn a_preset_is_written_as_one() {
     model.settings.simulation.cell = 1.05 / model.settings.probe.frequency;
     model.save(None, false).expect("saved");
     let text = desk.text("scene.toml");
-    assert!(
-        text.contains("preset = \"abdominal\"\n\n[tissues"),
-        "{text}"
-    );
+    assert!(text.contains("preset = \"abdominal\"\n\n[tissues"), "{text}");
     hold(&desk, model.settings.clone(), "preset");
 }
 
@@ -378,9 +346,7 @@ fn counts_that_a_quality_chose_stay_out_of_the_file() {
     let desk = Desk::new();
     let mut scene = desk.scene("scene.toml", &[]);
     let file = File::new(desk.folder.path().join("scene.toml"), Vec::new(), &scene);
-    scene
-        .simulation
-        .set_quality(Quality::Draft, Machine::Software);
+    scene.simulation.set_quality(Quality::Draft, Machine::Software);
     let mut model = Model::new(&scene, file, Tracer::Bvh, 0.0, Instant::now());
     // The lattice follows the wavelength, in the session and in the file.
     let before = model.settings.probe.frequency;
@@ -388,10 +354,7 @@ fn counts_that_a_quality_chose_stay_out_of_the_file() {
     model.settings.simulation.cell *= before / 5.0;
     model.save(None, false).expect("saved");
     let text = desk.text("scene.toml");
-    assert!(
-        text.contains("frequency = \"5 MHz\"") && !text.contains("cell"),
-        "{text}"
-    );
+    assert!(text.contains("frequency = \"5 MHz\"") && !text.contains("cell"), "{text}");
     assert_eq!(desk.saved().simulation.paths, 8);
     // What is set by hand is meant.
     model.settings.simulation.cell = 0.3;
@@ -417,11 +380,7 @@ fn the_pose_is_written_where_it_is_wanted() {
     let desk = Desk::new();
     let mut model = desk.model(&[]);
     let now = Instant::now();
-    for (axis, amount) in [
-        (Axis::Rock, 0.3),
-        (Axis::Lateral, 12.3),
-        (Axis::Rotate, -0.7),
-    ] {
+    for (axis, amount) in [(Axis::Rock, 0.3), (Axis::Lateral, 12.3), (Axis::Rotate, -0.7)] {
         model.move_probe(axis, amount, now);
     }
     assert!(model.is_modified(true) && !model.is_modified(false));
@@ -466,30 +425,18 @@ fn settings_of_another_file_are_taken_and_undone() {
     };
     gain(&mut model, 1.0);
     let before = model.settings.clone();
-    desk.write(
-        "other.toml",
-        "[probe]\npreset = \"phased\"\n[probe.pose]\nposition = [9, 9, 9]\n",
-    );
+    desk.write("other.toml", "[probe]\npreset = \"phased\"\n[probe.pose]\nposition = [9, 9, 9]\n");
     let pose = model.pose;
-    model
-        .load_settings(&desk.folder.path().join("other.toml"), now)
-        .expect("taken");
+    model.load_settings(&desk.folder.path().join("other.toml"), now).expect("taken");
     assert_eq!(model.settings.probe, Probe::phased());
-    assert_eq!(
-        (model.settings.imaging.gain, model.pose),
-        (1.0, pose),
-        "not spoken of"
-    );
+    assert_eq!((model.settings.imaging.gain, model.pose), (1.0, pose), "not spoken of");
     let cell = 1.05 / Probe::phased().frequency;
     assert!((model.settings.simulation.cell / cell - 1.0).abs() < 1e-14);
     gain(&mut model, 2.0);
     model.undo(now);
     assert_eq!(model.settings.imaging.gain, 1.0);
     model.undo(now);
-    assert_eq!(
-        model.settings, before,
-        "one step, whatever came before at the same moment"
-    );
+    assert_eq!(model.settings, before, "one step, whatever came before at the same moment");
 
     desk.write("other.toml", "[imaging]\ngain = \"5 mm\"\n");
     let error = model.load_settings(Path::new(&desk.folder.path().join("other.toml")), now);

@@ -280,10 +280,7 @@ impl Sheet {
     /// Removes all.
     pub fn clear(&mut self) {
         let tool = self.tool;
-        *self = Self {
-            tool,
-            ..Self::default()
-        };
+        *self = Self { tool, ..Self::default() };
     }
 
     /// Names a measurement, or sets the text of a note.
@@ -322,10 +319,7 @@ mod tests {
     use super::{Moment, Sheet, Tool, What};
 
     const REACH: f64 = 1.0;
-    const NOW: Moment = Moment {
-        pose: DAffine3::IDENTITY,
-        seconds: 0.5,
-    };
+    const NOW: Moment = Moment { pose: DAffine3::IDENTITY, seconds: 0.5 };
 
     fn click(sheet: &mut Sheet, x: f64, z: f64) {
         sheet.press(dvec2(x, z), REACH, NOW);
@@ -356,10 +350,7 @@ mod tests {
         sheet.take(Some(Tool::Measure(Kind::Distance)));
         click(&mut sheet, 0.0, 10.0);
         sheet.motion(dvec2(0.0, 33.0));
-        assert_eq!(
-            sheet.draft().unwrap().points,
-            [dvec2(0.0, 10.0), dvec2(0.0, 33.0)]
-        );
+        assert_eq!(sheet.draft().unwrap().points, [dvec2(0.0, 10.0), dvec2(0.0, 33.0)]);
         click(&mut sheet, 0.0, 40.0);
         drag(&mut sheet, [10.0, 20.0], [13.0, 24.0]);
         assert_eq!([distance(&sheet, 0), distance(&sheet, 1)], [30.0, 5.0]);
@@ -385,13 +376,7 @@ mod tests {
                 What::Note(note) => panic!("{note:?}"),
             })
             .collect();
-        assert!(matches!(
-            readings[0],
-            Reading::Ellipse {
-                axes: [10.0, 6.0],
-                ..
-            }
-        ));
+        assert!(matches!(readings[0], Reading::Ellipse { axes: [10.0, 6.0], .. }));
         assert!(matches!(readings[1], Reading::Angle(a) if (a - 90.0).abs() < 1e-12));
     }
 
@@ -445,10 +430,7 @@ mod tests {
             What::Note(note) => note.clone(),
             What::Caliper(caliper) => panic!("{caliper:?}"),
         };
-        assert_eq!(
-            (note(&sheet, 0).text.as_str(), note(&sheet, 0).arrow),
-            ("liver", None)
-        );
+        assert_eq!((note(&sheet, 0).text.as_str(), note(&sheet, 0).arrow), ("liver", None));
         assert_eq!(note(&sheet, 1).arrow, Some(dvec2(20.0, 20.0)));
         assert_eq!(note(&sheet, 1).at, dvec2(30.0, 25.0));
         // Nothing was typed, so there is nothing to keep.

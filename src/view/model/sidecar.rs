@@ -78,31 +78,20 @@ pub fn marks(marks: &[Mark], moment: &Moment) -> Map<String, Value> {
 fn values(reading: &Reading) -> Map<String, Value> {
     let pairs = match *reading {
         Reading::Distance(mm) => vec![("length_mm", json!(mm))],
-        Reading::Ellipse {
-            axes,
-            circumference,
-            area,
-        } => vec![
+        Reading::Ellipse { axes, circumference, area } => vec![
             ("axes_mm", json!(axes)),
             ("circumference_mm", json!(circumference)),
             ("area_mm2", json!(area)),
         ],
         Reading::Angle(degrees) => vec![("angle_deg", json!(degrees))],
     };
-    pairs
-        .into_iter()
-        .map(|(key, value)| (key.into(), value))
-        .collect()
+    pairs.into_iter().map(|(key, value)| (key.into(), value)).collect()
 }
 
 /// A title as part of a file's name: letters, digits and hyphens.
 pub fn stem(title: &str) -> String {
     let plain = |c: char| {
-        if c.is_ascii_alphanumeric() {
-            c.to_ascii_lowercase()
-        } else {
-            '-'
-        }
+        if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }
     };
     let text: String = title.chars().map(plain).collect();
     let words: Vec<&str> = text.split('-').filter(|word| !word.is_empty()).collect();
@@ -137,23 +126,14 @@ mod tests {
 
     #[test]
     fn measurements_say_what_they_measure_and_where() {
-        let moment = Moment {
-            pose: DAffine3::from_translation(DVec3::new(1.0, 2.0, 3.0)),
-            seconds: 0.5,
-        };
-        let later = Moment {
-            seconds: 0.6,
-            ..moment
-        };
+        let moment =
+            Moment { pose: DAffine3::from_translation(DVec3::new(1.0, 2.0, 3.0)), seconds: 0.5 };
+        let later = Moment { seconds: 0.6, ..moment };
         let caliper = |kind, points: &[DVec2], label: &str| Caliper {
             label: label.into(),
             ..Caliper::new(kind, points.to_vec())
         };
-        let note = Note {
-            text: "vessel".into(),
-            at: dvec2(1.0, 2.0),
-            arrow: None,
-        };
+        let note = Note { text: "vessel".into(), at: dvec2(1.0, 2.0), arrow: None };
         let all = [
             Mark {
                 letter: 'A',
@@ -164,11 +144,7 @@ mod tests {
                 )),
                 of: moment,
             },
-            Mark {
-                letter: 'B',
-                what: What::Note(note),
-                of: later,
-            },
+            Mark { letter: 'B', what: What::Note(note), of: later },
         ];
         let said = marks(&all, &moment);
         let expected = json!([{

@@ -32,10 +32,8 @@ impl Body {
     pub fn of(scene: &Scene) -> Option<Self> {
         let contact = scene.contact.as_ref()?;
         let named = contact.skin.iter().map(|&i| &scene.instances[i]);
-        let used: Vec<usize> = named
-            .flat_map(|i| i.keyframes.meshes.iter().chain([&i.mesh]))
-            .copied()
-            .collect();
+        let used: Vec<usize> =
+            named.flat_map(|i| i.keyframes.meshes.iter().chain([&i.mesh])).copied().collect();
         let meshes = scene.meshes.iter().enumerate();
         let meshes = meshes.map(|(i, mesh)| match used.contains(&i) {
             true => mesh.clone(),
@@ -96,10 +94,8 @@ impl<'s> Hand<'s> {
     /// was found from the depth axis; without skin ahead the place at the face itself.
     pub fn held(&self, pose: &DAffine3) -> Spot {
         let centre = pose.translation;
-        let mut spot = Spot {
-            point: centre,
-            normal: -pose.transform_vector3(DVec3::Z).normalize(),
-        };
+        let mut spot =
+            Spot { point: centre, normal: -pose.transform_vector3(DVec3::Z).normalize() };
         for _ in 0..4 {
             let Some(gap) = self.skin.gap(centre, -spot.normal) else {
                 break;
@@ -140,11 +136,7 @@ impl<'s> Hand<'s> {
             self.skin.gap(placed.transform_point3(point), -to.normal)
         });
         let least = gaps.fold(f64::INFINITY, f64::min);
-        let lift = if least.is_finite() {
-            least + press
-        } else {
-            press
-        };
+        let lift = if least.is_finite() { least + press } else { press };
         at(to.point - to.normal * lift)
     }
 

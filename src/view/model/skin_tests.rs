@@ -33,10 +33,7 @@ fn angle(a: &DAffine3, b: &DAffine3) -> f64 {
 
 /// A place straight below `from` (world, mm), seen from far outside.
 fn seen(hand: &Hand<'_>, from: DVec3) -> Spot {
-    let ray = Ray {
-        origin: from,
-        direction: -from.normalize(),
-    };
+    let ray = Ray { origin: from, direction: -from.normalize() };
     hand.pick(&ray).unwrap()
 }
 
@@ -50,11 +47,9 @@ fn on_a_sphere_the_probe_stands_on_the_radius_and_is_pressed_in_as_wanted() {
         assert!(from.point.distance(DVec3::Z * 80.0) < 0.01, "{from:?}");
         // Facets of a radian / 64, seen by 24 points: 0.2 degrees.
         assert!(from.normal.angle_between(DVec3::Z) < 0.004, "{from:?}");
-        for to in [
-            DVec3::new(1.0, 2.0, 3.0),
-            DVec3::new(-3.0, 0.5, -1.0),
-            DVec3::new(0.1, -4.0, 0.3),
-        ] {
+        for to in
+            [DVec3::new(1.0, 2.0, 3.0), DVec3::new(-3.0, 0.5, -1.0), DVec3::new(0.1, -4.0, 0.3)]
+        {
             let spot = seen(&hand, to * 100.0);
             let radial = to.normalize();
             assert!(spot.normal.angle_between(radial) < 0.004, "{spot:?}");
@@ -113,10 +108,7 @@ fn tilt_and_rock_stay_as_the_hand_has_them() {
     let before = tilt(&pose, &from);
     for step in 1..200 {
         let a = 0.01 * f64::from(step);
-        let to = seen(
-            &hand,
-            DVec3::new(a.sin(), 0.4 * (3.0 * a).sin(), a.cos()) * 200.0,
-        );
+        let to = seen(&hand, DVec3::new(a.sin(), 0.4 * (3.0 * a).sin(), a.cos()) * 200.0);
         pose = hand.slid(&pose, &from, &to, PRESS);
         assert!((tilt(&pose, &to) - before).abs() < 1e-6, "{step}");
         // What is found of the pose alone is the place that it was put on.
@@ -185,15 +177,9 @@ fn on_the_abdomen_the_probe_slides_without_a_jump() {
 #[test]
 fn rays_beside_the_body_pick_nothing_and_the_far_side_is_reached_without_a_spin() {
     let skin = skin("sphere = { radius = 30, subdivisions = 5 }");
-    let probe = Probe {
-        kind: Kind::Linear { width: 20.0 },
-        ..Probe::linear()
-    };
+    let probe = Probe { kind: Kind::Linear { width: 20.0 }, ..Probe::linear() };
     let hand = Hand::new(&skin, &probe);
-    let miss = Ray {
-        origin: DVec3::new(40.0, 0.0, 100.0),
-        direction: -DVec3::Z,
-    };
+    let miss = Ray { origin: DVec3::new(40.0, 0.0, 100.0), direction: -DVec3::Z };
     assert_eq!(hand.pick(&miss), None);
     let pose = above(30.0);
     let from = hand.held(&pose);

@@ -71,24 +71,14 @@ impl Survey {
             let (colour, show) = palette::look(&name, shown.len());
             let encloses = || encloses_much(scene, instance.tissue);
             let glass = || {
-                if encloses() {
-                    Show::SeeThrough
-                } else {
-                    Show::Solid
-                }
+                if encloses() { Show::SeeThrough } else { Show::Solid }
             };
             let show = show.unwrap_or_else(glass);
             let otherwise = match show {
                 Show::Hidden => Show::SeeThrough,
                 other => other,
             };
-            shown.push(Shown {
-                name,
-                tissue: instance.tissue,
-                colour,
-                show,
-                otherwise,
-            });
+            shown.push(Shown { name, tissue: instance.tissue, colour, show, otherwise });
         }
         if shown.iter().all(|s| s.show == Show::Hidden) {
             shown.iter_mut().for_each(Shown::toggle);
@@ -98,9 +88,7 @@ impl Survey {
             cut: false,
             shown,
             tissues: scene.instances.iter().map(|i| i.tissue).collect(),
-            wires: (scene.wires.iter())
-                .map(|wire| wire.ends.map(DVec3::from))
-                .collect(),
+            wires: (scene.wires.iter()).map(|wire| wire.ends.map(DVec3::from)).collect(),
         }
     }
 
@@ -141,10 +129,9 @@ impl Survey {
 /// Somewhat from above and from the side, with the probe and all of the fan in view.
 fn overview(pose: &DAffine3, probe: &Probe) -> Camera {
     let half_width = match probe.kind {
-        Kind::Convex {
-            radius,
-            field_of_view,
-        } => (radius + probe.depth) * (field_of_view / 2.0).sin(),
+        Kind::Convex { radius, field_of_view } => {
+            (radius + probe.depth) * (field_of_view / 2.0).sin()
+        }
         Kind::Phased { field_of_view } => probe.depth * (field_of_view / 2.0).sin(),
         Kind::Linear { width } => width / 2.0,
     };
@@ -162,16 +149,10 @@ fn overview(pose: &DAffine3, probe: &Probe) -> Camera {
 fn encloses_much(scene: &Scene, tissue: usize) -> bool {
     let bounds: Vec<[DVec3; 2]> = (scene.instances.iter())
         .map(|i| {
-            let [low, high] = scene.meshes[i.mesh]
-                .bounds()
-                .map(|p| glam::Vec3::from(p).as_dvec3());
+            let [low, high] = scene.meshes[i.mesh].bounds().map(|p| glam::Vec3::from(p).as_dvec3());
             let corners = (0..8).map(|c| {
                 let pick = |axis: usize| {
-                    if c >> axis & 1 == 1 {
-                        high[axis]
-                    } else {
-                        low[axis]
-                    }
+                    if c >> axis & 1 == 1 { high[axis] } else { low[axis] }
                 };
                 let corner = DVec3::new(pick(0), pick(1), pick(2));
                 i.world_from_object.transform_point3(corner)
@@ -184,14 +165,10 @@ fn encloses_much(scene: &Scene, tissue: usize) -> bool {
     let within = |outer: &[DVec3; 2], inner: &[DVec3; 2]| {
         outer[0].cmple(inner[0]).all() && outer[1].cmpge(inner[1]).all()
     };
-    scene
-        .instances
-        .iter()
-        .zip(&bounds)
-        .any(|(instance, outer)| {
-            let inside = bounds.iter().filter(|inner| within(outer, inner)).count() - 1;
-            instance.tissue == tissue && inside >= 2 && 2 * inside >= bounds.len() - 1
-        })
+    scene.instances.iter().zip(&bounds).any(|(instance, outer)| {
+        let inside = bounds.iter().filter(|inner| within(outer, inner)).count() - 1;
+        instance.tissue == tissue && inside >= 2 && 2 * inside >= bounds.len() - 1
+    })
 }
 
 #[cfg(test)]
@@ -200,14 +177,10 @@ mod tests {
     use crate::scene::{Instance, Tissue, shapes};
 
     fn scene() -> Scene {
-        let tissue = |name: &str| Tissue {
-            name: name.into(),
-            ..Tissue::shipped("liver").expect("shipped")
-        };
+        let tissue =
+            |name: &str| Tissue { name: name.into(), ..Tissue::shipped("liver").expect("shipped") };
         let mut scene = Scene::homogeneous(tissue("gel"), Probe::paper_table1());
-        scene.tissues = ["gel", "muscle", "blood", "one", "two"]
-            .map(tissue)
-            .to_vec();
+        scene.tissues = ["gel", "muscle", "blood", "one", "two"].map(tissue).to_vec();
         let template = |mesh: usize, tissue: usize, at: f64| Instance {
             name: "ball".into(),
             mesh,
@@ -232,10 +205,7 @@ mod tests {
     fn what_is_around_is_glass_and_hiding_comes_back() {
         let mut survey = Survey::new(&scene());
         let shows: Vec<Show> = survey.shown.iter().map(|s| s.show).collect();
-        assert_eq!(
-            shows,
-            [Show::SeeThrough, Show::Hidden, Show::Solid, Show::Solid]
-        );
+        assert_eq!(shows, [Show::SeeThrough, Show::Hidden, Show::Solid, Show::Solid]);
         let opacities = |survey: &Survey| survey.sight([4, 4]).looks.iter().map(|l| l[3]).collect();
         let before: Vec<f32> = opacities(&survey);
         assert_eq!(before, [GLASS, 0.0, 1.0, 1.0]);

@@ -49,22 +49,13 @@ fn the_probe_moves_in_its_own_axes() {
     close(model.pose.translation, DVec3::new(10.0, 23.0, 30.0));
     model.move_probe(Axis::Lateral, 2.0, now);
     close(model.pose.translation, DVec3::new(12.0, 23.0, 30.0));
-    for (axis, fixed) in [
-        (Axis::Rotate, DVec3::Z),
-        (Axis::Rock, DVec3::Y),
-        (Axis::Tilt, DVec3::X),
-    ] {
+    for (axis, fixed) in [(Axis::Rotate, DVec3::Z), (Axis::Rock, DVec3::Y), (Axis::Tilt, DVec3::X)]
+    {
         let turned = moved(&home, axis, 0.3);
         close(turned.translation, home.translation);
-        close(
-            turned.transform_vector3(fixed),
-            home.transform_vector3(fixed),
-        );
+        close(turned.transform_vector3(fixed), home.transform_vector3(fixed));
         let other = fixed.any_orthonormal_vector();
-        let (a, b) = (
-            turned.transform_vector3(other),
-            home.transform_vector3(other),
-        );
+        let (a, b) = (turned.transform_vector3(other), home.transform_vector3(other));
         assert!((a.angle_between(b) - 0.3).abs() < 1e-12, "{axis:?}");
     }
     for axis in Axis::ALL {
@@ -131,10 +122,7 @@ fn time_passes_for_a_volume_that_changes() {
         let (scene, _) = Scene::load(&path, &[]).unwrap();
         let file = File::new(path, Vec::new(), &scene);
         let mut model = Model::new(&scene, file, Tracer::Bvh, 0.0, now);
-        assert_eq!(
-            (model.animated, model.order().runs(now)),
-            (changes, changes)
-        );
+        assert_eq!((model.animated, model.order().runs(now)), (changes, changes));
         model.clock.play(false, now);
         assert!(!model.order().runs(now));
     }

@@ -95,11 +95,7 @@ impl Recorder {
         if seconds > last.seconds {
             self.rows.push(Row { seconds, ..last });
         }
-        Recording {
-            scene_seconds: self.scene_seconds,
-            rows: self.rows,
-            devices: self.devices,
-        }
+        Recording { scene_seconds: self.scene_seconds, rows: self.rows, devices: self.devices }
     }
 }
 
@@ -188,11 +184,8 @@ impl Replay {
         now: Instant,
     ) -> Self {
         let (first, last) = track.span().expect("a trajectory has rows");
-        let rest = Trs {
-            translation: home.translation,
-            rotation: rotation(home),
-            ..Trs::default()
-        };
+        let rest =
+            Trs { translation: home.translation, rotation: rotation(home), ..Trs::default() };
         Self {
             track,
             rest,

@@ -40,12 +40,7 @@ pub struct Kept {
 impl Kept {
     /// A trajectory from a file.
     pub fn loaded(track: Track, name: String) -> Self {
-        Self {
-            track: Arc::new(track),
-            unsaved: None,
-            name,
-            scene_seconds: None,
-        }
+        Self { track: Arc::new(track), unsaved: None, name, scene_seconds: None }
     }
 
     /// Its length, s.

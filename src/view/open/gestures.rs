@@ -20,10 +20,7 @@ pub(super) fn passes(mut input: RawInput) -> Vec<RawInput> {
             false => group.push(event),
         }
     }
-    let pass = |events| RawInput {
-        events,
-        ..input.clone()
-    };
+    let pass = |events| RawInput { events, ..input.clone() };
     groups.into_iter().map(pass).collect()
 }
 
@@ -84,11 +81,7 @@ mod tests {
         let events = || [&drag[..], &way[..], &after[..]].concat().concat();
         let context = Context::default();
         drawn(&context, vec![input(Vec::new()); 2]);
-        assert_eq!(
-            drawn(&context, vec![input(events())]).0,
-            Vec2::ZERO,
-            "as egui has it"
-        );
+        assert_eq!(drawn(&context, vec![input(events())]).0, Vec2::ZERO, "as egui has it");
         let (by, clicks) = drawn(&context, passes(input(events())));
         assert_eq!((by, clicks), (Vec2::new(90.0, 0.0), 0));
     }
@@ -97,12 +90,7 @@ mod tests {
     fn a_click_between_two_pictures_is_one_where_it_was() {
         let context = Context::default();
         drawn(&context, vec![input(Vec::new()); 2]);
-        let events = vec![
-            moved(100.0),
-            button(100.0, true),
-            button(100.0, false),
-            moved(5.0),
-        ];
+        let events = vec![moved(100.0), button(100.0, true), button(100.0, false), moved(5.0)];
         let (by, clicks) = drawn(&context, passes(input(events)));
         assert_eq!((by, clicks), (Vec2::ZERO, 1));
     }
@@ -114,13 +102,7 @@ mod tests {
         assert_eq!(made.len(), 1);
         assert_eq!(made[0].events, events);
         assert_eq!(passes(input(Vec::new())).len(), 1);
-        let order = vec![
-            moved(1.0),
-            Event::Copy,
-            button(1.0, true),
-            Event::Cut,
-            moved(2.0),
-        ];
+        let order = vec![moved(1.0), Event::Copy, button(1.0, true), Event::Cut, moved(2.0)];
         let made = passes(input(order.clone()));
         let again: Vec<Event> = made.into_iter().flat_map(|pass| pass.events).collect();
         assert_eq!(again, order);

@@ -12,13 +12,7 @@ impl Open {
         if let Some(path) = files.wanted.take() {
             // Said of this file; another one speaks for itself.
             let of_this = path == self.model.file.path;
-            let overrides = self
-                .model
-                .file
-                .overrides
-                .iter()
-                .filter(|_| of_this)
-                .cloned();
+            let overrides = self.model.file.overrides.iter().filter(|_| of_this).cloned();
             files.opening = true;
             let proxy = plan.proxy.clone();
             self.opening = Some(Opening::begin(path, overrides.collect(), proxy));

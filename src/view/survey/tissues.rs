@@ -26,11 +26,7 @@ pub(super) fn show(ui: &mut Ui, area: Rect, shown: &mut [Shown]) {
                     for (word, show, tip) in [
                         ("All", None, "Show every tissue as it was"),
                         ("None", Some(Show::Hidden), "Hide every tissue"),
-                        (
-                            "Glass",
-                            Some(Show::SeeThrough),
-                            "Show every tissue as glass",
-                        ),
+                        ("Glass", Some(Show::SeeThrough), "Show every tissue as glass"),
                     ] {
                         if ui.small_button(word).on_hover_text(tip).clicked() {
                             for tissue in shown.iter_mut() {

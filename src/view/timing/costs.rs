@@ -30,37 +30,34 @@ pub(super) fn structures(ui: &mut Ui, times: &Times, model: &Model) {
         seen.dedup();
         seen.sort_unstable();
         seen.dedup();
-        egui::Grid::new("strategies")
-            .num_columns(4)
-            .spacing([8.0, 2.0])
-            .show(ui, |ui| {
-                for (head, tip) in [
-                    ("strategy", "How the device followed what changes its shape"),
-                    ("frames", "Of the last ones"),
-                    (
-                        "device, ms",
-                        "Builds, refits and interpolation of a frame: median, 99th percentile",
-                    ),
-                    (
-                        "processor, ms",
-                        "What the processor took to record them, and to build: median, 99th percentile",
-                    ),
-                ] {
-                    ui.strong(head).on_hover_text(tip);
+        egui::Grid::new("strategies").num_columns(4).spacing([8.0, 2.0]).show(ui, |ui| {
+            for (head, tip) in [
+                ("strategy", "How the device followed what changes its shape"),
+                ("frames", "Of the last ones"),
+                (
+                    "device, ms",
+                    "Builds, refits and interpolation of a frame: median, 99th percentile",
+                ),
+                (
+                    "processor, ms",
+                    "What the processor took to record them, and to build: median, 99th percentile",
+                ),
+            ] {
+                ui.strong(head).on_hover_text(tip);
+            }
+            ui.end_row();
+            for name in seen {
+                let of = || times.samples().filter(|s| s.strategy == name);
+                let device: Vec<f64> = of().filter_map(|s| s.stage("update")).collect();
+                let processor: Vec<f64> = of().map(|s| s.update).collect();
+                ui.label(name);
+                ui.monospace(processor.len().to_string());
+                for values in [device, processor] {
+                    ui.monospace(pair(&values).join("  "));
                 }
                 ui.end_row();
-                for name in seen {
-                    let of = || times.samples().filter(|s| s.strategy == name);
-                    let device: Vec<f64> = of().filter_map(|s| s.stage("update")).collect();
-                    let processor: Vec<f64> = of().map(|s| s.update).collect();
-                    ui.label(name);
-                    ui.monospace(processor.len().to_string());
-                    for values in [device, processor] {
-                        ui.monospace(pair(&values).join("  "));
-                    }
-                    ui.end_row();
-                }
-            });
+            }
+        });
         ui.separator();
         meshes(ui, model);
     });
@@ -74,22 +71,19 @@ fn meshes(ui: &mut Ui, model: &Model) {
         ui.label("No mesh changes its shape.");
         return;
     }
-    egui::Grid::new("meshes")
-        .num_columns(4)
-        .spacing([8.0, 2.0])
-        .show(ui, |ui| {
-            for head in ["mesh", "strategy", "shapes", "triangles"] {
-                ui.strong(head);
-            }
+    egui::Grid::new("meshes").num_columns(4).spacing([8.0, 2.0]).show(ui, |ui| {
+        for head in ["mesh", "strategy", "shapes", "triangles"] {
+            ui.strong(head);
+        }
+        ui.end_row();
+        for (mesh, strategy) in changing {
+            ui.label(&mesh.name);
+            ui.label(strategy.to_string());
+            ui.monospace(mesh.keyframes.to_string());
+            ui.monospace(mesh.triangles.to_string());
             ui.end_row();
-            for (mesh, strategy) in changing {
-                ui.label(&mesh.name);
-                ui.label(strategy.to_string());
-                ui.monospace(mesh.keyframes.to_string());
-                ui.monospace(mesh.triangles.to_string());
-                ui.end_row();
-            }
-        });
+        }
+    });
 }
 
 /// Memory by kind; `heap` is that of the device, bytes.
@@ -99,39 +93,28 @@ pub(super) fn memory(ui: &mut Ui, frame: Option<&Frame>, heap: u64) {
     };
     let (all, scene) = (frame.memory.current, frame.scene_memory);
     let known = scene.total() + frame.image_bytes;
-    egui::Grid::new("memory")
-        .num_columns(3)
-        .spacing([8.0, 1.0])
-        .show(ui, |ui| {
-            for (name, tip, bytes) in [
-                (
-                    "geometry",
-                    "Vertices, normals and triangles of all shapes",
-                    scene.geometry,
-                ),
-                ("structures", "What rays walk", scene.structures),
-                ("fields", "Where deforming tissue has gone", scene.fields),
-                ("volume", "The acquired volume", scene.volume),
-                (
-                    "images",
-                    "Those on the screen and in the loop",
-                    frame.image_bytes,
-                ),
-                (
-                    "frame, interface",
-                    "Buffers of a frame, of the interface, and of transfers",
-                    all.saturating_sub(known),
-                ),
-                ("all", "In use now", all),
-                ("most", "In use at one time so far", frame.memory.peak),
-            ] {
-                ui.label(name).on_hover_text(tip);
-                ui.monospace(format!("{:8.1} MiB", mebibytes(bytes)));
-                let share = 100.0 * bytes as f64 / heap.max(1) as f64;
-                ui.monospace(format!("{share:5.2} %"));
-                ui.end_row();
-            }
-        });
+    egui::Grid::new("memory").num_columns(3).spacing([8.0, 1.0]).show(ui, |ui| {
+        for (name, tip, bytes) in [
+            ("geometry", "Vertices, normals and triangles of all shapes", scene.geometry),
+            ("structures", "What rays walk", scene.structures),
+            ("fields", "Where deforming tissue has gone", scene.fields),
+            ("volume", "The acquired volume", scene.volume),
+            ("images", "Those on the screen and in the loop", frame.image_bytes),
+            (
+                "frame, interface",
+                "Buffers of a frame, of the interface, and of transfers",
+                all.saturating_sub(known),
+            ),
+            ("all", "In use now", all),
+            ("most", "In use at one time so far", frame.memory.peak),
+        ] {
+            ui.label(name).on_hover_text(tip);
+            ui.monospace(format!("{:8.1} MiB", mebibytes(bytes)));
+            let share = 100.0 * bytes as f64 / heap.max(1) as f64;
+            ui.monospace(format!("{share:5.2} %"));
+            ui.end_row();
+        }
+    });
     let heap = format!("of the device's {:.1} GiB", mebibytes(heap) / 1024.0);
     ui.label(heap);
 }
@@ -148,12 +131,7 @@ mod tests {
     #[test]
     fn what_follows_is_named_once() {
         assert_eq!(strategies(&[None, None]), "placement alone");
-        let all = [
-            None,
-            Some(Strategy::Refit),
-            Some(Strategy::Mask),
-            Some(Strategy::Refit),
-        ];
+        let all = [None, Some(Strategy::Refit), Some(Strategy::Mask), Some(Strategy::Refit)];
         assert_eq!(strategies(&all), "refit, mask");
     }
 }

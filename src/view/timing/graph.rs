@@ -16,10 +16,7 @@ const WIDTHS: [f32; 2] = [200.0, 480.0];
 /// Bars from the left, oldest first: stages from below, then what the frame took beside the device;
 /// the line is at 1/30 s.
 pub(super) fn show(ui: &mut Ui, times: &Times) {
-    let size = vec2(
-        ui.available_width().clamp(WIDTHS[0], WIDTHS[1]),
-        HEIGHT - 52.0,
-    );
+    let size = vec2(ui.available_width().clamp(WIDTHS[0], WIDTHS[1]), HEIGHT - 52.0);
     let (area, response) = ui.allocate_exact_size(size, Sense::hover());
     let painter = ui.painter_at(area);
     painter.rect_filled(area, 2.0, style::BACK);
@@ -42,10 +39,7 @@ pub(super) fn show(ui: &mut Ui, times: &Times) {
         for (name, ms) in &sample.stages {
             bar(*ms, colour(&names, name));
         }
-        bar(
-            (sample.wall - sample.device()).max(0.0),
-            Color32::from_gray(70),
-        );
+        bar((sample.wall - sample.device()).max(0.0), Color32::from_gray(70));
     }
     let line = area.bottom() - height(LIVE);
     let stroke = Stroke::new(1.0, Color32::from_gray(150));
@@ -71,11 +65,9 @@ fn details(ui: &mut Ui, names: &[String], sample: &Sample) {
             ui.monospace(written(sample.stage(name).unwrap_or(f64::NAN)));
             ui.end_row();
         }
-        for (name, ms) in [
-            ("device", sample.device()),
-            ("frame", sample.wall),
-            ("latency", sample.latency),
-        ] {
+        for (name, ms) in
+            [("device", sample.device()), ("frame", sample.wall), ("latency", sample.latency)]
+        {
             ui.label(name);
             ui.monospace(format!("{} ms", written(ms)));
             ui.end_row();

@@ -116,20 +116,12 @@ impl Parser<'_> {
 
     fn u16(&mut self) -> Result<u16, Mistake> {
         let bytes = self.take()?;
-        Ok(if self.syntax.big {
-            u16::from_be_bytes(bytes)
-        } else {
-            u16::from_le_bytes(bytes)
-        })
+        Ok(if self.syntax.big { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
     }
 
     fn u32(&mut self) -> Result<u32, Mistake> {
         let bytes = self.take()?;
-        Ok(if self.syntax.big {
-            u32::from_be_bytes(bytes)
-        } else {
-            u32::from_le_bytes(bytes)
-        })
+        Ok(if self.syntax.big { u32::from_be_bytes(bytes) } else { u32::from_le_bytes(bytes) })
     }
 
     fn element(&mut self) -> Result<Element, Mistake> {
@@ -154,13 +146,7 @@ impl Parser<'_> {
                 _ => return Err((start, format!("{tag:04x?} has no type that DICOM knows"))),
             }
         };
-        Ok(Element {
-            tag,
-            sequence,
-            implicit,
-            length,
-            start,
-        })
+        Ok(Element { tag, sequence, implicit, length, start })
     }
 
     /// The end of a value of this length, which has to lie within `end`.
@@ -169,10 +155,7 @@ impl Parser<'_> {
         let fits = self.at.checked_add(length).filter(|&e| e <= end);
         fits.ok_or_else(|| {
             let held = end.saturating_sub(self.at);
-            let cause = format!(
-                "{:04x?} declares {length} bytes, {held} are there",
-                element.tag
-            );
+            let cause = format!("{:04x?} declares {length} bytes, {held} are there", element.tag);
             (element.start, cause)
         })
     }
@@ -250,10 +233,7 @@ impl Parser<'_> {
                     }
                 }
                 tag => {
-                    return Err((
-                        element.start,
-                        format!("{tag:04x?} is no item of a sequence"),
-                    ));
+                    return Err((element.start, format!("{tag:04x?} is no item of a sequence")));
                 }
             }
         }
@@ -272,17 +252,11 @@ impl Parser<'_> {
                     out.push(value);
                 }
                 tag => {
-                    return Err((
-                        element.start,
-                        format!("{tag:04x?} is no fragment of pixels"),
-                    ));
+                    return Err((element.start, format!("{tag:04x?} is no fragment of pixels")));
                 }
             }
         }
-        Err((
-            self.at,
-            "is cut off: the compressed pixels do not end".to_owned(),
-        ))
+        Err((self.at, "is cut off: the compressed pixels do not end".to_owned()))
     }
 }
 
@@ -311,11 +285,7 @@ impl Elements<'_> {
     /// An unsigned 16-bit integer.
     pub fn number(&self, item: &Item, tag: Tag) -> Option<u16> {
         let bytes = *self.bytes(item, tag)?.first_chunk::<2>()?;
-        Some(if self.big {
-            u16::from_be_bytes(bytes)
-        } else {
-            u16::from_le_bytes(bytes)
-        })
+        Some(if self.big { u16::from_be_bytes(bytes) } else { u16::from_le_bytes(bytes) })
     }
 
     /// Decimal numbers in text.
@@ -330,11 +300,7 @@ impl Elements<'_> {
         let bytes = self.bytes(item, tag)?;
         let words = bytes.as_chunks::<8>().0.iter();
         let read = |b: &[u8; 8]| {
-            if self.big {
-                f64::from_be_bytes(*b)
-            } else {
-                f64::from_le_bytes(*b)
-            }
+            if self.big { f64::from_be_bytes(*b) } else { f64::from_le_bytes(*b) }
         };
         let numbers: Vec<f64> = words.map(read).collect();
         numbers.try_into().ok()

@@ -47,10 +47,7 @@ impl Transfer {
 
     /// How elements are written.
     pub fn elements(self) -> Syntax {
-        Syntax {
-            explicit: self != Self::Implicit,
-            big: self == Self::Big,
-        }
+        Syntax { explicit: self != Self::Implicit, big: self == Self::Big }
     }
 }
 
@@ -75,18 +72,11 @@ pub(super) fn read(path: &Path) -> Result<Dicom<'_>, VolumeError> {
         return Err(VolumeError::file(path, message, SAVE));
     }
     let mistake = |(at, cause): (usize, String)| VolumeError::byte(path, at as u64, cause, SAVE);
-    let mut parser = Parser {
-        bytes: &bytes,
-        at: START,
-        syntax: Transfer::Explicit.elements(),
-    };
+    let mut parser = Parser { bytes: &bytes, at: START, syntax: Transfer::Explicit.elements() };
     // Group 2 alone is written with types in every file.
     let end = parser.end_of_group_2();
     let meta = parser.item(end, 0).map_err(mistake)?;
-    let elements = Elements {
-        bytes: &bytes,
-        big: false,
-    };
+    let elements = Elements { bytes: &bytes, big: false };
     let Some(uid) = elements.text(&meta, (0x0002, 0x0010)) else {
         let message = "lacks TransferSyntaxUID (0002,0010)";
         return Err(VolumeError::file(path, message, SAVE));
@@ -102,27 +92,16 @@ pub(super) fn read(path: &Path) -> Result<Dicom<'_>, VolumeError> {
         _ => (bytes, end),
     };
     let root = root(&bytes, at, syntax).map_err(mistake)?;
-    Ok(Dicom {
-        path,
-        bytes,
-        syntax,
-        root,
-    })
+    Ok(Dicom { path, bytes, syntax, root })
 }
 
 fn root(bytes: &[u8], at: usize, syntax: Transfer) -> Result<Item, (usize, String)> {
-    let mut parser = Parser {
-        bytes,
-        at,
-        syntax: syntax.elements(),
-    };
+    let mut parser = Parser { bytes, at, syntax: syntax.elements() };
     parser.item(bytes.len(), 0)
 }
 
 fn inflate(path: &Path, packed: &[u8]) -> Result<Vec<u8>, VolumeError> {
-    let most = (packed.len() as u64)
-        .saturating_mul(MAX_INFLATION)
-        .min(MAX_BYTES);
+    let most = (packed.len() as u64).saturating_mul(MAX_INFLATION).min(MAX_BYTES);
     let mut out = Vec::new();
     let mut stream = DeflateDecoder::new(packed).take(most + 1);
     stream.read_to_end(&mut out).map_err(|e| {

@@ -83,25 +83,23 @@ fn unplaced(dicom: &Dicom, image: &Image) -> VolumeError {
 fn plane(dicom: &Dicom, groups: &[&Item]) -> Option<Plane> {
     let elements = dicom.elements();
     let find = |tag| groups.iter().find_map(|g| first(g, tag));
-    let (origin, orientation, patient) = match (
-        find(elements::POSITION_VOLUME),
-        find(elements::ORIENTATION_VOLUME),
-    ) {
-        (Some(position), Some(orientation)) => (
-            elements.doubles::<3>(position, (0x0020, 0x9301))?,
-            elements.doubles::<6>(orientation, (0x0020, 0x9302))?,
-            false,
-        ),
-        _ => {
-            let position = find(elements::POSITION_PATIENT).unwrap_or(&dicom.root);
-            let orientation = find(elements::ORIENTATION_PATIENT).unwrap_or(&dicom.root);
-            (
-                elements.decimals::<3>(position, (0x0020, 0x0032))?,
-                elements.decimals::<6>(orientation, (0x0020, 0x0037))?,
-                true,
-            )
-        }
-    };
+    let (origin, orientation, patient) =
+        match (find(elements::POSITION_VOLUME), find(elements::ORIENTATION_VOLUME)) {
+            (Some(position), Some(orientation)) => (
+                elements.doubles::<3>(position, (0x0020, 0x9301))?,
+                elements.doubles::<6>(orientation, (0x0020, 0x9302))?,
+                false,
+            ),
+            _ => {
+                let position = find(elements::POSITION_PATIENT).unwrap_or(&dicom.root);
+                let orientation = find(elements::ORIENTATION_PATIENT).unwrap_or(&dicom.root);
+                (
+                    elements.decimals::<3>(position, (0x0020, 0x0032))?,
+                    elements.decimals::<6>(orientation, (0x0020, 0x0037))?,
+                    true,
+                )
+            }
+        };
     let [a, b, c, d, e, f] = orientation;
     Some(Plane {
         origin: DVec3::from(origin),
@@ -119,15 +117,11 @@ fn measures(
 ) -> Result<([f64; 2], f64), VolumeError> {
     let elements = dicom.elements();
     let mut groups = frame.into_iter().chain(shared);
-    let item = groups
-        .find_map(|g| first(g, elements::MEASURES))
-        .unwrap_or(&dicom.root);
+    let item = groups.find_map(|g| first(g, elements::MEASURES)).unwrap_or(&dicom.root);
     let spacing = elements.decimals::<2>(item, (0x0028, 0x0030));
     // The first is between rows, that is along a column.
     let [y, x] = spacing.ok_or_else(|| dicom.lacks("PixelSpacing", (0x0028, 0x0030)))?;
-    let thickness = elements
-        .decimals::<1>(item, (0x0018, 0x0050))
-        .map_or(1.0, |[t]| t);
+    let thickness = elements.decimals::<1>(item, (0x0018, 0x0050)).map_or(1.0, |[t]| t);
     let sound = |v: f64| v.is_finite() && v > 0.0;
     if !(sound(x) && sound(y)) {
         let message = format!("PixelSpacing is {y}\\{x}: a spacing has to be above zero");
@@ -161,16 +155,10 @@ fn assemble(
     let all = order.len();
     order.dedup_by(|b, a| planes[*b].origin.distance(planes[*a].origin) < SAME);
     if !all.is_multiple_of(order.len()) {
-        let message = format!(
-            "{all} planes in {} places are no whole volumes",
-            order.len()
-        );
+        let message = format!("{all} planes in {} places are no whole volumes", order.len());
         return Err(dicom.error(message, "save one volume"));
     }
-    let (first, last) = (
-        planes[order[0]].origin,
-        planes[order[order.len() - 1]].origin,
-    );
+    let (first, last) = (planes[order[0]].origin, planes[order[order.len() - 1]].origin);
     let step = match order.len() {
         1 => normal * thickness,
         count => (last - first) / (count - 1) as f64,
@@ -182,19 +170,10 @@ fn assemble(
             return Err(dicom.error(message, "resample the volume"));
         }
     }
-    let frame = if lead.patient {
-        Frame::Lps
-    } else {
-        Frame::Unstated
-    };
+    let frame = if lead.patient { Frame::Lps } else { Frame::Unstated };
     Ok(Planes {
         volumes: all / order.len(),
         frames: order,
-        grid: Grid {
-            steps: [lead.x * x, lead.y * y, step],
-            origin: first,
-            frame,
-            unit: 1.0,
-        },
+        grid: Grid { steps: [lead.x * x, lead.y * y, step], origin: first, frame, unit: 1.0 },
     })
 }

@@ -123,10 +123,7 @@ fn scale(dicom: &Dicom) -> Result<Option<(f64, f64)>, VolumeError> {
     let slope = value((0x0028, 0x1053)).unwrap_or(1.0);
     let intercept = value((0x0028, 0x1052)).unwrap_or(0.0);
     if !(slope.is_finite() && intercept.is_finite()) {
-        return Err(dicom.error(
-            "RescaleSlope or RescaleIntercept is not a finite number",
-            SAVE,
-        ));
+        return Err(dicom.error("RescaleSlope or RescaleIntercept is not a finite number", SAVE));
     }
     Ok(((slope, intercept) != (1.0, 0.0)).then_some((slope, intercept)))
 }

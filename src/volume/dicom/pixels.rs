@@ -22,11 +22,7 @@ pub(super) fn decode(
     image: &Image,
     frames: &[usize],
 ) -> Result<Voxels, VolumeError> {
-    let tag = if image.kind == VoxelType::F32 {
-        FLOAT_PIXELS
-    } else {
-        PIXELS
-    };
+    let tag = if image.kind == VoxelType::F32 { FLOAT_PIXELS } else { PIXELS };
     let bytes = match dicom.root.get(&tag) {
         Some(Value::Bytes(range)) => native(dicom, image, range.clone(), frames)?,
         Some(Value::Fragments(fragments)) => packed(dicom, image, fragments, frames)?,
@@ -63,28 +59,16 @@ fn native(
     range: Range<usize>,
     frames: &[usize],
 ) -> Result<Vec<u8>, VolumeError> {
-    let samples = if image.color == Color::Ybr422 {
-        2
-    } else {
-        image.samples
-    };
+    let samples = if image.color == Color::Ybr422 { 2 } else { image.samples };
     let frame = image.rows * image.columns * samples * image.kind.bytes();
     // Of 8-bit values in big-endian words two would change places; nobody writes them since 2006.
     let held = range.len();
-    if frame
-        .checked_mul(image.frames)
-        .is_none_or(|total| total > held)
-    {
+    if frame.checked_mul(image.frames).is_none_or(|total| total > held) {
         let message = format!(
             "is cut off: {} frames of {frame} bytes are declared, {held} bytes are there",
             image.frames
         );
-        return Err(VolumeError::byte(
-            dicom.path,
-            range.start as u64,
-            message,
-            SAVE,
-        ));
+        return Err(VolumeError::byte(dicom.path, range.start as u64, message, SAVE));
     }
     let mut out = Vec::new();
     for &index in frames {
@@ -129,10 +113,7 @@ fn packed(
     let data = fragments.get(1..).unwrap_or_default();
     if data.len() != image.frames {
         let message = format!("{} frames lie in {} fragments", image.frames, data.len());
-        return Err(dicom.error(
-            message,
-            "save it with one fragment per frame, or uncompressed",
-        ));
+        return Err(dicom.error(message, "save it with one fragment per frame, or uncompressed"));
     }
     let size = bytes_of(image, 1).unwrap_or(u64::MAX) as usize;
     let mut out = Vec::new();
@@ -169,14 +150,8 @@ fn jpeg(image: &Image, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
         other => return Err(format!("pixels of {other:?} cannot be read")),
     };
     let mut pixels = vec![0; decoder.total_bytes() as usize];
-    decoder
-        .read_image(&mut pixels)
-        .map_err(|e| format!("the JPEG is broken: {e}"))?;
-    let decoded = Image {
-        color,
-        planar: false,
-        ..image.clone()
-    };
+    decoder.read_image(&mut pixels).map_err(|e| format!("the JPEG is broken: {e}"))?;
+    let decoded = Image { color, planar: false, ..image.clone() };
     grey(&decoded, &pixels, out);
     Ok(())
 }
@@ -229,10 +204,7 @@ fn rle(image: &Image, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
             }
         }
     }
-    let planar = Image {
-        planar: true,
-        ..image.clone()
-    };
+    let planar = Image { planar: true, ..image.clone() };
     grey(&planar, &frame, out);
     Ok(())
 }

@@ -43,13 +43,7 @@ pub(super) fn directions(
 
 /// Values like `(1,0,0) none (0, 1, 0)`; of two components the third is zero.
 fn vectors(fields: &Fields, field: &Field) -> Result<Directions, VolumeError> {
-    let wrong = || {
-        fields.error(
-            field,
-            "is no list of vectors",
-            "write it like (1,0,0) (0,1,0)",
-        )
-    };
+    let wrong = || fields.error(field, "is no list of vectors", "write it like (1,0,0) (0,1,0)");
     let mut out = Vec::new();
     let mut rest = field.value.trim();
     while !rest.is_empty() {
@@ -80,11 +74,7 @@ pub(super) fn axes(
 ) -> Result<Vec<Axis>, VolumeError> {
     let kinds = fields.find(&["kinds"]);
     let kinds: Vec<_> = kinds.map_or(Vec::new(), |k| k.value.split_whitespace().collect());
-    let kind = |axis: usize| {
-        kinds
-            .get(axis)
-            .map_or("domain".into(), |k| k.to_ascii_lowercase())
-    };
+    let kind = |axis: usize| kinds.get(axis).map_or("domain".into(), |k| k.to_ascii_lowercase());
     let plain = |axis: usize| ["domain", "space", "none", "???"].contains(&kind(axis).as_str());
     let of_space = |axis: &usize| match directions {
         Some(vectors) => vectors[*axis].is_some(),
@@ -183,12 +173,7 @@ pub(super) fn grid(
         },
         None => DVec3::ZERO,
     };
-    Ok(Grid {
-        steps,
-        origin,
-        frame,
-        unit: unit(fields, axes)?,
-    })
+    Ok(Grid { steps, origin, frame, unit: unit(fields, axes)? })
 }
 
 fn unit(fields: &Fields, axes: &[Axis]) -> Result<f64, VolumeError> {

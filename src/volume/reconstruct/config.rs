@@ -78,11 +78,7 @@ impl Config {
 
 impl Element<'_, '_> {
     fn error(&self, name: &str, cause: &str, remedy: &str) -> VolumeError {
-        let line = self
-            .node
-            .document()
-            .text_pos_at(self.node.range().start)
-            .row;
+        let line = self.node.document().text_pos_at(self.node.range().start).row;
         let value = self.node.attribute(name).unwrap_or_default();
         let value: String = value.chars().take(60).collect();
         let message = format!("`{name}` is `{value}`: {cause}");
@@ -127,10 +123,7 @@ fn settings(element: &Element) -> Result<Settings, VolumeError> {
     element.need("OutputSpacing")?;
     let spacing = element.numbers("OutputSpacing")?.map(DVec3::from_array);
     let mut out = Settings::new(spacing.unwrap_or(DVec3::ONE));
-    let modes = [
-        ("NEAREST_NEIGHBOR", Interpolation::Nearest),
-        ("LINEAR", Interpolation::Linear),
-    ];
+    let modes = [("NEAREST_NEIGHBOR", Interpolation::Nearest), ("LINEAR", Interpolation::Linear)];
     if let Some(mode) = element.choice("Interpolation", &modes)? {
         out.interpolation = mode;
     }
@@ -155,26 +148,17 @@ fn settings(element: &Element) -> Result<Settings, VolumeError> {
     };
     let clip = element.numbers::<i32, 2>("ClipRectangleOrigin")?;
     let clip = clip.zip(element.numbers("ClipRectangleSize")?);
-    out.clip = clip
-        .filter(|(_, [w, h])| *w > 0 && *h > 0)
-        .map(|([x, y], [w, h])| [x, y, w, h]);
+    out.clip = clip.filter(|(_, [w, h])| *w > 0 && *h > 0).map(|([x, y], [w, h])| [x, y, w, h]);
     out.fan = fan(element)?;
-    out.reject_below = element
-        .numbers("PixelRejectionThreshold")?
-        .map(|[v]: [f64; 1]| v);
-    out.every = element
-        .numbers("SkipInterval")?
-        .map_or(1, |[n]: [usize; 1]| n.max(1));
+    out.reject_below = element.numbers("PixelRejectionThreshold")?.map(|[v]: [f64; 1]| v);
+    out.every = element.numbers("SkipInterval")?.map_or(1, |[n]: [usize; 1]| n.max(1));
     element.choice("EnableFanAnglesAutoDetect", &[("FALSE", ())])?;
     let fill = element.choice("FillHoles", &[("ON", true), ("OFF", false)])?;
     out.holes = Vec::new();
     if fill == Some(true) {
         let nodes = element.node.descendants();
         for node in nodes.filter(|n| n.has_tag_name("HoleFillingElement")) {
-            let element = Element {
-                node,
-                path: element.path,
-            };
+            let element = Element { node, path: element.path };
             out.holes.push(filling(&element)?);
         }
     }
@@ -196,10 +180,7 @@ fn fan(element: &Element) -> Result<Option<Fan>, VolumeError> {
         origin: element.numbers("FanOriginPixel")?.unwrap_or([0.0; 2]),
         angles: [angles[0].min(angles[1]), angles[0].max(angles[1])],
         // PLUS's own values where none is given.
-        radii: [
-            radius("FanRadiusStartPixel", 0.0)?,
-            radius("FanRadiusStopPixel", 500.0)?,
-        ],
+        radii: [radius("FanRadiusStartPixel", 0.0)?, radius("FanRadiusStopPixel", 500.0)?],
     }))
 }
 
@@ -221,8 +202,5 @@ fn filling(element: &Element) -> Result<Filling, VolumeError> {
     }
     element.need("MinimumKnownVoxelsRatio")?;
     let share = element.numbers::<f64, 1>("MinimumKnownVoxelsRatio")?;
-    Ok(Filling::Nearest {
-        size: integer("Size")?,
-        share: share.map_or(0.0, |[v]| v),
-    })
+    Ok(Filling::Nearest { size: integer("Size")?, share: share.map_or(0.0, |[v]| v) })
 }

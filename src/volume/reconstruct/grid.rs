@@ -36,11 +36,7 @@ impl Lattice {
                 "change the spacing or the extent; check the size of a pixel in the transform",
             ));
         }
-        Ok(Self {
-            origin,
-            spacing,
-            size,
-        })
+        Ok(Self { origin, spacing, size })
     }
 
     /// The voxels that hold the part of these frames that is used: from the smallest coordinate of
@@ -51,12 +47,9 @@ impl Lattice {
         spacing: DVec3,
     ) -> Result<Self, ReconstructError> {
         let corners = source.corners();
-        let points = frames
-            .iter()
-            .flat_map(|(_, pose)| corners.map(|c| pose.transform_point3(c)));
-        let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| {
-            (l.min(p), h.max(p))
-        });
+        let points = frames.iter().flat_map(|(_, pose)| corners.map(|c| pose.transform_point3(c)));
+        let (low, high) =
+            points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
         // A size beyond all numbers is refused with the others.
         let size = ((high - low) / spacing).round().to_array();
         Self::new(low, spacing, size.map(|n| (n as usize).saturating_add(1)))

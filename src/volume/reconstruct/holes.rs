@@ -28,10 +28,7 @@ pub(super) fn fill(values: Vec<f32>, sums: &Sums, ways: &[Filling]) -> (Vec<f32>
         return (values, 0);
     }
     let [x, y, _] = sums.size();
-    let volume = Reached {
-        values: &values,
-        sums,
-    };
+    let volume = Reached { values: &values, sums };
     let mut out = values.clone();
     let filled = out
         .par_chunks_mut(x * y)
@@ -112,9 +109,8 @@ impl Reached<'_> {
         // Lines as long as the last of those that are used are used as well.
         let last = found.get(count.max(1).min(found.len()).checked_sub(1)?)?.0;
         let used = found.iter().take_while(|(line, _)| *line <= last);
-        let (sum, weights) = used.fold((0.0, 0.0), |(s, w), (line, value)| {
-            (s + value / line, w + 1.0 / line)
-        });
+        let (sum, weights) =
+            used.fold((0.0, 0.0), |(s, w), (line, value)| (s + value / line, w + 1.0 / line));
         Some(sum / weights)
     }
 

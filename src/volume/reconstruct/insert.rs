@@ -73,10 +73,7 @@ impl<'s> Source<'s> {
             let at = at as usize;
             if flip { size - 1 - at } else { at }
         };
-        let (x, y) = (
-            along(x, width, self.flip[0]),
-            along(y, height, self.flip[1]),
-        );
+        let (x, y) = (along(x, width, self.flip[0]), along(y, height, self.flip[1]));
         let index = self.sequence.first_pixel(frame) + x + width * y;
         self.sequence.pixels.get(index)
     }
@@ -134,9 +131,7 @@ impl Sums {
             return self.value.clone();
         }
         let pairs = self.value.iter().zip(&self.weight);
-        pairs
-            .map(|(sum, weight)| if *weight > 0.0 { sum / weight } else { 0.0 })
-            .collect()
+        pairs.map(|(sum, weight)| if *weight > 0.0 { sum / weight } else { 0.0 }).collect()
     }
 
     /// Adds the pixels of a frame.

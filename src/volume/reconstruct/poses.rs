@@ -39,19 +39,12 @@ impl Transforms {
         image: &str,
         reference: &str,
     ) -> Result<Vec<Option<DAffine3>>, ReconstructError> {
-        let ways = sequence
-            .frames
-            .iter()
-            .map(|f| self.way(&f.poses, image, reference));
+        let ways = sequence.frames.iter().map(|f| self.way(&f.poses, image, reference));
         let ways: Vec<_> = ways.collect();
         if ways.iter().any(Option::is_some) {
             return Ok(ways.into_iter().map(Option::flatten).collect());
         }
-        let mut names: Vec<_> = self
-            .fixed
-            .iter()
-            .map(|(a, b, _)| format!("{a}To{b}"))
-            .collect();
+        let mut names: Vec<_> = self.fixed.iter().map(|(a, b, _)| format!("{a}To{b}")).collect();
         names.extend(sequence.frames.iter().flat_map(|f| f.poses.keys().cloned()));
         names.sort();
         names.dedup();
@@ -59,11 +52,7 @@ impl Transforms {
         Err(ReconstructError::new(
             format!(
                 "nothing leads from `{image}` to `{reference}`; there is {}",
-                if names.is_empty() {
-                    "no transform".to_owned()
-                } else {
-                    names.join(", ")
-                }
+                if names.is_empty() { "no transform".to_owned() } else { names.join(", ") }
             ),
             "give the calibration (--config or --image-to-probe) and the names of the frames \
              (--image, --reference)",
@@ -79,17 +68,10 @@ impl Transforms {
     ) -> Option<Option<DAffine3>> {
         let mut steps: BTreeMap<&str, Vec<Step>> = BTreeMap::new();
         let mut join = |from, to, transform: DAffine3, ok: bool| {
-            steps
-                .entry(from)
-                .or_default()
-                .push(Step { to, transform, ok });
+            steps.entry(from).or_default().push(Step { to, transform, ok });
             let inverse = transform.inverse();
             let (to, ok) = (to, ok && inverse.is_finite());
-            steps.entry(to).or_default().push(Step {
-                to: from,
-                transform: inverse,
-                ok,
-            });
+            steps.entry(to).or_default().push(Step { to: from, transform: inverse, ok });
         };
         // A pose of the file goes before the calibration of the same name.
         for (name, pose) in poses {

@@ -29,10 +29,7 @@ pub struct Pose {
 impl Pose {
     /// A pose that holds.
     pub fn ok(transform: DAffine3) -> Self {
-        Self {
-            transform,
-            status: Some("OK".to_owned()),
-        }
+        Self { transform, status: Some("OK".to_owned()) }
     }
 
     /// Whether it holds.
@@ -70,10 +67,7 @@ impl TrackedFrame {
                 let row = m.row(row).extend(t[row]).to_array();
                 row.map(number).join(" ")
             });
-            entry(
-                &format!("{name}{TRANSFORM}"),
-                &format!("{} 0 0 0 1", rows.join(" ")),
-            );
+            entry(&format!("{name}{TRANSFORM}"), &format!("{} 0 0 0 1", rows.join(" ")));
             if let Some(status) = &pose.status {
                 entry(&format!("{name}{STATUS}"), status);
             }
@@ -112,9 +106,8 @@ pub(super) fn parse(
         let Some(rest) = field.key.strip_prefix(PREFIX) else {
             continue;
         };
-        let parts = rest
-            .split_once('_')
-            .and_then(|(i, name)| Some((i.parse::<usize>().ok()?, name)));
+        let parts =
+            rest.split_once('_').and_then(|(i, name)| Some((i.parse::<usize>().ok()?, name)));
         let Some((index, name)) = parts else {
             return Err(fields.error(
                 field,
@@ -130,10 +123,7 @@ pub(super) fn parse(
         if let Some(of) = name.strip_suffix(STATUS) {
             statuses.insert(of.to_owned(), field.value.clone());
         } else if let Some(of) = name.strip_suffix(TRANSFORM) {
-            let pose = Pose {
-                transform: transform(fields, field)?,
-                status: None,
-            };
+            let pose = Pose { transform: transform(fields, field)?, status: None };
             frame.poses.insert(of.to_owned(), pose);
         } else if name == TIMESTAMP {
             let time: f64 = fields.number(field)?;
@@ -156,20 +146,13 @@ pub(super) fn parse(
         }
         frame
     };
-    Ok(out
-        .into_iter()
-        .map(|(i, found)| (i, attach(found)))
-        .collect())
+    Ok(out.into_iter().map(|(i, found)| (i, attach(found))).collect())
 }
 
 /// Sixteen numbers, row by row, the last row (0, 0, 0, 1).
 fn transform(fields: &Fields, field: &Field) -> Result<DAffine3, VolumeError> {
     matrix(&field.value).map_err(|cause| {
-        fields.error(
-            field,
-            cause,
-            "write the sixteen numbers of a 4 x 4 matrix, row by row",
-        )
+        fields.error(field, cause, "write the sixteen numbers of a 4 x 4 matrix, row by row")
     })
 }
 

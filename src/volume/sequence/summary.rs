@@ -46,11 +46,7 @@ impl Summary {
             let [low, high] = range.unwrap_or([t, t]);
             Some([low.min(t), high.max(t)])
         });
-        Ok(Some(Self {
-            frames: count,
-            poses,
-            times,
-        }))
+        Ok(Some(Self { frames: count, poses, times }))
     }
 }
 

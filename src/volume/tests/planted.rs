@@ -33,22 +33,12 @@ fn planted_mistakes_in_text_headers_name_line_and_cause() {
         ("raw", "zip", 10, "`zip`"),
         ("short", "block", 3, "this type"),
         ("LPS", "up-down", 5, "this space"),
-        (
-            "space directions: (",
-            "space directions: ((",
-            7,
-            "no list of vectors",
-        ),
+        ("space directions: (", "space directions: ((", 7, "no list of vectors"),
         ("4 3 2", "4 3", 6, "2 values where 3"),
         ("little", "middle", 9, "no byte order"),
         ("NRRD0004", "NRRD0009", 1, "does not begin with NRRD"),
         ("raw\n", "raw\nbyte skip: -2\n", 11, "no number of bytes"),
-        (
-            "raw\n",
-            "raw\nspace units: \"ell\"\n",
-            11,
-            "one unit of length",
-        ),
+        ("raw\n", "raw\nspace units: \"ell\"\n", 11, "one unit of length"),
     ] {
         assert!(good.contains(from), "{from}");
         let mut bad = good.replacen(from, to, 1).into_bytes();
@@ -112,10 +102,7 @@ fn cut_singular_huge_and_bomb_are_refused() {
     }
     let text = |old: &str, new: &str, more: &str, data: &[u8]| {
         let file = nrrd("LPS", DVec3::ONE, more, b"");
-        let mut file = String::from_utf8(file)
-            .expect("text")
-            .replacen(old, new, 1)
-            .into_bytes();
+        let mut file = String::from_utf8(file).expect("text").replacen(old, new, 1).into_bytes();
         file.extend(data);
         file
     };
@@ -126,28 +113,14 @@ fn cut_singular_huge_and_bomb_are_refused() {
         ("1000 1000 1000".to_owned(), "cut off"),
     ] {
         let size = format!("sizes: {size}");
-        folder.refused(
-            "a.nrrd",
-            &text("sizes: 4 3 2", &size, RAW, &bytes(false)),
-            cause,
-        );
-        folder.refused(
-            "g.nrrd",
-            &text("sizes: 4 3 2", &size, GZIP, &gzip(&bytes(true))),
-            cause,
-        );
+        folder.refused("a.nrrd", &text("sizes: 4 3 2", &size, RAW, &bytes(false)), cause);
+        folder.refused("g.nrrd", &text("sizes: 4 3 2", &size, GZIP, &gzip(&bytes(true))), cause);
     }
     // 64 MB of zeros in 64 kB: with bytes to skip counted from the end it is not unpacked whole.
     let bomb = gzip(&vec![0; 64 << 20]);
     let from_end = format!("{GZIP}\nbyte skip: -1");
-    folder.refused(
-        "b.nrrd",
-        &text("", "", &from_end, &bomb),
-        "precede the voxels",
-    );
-    let (volume, warnings) = folder
-        .load("b.nrrd", &text("", "", GZIP, &bomb))
-        .expect("zeros");
+    folder.refused("b.nrrd", &text("", "", &from_end, &bomb), "precede the voxels");
+    let (volume, warnings) = folder.load("b.nrrd", &text("", "", GZIP, &bomb)).expect("zeros");
     assert_eq!(volume.voxels.len(), 24);
     assert!(warnings[0].message.contains("data go on"));
     // And with bzip2, where 64 MB are 50 bytes: no more than the header declares is unpacked.
@@ -156,25 +129,15 @@ fn cut_singular_huge_and_bomb_are_refused() {
     let bomb = encoder.finish().expect("memory");
     assert!(bomb.len() < 200, "{}", bomb.len());
     let small = GZIP.replace("gzip", "bzip2");
-    let (volume, _) = folder
-        .load("b.nrrd", &text("", "", &small, &bomb))
-        .expect("zeros");
+    let (volume, _) = folder.load("b.nrrd", &text("", "", &small, &bomb)).expect("zeros");
     assert_eq!(volume.voxels.len(), 24);
     let hex = GZIP.replace("gzip", "hex");
     folder.refused("h.nrrd", &text("", "", &hex, &[b'0'; 95]), "cut off");
-    folder.refused(
-        "h.nrrd",
-        &text("", "", &hex, &[b'x'; 96]),
-        "no hexadecimal digit",
-    );
+    folder.refused("h.nrrd", &text("", "", &hex, &[b'x'; 96]), "no hexadecimal digit");
 
     let d = direction().to_cols_array().map(|v| v.to_string()).join(" ");
     let good = String::from_utf8(meta(LOCAL, b"")).expect("text");
-    for flat in [
-        "1 0 0 1 0 0 0 0 1",
-        "1 0 0 0 1 0 nan 0 0",
-        "0 0 0 0 1 0 0 0 1",
-    ] {
+    for flat in ["1 0 0 1 0 0 0 0 1", "1 0 0 0 1 0 nan 0 0", "0 0 0 0 1 0 0 0 1"] {
         let mut bad = good.replacen(&d, flat, 1).into_bytes();
         bad.extend(bytes(false));
         folder.load("s.mha", &bad).expect_err(flat);

@@ -65,19 +65,9 @@ fn sequences_read_back_equal() {
     assert_eq!(summary.poses["ReferenceToTracker"], [3, 3]);
 
     let error = sequence.write(&folder.0.path().join("a.nrrd"));
-    assert!(
-        error
-            .expect_err("no MetaImage")
-            .message
-            .contains("only MetaImage")
-    );
+    assert!(error.expect_err("no MetaImage").message.contains("only MetaImage"));
     let error = sequence.write(&folder.0.path().join("none/a.mha"));
-    assert!(
-        error
-            .expect_err("no folder")
-            .message
-            .contains("cannot be written")
-    );
+    assert!(error.expect_err("no folder").message.contains("cannot be written"));
 }
 
 #[test]
@@ -102,11 +92,7 @@ fn planted_mistakes_in_frames_name_line_and_cause() {
     let path = folder.0.path().join("a.mha");
     sequence().write(&path).expect("written");
     let whole = std::fs::read(&path).expect("readable");
-    let end = whole
-        .windows(6)
-        .position(|w| w == b"LOCAL\n")
-        .expect("a header")
-        + 6;
+    let end = whole.windows(6).position(|w| w == b"LOCAL\n").expect("a header") + 6;
     let header = std::str::from_utf8(&whole[..end]).expect("text");
     let refused = |from: &str, to: &str, cause: &str, at_line: bool| {
         assert!(header.contains(from), "{from}");
@@ -115,10 +101,7 @@ fn planted_mistakes_in_frames_name_line_and_cause() {
         let error = Sequence::load(&folder.write("b.mha", &bad)).expect_err(cause);
         assert!(error.to_string().contains(cause), "{error}");
         let line = from.lines().last().expect("a line");
-        let line = header
-            .lines()
-            .position(|l| l.contains(line))
-            .map(|l| Place::Line(l + 1));
+        let line = header.lines().position(|l| l.contains(line)).map(|l| Place::Line(l + 1));
         assert!(!at_line || Some(error.place) == line, "{error}");
     };
     for (to, cause) in [
@@ -127,9 +110,7 @@ fn planted_mistakes_in_frames_name_line_and_cause() {
         ("0 0 0 x\n", "no list of numbers"),
         ("0 0 nan 1\n", "is not finite"),
     ] {
-        let pose = header
-            .lines()
-            .position(|l| l.ends_with("0 0 0 1") && l.contains("Probe"));
+        let pose = header.lines().position(|l| l.ends_with("0 0 0 1") && l.contains("Probe"));
         let line = header.lines().nth(pose.expect("a pose")).expect("a line");
         let from = format!("{line}\n");
         let to = from.replacen("0 0 0 1\n", to, 1);
@@ -137,17 +118,9 @@ fn planted_mistakes_in_frames_name_line_and_cause() {
     }
     for (from, to, cause) in [
         ("Frame0002_Time", "Frame0003_Time", "there are 3 frames"),
-        (
-            "Frame0002_Time",
-            "Frame2000000000000000000_Time",
-            "there are 3 frames",
-        ),
+        ("Frame0002_Time", "Frame2000000000000000000_Time", "there are 3 frames"),
         ("Frame0002_Time", "Frame_Time", "names no frame"),
-        (
-            "Frame0002_Timestamp = ",
-            "Frame0002_Timestamp = nan",
-            "no number that fits",
-        ),
+        ("Frame0002_Timestamp = ", "Frame0002_Timestamp = nan", "no number that fits"),
     ] {
         refused(from, to, cause, true);
     }

@@ -36,11 +36,7 @@ fn series(order: &str, big: bool) -> Vec<u8> {
             }
         }
         let value = value(place, time) + 7 * channel as i16;
-        out.extend(if big {
-            value.to_be_bytes()
-        } else {
-            value.to_le_bytes()
-        });
+        out.extend(if big { value.to_be_bytes() } else { value.to_le_bytes() });
     }
     out
 }
@@ -212,12 +208,9 @@ fn planted_mistakes_in_time_are_refused() {
         single[92..96].copy_from_slice(&pace.to_le_bytes());
         folder.load("b.nii", &single).expect("one volume");
     }
-    for (size, cause) in [
-        (-3i16, "dim[4] is -3"),
-        (0, "dim[4] is 0"),
-        (4, "is cut off"),
-        (i16::MAX, "is cut off"),
-    ] {
+    for (size, cause) in
+        [(-3i16, "dim[4] is -3"), (0, "dim[4] is 0"), (4, "is cut off"), (i16::MAX, "is cut off")]
+    {
         for packed in [false, true] {
             let mut file = nifti_4d(false, 0.05, 10);
             file[48..50].copy_from_slice(&size.to_le_bytes());
@@ -253,18 +246,11 @@ fn planted_mistakes_in_time_are_refused() {
     let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
     encoder.write_all(&vec![0; 1 << 20]).expect("memory");
     let tiny = nrrd_4d("1 1 1 4000000000", "", &encoder.finish().expect("memory"));
-    let at = tiny
-        .windows(3)
-        .position(|w| w == b"raw")
-        .expect("an encoding");
+    let at = tiny.windows(3).position(|w| w == b"raw").expect("an encoding");
     let tiny = [&tiny[..at], b"bzip2", &tiny[at + 3..]].concat();
     let at = tiny.windows(5).position(|w| w == b"short").expect("a type");
     let tiny = [&tiny[..at], b"uint8", &tiny[at + 5..]].concat();
-    folder.refused(
-        "t.nrrd",
-        &tiny,
-        "4000000000 volumes over time are more than 65536",
-    );
+    folder.refused("t.nrrd", &tiny, "4000000000 volumes over time are more than 65536");
     let nrrd = |spacing: &str, unit: &str| {
         let more = format!(
             "endian: little\nkinds: domain domain domain time\nspacings: 1 1 1 {spacing}\n\
@@ -303,14 +289,7 @@ fn planted_mistakes_in_time_are_refused() {
 fn what_would_be_held_counts_too() {
     let folder = Folder::new();
     let mut file = nifti_4d(false, 0.05, 10);
-    for (at, value) in [
-        (42, 1024i16),
-        (44, 1024),
-        (46, 100),
-        (48, 20),
-        (70, 2),
-        (72, 8),
-    ] {
+    for (at, value) in [(42, 1024i16), (44, 1024), (46, 100), (48, 20), (70, 2), (72, 8)] {
         file[at..at + 2].copy_from_slice(&value.to_le_bytes());
     }
     folder.refused("a.nii", &file, "is cut off");
@@ -338,37 +317,20 @@ fn files_of_one_volume_each_make_a_series() {
     let header = String::from_utf8(meta(LOCAL, b"")).expect("text");
     let changed = |from: &str, to: &str, data: &[u8]| {
         let text = header.replacen(from, to, 1);
-        let name = format!(
-            "{}.mha",
-            std::fs::read_dir(folder.0.path())
-                .expect("a folder")
-                .count()
-        );
+        let name = format!("{}.mha", std::fs::read_dir(folder.0.path()).expect("a folder").count());
         folder.write(&name, &[text.as_bytes(), data].concat())
     };
     let direction = direction().to_cols_array()[0].to_string();
     for (path, cause) in [
-        (
-            changed("4 3 2", "4 2 3", &bytes(2)),
-            "has 4 x 2 x 3 voxels, not 4 x 3 x 2 as in",
-        ),
+        (changed("4 3 2", "4 2 3", &bytes(2)), "has 4 x 2 x 3 voxels, not 4 x 3 x 2 as in"),
         (
             changed("MET_SHORT", "MET_USHORT", &bytes(2)),
             "16-bit unsigned integer, not 16-bit signed",
         ),
-        (
-            changed("Offset = -12.5", "Offset = -12.4", &bytes(2)),
-            "voxels from where it does in",
-        ),
-        (
-            changed("0.5 1.25 2", "0.5 1.25 2.1", &bytes(2)),
-            "up to 0.05 voxels",
-        ),
+        (changed("Offset = -12.5", "Offset = -12.4", &bytes(2)), "voxels from where it does in"),
+        (changed("0.5 1.25 2", "0.5 1.25 2.1", &bytes(2)), "up to 0.05 voxels"),
         (changed(&direction, "0.9", &bytes(2)), "voxels from where"),
-        (
-            folder.write("four.mha", &meta_4d("1", LOCAL, &series("xyzt", false))),
-            "holds 3 volumes",
-        ),
+        (folder.write("four.mha", &meta_4d("1", LOCAL, &series("xyzt", false))), "holds 3 volumes"),
         (changed("", "", &bytes(2)[..40]), "is cut off"),
     ] {
         let (number, error) = load(path.clone()).expect_err(cause);
@@ -394,9 +356,7 @@ fn files_of_one_volume_each_make_a_series() {
 #[test]
 fn volumes_over_time_read_back_equal() {
     let folder = Folder::new();
-    let (volume, _) = folder
-        .load("a.nii", &nifti_4d(false, 0.05, 10))
-        .expect("readable");
+    let (volume, _) = folder.load("a.nii", &nifti_4d(false, 0.05, 10)).expect("readable");
     let path = folder.0.path().join("b.mha");
     write_meta(&path, &volume).expect("written");
     let (read, warnings) = Volume::load(&path).expect("readable");
@@ -405,9 +365,6 @@ fn volumes_over_time_read_back_equal() {
     let (a, b) = (read.world_from_voxel, volume.world_from_voxel);
     assert!(a.abs_diff_eq(b, 1e-14), "{a:?} {b:?}");
     let told = read.to_string();
-    assert!(
-        told.contains("3 volumes over time, one every 0.05 s"),
-        "{told}"
-    );
+    assert!(told.contains("3 volumes over time, one every 0.05 s"), "{told}");
     assert!(told.contains("values -1500 to 623"), "{told}");
 }

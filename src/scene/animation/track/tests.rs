@@ -26,10 +26,7 @@ fn steps_hold_lines_join_and_the_ends_stay() {
 #[test]
 fn a_cubic_spline_with_a_parabolas_tangents_is_the_parabola() {
     // x = t^2 at 0, 2, 4 s: slopes 0, 4, 8. A cubic Hermite reproduces it exactly.
-    let spline = line(
-        &[0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 8.0, 16.0, 8.0],
-        Curve::CubicSpline,
-    );
+    let spline = line(&[0.0, 0.0, 0.0, 4.0, 4.0, 4.0, 8.0, 16.0, 8.0], Curve::CubicSpline);
     for i in 0..=40 {
         let t = f64::from(i) / 10.0;
         assert!((spline.at(t).x - t * t).abs() < 1e-12, "{t}");
@@ -76,10 +73,7 @@ fn a_track_keeps_what_has_no_channel() {
         scale: Some(line(&[1.0, 3.0], Curve::Linear)),
         ..Track::default()
     };
-    let rest = Trs {
-        translation: DVec3::new(1.0, 2.0, 3.0),
-        ..Trs::default()
-    };
+    let rest = Trs { translation: DVec3::new(1.0, 2.0, 3.0), ..Trs::default() };
     let now = track.at(rest, 2.0);
     assert_eq!(now.translation, rest.translation);
     assert_eq!(now.scale, DVec3::splat(3.0));
@@ -99,10 +93,7 @@ fn bad_samples_are_named() {
         Channel::new(times.to_vec(), values, Curve::Linear).map(|_| ())
     };
     assert_eq!(make(&[], &[]), Err(TrackError::Empty));
-    let count = TrackError::Count {
-        times: 2,
-        values: 1,
-    };
+    let count = TrackError::Count { times: 2, values: 1 };
     assert_eq!(make(&[0.0, 1.0], &[1.0]), Err(count));
     assert_eq!(make(&[0.0, 0.0], &[1.0; 2]), Err(TrackError::Order(1)));
     assert_eq!(make(&[0.0, -1.0], &[1.0; 2]), Err(TrackError::Order(1)));
@@ -119,10 +110,7 @@ fn bad_samples_are_named() {
     assert_eq!(found, Err(TrackError::ZeroQuaternion(1)));
     for bad in [[1.0, 0.0], [1.0, -1.0]] {
         let scale = Some(line(&bad, Curve::Linear));
-        let track = Track {
-            scale,
-            ..Track::default()
-        };
+        let track = Track { scale, ..Track::default() };
         assert_eq!(track.invertible(), Err(TrackError::ZeroScale(1)));
     }
 }

@@ -33,11 +33,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
 }
 
 fn list<'a>(findings: &Findings<'a>, name: &str) -> &'a [Value] {
-    findings
-        .root
-        .get(name)
-        .and_then(Value::as_array)
-        .map_or(&[], Vec::as_slice)
+    findings.root.get(name).and_then(Value::as_array).map_or(&[], Vec::as_slice)
 }
 
 fn number(value: &Value, key: &str) -> Option<i64> {
@@ -64,23 +60,16 @@ fn version(findings: &mut Findings<'_>) {
     }
     match read("minVersion").map(|v| (v, parse(v))) {
         Some((_, Some(least))) if least <= (2, 0) => {}
-        Some((v, _)) => findings.fault(
-            "/asset/minVersion",
-            format!("requires `{v}`; 2.0 can be read"),
-        ),
+        Some((v, _)) => {
+            findings.fault("/asset/minVersion", format!("requires `{v}`; 2.0 can be read"))
+        }
         None => {}
     }
 }
 
 fn extensions(findings: &mut Findings<'_>) {
-    let used: Vec<_> = list(findings, "extensionsUsed")
-        .iter()
-        .filter_map(Value::as_str)
-        .collect();
-    for name in list(findings, "extensionsRequired")
-        .iter()
-        .filter_map(Value::as_str)
-    {
+    let used: Vec<_> = list(findings, "extensionsUsed").iter().filter_map(Value::as_str).collect();
+    for name in list(findings, "extensionsRequired").iter().filter_map(Value::as_str) {
         if !HARMLESS.iter().any(|known| name.starts_with(known)) {
             findings.fault(
                 "/meshes",
@@ -88,10 +77,8 @@ fn extensions(findings: &mut Findings<'_>) {
             );
         }
         if !used.contains(&name) {
-            findings.remark(
-                "/extensionsRequired",
-                format!("{name} is not declared in extensionsUsed"),
-            );
+            findings
+                .remark("/extensionsRequired", format!("{name} is not declared in extensionsUsed"));
         }
     }
     if !used.is_empty() {
@@ -116,10 +103,7 @@ fn unread(findings: &mut Findings<'_>) {
     for (i, material) in list(findings, "materials").iter().enumerate() {
         let masked = material.get("alphaMode").and_then(Value::as_str) == Some("MASK");
         if material.get("alphaCutoff").is_some() && !masked {
-            findings.remark(
-                &format!("/materials/{i}/alphaCutoff"),
-                "needs alphaMode MASK",
-            );
+            findings.remark(&format!("/materials/{i}/alphaCutoff"), "needs alphaMode MASK");
         }
     }
 }
@@ -159,24 +143,16 @@ fn views(findings: &mut Findings<'_>) {
         }
     }
     for (i, buffer) in buffers.iter().enumerate() {
-        let uri = buffer
-            .get("uri")
-            .and_then(Value::as_str)
-            .unwrap_or_default();
+        let uri = buffer.get("uri").and_then(Value::as_str).unwrap_or_default();
         let header = uri.split(',').next().unwrap_or_default();
         if header.starts_with("data:") && header.contains(";;") {
             findings.remark(&format!("/buffers/{i}/uri"), "is not a valid data URI");
         }
-        let media = uri
-            .strip_prefix("data:")
-            .and_then(|u| u.split([',', ';']).next());
+        let media = uri.strip_prefix("data:").and_then(|u| u.split([',', ';']).next());
         if media
             .is_some_and(|m| !["application/octet-stream", "application/gltf-buffer"].contains(&m))
         {
-            findings.remark(
-                &format!("/buffers/{i}/uri"),
-                "has the media type of something else",
-            );
+            findings.remark(&format!("/buffers/{i}/uri"), "has the media type of something else");
         }
     }
 }
@@ -185,19 +161,13 @@ fn accessors(findings: &mut Findings<'_>) {
     for (i, accessor) in list(findings, "accessors").iter().enumerate() {
         let at = format!("/accessors/{i}");
         let has = |key| accessor.get(key).is_some();
-        let kind = accessor
-            .get("type")
-            .and_then(Value::as_str)
-            .unwrap_or_default();
+        let kind = accessor.get("type").and_then(Value::as_str).unwrap_or_default();
         let component = number(accessor, "componentType").unwrap_or_default();
         for key in ["min", "max"] {
             let bounds = accessor.get(key).and_then(Value::as_array);
             let wanted = super::super::bounds::components(kind);
             if bounds.is_some_and(|b| wanted > 0 && b.len() != wanted) {
-                findings.fault(
-                    &format!("{at}/{key}"),
-                    format!("should have {wanted} elements"),
-                );
+                findings.fault(&format!("{at}/{key}"), format!("should have {wanted} elements"));
             }
         }
         if has("byteOffset") && !has("bufferView") {
@@ -205,10 +175,7 @@ fn accessors(findings: &mut Findings<'_>) {
         }
         let normalized = accessor.get("normalized").and_then(Value::as_bool) == Some(true);
         if normalized && matches!(component, 5125 | 5126) {
-            findings.fault(
-                &format!("{at}/normalized"),
-                "does not go with this componentType",
-            );
+            findings.fault(&format!("{at}/normalized"), "does not go with this componentType");
         }
         let sparse = accessor.get("sparse");
         let replaced = sparse.and_then(|s| number(s, "count"));
@@ -222,19 +189,12 @@ fn nodes(findings: &mut Findings<'_>) {
     for (i, node) in list(findings, "nodes").iter().enumerate() {
         let at = format!("/nodes/{i}");
         let numbers = |key: &str| -> Option<Vec<f64>> {
-            node.get(key)?
-                .as_array()?
-                .iter()
-                .map(Value::as_f64)
-                .collect()
+            node.get(key)?.as_array()?.iter().map(Value::as_f64).collect()
         };
         if let Some(q) = numbers("rotation").filter(|q| q.len() == 4) {
             let length = q.iter().map(|v| v * v).sum::<f64>().sqrt();
             if (length - 1.0).abs() > UNIT_TOLERANCE {
-                findings.fault(
-                    &format!("{at}/rotation"),
-                    format!("has length {length:.4}, not 1"),
-                );
+                findings.fault(&format!("{at}/rotation"), format!("has length {length:.4}, not 1"));
             }
         }
         for key in ["weights", "skin"] {
@@ -254,20 +214,13 @@ fn nodes(findings: &mut Findings<'_>) {
             findings.fault(&format!("{at}/matrix"), "is not affine");
         }
         let axis = |k: usize| glam::DVec3::new(m[4 * k], m[4 * k + 1], m[4 * k + 2]);
-        let skew = |a: usize, b: usize| {
-            axis(a)
-                .normalize_or_zero()
-                .dot(axis(b).normalize_or_zero())
-                .abs()
-        };
+        let skew =
+            |a: usize, b: usize| axis(a).normalize_or_zero().dot(axis(b).normalize_or_zero()).abs();
         if skew(0, 1).max(skew(1, 2)).max(skew(0, 2)) > UNIT_TOLERANCE {
             findings.remark(&format!("{at}/matrix"), "shears, which glTF does not allow");
         }
         if axis(0).cross(axis(1)).dot(axis(2)) == 0.0 {
-            findings.fault(
-                &format!("{at}/matrix"),
-                "flattens its mesh (determinant zero)",
-            );
+            findings.fault(&format!("{at}/matrix"), "flattens its mesh (determinant zero)");
         }
     }
 }
@@ -304,9 +257,7 @@ fn tree(findings: &mut Findings<'_>) {
     for (i, scene) in list(findings, "scenes").iter().enumerate() {
         let roots = scene.get("nodes").and_then(Value::as_array);
         for root in roots.into_iter().flatten().filter_map(integer) {
-            let inner = usize::try_from(root)
-                .ok()
-                .and_then(|r| parent.get(r).copied().flatten());
+            let inner = usize::try_from(root).ok().and_then(|r| parent.get(r).copied().flatten());
             if inner.is_some() {
                 findings.fault(
                     &format!("/scenes/{i}/nodes"),

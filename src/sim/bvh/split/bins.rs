@@ -23,10 +23,7 @@ pub(super) struct Side {
     pub(super) parts: usize,
 }
 
-pub(super) const NOTHING: Side = Side {
-    bounds: Aabb::INVALID,
-    parts: 0,
-};
+pub(super) const NOTHING: Side = Side { bounds: Aabb::INVALID, parts: 0 };
 
 impl Side {
     pub(super) fn cost(self) -> f32 {
@@ -37,17 +34,11 @@ impl Side {
     }
 
     pub(super) fn grown(self, bounds: &Aabb) -> Self {
-        Self {
-            bounds: self.bounds.union(bounds),
-            ..self
-        }
+        Self { bounds: self.bounds.union(bounds), ..self }
     }
 
     pub(super) fn without_one(self) -> Self {
-        Self {
-            parts: self.parts.saturating_sub(1),
-            ..self
-        }
+        Self { parts: self.parts.saturating_sub(1), ..self }
     }
 }
 

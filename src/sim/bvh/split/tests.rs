@@ -11,8 +11,7 @@ fn straw() -> Mesh {
         let (sin, cos) = turn.sin_cos();
         let [x, y, z] = [20.0 * cos, 20.0 * sin, 14.0 * (1.3 * turn).sin()];
         let first = mesh.positions.len() as u32;
-        mesh.positions
-            .extend([[x, y, z], [-x, -y, -z], [0.2 - x, 0.1 - y, -z]]);
+        mesh.positions.extend([[x, y, z], [-x, -y, -z], [0.2 - x, 0.1 - y, -z]]);
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     mesh
@@ -68,19 +67,12 @@ fn tree_of(mesh: &Mesh) -> Bvh2 {
 
 #[test]
 fn every_part_of_a_triangle_lies_in_a_leaf_that_holds_it() {
-    for mesh in [
-        straw(),
-        shapes::cylinder(2.0, 60.0, 24),
-        shapes::cuboid([3.0, 30.0, 9.0]),
-    ] {
+    for mesh in [straw(), shapes::cylinder(2.0, 60.0, 24), shapes::cuboid([3.0, 30.0, 9.0])] {
         let built = tree_of(&mesh);
         assert_eq!(uncovered(&built, &mesh), 0);
         depth(&built, 0);
         let bounds = built.nodes[0].aabb();
-        assert_eq!(
-            [bounds.min.to_array(), bounds.max.to_array()],
-            mesh.bounds()
-        );
+        assert_eq!([bounds.min.to_array(), bounds.max.to_array()], mesh.bounds());
     }
     // The comparison notices a box that is too small, and a part that is missing.
     let mesh = straw();
@@ -88,10 +80,7 @@ fn every_part_of_a_triangle_lies_in_a_leaf_that_holds_it() {
     let parts = leaves(&built, mesh.triangles.len());
     let most = parts.iter().map(Vec::len).max();
     assert!(most >= Some(2), "straws are cut: {most:?}");
-    let cut = parts
-        .iter()
-        .position(|parts| Some(parts.len()) == most)
-        .expect("the most");
+    let cut = parts.iter().position(|parts| Some(parts.len()) == most).expect("the most");
     let leaf = built.nodes.iter().position(|node| {
         node.is_leaf() && built.primitive_indices[node.first_index as usize] as usize == cut
     });
@@ -102,10 +91,7 @@ fn every_part_of_a_triangle_lies_in_a_leaf_that_holds_it() {
         let axis = bounds.largest_axis();
         bounds.max[axis] -= share * bounds.diagonal()[axis];
         node.set_aabb(bounds);
-        assert!(
-            uncovered(&spoilt, &mesh) > 0,
-            "{share} of a leaf is not missed"
-        );
+        assert!(uncovered(&spoilt, &mesh) > 0, "{share} of a leaf is not missed");
     }
 }
 
@@ -118,11 +104,8 @@ fn cost(tree: &Bvh2) -> f32 {
 #[test]
 fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     let mesh = straw();
-    let whole = Builder {
-        positions: &mesh.positions,
-        triangles: &mesh.triangles,
-        least_overlap: 0.0,
-    };
+    let whole =
+        Builder { positions: &mesh.positions, triangles: &mesh.triangles, least_overlap: 0.0 };
     let parts: Vec<Part> = (0..mesh.triangles.len())
         .map(|t| Part {
             bounds: Aabb::from_points(
@@ -152,9 +135,7 @@ fn odd_triangles_are_built_over() {
     let corner = [[1.0, 2.0, 3.0], [40.0, -9.0, 5.0], [7.0, 30.0, -20.0]];
     let scales = (0..120).map(|i| (0.5_f32).powi(i));
     let nested = Mesh {
-        positions: scales
-            .flat_map(|s| corner.map(|p| p.map(|x| x * s)))
-            .collect(),
+        positions: scales.flat_map(|s| corner.map(|p| p.map(|x| x * s))).collect(),
         triangles: (0..120).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect(),
         ..Mesh::default()
     };
@@ -176,11 +157,7 @@ fn odd_triangles_are_built_over() {
         let built = tree_of(&mesh);
         let held = leaves(&built, mesh.triangles.len());
         assert!(held.iter().all(|leaves| !leaves.is_empty()), "{name}");
-        assert!(
-            depth(&built, 0) <= DEEPEST + 14,
-            "{name}: {}",
-            depth(&built, 0)
-        );
+        assert!(depth(&built, 0) <= DEEPEST + 14, "{name}: {}", depth(&built, 0));
         let most = mesh.triangles.len() as f64 * (1.0 + MOST_MORE);
         assert!(built.primitive_indices.len() as f64 <= most, "{name}");
         if !name.starts_with("far") {

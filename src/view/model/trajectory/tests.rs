@@ -40,10 +40,7 @@ fn a_file_gives_back_what_was_recorded_to_the_last_digit() {
     let read = load_trajectory(&path).expect("its own format");
     assert_eq!(read, recording.track());
     let text = recording.text();
-    assert!(
-        text.contains("scene's time at the first row: 3 s"),
-        "{text}"
-    );
+    assert!(text.contains("scene's time at the first row: 3 s"), "{text}");
     assert!(text.contains("# keyboard\n"), "{text}");
 }
 
@@ -149,10 +146,7 @@ fn a_replay_by_the_scenes_time_goes_as_fast_as_that_and_stands_with_it() {
     assert!((x(&scene, 9000) - 5.0).abs() < 1e-9);
     assert!(!replay.moves(&scene, after(began, 9000)));
     scene.seek(3.9, after(began, 9000));
-    assert!(
-        (x(&scene, 9000) - 9.0).abs() < 1e-9,
-        "and goes where it is set"
-    );
+    assert!((x(&scene, 9000) - 9.0).abs() < 1e-9, "and goes where it is set");
 }
 
 #[test]

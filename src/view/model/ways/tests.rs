@@ -44,11 +44,7 @@ fn a_replay_goes_where_was_recorded_and_leaves_the_probe_at_its_end() {
     model.follow(after(began, 3100));
     assert!(model.ways.replay.is_none());
     assert!((slid(&model, &model.pose) - 20.0).abs() < 1e-9);
-    assert_eq!(
-        model.revision(),
-        revision,
-        "the simulation has seen to it by itself"
-    );
+    assert_eq!(model.revision(), revision, "the simulation has seen to it by itself");
 }
 
 #[test]
@@ -63,11 +59,7 @@ fn a_key_takes_the_probe_where_the_replay_has_brought_it() {
     // Put where it is already, the probe stops there all the same.
     model.replay(after(began, 3000));
     let revision = model.revision();
-    model.place_probe(
-        Source::Pointer,
-        model.order().pose(after(began, 3500)),
-        after(began, 3500),
-    );
+    model.place_probe(Source::Pointer, model.order().pose(after(began, 3500)), after(began, 3500));
     assert!(model.ways.replay.is_none() && model.revision() > revision);
 }
 
