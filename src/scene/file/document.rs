@@ -11,7 +11,7 @@ use toml_edit::Key;
 
 use super::error::{SceneError, advice};
 use super::schema::File;
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
@@ -194,6 +194,14 @@ impl Document<'_> {
     pub fn says_of(&self, table: &str, but: &str) -> bool {
         let table = self.root.get(table).and_then(|v| v.get_ref().as_table());
         table.is_some_and(|t| t.keys().any(|key| key.get_ref() != but))
+    }
+
+    /// The name under which the file has the table `vary`: it was called `sweep`.
+    pub fn vary(&self) -> &'static str {
+        match self.root.contains_key("sweep") {
+            true => "sweep",
+            false => "vary",
+        }
     }
 
     /// Where the value of a dotted path, or its nearest parent, begins: for the order of tables.
