@@ -3,6 +3,7 @@
 //! Reading and writing scene files, `--set`, undo, the console, parameter studies, matching and the tables of
 //! `docs/scenes.md` are loops over the rows. Knows no file, no window and no kernel.
 
+mod field;
 mod fusion;
 mod imaging;
 mod key;
@@ -14,9 +15,10 @@ mod tissue;
 pub mod units;
 mod words;
 
+pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};
 pub use imaging::{Imaging, Live, Machine};
-pub use key::{Facts, Field, Form, Group, Off, Row, Value, plain};
+pub use key::{Facts, Form, Group, Off, Row, Value, plain};
 pub use probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
 pub use simulation::{
     Coherence, Quality, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,

@@ -29,6 +29,7 @@ mod tracker;
 mod trajectory;
 mod vary;
 
+pub use document::quoted;
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;

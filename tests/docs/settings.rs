@@ -1,23 +1,26 @@
 //! The lines of `docs/scenes.md` that follow from the program: a row of a table for each setting, the units, and what
 //! `insonify vary` shows. `INSONIFY_BLESS=1 cargo test --test docs` writes them.
 
+use insonify::scene::tissue::table;
 use insonify::scene::vary::Parameter;
 use insonify::settings::units::MEASURES;
 use insonify::settings::{
     Display, Facts, Form, Fusion, Group, Imaging, Live, Probe, Simulation, Surface, Tissue, Value,
+    plain,
 };
 
-/// A line of a table: the table's heading, and the cells.
+/// A line of a table: the section's heading, the first word of the table's head, and the cells.
 #[derive(Debug, PartialEq)]
 pub struct Line {
-    pub table: String,
+    section: &'static str,
+    head: &'static str,
     cells: Vec<String>,
 }
 
 impl Line {
-    fn new(table: &str, cells: &[&str]) -> Self {
+    fn new(section: &'static str, head: &'static str, cells: &[&str]) -> Self {
         let cells = cells.iter().map(|cell| (*cell).to_owned()).collect();
-        Self { table: table.to_owned(), cells }
+        Self { section, head, cells }
     }
 
     /// The first cell, with its blanks: what finds the line.
@@ -83,7 +86,8 @@ fn of_group<T: Group>(from: Option<&T>, (before, default): (&str, Option<&str>))
             _ => "The same, met from within.",
         };
         let key = format!("`{before}{}`", facts.key);
-        Line::new(T::TABLE, &[&key, &type_of(facts.form), &default, &range_of(facts), meaning])
+        let cells = [&key, &type_of(facts.form), &default, &range_of(facts), meaning];
+        Line::new(T::TABLE, "Key", &cells)
     };
     rows.map(line).collect()
 }
@@ -106,56 +110,93 @@ pub fn lines() -> Vec<Line> {
             "" => measure.allowed(),
             note => format!("{}; {note}", measure.allowed()),
         };
-        Line::new("", &[measure.name, &units])
+        Line::new("", "Type", &[measure.name, &units])
     }));
     out.extend(Parameter::suggested().map(|parameter| {
         let key = format!("`{}`", parameter.key());
         let path = format!("`{}`", parameter.path());
-        Line::new("vary", &[&key, &path, &parameter.suggested_values()])
+        Line::new("vary", "Parameter", &[&key, &path, &parameter.suggested_values()])
     }));
+    out.extend(presets());
+    out.extend(table::shipped().iter().map(tissue));
     out
+}
+
+/// What the presets of probes hold.
+fn presets() -> impl Iterator<Item = Line> {
+    Probe::rows().iter().map(|row| {
+        let key = format!("`{}`", row.facts.key);
+        let values = Probe::PRESETS.map(|(_, make)| {
+            let text = row.facts.text(&(row.get)(&make()));
+            text.unwrap_or_default().trim_matches('"').to_owned()
+        });
+        let values = values.iter().map(String::as_str);
+        let cells: Vec<_> = [key.as_str()].into_iter().chain(values).collect();
+        Line::new(Probe::TABLE, "Preset value", &cells)
+    })
+}
+
+/// What a shipped tissue is.
+fn tissue(tissue: &Tissue) -> Line {
+    let name = format!("`{}`", tissue.name);
+    let surface = tissue.surface;
+    let values = [
+        tissue.speed,
+        tissue.density,
+        tissue.attenuation,
+        tissue.echogenicity,
+        tissue.density_of_scatterers,
+        tissue.texture_depth,
+        tissue.texture_length,
+        surface.roughness,
+        surface.thickness,
+        surface.specularity,
+    ];
+    let values = values.map(plain);
+    let values = values.iter().map(String::as_str);
+    let cells: Vec<_> = [name.as_str()].into_iter().chain(values).collect();
+    Line::new(Tissue::TABLE, "Tissue", &cells)
 }
 
 /// Paths of the keys that have a row.
 pub fn keys() -> Vec<String> {
-    let lines = lines().into_iter().filter(|line| line.cells.len() == 5);
-    lines.map(|line| format!("{}.{}", line.table, line.cells[0].trim_matches('`'))).collect()
+    let lines = lines().into_iter().filter(|line| line.head == "Key");
+    lines.map(|line| format!("{}.{}", line.section, line.cells[0].trim_matches('`'))).collect()
 }
 
-/// The document with these lines: those that are there are replaced, others stand below the last one that is.
+/// The document with these lines: those that are there are replaced, others stand below the one before.
 pub fn written(document: &str, lines: &[Line]) -> String {
     let mut out: Vec<String> = document.lines().map(str::to_owned).collect();
-    let mut last = None;
+    let mut last = 0;
     for line in lines {
-        let table = heading(&out, &line.table);
-        let within = table.clone().filter(|&at| out[at].starts_with(&line.start()));
-        match within.last() {
+        let table = table(&out, line);
+        let there = table.clone().find(|&at| out[at].starts_with(&line.start()));
+        last = match there {
             Some(at) => {
                 out[at] = line.text();
-                last = Some(at);
+                at
             }
             None => {
-                // After the line before it, where that is of the same table, else at the table's end.
-                let end = table.clone().rev().find(|&at| out[at].starts_with("| "));
-                let at = last.filter(|at| table.contains(at)).or(end).expect("a table") + 1;
+                let at = if table.contains(&last) { last + 1 } else { table.end };
                 out.insert(at, line.text());
-                last = Some(at);
+                at
             }
-        }
+        };
     }
     out.join("\n") + "\n"
 }
 
-/// Numbers of the lines below the heading of a table; below the heading of units for no name.
-fn heading(lines: &[String], table: &str) -> std::ops::Range<usize> {
-    let named = match table {
-        "" => "## Quantities and units".to_owned(),
-        table => format!("`[{table}]`"),
+/// Numbers of the lines of the table in which `line` belongs, without its head.
+fn table(lines: &[String], line: &Line) -> std::ops::Range<usize> {
+    let named = match line.section {
+        "" => "Quantities and units".to_owned(),
+        section => format!("[{section}]"),
     };
-    let is_it = |line: &String| {
-        line.starts_with('#') && (line.contains(&named) || line.contains(&format!("`[[{table}]]`")))
-    };
-    let start = lines.iter().position(is_it).unwrap_or_else(|| panic!("no heading {table}")) + 1;
-    let length = lines[start..].iter().position(|line| line.starts_with('#'));
-    start..length.map_or(lines.len(), |length| start + length)
+    let section = lines.iter().position(|l| l.starts_with('#') && l.contains(&named));
+    let section = section.unwrap_or_else(|| panic!("no heading {named}"));
+    let head = format!("| {} |", line.head);
+    let table = lines[section..].iter().position(|l| l.starts_with(&head));
+    let start = section + table.unwrap_or_else(|| panic!("no table {head}")) + 2;
+    let length = lines[start..].iter().position(|l| !l.starts_with('|'));
+    start..start + length.unwrap_or(lines.len() - start)
 }

@@ -186,8 +186,7 @@ impl Document<'_> {
         message: impl Into<String>,
         remedy: impl Into<String>,
     ) -> SceneError {
-        let segments: Vec<_> = path.split('.').collect();
-        self.source.error(self.span(&segments), message.into(), Some(remedy.into()))
+        self.source.error(self.span_of(path), message.into(), Some(remedy.into()))
     }
 
     /// Whether the top-level `table` has a key other than `but`.
@@ -206,8 +205,12 @@ impl Document<'_> {
 
     /// Where the value of a dotted path, or its nearest parent, begins: for the order of tables.
     pub fn place(&self, path: &str) -> usize {
-        let segments: Vec<_> = path.split('.').collect();
-        self.span(&segments).start
+        self.span_of(path).start
+    }
+
+    fn span_of(&self, path: &str) -> Range<usize> {
+        let segments = segments(path);
+        self.span(&segments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
     fn span(&self, path: &[&str]) -> Range<usize> {
@@ -244,7 +247,6 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
 
 type Misfit = (String, String);
 
-/// Puts `value` at a path; elements of arrays of tables are addressed by index or by name.
 /// The parts of a path as the command line and the program itself write it. Names with dots stand in quotes, as in
 /// TOML; others need none, and may hold what a bare key of TOML may not.
 pub(super) fn segments(path: &str) -> Vec<String> {
@@ -254,6 +256,12 @@ pub(super) fn segments(path: &str) -> Vec<String> {
     }
 }
 
+/// A name as a part of a path: in quotes where it needs them.
+pub fn quoted(name: &str) -> String {
+    Key::new(name).display_repr().into_owned()
+}
+
+/// Puts `value` at a path; elements of arrays of tables are addressed by index or by name.
 fn insert<'s>(
     table: &mut DeTable<'s>,
     path: &[&'s str],

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::document::Document;
+use super::document::{Document, quoted};
 use super::error::SceneError;
 use super::schema::TissueTable;
 use super::table::Table;
@@ -103,7 +103,7 @@ fn resolve(
     chain: &mut Vec<String>,
 ) -> Result<Tissue, SceneError> {
     let table = &tables[name];
-    let path = format!("tissues.{name}");
+    let path = format!("tissues.{}", quoted(name));
     let based_on = format!("{path}.based_on");
     chain.push(name.to_owned());
     let base = match table.other.based_on.as_deref() {

@@ -1,11 +1,11 @@
 //! Settings as the entries of a scene file that say them.
 
 use glam::{DAffine3, DVec3};
-use toml_edit::{Key, Value};
+use toml_edit::Value;
 
 use super::Settings;
 use crate::register::{Placement, Transformation};
-use crate::scene::file::{self, Entry};
+use crate::scene::file::{self, Entry, quoted};
 use crate::scene::{Origin, Origins};
 use crate::settings::Value::Number;
 use crate::settings::{
@@ -64,8 +64,8 @@ pub(super) fn changes(
 /// Path of the table that says how an instance's keyframes are followed.
 pub(super) fn switch(origin: &Origin) -> String {
     match &origin.selector {
-        Some(selector) => format!("selector.{}", name(selector)),
-        None => format!("mesh.{}", name(&origin.mesh)),
+        Some(selector) => format!("selector.{}", quoted(selector)),
+        None => format!("mesh.{}", quoted(&origin.mesh)),
     }
 }
 
@@ -170,7 +170,7 @@ fn tissue_changes(from: &[Tissue], to: &[Tissue], bases: &[Vec<String>]) -> Vec<
         let t = (from[i].impedance(), to_tissue.impedance());
         if t.0 != t.1 {
             // It is derived; a stated one would contradict it.
-            let path = format!("tissues.{}.impedance", name(&to_tissue.name));
+            let path = format!("tissues.{}.impedance", quoted(&to_tissue.name));
             out.push((path, None));
         }
     }
@@ -178,12 +178,12 @@ fn tissue_changes(from: &[Tissue], to: &[Tissue], bases: &[Vec<String>]) -> Vec<
 }
 
 fn tissue(t: &Tissue) -> Vec<Entry> {
-    file::entries(t, &format!("tissues.{}", name(&t.name)))
+    file::entries(t, &format!("tissues.{}", quoted(&t.name)))
 }
 
 /// The inside is as the outside where the file does not say it: who changes that one says it.
 fn surface_changes(mesh: &str, from: &[Surface; 2], to: &[Surface; 2]) -> Vec<Entry> {
-    let path = format!("mesh.{}", name(mesh));
+    let path = format!("mesh.{}", quoted(mesh));
     let [outside, inside] = [(0, path.clone()), (1, format!("{path}.inside"))]
         .map(|(side, path)| (file::entries(&from[side], &path), file::entries(&to[side], &path)));
     let mut out = Vec::new();
@@ -198,9 +198,4 @@ fn surface_changes(mesh: &str, from: &[Surface; 2], to: &[Surface; 2]) -> Vec<En
         }
     }
     out
-}
-
-/// A name as a part of a path.
-fn name(name: &str) -> String {
-    Key::new(name).display_repr().into_owned()
 }
