@@ -112,6 +112,11 @@ impl<'a> Calibration<'a> {
         amplitude(self.scene.imaging.noise) / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
     }
 
+    /// Factor on what is received, TGC applied, after which 1 is white.
+    pub fn display_gain(&self) -> f64 {
+        amplitude(self.scene.imaging.gain)
+    }
+
     /// Elevational half-width in which one layer sees scatterers, mm: its share of the slice.
     pub fn elevation_reach(&self) -> f64 {
         let probe = &self.scene.probe;
@@ -199,7 +204,7 @@ impl<'a> Calibration<'a> {
         if simulation.scatterers_per_resolution_cell <= 0.0 {
             return f64::NEG_INFINITY;
         }
-        let shown = amplitude(-imaging.gain - imaging.dynamic_range);
+        let shown = amplitude(-imaging.dynamic_range) / self.display_gain();
         let level = shown / (self.speckle_target() * amplitude(self.tgc_db(z)));
         let alike = simulation.sampling == Sampling::MainPath
             && simulation.origin_jitter <= 0.0

@@ -95,7 +95,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,
         noise: calibration.noise() as f32,
-        inverse_reference: amplitude(imaging.gain) as f32,
+        inverse_reference: calibration.display_gain() as f32,
         inverse_range: imaging.dynamic_range.recip() as f32,
         frame_index,
         image_width: image_width as u32,
