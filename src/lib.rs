@@ -20,6 +20,7 @@ pub mod probe;
 pub mod reference;
 pub mod register;
 pub mod scene;
+pub mod settings;
 pub mod sheet;
 pub mod sim;
 pub mod statistics;

@@ -27,8 +27,8 @@ use std::time::{Duration, Instant};
 
 use crate::gpu::{Abandon, AdapterKind, Buffer, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
-use crate::scene::settings::Machine;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
+use crate::settings::Machine;
 use bvh::Splits;
 use contact::Touch;
 use fusion::{Fused, Tint};

@@ -7,8 +7,8 @@ use super::contact::reach;
 use super::layout::{self, Rows};
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
-use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::{Scene, Surface, Wire};
+use crate::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
 
 /// The kernel ends a path by setting its weight to 0, which has to be below every limit.
 const LEAST_WEIGHT: f32 = 1e-30;
@@ -95,7 +95,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,
         noise: calibration.noise() as f32,
-        inverse_reference: amplitude(imaging.gain) as f32,
+        inverse_reference: calibration.display_gain() as f32,
         inverse_range: imaging.dynamic_range.recip() as f32,
         frame_index,
         image_width: image_width as u32,

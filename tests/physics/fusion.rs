@@ -4,8 +4,10 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::scene::fusion::{Acquired, Blend, Fusion, MaskSpeed, Surroundings};
+use insonify::scene::fusion::Acquired;
 use insonify::scene::{Scene, shapes};
+use insonify::settings::Words;
+use insonify::settings::{Blend, Fusion, MaskSpeed, Surroundings};
 use insonify::sim::fusion::Steps;
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
@@ -662,7 +664,7 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
             for (what, found, expected, other) in
                 [("near", ends[0], top, top * slow), ("far", ends[1], far, (top + chord) * slow)]
             {
-                let name = format!("{tracer}, {}: {what} border, sample", said.name());
+                let name = format!("{tracer}, {}: {what} border, sample", said.word());
                 out.compare(name, found, expected / pitch, 1.0)
                     .unlike("fat's speed from the face on", other / pitch);
             }
@@ -687,7 +689,7 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
                     worst = worst.max((f64::from(prescan[2 * k + 1]) - level(z)).abs());
                 }
             }
-            let name = format!("{tracer}, {}: largest error of the volume's level", said.name());
+            let name = format!("{tracer}, {}: largest error of the volume's level", said.word());
             out.compare(name, worst, 0.0, 2e-6).unlike(
                 "nearer by fat's speed, and where it should not be",
                 chord * (slow - 1.0) / 200.0,

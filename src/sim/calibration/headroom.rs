@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Calibration, amplitude};
 use crate::scene::Tissue;
-use crate::scene::settings::ScatterMode;
+use crate::settings::ScatterMode;
 use crate::sim::layout::LEVELS_PER_OCTAVE;
 use crate::sim::tables::wire_spacing;
 

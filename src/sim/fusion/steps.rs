@@ -6,7 +6,7 @@ use crate::gpu::Buffer;
 use crate::npy::Element;
 use crate::scene::Scene;
 #[cfg(doc)]
-use crate::scene::fusion::Blend;
+use crate::settings::Blend;
 
 /// The steps of the last fused frame, row by row where they are images.
 pub struct Steps {
