@@ -20,7 +20,7 @@ use crate::volume::{
 
 mod sweep;
 
-pub use sweep::{Station, Sweep, stations_at, stations_of};
+pub use sweep::{Station, Sweep, poses_at, stations_at, stations_of};
 
 /// Most pixels of all frames, bytes: the sequence is in memory as a whole.
 const MAX_PIXELS: u64 = 2 << 30;

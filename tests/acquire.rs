@@ -279,6 +279,20 @@ fn a_file_of_poses_is_followed() {
     assert!(error.to_string().contains("none.csv"), "{error}");
 }
 
+/// More frames than memory holds are counted before they are made: 10000 a second over thirty years.
+#[test]
+fn a_file_of_poses_that_makes_too_many_frames_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "[probe]\nscanlines = 2\nsamples = 16\nelevation_layers = 1\n[imaging]\nimage_height = 16\n";
+    std::fs::write(folder.path().join("a.toml"), text).expect("written");
+    let way = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n1e9,5,0,0\n";
+    std::fs::write(folder.path().join("way.csv"), way).expect("written");
+    let render = ["render", "a.toml", "--trajectory", "way.csv", "--fps", "10000", "-o", "a.gif"];
+    let (fine, told) = insonify(folder.path(), &render);
+    assert!(!fine && told.contains("makes 10000000000001 frames"), "{told}");
+    assert!(told.contains("a lower --fps"), "{told}");
+}
+
 #[test]
 fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     let folder = tempfile::tempdir().expect("a folder");

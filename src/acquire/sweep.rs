@@ -71,13 +71,18 @@ pub fn stations_of(track: &Track, scene: &Scene, frames: Option<u32>) -> Vec<Sta
     stations(track, scene, times)
 }
 
-/// The same, `rate` poses a second from its first time on: `frames` of them, or up to its last time.
-pub fn stations_at(track: &Track, scene: &Scene, rate: f64, frames: Option<u32>) -> Vec<Station> {
+/// The same, `rate` poses a second from its first time on.
+pub fn stations_at(track: &Track, scene: &Scene, rate: f64, frames: u32) -> Vec<Station> {
+    let (first, _) = track.span().unwrap_or_default();
+    let times = (0..frames).map(|i| first + f64::from(i) / rate);
+    stations(track, scene, times.collect())
+}
+
+/// Poses from a trajectory's first time up to its last at `rate` a second; there may be more than anything holds.
+pub fn poses_at(track: &Track, rate: f64) -> f64 {
     let (first, last) = track.span().unwrap_or_default();
     // The last one must not be lost to rounding.
-    let all = || ((last - first) * rate + 1e-6) as u32 + 1;
-    let times = (0..frames.unwrap_or_else(all)).map(|i| first + f64::from(i) / rate);
-    stations(track, scene, times.collect())
+    ((last - first) * rate + 1e-6).floor() + 1.0
 }
 
 fn stations(track: &Track, scene: &Scene, times: Vec<f64>) -> Vec<Station> {

@@ -227,18 +227,22 @@ fn moments(args: &Render, scene: &Scene) -> Result<Vec<Moment>> {
         return Ok((0..args.frames.unwrap_or(1)).map(moment).collect());
     };
     let track = file::load_trajectory(path)?;
+    let few = |frames: f64| match frames <= 100_000.0 {
+        true => Ok(frames as u32),
+        false => Err(miette!(
+            help = "give --frames or a lower --fps",
+            "{} makes {frames} frames; at most 100000 are rendered",
+            path.display()
+        )),
+    };
     let stations = match args.fps {
-        Some(fps) => acquire::stations_at(&track, scene, fps, args.frames),
+        Some(fps) => {
+            let frames = args.frames.map_or_else(|| acquire::poses_at(&track, fps), f64::from);
+            acquire::stations_at(&track, scene, fps, few(frames)?)
+        }
         None => acquire::stations_of(&track, scene, args.frames),
     };
-    if stations.len() > 100_000 {
-        return Err(miette!(
-            help = "give --frames or a lower --fps",
-            "{} makes {} frames; at most 100000 are rendered",
-            path.display(),
-            stations.len()
-        ));
-    }
+    few(stations.len() as f64)?;
     let first = stations[0].time;
     let moment = |station: &Station| Moment {
         seconds: start + station.time - first,
