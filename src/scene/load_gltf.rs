@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DMat4;
 
-use super::issue::Issue;
+use crate::issue::Issue;
 use super::mesh::{self, Choice, Parts, Soup};
 
 mod accessor;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions, sparse};
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// Where the bytes are.
 pub(super) struct Reader<'a> {

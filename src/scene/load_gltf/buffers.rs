@@ -4,7 +4,7 @@ use std::path::Path;
 
 use gltf::buffer::{Data, Source};
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::MAX_FILE;
 
 /// Buffers by index, absent where they cannot be loaded, and why not.

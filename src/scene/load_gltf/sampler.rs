@@ -9,7 +9,7 @@ use gltf::animation::{Interpolation, Property};
 use super::accessor::Reader;
 use super::budget::Budget;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// What an animation does to one node.
 #[derive(Debug, Default)]

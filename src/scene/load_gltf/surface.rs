@@ -4,7 +4,7 @@ use gltf::mesh::Mode;
 
 use super::File;
 use super::accessor::Reader;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::MAX_ELEMENTS;
 
 /// Triangles of a primitive as they are stored, metres.

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::schema::{Kind, ROOT, Table};
-use crate::scene::issue::{Issue, Severity};
+use crate::issue::{Issue, Severity};
 use crate::scene::suggest;
 
 mod rules;
