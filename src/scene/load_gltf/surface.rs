@@ -23,7 +23,7 @@ pub(super) struct Surfaces<'a> {
 impl<'a> Surfaces<'a> {
     pub fn new(file: &'a File<'_>) -> Self {
         Self {
-            reader: Reader { path: file.path, buffers: &file.buffers, accessors: &file.accessors },
+            reader: Reader { path: file.path, buffers: &file.buffers },
             issues: Vec::new(),
             elements: 0,
         }
