@@ -7,21 +7,18 @@
 #![warn(missing_docs)]
 
 pub mod acquire;
-pub mod files;
 pub mod gpu;
 pub mod harness;
 pub mod igtl;
+pub mod issue;
 pub mod live;
-pub mod movie;
-pub mod npy;
+pub mod matching;
 pub mod output;
-pub mod plot;
 pub mod probe;
 pub mod reference;
 pub mod register;
 pub mod scene;
 pub mod settings;
-pub mod sheet;
 pub mod sim;
 pub mod statistics;
 pub mod study;

@@ -3,7 +3,7 @@
 
 use insonify::gpu::{Kernel, test_device};
 use insonify::harness::{self, Case, SUBJECTS, Size};
-use insonify::sim::shaders::{Library, source};
+use insonify::sim::shaders::Library;
 
 fn subject(name: &str) {
     let subject = SUBJECTS.iter().find(|s| s.name == name).unwrap();
@@ -50,10 +50,7 @@ macro_rules! subjects {
             let mut stems: Vec<&str> = SUBJECTS.iter().flat_map(|s| s.stems).copied().collect();
             stems.sort_unstable();
             stems.dedup(); // `detect` is the last step of `axial`
-            let dir = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
-            let variants = source::variants(dir.as_ref()).unwrap();
-            let kernels = variants.iter().filter(|v| !v.keep_names).map(|v| v.stem.as_str());
-            assert_eq!(stems, kernels.collect::<Vec<_>>());
+            assert_eq!(stems, Library::embedded().stems().collect::<Vec<_>>());
         }
     };
 }

@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 
 use super::{Element, Job, Role, Subject};
-use crate::npy;
+use crate::output::npy;
 
 /// Writes every binding of a job, or of what a run left behind.
 ///

@@ -35,7 +35,7 @@ mod worlds;
 
 use bytemuck::Pod;
 
-pub use crate::npy::Element;
+pub use crate::output::npy::Element;
 use crate::sim::rounds::Round;
 pub use check::Check;
 pub use run::{Outcome, run};

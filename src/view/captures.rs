@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use self::files::{Claim, grey_png, scaled};
 use super::engine::Frame;
 use crate::gpu::{GpuError, Shot};
-use crate::movie::{Movie, MovieError};
+use crate::output::movie::{Movie, MovieError};
 
 /// What is written beside a picture: see `docs/window.md`.
 pub(super) type Sidecar = Map<String, Value>;

@@ -15,7 +15,7 @@ use super::model::sidecar::{self, Area};
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
 use crate::gpu::{DeviceInfo, Image, Shot};
-use crate::output;
+use crate::sim::facts;
 
 /// Most frames of the loop.
 const FRAMES: usize = 256;
@@ -257,7 +257,7 @@ fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     counts.set(&mut settings.probe, &mut settings.simulation, &mut settings.imaging);
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
-    let all = output::settings(&settings.probe, &settings.simulation, &settings.imaging);
+    let all = facts::settings(&settings.probe, &settings.simulation, &settings.imaging);
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()

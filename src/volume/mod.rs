@@ -9,7 +9,7 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 
 /// What is worth knowing about a volume that could be loaded.
-pub use crate::scene::Warning;
+pub use crate::issue::Warning;
 
 mod dicom;
 mod error;

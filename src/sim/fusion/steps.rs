@@ -3,7 +3,7 @@
 use super::super::stages::lines;
 use super::super::{SimError, Simulator, layout};
 use crate::gpu::Buffer;
-use crate::npy::Element;
+use crate::output::npy::Element;
 use crate::scene::Scene;
 #[cfg(doc)]
 use crate::settings::Blend;

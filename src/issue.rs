@@ -29,7 +29,7 @@ pub struct Issue {
     pub remedy: String,
 }
 
-/// What [`super::Scene::load`] hands back beside a scene that it could load.
+/// A finding beside something that could be loaded all the same.
 pub type Warning = Issue;
 
 impl Issue {

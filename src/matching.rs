@@ -12,9 +12,9 @@ mod statistics;
 
 use thiserror::Error;
 
-use super::calibration::Calibration;
-use super::{SimError, Simulator};
 use crate::scene::{Imaging, Scene};
+use crate::sim::calibration::Calibration;
+use crate::sim::{SimError, Simulator};
 pub use adjust::Adjusted;
 use adjust::{change, common, halfway, proposal};
 use bands::Bands;

@@ -169,6 +169,6 @@ fn read(path: &Path) -> Result<String, Error> {
     fs::read_to_string(path).map_err(|e| file_error(path, e))
 }
 
-pub(super) fn file_error(path: impl Into<PathBuf>, cause: std::io::Error) -> Error {
+pub(crate) fn file_error(path: impl Into<PathBuf>, cause: std::io::Error) -> Error {
     Error::File { path: path.into(), cause }
 }
