@@ -17,6 +17,7 @@ pub mod npy;
 pub mod output;
 pub mod plot;
 pub mod probe;
+pub mod random;
 pub mod reference;
 pub mod register;
 pub mod scene;

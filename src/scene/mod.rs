@@ -26,6 +26,7 @@ pub mod sweep;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;
+pub mod triangle;
 
 pub use contact::Contact;
 pub use file::SceneError;
