@@ -43,6 +43,7 @@ use passes::{Kernels, Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
+use stages::{AXIAL, BEAM, DISPLAY, ORIGIN, SCATTER};
 use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
@@ -217,17 +218,17 @@ impl Simulator {
         self.update_time = exchanged + passes.update(&mut cmd, scene, self.coincident, index)?;
         passes.touch(&mut cmd, scene)?;
         passes.clear(&mut cmd);
-        passes.run(&mut cmd, &stages::ORIGIN, &[])?;
+        passes.run(&mut cmd, &ORIGIN)?;
         let mut turn = 0;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
             passes.trace(&mut cmd, begin, &mut turn)?;
-            passes.run(&mut cmd, &stages::SCATTER, &[])?;
+            passes.run(&mut cmd, &SCATTER)?;
         }
-        passes.run(&mut cmd, &stages::BEAM, &[])?;
-        passes.run(&mut cmd, &stages::AXIAL, &[])?;
+        passes.run(&mut cmd, &BEAM)?;
+        passes.run(&mut cmd, &AXIAL)?;
         // The picture before is replaced as a whole.
         cmd.keep_on();
-        passes.run(&mut cmd, &stages::DISPLAY, &[])?;
+        passes.run(&mut cmd, &DISPLAY)?;
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
             cmd.copy_to_image(passes.pixels(self.fused), image)?;
@@ -274,7 +275,7 @@ impl Simulator {
 
     /// True where the first frame will wait for the driver's compiler: its kernels have never run here.
     pub fn compiles(&self) -> bool {
-        self.passes.kernels.of(&stages::SCATTER).is_new()
+        self.passes.kernels.of(&SCATTER).is_new()
     }
 
     /// Makes the pipelines again of `library`'s kernels, after the frames in flight.

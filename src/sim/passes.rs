@@ -10,7 +10,8 @@ use super::contact::{self, Coupling, Skins, Touch};
 use super::fusion::Fused;
 use super::pass::{Extent, Pass, Variants};
 use super::shaders::Library;
-use super::{SimError, World, layout, stages, tables};
+use super::stages::{self, CONVERT, DARKEN, FUSE, MASK, SHADOW, TRACE};
+use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
 use crate::scene::fusion::Blend;
@@ -71,8 +72,13 @@ impl Passes {
         cmd.barrier(Stage::Transfer, Stage::Compute);
     }
 
-    /// Records a pass as it says itself, with other buffers than those of a name where they are `given`.
-    pub(super) fn run(
+    /// Records a pass as it says itself.
+    pub(super) fn run(&self, cmd: &mut Commands, pass: &Pass) -> Result<(), GpuError> {
+        self.run_with(cmd, pass, &[])
+    }
+
+    /// As [`Self::run`], with the buffers `given` instead of those of their names.
+    pub(super) fn run_with(
         &self,
         cmd: &mut Commands,
         pass: &Pass,
@@ -83,7 +89,7 @@ impl Passes {
         self.record(cmd, pass, extent(&self.frame), &[], given)
     }
 
-    /// Records a dispatch of a pass and the barrier behind it; `given` as for [`Self::run`].
+    /// Records a dispatch of a pass and the barrier behind it; `given` as for [`Self::run_with`].
     pub(super) fn record(
         &self,
         cmd: &mut Commands,
@@ -131,7 +137,7 @@ impl Passes {
         for round in self.batches.rounds.of(&self.frame, path_begin..path_end, turn) {
             let threads = Extent::Threads([round.workers, 1, 1]);
             let push = bytemuck::cast_slice(&round.push);
-            self.record(cmd, &stages::TRACE[round.role as usize], threads, push, &[])?;
+            self.record(cmd, &TRACE[round.role as usize], threads, push, &[])?;
         }
         Ok(())
     }
@@ -143,14 +149,14 @@ impl Passes {
         };
         // What `display` has left is read, not only copied.
         cmd.barrier(Stage::Compute, Stage::Compute);
-        self.run(cmd, &stages::MASK, &[])?;
+        self.run(cmd, &MASK)?;
         let mut prescan = &self.buffers["prescan"];
         if fusion.background_shadows {
-            self.run(cmd, &stages::SHADOW, &[])?;
-            self.run(cmd, &stages::DARKEN, &[])?;
+            self.run(cmd, &SHADOW)?;
+            self.run(cmd, &DARKEN)?;
             prescan = &self.buffers["shaded"];
         }
-        self.run(cmd, &stages::CONVERT, &[("prescan", prescan)])?;
+        self.run_with(cmd, &CONVERT, &[("prescan", prescan)])?;
         // Where it is not blended by bands, the kernel does not read their change.
         let mut change = &self.buffers["background"];
         match fusion.blend {
@@ -160,7 +166,7 @@ impl Passes {
             }
             Blend::Linear | Blend::Smooth => self.blur(cmd)?,
         }
-        self.run(cmd, &stages::FUSE, &[("change", change)])?;
+        self.run_with(cmd, &FUSE, &[("change", change)])?;
         Ok(true)
     }
 

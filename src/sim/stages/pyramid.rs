@@ -87,7 +87,7 @@ impl Passes {
             let [width, height] = size_at(size, level);
             Extent::Threads([width, height, 1])
         };
-        self.run(cmd, &DIFFERENCE, &[("level", &levels[0].sums)])?;
+        self.run_with(cmd, &DIFFERENCE, &[("level", &levels[0].sums)])?;
         cmd.scope(REDUCE.name);
         for level in 0..top {
             let given = [("fine", &levels[level].sums), ("coarse", &levels[level + 1].sums)];
