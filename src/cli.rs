@@ -17,7 +17,7 @@ mod register;
 mod render;
 mod serve;
 mod study;
-mod sweep;
+mod vary;
 mod view;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
@@ -49,7 +49,9 @@ enum Command {
     /// Make a user study of realism (form and key), or tables of what was answered
     Study(study::Study),
     /// Render a scene many times, one parameter at a time, onto one labelled sheet
-    Sweep(Box<sweep::Sweep>),
+    // It was called `sweep`, which is a path of the probe.
+    #[command(alias = "sweep")]
+    Vary(Box<vary::Vary>),
     /// Open a window: the live image, the probe under the keyboard, every setting
     View(Box<view::View>),
 }
@@ -66,7 +68,7 @@ pub fn run() -> ExitCode {
         Command::Render(render) => render::run(&render).map(|()| ExitCode::SUCCESS),
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
         Command::Study(study) => study::run(&study).map(|()| ExitCode::SUCCESS),
-        Command::Sweep(sweep) => sweep::run(&sweep).map(|()| ExitCode::SUCCESS),
+        Command::Vary(vary) => vary::run(&vary).map(|()| ExitCode::SUCCESS),
         Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
     };
     match result {

@@ -21,6 +21,7 @@ pub mod random;
 pub mod reference;
 pub mod register;
 pub mod scene;
+pub mod settings;
 pub mod sheet;
 pub mod sim;
 pub mod statistics;

@@ -16,7 +16,7 @@ pub use governor::Governor;
 pub use ladder::{Ladder, Level};
 
 use crate::scene::Scene;
-use crate::scene::settings::Machine;
+use crate::settings::Machine;
 
 /// What was imaged is at rest when nothing has moved for this long.
 pub const REST: Duration = Duration::from_millis(150);

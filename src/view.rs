@@ -7,7 +7,6 @@ mod app;
 mod bmode;
 mod calipers;
 mod captures;
-mod catalogue;
 mod cine;
 mod console;
 pub mod engine;

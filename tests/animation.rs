@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use insonify::gpu::test_device;
-use insonify::scene::settings::TextureSpace;
 use insonify::scene::{Scene, Strategy};
+use insonify::settings::TextureSpace;
+use insonify::settings::Words;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
@@ -25,7 +26,7 @@ fn small(name: &str) -> Scene {
 
 fn strategies(tracer: Tracer) -> impl Iterator<Item = Strategy> {
     let has = move |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Selector;
-    Strategy::ALL.into_iter().filter(has)
+    Strategy::ALL.iter().copied().filter(has)
 }
 
 fn choose(scene: &mut Scene, strategy: Strategy, seconds: f64) {

@@ -8,8 +8,8 @@ use std::f64::consts::SQRT_2;
 
 use glam::DAffine3;
 use insonify::probe::{Kind, Probe};
-use insonify::scene::settings::ScatterMode;
 use insonify::scene::{Instance, Keyframes, Scene, Surface, Tissue, Wire};
+use insonify::settings::ScatterMode;
 use insonify::sim::calibration::{Calibration, amplitude, lateral_taps};
 use insonify::sim::{layout, tables};
 use signal::{Random, scene, tissue};

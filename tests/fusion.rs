@@ -11,6 +11,7 @@ use std::sync::Arc;
 use glam::{DAffine3, DVec3};
 use insonify::gpu::{Device, Image, ImageDim, ImageFormat, test_device};
 use insonify::scene::{Acquired, Scene, SceneError, Strategy, shapes};
+use insonify::settings::Words;
 use insonify::sim::dump;
 use insonify::sim::fusion::Tint;
 use insonify::sim::shaders::Library;
@@ -260,7 +261,7 @@ fn a_mask_follows_its_transform_and_its_selector_by_every_strategy() {
         let faces = ball.triangles.iter().map(face);
         vertices.chain(faces).collect::<String>()
     };
-    for strategy in Strategy::ALL {
+    for strategy in Strategy::ALL.iter().copied() {
         let folder = tempfile::tempdir().expect("a folder");
         write(folder.path(), &MOVING.replace("STRATEGY", &strategy.to_string()));
         for (name, radius) in [("small", RADII[0]), ("large", RADII[1])] {

@@ -57,11 +57,11 @@ shot "$out/fetus.toml" 2-side "90 degrees, simulated" "${side[@]}"
 shot "$out/slice.toml" 2-slice "90 degrees, a slice of the volume acquired at 0" "${side[@]}"
 
 heading "Figures 10 and 12" "Steps of a fusion."
-insonify sweep scenes/pregnancy.toml --show steps -o "$out/10-steps.png" >/dev/null
+insonify vary scenes/pregnancy.toml --show steps -o "$out/10-steps.png" >/dev/null
 picture 10-steps.png "volume, simulation, mask, composition, blurred mask, fused image"
 
 heading "Figure 11" "Surroundings of what is simulated."
-insonify sweep scenes/pregnancy.toml --show surroundings -o "$out/11-surroundings.png" >/dev/null
+insonify vary scenes/pregnancy.toml --show surroundings -o "$out/11-surroundings.png" >/dev/null
 picture 11-surroundings.png "acquired volume, none, the scene's own scatterers"
 
 heading "A real volume" "Fusion with a volume that nobody simulated: a freehand sweep over a spine phantom (PLUS toolkit)."
@@ -78,7 +78,7 @@ for f in 5 7 9; do
 done
 
 heading "Figure 14" "An ectopic pregnancy, with each of the surroundings."
-insonify sweep scenes/ectopic.toml --show surroundings -o "$out/14-surroundings.png" >/dev/null
+insonify vary scenes/ectopic.toml --show surroundings -o "$out/14-surroundings.png" >/dev/null
 picture 14-surroundings.png "acquired volume, none, the scene's own scatterers"
 
 heading "Figure 15" "Transform nodes: a fetus at rest, and moved."

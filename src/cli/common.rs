@@ -10,7 +10,7 @@ use miette::{IntoDiagnostic, Result, miette};
 use insonify::gpu::{Device, DeviceOptions, cache_folder};
 use insonify::scene::Scene;
 use insonify::scene::file::{self, override_of};
-use insonify::scene::settings::{Quality, Simulation};
+use insonify::settings::{Quality, Simulation};
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
 use insonify::sim::{self, Simulator, Tracer};

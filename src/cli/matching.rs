@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use insonify::output;
 use insonify::scene::Imaging;
-use insonify::scene::file::{Entry, save};
+use insonify::scene::file::{self, Entry, save};
+use insonify::settings::Group;
 use insonify::sim::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::sim::shaders::Library;
 use miette::{Result, miette};
@@ -132,18 +133,9 @@ fn write(args: &Match, made: &Matching) -> Result<()> {
 /// Entries of the scene file that have changed, as `--set` takes them; those that were overridden count,
 /// since the file may say something else.
 fn settings(made: &Matching, overrides: &[(String, String)]) -> Vec<Entry> {
-    let (before, after) = (&made.before.imaging, &made.after.imaging);
-    let mut out = Vec::new();
-    let mut set = |key: &str, differs: bool, value: String| {
-        let path = format!("imaging.{key}");
-        if differs || overrides.iter().any(|(set, _)| set.starts_with(&path)) {
-            out.push((path, Some(value)));
-        }
-    };
-    let level = |decibel: f64| format!("\"{decibel} dB\"");
-    set("gain", before.gain != after.gain, level(after.gain));
-    set("dynamic_range", before.dynamic_range != after.dynamic_range, level(after.dynamic_range));
-    set("tgc_sliders", before.tgc_sliders != after.tgc_sliders, format!("{:?}", after.tgc_sliders));
-    set("psf_scale", before.psf_scale != after.psf_scale, format!("{:?}", after.psf_scale));
-    out
+    let after = file::entries(&made.after.imaging, Imaging::TABLE);
+    let changed = file::changes(&made.before.imaging, &made.after.imaging, Imaging::TABLE);
+    let overridden = |path: &str| overrides.iter().any(|(set, _)| set.starts_with(path));
+    let out = after.into_iter();
+    out.filter(|entry| changed.contains(entry) || overridden(&entry.0)).collect()
 }

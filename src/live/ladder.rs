@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::probe::Probe;
 use crate::scene::Scene;
-use crate::scene::settings::{Imaging, Simulation};
+use crate::settings::{Imaging, Simulation};
 
 /// Fewest scanlines that still show a sector.
 const LEAST_SCANLINES: u32 = 32;
@@ -230,7 +230,7 @@ fn odd(layers: u32, share: f64) -> u32 {
 mod tests {
     use super::{Ladder, Level, odd};
     use crate::probe::Probe;
-    use crate::scene::settings::{Imaging, Simulation};
+    use crate::settings::{Imaging, Simulation};
 
     fn ladder(probe: &Probe, keeps_picture: bool) -> Ladder {
         let (simulation, imaging) = (Simulation::default(), Imaging::default());

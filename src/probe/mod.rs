@@ -2,6 +2,6 @@
 
 pub mod beam;
 pub mod face;
-pub mod transducer;
+mod transducer;
 
-pub use transducer::{Kind, MAX_ELEVATION_LAYERS, Probe};
+pub use crate::settings::{Kind, MAX_ELEVATION_LAYERS, Probe};

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::sweep::Variant;
+use super::vary::Variant;
 use super::{Origins, Scene, Tissue, Warning};
 
 mod anatomy;
@@ -23,20 +23,24 @@ mod save;
 mod schema;
 mod shelf;
 mod study;
-mod sweep;
+mod table;
 mod tissues;
 mod tracker;
 mod trajectory;
-mod units;
+mod vary;
 
+pub use document::quoted;
 pub use error::SceneError;
 pub use paper::paper;
+pub use placing::SCALES;
 pub use preset::{Preset, load_preset};
 pub use save::{Entry, Note, save, save_with};
 pub use study::{Plan, Question, Scenario, Slice};
+pub use table::{changes, entries};
 pub use trajectory::load_trajectory;
 
 use crate::probe::Probe;
+use crate::settings::units;
 use document::{Document, Source};
 
 /// Pixels that a picture has beside each other at most: what files and messages can say.
@@ -66,12 +70,12 @@ impl Scene {
         Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
     }
 
-    /// As [`Scene::load`], with the variants of the scene that its table `[sweep]` describes: in the
-    /// order of [`Parameter::ALL`](super::sweep::Parameter::ALL), of a parameter in the table's.
+    /// As [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
+    /// order of [`Parameter::suggested`](super::vary::Parameter::suggested), others after them.
     ///
     /// # Errors
     /// As there.
-    pub fn load_sweep(
+    pub fn load_variants(
         path: &Path,
         overrides: &[(String, String)],
     ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
@@ -97,8 +101,8 @@ impl Scene {
         let instances = anatomy.origins(&file.mesh);
         let wires = anatomy::wires(&document, &file.wire)?;
         let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
-        let simulation = parameters::simulation(&document, file.simulation, probe.frequency)?;
-        let imaging = parameters::imaging(&document, file.imaging)?;
+        let simulation = parameters::simulation(&document, &file.simulation, probe.frequency)?;
+        let imaging = parameters::imaging(&document, &file.imaging)?;
         presentable(&document, &probe, imaging.image_height)?;
         let volume = match &file.volume {
             Some(table) => Some(fusion::volume(&document, table, &mut warnings)?),
@@ -146,7 +150,7 @@ impl Scene {
         scene.place_model(placing::placement(&document, "model", model)?);
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
-        let variants = sweep::variants(&document, &file.sweep, &scene, suggested)?;
+        let variants = vary::variants(&document, &file.vary, &scene, suggested)?;
         Ok((scene, variants, warnings))
     }
 }
@@ -156,7 +160,7 @@ impl Scene {
 pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
     let table = file.ok().and_then(|file| file.volume);
-    table.map_or_else(Vec::new, |table| table.files())
+    table.map_or_else(Vec::new, |table| table.other.files())
 }
 
 /// A time as the command line and scene files write it: seconds, or with a unit. Finite.
@@ -166,7 +170,7 @@ pub fn volume_of(path: &Path) -> Vec<PathBuf> {
 pub fn seconds(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
-        Err(_) => units::parse::<units::InDuration>(text)?,
+        Err(_) => units::DURATION.parse(text)?,
     };
     match value.is_finite() {
         true => Ok(value),
@@ -181,7 +185,7 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 pub fn millimetres(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
-        Err(_) => units::parse::<units::InLength>(text)?,
+        Err(_) => units::LENGTH.parse(text)?,
     };
     match value.is_finite() {
         true => Ok(value),
@@ -194,7 +198,7 @@ pub fn millimetres(text: &str) -> Result<f64, String> {
 /// # Errors
 /// What is wrong with the text, in words.
 pub fn radians(text: &str) -> Result<f64, String> {
-    let value = units::parse::<units::InAngle>(text)?;
+    let value = units::ANGLE.parse(text)?;
     match value.is_finite() {
         true => Ok(value),
         false => Err(format!("{value} rad is no angle")),
@@ -243,6 +247,6 @@ mod graph_mistakes;
 #[cfg(test)]
 mod graph_tests;
 #[cfg(test)]
-mod sweep_tests;
-#[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod vary_tests;

@@ -8,6 +8,7 @@ use super::animation::Sequence;
 use super::mesh::{Soup, weld};
 use super::topology::Edges;
 use super::{Instance, Mesh, Scene};
+use crate::settings::{Display, Fusion, Surroundings};
 use crate::volume::Voxels;
 
 /// Most bytes of the volume on the device, at all its times. What is larger is averaged: a frame reads
@@ -33,17 +34,6 @@ pub struct Acquired {
     /// Stored value that is shown black, at grey level 0.
     pub black: f64,
     /// Stored value that is shown white, at grey level 1; not equal to `black`.
-    pub white: f64,
-}
-
-/// How an acquired volume is shown: where, and in which grey levels.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Display {
-    /// See [`Acquired::world_from_lps`].
-    pub world_from_lps: DAffine3,
-    /// See [`Acquired::black`].
-    pub black: f64,
-    /// See [`Acquired::white`].
     pub white: f64,
 }
 
@@ -109,98 +99,6 @@ impl Acquired {
     pub(super) fn set_time(&mut self, seconds: f64) {
         self.now = self.sequence.as_ref().map_or(0, |s| s.step(seconds));
     }
-}
-
-/// What is shown around the masking meshes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Surroundings {
-    /// The acquired volume.
-    Volume,
-    /// Nothing: sound passes and is absorbed there, but does not echo.
-    None,
-    /// The scene's own anatomy with its scatterers: as without fusion.
-    Scatterers,
-}
-
-impl Surroundings {
-    /// All of them, in the order of the paper's figure 14.
-    pub const ALL: [Self; 3] = [Self::Volume, Self::None, Self::Scatterers];
-
-    /// What scene files call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Volume => "volume",
-            Self::None => "none",
-            Self::Scatterers => "scatterers",
-        }
-    }
-}
-
-/// How the two images meet at the border of the mask.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Blend {
-    /// Along the ramp that the box blur makes of the mask (the paper).
-    Linear,
-    /// The same ramp through the smoothstep 3 m^2 - 2 m^3.
-    Smooth,
-    /// By bands of an image pyramid, each over as many pixels as its structures are wide (Burt and
-    /// Adelson, ACM Transactions on Graphics 2(4), 1983).
-    Multiband,
-}
-
-impl Blend {
-    /// All of them.
-    pub const ALL: &[Self] = &[Self::Linear, Self::Smooth, Self::Multiband];
-
-    /// What scene files call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Linear => "linear",
-            Self::Smooth => "smooth",
-            Self::Multiband => "multiband",
-        }
-    }
-}
-
-/// How fast the scanlines' samples go through the masking meshes, where mask and volume are looked up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MaskSpeed {
-    /// As the sound does: at the speed of the tissue that the masking mesh encloses (the paper). The mask's far border
-    /// lies where its surface echoes.
-    #[default]
-    Enclosing,
-    /// At the probe's speed, as around them: the volume is shown undistorted.
-    Probe,
-}
-
-impl MaskSpeed {
-    /// What scene files call it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Enclosing => "enclosing",
-            Self::Probe => "probe",
-        }
-    }
-}
-
-/// On-the-fly fusion of the acquired volume with the simulation.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Fusion {
-    /// The masking meshes, of which the union is simulated: indices into [`Scene::instances`].
-    pub masks: Vec<usize>,
-    /// What is shown around them.
-    pub surroundings: Surroundings,
-    /// Edge of the box by which the scan-converted mask is blurred, pixels, at least 1.
-    pub blur: u32,
-    /// How the two images meet.
-    pub blend: Blend,
-    /// How fast samples go through the masks.
-    pub mask_speed: MaskSpeed,
-    /// Whether the anatomy inside the mask throws its shadow into the acquired volume.
-    pub background_shadows: bool,
 }
 
 impl Fusion {

@@ -1,70 +1,41 @@
 //! Shapes that an instance takes over time, and how the device goes from one to the next.
 
-use std::fmt;
-
-use glam::DVec3;
-use serde::Deserialize;
-
 use super::{Mesh, Scene};
+use crate::settings::words;
+use glam::DVec3;
 
-/// How the structures that rays walk follow an instance that changes its shape. The same shape gives
-/// the same image by every strategy that can show it; they differ in what is stored and what is built.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Strategy {
-    /// Node exchange (Starkov et al. 2019, section II-B): every keyframe's structure is built once, and the top level is
-    /// rebuilt over the one that is shown, with its own tight box.
-    #[default]
-    Exchange,
-    /// As `exchange`, but the top level is refitted. The compute tracer, whose top level is made on
-    /// the host, keeps its tree and recomputes its boxes.
-    Update,
-    /// Every keyframe is in the top level at all times, and rays pass by all but one: nothing is built.
-    Mask,
-    /// Selector node (the same section): one entry in the top level with the union of all keyframes' boxes, whose
-    /// child is swapped: nothing is built. Compute tracer only.
-    Selector,
-    /// The keyframe's geometry is uploaded and its structure built, fast, when it is shown.
-    Rebuild,
-    /// As `rebuild`, from geometry that has stayed on the device.
-    Cached,
-    /// One structure for all keyframes, which must have equal triangles; its boxes follow the vertices.
-    Refit,
-    /// As `refit`, over vertices between the keyframes.
-    Interpolate,
-}
-
-impl Strategy {
-    /// All of them, in the order in which tables list them.
-    pub const ALL: [Self; 8] = [
-        Self::Exchange,
-        Self::Update,
-        Self::Mask,
-        Self::Selector,
-        Self::Rebuild,
-        Self::Cached,
-        Self::Refit,
-        Self::Interpolate,
-    ];
-
-    /// Whether keyframes must have equal triangles.
-    pub fn needs_shared_topology(self) -> bool {
-        matches!(self, Self::Refit | Self::Interpolate)
+words! {
+    /// How the structures that rays walk follow an instance that changes its shape. The same shape gives
+    /// the same image by every strategy that can show it; they differ in what is stored and what is built.
+    #[derive(Default, Hash)]
+    pub enum Strategy {
+        /// Node exchange (Starkov et al. 2019, section II-B): every keyframe's structure is built once, and the top level is
+        /// rebuilt over the one that is shown, with its own tight box.
+        #[default]
+        Exchange = "exchange",
+        /// As `exchange`, but the top level is refitted. The compute tracer, whose top level is made on
+        /// the host, keeps its tree and recomputes its boxes.
+        Update = "update",
+        /// Every keyframe is in the top level at all times, and rays pass by all but one: nothing is built.
+        Mask = "mask",
+        /// Selector node (the same section): one entry in the top level with the union of all keyframes' boxes, whose
+        /// child is swapped: nothing is built. Compute tracer only.
+        Selector = "selector",
+        /// The keyframe's geometry is uploaded and its structure built, fast, when it is shown.
+        Rebuild = "rebuild",
+        /// As `rebuild`, from geometry that has stayed on the device.
+        Cached = "cached",
+        /// One structure for all keyframes, which must have equal triangles; its boxes follow the vertices.
+        Refit = "refit",
+        /// As `refit`, over vertices between the keyframes.
+        Interpolate = "interpolate",
     }
 }
 
-impl fmt::Display for Strategy {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Exchange => "exchange",
-            Self::Update => "update",
-            Self::Mask => "mask",
-            Self::Selector => "selector",
-            Self::Rebuild => "rebuild",
-            Self::Cached => "cached",
-            Self::Refit => "refit",
-            Self::Interpolate => "interpolate",
-        })
+impl Strategy {
+    /// Whether keyframes must have equal triangles.
+    pub fn needs_shared_topology(self) -> bool {
+        matches!(self, Self::Refit | Self::Interpolate)
     }
 }
 

@@ -164,7 +164,7 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
 
 /// Message for a node that a file does not have.
 pub(super) fn no_such_node(path: &Path, node: &str, names: &[String]) -> Issue {
-    let remedy = super::suggest::among(node, names.iter().map(String::as_str));
+    let remedy = crate::settings::suggest::among(node, names.iter().map(String::as_str));
     Issue::error(path, 1, format!("no node or object `{node}` with triangles"), remedy)
 }
 

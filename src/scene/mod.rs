@@ -19,27 +19,24 @@ mod load_stl;
 pub mod mesh;
 pub mod normals;
 mod origin;
-pub mod settings;
 pub mod shapes;
-pub mod suggest;
-pub mod sweep;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;
 pub mod triangle;
+pub mod vary;
 
 pub use contact::Contact;
 pub use file::SceneError;
-pub use fusion::{Acquired, Display, Fusion};
+pub use fusion::Acquired;
 pub use graph::Graph;
 pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
 pub use origin::{Origin, Origins};
-pub use settings::{Imaging, Live, Simulation};
-pub use tissue::Tissue;
 pub use tracker::Tracker;
 
 use crate::probe::Probe;
+pub use crate::settings::{Display, Fusion, Imaging, Live, Simulation, Surface, Tissue};
 
 /// A triangle mesh in its own object space, mm.
 #[derive(Clone, Debug, Default)]
@@ -67,19 +64,6 @@ impl Mesh {
             [pick(f32::min, low), pick(f32::max, high)]
         })
     }
-}
-
-/// How an interface reflects, seen from one side.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Surface {
-    /// Exponent s of the micro-normal's power-cosine distribution: 0 diffuse, infinity specular.
-    pub roughness: f64,
-    /// Scale tau of the half-normal interface thickness, mm.
-    pub thickness: f64,
-    /// Exponent n_s of the echo lobe.
-    pub specularity: f64,
-    /// Echo gain of this surface, dB.
-    pub gain: f64,
 }
 
 /// One placed mesh with the tissue that it encloses.

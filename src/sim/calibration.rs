@@ -9,8 +9,8 @@ use std::f64::consts::{LN_10, PI, TAU};
 
 use super::layout::{AXIAL_REACH, LATERAL_REACH, LEVELS_PER_OCTAVE, SAMPLE_BLEND};
 use super::special::{erf, sinc};
-use crate::scene::settings::{Sampling, ScatterMode};
 use crate::scene::{Scene, Tissue};
+use crate::settings::{Sampling, ScatterMode};
 
 /// RMS envelope of unattenuated liver relative to a perfect mirror, dB. No source gives it; at
 /// this level a fat/muscle interface (-19.7 dB) stands 25 dB above liver.

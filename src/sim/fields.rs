@@ -26,8 +26,8 @@ use rayon::prelude::*;
 
 use super::layout::NONE;
 use super::placement::rigid;
-use crate::scene::settings::TextureSpace;
 use crate::scene::{Instance, Mesh, Scene, Strategy};
+use crate::settings::TextureSpace;
 pub use grid::Grid;
 use solve::{Patch, Solver};
 

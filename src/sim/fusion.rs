@@ -7,8 +7,8 @@ use super::buffers::Buffers;
 use super::stages::pyramid::{Pyramid, is_banded};
 use super::{layout, placement};
 use crate::gpu::{Commands, Device, GpuError, Image};
-use crate::scene::fusion::{Blend, MaskSpeed};
 use crate::scene::{Acquired, Fusion, Scene};
+use crate::settings::{Blend, MaskSpeed};
 use texture::Texture;
 
 pub use super::stages::tint::Tint;

@@ -31,8 +31,8 @@ use std::time::{Duration, Instant};
 
 use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
-use crate::scene::settings::Machine;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
+use crate::settings::Machine;
 use batches::Room;
 use buffers::Buffers;
 use bvh::Splits;

@@ -14,7 +14,7 @@ use super::stages::{self, CONVERT, DARKEN, FUSE, MASK, SHADOW, TRACE};
 use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
-use crate::scene::fusion::Blend;
+use crate::settings::Blend;
 
 /// What the stages work on.
 pub(super) struct Passes {

@@ -6,8 +6,8 @@ use super::layout;
 use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
-use crate::scene::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::{Scene, Surface, Wire};
+use crate::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
 
 /// The kernel ends a path by setting its weight to 0, which has to be below every limit.
 const LEAST_WEIGHT: f32 = 1e-30;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use super::answers::{Answers, DEGREES};
 use super::key::{Key, UNPERTURBED};
-use crate::scene::sweep::Parameter;
+use crate::scene::vary::Parameter;
 use crate::statistics::ranks::{Friedman, friedman, holm, median, sign_test};
 
 mod ratings;
@@ -65,7 +65,7 @@ pub struct Pair {
 /// How often images with one parameter changed were chosen.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
-    /// The parameter's key in `[sweep]`.
+    /// The parameter's key in `[vary]`.
     pub parameter: String,
     /// Below the scene's own value, at it, above it.
     pub counts: [usize; 3],
@@ -139,8 +139,8 @@ fn parameters(key: &Key) -> Vec<&str> {
     let mut found: Vec<&str> = key.rows().iter().map(|r| &*r.parameter).collect();
     found.retain(|p| *p != UNPERTURBED);
     let place = |name: &str| {
-        let place = Parameter::ALL.iter().position(|p| p.key() == name);
-        place.unwrap_or(Parameter::ALL.len())
+        let place = Parameter::suggested().position(|p| p.key() == name);
+        place.unwrap_or(Parameter::suggested().count())
     };
     found.sort_by_key(|name| (place(name), name.to_string()));
     found.dedup();

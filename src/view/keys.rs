@@ -5,12 +5,13 @@ use std::time::Instant;
 use egui::{Event, Key, Modifiers};
 
 use super::files::Purpose;
+use super::mmode;
 use super::model::calipers::Kind;
 use super::model::sheet::Tool;
 use super::model::{Axis, Model, Press, STEP, Source};
 use super::pads::{self, Word};
 use super::state::State;
-use super::{catalogue, mmode};
+use crate::settings::{Group, Imaging, Probe};
 
 /// What a key does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -253,10 +254,6 @@ fn carry_out(
     state: &mut State,
     now: Instant,
 ) {
-    let clamped = |key: &str, value: f64| {
-        let [least, most] = catalogue::entry(key).range;
-        value.clamp(least, most)
-    };
     let before = model.settings.clone();
     match action {
         Action::Move(axis, steps) if state.tools.nudge(axis, steps, modifiers.shift) => {}
@@ -267,12 +264,12 @@ fn carry_out(
         }
         Action::Gain(by) => {
             let gain = &mut model.settings.imaging.gain;
-            *gain = clamped("imaging.gain", *gain + by);
+            *gain = Imaging::clamped("gain", *gain + by);
         }
         Action::Depth(by) => {
             let depth = &mut model.settings.probe.depth;
             // Ten millimetres above nothing are a lower limit of their own.
-            *depth = clamped("probe.depth", (*depth + by).max(10.0));
+            *depth = Probe::clamped("depth", (*depth + by).max(10.0));
         }
         Action::Freeze => model.freeze(!model.frozen, now),
         Action::Frame(by) if model.frozen => state.tools.cine.step(by),

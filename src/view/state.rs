@@ -5,7 +5,7 @@ use super::inputs::Inputs;
 use super::mmode;
 use super::timing;
 use super::tools::Tools;
-use crate::scene::settings::Machine;
+use crate::settings::Machine;
 
 /// State of the window itself.
 pub(super) struct State {

@@ -68,7 +68,7 @@ pub fn place(path: &str) -> (String, String) {
 }
 
 /// Everything that settings decide, for comparison.
-pub fn settings(scene: &Scene) -> String {
+pub fn said(scene: &Scene) -> String {
     let mut out = format!(
         "{:?}{:?}{:?}{:?}",
         scene.probe, scene.world_from_probe, scene.simulation, scene.imaging
@@ -106,7 +106,7 @@ pub fn of_values(path: &str, kind: &str, default: &str, stated: &str) -> Vec<Str
             false => text.clone(),
         };
         let same = load(&bare, &[(at.clone(), default.to_owned())])
-            .map(|set| settings(&set) == settings(&load(&bare, &[]).expect("sound")));
+            .map(|set| said(&set) == said(&load(&bare, &[]).expect("sound")));
         match same {
             Ok(true) => {}
             Ok(false) => faults.push(format!("{path}: {default} is not the default")),

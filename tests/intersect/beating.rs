@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Keyframes, Mesh, Scene, Strategy, shapes};
+use insonify::settings::Words;
 use insonify::sim::tracer::Tracer;
 
 use super::device::Rig;
@@ -79,7 +80,7 @@ pub fn show(scene: &mut Scene, k: usize) {
 
 pub fn strategies(tracer: Tracer) -> impl Iterator<Item = Strategy> {
     let has = move |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Selector;
-    Strategy::ALL.into_iter().filter(has)
+    Strategy::ALL.iter().copied().filter(has)
 }
 
 /// Whether a line in double precision meets a box.

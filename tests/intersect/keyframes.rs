@@ -2,6 +2,7 @@
 //! with as many false intersections as geometry says.
 
 use insonify::scene::Strategy;
+use insonify::settings::Words;
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
 
@@ -53,7 +54,7 @@ fn a_stale_keyframe_is_noticed() {
 /// What each strategy has to record when the keyframe changes, and that none does when nothing does.
 #[test]
 fn only_what_a_strategy_needs_is_recorded() {
-    for strategy in Strategy::ALL {
+    for strategy in Strategy::ALL.iter().copied() {
         let mut scene = beating(strategy);
         let mut rig = Rig::new(&scene, Tracer::Bvh);
         assert!(!rig.update(&scene), "{strategy}: nothing has changed");

@@ -69,7 +69,7 @@ impl Random {
 /// Meshes placed in a world that is otherwise of no interest.
 pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
     let tissue = Tissue::shipped("liver").expect("liver is shipped");
-    let surface = tissue.default_surface();
+    let surface = tissue.surface;
     let (meshes, instances) = placed
         .into_iter()
         .enumerate()

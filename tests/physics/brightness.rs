@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use insonify::scene::Scene;
-use insonify::scene::settings::Sampling;
+use insonify::settings::Sampling;
 use insonify::sim::Tracer;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
-use insonify::scene::settings::{Sampling, Sequence};
+use insonify::settings::{Sampling, Sequence};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS};

@@ -4,7 +4,7 @@ use std::f64::consts::LN_10;
 
 use insonify::reference::Segment;
 use insonify::scene::Scene;
-use insonify::scene::settings::Sampling;
+use insonify::settings::Sampling;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS};

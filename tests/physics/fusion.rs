@@ -4,8 +4,10 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::scene::fusion::{Acquired, Blend, Fusion, MaskSpeed, Surroundings};
+use insonify::scene::fusion::Acquired;
 use insonify::scene::{Scene, shapes};
+use insonify::settings::Words;
+use insonify::settings::{Blend, Fusion, MaskSpeed, Surroundings};
 use insonify::sim::fusion::Steps;
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
@@ -639,7 +641,7 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
             let ends = [inside[0], inside[inside.len() - 1] + 1].map(|k| k as f64);
             let far = top + chord / rate;
             for (what, found, expected) in [("near", ends[0], top), ("far", ends[1], far)] {
-                let name = format!("{tracer}, {}: {what} border, sample", said.name());
+                let name = format!("{tracer}, {}: {what} border, sample", said.word());
                 out.compare(name, found, expected / pitch, 1.0);
             }
             if said == MaskSpeed::Enclosing {
@@ -663,7 +665,7 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
                     worst = worst.max((f64::from(prescan[2 * k + 1]) - level(z)).abs());
                 }
             }
-            let name = format!("{tracer}, {}: largest error of the volume's level", said.name());
+            let name = format!("{tracer}, {}: largest error of the volume's level", said.word());
             out.compare(name, worst, 0.0, 2e-6);
         }
     }

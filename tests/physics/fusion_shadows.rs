@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
-use insonify::scene::fusion::{Acquired, Blend, Fusion, MaskSpeed, Surroundings};
+use insonify::scene::fusion::Acquired;
 use insonify::scene::{Scene, Tissue};
+use insonify::settings::{Blend, Fusion, MaskSpeed, Surroundings};
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
 

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
-use insonify::scene::settings::ScatterMode;
+use insonify::settings::ScatterMode;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::moments::{autocovariance, correlation, gaussian_fwhm, transposed};

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::scene::Scene;
-use insonify::scene::settings::Sampling;
+use insonify::settings::Sampling;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::moments::{decibel, mean};

@@ -2,8 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::probe::Probe;
-use insonify::scene::settings::{Imaging, Simulation};
 use insonify::scene::{Scene, Tissue};
+use insonify::settings::{Imaging, Simulation};
 
 use crate::check::{Bench, Picture};
 use crate::scenes::{add_box, add_sphere, linear};
@@ -28,7 +28,7 @@ pub fn shown(bench: &Bench, title: &str, scene: &Scene) -> Picture {
 /// Both sides of the only instance reflect as its tissue's surface does.
 fn seen(bench: &Bench, title: &str, mut scene: Scene) -> Picture {
     if let [instance] = scene.instances.as_mut_slice() {
-        instance.surface = [scene.tissues[instance.tissue].default_surface(); 2];
+        instance.surface = [scene.tissues[instance.tissue].surface; 2];
     }
     shown(bench, title, &scene)
 }

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
-use insonify::scene::settings::Sampling;
+use insonify::settings::Sampling;
 use insonify::sim::Tracer;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};

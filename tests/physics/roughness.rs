@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_1_SQRT_2;
 use insonify::reference::acoustics::power_cosine;
 use insonify::reference::random::{PURPOSE_NORMAL, path_random, unit};
 use insonify::scene::Scene;
-use insonify::scene::settings::Sampling;
+use insonify::settings::Sampling;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS, echo};

@@ -2,8 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
-use insonify::scene::settings::{Imaging, Simulation};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
+use insonify::settings::{Imaging, Simulation};
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
-use insonify::scene::settings::Coherence;
+use insonify::settings::Coherence;
 use insonify::sim::Tracer;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};

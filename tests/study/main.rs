@@ -30,7 +30,7 @@ depth = "20 mm"
 paths = 2
 [imaging]
 image_height = 120
-[sweep]
+[vary]
 gain = [-6, 6]
 speckle_gain = [9]
 frequency = []
@@ -238,8 +238,8 @@ fn told(folder: &Path) -> Vec<String> {
         .chain(["ownslice", "movedslice", "one.toml", "two.toml", "speckle", "surface"])
         .map(str::to_owned)
         .collect();
-    for parameter in insonify::scene::sweep::Parameter::ALL {
-        words.extend([parameter.key(), parameter.name()].map(str::to_lowercase));
+    for parameter in insonify::scene::vary::Parameter::suggested() {
+        words.extend([parameter.key(), parameter.name()].map(|word| word.to_lowercase()));
     }
     let mut found = Vec::new();
     for (name, bytes) in files(folder) {

@@ -70,7 +70,8 @@ fn the_shipped_plan_shows_what_is_simulated_in_every_slice() {
     let plan = Plan::load(&path).expect("sound");
     assert_eq!((plan.scenarios.len(), plan.backgrounds.len()), (3, 3));
     for scenario in &plan.scenarios {
-        let (scene, variants, warnings) = Scene::load_sweep(&scenario.scene, &[]).expect("sound");
+        let (scene, variants, warnings) =
+            Scene::load_variants(&scenario.scene, &[]).expect("sound");
         assert!(warnings.is_empty(), "{warnings:?}");
         assert_eq!((variants.len(), scenario.slices.len()), (22, 3));
         assert!(scene.volume.is_some());

@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::plot::{Curve, Plot};
 use insonify::scene::{Graph, Keyframes, Mesh, Scene, Strategy, shapes};
+use insonify::settings::Words;
 use insonify::sim::Tracer;
 use miette::{IntoDiagnostic, Result};
 use serde_json::{Value, json};
@@ -100,7 +101,7 @@ fn strategies(tracer: Tracer) -> Vec<Strategy> {
     let has = |s: &Strategy| tracer == Tracer::Bvh || *s != Strategy::Selector;
     // Between keyframes there is nothing to compare with the others.
     let same = |s: &Strategy| *s != Strategy::Interpolate;
-    Strategy::ALL.into_iter().filter(has).filter(same).collect()
+    Strategy::ALL.iter().copied().filter(has).filter(same).collect()
 }
 
 /// A rig with its samples for each strategy, in turns, over keyframes that follow each other erratically.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use insonify::plot::{Curve, Plot};
 use insonify::scene::graph::NodeKind;
 use insonify::scene::{Scene, Strategy};
+use insonify::settings::Words;
 use insonify::sim::Tracer;
 use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
@@ -36,7 +37,7 @@ pub fn possible(scene: &Scene, tracer: Tracer) -> Vec<Strategy> {
         (shared || !s.needs_shared_topology())
             && (*s != Strategy::Selector || tracer == Tracer::Bvh)
     };
-    Strategy::ALL.into_iter().filter(can).collect()
+    Strategy::ALL.iter().copied().filter(can).collect()
 }
 
 /// The scene with all its keyframes going by `strategy`.

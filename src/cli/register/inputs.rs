@@ -7,7 +7,8 @@ use insonify::register::landmarks::Landmark;
 use insonify::register::surface::{Surface, Triangle, samples};
 use insonify::register::{RegisterError, points};
 use insonify::scene::graph::{Placed, is_even};
-use insonify::scene::{Acquired, Mesh, Scene, mesh, suggest};
+use insonify::scene::{Acquired, Mesh, Scene, mesh};
+use insonify::settings::suggest;
 use miette::{Report, Result, miette};
 
 use super::Register;

@@ -1,9 +1,9 @@
 //! The cases of a study: what is shown in each, and under which number.
 
 use insonify::scene::file::Plan;
-use insonify::scene::fusion::Surroundings;
-use insonify::scene::sweep::Variant;
+use insonify::scene::vary::Variant;
 use insonify::scene::{Scene, SceneError};
+use insonify::settings::{Surroundings, Words};
 use insonify::study::key::{Row, UNPERTURBED};
 use miette::Result;
 
@@ -55,7 +55,7 @@ impl Case {
         let mut entries = vec![entry];
         if let Some(fusion) = &mut scene.fusion {
             fusion.surroundings = self.background;
-            let name = self.background.name().to_owned();
+            let name = self.background.word().to_owned();
             entries.push(("fusion.surroundings".to_owned(), name));
         }
         (scene, entries)
@@ -82,10 +82,12 @@ impl Case {
             image,
             scenario: scenario.name.clone(),
             slice: scenario.slices[self.slice].name.clone(),
-            background: self.background.name().to_owned(),
-            parameter: variant.map_or(UNPERTURBED, |v| v.parameter.key()).to_owned(),
+            background: self.background.word().to_owned(),
+            parameter: variant.map_or_else(|| UNPERTURBED.to_owned(), |v| v.parameter.key()),
             value: text(&|v| v.value.to_string()),
-            own: text(&|v| v.parameter.value(&loaded.scene).to_string()),
+            own: text(&|v| {
+                v.parameter.value(&loaded.scene).map_or_else(String::new, |own| own.to_string())
+            }),
             unit: text(&|v| v.parameter.unit().to_owned()),
             set: set.join(" "),
             crc: String::new(),
@@ -110,7 +112,7 @@ pub fn check_backgrounds(plan: &Plan, scenario: usize, scene: &Scene) -> Result<
             _ => continue,
         };
         let message =
-            format!("{file} has {lacks}, and is to be shown before `{}`", background.name());
+            format!("{file} has {lacks}, and is to be shown before `{}`", background.word());
         return Err(plan.fault(&format!("scenario.{scenario}.scene"), message, remedy));
     }
     Ok(())

@@ -17,7 +17,7 @@ use miette::{IntoDiagnostic, Result, miette};
 use serde_json::json;
 
 use super::super::common::{self, Common, Progress};
-use super::super::sweep::pictures::Studio;
+use super::super::vary::pictures::Studio;
 use super::cases::{Case, Loaded, cases, check_backgrounds};
 use super::folder::{Folder, settings};
 
@@ -77,7 +77,7 @@ pub fn run(args: &Make) -> Result<()> {
 fn load(plan: &Plan, common: &Common) -> Result<Vec<Loaded>> {
     let mut loaded = Vec::new();
     for (i, scenario) in plan.scenarios.iter().enumerate() {
-        let (scene, variants, warnings) = Scene::load_sweep(&scenario.scene, &common.overrides)?;
+        let (scene, variants, warnings) = Scene::load_variants(&scenario.scene, &common.overrides)?;
         for warning in &warnings {
             eprintln!("{warning}");
         }

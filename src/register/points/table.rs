@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use super::{FAR, MAX_POINTS, far, frame_named, too_many, unknown_frame};
 use crate::register::RegisterError;
-use crate::scene::suggest;
+use crate::settings::suggest;
 use crate::volume::Frame;
 
 /// A row that has something in it.

@@ -6,8 +6,9 @@ use glam::DVec3;
 
 use super::Facts;
 use super::nodes::periods;
-use crate::scene::fusion::{Acquired, Surroundings, TEXTURE_BUDGET};
+use crate::scene::fusion::{Acquired, TEXTURE_BUDGET};
 use crate::scene::{Issue, Scene, file};
+use crate::settings::{Surroundings, Words};
 use crate::volume::Volume;
 
 /// What the scene file at `path` shows around what is simulated, line by line, and masks that do
@@ -36,8 +37,8 @@ pub fn describe(
         Surroundings::None => "nothing",
         Surroundings::Scatterers => "the scene's own scatterers",
     };
-    let (blur, blend) = (fusion.blur, fusion.blend.name());
-    let speed = fusion.mask_speed.name();
+    let (blur, blend) = (fusion.blur, fusion.blend.word());
+    let speed = fusion.mask_speed.word();
     lines.push(format!(
         "fusion: around the masks {around}; over {blur} pixels, blend {blend}; mask speed {speed}"
     ));

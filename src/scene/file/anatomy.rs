@@ -8,8 +8,9 @@ use super::document::Document;
 use super::error::SceneError;
 use super::placing::placement;
 use super::playing::{self, Played, Playing};
-use super::schema::{MeshTable, SurfaceTable, WireTable};
+use super::schema::{MeshTable, WireTable};
 use super::shelf::Shelf;
+use super::table::Table;
 use super::tissues::Tissues;
 use super::within;
 use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Surface, Wire};
@@ -39,8 +40,8 @@ pub(super) struct Anatomy {
 
 impl Anatomy {
     /// Where the file describes each instance.
-    pub fn origins(&self, tables: &[MeshTable]) -> Vec<Origin> {
-        let of = |(table, placed): (&MeshTable, &Placed)| {
+    pub fn origins(&self, tables: &[Table<Surface, MeshTable>]) -> Vec<Origin> {
+        let of = |(Table { other: table, .. }, placed): (&Table<Surface, MeshTable>, &Placed)| {
             let origin = Origin {
                 mesh: table.name.clone(),
                 // What switches an animation is the mesh's own.
@@ -55,13 +56,13 @@ impl Anatomy {
 /// Reads every mesh.
 pub(super) fn meshes(
     document: &Document<'_>,
-    tables: &[MeshTable],
+    tables: &[Table<Surface, MeshTable>],
     tissues: &mut Tissues<'_>,
     warnings: &mut Vec<Issue>,
 ) -> Result<Anatomy, SceneError> {
     let mut shelf = Shelf::default();
     let mut out = Anatomy::default();
-    for (i, table) in tables.iter().enumerate() {
+    for (i, Table { stated, other: table }) in tables.iter().enumerate() {
         let path = format!("mesh.{i}");
         if out.instances.iter().any(|other| other.name == table.name) {
             return Err(document.fail(
@@ -71,7 +72,7 @@ pub(super) fn meshes(
             ));
         }
         let tissue = tissues.index(&format!("{path}.tissue"), &table.tissue)?;
-        let default = tissues.get(tissue).default_surface();
+        let mut outside = tissues.get(tissue).surface;
         let playing = playing::read(document, table, &path, &mut shelf, warnings)?;
         let shapes = match &playing {
             Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
@@ -79,7 +80,9 @@ pub(super) fn meshes(
         };
         let place = (table.translate, table.rotate.as_ref(), table.scale);
         let rest = placement(document, &path, place)?;
-        let surface = surfaces(document, table, default, &path)?;
+        stated.put(document, &path, &mut outside)?;
+        let mut inside = outside;
+        table.inside.stated.put(document, &format!("{path}.inside"), &mut inside)?;
         let first = out.instances.len();
         for shapes in shapes {
             out.instances.push(Instance {
@@ -94,52 +97,12 @@ pub(super) fn meshes(
                 tissue,
                 priority: table.priority,
                 world_from_object: rest,
-                surface,
+                surface: [outside, inside],
             });
         }
         out.placed.push(Placed { rest, instances: first..out.instances.len(), playing });
     }
     out.meshes = shelf.meshes;
-    Ok(out)
-}
-
-fn surfaces(
-    document: &Document<'_>,
-    table: &MeshTable,
-    default: Surface,
-    path: &str,
-) -> Result<[Surface; 2], SceneError> {
-    let front = SurfaceTable {
-        roughness: table.roughness,
-        thickness: table.thickness,
-        specularity: table.specularity,
-        surface_gain: table.surface_gain,
-    };
-    let outside = surface(document, &front, default, path)?;
-    let inside = surface(document, &table.inside, outside, &format!("{path}.inside"))?;
-    Ok([outside, inside])
-}
-
-fn surface(
-    document: &Document<'_>,
-    table: &SurfaceTable,
-    default: Surface,
-    path: &str,
-) -> Result<Surface, SceneError> {
-    let out = Surface {
-        roughness: table.roughness.unwrap_or(default.roughness),
-        thickness: table.thickness.map_or(default.thickness, |q| q.0),
-        specularity: table.specularity.unwrap_or(default.specularity),
-        gain: table.surface_gain.map_or(default.gain, |q| q.0),
-    };
-    for (key, value, (least, most), unit) in [
-        ("roughness", out.roughness, (0.0, f64::INFINITY), ""),
-        ("thickness", out.thickness, (0.0, 10.0), "mm"),
-        ("specularity", out.specularity, (0.0, 1e6), ""),
-        ("surface_gain", out.gain, (f64::NEG_INFINITY, 200.0), "dB"),
-    ] {
-        within(document, &format!("{path}.{key}"), value, least, most, unit)?;
-    }
     Ok(out)
 }
 

@@ -11,7 +11,7 @@ use toml_edit::Key;
 
 use super::error::{SceneError, advice};
 use super::schema::File;
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
@@ -186,8 +186,7 @@ impl Document<'_> {
         message: impl Into<String>,
         remedy: impl Into<String>,
     ) -> SceneError {
-        let segments: Vec<_> = path.split('.').collect();
-        self.source.error(self.span(&segments), message.into(), Some(remedy.into()))
+        self.source.error(self.span_of(path), message.into(), Some(remedy.into()))
     }
 
     /// Whether the top-level `table` has a key other than `but`.
@@ -196,10 +195,22 @@ impl Document<'_> {
         table.is_some_and(|t| t.keys().any(|key| key.get_ref() != but))
     }
 
+    /// The name under which the file has the table `vary`: it was called `sweep`.
+    pub fn vary(&self) -> &'static str {
+        match self.root.contains_key("sweep") {
+            true => "sweep",
+            false => "vary",
+        }
+    }
+
     /// Where the value of a dotted path, or its nearest parent, begins: for the order of tables.
     pub fn place(&self, path: &str) -> usize {
-        let segments: Vec<_> = path.split('.').collect();
-        self.span(&segments).start
+        self.span_of(path).start
+    }
+
+    fn span_of(&self, path: &str) -> Range<usize> {
+        let segments = segments(path);
+        self.span(&segments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
     fn span(&self, path: &[&str]) -> Range<usize> {
@@ -236,7 +247,6 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
 
 type Misfit = (String, String);
 
-/// Puts `value` at a path; elements of arrays of tables are addressed by index or by name.
 /// The parts of a path as the command line and the program itself write it. Names with dots stand in quotes, as in
 /// TOML; others need none, and may hold what a bare key of TOML may not.
 pub(super) fn segments(path: &str) -> Vec<String> {
@@ -246,6 +256,12 @@ pub(super) fn segments(path: &str) -> Vec<String> {
     }
 }
 
+/// A name as a part of a path: in quotes where it needs them.
+pub fn quoted(name: &str) -> String {
+    Key::new(name).display_repr().into_owned()
+}
+
+/// Puts `value` at a path; elements of arrays of tables are addressed by index or by name.
 fn insert<'s>(
     table: &mut DeTable<'s>,
     path: &[&'s str],

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use thiserror::Error;
 
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// A mistake in a scene file or in what it names. Nothing is loaded.
 #[derive(Debug, Error, Diagnostic)]

@@ -8,14 +8,12 @@ use super::error::SceneError;
 use super::motion;
 use super::placing::placement;
 use super::schema::{Files, FusionTable, VolumeTable, even};
-use super::within;
+use super::table::Table;
 use crate::scene::animation::{Interpolation, Loop, Sequence};
-use crate::scene::fusion::{Blend, Surroundings, open_edges};
-use crate::scene::{Acquired, Fusion, Instance, Mesh, Warning, suggest};
+use crate::scene::fusion::open_edges;
+use crate::scene::{Acquired, Display, Fusion, Instance, Mesh, Warning};
+use crate::settings::{Group, Surroundings, suggest};
 use crate::volume::{Volume, Voxels};
-
-/// Pixels of the box by which the mask is blurred where the file says nothing, as in the paper.
-const BLUR: u32 = 32;
 
 /// Most volumes over time: 30 a second for half a minute, as keyframes of a mesh.
 const MAX_VOLUMES: usize = 1000;
@@ -41,7 +39,7 @@ impl VolumeTable {
 /// Reads the volume and places it.
 pub(super) fn volume(
     document: &Document<'_>,
-    table: &VolumeTable,
+    Table { stated, other: table }: &Table<Display, VolumeTable>,
     warnings: &mut Vec<Warning>,
 ) -> Result<Acquired, SceneError> {
     let folder = document.source.path.parent().unwrap_or(Path::new(""));
@@ -71,7 +69,9 @@ pub(super) fn volume(
         Voxels::U8(_) => (0.0, 255.0),
         _ => (volume.statistics.min, volume.statistics.max),
     };
-    let (black, white) = (table.black.unwrap_or(range.0), table.white.unwrap_or(range.1));
+    let mut display = Display { black: range.0, white: range.1, world_from_lps };
+    stated.put(document, Display::TABLE, &mut display)?;
+    let Display { black, white, .. } = display;
     for (key, level) in [("black", black), ("white", white)] {
         if !level.is_finite() {
             return Err(document.fail(
@@ -179,12 +179,12 @@ fn sequence(
 /// The settings of the fusion, with the meshes that its mask names.
 pub(super) fn fusion(
     document: &Document<'_>,
-    table: Option<&FusionTable>,
+    table: Option<&Table<Fusion, FusionTable>>,
     has_volume: bool,
     meshes: &[Mesh],
     instances: &[Instance],
 ) -> Result<Option<Fusion>, SceneError> {
-    let Some(table) = table else {
+    let Some(Table { stated, other: table }) = table else {
         return match has_volume {
             true => Err(document.fail(
                 "volume",
@@ -194,8 +194,9 @@ pub(super) fn fusion(
             false => Ok(None),
         };
     };
-    let surroundings = table.surroundings.unwrap_or(Surroundings::Volume);
-    if surroundings == Surroundings::Volume && !has_volume {
+    let mut out = Fusion::default();
+    stated.put(document, Fusion::TABLE, &mut out)?;
+    if out.surroundings == Surroundings::Volume && !has_volume {
         return Err(document.fail(
             "fusion.surroundings",
             "the surroundings are a volume, and the scene has none",
@@ -209,21 +210,13 @@ pub(super) fn fusion(
             "name the closed mesh around what is simulated",
         ));
     }
-    let blur = table.blur.unwrap_or(BLUR);
-    within(document, "fusion.blur", f64::from(blur), 1.0, 512.0, "pixels")?;
     let masks = table.mask.iter().enumerate();
     let masks = masks.map(|(i, name)| {
         let path = format!("fusion.mask.{i}");
         closed_mesh(document, &path, name, "a mask", meshes, instances)
     });
-    Ok(Some(Fusion {
-        masks: masks.collect::<Result<_, _>>()?,
-        surroundings,
-        blur,
-        blend: table.blend.unwrap_or(Blend::Linear),
-        mask_speed: table.mask_speed.unwrap_or_default(),
-        background_shadows: table.background_shadows.unwrap_or(false),
-    }))
+    out.masks = masks.collect::<Result<_, _>>()?;
+    Ok(Some(out))
 }
 
 /// The instance of this name, which is to be `what`: it must have an inside, in every shape that it

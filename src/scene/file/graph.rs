@@ -102,7 +102,7 @@ fn switched(anatomy: &Anatomy, table: usize) -> Option<usize> {
 /// change at the same times.
 fn group_played(file: &File, anatomy: &mut Anatomy) {
     let mut groups: Vec<(Option<&str>, &Sequence)> = Vec::new();
-    for (table, placed) in file.mesh.iter().zip(&anatomy.placed) {
+    for (table, placed) in file.mesh.iter().map(|t| &t.other).zip(&anatomy.placed) {
         let played = placed.playing.iter().flat_map(|p| &p.meshes);
         for (mesh, instance) in played.zip(placed.instances.clone()) {
             let Some(sequence) = &mesh.sequence else {

@@ -6,9 +6,9 @@ use super::document::Document;
 use super::error::SceneError;
 use super::placing::{factors, shift, turn};
 use super::schema::{BetweenRows, MotionKind, MotionTable, Rotation};
-use super::units::{Duration, Rate};
 use super::{trajectory, within};
 use crate::scene::animation::{Clock, Curve, Fetal, Loop, Motion, Trs, Turn};
+use crate::settings::units::{Duration, Rate};
 
 /// Shortest and longest period, s: a microsecond, which no frame resolves, to a day.
 pub(super) const PERIODS: (f64, f64) = (1e-6, 86_400.0);

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use super::document::Document;
 use super::error::SceneError;
 use super::schema::File;
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// A table that is a node.
 pub(super) struct Entry<'f> {
@@ -44,7 +44,7 @@ pub(super) fn entries<'f>(
         add(Kind::Selector(i), format!("selector.{i}"), &t.name, &t.parent);
     }
     for (i, t) in file.mesh.iter().enumerate() {
-        add(Kind::Mesh(i), format!("mesh.{i}"), &t.name, &t.parent);
+        add(Kind::Mesh(i), format!("mesh.{i}"), &t.other.name, &t.other.parent);
     }
     out.sort_by_key(|e| document.place(&e.path));
     let mut names = HashMap::new();

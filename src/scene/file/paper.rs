@@ -45,8 +45,8 @@ pub fn paper(path: &Path, selectors: bool) -> Vec<(String, String)> {
 mod tests {
     use super::super::graph_tests::{BEAT, beating, case, mesh};
     use super::*;
-    use crate::scene::settings::{Coherence, Sampling, ScatterMode, TextureSpace};
     use crate::scene::{Scene, Strategy};
+    use crate::settings::{Coherence, Sampling, ScatterMode, TextureSpace};
 
     #[test]
     fn a_scene_is_imaged_as_in_the_paper() {

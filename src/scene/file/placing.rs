@@ -5,8 +5,11 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::document::Document;
 use super::error::SceneError;
 use super::schema::{Factors, Rotation};
-use super::units::Length;
 use super::within;
+use crate::settings::units::Length;
+
+/// Least and largest factor by which a placement scales.
+pub const SCALES: [f64; 2] = [1e-6, 1e6];
 
 /// World from object: scale, then rotate, then translate.
 pub(super) fn placement(
@@ -14,7 +17,7 @@ pub(super) fn placement(
     path: &str,
     (translate, rotate, scale): (Option<[Length; 3]>, Option<&Rotation>, Option<Factors>),
 ) -> Result<DAffine3, SceneError> {
-    let scale = factors(document, &format!("{path}.scale"), scale, (1e-6, 1e6))?;
+    let scale = factors(document, &format!("{path}.scale"), scale, SCALES.into())?;
     let rotation = match rotate {
         Some(rotation) => {
             let (axis, angle) = turn(document, &format!("{path}.rotate"), rotation)?;

@@ -32,8 +32,8 @@ pub fn load_preset(path: &Path, frequency: f64) -> Result<Preset, SceneError> {
     let (probe, _) = probe::build(&document, &file.probe)?;
     let probe = document.says_of("probe", "pose").then_some(probe);
     let frequency = probe.as_ref().map_or(frequency, |probe| probe.frequency);
-    let simulation = parameters::simulation(&document, file.simulation, frequency)?;
-    let imaging = parameters::imaging(&document, file.imaging)?;
+    let simulation = parameters::simulation(&document, &file.simulation, frequency)?;
+    let imaging = parameters::imaging(&document, &file.imaging)?;
     let preset = Preset {
         probe,
         simulation: document.says_of("simulation", "").then_some(simulation),

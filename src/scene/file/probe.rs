@@ -1,122 +1,81 @@
 //! The table `probe` with its pose.
 
-use std::f64::consts::{PI, TAU};
-
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::parameters::overlay;
-use super::schema::{KindName, PoseTable, ProbeTable};
+use super::schema::{PoseTable, ProbeTable};
+use super::table::{Stated, Table};
 use super::within;
-use crate::probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
-use crate::scene::suggest;
+use crate::probe::Probe;
+use crate::settings::{Group, Value, suggest};
 
 /// Lateral and depth axes nearer to parallel than this (sine) define no image plane.
 const PARALLEL: f64 = 1e-3;
 
 pub(super) fn build(
     document: &Document<'_>,
-    table: &ProbeTable,
+    table: &Table<Probe, ProbeTable>,
 ) -> Result<(Probe, DAffine3), SceneError> {
-    let preset = table.preset.as_deref().unwrap_or("paper-table1");
+    let preset = table.other.preset.as_deref().unwrap_or("paper-table1");
     let presets = &Probe::PRESETS;
     let make = presets.iter().find(|p| p.0 == preset).ok_or_else(|| {
         let remedy = suggest::among(preset, presets.iter().map(|p| p.0));
         document.fail("probe.preset", format!("unknown preset `{preset}`"), remedy)
     })?;
     let mut out = make.1();
-    out.kind = kind(document, table, out.kind)?;
-    overlay!(table => out:
-        scanlines, elevation_layers, samples, bandwidth, f_number_transmit, f_number_receive;
-        depth, frequency, speed, focus, aperture, elevation_focus, elevation_height,
-        slice_thickness);
-    let far = f64::INFINITY;
-    for (key, value, (least, most), unit) in [
-        ("scanlines", f64::from(out.scanlines), (1.0, 4096.0), ""),
-        (
-            "elevation_layers",
-            f64::from(out.elevation_layers),
-            (1.0, f64::from(MAX_ELEVATION_LAYERS)),
-            "",
-        ),
-        ("samples", f64::from(out.samples), (16.0, 65_536.0), ""),
-        ("depth", out.depth, (1.0, 1000.0), "mm"),
-        ("frequency", out.frequency, (0.1, 100.0), "MHz"),
-        ("bandwidth", out.bandwidth, (0.01, 2.0), ""),
-        ("speed", out.speed, (0.3, 5.0), "mm/us"),
-        ("focus", out.focus, (0.1, 1e4), "mm"),
-        ("f_number_transmit", out.f_number_transmit, (0.1, 100.0), ""),
-        ("f_number_receive", out.f_number_receive, (0.1, 100.0), ""),
-        ("aperture", out.aperture, (0.1, far), "mm"),
-        ("elevation_focus", out.elevation_focus, (0.1, 1e4), "mm"),
-        ("elevation_height", out.elevation_height, (0.1, 1000.0), "mm"),
-        ("slice_thickness", out.slice_thickness, (0.0, 1000.0), "mm"),
-    ] {
-        within(document, &format!("probe.{key}"), value, least, most, unit)?;
-    }
-    let pose = match &table.pose {
+    arrange(document, &table.stated, &mut out)?;
+    table.stated.put(document, Probe::TABLE, &mut out)?;
+    let pose = match &table.other.pose {
         Some(pose) => place(document, "probe.pose", pose)?,
         None => DAffine3::IDENTITY,
     };
     Ok((out, pose))
 }
 
-/// The preset's arrangement with the keys of the file; keys of another arrangement are refused.
-fn kind(document: &Document<'_>, table: &ProbeTable, preset: Kind) -> Result<Kind, SceneError> {
-    let of_preset = match preset {
-        Kind::Convex { .. } => KindName::Convex,
-        Kind::Linear { .. } => KindName::Linear,
-        Kind::Phased { .. } => KindName::Phased,
+/// Gives `out`, which is as the preset has it, the arrangement that is stated. Keys of another arrangement are refused,
+/// and so is one that lacks a key which the preset has not either.
+fn arrange(
+    document: &Document<'_>,
+    stated: &Stated<Probe>,
+    out: &mut Probe,
+) -> Result<(), SceneError> {
+    const KEYS: [&str; 3] = ["radius", "field_of_view", "width"];
+    let preset = out.clone();
+    let absent = |probe: &Probe, key: &str| {
+        Probe::row(key).is_some_and(|row| (row.get)(probe) == Value::Absent)
     };
-    let name = table.kind.unwrap_or(of_preset);
-    let (radius, field_of_view, width) = match preset {
-        Kind::Convex { radius, field_of_view } => (Some(radius), Some(field_of_view), None),
-        Kind::Linear { width } => (None, None, Some(width)),
-        Kind::Phased { field_of_view } => (None, Some(field_of_view), None),
-    };
-    let key = |name: &str, given: Option<f64>, preset: Option<f64>, most: f64, unit: &str| {
-        let value = given.or(preset).ok_or_else(|| {
-            document.fail(
-                "probe.kind",
-                format!("this kind of probe needs `{name}`"),
-                format!("add `{name}` to [probe]"),
-            )
-        })?;
-        within(document, &format!("probe.{name}"), value, 1e-3, most, unit)?;
-        Ok(value)
-    };
-    let unfit = |name: &str, given: bool| match given {
-        true => Err(document.fail(
-            &format!("probe.{name}"),
-            format!("`{name}` does not belong to this kind of probe"),
-            "convex takes radius and field_of_view, linear width, phased field_of_view",
-        )),
-        false => Ok(()),
-    };
-    let (given_radius, given_view, given_width) =
-        (table.radius.map(|q| q.0), table.field_of_view.map(|q| q.0), table.width.map(|q| q.0));
-    Ok(match name {
-        KindName::Convex => {
-            unfit("width", given_width.is_some())?;
-            Kind::Convex {
-                radius: key("radius", given_radius, radius, 1000.0, "mm")?,
-                field_of_view: key("field_of_view", given_view, field_of_view, TAU, "rad")?,
+    if let Some(Value::Word(word)) = stated.value("kind") {
+        out.kind = out.kind.turned(word);
+    }
+    for key in KEYS {
+        let path = format!("probe.{key}");
+        let given = stated.number(key);
+        match (absent(out, key), given) {
+            (true, Some(_)) => {
+                return Err(document.fail(
+                    &path,
+                    format!("`{key}` does not belong to this kind of probe"),
+                    "convex takes radius and field_of_view, linear width, phased field_of_view",
+                ));
             }
-        }
-        KindName::Linear => {
-            unfit("radius", given_radius.is_some())?;
-            unfit("field_of_view", given_view.is_some())?;
-            Kind::Linear { width: key("width", given_width, width, 1000.0, "mm")? }
-        }
-        KindName::Phased => {
-            unfit("radius", given_radius.is_some())?;
-            unfit("width", given_width.is_some())?;
-            Kind::Phased {
-                field_of_view: key("field_of_view", given_view, field_of_view, PI, "rad")?,
+            (false, None) if absent(&preset, key) => {
+                return Err(document.fail(
+                    "probe.kind",
+                    format!("this kind of probe needs `{key}`"),
+                    format!("add `{key}` to [probe]"),
+                ));
             }
+            _ => {}
         }
-    })
+    }
+    match stated.number("field_of_view") {
+        Some(view) => {
+            let [least, _] = Probe::range("field_of_view");
+            within(document, "probe.field_of_view", view, least, out.kind.widest(), "rad")
+        }
+        None => Ok(()),
+    }
 }
 
 /// The pose that the table at `path` describes.

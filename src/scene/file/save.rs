@@ -13,7 +13,7 @@ use super::schema::even;
 use super::tissues::Tissues;
 use super::{parameters, probe};
 use crate::files;
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// What is wrong with a setting, and what to do about it.
 type Misfit = (String, String);
@@ -91,11 +91,11 @@ fn check(source: &Source) -> Result<(), SceneError> {
     let document = source.document()?;
     let file = document.parse()?;
     let (probe, _) = probe::build(&document, &file.probe)?;
-    parameters::simulation(&document, file.simulation, probe.frequency)?;
-    parameters::imaging(&document, file.imaging)?;
+    parameters::simulation(&document, &file.simulation, probe.frequency)?;
+    parameters::imaging(&document, &file.imaging)?;
     parameters::live(&document, &file.live)?;
     Tissues::new(&document, &file.tissues)?;
-    if let Some(t) = &file.volume {
+    if let Some(t) = file.volume.as_ref().map(|t| &t.other) {
         let place = (t.translate, t.rotate.as_ref(), even(t.scale));
         placement(&document, "volume", place)?;
     }
@@ -106,7 +106,7 @@ fn check(source: &Source) -> Result<(), SceneError> {
         let path = format!("transform.{i}");
         placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
     }
-    for (i, t) in file.mesh.iter().enumerate() {
+    for (i, t) in file.mesh.iter().map(|t| &t.other).enumerate() {
         let path = format!("mesh.{i}");
         placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
     }

@@ -7,14 +7,13 @@ use serde::Deserialize;
 use serde::de::value::SeqAccessDeserializer;
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 
-use super::units::{
-    Angle, Attenuation, Density, Duration, Frequency, Impedance, Length, Level, Rate, Speed,
-};
+use super::table::Table;
+use super::vary::VaryTable;
 use crate::scene::animation::{Interpolation, Loop};
-use crate::scene::fusion::{Blend, MaskSpeed, Surroundings};
 use crate::scene::keyframes::Strategy;
-use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
 use crate::scene::tracker::Axes;
+use crate::settings::units::{Angle, Duration, Impedance, Length, Level, Rate};
+use crate::settings::{Display, Fusion, Imaging, Live, Probe, Simulation, Surface, Tissue};
 
 /// The whole file.
 #[derive(Debug, Deserialize)]
@@ -23,21 +22,21 @@ pub struct File {
     pub name: Option<String>,
     pub background: Option<String>,
     #[serde(default)]
-    pub probe: ProbeTable,
+    pub probe: Table<Probe, ProbeTable>,
     #[serde(default)]
-    pub simulation: SimulationTable,
+    pub simulation: Table<Simulation>,
     #[serde(default)]
-    pub imaging: ImagingTable,
+    pub imaging: Table<Imaging>,
     #[serde(default)]
     pub model: ModelTable,
-    pub volume: Option<VolumeTable>,
-    pub fusion: Option<FusionTable>,
+    pub volume: Option<Table<Display, VolumeTable>>,
+    pub fusion: Option<Table<Fusion, FusionTable>>,
     pub contact: Option<ContactTable>,
     pub tracker: Option<TrackerTable>,
     #[serde(default)]
-    pub live: LiveTable,
-    #[serde(default)]
-    pub sweep: SweepTable,
+    pub live: Table<Live>,
+    #[serde(default, alias = "sweep")]
+    pub vary: VaryTable,
     #[serde(default)]
     pub group: Vec<GroupTable>,
     #[serde(default)]
@@ -45,44 +44,17 @@ pub struct File {
     #[serde(default)]
     pub selector: Vec<SelectorTable>,
     #[serde(default)]
-    pub mesh: Vec<MeshTable>,
+    pub mesh: Vec<Table<Surface, MeshTable>>,
     #[serde(default)]
     pub wire: Vec<WireTable>,
     #[serde(default)]
-    pub tissues: BTreeMap<String, TissueTable>,
+    pub tissues: BTreeMap<String, Table<Tissue, TissueTable>>,
 }
 
 #[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct ProbeTable {
     pub preset: Option<String>,
-    pub kind: Option<KindName>,
-    pub radius: Option<Length>,
-    pub field_of_view: Option<Angle>,
-    pub width: Option<Length>,
-    pub scanlines: Option<u32>,
-    pub elevation_layers: Option<u32>,
-    pub samples: Option<u32>,
-    pub depth: Option<Length>,
-    pub frequency: Option<Frequency>,
-    pub bandwidth: Option<f64>,
-    pub speed: Option<Speed>,
-    pub focus: Option<Length>,
-    pub f_number_transmit: Option<f64>,
-    pub f_number_receive: Option<f64>,
-    pub aperture: Option<Length>,
-    pub elevation_focus: Option<Length>,
-    pub elevation_height: Option<Length>,
-    pub slice_thickness: Option<Length>,
     pub pose: Option<PoseTable>,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "kebab-case")]
-pub enum KindName {
-    Convex,
-    Linear,
-    Phased,
 }
 
 #[derive(Debug, Deserialize)]
@@ -108,50 +80,6 @@ fn x_axis() -> [f64; 3] {
     [1.0, 0.0, 0.0]
 }
 
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SimulationTable {
-    pub paths: Option<u32>,
-    pub sampling: Option<Sampling>,
-    pub sequence: Option<Sequence>,
-    pub max_interactions: Option<u32>,
-    pub max_reflections: Option<u32>,
-    pub min_weight: Option<f64>,
-    pub coherence: Option<Coherence>,
-    pub rough_transmission: Option<bool>,
-    pub face_reflection: Option<bool>,
-    pub beam_footprint: Option<bool>,
-    pub origin_jitter: Option<Length>,
-    pub emission_lobe: Option<f64>,
-    pub beam_width: Option<Length>,
-    pub scatter_mode: Option<ScatterMode>,
-    pub cell: Option<Length>,
-    pub scatterers_per_resolution_cell: Option<f64>,
-    pub texture_space: Option<TextureSpace>,
-    pub volume_floor: Option<Level>,
-    pub branch_floor: Option<Level>,
-    pub speckle_gain: Option<Level>,
-    pub surface_gain: Option<Level>,
-    pub density_scale: Option<f64>,
-    pub roughness_scale: Option<f64>,
-    pub thickness_scale: Option<f64>,
-    pub seed: Option<u32>,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ImagingTable {
-    pub gain: Option<Level>,
-    pub dynamic_range: Option<Level>,
-    pub tgc_attenuation: Option<Attenuation>,
-    pub tgc_limit: Option<Level>,
-    pub tgc_sliders: Option<[Level; 8]>,
-    pub noise: Option<Level>,
-    pub grey_gamma: Option<f64>,
-    pub psf_scale: Option<[f64; 3]>,
-    pub image_height: Option<u32>,
-}
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct VolumeTable {
@@ -164,8 +92,6 @@ pub struct VolumeTable {
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
     pub scale: Option<f64>,
-    pub black: Option<f64>,
-    pub white: Option<f64>,
 }
 
 /// Where the whole model is.
@@ -183,14 +109,8 @@ pub fn even(scale: Option<f64>) -> Option<Factors> {
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct FusionTable {
     pub mask: Vec<String>,
-    pub surroundings: Option<Surroundings>,
-    pub blur: Option<u32>,
-    pub blend: Option<Blend>,
-    pub mask_speed: Option<MaskSpeed>,
-    pub background_shadows: Option<bool>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -198,28 +118,6 @@ pub struct FusionTable {
 pub struct ContactTable {
     pub mesh: Vec<String>,
     pub gel: Option<Length>,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SweepTable {
-    pub frequency: Option<Vec<Frequency>>,
-    pub gain: Option<Vec<Level>>,
-    pub tgc_attenuation: Option<Vec<Attenuation>>,
-    pub dynamic_range: Option<Vec<Level>>,
-    pub speckle_gain: Option<Vec<Level>>,
-    pub density_scale: Option<Vec<f64>>,
-    pub psf_lateral: Option<Vec<f64>>,
-    pub psf_axial: Option<Vec<f64>>,
-    pub surface_gain: Option<Vec<Level>>,
-    pub roughness_scale: Option<Vec<f64>>,
-    pub thickness_scale: Option<Vec<f64>>,
-}
-
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LiveTable {
-    pub budget: Option<Duration>,
 }
 
 #[derive(Debug, Deserialize)]
@@ -332,12 +230,8 @@ pub struct MeshTable {
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
     pub scale: Option<Factors>,
-    pub roughness: Option<f64>,
-    pub thickness: Option<Length>,
-    pub specularity: Option<f64>,
-    pub surface_gain: Option<Level>,
     #[serde(default)]
-    pub inside: SurfaceTable,
+    pub inside: Table<Surface>,
     #[serde(default)]
     pub cap_openings: bool,
 }
@@ -496,15 +390,6 @@ pub struct Rotation {
     pub angle: Angle,
 }
 
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SurfaceTable {
-    pub roughness: Option<f64>,
-    pub thickness: Option<Length>,
-    pub specularity: Option<f64>,
-    pub surface_gain: Option<Level>,
-}
-
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WireTable {
@@ -516,17 +401,8 @@ pub struct WireTable {
 }
 
 #[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct TissueTable {
     pub based_on: Option<String>,
-    pub speed: Option<Speed>,
-    pub density: Option<Density>,
     pub impedance: Option<Impedance>,
-    pub attenuation: Option<Attenuation>,
-    pub echogenicity: Option<Level>,
-    pub density_of_scatterers: Option<f64>,
-    pub mean_over_sigma: Option<f64>,
-    pub texture_depth: Option<f64>,
-    pub texture_length: Option<Length>,
     pub source: Option<String>,
 }

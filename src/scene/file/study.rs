@@ -12,10 +12,10 @@ use super::placing::placement;
 use super::probe::{look, place};
 use super::schema::{PoseTable, Rotation};
 use super::trajectory;
-use super::units::Length;
 use super::within;
 use crate::scene::Scene;
-use crate::scene::fusion::Surroundings;
+use crate::settings::units::Length;
+use crate::settings::{Surroundings, Words};
 
 /// Most cases of a study: the paper has 27, an assessor a day.
 const MAX_CASES: usize = 999;
@@ -276,7 +276,7 @@ impl Check<'_> {
         }
         for (i, background) in backgrounds.iter().enumerate() {
             if backgrounds[..i].contains(background) {
-                let message = format!("`{}` is there twice", background.name());
+                let message = format!("`{}` is there twice", background.word());
                 return self.fail(&format!("backgrounds.{i}"), message, "remove one");
             }
         }

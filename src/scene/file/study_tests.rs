@@ -6,7 +6,7 @@ use super::Plan;
 use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::scene::file::tests::Case;
-use crate::scene::fusion::Surroundings;
+use crate::settings::Surroundings;
 
 const HEAD: &str = r#"title = "Realism"
 [question]

@@ -2,12 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use super::document::Document;
+use super::document::{Document, quoted};
 use super::error::SceneError;
 use super::schema::TissueTable;
-use super::within;
+use super::table::Table;
 use crate::scene::tissue::table;
-use crate::scene::{Issue, Tissue, suggest};
+use crate::scene::{Issue, Tissue};
+use crate::settings::{Group, suggest};
+
+type Tables = BTreeMap<String, Table<Tissue, TissueTable>>;
 
 /// Impedance stated beside speed and density may differ from their product by this fraction:
 /// tables round to two digits. More, and refraction and reflection would contradict each other.
@@ -21,10 +24,7 @@ pub(super) struct Tissues<'a> {
 }
 
 impl<'a> Tissues<'a> {
-    pub fn new(
-        document: &'a Document<'a>,
-        tables: &BTreeMap<String, TissueTable>,
-    ) -> Result<Self, SceneError> {
+    pub fn new(document: &'a Document<'a>, tables: &Tables) -> Result<Self, SceneError> {
         let mut own: Vec<Tissue> = Vec::new();
         for name in tables.keys() {
             let mut chain = Vec::new();
@@ -82,10 +82,10 @@ fn unknown<'n>(
 }
 
 /// Names of the tissues from which `name` takes what it does not say, the nearest first.
-pub(super) fn bases(tables: &BTreeMap<String, TissueTable>, name: &str) -> Vec<String> {
+pub(super) fn bases(tables: &Tables, name: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut at = name;
-    while let Some(base) = tables.get(at).and_then(|table| table.based_on.as_deref())
+    while let Some(base) = tables.get(at).and_then(|table| table.other.based_on.as_deref())
         && base != at
     {
         out.push(base.to_owned());
@@ -98,15 +98,15 @@ pub(super) fn bases(tables: &BTreeMap<String, TissueTable>, name: &str) -> Vec<S
 /// one, or the shipped one of its own name.
 fn resolve(
     document: &Document<'_>,
-    tables: &BTreeMap<String, TissueTable>,
+    tables: &Tables,
     name: &str,
     chain: &mut Vec<String>,
 ) -> Result<Tissue, SceneError> {
     let table = &tables[name];
-    let path = format!("tissues.{name}");
+    let path = format!("tissues.{}", quoted(name));
     let based_on = format!("{path}.based_on");
     chain.push(name.to_owned());
-    let base = match table.based_on.as_deref() {
+    let base = match table.other.based_on.as_deref() {
         Some(base) if base != name && chain.iter().any(|c| c == base) => {
             return Err(document.fail(
                 &based_on,
@@ -122,9 +122,8 @@ fn resolve(
         })?),
         None => Tissue::shipped(name),
     };
-    let tissue = overlay(document, table, base, &path, name)?;
-    validate(document, &tissue, &path)?;
-    if let Some(stated) = table.impedance {
+    let tissue = over(document, table, base, &path, name)?;
+    if let Some(stated) = table.other.impedance {
         let product = tissue.impedance();
         let off = (stated.0 - product).abs() / stated.0;
         // Written so that a zero or infinite impedance fails as well.
@@ -143,65 +142,37 @@ fn resolve(
     Ok(tissue)
 }
 
-fn overlay(
+/// What `table` states over `base`.
+fn over(
     document: &Document<'_>,
-    table: &TissueTable,
+    table: &Table<Tissue, TissueTable>,
     base: Option<Tissue>,
     path: &str,
     name: &str,
 ) -> Result<Tissue, SceneError> {
-    let need = |key: &str, given: Option<f64>, base: Option<f64>| {
-        given.or(base).ok_or_else(|| {
-            let message = format!("tissue `{name}` has no {key}");
-            document.fail(path, message, format!("add `{key}` or `based_on`"))
-        })
-    };
-    let b = base.as_ref();
-    let tissue = Tissue {
-        name: name.to_owned(),
-        speed: need("speed", table.speed.map(|q| q.0), b.map(|t| t.speed))?,
-        density: need("density", table.density.map(|q| q.0), b.map(|t| t.density))?,
-        attenuation: need("attenuation", table.attenuation.map(|q| q.0), b.map(|t| t.attenuation))?,
-        echogenicity: need(
-            "echogenicity",
-            table.echogenicity.map(|q| q.0),
-            b.map(|t| t.echogenicity),
-        )?,
-        ..base.unwrap_or_else(|| Tissue {
-            source: "scene file".to_owned(),
-            texture_depth: 0.0,
-            ..Tissue::shipped("liver").expect("the reference tissue is shipped")
-        })
-    };
-    let source = match &table.source {
+    if base.is_none() {
+        let required = Tissue::rows().iter().map(|row| &row.facts);
+        let required = required.filter(|facts| facts.default == Some("required"));
+        for key in required.map(|facts| facts.key) {
+            if table.stated.value(key).is_none() {
+                let message = format!("tissue `{name}` has no {key}");
+                return Err(document.fail(path, message, format!("add `{key}` or `based_on`")));
+            }
+        }
+    }
+    let mut out = base.unwrap_or_else(|| Tissue {
+        source: "scene file".to_owned(),
+        texture_depth: 0.0,
+        ..Tissue::shipped("liver").expect("the reference tissue is shipped")
+    });
+    out.name = name.to_owned();
+    table.stated.put(document, path, &mut out)?;
+    out.source = match &table.other.source {
         Some(source) => source.clone(),
-        None => match tissue.source.as_str() {
-            "scene file" => tissue.source.clone(),
+        None => match out.source.as_str() {
+            "scene file" => out.source,
             inherited => format!("changed by the scene file; before that\n{inherited}"),
         },
     };
-    Ok(Tissue {
-        density_of_scatterers: table.density_of_scatterers.unwrap_or(tissue.density_of_scatterers),
-        mean_over_sigma: table.mean_over_sigma.unwrap_or(tissue.mean_over_sigma),
-        texture_depth: table.texture_depth.unwrap_or(tissue.texture_depth),
-        texture_length: table.texture_length.map_or(tissue.texture_length, |q| q.0),
-        source,
-        ..tissue
-    })
-}
-
-fn validate(document: &Document<'_>, t: &Tissue, path: &str) -> Result<(), SceneError> {
-    for (key, value, (least, most), unit) in [
-        ("speed", t.speed, (0.1, 10.0), "mm/us"),
-        ("density", t.density, (1e-4, 25.0), "g/cm3"),
-        ("attenuation", t.attenuation, (0.0, 1000.0), "dB/(cm MHz)"),
-        ("echogenicity", t.echogenicity, (f64::NEG_INFINITY, 60.0), "dB"),
-        ("density_of_scatterers", t.density_of_scatterers, (0.0, 1.0), ""),
-        ("mean_over_sigma", t.mean_over_sigma, (-100.0, 100.0), ""),
-        ("texture_depth", t.texture_depth, (0.0, 0.5), ""),
-        ("texture_length", t.texture_length, (0.01, 1000.0), "mm"),
-    ] {
-        within(document, &format!("{path}.{key}"), value, least, most, unit)?;
-    }
-    Ok(())
+    Ok(out)
 }

@@ -10,7 +10,7 @@ use toml::Spanned;
 use super::error::SceneError;
 use super::motion::SQUEEZE;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// Largest file, bytes.
 const MAX_TEXT: u64 = 16 << 20;

@@ -6,7 +6,7 @@ use serde_json::{Map, Value};
 
 use crate::scene::issue::Issue;
 use crate::scene::mesh::Choice;
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 /// An animation of a file.
 pub(super) struct Chosen {

@@ -8,7 +8,7 @@ use serde_json::{Map, Value};
 
 use super::schema::{Kind, ROOT, Table};
 use crate::scene::issue::{Issue, Severity};
-use crate::scene::suggest;
+use crate::settings::suggest;
 
 mod rules;
 

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::{Calibration, amplitude};
 use crate::scene::Tissue;
-use crate::scene::settings::ScatterMode;
+use crate::settings::ScatterMode;
 use crate::sim::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE};
 use crate::sim::tables::{wire_points, wire_spacing};
 

@@ -3,7 +3,7 @@
 use super::super::{SimError, Simulator};
 use crate::scene::Scene;
 #[cfg(doc)]
-use crate::scene::fusion::Blend;
+use crate::settings::Blend;
 
 /// The steps of the last fused frame, row by row where they are images.
 pub struct Steps {

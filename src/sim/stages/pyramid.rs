@@ -7,7 +7,7 @@ use super::super::pass::{Extent, Pass, per_pixel};
 use super::super::passes::Passes;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
 use crate::scene::Scene;
-use crate::scene::fusion::Blend;
+use crate::settings::Blend;
 
 /// The finest level.
 pub const DIFFERENCE: Pass = Pass {

@@ -7,7 +7,7 @@ use super::super::pass::{Array, Pass, Sizes, Variants};
 use super::super::rounds::Round;
 use crate::npy::Element::{Integer, Word};
 use crate::scene::Scene;
-use crate::scene::settings::Sampling;
+use crate::settings::Sampling;
 
 /// The stage, by role.
 pub const TRACE: [Pass; 3] = [

@@ -7,7 +7,6 @@ use egui::{DragValue, Label, Slider, Ui};
 use super::controls::words;
 use crate::scene::Strategy;
 use crate::sim::Tracer;
-use crate::view::catalogue;
 use crate::view::model::{Model, Placed};
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
@@ -36,7 +35,6 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
         model.clock.set_speed(speed, now);
         model.touch(now);
     }
-    let entry = catalogue::entry("selector.strategy");
     let tracer = model.settings.tracer;
     // What one selector switches is followed by one strategy.
     let mut shown: Vec<&Option<String>> = Vec::new();
@@ -57,7 +55,8 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
                     Strategy::Selector => tracer == Tracer::Bvh,
                     s => shares || !s.needs_shared_topology(),
                 };
-                words(ui, &format!("strategy {index}"), strategy, entry, possible);
+                words(ui, &format!("strategy {index}"), strategy, possible)
+                    .on_hover_text("How the device follows");
                 let names: Vec<_> = meshes().map(|mesh| mesh.name.as_str()).collect();
                 ui.add(Label::new(names.join(", ")).truncate());
             });

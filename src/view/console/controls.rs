@@ -1,17 +1,14 @@
-//! Controls of one key each.
-
-use std::ops::RangeInclusive;
+//! Controls of settings, made from their rows.
 
 use egui::{ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
-use serde::Deserialize;
-use serde::de::value::{Error, StrDeserializer};
 
-use crate::view::catalogue::{self, Entry};
+use crate::settings::units::ANGLE;
+use crate::settings::{Facts, Form, Group, Off, Row, Value, Words};
 
-/// Name and meaning of a key in a tooltip.
-pub(super) fn explained(response: Response, key: &str, entry: &Entry) -> Response {
-    let unit = &entry.unit;
-    let range = match entry.range {
+/// Meaning, range and name of a key in a tooltip. `path` is its table.
+pub(super) fn explained(response: Response, path: &str, facts: &Facts) -> Response {
+    let unit = facts.unit();
+    let range = match facts.range {
         [least, most] if least.is_finite() && most.is_finite() => {
             format!("\n{least} to {most} {unit}")
         }
@@ -19,15 +16,8 @@ pub(super) fn explained(response: Response, key: &str, entry: &Entry) -> Respons
         [_, most] if most.is_finite() => format!("\nat most {most} {unit}"),
         _ => String::new(),
     };
-    response.on_hover_text(format!("{}{range}\n{key}", entry.meaning))
-}
-
-/// A label and a control in a row of a two-column grid.
-pub(super) fn row(ui: &mut Ui, key: &str, label: &str, add: impl FnOnce(&mut Ui, &Entry)) {
-    let entry = catalogue::entry(key);
-    explained(ui.label(label), key, entry);
-    ui.horizontal(|ui| add(ui, entry));
-    ui.end_row();
+    let meaning = facts.meaning().replace('`', "");
+    response.on_hover_text(format!("{meaning}{range}\n{path}.{}", facts.key))
 }
 
 /// The two columns that the controls below fill.
@@ -35,128 +25,159 @@ pub(super) fn grid(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
     egui::Grid::new(id).num_columns(2).spacing([8.0, 4.0]).min_col_width(96.0).show(ui, add);
 }
 
-/// A slider over the `usual` values; typing takes all that a scene file may give.
-fn slider(ui: &mut Ui, key: &str, entry: &Entry, value: &mut f64, usual: RangeInclusive<f64>) {
-    let wide = *usual.start() > 0.0 && usual.end() / usual.start() > 50.0;
-    // A long unit needs the room.
-    let beyond = entry.unit.len().saturating_sub(5) as f32;
-    ui.spacing_mut().slider_width -= 7.0 * beyond;
-    let slider = Slider::new(value, usual)
-        .clamping(SliderClamping::Never)
-        .logarithmic(wide)
-        .max_decimals(4)
-        .suffix(format!(" {}", entry.unit));
-    explained(ui.add(slider), key, entry);
-    let [least, most] = entry.range;
-    *value = value.clamp(least, most);
-}
+/// What draws a setting that needs more than its row; true where it has.
+pub(super) type Special<'s, T> = &'s mut dyn FnMut(&mut Ui, &Facts, &mut T) -> bool;
 
-/// A number.
-pub(super) fn number(
-    ui: &mut Ui,
-    key: &str,
-    label: &str,
-    value: &mut f64,
-    usual: RangeInclusive<f64>,
-) {
-    row(ui, key, label, |ui, entry| slider(ui, key, entry, value, usual));
-}
-
-/// An angle, shown in degrees and held in radians.
-pub(super) fn angle(ui: &mut Ui, key: &str, label: &str, value: &mut f64, most: f64) {
-    row(ui, key, label, |ui, entry| {
-        let mut degrees = value.to_degrees();
-        let slider = Slider::new(&mut degrees, 10.0..=most).max_decimals(1).suffix(" deg");
-        if explained(ui.add(slider), key, entry).changed() {
-            *value = degrees.to_radians();
+/// Controls of all settings of a group, its sections one below the other. `path` is its table.
+pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T, special: Special<'_, T>) {
+    section(ui, path, settings, "", special);
+    let mut shown = vec![""];
+    for row in T::rows() {
+        let name = row.facts.under;
+        if !shown.contains(&name) {
+            shown.push(name);
+            ui.collapsing(name, |ui| section(ui, path, settings, name, special));
         }
-    });
+    }
 }
 
-/// A whole number.
-pub(super) fn count(
+/// Controls of one section of a group.
+pub(super) fn section<T: Group>(
     ui: &mut Ui,
-    key: &str,
-    label: &str,
-    value: &mut u32,
-    usual: RangeInclusive<u32>,
+    path: &str,
+    settings: &mut T,
+    name: &str,
+    special: Special<'_, T>,
 ) {
-    row(ui, key, label, |ui, entry| {
-        let mut number = f64::from(*value);
-        let wide = *usual.start() > 0 && usual.end() / usual.start().max(&1) > 50;
-        let range = f64::from(*usual.start())..=f64::from(*usual.end());
-        let slider = Slider::new(&mut number, range)
-            .clamping(SliderClamping::Never)
-            .logarithmic(wide)
-            .integer()
-            .suffix(match entry.unit.as_str() {
-                "" => String::new(),
-                unit => format!(" {unit}"),
-            });
-        explained(ui.add(slider), key, entry);
-        *value = number.clamp(entry.range[0], entry.range[1]) as u32;
-    });
-}
-
-/// A number that may be switched off: `off` is infinite.
-pub(super) fn number_or(
-    ui: &mut Ui,
-    key: &str,
-    label: &str,
-    value: &mut f64,
-    usual: RangeInclusive<f64>,
-    (off, word): (f64, &str),
-) {
-    row(ui, key, label, |ui, entry| {
-        let mut is_off = *value == off;
-        if ui.checkbox(&mut is_off, word).changed() {
-            *value = if is_off { off } else { (usual.start() + usual.end()) / 2.0 };
-        }
-        if !is_off {
-            let number = DragValue::new(value)
-                .speed((usual.end() - usual.start()) / 200.0)
-                .max_decimals(3)
-                .suffix(format!(" {}", entry.unit));
-            explained(ui.add(number), key, entry);
-            *value = value.clamp(entry.range[0], entry.range[1]);
-        }
-    });
-}
-
-/// Yes or no.
-pub(super) fn switch(ui: &mut Ui, key: &str, label: &str, value: &mut bool) {
-    row(ui, key, label, |ui, entry| {
-        explained(ui.checkbox(value, ""), key, entry);
-    });
-}
-
-/// One of the words that the key takes.
-pub(super) fn choice<T>(ui: &mut Ui, key: &str, label: &str, value: &mut T)
-where
-    T: for<'de> Deserialize<'de> + PartialEq,
-{
-    row(ui, key, label, |ui, entry| words(ui, key, value, entry, |_| true));
-}
-
-/// The list of words alone, those that are `possible`; `id` tells several of one key apart.
-pub(super) fn words<T>(
-    ui: &mut Ui,
-    id: &str,
-    value: &mut T,
-    entry: &Entry,
-    possible: impl Fn(&T) -> bool,
-) where
-    T: for<'de> Deserialize<'de> + PartialEq,
-{
-    let of = |word: &str| T::deserialize(StrDeserializer::<Error>::new(word)).ok();
-    let chosen = entry.choices.iter().find(|w| of(w).as_ref() == Some(value));
-    let shown = chosen.map_or("", String::as_str);
-    let list = ComboBox::from_id_salt(id).selected_text(shown).show_ui(ui, |ui| {
-        for word in &entry.choices {
-            if let Some(choice) = of(word).filter(&possible) {
-                ui.selectable_value(value, choice, word);
+    grid(ui, &format!("{path} {name}"), |ui| {
+        // Without a label a setting has its control elsewhere.
+        let rows = T::rows().iter().filter(|row| row.facts.under == name);
+        for row in rows.filter(|row| !row.facts.label.is_empty()) {
+            if !special(ui, &row.facts, settings) {
+                control(ui, path, row, settings);
             }
         }
     });
-    explained(list.response, id, entry);
+}
+
+/// Label and control of one setting.
+fn control<T>(ui: &mut Ui, path: &str, row: &Row<T>, settings: &mut T) {
+    let facts = &row.facts;
+    let before = (row.get)(settings);
+    let mut value = before.clone();
+    if value == Value::Absent && !matches!(facts.off, Some((Off::Absent, _))) {
+        return;
+    }
+    if let Value::List(list) = &mut value {
+        for (part, number) in facts.parts.iter().zip(list) {
+            explained(ui.label(format!("{} {part}", facts.label)), path, facts);
+            ui.horizontal(|ui| slider(ui, path, facts, number));
+            ui.end_row();
+        }
+    } else {
+        explained(ui.label(facts.label), path, facts);
+        ui.horizontal(|ui| match &mut value {
+            _ if facts.off.is_some() => number_or_off(ui, path, facts, &mut value),
+            Value::Number(radians) if facts.form.measures(&ANGLE) => {
+                angle(ui, path, facts, radians)
+            }
+            Value::Number(number) => slider(ui, path, facts, number),
+            Value::Whole(number) => count(ui, path, facts, number),
+            Value::Switch(on) => drop(explained(ui.checkbox(on, ""), path, facts)),
+            Value::Word(word) => choice(ui, path, facts, word),
+            Value::List(_) | Value::Absent => {}
+        });
+        ui.end_row();
+    }
+    if value != before {
+        (row.set)(settings, &value);
+    }
+}
+
+/// A slider over the usual values; typing takes all that a scene file may give.
+fn slider(ui: &mut Ui, path: &str, facts: &Facts, value: &mut f64) {
+    // A long unit needs the room.
+    let beyond = facts.unit().len().saturating_sub(5) as f32;
+    ui.spacing_mut().slider_width -= 7.0 * beyond;
+    let slider = over(facts, value).max_decimals(4).suffix(format!(" {}", facts.unit()));
+    explained(ui.add(slider), path, facts);
+    let [least, most] = facts.range;
+    *value = value.clamp(least, most);
+}
+
+/// The slider of a setting, logarithmic where its usual values span decades.
+fn over<'v>(facts: &Facts, value: &'v mut f64) -> Slider<'v> {
+    let [low, high] = facts.usual;
+    let wide = low > 0.0 && high / low > 50.0;
+    Slider::new(value, low..=high).clamping(SliderClamping::Never).logarithmic(wide)
+}
+
+/// An angle, shown in degrees and held in radians.
+fn angle(ui: &mut Ui, path: &str, facts: &Facts, radians: &mut f64) {
+    let [low, high] = facts.usual.map(f64::to_degrees);
+    let mut degrees = radians.to_degrees();
+    let slider = Slider::new(&mut degrees, low..=high).max_decimals(1).suffix(" deg");
+    if explained(ui.add(slider), path, facts).changed() {
+        *radians = degrees.to_radians();
+    }
+}
+
+/// A whole number.
+fn count(ui: &mut Ui, path: &str, facts: &Facts, value: &mut u32) {
+    let mut number = f64::from(*value);
+    let suffix = match facts.unit() {
+        "" => String::new(),
+        unit => format!(" {unit}"),
+    };
+    explained(ui.add(over(facts, &mut number).integer().suffix(suffix)), path, facts);
+    *value = number.clamp(facts.range[0], facts.range[1]) as u32;
+}
+
+/// A number that may be switched off.
+fn number_or_off(ui: &mut Ui, path: &str, facts: &Facts, value: &mut Value) {
+    let Some((off, word)) = facts.off else { return };
+    let off = match off {
+        Off::At(number) => Value::Number(number),
+        Off::Absent => Value::Absent,
+    };
+    let [low, high] = facts.usual;
+    let mut is_off = *value == off;
+    if ui.checkbox(&mut is_off, word).changed() {
+        *value = if is_off { off } else { Value::Number((low + high) / 2.0) };
+    }
+    if let (false, Value::Number(number)) = (is_off, value) {
+        let drag = DragValue::new(number)
+            .speed((high - low) / 200.0)
+            .max_decimals(3)
+            .suffix(format!(" {}", facts.unit()));
+        explained(ui.add(drag), path, facts);
+        *number = number.clamp(facts.range[0], facts.range[1]);
+    }
+}
+
+/// One of the words of a key.
+fn choice(ui: &mut Ui, path: &str, facts: &Facts, chosen: &mut &'static str) {
+    let Form::Words(words) = facts.form else { return };
+    let id = format!("{path}.{}", facts.key);
+    let list = ComboBox::from_id_salt(id).selected_text(*chosen).show_ui(ui, |ui| {
+        for &word in words {
+            ui.selectable_value(chosen, word, word);
+        }
+    });
+    explained(list.response, path, facts);
+}
+
+/// The list of choices alone, those that are `possible`; `id` tells several apart.
+pub(super) fn words<W: Words>(
+    ui: &mut Ui,
+    id: &str,
+    value: &mut W,
+    possible: impl Fn(&W) -> bool,
+) -> Response {
+    let list = ComboBox::from_id_salt(id).selected_text(value.word()).show_ui(ui, |ui| {
+        for &choice in W::ALL.iter().filter(|choice| possible(choice)) {
+            ui.selectable_value(value, choice, choice.word());
+        }
+    });
+    list.response
 }

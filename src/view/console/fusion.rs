@@ -4,20 +4,15 @@ use std::time::Instant;
 
 use egui::{Slider, Ui};
 
-use super::controls::{choice, count, grid, switch};
+use super::controls::group;
+use crate::settings::{Fusion, Group};
 use crate::view::model::Model;
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
     let Some(fusion) = &mut model.settings.fusion else {
         return;
     };
-    grid(ui, "fusion", |ui| {
-        choice(ui, "fusion.surroundings", "Around the mask", &mut fusion.surroundings);
-        count(ui, "fusion.blur", "Blur", &mut fusion.blur, 1..=128);
-        choice(ui, "fusion.blend", "Blend", &mut fusion.blend);
-        choice(ui, "fusion.mask_speed", "Mask speed", &mut fusion.mask_speed);
-        switch(ui, "fusion.background_shadows", "Shadows", &mut fusion.background_shadows);
-    });
+    group(ui, Fusion::TABLE, fusion, &mut |_, _, _| false);
     let mut real = model.real;
     ui.checkbox(&mut real.shown, "Which pixels are real").on_hover_text(
         "Colours what of the image comes from the acquired volume; mixed pixels by their share \

@@ -3,8 +3,9 @@
 use egui::{DragValue, Ui};
 use glam::{DAffine3, DQuat, DVec3};
 
-use super::controls::{explained, grid, row};
-use crate::scene::Display;
+use super::controls::{explained, grid, section};
+use crate::scene::file::SCALES;
+use crate::settings::{Display, Group};
 use crate::view::model::Model;
 use crate::view::model::registration::Moves;
 
@@ -23,13 +24,9 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
             ui.selectable_value(&mut registration.moves, moves, name).on_hover_text(tip);
         }
     });
-    let table = match registration.moves {
-        Moves::Volume => "volume",
-        Moves::Model => "model",
-    };
     let place = registration.place(&model.settings);
     let mut changed = place;
-    grid(ui, "registration", |ui| placement(ui, table, &mut changed));
+    grid(ui, "registration", |ui| placement(ui, &mut changed));
     if changed != place {
         registration.put(&mut model.settings, changed);
     }
@@ -42,35 +39,34 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
         }
     }
     if let Some(display) = &mut model.settings.volume {
-        grid(ui, "grey levels", |ui| levels(ui, display));
+        levels(ui, display);
     }
     masks(ui, model);
 }
 
 /// Shift, rotation and scale.
-fn placement(ui: &mut Ui, table: &str, place: &mut DAffine3) {
+fn placement(ui: &mut Ui, place: &mut DAffine3) {
     let (scale, rotation, mut shift) = place.to_scale_rotation_translation();
     let mut factor = scale.x;
     let (axis, angle) = rotation.to_axis_angle();
     let mut turn = (axis * angle).to_array().map(f64::to_degrees);
     let mut any = false;
-    row(ui, &format!("{table}.translate"), "Shift", |ui, entry| {
-        for part in shift.as_mut() {
-            let value = DragValue::new(part).speed(0.1).max_decimals(2);
-            any |= explained(ui.add(value), "mm, along the axes of the world", entry).changed();
-        }
-    });
-    row(ui, &format!("{table}.rotate.angle"), "Turn", |ui, entry| {
-        for part in &mut turn {
-            let value = DragValue::new(part).speed(0.1).max_decimals(2);
-            let what = "Degrees: a vector along the axis of the rotation, as long as its angle";
-            any |= explained(ui.add(value), what, entry).changed();
-        }
-    });
-    row(ui, &format!("{table}.scale"), "Scale", |ui, entry| {
-        let value = DragValue::new(&mut factor).speed(0.002).max_decimals(4);
-        any |= explained(ui.add(value.range(entry.range[0]..=entry.range[1])), "", entry).changed();
-    });
+    let mut row = |label: &str, what: &str, parts: &mut [f64], speed: f64, range: [f64; 2]| {
+        ui.label(label).on_hover_text(what);
+        ui.horizontal(|ui| {
+            for part in parts {
+                let value = DragValue::new(part).speed(speed).max_decimals(4);
+                let value = value.range(range[0]..=range[1]);
+                any |= ui.add(value).on_hover_text(what).changed();
+            }
+        });
+        ui.end_row();
+    };
+    let all = [f64::NEG_INFINITY, f64::INFINITY];
+    row("Shift", "mm, along the axes of the world", shift.as_mut(), 0.1, all);
+    let what = "Degrees: a vector along the axis of the rotation, as long as its angle";
+    row("Turn", what, &mut turn, 0.1, all);
+    row("Scale", "Size factor", std::slice::from_mut(&mut factor), 0.002, SCALES);
     if any {
         let turn = DVec3::from(turn.map(f64::to_radians));
         let rotation = DQuat::from_scaled_axis(turn);
@@ -82,14 +78,13 @@ fn placement(ui: &mut Ui, table: &str, place: &mut DAffine3) {
 fn levels(ui: &mut Ui, display: &mut Display) {
     let step = (display.white - display.black).abs() / 200.0;
     let before = *display;
-    for (key, name, level) in [
-        ("volume.black", "Black", &mut display.black),
-        ("volume.white", "White", &mut display.white),
-    ] {
-        row(ui, key, name, |ui, entry| {
-            explained(ui.add(DragValue::new(level).speed(step)), key, entry);
-        });
-    }
+    section(ui, Display::TABLE, display, "", &mut |ui, facts, display| {
+        let level = if facts.key == "black" { &mut display.black } else { &mut display.white };
+        explained(ui.label(facts.label), Display::TABLE, facts);
+        explained(ui.add(DragValue::new(level).speed(step)), Display::TABLE, facts);
+        ui.end_row();
+        true
+    });
     if display.black == display.white {
         *display = before;
     }

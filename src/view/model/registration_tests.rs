@@ -3,7 +3,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::*;
-use crate::scene::{Display, Fusion, fusion};
+use crate::scene::{Display, Fusion};
 use crate::view::model::{File, Model, tests};
 use crate::volume::Voxels;
 
@@ -27,10 +27,10 @@ fn scene() -> Scene {
     });
     scene.fusion = Some(Fusion {
         masks: vec![0],
-        surroundings: fusion::Surroundings::Volume,
+        surroundings: crate::settings::Surroundings::Volume,
         blur: 1,
-        blend: fusion::Blend::Linear,
-        mask_speed: fusion::MaskSpeed::Probe,
+        blend: crate::settings::Blend::Linear,
+        mask_speed: crate::settings::MaskSpeed::Probe,
         background_shadows: false,
     });
     scene

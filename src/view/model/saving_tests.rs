@@ -2,12 +2,10 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::{File, Model};
-use crate::probe::{Kind, Probe};
-use crate::scene::fusion::{Blend, MaskSpeed, Surroundings};
-use crate::scene::settings::{Coherence, Sampling, ScatterMode, Sequence, TextureSpace};
+use crate::probe::Probe;
 use crate::scene::{Scene, Strategy};
+use crate::settings::{Facts, Group, Surroundings, Value};
 use crate::sim::Tracer;
-use crate::view::catalogue;
 use crate::view::model::{Axis, Settings};
 
 /// Everything of a scene file that a setting can depend on: keys of a preset, a stated impedance, a
@@ -100,129 +98,92 @@ impl Desk {
     }
 }
 
-/// Changes a setting, taking values from the range of a key.
-type Change = fn(&mut Settings, &mut dyn FnMut(&str) -> f64);
+/// Draws a number between two ends.
+type Draw<'d> = &'d mut dyn FnMut([f64; 2]) -> f64;
 
-/// What the console can change, by the key that says it in a scene file.
-#[rustfmt::skip]
-const CHANGES: &[(&str, Change)] = &[
-    ("probe.preset", |s, _| s.probe = Probe::cardiac()),
-    ("probe.kind", |s, _| s.probe.kind = Kind::Phased { field_of_view: 1.234_567_891_234 }),
-    ("probe.radius", |s, v| s.probe.kind = Kind::Convex { radius: v("probe.radius"), field_of_view: 1.0 }),
-    ("probe.field_of_view", |s, v| {
-        let angle = v("probe.field_of_view").min(std::f64::consts::PI);
-        s.probe.kind = Kind::Phased { field_of_view: angle };
-    }),
-    ("probe.width", |s, v| s.probe.kind = Kind::Linear { width: v("probe.width") }),
-    ("probe.scanlines", |s, v| s.probe.scanlines = v("probe.scanlines") as u32),
-    ("probe.elevation_layers", |s, v| s.probe.elevation_layers = v("probe.elevation_layers") as u32),
-    ("probe.samples", |s, v| s.probe.samples = v("probe.samples") as u32),
-    ("probe.depth", |s, v| s.probe.depth = v("probe.depth")),
-    ("probe.frequency", |s, v| {
-        let before = s.probe.frequency;
-        s.probe.frequency = v("probe.frequency");
-        s.follow_frequency(before);
-    }),
-    ("probe.bandwidth", |s, v| s.probe.bandwidth = v("probe.bandwidth")),
-    ("probe.speed", |s, v| s.probe.speed = v("probe.speed")),
-    ("probe.focus", |s, v| s.probe.focus = v("probe.focus")),
-    ("probe.f_number_transmit", |s, v| s.probe.f_number_transmit = v("probe.f_number_transmit")),
-    ("probe.f_number_receive", |s, v| s.probe.f_number_receive = v("probe.f_number_receive")),
-    ("probe.aperture", |s, v| s.probe.aperture = v("probe.aperture")),
-    ("probe.elevation_focus", |s, v| s.probe.elevation_focus = v("probe.elevation_focus")),
-    ("probe.elevation_height", |s, v| s.probe.elevation_height = v("probe.elevation_height")),
-    ("probe.slice_thickness", |s, v| s.probe.slice_thickness = v("probe.slice_thickness")),
-    ("simulation.paths", |s, v| s.simulation.paths = v("simulation.paths") as u32),
-    ("simulation.sampling", |s, _| s.simulation.sampling = Sampling::SharedPrimary),
-    ("simulation.sequence", |s, _| s.simulation.sequence = Sequence::Random),
-    ("simulation.max_interactions", |s, v| s.simulation.max_interactions = v("simulation.max_interactions") as u32),
-    ("simulation.max_reflections", |s, v| s.simulation.max_reflections = v("simulation.max_reflections") as u32),
-    ("simulation.min_weight", |s, v| s.simulation.min_weight = v("simulation.min_weight")),
-    ("simulation.coherence", |s, _| s.simulation.coherence = Coherence::Coherent),
-    ("simulation.rough_transmission", |s, _| s.simulation.rough_transmission ^= true),
-    ("simulation.face_reflection", |s, _| s.simulation.face_reflection ^= true),
-    ("simulation.beam_footprint", |s, _| s.simulation.beam_footprint ^= true),
-    ("simulation.origin_jitter", |s, v| s.simulation.origin_jitter = v("simulation.origin_jitter")),
-    ("simulation.emission_lobe", |s, v| s.simulation.emission_lobe = v("simulation.emission_lobe")),
-    ("simulation.beam_width", |s, v| s.simulation.beam_width = v("simulation.beam_width")),
-    ("simulation.scatter_mode", |s, _| s.simulation.scatter_mode = ScatterMode::Voxel),
-    ("simulation.cell", |s, v| s.simulation.cell = v("simulation.cell")),
-    ("simulation.scatterers_per_resolution_cell", |s, v| s.simulation.scatterers_per_resolution_cell = v("simulation.scatterers_per_resolution_cell")),
-    ("simulation.texture_space", |s, _| s.simulation.texture_space = TextureSpace::World),
-    ("simulation.volume_floor", |s, v| s.simulation.volume_floor = v("simulation.volume_floor")),
-    ("simulation.branch_floor", |s, v| s.simulation.branch_floor = v("simulation.branch_floor")),
-    ("simulation.speckle_gain", |s, v| s.simulation.speckle_gain = v("simulation.speckle_gain")),
-    ("simulation.surface_gain", |s, v| s.simulation.surface_gain = v("simulation.surface_gain")),
-    ("simulation.density_scale", |s, v| s.set_density_scale(v("simulation.density_scale"))),
-    ("simulation.roughness_scale", |s, v| s.simulation.roughness_scale = v("simulation.roughness_scale")),
-    ("simulation.thickness_scale", |s, v| s.simulation.thickness_scale = v("simulation.thickness_scale")),
-    ("simulation.seed", |s, _| s.simulation.seed = u32::MAX),
-    ("imaging.gain", |s, v| s.imaging.gain = v("imaging.gain")),
-    ("imaging.dynamic_range", |s, v| s.imaging.dynamic_range = v("imaging.dynamic_range")),
-    ("imaging.tgc_attenuation", |s, v| s.imaging.tgc_attenuation = v("imaging.tgc_attenuation")),
-    ("imaging.tgc_limit", |s, v| s.imaging.tgc_limit = v("imaging.tgc_limit")),
-    ("imaging.tgc_sliders", |s, v| s.imaging.tgc_sliders = [0; 8].map(|_| v("imaging.tgc_sliders"))),
-    ("imaging.noise", |s, v| s.imaging.noise = v("imaging.noise")),
-    ("imaging.grey_gamma", |s, v| s.imaging.grey_gamma = v("imaging.grey_gamma")),
-    ("imaging.psf_scale", |s, v| s.imaging.psf_scale = [0; 3].map(|_| v("imaging.psf_scale"))),
-    ("imaging.image_height", |s, v| s.imaging.image_height = v("imaging.image_height") as u32),
-    ("live.budget", |s, v| s.live.budget = Some(v("live.budget"))),
-    ("fusion.surroundings", |s, _| s.fusion.as_mut().unwrap().surroundings = Surroundings::Scatterers),
-    ("fusion.blur", |s, v| s.fusion.as_mut().unwrap().blur = v("fusion.blur") as u32),
-    ("fusion.blend", |s, _| s.fusion.as_mut().unwrap().blend = Blend::Multiband),
-    ("fusion.mask_speed", |s, _| s.fusion.as_mut().unwrap().mask_speed = MaskSpeed::Probe),
-    ("fusion.background_shadows", |s, _| s.fusion.as_mut().unwrap().background_shadows ^= true),
-    ("tissues.NAME.speed", |s, v| s.tissues[2].speed = v("tissues.NAME.speed")),
-    ("tissues.NAME.density", |s, v| s.tissues[1].density = v("tissues.NAME.density")),
-    ("tissues.NAME.attenuation", |s, v| s.tissues[0].attenuation = v("tissues.NAME.attenuation")),
-    ("tissues.NAME.echogenicity", |s, v| s.tissues[1].echogenicity = v("tissues.NAME.echogenicity")),
-    ("tissues.NAME.density_of_scatterers", |s, v| s.tissues[3].density_of_scatterers = v("tissues.NAME.density_of_scatterers")),
-    ("tissues.NAME.mean_over_sigma", |s, v| s.tissues[1].mean_over_sigma = v("tissues.NAME.mean_over_sigma")),
-    ("tissues.NAME.texture_depth", |s, v| s.tissues[2].texture_depth = v("tissues.NAME.texture_depth")),
-    ("tissues.NAME.texture_length", |s, v| s.tissues[2].texture_length = v("tissues.NAME.texture_length")),
-    ("selector.strategy", |s, _| s.strategies[1] = Some(Strategy::Interpolate)),
-    ("mesh.roughness", |s, v| s.surfaces[0][0].roughness = v("mesh.roughness")),
-    ("mesh.thickness", |s, v| s.surfaces[1][0].thickness = v("mesh.thickness")),
-    ("mesh.specularity", |s, v| s.surfaces[2][0].specularity = v("mesh.specularity")),
-    ("mesh.surface_gain", |s, v| s.surfaces[2][0].gain = v("mesh.surface_gain")),
-    ("mesh.inside.roughness", |s, v| s.surfaces[2][1].roughness = v("mesh.inside.roughness")),
-    ("mesh.inside.thickness", |s, v| s.surfaces[2][1].thickness = v("mesh.inside.thickness")),
-    ("mesh.inside.specularity", |s, v| s.surfaces[0][1].specularity = v("mesh.inside.specularity")),
-    ("mesh.inside.surface_gain", |s, v| s.surfaces[0][1].gain = v("mesh.inside.surface_gain")),
-];
+/// A setting by its path, and what changes it.
+struct Change {
+    path: String,
+    apply: Box<dyn Fn(&mut Settings, Draw<'_>)>,
+}
 
-/// Keys of those tables that are no settings: which meshes, and what else the anatomy is. A strategy
-/// of a mesh is that of an animation in its file, which the ones of selectors stand for here.
-const ANATOMY: [&str; 22] = [
-    "fusion.mask",
-    "tissues.NAME.based_on",
-    "tissues.NAME.impedance",
-    "tissues.NAME.source",
-    "mesh.name",
-    "mesh.parent",
-    "mesh.tissue",
-    "mesh.priority",
-    "mesh.file",
-    "mesh.keyframes",
-    "mesh.animation",
-    "mesh.phase",
-    "mesh.loop",
-    "mesh.rate",
-    "mesh.strategy",
-    "mesh.interpolation",
-    "mesh.node",
-    "mesh.units",
-    "mesh.cap_openings",
-    "mesh.shape",
-    "mesh.scale",
-    "mesh.translate",
-];
+/// Another value that a key may have.
+fn another(facts: &Facts, now: Value, draw: Draw<'_>) -> Value {
+    match now {
+        Value::Absent if facts.off.is_none() => Value::Absent,
+        Value::Absent | Value::Number(_) => Value::Number(draw(facts.range)),
+        Value::Whole(_) => Value::Whole(draw(facts.range) as u32),
+        Value::Switch(on) => Value::Switch(!on),
+        Value::Word(word) => {
+            let words = facts.words();
+            let at = words.iter().position(|w| *w == word).expect("one of them");
+            Value::Word(words[(at + 1) % words.len()])
+        }
+        Value::List(list) => Value::List(list.iter().map(|_| draw(facts.range)).collect()),
+    }
+}
+
+/// The changes of all settings of a group; `path` is its table.
+fn group<T: Group>(out: &mut Vec<Change>, path: &str, of: fn(&mut Settings) -> &mut T) {
+    for row in T::rows() {
+        let apply = move |settings: &mut Settings, draw: Draw<'_>| {
+            let (frequency, density) =
+                (settings.probe.frequency, settings.simulation.density_scale);
+            let value = another(&row.facts, (row.get)(of(settings)), draw);
+            (row.set)(of(settings), &value);
+            settings.follow_frequency(frequency);
+            let wanted = settings.simulation.density_scale;
+            if wanted != density {
+                settings.simulation.density_scale = density;
+                settings.set_density_scale(wanted);
+            }
+        };
+        let path = format!("{path}.{}", row.facts.key);
+        out.push(Change { path, apply: Box::new(apply) });
+    }
+}
+
+/// What the console can change.
+fn changes() -> Vec<Change> {
+    let mut out = Vec::new();
+    for (word, settings) in [("convex", 0), ("linear", 1), ("phased", 2)] {
+        let apply = move |s: &mut Settings, _: Draw<'_>| {
+            s.probe.kind = s.probe.kind.turned(word);
+            s.probe.depth = 50.0 + f64::from(settings);
+        };
+        out.push(Change { path: format!("probe, {word}"), apply: Box::new(apply) });
+        group(&mut out, "probe", |s| &mut s.probe);
+    }
+    group(&mut out, "simulation", |s| &mut s.simulation);
+    group(&mut out, "imaging", |s| &mut s.imaging);
+    group(&mut out, "live", |s| &mut s.live);
+    group(&mut out, "fusion", |s| s.fusion.as_mut().expect("there"));
+    let none = |s: &mut Settings, _: Draw<'_>| {
+        // The scene has no volume that they could be.
+        let fusion = s.fusion.as_mut().expect("there");
+        if fusion.surroundings == Surroundings::Volume {
+            fusion.surroundings = Surroundings::None;
+        }
+    };
+    out.push(Change { path: "surroundings".to_owned(), apply: Box::new(none) });
+    group(&mut out, "tissue 0", |s| &mut s.tissues[0]);
+    group(&mut out, "tissue 1", |s| &mut s.tissues[1]);
+    group(&mut out, "tissue 2", |s| &mut s.tissues[2]);
+    group(&mut out, "tissue 3", |s| &mut s.tissues[3]);
+    group(&mut out, "surface 0", |s| &mut s.surfaces[0][0]);
+    group(&mut out, "surface 1", |s| &mut s.surfaces[1][0]);
+    group(&mut out, "surface 2", |s| &mut s.surfaces[2][0]);
+    group(&mut out, "surface 0, inside", |s| &mut s.surfaces[0][1]);
+    group(&mut out, "surface 2, inside", |s| &mut s.surfaces[2][1]);
+    let interpolate = |s: &mut Settings, _: Draw<'_>| s.strategies[1] = Some(Strategy::Interpolate);
+    out.push(Change { path: "strategy".to_owned(), apply: Box::new(interpolate) });
+    out
+}
 
 /// Least, most, and numbers with many digits between, by turns.
-fn values(seed: u64) -> impl FnMut(&str) -> f64 {
+fn values(seed: u64) -> impl FnMut([f64; 2]) -> f64 {
     let mut state = seed;
-    move |key| {
-        let [least, most] = catalogue::entry(key).range;
+    move |[least, most]| {
         // Knuth's MMIX generator: any sequence will do.
         state =
             state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -257,26 +218,16 @@ fn hold(desk: &Desk, mut wanted: Settings, what: &str) {
 
 #[test]
 fn every_setting_is_saved_and_loaded() {
-    let tables =
-        ["probe.", "simulation.", "imaging.", "live.", "fusion.", "tissues.NAME.", "mesh."];
-    for key in catalogue::keys() {
-        let nested = ["probe.pose.", "mesh.shape.", "mesh.rotate."];
-        let is_setting = tables.iter().any(|t| key.starts_with(t))
-            && !nested.iter().any(|t| key.starts_with(t))
-            && !ANATOMY.contains(&key);
-        let is_changed = CHANGES.iter().any(|c| c.0 == key);
-        assert_eq!(is_setting || key == "selector.strategy", is_changed, "{key}");
-    }
-    for (key, change) in CHANGES {
+    for change in changes() {
         for seed in 0..4 {
             let desk = Desk::new();
             let mut model = desk.model(&[]);
             let before = model.settings.clone();
-            change(&mut model.settings, &mut values(seed));
+            (change.apply)(&mut model.settings, &mut values(seed));
             model.note(&before, Instant::now());
-            assert!(seed > 0 || model.is_modified(false), "{key}");
-            model.save(None, false).unwrap_or_else(|e| panic!("{key}: {e}"));
-            hold(&desk, model.settings.clone(), key);
+            let what = &change.path;
+            model.save(None, false).unwrap_or_else(|e| panic!("{what}: {e}"));
+            hold(&desk, model.settings.clone(), what);
             assert!(!model.is_modified(true));
         }
     }
@@ -288,10 +239,10 @@ fn all_settings_at_once_are_saved_and_loaded_again_and_again() {
     let mut model = desk.model(&[]);
     for seed in 10..40 {
         let before = model.settings.clone();
-        for (key, change) in CHANGES {
+        for (at, change) in (0..).zip(changes()) {
             // Every other one, so that what was set before has to stay.
-            if (seed + key.len() as u64).is_multiple_of(2) {
-                change(&mut model.settings, &mut values(seed * 1000 + key.len() as u64));
+            if (seed + at) % 2 == 0 || change.path == "surroundings" {
+                (change.apply)(&mut model.settings, &mut values(seed * 1000 + at));
             }
         }
         // A lattice that nobody asks for leaves the range of its key.
@@ -342,7 +293,7 @@ fn a_preset_is_written_as_one() {
 
 #[test]
 fn counts_that_a_quality_chose_stay_out_of_the_file() {
-    use crate::scene::settings::{Machine, Quality};
+    use crate::settings::{Machine, Quality};
     let desk = Desk::new();
     let mut scene = desk.scene("scene.toml", &[]);
     let file = File::new(desk.folder.path().join("scene.toml"), Vec::new(), &scene);

@@ -6,8 +6,8 @@ use crate::probe::Probe;
 use crate::scene::{
     Acquired, Display, Fusion, Imaging, Live, Scene, Simulation, Strategy, Surface, Tissue,
 };
+use crate::settings::Group;
 use crate::sim::Tracer;
-use crate::view::catalogue;
 
 /// Settings of a scene that change while it is imaged.
 #[derive(Clone, Debug, PartialEq)]
@@ -63,9 +63,8 @@ impl Settings {
         let frequency = self.probe.frequency;
         if frequency != before {
             let crowding = self.simulation.crowding();
-            let [least, most] = catalogue::entry("simulation.cell").range;
             let cell = self.simulation.cell * crowding * before / frequency;
-            self.simulation.cell = cell.clamp(least, most) / crowding;
+            self.simulation.cell = Simulation::clamped("cell", cell) / crowding;
         }
     }
 

@@ -189,7 +189,7 @@ mod tests {
             tissue,
             priority: 0,
             world_from_object: DAffine3::from_translation(DVec3::new(at, 0.0, 40.0)),
-            surface: [Tissue::shipped("liver").expect("shipped").default_surface(); 2],
+            surface: [Tissue::shipped("liver").expect("shipped").surface; 2],
         };
         scene.meshes = vec![shapes::sphere(50.0, 2), shapes::sphere(5.0, 1)];
         scene.instances = vec![

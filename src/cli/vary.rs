@@ -1,4 +1,4 @@
-//! `insonify sweep`: many images of one scene on one sheet.
+//! `insonify vary`: many images of one scene on one sheet.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -18,10 +18,10 @@ use record::Record;
 pub(super) mod pictures;
 mod record;
 
-/// Arguments of `insonify sweep`.
+/// Arguments of `insonify vary`.
 #[derive(Debug, Args)]
-pub struct Sweep {
-    /// Scene file (.toml); its table [sweep] says which parameters take which values.
+pub struct Vary {
+    /// Scene file (.toml); its table [vary] says which parameters take which values.
     scene: PathBuf,
     /// The sheet, NAME.png, with its table beside it, NAME.csv; or a folder for both and every single
     /// image [default: the scene's name and what is shown, here].
@@ -69,10 +69,10 @@ impl fmt::Display for Show {
 ///
 /// # Errors
 /// Everything that the user or the device can get wrong, said once.
-pub fn run(args: &Sweep) -> Result<()> {
+pub fn run(args: &Vary) -> Result<()> {
     let common = &args.common;
     let (mut scene, variants, warnings) =
-        Scene::load_sweep(&args.scene, &common.overrides(&args.scene))?;
+        Scene::load_variants(&args.scene, &common.overrides(&args.scene))?;
     for warning in &warnings {
         eprintln!("{warning}");
     }
@@ -117,7 +117,7 @@ struct Files {
 }
 
 impl Files {
-    fn new(args: &Sweep) -> Result<Self> {
+    fn new(args: &Vary) -> Result<Self> {
         let stem = args.scene.file_stem().unwrap_or_default().to_string_lossy();
         let named = || PathBuf::from(format!("{stem}-{}.png", args.show));
         let output = args.output.clone().unwrap_or_else(named);
@@ -137,7 +137,7 @@ impl Files {
 }
 
 /// Writes sheet, table and single images.
-fn write(args: &Sweep, scene: &Scene, pictures: &[Picture], files: &Files) -> Result<()> {
+fn write(args: &Vary, scene: &Scene, pictures: &[Picture], files: &Files) -> Result<()> {
     let order = match args.shuffle {
         Some(seed) => order(pictures.len(), seed, 0),
         None => (0..pictures.len()).collect(),
@@ -200,14 +200,14 @@ fn single(number: usize, picture: &Picture, blind: bool) -> String {
 }
 
 /// Below, above, below, above: both values of two parameters in a row.
-fn columns(args: &Sweep) -> usize {
+fn columns(args: &Vary) -> usize {
     match args.show {
         Show::Parameters => 4,
         Show::Steps | Show::Surroundings | Show::Blends => 3,
     }
 }
 
-fn title(args: &Sweep, scene: &Scene) -> String {
+fn title(args: &Vary, scene: &Scene) -> String {
     let name = &scene.name;
     match (args.shuffle, args.show) {
         (Some(_), _) => name.clone(),

@@ -2,8 +2,8 @@
 
 use image::{GrayImage, Luma};
 use insonify::scene::Scene;
-use insonify::scene::fusion::{Blend, Surroundings};
-use insonify::scene::sweep::{Parameter, Variant, short};
+use insonify::scene::vary::{Parameter, Variant, short};
+use insonify::settings::{Blend, Surroundings, Words};
 use insonify::sim::Simulator;
 use miette::{IntoDiagnostic, Result};
 
@@ -12,7 +12,7 @@ use crate::cli::common::{self, Progress};
 /// One image and what it is of.
 pub struct Picture {
     /// What was changed; `none` in the image of the scene as it is.
-    pub parameter: &'static str,
+    pub parameter: String,
     /// Its value.
     pub value: String,
     /// Its value in the scene.
@@ -83,7 +83,9 @@ impl Frame {
 
 /// The scene's own values, line by line.
 pub fn own_values(scene: &Scene) -> Vec<String> {
-    let own = Parameter::ALL.map(|p| format!("  {}", p.caption(p.value(scene))));
+    let own = Parameter::suggested();
+    let own = own.filter_map(|p| Some(format!("  {}", p.caption(p.value(scene)?))));
+    let own: Vec<String> = own.collect();
     let head = "1 is the scene itself:".to_owned();
     let tail = "The others differ in one value.".to_owned();
     [head].into_iter().chain(own).chain([tail]).collect()
@@ -111,7 +113,7 @@ impl Studio {
         let (image, grey) = self.shoot(scene, "the scene itself")?.whole();
         progress.done(1);
         let mut pictures = vec![Picture {
-            parameter: "none",
+            parameter: "none".to_owned(),
             value: String::new(),
             own: String::new(),
             unit: "",
@@ -131,7 +133,7 @@ impl Studio {
             pictures.push(Picture {
                 parameter: parameter.key(),
                 value: variant.value.to_string(),
-                own: parameter.value(scene).to_string(),
+                own: parameter.value(scene).map_or_else(String::new, |own| own.to_string()),
                 unit: parameter.unit(),
                 settings: vec![variant.setting.clone()],
                 caption,
@@ -150,7 +152,7 @@ impl Studio {
         let mut scene = scene.clone();
         let fusion = scene.fusion.as_mut().expect("a volume is shown by a fusion");
         fusion.surroundings = Surroundings::Volume;
-        let (blend, blur) = (fusion.blend.name(), fusion.blur);
+        let (blend, blur) = (fusion.blend.word(), fusion.blur);
         let blurred = match fusion.blend {
             Blend::Multiband => "mask, of which each band blurs its own".to_owned(),
             _ => format!("mask blurred over {blur} px"),
@@ -165,7 +167,7 @@ impl Studio {
         let levels = |plane: &[f32]| frame.image(plane.iter().map(|v| (v * 255.0 + 0.5) as u8));
         let simulated = frame.image(steps.simulated.iter().step_by(4).copied());
         let step = |value: &str, caption: String, (image, grey): (GrayImage, Grey)| Picture {
-            parameter: "step",
+            parameter: "step".to_owned(),
             value: value.to_owned(),
             own: "fused".to_owned(),
             unit: "",
@@ -176,7 +178,7 @@ impl Studio {
             grey,
         };
         let plain = str::to_owned;
-        let sharp_border = [("blur", "1"), ("blend", Blend::Linear.name())];
+        let sharp_border = [("blur", "1"), ("blend", Blend::Linear.word())];
         let sharp_border = sharp_border.map(|(key, value)| (format!("fusion.{key}"), plain(value)));
         Ok(vec![
             step("volume", plain("acquired volume"), levels(&steps.background)),
@@ -199,8 +201,8 @@ impl Studio {
             Surroundings::None => "no surroundings",
             Surroundings::Scatterers => "simulated surroundings",
         };
-        let each = Surroundings::ALL.map(|s| (s.name(), shown(s)));
-        self.each("surroundings", own.name(), &each, scene, |fusion, i| {
+        let each: Vec<_> = Surroundings::ALL.iter().map(|&s| (s.word(), shown(s))).collect();
+        self.each("surroundings", own.word(), &each, scene, |fusion, i| {
             fusion.surroundings = Surroundings::ALL[i];
         })
     }
@@ -208,8 +210,8 @@ impl Studio {
     /// The ways in which the two images meet.
     pub fn blends(&mut self, scene: &Scene) -> Result<Vec<Picture>> {
         let own = fusion(scene).blend;
-        let each: Vec<_> = Blend::ALL.iter().map(|b| (b.name(), b.name())).collect();
-        self.each("blend", own.name(), &each, scene, |fusion, i| {
+        let each: Vec<_> = Blend::ALL.iter().map(|b| (b.word(), b.word())).collect();
+        self.each("blend", own.word(), &each, scene, |fusion, i| {
             fusion.surroundings = Surroundings::Volume;
             fusion.blend = Blend::ALL[i];
         })
@@ -231,7 +233,7 @@ impl Studio {
             set(scene.fusion.as_mut().expect("a fusion"), i);
             let (image, grey) = self.shoot(&scene, caption)?.whole();
             pictures.push(Picture {
-                parameter: key,
+                parameter: key.to_owned(),
                 value: (*value).to_owned(),
                 own: own.to_owned(),
                 unit: "",

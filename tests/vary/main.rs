@@ -98,8 +98,8 @@ impl Folder {
             .expect("the program starts")
     }
 
-    fn sweep(&self, args: &[&str]) {
-        let out = self.run("sweep", &[&["--validate"], args].concat());
+    fn vary(&self, args: &[&str]) {
+        let out = self.run("vary", &[&["--validate"], args].concat());
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
         assert!(out.status.success() && said.is_empty(), "{said}");
     }
@@ -133,7 +133,7 @@ fn swept() -> &'static Folder {
     static MADE: OnceLock<Folder> = OnceLock::new();
     MADE.get_or_init(|| {
         let folder = Folder::new(SCENE);
-        folder.sweep(&["-o", "all"]);
+        folder.vary(&["-o", "all"]);
         folder
     })
 }
@@ -205,15 +205,15 @@ fn single_images_are_what_render_makes_of_the_entry_that_is_named() {
 fn a_seed_shuffles_and_says_nothing_on_the_sheet() {
     let folder = Folder::new(SCENE);
     let plain = swept();
-    let values = "sweep.tgc_attenuation=[0.1, 0.9]";
+    let values = "vary.tgc_attenuation=[0.1, 0.9]";
     let small = ["--set", "imaging.image_height=200", "--set", values];
     let blind = |seed: &str, to: &str| {
-        folder.sweep(&[&["--shuffle", seed, "-o", to], &small[..]].concat());
+        folder.vary(&[&["--shuffle", seed, "-o", to], &small[..]].concat());
     };
     blind("7", "first");
     blind("7", "again");
     blind("8", "other");
-    folder.sweep(&[&["-o", "plain"], &small[..]].concat());
+    folder.vary(&[&["-o", "plain"], &small[..]].concat());
     for name in ["sheet.png", "sheet.csv"] {
         let of = |to: &str| folder.bytes(&format!("{to}/{name}"));
         assert!(of("first") == of("again"), "{name}");
@@ -264,7 +264,7 @@ fn steps_surroundings_and_blends_are_what_render_makes() {
         ("surroundings", "surroundings", &["volume", "none", "scatterers"]),
         ("blends", "blend", &["linear", "smooth", "multiband"]),
     ] {
-        folder.sweep(&["--show", show, "-o", show]);
+        folder.vary(&["--show", show, "-o", show]);
         let rows = folder.rows(&format!("{show}/sheet.csv"));
         let sheet = folder.image(&format!("{show}/sheet.png"));
         let found: Vec<_> = rows.iter().map(|r| r.value.as_str()).collect();
@@ -294,9 +294,10 @@ fn steps_surroundings_and_blends_are_what_render_makes() {
 
 #[test]
 fn mistakes_are_explained() {
-    let folder = Folder::new(&format!("{SCENE}[sweep]\ngain = [3, 999]\n"));
+    let folder = Folder::new(&format!("{SCENE}[vary]\ngain = [3, 999]\n"));
     let line = format!("scene.toml:{}:", SCENE.lines().count() + 2);
     let told = |args: &[&str]| {
+        // The name that the command had.
         let out = folder.run("sweep", args);
         assert!(!out.status.success(), "{args:?}");
         String::from_utf8_lossy(&out.stderr).into_owned()
@@ -305,9 +306,9 @@ fn mistakes_are_explained() {
     for part in [line.as_str(), "gain", "999 dB", "between -200 and 200 dB"] {
         assert!(said.contains(part), "{part}: {said}");
     }
-    let said = told(&["--set", "sweep.gain=[3]", "--show", "steps"]);
+    let said = told(&["--set", "vary.gain=[3]", "--show", "steps"]);
     assert!(said.contains("no acquired volume") && said.contains("[volume]"), "{said}");
-    let said = told(&["--set", "sweep.gain=[3]", "-o", "no/where/sheet.png"]);
+    let said = told(&["--set", "vary.gain=[3]", "-o", "no/where/sheet.png"]);
     assert!(said.contains("no/where"), "{said}");
     assert!(!Path::new("no").exists());
 }

@@ -13,7 +13,7 @@ pub struct Record {
     /// Number on the sheet, from 1.
     pub image: usize,
     /// What was changed; `none` in the image of the scene as it is.
-    pub parameter: &'static str,
+    pub parameter: String,
     /// Its value here.
     pub value: String,
     /// Its value in the scene.
@@ -51,7 +51,7 @@ impl Record {
         let three = |x: f64| (x * 1000.0).round() / 1000.0;
         Self {
             image,
-            parameter: picture.parameter,
+            parameter: picture.parameter.clone(),
             value: picture.value.clone(),
             own: picture.own.clone(),
             unit: picture.unit,

@@ -1,8 +1,6 @@
 use super::tests::Case;
 use super::*;
-use crate::scene::fusion::{Blend, Surroundings};
-use crate::scene::suggest;
-use crate::scene::sweep::Parameter;
+use crate::scene::vary::Parameter;
 
 const SCENE: &str = r#"
 [probe]
@@ -19,11 +17,11 @@ tissue = "liver"
 shape = { sphere = { radius = 8, subdivisions = 1 } }
 "#;
 
-fn sweep(case: &Case, text: &str, set: &[(&str, &str)]) -> (Scene, Vec<Variant>) {
+fn vary(case: &Case, text: &str, set: &[(&str, &str)]) -> (Scene, Vec<Variant>) {
     case.load(text, set).expect("sound");
     let set: Vec<_> =
         set.iter().map(|(path, value)| ((*path).to_owned(), (*value).to_owned())).collect();
-    let (scene, variants, _) = Scene::load_sweep(&case.path(), &set).expect("sound");
+    let (scene, variants, _) = Scene::load_variants(&case.path(), &set).expect("sound");
     (scene, variants)
 }
 
@@ -31,19 +29,19 @@ fn sweep(case: &Case, text: &str, set: &[(&str, &str)]) -> (Scene, Vec<Variant>)
 fn every_parameter_stands_below_and_above_its_own_value_and_nothing_else_differs() {
     let case = Case::new();
     for set in [&[][..], &[("probe.depth", "60 mm"), ("simulation.cell", "0.2")]] {
-        let (scene, variants) = sweep(&case, SCENE, set);
+        let (scene, variants) = vary(&case, SCENE, set);
         let order: Vec<_> = variants.iter().map(|v| v.parameter).collect();
-        let expected: Vec<_> = Parameter::ALL.iter().flat_map(|&p| [p, p]).collect();
+        let expected: Vec<_> = Parameter::suggested().flat_map(|p| [p, p]).collect();
         assert_eq!(order, expected);
         for pair in variants.chunks(2) {
-            let own = pair[0].parameter.value(&scene);
+            let own = pair[0].parameter.value(&scene).expect("a number");
             assert!(pair[0].value < own && own < pair[1].value, "{pair:?}");
         }
         for variant in &variants {
             let mut changed = scene.clone();
             variant.apply(&mut changed);
-            assert_eq!(variant.parameter.value(&changed), variant.value);
-            for other in Parameter::ALL.iter().filter(|p| **p != variant.parameter) {
+            assert_eq!(variant.parameter.value(&changed), Some(variant.value));
+            for other in Parameter::suggested().filter(|p| *p != variant.parameter) {
                 assert_eq!(other.value(&changed), other.value(&scene), "{variant:?}");
             }
             // What --set makes of the entry that is named.
@@ -60,17 +58,21 @@ fn every_parameter_stands_below_and_above_its_own_value_and_nothing_else_differs
 #[test]
 fn the_file_says_which_values_and_empty_lists_leave_out() {
     let case = Case::new();
-    let others = Parameter::ALL.map(|p| format!("{} = []\n", p.key()));
-    let text = format!("{SCENE}[sweep]\n{}", others.concat())
+    let others: String = Parameter::suggested().map(|p| format!("{} = []\n", p.key())).collect();
+    let text = format!("{SCENE}[vary]\n{others}focus = [\"3 cm\"]\nimage_height = [300]\n")
         .replace("frequency = []", "frequency = [5, \"6500 kHz\", 9]")
         .replace("psf_axial = []", "psf_axial = [3]");
-    let (_, variants) = sweep(&case, &text, &[]);
-    let found: Vec<_> = variants.iter().map(|v| (v.parameter, v.value)).collect();
-    let frequency = Parameter::Frequency;
-    assert_eq!(
-        found,
-        [(frequency, 5.0), (frequency, 6.5), (frequency, 9.0), (Parameter::AxialPsf, 3.0)]
-    );
+    let (_, variants) = vary(&case, &text, &[]);
+    let found: Vec<_> = variants.iter().map(|v| (v.parameter.key(), v.value)).collect();
+    let expected = [
+        ("frequency", 5.0),
+        ("frequency", 6.5),
+        ("frequency", 9.0),
+        ("psf_axial", 3.0),
+        ("focus", 30.0),
+        ("image_height", 300.0),
+    ];
+    assert_eq!(found, expected.map(|(key, value)| (key.to_owned(), value)));
     assert_eq!(variants[3].setting.1, "[3,0.8,1.1]");
     assert_eq!(variants[3].imaging.psf_scale, [3.0, 0.8, 1.1]);
     // The lattice follows the wavelength.
@@ -94,11 +96,13 @@ fn values_out_of_range_are_refused_with_their_key() {
         ("frequency = [\"5 mm\"]", 14, "unit `mm` does not fit", "MHz"),
         ("gian = [5]", 1, "unknown field", "`gain`"),
     ] {
-        let text = format!("{SCENE}[sweep]\n{entry}\n");
+        let text = format!("{SCENE}[vary]\n{entry}\n");
         case.fails(&text, (line, column), cause, remedy);
+        // What the table was called.
+        case.fails(&text.replace("[vary]", "[sweep]"), (line, column), cause, remedy);
     }
     // An override is at fault where it is one.
-    let error = case.load(SCENE, &[("sweep.gain", "[500]")]).map(|_| ()).expect_err("out of range");
+    let error = case.load(SCENE, &[("vary.gain", "[500]")]).map(|_| ()).expect_err("out of range");
     assert!(error.to_string().starts_with("--set:1:"), "{error}");
 }
 
@@ -113,19 +117,4 @@ fn more_scatterers_take_a_finer_lattice_and_fewer_are_thinned_out() {
     assert_eq!((own.thinning(), thin.thinning()), (1.0, 0.25));
     assert_eq!((own.cell, dense.thinning()), (thin.cell, 1.0));
     assert!((dense.cell - own.cell / 2.0).abs() < 1e-12);
-}
-
-/// The lists of choices in the program are those of the scene file.
-#[test]
-fn every_way_to_fuse_is_listed() {
-    let case = Case::new();
-    let offered = |key: &str| {
-        let text = format!("{SCENE}[fusion]\nmask = [\"one\"]\n{key} = \"zzzzzzzz\"\n");
-        let error = case.load(&text, &[]).map(|_| ()).expect_err(key);
-        error.remedy.unwrap_or_default()
-    };
-    let blends = Blend::ALL.iter().map(|b| b.name());
-    assert_eq!(offered("blend"), suggest::among("zzzzzzzz", blends));
-    let surroundings = Surroundings::ALL.iter().map(|s| s.name());
-    assert_eq!(offered("surroundings"), suggest::among("zzzzzzzz", surroundings));
 }

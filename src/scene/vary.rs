@@ -1,0 +1,268 @@
+//! One parameter at a time below and above the scene's own value: the images of which an observer
+//! picks the most realistic, as in the user study of Starkov et al. 2019, section III-B. That tuned
+//! eleven major parameters and does not list them; [`SUGGESTED`] are ours.
+
+use super::{Imaging, Scene, Simulation};
+use crate::probe::Probe;
+use crate::settings::{Facts, Form, Group, Value};
+
+/// How far from the scene's own value a parameter is shown, below and above.
+#[derive(Clone, Copy, Debug)]
+enum Around {
+    /// Times these factors.
+    Times(f64, f64),
+    /// So much less and more.
+    Plus(f64),
+}
+
+/// The parameters that a scene is shown with where its file says nothing: key, what it is called on a sheet, and how
+/// far it is varied, so that the images differ to the eye. The frequencies stand to each other as the 5, 7 and 9 MHz
+/// of the paper's figure 13; the others were found by looking.
+const SUGGESTED: [(&str, &str, Around); 11] = [
+    ("frequency", "frequency", Around::Times(5.0 / 7.0, 9.0 / 7.0)),
+    ("gain", "gain", Around::Plus(6.0)),
+    ("tgc_attenuation", "TGC slope", Around::Times(0.75, 1.25)),
+    ("dynamic_range", "dynamic range", Around::Times(0.75, 1.25)),
+    ("speckle_gain", "speckle level", Around::Plus(6.0)),
+    ("density_scale", "scatterer density", Around::Times(0.05, 4.0)),
+    ("psf_lateral", "lateral PSF", Around::Times(0.5, 2.0)),
+    ("psf_axial", "axial PSF", Around::Times(0.5, 2.0)),
+    ("surface_gain", "surface level", Around::Plus(12.0)),
+    ("roughness_scale", "roughness exponent", Around::Times(0.001, 100.0)),
+    ("thickness_scale", "surface thickness", Around::Times(0.0, 10.0)),
+];
+
+/// A number among the settings of probe, simulation or imaging.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    table: &'static str,
+    facts: &'static Facts,
+    /// Which number of a list.
+    part: Option<usize>,
+}
+
+impl PartialEq for Parameter {
+    fn eq(&self, other: &Self) -> bool {
+        self.path() == other.path() && self.part == other.part
+    }
+}
+
+/// The numbers among the settings of a table.
+fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
+    T::rows().iter().flat_map(|row| {
+        let facts = &row.facts;
+        let parts = match facts.form {
+            Form::Number | Form::Quantity(_) | Form::Whole => vec![None],
+            Form::Numbers(_) => (0..facts.parts.len()).map(Some).collect(),
+            _ => Vec::new(),
+        };
+        // An angle of a sector that the probe may not have.
+        let belongs = facts.limits.is_none() || facts.form.is_whole();
+        let parts = parts.into_iter().filter(move |_| belongs);
+        parts.map(|part| Parameter { table: T::TABLE, facts, part })
+    })
+}
+
+/// The number of a group's setting; none for what is absent.
+fn number<T: Group>(settings: &T, parameter: &Parameter) -> Option<f64> {
+    match ((T::row(parameter.facts.key)?.get)(settings), parameter.part) {
+        (Value::Number(number), _) => Some(number),
+        (Value::Whole(count), _) => Some(f64::from(count)),
+        (Value::List(list), Some(part)) => list.get(part).copied(),
+        _ => None,
+    }
+}
+
+impl Parameter {
+    /// All of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        numbers::<Probe>().chain(numbers::<Simulation>()).chain(numbers::<Imaging>())
+    }
+
+    /// Those of which a sheet consists where the file says nothing, in its order.
+    pub fn suggested() -> impl Iterator<Item = Self> {
+        SUGGESTED.iter().filter_map(|(key, ..)| Self::of(key))
+    }
+
+    /// The one of this key.
+    pub fn of(key: &str) -> Option<Self> {
+        Self::all().find(|parameter| parameter.key() == key)
+    }
+
+    fn suggestion(&self) -> Option<&'static (&'static str, &'static str, Around)> {
+        SUGGESTED.iter().find(|(key, ..)| *key == self.key())
+    }
+
+    /// Its key in the table `[vary]` of a scene file: that of the setting, or of one number of it (`psf_axial`).
+    pub fn key(&self) -> String {
+        match self.part {
+            None => self.facts.key.to_owned(),
+            Some(part) => {
+                let stem = self.facts.key.split('_').next().unwrap_or_default();
+                format!("{stem}_{}", self.facts.parts[part])
+            }
+        }
+    }
+
+    /// Path of the setting behind it.
+    pub fn path(&self) -> String {
+        format!("{}.{}", self.table, self.facts.key)
+    }
+
+    /// What a value of it is given as.
+    pub fn form(&self) -> Form {
+        match self.facts.form {
+            Form::Numbers(_) | Form::Whole => Form::Number,
+            form => form,
+        }
+    }
+
+    /// What it is called on a sheet.
+    pub fn name(&self) -> String {
+        match self.suggestion() {
+            Some((_, name, _)) => (*name).to_owned(),
+            None => self.key().replace('_', " "),
+        }
+    }
+
+    /// Its unit; empty for a factor.
+    pub fn unit(&self) -> &'static str {
+        self.facts.unit()
+    }
+
+    /// The scene's own value, in [`Self::unit`]; none where the scene's probe has no such thing.
+    pub fn value(&self, scene: &Scene) -> Option<f64> {
+        match self.table {
+            Probe::TABLE => number(&scene.probe, self),
+            Simulation::TABLE => number(&scene.simulation, self),
+            _ => number(&scene.imaging, self),
+        }
+    }
+
+    /// A value below and one above `own`, those of [`SUGGESTED`]; none for other parameters.
+    pub fn around(&self, own: f64) -> Option<[f64; 2]> {
+        Some(match self.suggestion()?.2 {
+            Around::Times(below, above) => [round(own * below), round(own * above)],
+            Around::Plus(step) => [own - step, own + step],
+        })
+    }
+
+    /// Which values it is shown with where the file says nothing, in words; empty for parameters that are not
+    /// suggested.
+    pub fn suggested_values(&self) -> String {
+        match self.suggestion() {
+            Some((.., Around::Times(below, above))) => {
+                format!("the scene's times {} and {}", short(*below), short(*above))
+            }
+            Some((.., Around::Plus(step))) => {
+                format!("the scene's -{step} and +{step} {}", self.unit())
+            }
+            None => String::new(),
+        }
+    }
+
+    /// The entry of the scene file, path and value, that sets it to `value` in `scene`.
+    pub fn setting(&self, scene: &Scene, value: f64) -> (String, String) {
+        let text = match (self.part, Imaging::row(self.facts.key)) {
+            (Some(part), Some(row)) => match (row.get)(&scene.imaging) {
+                Value::List(mut list) => {
+                    list[part] = value;
+                    let list: Vec<_> = list.iter().map(f64::to_string).collect();
+                    format!("[{}]", list.join(","))
+                }
+                _ => value.to_string(),
+            },
+            _ => value.to_string(),
+        };
+        (self.path(), text)
+    }
+
+    /// Name and value as on a sheet: "gain 10 dB", "axial PSF x 2".
+    pub fn caption(&self, value: f64) -> String {
+        let (name, value) = (self.name(), short(value));
+        match (self.unit(), self.suggestion()) {
+            ("", Some(_)) => format!("{name} \u{d7} {value}"),
+            ("", None) => format!("{name} {value}"),
+            (unit, _) => format!("{name} {value} {unit}"),
+        }
+    }
+}
+
+/// Two digits: a suggested value may be a plain one.
+fn round(value: f64) -> f64 {
+    format!("{value:.1e}").parse().unwrap_or(value)
+}
+
+/// At most four digits.
+pub fn short(value: f64) -> String {
+    let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
+    rounded.to_string()
+}
+
+/// A scene's settings with one parameter at another value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    /// The parameter.
+    pub parameter: Parameter,
+    /// Its value, in [`Parameter::unit`].
+    pub value: f64,
+    /// The entry of the scene file, path and value, that says the same.
+    pub setting: (String, String),
+    /// The transducer with it.
+    pub probe: Probe,
+    /// Path tracing and scatterers with it.
+    pub simulation: Simulation,
+    /// Image formation with it.
+    pub imaging: Imaging,
+}
+
+impl Variant {
+    /// Puts its settings into the scene that it was made of.
+    pub fn apply(&self, scene: &mut Scene) {
+        scene.probe = self.probe.clone();
+        scene.simulation = self.simulation.clone();
+        scene.imaging = self.imaging.clone();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(key: &str) -> Parameter {
+        Parameter::of(key).expect(key)
+    }
+
+    #[test]
+    fn every_key_is_the_key_of_one_parameter_and_all_that_are_suggested_exist() {
+        let mut keys: Vec<_> = Parameter::all().map(|p| p.key()).collect();
+        assert!(keys.len() > 40 && keys.contains(&"focus".to_owned()), "{keys:?}");
+        keys.sort();
+        let count = keys.len();
+        keys.dedup();
+        assert_eq!(keys.len(), count);
+        assert_eq!(Parameter::suggested().count(), SUGGESTED.len());
+    }
+
+    #[test]
+    fn suggested_values_lie_on_both_sides_and_are_plain() {
+        for parameter in Parameter::suggested() {
+            for own in [0.5, 1.0, 7.0, 60.0] {
+                let [below, above] = parameter.around(own).expect("suggested");
+                assert!(below < own && own < above, "{parameter:?} {own}");
+            }
+        }
+        assert_eq!(parameter("frequency").around(7.0), Some([5.0, 9.0]));
+        assert_eq!(parameter("frequency").around(6.0), Some([4.3, 7.7]));
+        assert_eq!(parameter("dynamic_range").around(60.0), Some([45.0, 75.0]));
+        assert_eq!(parameter("focus").around(60.0), None);
+    }
+
+    #[test]
+    fn captions_name_value_and_unit() {
+        assert_eq!(parameter("gain").caption(-10.0), "gain -10 dB");
+        assert_eq!(parameter("psf_axial").caption(2.0 / 3.0), "axial PSF \u{d7} 0.6667");
+        assert_eq!(parameter("elevation_focus").caption(60.0), "elevation focus 60 mm");
+        assert_eq!(short(f64::NEG_INFINITY), "-inf");
+    }
+}

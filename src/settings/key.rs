@@ -1,0 +1,394 @@
+//! Rows: what is to be known of a key, and how its value is read from a field and put there.
+
+use super::units::{ANGLE, Measure};
+
+/// The value of a key, in the unit used inside.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// A number, or a quantity.
+    Number(f64),
+    /// A count.
+    Whole(u32),
+    /// Yes or no.
+    Switch(bool),
+    /// One of the key's words.
+    Word(&'static str),
+    /// Several numbers or quantities.
+    List(Vec<f64>),
+    /// The file does not say it.
+    Absent,
+}
+
+/// What a key takes.
+#[derive(Clone, Copy, Debug)]
+pub enum Form {
+    /// A number without a unit.
+    Number,
+    /// A quantity of this measure.
+    Quantity(&'static Measure),
+    /// A whole number from 0 on.
+    Whole,
+    /// True or false.
+    Switch,
+    /// One of these words.
+    Words(&'static [&'static str]),
+    /// So many numbers.
+    Numbers(usize),
+    /// So many quantities.
+    Quantities(&'static Measure, usize),
+}
+
+impl Form {
+    /// Whether it takes counts.
+    pub fn is_whole(&self) -> bool {
+        matches!(self, Self::Whole)
+    }
+
+    /// Whether it takes quantities of this measure.
+    pub fn measures(&self, measure: &Measure) -> bool {
+        matches!(self, Self::Quantity(own) if *own == measure)
+    }
+}
+
+/// The state of a key in which what it sets is off.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Off {
+    /// This value.
+    At(f64),
+    /// The file does not say it.
+    Absent,
+}
+
+/// All that is to be known of a key.
+#[derive(Clone, Copy, Debug)]
+pub struct Facts {
+    /// The key in its table.
+    pub key: &'static str,
+    /// What it takes.
+    pub form: Form,
+    /// Least and largest value that a scene file may give, of each number of a list.
+    pub range: [f64; 2],
+    /// Ends of the console's slider.
+    pub usual: [f64; 2],
+    /// What the console calls it.
+    pub label: &'static str,
+    /// The section of the console in which it stands; empty: the first one.
+    pub under: &'static str,
+    /// When it is off, and the console's word for that.
+    pub off: Option<(Off, &'static str)>,
+    /// What each number of a list is called.
+    pub parts: &'static [&'static str],
+    /// What a plain count counts: "pixels".
+    pub counted: &'static str,
+    /// The default in words, where it is no value.
+    pub default: Option<&'static str>,
+    /// The range in words, where two numbers do not say it.
+    pub limits: Option<&'static str>,
+    /// What it is, in Markdown.
+    meaning: &'static str,
+}
+
+/// A key with the field behind it.
+pub struct Row<T> {
+    /// What is to be known of it.
+    pub facts: Facts,
+    /// The field's value.
+    pub get: fn(&T) -> Value,
+    /// Puts a value of the key's form into the field.
+    pub set: fn(&mut T, &Value),
+}
+
+/// Settings that stand in one table of a scene file.
+pub trait Group: Sized + 'static {
+    /// The table: `probe`, `tissues.NAME`.
+    const TABLE: &'static str;
+
+    /// A row for each key, in the order of the reference.
+    fn rows() -> &'static [Row<Self>];
+
+    /// The row of a key.
+    fn row(key: &str) -> Option<&'static Row<Self>> {
+        Self::rows().iter().find(|row| row.facts.key == key)
+    }
+
+    /// Range of a number's key; unbounded where there is none.
+    fn range(key: &str) -> [f64; 2] {
+        Self::row(key).map_or([f64::NEG_INFINITY, f64::INFINITY], |row| row.facts.range)
+    }
+
+    /// A number within the range of its key.
+    fn clamped(key: &str, number: f64) -> f64 {
+        let [least, most] = Self::range(key);
+        number.clamp(least, most)
+    }
+}
+
+impl Facts {
+    const fn new(form: Form, least: f64, most: f64) -> Self {
+        Self {
+            key: "",
+            form,
+            range: [least, most],
+            usual: [least, most],
+            label: "",
+            under: "",
+            off: None,
+            parts: &[],
+            counted: "",
+            default: None,
+            limits: None,
+            meaning: "",
+        }
+    }
+
+    /// A number within these limits.
+    pub const fn number(least: f64, most: f64) -> Self {
+        Self::new(Form::Number, least, most)
+    }
+
+    /// A quantity within these limits, in the unit used inside.
+    pub const fn quantity(measure: &'static Measure, least: f64, most: f64) -> Self {
+        Self::new(Form::Quantity(measure), least, most)
+    }
+
+    /// A count within these limits.
+    pub const fn whole(least: u32, most: u32) -> Self {
+        Self::new(Form::Whole, least as f64, most as f64)
+    }
+
+    /// True or false.
+    pub const fn switch() -> Self {
+        Self::new(Form::Switch, f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// One of the words of `W`.
+    pub const fn word<W: super::Words>() -> Self {
+        Self::one_of(W::WORDS)
+    }
+
+    /// One of these words.
+    pub const fn one_of(words: &'static [&'static str]) -> Self {
+        Self::new(Form::Words(words), f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// `parts.len()` numbers, each within these limits; `parts` are what they are called.
+    pub const fn numbers(parts: &'static [&'static str], least: f64, most: f64) -> Self {
+        let mut out = Self::new(Form::Numbers(parts.len()), least, most);
+        out.parts = parts;
+        out
+    }
+
+    /// `count` quantities, each within these limits.
+    pub const fn quantities(
+        measure: &'static Measure,
+        count: usize,
+        least: f64,
+        most: f64,
+    ) -> Self {
+        Self::new(Form::Quantities(measure, count), least, most)
+    }
+
+    /// Called so by the console.
+    pub const fn label(mut self, label: &'static str) -> Self {
+        self.label = label;
+        self
+    }
+
+    /// In this section of the console.
+    pub const fn under(mut self, section: &'static str) -> Self {
+        self.under = section;
+        self
+    }
+
+    /// With these ends of the console's slider.
+    pub const fn usual(mut self, least: f64, most: f64) -> Self {
+        self.usual = [least, most];
+        self
+    }
+
+    /// Off at this value, for which the console says `word`.
+    pub const fn off(mut self, at: f64, word: &'static str) -> Self {
+        self.off = Some((Off::At(at), word));
+        self
+    }
+
+    /// Off where the file does not say it, for which the console says `word`.
+    pub const fn off_if_absent(mut self, word: &'static str) -> Self {
+        self.off = Some((Off::Absent, word));
+        self
+    }
+
+    /// A count of these.
+    pub const fn counted(mut self, what: &'static str) -> Self {
+        self.counted = what;
+        self
+    }
+
+    /// With a default in words.
+    pub const fn by_default(mut self, words: &'static str) -> Self {
+        self.default = Some(words);
+        self
+    }
+
+    /// With a range in words.
+    pub const fn limits(mut self, words: &'static str) -> Self {
+        self.limits = Some(words);
+        self
+    }
+
+    /// With its key and its meaning, unless the key has been given.
+    pub(super) const fn named(mut self, key: &'static str, meaning: &'static str) -> Self {
+        if self.key.is_empty() {
+            self.key = key;
+        }
+        self.meaning = meaning;
+        self
+    }
+
+    /// Under another key than the field's name.
+    pub const fn key(mut self, key: &'static str) -> Self {
+        self.key = key;
+        self
+    }
+
+    /// What it is, in Markdown.
+    pub fn meaning(&self) -> &'static str {
+        self.meaning.trim()
+    }
+
+    /// Unit of the value as the program holds it, or what it counts; empty without one.
+    pub fn unit(&self) -> &'static str {
+        match self.form {
+            Form::Quantity(measure) | Form::Quantities(measure, _) => measure.unit(),
+            _ => self.counted,
+        }
+    }
+
+    /// The words that it takes, if it takes words.
+    pub fn words(&self) -> &'static [&'static str] {
+        match self.form {
+            Form::Words(words) => words,
+            _ => &[],
+        }
+    }
+
+    /// A value as TOML says it; none for [`Value::Absent`].
+    pub fn text(&self, value: &Value) -> Option<String> {
+        let listed = |all: &[f64]| {
+            let texts: Vec<_> = all.iter().map(|v| plain(*v)).collect();
+            format!("[{}]", texts.join(", "))
+        };
+        Some(match (value, self.form) {
+            (Value::Absent, _) => return None,
+            (Value::Number(radians), form) if form.measures(&ANGLE) => angle(*radians),
+            (Value::Number(number), Form::Quantity(measure)) if number.is_finite() => {
+                format!("\"{} {}\"", plain(*number), measure.unit())
+            }
+            (Value::Number(number), _) => plain(*number),
+            (Value::Whole(count), _) => count.to_string(),
+            (Value::Switch(on), _) => on.to_string(),
+            (Value::Word(word), _) => format!("\"{word}\""),
+            (Value::List(all), _) => listed(all),
+        })
+    }
+
+    /// What is wrong with a value of this key, and what to do: none where it lies in the range. NaN lies in none.
+    pub fn fault(&self, value: &Value) -> Option<(String, String)> {
+        let all = match value {
+            Value::Number(number) => std::slice::from_ref(number),
+            Value::List(all) => all,
+            Value::Whole(count) => return self.outside(f64::from(*count)),
+            _ => return None,
+        };
+        all.iter().find_map(|&number| self.outside(number))
+    }
+
+    fn outside(&self, number: f64) -> Option<(String, String)> {
+        let [least, most] = self.range;
+        if (least..=most).contains(&number) {
+            return None;
+        }
+        let unit = match self.unit() {
+            "" => String::new(),
+            unit => format!(" {unit}"),
+        };
+        let remedy = match most.is_infinite() {
+            true => format!("it must be at least {least}{unit}"),
+            false => format!("it must lie between {least} and {most}{unit}"),
+        };
+        Some((format!("{} is {number}{unit}", self.key), remedy))
+    }
+}
+
+/// A number as TOML reads it back, to the last bit.
+pub fn plain(value: f64) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+/// In degrees where they are the same number: most people would write them.
+fn angle(radians: f64) -> String {
+    let degrees = (radians.to_degrees() * 1e9).round() / 1e9;
+    match degrees * (std::f64::consts::PI / 180.0) == radians {
+        true => format!("\"{} deg\"", plain(degrees)),
+        false => format!("\"{} rad\"", plain(radians)),
+    }
+}
+
+/// Declares the settings of a table, a field and its row at a time. The fields of `beside` are no keys of their own;
+/// the rows of `first` are those of keys that are no field.
+macro_rules! group {
+    ($(#[$meta:meta])* pub struct $name:ident in $table:literal {
+        $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr, $facts:expr;)*
+    } $(beside { $($(#[doc = $other_doc:literal])+ $other:ident: $other_type:ty = $other_default:expr;)* })?
+    ) => {
+        $crate::settings::key::group! {
+            $(#[$meta])* pub struct $name in $table, from files {
+                $($(#[doc = $doc])+ $field: $type, $facts;)*
+            } $(beside { $($(#[doc = $other_doc])+ $other: $other_type;)* })?
+        }
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $default,)* $($($other: $other_default,)*)? }
+            }
+        }
+    };
+    ($(#[$meta:meta])* pub struct $name:ident in $table:literal, from files {
+        $($(#[doc = $doc:literal])+ $field:ident: $type:ty, $facts:expr;)*
+    } $(beside { $($(#[doc = $other_doc:literal])+ $other:ident: $other_type:ty;)* })?
+      $(first $first:expr)?
+    ) => {
+        $(#[$meta])*
+        #[derive(Clone, Debug, PartialEq)]
+        pub struct $name {
+            $($(#[doc = $doc])+ pub $field: $type,)*
+            $($($(#[doc = $other_doc])+ pub $other: $other_type,)*)?
+        }
+
+        impl $crate::settings::Group for $name {
+            const TABLE: &'static str = $table;
+
+            fn rows() -> &'static [$crate::settings::Row<Self>] {
+                use $crate::settings::{Facts, Field, Row};
+                static ROWS: std::sync::LazyLock<Vec<Row<$name>>> = std::sync::LazyLock::new(|| {
+                    let rows = [$(Row {
+                        facts: {
+                            const FACTS: Facts = $facts;
+                            FACTS.named(stringify!($field), concat!($($doc),+))
+                        },
+                        get: |from: &$name| from.$field.get(),
+                        set: |to: &mut $name, value| to.$field.set(value),
+                    }),*];
+                    #[allow(unused_mut)]
+                    let mut all: Vec<Row<$name>> = Vec::new();
+                    $(all.extend($first);)?
+                    all.extend(rows);
+                    all
+                });
+                &ROWS
+            }
+        }
+    };
+}
+pub(super) use group;

@@ -1,0 +1,254 @@
+//! Path tracing and scatterers.
+
+use super::imaging::Machine;
+use super::key::group;
+use super::units::{LENGTH, LEVEL};
+use super::words;
+
+const INF: f64 = f64::INFINITY;
+const OFF: f64 = f64::NEG_INFINITY;
+/// Levels may be switched off (minus infinity) but not boundless.
+const LOUDEST: f64 = 200.0;
+
+words! {
+    /// Which paths are followed.
+    pub enum Sampling {
+        /// The transmitted path always continues; reflected branches are spawned. Our default, a
+        /// stand-in for the adaptive scheme of Mattausch et al. 2018.
+        MainPath = "main-path",
+        /// N independent paths, one stochastic choice per interaction (S0, the paper's text).
+        Plain = "plain",
+        /// One shared primary, split into N paths at the first interaction (S1).
+        SharedPrimary = "shared-primary",
+    }
+}
+
+words! {
+    /// Where the paths' random decisions come from.
+    pub enum Sequence {
+        /// A Sobol sequence over the paths, Owen-scrambled: less noise with as many paths.
+        Sobol = "sobol",
+        /// Independent numbers.
+        Random = "random",
+    }
+}
+
+words! {
+    /// What thickness does to the phase of a surface echo.
+    pub enum Coherence {
+        /// Coherent part at the surface, the rest as static speckle; energy independent of N.
+        Split = "split",
+        /// Every echo at its displaced point with weight 1/N, as the paper describes.
+        Coherent = "coherent",
+    }
+}
+
+words! {
+    /// Where scatterers come from.
+    pub enum ScatterMode {
+        /// One point scatterer per cell of a lattice fixed to the tissue.
+        Lattice = "lattice",
+        /// Equally spaced samples looked up in a voxel grid, lateral convolution afterwards (paper).
+        Voxel = "voxel",
+    }
+}
+
+words! {
+    /// To what the scatterer lattice is fixed.
+    pub enum TextureSpace {
+        /// To the tissue: speckle moves with the anatomy and, where keyframes share their topology,
+        /// deforms with it.
+        Tissue = "tissue",
+        /// To the instance: speckle moves with it as a whole; what changes its shape slides through it.
+        Object = "object",
+        /// To the world: anatomy slides through the speckle, as in the paper.
+        World = "world",
+    }
+}
+
+group! {
+    /// Path tracing and scatterers.
+    pub struct Simulation in "simulation" {
+        /// Paths of each scanline and elevation layer.
+        paths: u32 = 8,
+            Facts::whole(1, 65_535).label("Paths").usual(1.0, 128.0);
+        /// The transmitted path always continues and reflections branch off; independent paths, each choosing at
+        /// random; or one path to the first interface, independent ones from there.
+        sampling: Sampling = Sampling::MainPath,
+            Facts::word::<Sampling>().under("Paths").label("Sampling");
+        /// The paths' random decisions: an Owen-scrambled Sobol sequence over the paths, less noise with as many of
+        /// them; or independent numbers.
+        sequence: Sequence = Sequence::Sobol,
+            Facts::word::<Sequence>().under("Paths").label("Sequence");
+        /// Most interfaces that one path meets, transmissions included.
+        max_interactions: u32 = 32,
+            Facts::whole(1, 256).under("Paths").label("Interactions").usual(1.0, 64.0);
+        /// Most reflections of one path.
+        max_reflections: u32 = 3,
+            Facts::whole(0, 256).under("Paths").label("Reflections").usual(0.0, 16.0);
+        /// Paths of less weight end; a path starts with 1.
+        min_weight: f64 = 1e-6,
+            Facts::number(0.0, 1.0).under("Paths").label("Least weight").usual(1e-9, 1e-2);
+        /// Echo of a thick surface: a coherent part at the surface and the rest as static speckle; or every path at
+        /// its own displaced point.
+        coherence: Coherence = Coherence::Split,
+            Facts::word::<Coherence>().under("Paths").label("Coherence");
+        /// Refract at the rough surface's sampled normal, not at the smooth one.
+        rough_transmission: bool = false,
+            Facts::switch().under("Paths").label("Rough refraction");
+        /// Paths that return to the probe's face bounce off it and are an echo themselves (reverberation). Off: they
+        /// end there. Phased probes have no face.
+        face_reflection: bool = false,
+            Facts::switch().under("Paths").label("Face reflects");
+        /// A curved interface reflects by its mean over the beam's width. Off: as the single ray meets it, geometric
+        /// acoustics.
+        beam_footprint: bool = true,
+            Facts::switch().under("Paths").label("Footprint");
+        /// Standard deviation of the paths' lateral start about the scanline.
+        origin_jitter: f64 = 0.0,
+            Facts::quantity(&LENGTH, 0.0, 100.0).under("Paths").label("Origin jitter").usual(0.0, 2.0);
+        /// Exponent of the cosine lobe about the scanline in which paths start; `inf`: all along it.
+        emission_lobe: f64 = INF,
+            Facts::number(1.0, INF).under("Paths").label("Emission lobe").usual(1.0, 10_000.0).off(INF, "off");
+        /// Standard deviation of the weight of echoes by their distance from the straight scanline, where refraction
+        /// and reflection lead; `inf`: all count alike.
+        beam_width: f64 = INF,
+            Facts::quantity(&LENGTH, 0.01, INF).under("Paths").label("Beam width").usual(0.1, 10.0).off(INF, "off");
+        /// Point scatterers in a lattice's cells, each summed over the beam; or a voxel grid sampled along the ray
+        /// and convolved laterally.
+        scatter_mode: ScatterMode = ScatterMode::Lattice,
+            Facts::word::<ScatterMode>().label("Lookup");
+        /// Edge of a lattice cell or voxel.
+        cell: f64 = 0.15,
+            Facts::quantity(&LENGTH, 0.01, 10.0).by_default("1.05 mm / frequency in MHz")
+                .label("Cell").usual(0.05, 1.0);
+        /// Scatterers per resolution cell (the volume that the pulse and the beam hold at once) down to which the
+        /// lattice is thinned where it holds more, by coarser lattices; level and statistics stay. Tissue that is
+        /// sparser by itself stays so. 0: nothing is thinned, and nothing under the display's black is left out.
+        scatterers_per_resolution_cell: f64 = 8.0,
+            Facts::number(0.0, 1000.0).label("Scatterers").usual(0.0, 64.0);
+        /// What scatterers rest in. `"tissue"`: they move with their mesh and, where its keyframes share their
+        /// topology, follow its deformation. `"object"`: they move with the mesh as a whole; a mesh that changes its
+        /// shape slides through them. `"world"`: all anatomy slides through them.
+        texture_space: TextureSpace = TextureSpace::Tissue,
+            Facts::word::<TextureSpace>().label("Texture in");
+        /// Reflected paths below this level, attenuation made up for, carry no speckle.
+        volume_floor: f64 = -50.0,
+            Facts::quantity(&LEVEL, OFF, LOUDEST).under("Paths").label("Speckle floor").usual(-100.0, 0.0).off(OFF, "none");
+        /// Reflected paths that begin below this level, attenuation made up for, are followed by chance (Russian
+        /// roulette): the fainter the rarer, and each for as many as it stands for, so that levels stay. `-inf`: all
+        /// are followed.
+        branch_floor: f64 = -35.0,
+            Facts::quantity(&LEVEL, OFF, LOUDEST).under("Paths").label("Branch floor").usual(-100.0, 0.0).off(OFF, "none");
+        /// Level of all speckle; at 0 dB liver lies 45 dB under a perfect mirror.
+        speckle_gain: f64 = 0.0,
+            Facts::quantity(&LEVEL, OFF, LOUDEST).label("Speckle").usual(-30.0, 30.0);
+        /// Level of all surface echoes.
+        surface_gain: f64 = 0.0,
+            Facts::quantity(&LEVEL, OFF, LOUDEST).label("Surfaces").usual(-30.0, 30.0);
+        /// Factor on the scatterers per volume of every tissue: below 1 they are thinned out
+        /// (`density_of_scatterers`), above 1 `cell` is divided by its cube root. Brightness stays; a frame takes that
+        /// much longer.
+        density_scale: f64 = 1.0,
+            Facts::number(0.001, 100.0).label("Density").usual(0.1, 4.0);
+        /// Factor on the `roughness` of every surface.
+        roughness_scale: f64 = 1.0,
+            Facts::number(1e-6, 1e6).label("Roughness").usual(0.1, 10.0);
+        /// Factor on the `thickness` of every surface.
+        thickness_scale: f64 = 1.0,
+            Facts::number(0.0, 100.0).label("Thickness").usual(0.0, 5.0);
+        /// Seed of every random number.
+        seed: u32 = 1,
+            Facts::whole(0, u32::MAX).limits("32 bits").under("Paths").label("Seed").usual(0.0, 1000.0);
+    }
+}
+
+/// How much work a frame is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quality {
+    /// As fast as can be, for trying things out.
+    Draft,
+    /// What the machine does in reasonable time.
+    Standard,
+    /// A proof, on any machine: many paths, a fine lattice, the whole slice.
+    Reference,
+}
+
+impl Simulation {
+    /// Edge of a lattice cell, mm, where nobody says it: it follows the wavelength, 0.15 mm at 7 MHz,
+    /// as far as a scene file may say it. `frequency` in MHz.
+    pub fn default_cell(frequency: f64) -> f64 {
+        (1.05 / frequency).min(10.0)
+    }
+
+    /// Share of its scatterers that a tissue keeps, 0..=1.
+    pub fn thinning(&self) -> f64 {
+        self.density_scale.min(1.0)
+    }
+
+    /// By what a cell is smaller than it would be without [`Self::density_scale`]: it holds one
+    /// scatterer at most, so more of them need more cells.
+    pub fn crowding(&self) -> f64 {
+        self.density_scale.max(1.0).cbrt()
+    }
+
+    /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
+    pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
+        let (paths, cell, scatterers, volume_floor, branch_floor) = match (quality, machine) {
+            (Quality::Draft, Machine::Software) => (2, 1.0, 5.0, -50.0, -30.0),
+            (Quality::Standard, Machine::Software) | (Quality::Draft, Machine::Gpu) => {
+                (8, 1.0, 8.0, -50.0, -35.0)
+            }
+            (Quality::Standard, Machine::Gpu) => (32, 1.0, 16.0, -60.0, -45.0),
+            (Quality::Reference, _) => (128, 2.0 / 3.0, 0.0, -80.0, f64::NEG_INFINITY),
+        };
+        self.paths = paths;
+        self.scatterers_per_resolution_cell = scatterers;
+        self.volume_floor = volume_floor;
+        self.branch_floor = branch_floor;
+        // A voxel's edge is a look, not a cost: there is one lookup per sample whatever its size.
+        if self.scatter_mode == ScatterMode::Lattice {
+            self.cell *= cell;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_quality_does_more_than_the_one_before_and_a_gpu_no_less() {
+        use Machine::{Gpu, Software};
+        let made = |quality, machine| {
+            let mut simulation = Simulation::default();
+            simulation.set_quality(quality, machine);
+            simulation
+        };
+        let more = |a: &Simulation, b: &Simulation| {
+            let scatterers = |s: &Simulation| match s.scatterers_per_resolution_cell {
+                0.0 => f64::INFINITY,
+                n => n,
+            };
+            a.paths <= b.paths && a.cell >= b.cell && scatterers(a) <= scatterers(b)
+        };
+        for machine in [Software, Gpu] {
+            let [draft, standard, proof] =
+                [Quality::Draft, Quality::Standard, Quality::Reference].map(|q| made(q, machine));
+            assert!(more(&draft, &standard) && draft != standard);
+            assert!(more(&standard, &proof) && standard != proof);
+        }
+        let standard = made(Quality::Standard, Software);
+        assert_eq!(standard, Simulation::default(), "the defaults suit a software driver");
+        assert!(more(&standard, &made(Quality::Standard, Gpu)));
+        assert_eq!(made(Quality::Reference, Software), made(Quality::Reference, Gpu));
+    }
+
+    #[test]
+    fn voxels_keep_their_size() {
+        let mut simulation =
+            Simulation { scatter_mode: ScatterMode::Voxel, ..Simulation::default() };
+        simulation.set_quality(Quality::Reference, Machine::Gpu);
+        assert_eq!(simulation.cell, Simulation::default().cell);
+    }
+}
