@@ -22,6 +22,7 @@ pub mod shapes;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;
+pub mod triangle;
 pub mod vary;
 
 pub use crate::issue::{Issue, Severity, Warning};

@@ -351,7 +351,7 @@ impl Worker {
         let fitted = match &self.fitted {
             Some(fitted) if **fitted == *settings => fitted.clone(),
             _ => {
-                simulator.fit(&self.library, &self.scene)?;
+                simulator.fit(&self.scene)?;
                 self.fitted.insert(Arc::new(settings.clone())).clone()
             }
         };
