@@ -1,5 +1,6 @@
 //! What of the window is open and chosen; not saved.
 
+use super::deaths::Deaths;
 use super::files::Files;
 use super::inputs::Inputs;
 use super::mmode;
@@ -39,6 +40,12 @@ pub(super) struct State {
     pub(super) files: Files,
     /// What went wrong last, until it goes right again.
     pub(super) problem: Option<String>,
+    /// Threads that died by a bug.
+    pub(super) deaths: Deaths,
+    /// The simulation's thread is dead, and not started again.
+    pub(super) stopped: bool,
+    /// It is to be started again.
+    pub(super) restart: bool,
     /// What is done before there is a picture.
     pub(super) preparing: &'static str,
     /// Loop, measurements, texts.

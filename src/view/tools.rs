@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
-use super::captures::{CaptureError, Captures, Clip, Format, Sidecar, Still};
+use super::captures::{Captures, Clip, Format, Sidecar, Still};
 use super::engine::Frame;
 use super::model::cine::Limit;
 use super::model::sheet::{Moment, Sheet};
@@ -234,9 +234,7 @@ impl Tools {
             match outcome {
                 Ok(Some(file)) => self.notices.saved(format!("Saved {}", file.display())),
                 Ok(None) => self.notices.saved("Cancelled; nothing was saved".into()),
-                Err(error @ (CaptureError::File { .. } | CaptureError::Gpu(_))) => {
-                    self.notices.failed(error.to_string());
-                }
+                Err(error) => self.notices.failed(error.to_string()),
             }
         }
     }

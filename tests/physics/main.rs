@@ -41,6 +41,8 @@ mod selectors;
 mod shadow;
 #[path = "../common/signal.rs"]
 mod signal;
+#[path = "../common/skip.rs"]
+mod skip;
 mod speckle;
 mod squeeze;
 mod stages;
