@@ -1,4 +1,4 @@
-//! A window with its device: all that is made anew when the device is lost.
+//! A window with its device: everything that is made anew when the device is lost.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use super::{Options, ViewError};
 use crate::gpu::{Device, Painter};
 use crate::scene::Scene;
 
-/// There is news of the simulation, or of a device.
+/// Wakes the event loop: there is news of the simulation, or of a device.
 pub(super) struct Wake;
 
 /// Window, device, simulation. Fields drop in order: the simulation ends first.
@@ -48,7 +48,7 @@ impl Session {
         link: Link,
     ) -> Result<Self, ViewError> {
         let painter = Painter::new(&device, window.clone())?;
-        // An event loop that is gone needs no news.
+        // An event loop that has ended needs no news.
         let wake = move || drop(proxy.send_event(Wake));
         let engine = Engine::start(&device, options.library.clone(), scene, order, link, wake);
         Ok(Self { engine, painter, device })
