@@ -1,9 +1,9 @@
-//! What a check has to say about a file: severity, where, how many, why, and what to do.
+//! A finding of a check on a file: severity, place, count, cause, and remedy.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Whether loading goes on.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The scene loads; the picture may be wrong in the way described.
@@ -15,17 +15,17 @@ pub enum Severity {
 /// One finding. Findings of a kind are counted, not repeated.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Issue {
-    /// Whether loading goes on.
+    /// Severity: an error stops loading.
     pub severity: Severity,
-    /// File that it is about.
+    /// The file.
     pub file: PathBuf,
     /// Mesh, node or place inside the file; empty for the whole file.
     pub mesh: String,
-    /// How many edges, triangles, values are concerned.
+    /// Number of edges, triangles or values.
     pub count: usize,
     /// Cause.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     pub remedy: String,
 }
 
@@ -60,7 +60,7 @@ impl Issue {
         Self { severity: Severity::Warning, ..Self::error(file, count, message, remedy) }
     }
 
-    /// Names the mesh, unless it is named already.
+    /// Sets the mesh's name, unless there is one.
     pub fn of(mut self, mesh: &str) -> Self {
         if self.mesh.is_empty() {
             mesh.clone_into(&mut self.mesh);
@@ -68,7 +68,7 @@ impl Issue {
         self
     }
 
-    /// Whether both say the same but for the numbers in it.
+    /// Returns whether both messages agree except for numbers in them.
     pub fn is_like(&self, other: &Self) -> bool {
         let words = |issue: &Self| {
             let number = |c: char| c.is_ascii_digit() || c == '.';
@@ -77,7 +77,7 @@ impl Issue {
         words(self) == words(other)
     }
 
-    /// Whether loading stops.
+    /// Returns whether it stops loading.
     pub fn is_error(&self) -> bool {
         self.severity == Severity::Error
     }

@@ -1,4 +1,4 @@
-//! What is where in the window.
+//! The layout of the window.
 
 use std::time::Instant;
 
@@ -16,15 +16,15 @@ use super::{
     calipers, cine, deaths, files, keys, mmode, notice, planes, saved, strip, style, survey, timing,
 };
 
-/// Room that the toggles and the loop want beside each other, points.
+/// Width of the toggles and the loop beside each other, points.
 const BAR: f32 = 760.0;
-/// And one toggle more, where there is a volume.
+/// Width of one toggle more, where there is a volume.
 const PLANES: f32 = 62.0;
 
 /// Least height that is left to the image beside a panel of timings, points.
 const LEAST_IMAGE: f32 = 200.0;
 
-/// Where pictures belong.
+/// Places of the pictures.
 #[derive(Default)]
 pub(super) struct Places {
     /// The B-mode image.
@@ -33,7 +33,7 @@ pub(super) struct Places {
     pub(super) survey: Option<survey::Place>,
 }
 
-/// Draws the interface; returns where the pictures belong.
+/// Draws the interface; returns the places of the pictures.
 pub(super) fn show(
     ui: &mut Ui,
     model: &mut Model,
@@ -49,7 +49,7 @@ pub(super) fn show(
             .exact_size(console::WIDTH)
             .show(ui, |ui| console::show(ui, model, state, now));
     }
-    // Below each other where there is no room beside each other.
+    // One below the other where there is no room beside each other.
     let more = if model.registration.is_some() { PLANES } else { 0.0 };
     let rows = if ui.available_width() < BAR + more { 2 } else { 1 };
     Panel::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {

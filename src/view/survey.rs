@@ -1,4 +1,4 @@
-//! The 3D view: anatomy, probe and fan, pictured by the simulation; the pointer moves the eye.
+//! The 3D view: anatomy, probe and fan, pictured by the simulation; the pointer moves the camera.
 
 mod fan;
 mod tissues;
@@ -12,34 +12,34 @@ use super::look::{Look, Pictured};
 use super::model::{Camera, Model, Ray};
 use super::{hold, style};
 
-/// Narrowest that the view is of use, points.
+/// Least useful width of the view, points.
 const LEAST: f32 = 240.0;
-/// Points of a wheel's turn that bring the eye a step nearer.
+/// Points of a wheel's turn that move the camera a step nearer.
 const NOTCH: f64 = 50.0;
-/// A picture may take this long while the eye moves, ms; else it is made coarser.
+/// Longest time of a picture while the camera moves, ms; a slower one is made coarser.
 const SWIFT: f64 = 60.0;
-/// Share of an image's budget that a picture may take while probe or anatomy move.
+/// Greatest share of an image's budget for a picture while probe or anatomy move.
 const SHARE: f64 = 0.2;
 /// Least pixels of the picture for each of the panel's, along an edge.
 const COARSEST: f64 = 0.2;
-/// Factor by which what pictures take varies for no reason that would last.
+/// Factor by which times of pictures vary without a lasting reason.
 const STEADY: f64 = 1.5;
-/// Everything is at rest when nothing has moved for this long.
+/// Time without movement after which everything counts as at rest.
 const REST: Duration = Duration::from_millis(160);
 
-/// What of the 3D view is open and under way; not saved.
+/// State of the 3D view; not saved.
 pub(super) struct State {
-    /// The view is open.
+    /// True while the view is open.
     pub(super) open: bool,
-    /// The list of tissues is open.
+    /// True while the list of tissues is open.
     tissues: bool,
-    /// Until when something counts as moving: the eye, or probe and anatomy.
+    /// Time until which something counts as moving: the camera, or probe and anatomy.
     moving: [Option<Instant>; 2],
-    /// What an image may take while something moves, ms.
+    /// Time for an image while something moves, ms.
     budget_ms: f64,
-    /// Revision of the model that was seen last.
+    /// Last seen revision of the model.
     revision: u64,
-    /// Time that a pixel is thought to take on the device, ms.
+    /// Estimated time of a pixel on the device, ms.
     pixel_ms: f64,
     /// The probe in the pointer's hand.
     hold: hold::State,
@@ -60,14 +60,14 @@ impl Default for State {
 }
 
 impl State {
-    /// Learns from a finished picture.
+    /// Learns the time of a pixel from a finished picture.
     pub(super) fn learn(&mut self, pictured: &Pictured) {
         let [width, height] = pictured.look.sight.size.map(f64::from);
         self.took(pictured.ms / (width * height));
     }
 
-    /// Notes what a pixel took, ms. Only where that is far from what was thought: at rest pictures would else
-    /// come again and again, now fine, now finer.
+    /// Notes the time of a pixel, ms, only where it is far from the estimate: otherwise, at rest, pictures would
+    /// be made again and again, at changing resolutions.
     fn took(&mut self, pixel_ms: f64) {
         let near = self.pixel_ms / STEADY..self.pixel_ms * STEADY;
         if !near.contains(&pixel_ms) {
@@ -75,7 +75,7 @@ impl State {
         }
     }
 
-    /// Notes what an image may take while something moves, ms.
+    /// Notes the time for an image while something moves, ms.
     pub(super) fn pace(&mut self, budget_ms: f64) {
         self.budget_ms = budget_ms;
     }
@@ -117,10 +117,10 @@ impl State {
     }
 }
 
-/// Where the view is on the screen.
+/// Place of the view on the screen.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Place {
-    /// All of it, points.
+    /// The whole view, points.
     pub(super) rect: Rect,
 }
 
@@ -129,19 +129,19 @@ impl Place {
         DVec2::new(self.rect.width().into(), self.rect.height().into())
     }
 
-    /// Where on the screen a point of the world is seen, with `camera`.
+    /// Screen position of a point of the world, with `camera`.
     pub(super) fn project(&self, camera: &Camera, point: DVec3) -> Option<egui::Pos2> {
         let at = camera.project(self.panel(), point)?;
         Some(self.rect.min + vec2(at.x as f32, at.y as f32))
     }
 
-    /// What is seen at a place of the screen, with `camera`.
+    /// The ray through a screen position, with `camera`.
     pub(super) fn ray(&self, camera: &Camera, at: egui::Pos2) -> Ray {
         let off = at - self.rect.min;
         camera.ray(self.panel(), DVec2::new(off.x.into(), off.y.into()))
     }
 
-    /// How the anatomy is to be pictured here; `scale`: pixels per point.
+    /// The view of the anatomy to be pictured here; `scale`: pixels per point.
     pub(super) fn look(&self, model: &Model, state: &State, scale: f32) -> Look {
         let pixels = self.panel() * f64::from(scale);
         let detail = state.detail(pixels.x * pixels.y, Instant::now());
@@ -153,13 +153,13 @@ impl Place {
     }
 }
 
-/// Width of the view in a room of `width` points; nothing where both would be too narrow.
+/// Width of the view in a room of `width` points; none where both parts would be too narrow.
 pub(super) fn width(width: f32) -> Option<f32> {
     let half = (width / 2.0).floor();
     (half >= LEAST).then_some(half)
 }
 
-/// Draws everything over the picture into the whole of `ui`, and moves the eye.
+/// Draws everything over the picture into the whole of `ui`, and moves the camera.
 pub(super) fn show(
     ui: &mut Ui,
     model: &mut Model,
@@ -275,7 +275,7 @@ mod tests {
         assert_eq!(detail(eye, 100.0), 0.5);
         assert_eq!(detail(eye, 50.0), 1.0);
         assert_eq!(detail(eye, 1.0), 2.0);
-        // A fifth of an image's 100 ms, whether the eye moves or not.
+        // A fifth of an image's 100 ms, whether the camera moves or not.
         assert_eq!(detail([true; 2], 60.0), 0.5);
         assert_eq!(detail(anatomy, 20.0), 1.0);
         assert_eq!(detail(anatomy, 60.0), 0.5);

@@ -1,4 +1,4 @@
-//! Channels of an animation: what moves each node and weighs its morph targets, over time in seconds.
+//! Channels of an animation: placement of each node and weights of its morph targets, over time in seconds.
 
 use std::collections::HashMap;
 
@@ -11,7 +11,7 @@ use super::budget::Budget;
 use crate::issue::Issue;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
 
-/// What an animation does to one node.
+/// The animation of one node.
 #[derive(Debug, Default)]
 pub(super) struct Motion {
     /// Placement, lengths in mm.

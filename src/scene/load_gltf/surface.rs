@@ -1,4 +1,4 @@
-//! Triangles of primitives, as they are stored.
+//! Triangles of primitives, as stored.
 
 use gltf::mesh::Mode;
 
@@ -7,13 +7,13 @@ use super::accessor::Reader;
 use crate::issue::Issue;
 use crate::scene::mesh::MAX_ELEMENTS;
 
-/// Triangles of a primitive as they are stored, metres.
+/// Triangles of a primitive as stored, metres.
 pub(super) struct Surface {
     pub positions: Vec<[f64; 3]>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Reads primitives, and counts what it reads.
+/// A reader of primitives that counts its elements.
 pub(super) struct Surfaces<'a> {
     pub reader: Reader<'a>,
     pub issues: Vec<Issue>,
@@ -34,7 +34,7 @@ impl<'a> Surfaces<'a> {
         self.issues.push(Issue::warning(self.reader.path, count, message, ""));
     }
 
-    /// Nothing for points and lines.
+    /// Triangles of a primitive; none for points and lines.
     pub fn primitive(
         &mut self,
         name: &str,

@@ -1,4 +1,4 @@
-//! What of the anatomy the 3D view shows, and from where.
+//! The state of the 3D view: the tissues shown, and the camera.
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -8,10 +8,10 @@ use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
 use crate::sim::survey::Sight;
 
-/// Share of a see-through surface in what is seen, looked at squarely.
+/// Opacity of a see-through surface, looked at squarely.
 const GLASS: f32 = 0.17;
 
-/// A tissue in the list of what is shown.
+/// A tissue in the list of the 3D view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Shown {
     /// Its name.
@@ -20,9 +20,9 @@ pub struct Shown {
     pub tissue: usize,
     /// Its colour, sRGB.
     pub colour: [u8; 3],
-    /// How it is shown.
+    /// Present visibility.
     pub show: Show,
-    /// How it is shown where it is not hidden.
+    /// Visibility where it is not hidden.
     pub otherwise: Show,
 }
 
@@ -35,7 +35,7 @@ impl Shown {
         }
     }
 
-    /// Shows it as glass, or solid.
+    /// Switches between glass and solid.
     pub fn toggle_glass(&mut self) {
         self.show = match self.show {
             Show::SeeThrough => Show::Solid,
@@ -47,9 +47,9 @@ impl Shown {
 /// The state of the 3D view.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Survey {
-    /// The eye.
+    /// The camera.
     pub camera: Camera,
-    /// What lies on the eye's side of the image plane is cut away.
+    /// True where the side of the image plane towards the camera is cut away.
     pub cut: bool,
     /// Tissues that enclose something, in the order of the scene's meshes.
     pub shown: Vec<Shown>,
@@ -60,7 +60,7 @@ pub struct Survey {
 }
 
 impl Survey {
-    /// A scene in the view that shows probe, fan and the organs around it.
+    /// The view of a scene that shows probe, fan and the organs around it.
     pub fn new(scene: &Scene) -> Self {
         let mut shown: Vec<Shown> = Vec::new();
         for instance in &scene.instances {
@@ -92,12 +92,12 @@ impl Survey {
         }
     }
 
-    /// The eye goes back to where one sees probe and fan from the side.
+    /// Moves the camera back to the view of probe and fan from the side.
     pub fn reset(&mut self, pose: &DAffine3, probe: &Probe) {
         self.camera = overview(pose, probe);
     }
 
-    /// What the simulation needs to know to picture it: `size` in pixels.
+    /// The simulation's input for the picture: `size` in pixels.
     pub fn sight(&self, size: [u32; 2]) -> Sight {
         let camera = &self.camera;
         let pitch = camera.pitch(DVec2::from(size.map(f64::from)));
@@ -126,7 +126,7 @@ impl Survey {
     }
 }
 
-/// Somewhat from above and from the side, with the probe and all of the fan in view.
+/// A camera somewhat above and to the side, with the probe and all of the fan in view.
 fn overview(pose: &DAffine3, probe: &Probe) -> Camera {
     let half_width = match probe.kind {
         Kind::Convex { radius, field_of_view } => {
@@ -135,7 +135,7 @@ fn overview(pose: &DAffine3, probe: &Probe) -> Camera {
         Kind::Phased { field_of_view } => probe.depth * (field_of_view / 2.0).sin(),
         Kind::Linear { width } => width / 2.0,
     };
-    // The probe's head is seen, too.
+    // The probe's head is to be seen, too.
     let above = 0.2 * probe.depth + 20.0;
     let radius = half_width.max((probe.depth + above) / 2.0);
     let middle = DVec3::new(0.0, 0.0, (probe.depth - above) / 2.0);
@@ -145,7 +145,7 @@ fn overview(pose: &DAffine3, probe: &Probe) -> Camera {
     camera
 }
 
-/// Whether a mesh of `tissue` has at least two others in its bounds, and half of all that there are.
+/// Returns whether a mesh of `tissue` has at least two others in its bounds, and half of all meshes.
 fn encloses_much(scene: &Scene, tissue: usize) -> bool {
     let bounds: Vec<[DVec3; 2]> = (scene.instances.iter())
         .map(|i| {

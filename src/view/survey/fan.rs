@@ -11,14 +11,14 @@ use crate::view::style;
 /// Points along each arc of the outline.
 const ARC: u32 = 32;
 
-/// Draws them where the picture's own camera and probe have them.
+/// Draws the lines, by the picture's own camera and probe.
 pub(super) fn show(painter: &Painter, place: &Place, pictured: &Pictured, wires: &[[DVec3; 2]]) {
     let camera = &pictured.look.camera;
     let at = |point: DVec3| place.project(camera, point);
     let thread = Stroke::new(1.0, Color32::from_rgba_unmultiplied(220, 220, 210, 90));
     for [a, b] in wires {
         if let (Some(a), Some(b)) = (at(*a), at(*b)) {
-            // A wire seen end on is still a point.
+            // A wire seen end on is still drawn as a point.
             painter.line_segment([a, b + egui::vec2(0.5, 0.5)], thread);
         }
     }
@@ -37,7 +37,7 @@ pub(super) fn show(painter: &Painter, place: &Place, pictured: &Pictured, wires:
 }
 
 /// The image's border in the probe's space, mm, from the last scanline's start around to the first's:
-/// the face itself is the probe's.
+/// the face itself belongs to the probe.
 pub(super) fn outline(probe: &Probe) -> Vec<DVec3> {
     let fan = |radius: f64, field_of_view: f64| {
         let along = |i: u32| field_of_view * (f64::from(i) / f64::from(ARC) - 0.5);
@@ -62,8 +62,8 @@ pub(super) fn outline(probe: &Probe) -> Vec<DVec3> {
 mod tests {
     use super::*;
 
-    // Scanlines are in the middle of their share of the field of view: the outline is half a share
-    // beside the first one; corners of a polygon of 32 sides cut 1.2 thousandths of the radius.
+    // Scanlines are in the middle of their share of the field of view: the outline is half a share beside
+    // the first one; the polygon of 32 sides is inside the arc by up to 1.2 thousandths of the radius.
     #[test]
     fn the_outline_runs_around_the_scanlines() {
         for probe in [Probe::abdominal(), Probe::linear(), Probe::cardiac()] {

@@ -44,7 +44,7 @@ pub(super) fn show(ui: &mut Ui, area: Rect, shown: &mut [Shown]) {
     });
 }
 
-/// Shows a tissue so; with nothing as it was before it was hidden.
+/// Sets a tissue's visibility; with none, the one before it was hidden.
 fn set(tissue: &mut Shown, show: Option<Show>) {
     match show {
         Some(Show::Hidden) if tissue.show == Show::Hidden => {}
@@ -76,7 +76,7 @@ fn row(ui: &mut Ui, tissue: &mut Shown) {
     });
 }
 
-/// Full: solid; half: glass; empty: hidden.
+/// Draws a tissue's sign. Full: solid; half: glass; empty: hidden.
 fn paint(ui: &Ui, rect: Rect, tissue: &Shown) {
     let [r, g, b] = tissue.colour;
     let colour = Color32::from_rgb(r, g, b);
