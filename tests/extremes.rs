@@ -263,7 +263,7 @@ fn pictured(
         },
     };
     let levels = simulator
-        .fit(&library, scene)
+        .fit(scene)
         .and_then(|_| simulator.frame(scene, 0))
         .and_then(|_| simulator.log_image());
     if case.is_setting() {

@@ -12,6 +12,8 @@ use insonify::output::npy;
 use insonify::sim::shaders::Library;
 use insonify::sim::stages;
 
+const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
+
 /// Kernels of pictures for the user, without a twin: tests/survey.rs and tests/fusion.rs hold them to
 /// closed forms.
 const CLOSED_FORMS: [&str; 3] = ["survey_bvh", "survey_query", "tint"];
