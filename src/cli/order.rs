@@ -1,6 +1,6 @@
 //! In which order images are shown.
 
-use insonify::reference::random::pcg4d;
+use insonify::random::pcg4d;
 
 /// Which of `count` images stands at each place, drawn by `seed` (Fisher and Yates). Each `stream` draws
 /// an order of its own.

@@ -20,7 +20,7 @@ fn properties() -> vk::PhysicalDeviceProperties {
     }
 }
 
-/// A pipeline cache's header for that device, and some bytes behind it.
+/// A pipeline cache's header for that device, and some bytes after it.
 fn data() -> Vec<u8> {
     let mut out = Vec::new();
     for word in [32, 1, 0x10de, 0x2335u32] {

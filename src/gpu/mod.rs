@@ -7,7 +7,7 @@
 //! - images stay in the GENERAL layout and barriers name two stages, so nothing tracks layouts;
 //! - layouts of descriptors and push constants come from the SPIR-V and every dispatch is checked
 //!   against them;
-//! - whatever a submission uses is kept alive until its fence has been waited for.
+//! - everything that a submission uses is kept alive until its fence has been waited for.
 
 mod accel;
 mod adapter;

@@ -2,7 +2,7 @@
 //! al., Int J Med Robotics 5, 2009). A client moves the probe by TRANSFORM or TDATA messages; every
 //! client that has room receives the B-mode image and the probe's pose.
 //!
-//! On the wire everything is in RAS and mm: 3D Slicer reads matrices so, whatever an image says.
+//! In messages everything is in RAS and mm: 3D Slicer reads matrices so, whatever axes an image states.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -28,12 +28,12 @@ pub const POSE_DEVICE: &str = "ProbeToWorld";
 /// The protocol's usual port.
 pub const PORT: u16 = 18944;
 
-/// What to say of a server that other machines reach.
+/// Warning about a server that other machines can reach.
 pub const OPEN: &str = "whoever reaches this machine can move the probe and see the images; OpenIGTLink \
     knows no passwords";
 
-/// What is behind the locks here is whole between any two statements: a thread that has panicked
-/// holding one leaves nothing half done.
+/// Locks a mutex. The data behind the locks here are whole between any two statements: a thread that has
+/// panicked holding one leaves nothing half done.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

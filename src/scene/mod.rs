@@ -1,4 +1,4 @@
-//! What is imaged, in world space. Knows no Vulkan.
+//! The imaged scene, in world space. Knows no Vulkan.
 //!
 //! Units everywhere after load: mm, microseconds, MHz, hence speed mm/us and impedance MRayl
 //! (g/cm3 times mm/us). Attenuation stays dB/(cm MHz). Angles are radians.
@@ -11,7 +11,6 @@ pub mod contact;
 pub mod file;
 pub mod fusion;
 pub mod graph;
-pub mod issue;
 pub mod keyframes;
 mod load_gltf;
 mod load_obj;
@@ -23,13 +22,14 @@ pub mod shapes;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;
+pub mod triangle;
 pub mod vary;
 
+pub use crate::issue::{Issue, Severity, Warning};
 pub use contact::Contact;
 pub use file::SceneError;
 pub use fusion::Acquired;
 pub use graph::Graph;
-pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
 pub use origin::{Origin, Origins};
 pub use tracker::Tracker;
@@ -70,19 +70,19 @@ impl Mesh {
 pub struct Instance {
     /// Name in messages and label lists.
     pub name: String,
-    /// The shape as it is now: index into [`Scene::meshes`].
+    /// The present shape: index into [`Scene::meshes`].
     pub mesh: usize,
-    /// The shapes that it takes over time; none for a constant one.
+    /// Shapes over time; none for a constant one.
     pub keyframes: Keyframes,
-    /// Whether it is in the scene now: selectors leave out all subtrees but one.
+    /// True where it is in the scene now: selectors leave out all subtrees but one.
     pub shown: bool,
     /// Index into [`Scene::tissues`].
     pub tissue: usize,
-    /// Where enclosed volumes overlap the highest priority wins; ties go to the one entered last.
+    /// Priority where enclosed volumes overlap: the highest wins; ties go to the one entered last.
     pub priority: i32,
     /// World from object space, mm.
     pub world_from_object: DAffine3,
-    /// Echo properties met from outside and from inside.
+    /// Echo properties from outside and from inside.
     pub surface: [Surface; 2],
 }
 
@@ -136,36 +136,36 @@ pub struct Scene {
     pub background: usize,
     /// Triangle meshes.
     pub meshes: Vec<Mesh>,
-    /// Placed meshes, as they are now.
+    /// Placed meshes in their present state.
     pub instances: Vec<Instance>,
-    /// How [`Scene::instances`] follow from time; empty where nothing moves.
+    /// The graph that gives [`Scene::instances`] over time; empty where nothing moves.
     pub graph: Graph,
     /// Point targets.
     pub wires: Vec<Wire>,
     /// Transducer and its geometry.
     pub probe: Probe,
-    /// Where the probe is: world from probe space (x lateral, y elevation, z depth), rigid, mm.
+    /// World from probe space (x lateral, y elevation, z depth), rigid, mm.
     pub world_from_probe: DAffine3,
     /// Path tracing and scatterers.
     pub simulation: Simulation,
     /// Image formation.
     pub imaging: Imaging,
-    /// What was acquired elsewhere and may be shown around the masking meshes.
+    /// A volume acquired elsewhere, which may be shown around the masking meshes.
     pub volume: Option<Acquired>,
-    /// How it is mixed with the simulation; none: everything is simulated.
+    /// Fusion of the volume with the simulation; none: everything is simulated.
     pub fusion: Option<Fusion>,
-    /// What the probe has to touch; none: every element is coupled wherever the probe is.
+    /// The skin that the probe has to touch; none: every element is coupled wherever the probe is.
     pub contact: Option<Contact>,
     /// The tracked tool that may move the probe.
     pub tracker: Tracker,
-    /// How it keeps pace while something moves.
+    /// Live quality while something moves.
     pub live: Live,
-    /// Where its file says all this.
+    /// Places of its parts in the scene file.
     pub origins: Origins,
 }
 
 impl Scene {
-    /// `probe` at the origin of an endless `background`, and nothing else.
+    /// A scene with `probe` at the origin of an endless `background`, and nothing else.
     pub fn homogeneous(background: Tissue, probe: Probe) -> Self {
         Self {
             name: String::new(),
@@ -188,7 +188,7 @@ impl Scene {
         }
     }
 
-    /// Triangles of all placed meshes.
+    /// Number of triangles of all placed meshes.
     pub fn triangles(&self) -> usize {
         self.instances.iter().map(|i| self.meshes[i.mesh].triangles.len()).sum()
     }

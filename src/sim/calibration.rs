@@ -7,7 +7,7 @@ mod headroom;
 
 use std::f64::consts::{LN_10, PI, TAU};
 
-use super::layout::{LEVELS_PER_OCTAVE, SAMPLE_BLEND};
+use super::layout::{AXIAL_REACH, LATERAL_REACH, LEVELS_PER_OCTAVE, SAMPLE_BLEND};
 use super::special::{erf, sinc};
 use crate::scene::{Scene, Tissue};
 use crate::settings::{Sampling, ScatterMode};
@@ -37,7 +37,7 @@ pub fn lateral_taps(lines: f64) -> Vec<f64> {
     if lines < 0.05 {
         return vec![1.0];
     }
-    gaussian_taps(lines, ((3.0 * lines).ceil() as i32).min(16))
+    gaussian_taps(lines, ((3.0 * lines).ceil() as i32).min(LATERAL_REACH))
 }
 
 fn gaussian_taps(sigma: f64, radius: i32) -> Vec<f64> {
@@ -66,7 +66,7 @@ impl<'a> Calibration<'a> {
         let samples = sigma / scene.probe.sample_pitch();
         // A pulse much narrower than a sample cannot be represented.
         let axial_sigma = samples.max(0.1);
-        let radius = ((4.0 * axial_sigma).ceil() as i32).min(32);
+        let radius = ((4.0 * axial_sigma).ceil() as i32).min(AXIAL_REACH);
         Self { scene, axial_sigma, axial_taps: gaussian_taps(axial_sigma, radius) }
     }
 

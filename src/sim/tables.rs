@@ -1,10 +1,9 @@
 //! What the kernels read: a scene as the structures of [`layout`](super::layout), computed in f64.
 
-use glam::DAffine3;
-
 use super::calibration::{Calibration, LATERAL_CUT, amplitude};
 use super::contact::reach;
-use super::layout::{self, Rows};
+use super::layout;
+use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
 use crate::scene::{Scene, Surface, Wire};
@@ -16,14 +15,6 @@ const LEAST_WEIGHT: f32 = 1e-30;
 const DECIBEL_PER_OCTAVE: f64 = 6.020_599_913;
 /// Roughness at and above which a surface is a perfect mirror.
 const MIRROR: f64 = 1e9;
-
-/// The rows of a 3x4 matrix.
-pub fn matrix_rows(m: &DAffine3) -> Rows {
-    std::array::from_fn(|i| {
-        let row = m.matrix3.row(i);
-        [row.x, row.y, row.z, m.translation[i]].map(|x| x as f32)
-    })
-}
 
 /// Kernels read 0 as "none"; infinity is no number to compute with.
 fn finite_or_zero(x: f64) -> f32 {
@@ -134,6 +125,18 @@ impl Tables {
             points: with_spheres(points(scene)),
             grey: grey_map(&scene.imaging),
         }
+    }
+
+    /// The buffers that they fill, by name, with their content.
+    pub fn arrays(&self) -> [(&'static str, &[u8]); 6] {
+        [
+            ("scanlines", bytemuck::cast_slice(&self.scanlines)),
+            ("rows", bytemuck::cast_slice(&self.rows)),
+            ("tissues", bytemuck::cast_slice(&self.tissues)),
+            ("surfaces", bytemuck::cast_slice(&self.surfaces)),
+            ("points", bytemuck::cast_slice(&self.points)),
+            ("grey", bytemuck::cast_slice(&self.grey)),
+        ]
     }
 }
 

@@ -18,10 +18,10 @@ use crate::gpu::{GpuError, Shot, ValidationLog};
 use crate::scene::Scene;
 use crate::sim::SimError;
 
-/// A device that is lost again within this time will be lost the next time, too.
+/// Time within which a second loss of the device ends the program: it would be lost again.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The application.
+/// The application: what the event loop drives.
 pub(super) struct App {
     plan: Plan,
     open: Option<Open>,
@@ -47,7 +47,7 @@ impl App {
         }
     }
 
-    /// Closes everything; why it ended, if not by the user.
+    /// Closes everything; returns the error that ended it, if one did.
     pub(super) fn finish(mut self) -> Result<(), ViewError> {
         self.open = None;
         if let Some(file) = &self.plan.options.json {
@@ -67,7 +67,7 @@ impl App {
         }
     }
 
-    /// Takes over a window, or leaves.
+    /// Takes over the opened window; ends the event loop where there is none.
     fn adopt(
         &mut self,
         events: &ActiveEventLoop,
@@ -183,7 +183,7 @@ impl ApplicationHandler<Wake> for App {
     }
 }
 
-/// True for an error that says that the device is gone.
+/// Returns true for an error that says that the device is gone.
 fn is_lost(error: &ViewError) -> bool {
     matches!(
         error,
@@ -192,7 +192,7 @@ fn is_lost(error: &ViewError) -> bool {
     )
 }
 
-/// An error that follows the loss of a device: with a remedy where it is another loss.
+/// The error after a device was lost once before: another loss gets a remedy.
 fn lost_again(error: ViewError) -> ViewError {
     match is_lost(&error) {
         true => ViewError::LostAgain(Box::new(error)),

@@ -1,4 +1,4 @@
-//! A scene that is read while the window goes on.
+//! A scene that is loaded while the window goes on.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,21 +16,21 @@ use crate::scene::{Scene, SceneError, Warning};
 
 type Loaded = Result<(Scene, Vec<Warning>), SceneError>;
 
-/// A scene on its way.
+/// A scene being loaded.
 pub(super) struct Opening {
     path: PathBuf,
     overrides: Vec<(String, String)>,
     loaded: Receiver<Loaded>,
 }
 
-/// A scene with what the window starts from.
+/// A scene with the window's first state of it.
 pub(super) struct Opened {
     pub(super) scene: Scene,
     pub(super) model: Model,
 }
 
 impl Opening {
-    /// Begins to read `path`; the event loop is woken when that has ended.
+    /// Begins to read `path`; wakes the event loop at the end.
     pub(super) fn begin(
         path: PathBuf,
         overrides: Vec<(String, String)>,
@@ -48,7 +48,7 @@ impl Opening {
         Self { path, overrides, loaded }
     }
 
-    /// What has been read, suited to the device; nothing while it is not ready.
+    /// The loaded scene, fitted to the device; none while it is not ready.
     pub(super) fn ready(
         &self,
         options: &Options,
@@ -79,7 +79,7 @@ impl Opening {
     }
 }
 
-/// The state of a window that opens `scene`, with counts that suit the device.
+/// The first state of a window with `scene`, with counts that suit the device.
 ///
 /// # Errors
 /// The device does not suit.

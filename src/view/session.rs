@@ -1,4 +1,4 @@
-//! A window with its device: all that is made anew when the device is lost.
+//! A window with its device: everything that is made anew when the device is lost.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -12,7 +12,7 @@ use super::{Options, ViewError};
 use crate::gpu::{Device, Painter};
 use crate::scene::Scene;
 
-/// There is news of the simulation, or of a device.
+/// Wakes the event loop: there is news of the simulation, or of a device.
 pub(super) struct Wake;
 
 /// Window, device, simulation. Fields drop in order: the simulation ends first.

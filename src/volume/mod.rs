@@ -1,15 +1,15 @@
 //! Volumes acquired elsewhere: MetaImage, NRRD, NIfTI-1 and DICOM files, placed in LPS and mm.
 //!
 //! Knows no Vulkan and no ultrasound. Frames and units of the files are turned into LPS and mm in
-//! `grid`, once. Nothing that a header says makes the program allocate or unpack more than the
-//! header declares and the file can hold (`source`).
+//! `grid`, once. No statement of a header makes the program allocate or unpack more than the header
+//! declares and the file can hold (`source`).
 
 use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
 /// What is worth knowing about a volume that could be loaded.
-pub use crate::scene::Warning;
+pub use crate::issue::Warning;
 
 mod dicom;
 mod error;
@@ -83,29 +83,29 @@ pub struct Volume {
     pub voxels: Voxels,
     /// Values of the volumes after the first.
     pub later: Vec<Voxels>,
-    /// Time from one volume to the next, s, where the file says it.
+    /// Time from one volume to the next, s, where stated.
     pub interval: Option<f64>,
     /// Range and mean of the values of all volumes.
     pub statistics: Statistics,
 }
 
-/// Cosine between two axes from which on they are called not perpendicular.
+/// Cosine between two axes from which on they count as not perpendicular.
 const SHEAR: f64 = 1e-3;
 
 /// Extensions of volume files.
 const EXTENSIONS: [&str; 8] =
     [".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom"];
 
-/// Whether a file is a volume by its extension, readable or not.
+/// Returns whether a file is a volume by its extension, readable or not.
 pub fn is_volume(path: &Path) -> bool {
     let name = path.to_string_lossy().to_ascii_lowercase();
     EXTENSIONS.iter().any(|e| name.ends_with(e))
 }
 
 impl Volume {
-    /// Reads a volume by the extension of its file, or several over time. Of several values per voxel
-    /// the first is read, of several DICOM volumes the first; slices of a tracked sequence are stacked
-    /// as they come.
+    /// Reads a volume, or several over time, by the extension of its file. Of several values per voxel the
+    /// first is read, of several DICOM volumes the first; slices of a tracked sequence are stacked in the
+    /// file's order.
     ///
     /// # Errors
     /// Where the file, or the data file that it names, is missing, cut off or wrong.

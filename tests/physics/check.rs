@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use insonify::gpu;
-pub use insonify::plot::{Curve, Plot};
+pub use insonify::output::plot::{Curve, Plot};
 
 use crate::render::{Renderer, renderers};
 

@@ -6,7 +6,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::check::{Check, Examined, Figure, Picture};
-use insonify::plot::{escape, svg};
+use insonify::output::plot::{escape, svg};
 
 /// Rows of the validation table.
 pub const ROWS: u32 = 35;

@@ -1,4 +1,4 @@
-//! What moves: placements and shapes as functions of time, in seconds.
+//! Animation: placements and shapes as functions of time, in seconds.
 
 pub mod clock;
 pub mod fetal;
@@ -12,7 +12,7 @@ pub use motion::{Motion, Turn};
 pub use sequence::{Interpolation, Sequence};
 pub use track::{Channel, Curve, Track, TrackError, Trs};
 
-/// A time that falls short of an instant by no more than this counts as the instant, in s or in
-/// periods: the time of frame i is i over the frame rate, rounded, and a change that is due on that
-/// frame must not come one frame late.
+/// Tolerance of instants, in s or in periods: a time that falls short of an instant by no more than this
+/// counts as the instant. The time of frame i is i over the frame rate, rounded, and a change that is due on
+/// that frame must not come one frame late.
 pub const EDGE: f64 = 1e-9;

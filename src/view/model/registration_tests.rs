@@ -7,7 +7,7 @@ use crate::scene::{Display, Fusion};
 use crate::view::model::{File, Model, tests};
 use crate::volume::Voxels;
 
-/// The tests' cyst of 5 mm as the mask, in a volume that reads x + 10 z of its own frame.
+/// The tests' cyst of 5 mm as the mask, in a volume with levels x + 10 z of its own frame.
 fn scene() -> Scene {
     let mut scene = tests::scene();
     let size = [21, 11, 31];
@@ -47,7 +47,7 @@ fn grey(volume: &Acquired, world: DVec3) -> Option<f64> {
     volume.grey_at(volume.world_from_voxel.inverse().transform_point3(world))
 }
 
-/// Middle of the mask as the model has it, and the grey level of the volume at a place.
+/// Middle of the mask in the model, and the grey level of the volume at a place.
 fn seen(model: &mut Model, at: DVec3) -> (DVec3, Option<f64>) {
     let mut registration = model.registration.take().expect("a volume");
     registration.follow(&model.settings, 0.0);
@@ -61,7 +61,7 @@ fn seen(model: &mut Model, at: DVec3) -> (DVec3, Option<f64>) {
 #[test]
 fn grey_levels_are_trilinear_and_end_with_the_volume() {
     let volume = scene().volume.expect("one");
-    // Linear in x and z: any place has it exactly.
+    // Linear in x and z, hence exact at any place.
     for (x, z) in [(0.0, 0.0), (3.25, -7.75), (-10.0, 15.0), (9.9, 0.5)] {
         let grey = grey(&volume, DVec3::new(x, 4.5, z)).expect("inside");
         assert!((grey - (x + 10.0 * z + 200.0) / 400.0).abs() < 1e-12, "{x} {z}");
@@ -106,7 +106,7 @@ fn a_mesh_is_cut_into_a_closed_line() {
         let lines = registration.outlines(&plane, 50.0);
         assert_eq!(lines.len(), 1);
         let pieces = &lines[0].pieces;
-        // A sphere of 5 mm around (0, 0, -3) from here, of facets.
+        // From here a sphere of 5 mm around (0, 0, -3), made of facets.
         let off = if plane.name == "x y" { 3.0 } else { 0.0 };
         let (centre, radius) =
             ([0.0, if off == 0.0 { -3.0 } else { 0.0 }], f64::sqrt(25.0 - off * off));
@@ -114,7 +114,7 @@ fn a_mesh_is_cut_into_a_closed_line() {
             let far = f64::hypot(end[0] - centre[0], end[1] - centre[1]);
             assert!((far / radius - 1.0).abs() < 0.05, "{} {end:?} {far}", plane.name);
         }
-        // Every end is that of two pieces.
+        // Every end belongs to two pieces.
         for end in pieces.iter().flatten() {
             let near = |other: &&[f64; 2]| {
                 (other[0] - end[0]).abs() < 1e-9 && (other[1] - end[1]).abs() < 1e-9
@@ -123,7 +123,7 @@ fn a_mesh_is_cut_into_a_closed_line() {
             assert!(met >= 2, "{} {end:?}", plane.name);
         }
     }
-    // Beyond what is shown there are no lines.
+    // Outside the shown part there are no lines.
     registration.middle = DVec3::new(80.0, 0.0, 0.0);
     assert!(registration.outlines(&Plane::ALL[0], 30.0).is_empty());
 }
@@ -140,7 +140,7 @@ fn volume_and_model_move_against_each_other_and_undo_takes_it_back() {
         how(&registration, &mut model.settings);
         model.note(&before, now);
     };
-    // The volume: what was at the place is 3 mm on.
+    // The volume: the content of the place is now 3 mm farther on.
     change(&mut model, now, &|r, s| r.shift(s, DVec3::new(0.0, 0.0, 3.0)));
     assert_eq!(seen(&mut model, place + 3.0 * DVec3::Z), (home, grey));
     now += Duration::from_secs(2);
@@ -163,7 +163,7 @@ fn volume_and_model_move_against_each_other_and_undo_takes_it_back() {
     change(&mut model, now, &|r, s| r.scale(s, 1.5));
     let (middle, after) = seen(&mut model, place);
     assert_eq!(after, grey);
-    // It was shifted by 1 mm, and then grew about where it had been.
+    // It was shifted by 1 mm, and then scaled about its old place.
     assert!((middle - home - 1.5 * DVec3::X).length() < 1e-5, "{middle}");
     assert!((model.settings.model.matrix3.determinant() - 1.5f64.powi(3)).abs() < 1e-12);
     model.undo(now);

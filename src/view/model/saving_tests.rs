@@ -8,7 +8,7 @@ use crate::settings::{Facts, Group, Surroundings, Value};
 use crate::sim::Tracer;
 use crate::view::model::{Axis, Settings};
 
-/// Everything of a scene file that a setting can depend on: keys of a preset, a stated impedance, a
+/// A scene file with everything that a setting can depend on: keys of a preset, a stated impedance, a
 /// tissue on another one, shapes that one selector switches, surfaces with and without an inside.
 const SCENE: &str = r#"
 # Two cubes.
@@ -101,7 +101,7 @@ impl Desk {
 /// Draws a number between two ends.
 type Draw<'d> = &'d mut dyn FnMut([f64; 2]) -> f64;
 
-/// A setting by its path, and what changes it.
+/// A setting by its path, and a function that changes it.
 struct Change {
     path: String,
     apply: Box<dyn Fn(&mut Settings, Draw<'_>)>,
@@ -143,7 +143,7 @@ fn group<T: Group>(out: &mut Vec<Change>, path: &str, of: fn(&mut Settings) -> &
     }
 }
 
-/// What the console can change.
+/// All changes that the console can make.
 fn changes() -> Vec<Change> {
     let mut out = Vec::new();
     for (word, settings) in [("convex", 0), ("linear", 1), ("phased", 2)] {
@@ -159,7 +159,7 @@ fn changes() -> Vec<Change> {
     group(&mut out, "live", |s| &mut s.live);
     group(&mut out, "fusion", |s| s.fusion.as_mut().expect("there"));
     let none = |s: &mut Settings, _: Draw<'_>| {
-        // The scene has no volume that they could be.
+        // The scene has no volume to be shown there.
         let fusion = s.fusion.as_mut().expect("there");
         if fusion.surroundings == Surroundings::Volume {
             fusion.surroundings = Surroundings::None;
@@ -180,7 +180,7 @@ fn changes() -> Vec<Change> {
     out
 }
 
-/// Least, most, and numbers with many digits between, by turns.
+/// Least, greatest, and values with many digits between, in turn.
 fn values(seed: u64) -> impl FnMut([f64; 2]) -> f64 {
     let mut state = seed;
     move |[least, most]| {
@@ -199,7 +199,7 @@ fn values(seed: u64) -> impl FnMut([f64; 2]) -> f64 {
     }
 }
 
-/// Holds the saved settings to those of the session. Sources of changed tissues say that they have
+/// Compares the saved settings with those of the session. Sources of changed tissues say that they have
 /// been changed; cells have been multiplied by a frequency and a cube root and divided by them, each
 /// rounded to 1.1e-16; all else has to be the same to the last bit.
 fn hold(desk: &Desk, mut wanted: Settings, what: &str) {
@@ -240,12 +240,12 @@ fn all_settings_at_once_are_saved_and_loaded_again_and_again() {
     for seed in 10..40 {
         let before = model.settings.clone();
         for (at, change) in (0..).zip(changes()) {
-            // Every other one, so that what was set before has to stay.
+            // Every other one, so that earlier changes have to stay.
             if (seed + at) % 2 == 0 || change.path == "surroundings" {
                 (change.apply)(&mut model.settings, &mut values(seed * 1000 + at));
             }
         }
-        // A lattice that nobody asks for leaves the range of its key.
+        // A lattice far from the wavelength leaves the range of its key.
         model.settings.simulation.cell = 0.1;
         model.note(&before, Instant::now());
         model.save(None, false).expect("saved");
@@ -307,7 +307,7 @@ fn counts_that_a_quality_chose_stay_out_of_the_file() {
     let text = desk.text("scene.toml");
     assert!(text.contains("frequency = \"5 MHz\"") && !text.contains("cell"), "{text}");
     assert_eq!(desk.saved().simulation.paths, 8);
-    // What is set by hand is meant.
+    // A value set by hand stays.
     model.settings.simulation.cell = 0.3;
     model.settings.simulation.paths = 5;
     model.save(None, false).expect("saved");

@@ -20,7 +20,7 @@ fn skin(shape: &str) -> Skin {
     Body::of(&scene).unwrap().at(0.0)
 }
 
-/// Over the pole of a ball, its depth axis down and its lateral axis along x.
+/// A pose over the pole of a ball, its depth axis down and its lateral axis along x.
 fn above(radius: f64) -> DAffine3 {
     let axes = DMat3::from_cols(DVec3::X, -DVec3::Y, -DVec3::Z);
     DAffine3::from_mat3_translation(axes, DVec3::Z * radius)
@@ -31,7 +31,7 @@ fn angle(a: &DAffine3, b: &DAffine3) -> f64 {
     a.angle_between(b)
 }
 
-/// A place straight below `from` (world, mm), seen from far outside.
+/// The place straight below `from` (world, mm), seen from far outside.
 fn seen(hand: &Hand<'_>, from: DVec3) -> Spot {
     let ray = Ray { origin: from, direction: -from.normalize() };
     hand.pick(&ray).unwrap()
@@ -45,7 +45,7 @@ fn on_a_sphere_the_probe_stands_on_the_radius_and_is_pressed_in_as_wanted() {
         let pose = above(90.0);
         let from = hand.held(&pose);
         assert!(from.point.distance(DVec3::Z * 80.0) < 0.01, "{from:?}");
-        // Facets of a radian / 64, seen by 24 points: 0.2 degrees.
+        // Facets of a radian / 64, sampled at 24 points: 0.2 degrees.
         assert!(from.normal.angle_between(DVec3::Z) < 0.004, "{from:?}");
         for to in
             [DVec3::new(1.0, 2.0, 3.0), DVec3::new(-3.0, 0.5, -1.0), DVec3::new(0.1, -4.0, 0.3)]
@@ -111,7 +111,7 @@ fn tilt_and_rock_stay_as_the_hand_has_them() {
         let to = seen(&hand, DVec3::new(a.sin(), 0.4 * (3.0 * a).sin(), a.cos()) * 200.0);
         pose = hand.slid(&pose, &from, &to, PRESS);
         assert!((tilt(&pose, &to) - before).abs() < 1e-6, "{step}");
-        // What is found of the pose alone is the place that it was put on.
+        // The place found from the pose alone is the one that it was put on.
         let found = hand.held(&pose);
         assert!(found.point.distance(to.point) < 0.3, "{found:?} {to:?}");
         from = to;
@@ -141,13 +141,13 @@ fn over_the_edges_of_a_box_the_probe_turns_smoothly() {
             turned += by;
             (pose, spot) = (put, next);
         }
-        // Once around, or near to it: way is lost and won at the edges.
+        // Once around, or nearly: some distance is lost and won at the edges.
         assert!((turned / (2.0 * PI) - 1.0).abs() < 0.3, "{turned}");
         assert!(pose.transform_vector3(DVec3::Y).angle_between(-DVec3::Y) < 0.05);
     }
 }
 
-/// All around the shipped abdomen.
+/// A slide all around the shipped abdomen.
 #[test]
 fn on_the_abdomen_the_probe_slides_without_a_jump() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/abdomen.toml");

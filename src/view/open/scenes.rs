@@ -9,7 +9,7 @@ use crate::view::opening::{Opened, Opening};
 const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
 
 impl Open {
-    /// Begins to open a scene where the user wants it.
+    /// Begins to open the scene that the user wants.
     pub(in crate::view) fn begin(&mut self, plan: &Plan) {
         let files = &mut self.state.files;
         if let Some(path) = files.wanted.take() {
@@ -26,7 +26,7 @@ impl Open {
         }
     }
 
-    /// Hands a scene that has been read to the simulation.
+    /// Hands a loaded scene to the simulation.
     pub(super) fn receive(&mut self, plan: &Plan) {
         let device = &self.session.device;
         let Some(opening) = &self.opening else { return };
@@ -50,7 +50,7 @@ impl Open {
         let Opened { scene, model } = opened.expect("nothing else was handed over");
         self.told = model.revision();
         self.model = model;
-        // It shows the scene before, as does all that was measured in it.
+        // It shows the scene before, as do all measurements on it.
         self.frame = None;
         (self.pictured, self.look) = (None, None);
         (self.state.tissue, self.state.mesh) = (0, 0);
