@@ -173,6 +173,7 @@ const TOLD: [u16; 4] = [420, 70, 440, 60];
 const START: (u16, u16) = (455, 112);
 
 #[test]
+#[cfg_attr(not(debug_assertions), ignore = "a program that is released dies for no test")]
 fn a_simulation_that_dies_is_told_and_started_again() {
     let Some(display) = Display::open() else {
         return;
