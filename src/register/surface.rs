@@ -10,7 +10,7 @@ use super::RegisterError;
 /// A triangle, mm.
 pub type Triangle = [DVec3; 3];
 
-/// A surface that can be asked for its nearest point.
+/// A surface with a search for the nearest point.
 pub struct Surface {
     tree: TriMesh,
     /// Unit normals of the triangles.
@@ -22,14 +22,14 @@ pub struct Surface {
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
-    /// Where, mm.
+    /// Position, mm.
     pub point: DVec3,
-    /// Unit normal of a triangle that it lies on.
+    /// Unit normal of a triangle at the point.
     pub normal: DVec3,
 }
 
 impl Surface {
-    /// The surface of these triangles, of any order and orientation; those without area do not count.
+    /// The surface of these triangles, of any order and orientation; triangles without area do not count.
     ///
     /// # Errors
     /// Coordinates that are no numbers; no triangle that has area.
@@ -83,7 +83,7 @@ impl Surface {
     }
 }
 
-/// `count` points spread evenly over the area of the triangles; the same each time. None of no area.
+/// `count` points spread evenly over the area of the triangles; the same each time. None for no area.
 pub fn samples(triangles: &[Triangle], count: usize) -> Vec<DVec3> {
     let mut total = 0.0;
     let sums: Vec<f64> = triangles
