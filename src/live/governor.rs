@@ -18,7 +18,7 @@ const PATIENCE: [u32; 2] = [30, 1920];
 const REMEMBERED: usize = 60;
 /// At rest, most budgets of a level that comes next at once.
 const SWIFT: f64 = 6.0;
-/// At rest, most budgets of an intermediate level, and least gain over the present one.
+/// At rest, most budgets of an intermediate level, and its least time as a multiple of the shown level's.
 const ON_THE_WAY: [f64; 2] = [3.0, 1.5];
 
 /// Chooses a level from the times of frames and from nothing else: the same times give the same
