@@ -15,7 +15,6 @@ layout(std430, binding = 2) restrict readonly buffer LateralBuffer { vec2 latera
 layout(std430, binding = 3) restrict buffer IqBuffer { vec2 iq[]; };
 layout(std430, binding = 4) restrict buffer LogBuffer { float log_image[]; };
 
-const int REACH = 32;
 const float DECIBEL_PER_OCTAVE = 6.020599913; // 20 log10(2)
 
 void main() {
@@ -26,7 +25,7 @@ void main() {
     int line = int(l) * samples;
 
     float sigma = frame.axial_sigma;
-    int radius = int(min(ceil(4.0 * sigma), float(REACH)));
+    int radius = int(min(ceil(4.0 * sigma), float(AXIAL_REACH)));
     vec2 sums[AXIAL_SAMPLES];
     // tap[n] is the weight, in output sample first + n, of the sample that is being read.
     float tap[AXIAL_SAMPLES];

@@ -10,16 +10,15 @@
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) restrict readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { ivec2 surface[]; };
-layout(std430, binding = 3) restrict readonly buffer VolumeBuffer { ivec2 volume[]; };
+layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { ivec2 surface_echoes[]; };
+layout(std430, binding = 3) restrict readonly buffer VolumeBuffer { ivec2 volume_echoes[]; };
 layout(std430, binding = 4) restrict buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 5) restrict buffer LateralBuffer { vec2 lateral[]; };
 // Per line the coupled share of the transmit aperture; from frame.scanlines on how many of the elements
 // before each one are not coupled.
 layout(std430, binding = 6) restrict readonly buffer ContactBuffer { float contact[]; };
 
-// Accumulators at and beyond this magnitude may have lost an echo.
-const int HEADROOM = 1 << 30;
+const int HEADROOM = int(ECHO_LIMIT);
 
 bool saturated(ivec2 v) { return any(greaterThanEqual(v, ivec2(HEADROOM))) || any(lessThanEqual(v, ivec2(-HEADROOM))); }
 
@@ -50,7 +49,7 @@ void main() {
     if (k >= frame.samples) { return; }
 
     float sigma = rows[k].lateral_lines;
-    int radius = sigma < 0.05 ? 0 : int(min(ceil(3.0 * sigma), 16.0));
+    int radius = sigma < 0.05 ? 0 : int(min(ceil(3.0 * sigma), float(LATERAL_REACH)));
     // Without smoothing the exponent of the only tap, j = 0, is 0 whatever this is.
     float falloff = -0.5 / max(sigma * sigma, 0.0025);
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;
@@ -77,7 +76,7 @@ void main() {
         int line = first + j;
         if (line < 0 || line >= scanlines) { continue; }
         uint at = uint(line * samples) + k;
-        ivec2 echo = surface[at];
+        ivec2 echo = surface_echoes[at];
         if (j >= 0 && j < BEAM_LINES && saturated(echo)) { full |= 1u << uint(j); }
         vec2 e = vec2(echo);
         for (int n = 0; n < BEAM_LINES; ++n) {
@@ -85,7 +84,7 @@ void main() {
             s[n] += tap[n] * e;
         }
         if (voxel) {
-            vec2 e = vec2(volume[at]);
+            vec2 e = vec2(volume_echoes[at]);
             for (int n = 0; n < BEAM_LINES; ++n) {
                 energies[n] += tap[n] * tap[n];
                 v[n] += tap[n] * e;
@@ -99,7 +98,7 @@ void main() {
         uint l = uint(first + n);
         if (l >= frame.scanlines) { break; }
         uint own = l * frame.samples + k;
-        ivec2 echo = volume[own];
+        ivec2 echo = volume_echoes[own];
         if (saturated(echo)) { full |= 1u << uint(n); }
         // Speckle adds in power, surface echoes in amplitude: each keeps its level at the edges.
         vec2 scatterers = vec2(echo);

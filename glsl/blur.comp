@@ -1,4 +1,4 @@
-// Box sums down the columns of an image of pairs of values, written with rows and columns exchanged:
+// Box sums down the columns of the mask, an image of pairs of values, written with rows and columns exchanged:
 // run twice, it sums over squares and the image stands upright again.
 //
 // A thread makes BLUR_SUMS neighbouring sums of a column: what all of them have in common is read and
@@ -10,13 +10,13 @@
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) restrict readonly buffer FusionBuffer { Fusion fusion; };
-layout(std430, binding = 2) restrict readonly buffer SourceBuffer { vec2 source[]; };
+layout(std430, binding = 2) restrict readonly buffer MaskBuffer { vec2 mask[]; };
 layout(std430, binding = 3) restrict buffer SumBuffer { vec2 sums[]; };
 
-layout(push_constant) uniform Push { uint turned; };  // 1: the source has rows and columns exchanged
+layout(push_constant) uniform Push { uint turned; };  // 1: the mask has rows and columns exchanged
 
 // Beyond the image's edge its outermost pixels count on.
-vec2 read(int x, int y, int width, int height) { return source[clamp(y, 0, height - 1) * width + x]; }
+vec2 read(int x, int y, int width, int height) { return mask[clamp(y, 0, height - 1) * width + x]; }
 
 void main() {
     int x = int(gl_GlobalInvocationID.x);

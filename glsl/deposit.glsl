@@ -2,8 +2,6 @@
 #include "angles.glsl"
 #include "numbers.glsl"
 
-const float FIXED_LIMIT = 1073741824.0; // 2^30
-
 vec2 carrier(float time) { return phasor(-2.0 * frame.frequency * time); }
 
 // What four samples get of an echo that lies `f` behind the second of them, 0 to 1: the cubic through
@@ -16,9 +14,9 @@ vec4 deposit_shares(float f) {
 // `dither` in [0, 1): 0.5 rounds to the nearest; uniform ones keep the mean of what is less than a unit.
 int to_fixed(float value, float scale, float dither) {
     float v = value * scale;
-    if (!(abs(v) < FIXED_LIMIT)) {
+    if (!(abs(v) < ECHO_LIMIT)) {
         atomicAdd(counters.saturated, 1u);
-        v = v > 0.0 ? FIXED_LIMIT : (v < 0.0 ? -FIXED_LIMIT : 0.0);
+        v = v > 0.0 ? ECHO_LIMIT : (v < 0.0 ? -ECHO_LIMIT : 0.0);
     }
     return whole_large(floor(v + dither));
 }

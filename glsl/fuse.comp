@@ -7,7 +7,7 @@
 layout(local_size_x = 64) in;
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
 layout(std430, binding = 1) restrict readonly buffer FusionBuffer { Fusion fusion; };
-layout(std430, binding = 2) restrict readonly buffer SimulatedBuffer { uint simulated[]; };
+layout(std430, binding = 2) restrict readonly buffer PixelBuffer { uint pixels[]; };
 layout(std430, binding = 3) restrict readonly buffer BackgroundBuffer { float background[]; };
 layout(std430, binding = 4) restrict readonly buffer SumBuffer { vec2 sums[]; };
 layout(std430, binding = 5) restrict buffer FusedBuffer { uint fused[]; };
@@ -19,7 +19,7 @@ void main() {
     uint j = gl_GlobalInvocationID.y;
     if (i >= frame.image_width || j >= frame.image_height) { return; }
     uint at = j * frame.image_width + i;
-    uint pixel = simulated[at];
+    uint pixel = pixels[at];
     if ((pixel >> 24u) != 0u) {
         float v;
         if (fusion.blend == BLEND_MULTIBAND) {

@@ -13,8 +13,6 @@
 // The top level's root is the node nodes[0].x; NONE: nothing is placed. nodes[0].z: of those that share
 // a structure some are not shown.
 
-const uint BVH_STACK = 32u;    // the builder refuses deeper trees
-
 // Which other instances are transparent, and whether any may be.
 #ifndef RAY_SKIPS
 #define RAY_SKIPS(i) false

@@ -22,7 +22,7 @@ layout(binding = 5) uniform accelerationStructureEXT tlas;
 layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
 layout(std430, binding = 6) readonly buffer FusionBuffer { Fusion fusion; };
-layout(binding = 7) uniform texture3D volume;
+layout(binding = 7) uniform texture3D acquired;
 layout(std430, binding = 8) buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 9) buffer PrescanBuffer { float prescan[]; };
 layout(std430, binding = 10) readonly buffer ScanlineBuffer { Scanline scanlines[]; };
@@ -129,7 +129,7 @@ void time_crossings() {
 }
 
 // By hand: the filters of many devices know only 256 places between two texels.
-float acquired(vec3 voxel) {
+float acquired_level(vec3 voxel) {
     vec3 size = vec3(float(fusion.size_x), float(fusion.size_y), float(fusion.size_z));
     bool inside = all(greaterThanEqual(voxel, vec3(-0.5))) && all(lessThanEqual(voxel, size - 0.5));
     if (!inside) return 0.0;
@@ -138,11 +138,11 @@ float acquired(vec3 voxel) {
     ivec3 b = min(a + 1, ivec3(size) - 1);
     vec3 f = p - vec3(a);
     float near = mix(
-        mix(texelFetch(volume, a, 0).x, texelFetch(volume, ivec3(b.x, a.y, a.z), 0).x, f.x),
-        mix(texelFetch(volume, ivec3(a.x, b.y, a.z), 0).x, texelFetch(volume, ivec3(b.x, b.y, a.z), 0).x, f.x), f.y);
+        mix(texelFetch(acquired, a, 0).x, texelFetch(acquired, ivec3(b.x, a.y, a.z), 0).x, f.x),
+        mix(texelFetch(acquired, ivec3(a.x, b.y, a.z), 0).x, texelFetch(acquired, ivec3(b.x, b.y, a.z), 0).x, f.x), f.y);
     float far = mix(
-        mix(texelFetch(volume, ivec3(a.x, a.y, b.z), 0).x, texelFetch(volume, ivec3(b.x, a.y, b.z), 0).x, f.x),
-        mix(texelFetch(volume, ivec3(a.x, b.y, b.z), 0).x, texelFetch(volume, b, 0).x, f.x), f.y);
+        mix(texelFetch(acquired, ivec3(a.x, a.y, b.z), 0).x, texelFetch(acquired, ivec3(b.x, a.y, b.z), 0).x, f.x),
+        mix(texelFetch(acquired, ivec3(a.x, b.y, b.z), 0).x, texelFetch(acquired, b, 0).x, f.x), f.y);
     return clamp(mix(near, far, f.z) * fusion.slope + fusion.intercept, 0.0, 1.0);
 }
 
@@ -170,6 +170,6 @@ void main() {
         }
         uint at = 2u * (line * frame.samples + k);
         prescan[at] = around > 0 ? 0.0 : 1.0;
-        prescan[at + 1u] = acquired(start + t * along);
+        prescan[at + 1u] = acquired_level(start + t * along);
     }
 }

@@ -1,5 +1,7 @@
 // Which medium encloses a point: a small stack of instance ids, entered in order. Stacks are passed
 // `inout` also where they are only read: a copy would move all of them.
+//
+// The includer declares frame, instances[] and tissues[].
 
 struct Media { uint count; uint ids[MAX_STACK]; };
 
@@ -21,6 +23,13 @@ uint current_instance(inout Media media) {
 
 uint tissue_of(uint instance) {
     return instance == NONE ? frame.background : instances[instance].tissue;
+}
+
+// What sound asks of a tissue on its way: mm/us, MRayl, Np/mm at f0.
+struct Medium { float speed; float impedance; float absorption; };
+
+Medium medium_of(uint tissue) {
+    return Medium(tissues[tissue].speed, tissues[tissue].impedance, tissues[tissue].absorption);
 }
 
 // Whether echoes from here are wanted: everywhere, or only inside the mask that is cut into an

@@ -106,9 +106,9 @@ bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2
 }
 
 // Moves the path along its segment: attenuation, time, widening after rough reflections.
-void advance(inout Path path, float t, Tissue tissue, vec3 position) {
-    path.weight *= exp(-tissue.absorption * t);
-    path.time += t / tissue.speed;
+void advance(inout Path path, float t, Medium medium, vec3 position) {
+    path.weight *= exp(-medium.absorption * t);
+    path.time += t / medium.speed;
     path.spread.x += t * (2.0 * path.spread.y + t * path.spread.z);
     path.spread.y += t * path.spread.z;
     path.origin = position;

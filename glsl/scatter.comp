@@ -176,11 +176,11 @@ vec2 slab_of() { return (vec2(-1.0, 1.0) + 2.0 * POINT_SHIFT) * frame.elevation_
 // Adds to a sample of the window; 1 where the sum could not hold it.
 uint deposit_at(int slot, vec2 v) {
     if (slot >= 0 && slot < int(min(SCATTER_WINDOW, frame.samples - window_begin))) {
-        vec2 held = clamp(v, vec2(-FIXED_LIMIT), vec2(FIXED_LIMIT));
+        vec2 held = clamp(v, vec2(-ECHO_LIMIT), vec2(ECHO_LIMIT));
         atomicAdd(echoes[2 * slot], whole_large(floor(held.x + 0.5)));
         atomicAdd(echoes[2 * slot + 1], whole_large(floor(held.y + 0.5)));
     }
-    return uint(!(max(abs(v.x), abs(v.y)) < FIXED_LIMIT));
+    return uint(!(max(abs(v.x), abs(v.y)) < ECHO_LIMIT));
 }
 
 // A scatterer's echo at the sample nearest to it. About halfway between two samples each gets a share: of

@@ -47,13 +47,8 @@ layout(std430, binding = 10) restrict readonly buffer ScanlineBuffer { Scanline 
 const float DARK = -200.0;
 const float NOTHING = 1e-30;
 
-Tissue medium(inout Media media) {
-    uint i = tissue_of(current_instance(media));
-    Tissue t;
-    t.speed = tissues[i].speed;
-    t.impedance = tissues[i].impedance;
-    t.absorption = tissues[i].absorption;
-    return t;
+Medium current_medium(inout Media media) {
+    return medium_of(tissue_of(current_instance(media)));
 }
 
 // The middle of the beam: the path of `trace` before anything random.
@@ -68,7 +63,7 @@ void middle(uint line, out Path path, inout Media media) {
 }
 
 // Sends the path through; the part of its intensity that is reflected, 1 where nothing gets through.
-float pass(inout Path path, Met here, Tissue t1, Tissue t2) {
+float pass(inout Path path, Met here, Medium t1, Medium t2) {
     vec3 n_geometric = here.normal;
     vec3 n = surface_shading_normal(here.hit);
     if (dot(path.direction, n_geometric) >= 0.0) { n_geometric = -n_geometric; n = -n; }
@@ -106,10 +101,10 @@ void main() {
     float close = 0.0;
     uint crossing = 0u;
     while (true) {
-        Tissue t1 = medium(media);
+        Medium t1 = current_medium(media);
         bool heard = is_heard(media);
         // Around the mask sound goes on at the speed of the recording.
-        Tissue way = t1;
+        Medium way = t1;
         if (!heard) {
             way.speed = frame.speed;
             surrounding = t1.absorption;
@@ -169,7 +164,7 @@ void main() {
         if (same || !fresh) {
             path.t_min = max(path.t_min, past - here.hit.t);
         } else {
-            float reflected = pass(path, here, t1, medium(after));
+            float reflected = pass(path, here, t1, current_medium(after));
             lost = reflected >= 1.0;
             level = lost ? DARK : level + log(max(1.0 - reflected, NOTHING));
         }

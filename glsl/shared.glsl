@@ -1,5 +1,5 @@
 // The only CPU/GPU contract: structures and constants shared by every kernel.
-// src/sim/layout.rs mirrors it; a test compares every offset by reflection.
+// src/sim/layout.rs mirrors it; a test compares every offset by reflection, and every constant.
 //
 // Only scalars and vec4, so that std430 and #[repr(C)] agree and naga can read the kernels.
 // Units: mm, microseconds, MHz; weights and amplitudes are relative to a perfect flat mirror.
@@ -10,12 +10,17 @@ const uint MAX_STACK = 16u;         // media that may enclose one point
 // begin, as bits of floats, and the interactions up to there.
 const uint START_WORDS = MAX_STACK + 4u;
 const uint MAX_ELEVATION_LAYERS = 64u;
+const uint BVH_STACK = 32u;         // entries of the compute tracer's stack: the builder refuses deeper trees
+const float ECHO_LIMIT = 1073741824.0; // 2^30: accumulators of this magnitude may have lost an echo
 const uint MAX_PIECES = 64u;        // of the level of what is transmitted along a line
 const float FAR_PIECE = 1e30;       // begins behind every sample: there are no more
 // Outputs of a thread, which share what it reads.
 const int BEAM_LINES = 8;           // neighbouring scanlines of one sample
 const int AXIAL_SAMPLES = 8;        // neighbouring samples of one scanline
 const int BLUR_SUMS = 16;           // neighbouring sums of one column
+// Neighbours on each side over which is smoothed at most.
+const int LATERAL_REACH = 16;       // scanlines
+const int AXIAL_REACH = 32;         // samples
 
 const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;

@@ -142,24 +142,6 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
     segments[at].handedness = path.handedness;
 }
 
-Tissue load_tissue(uint i) {
-    Tissue t;
-    t.speed = tissues[i].speed;
-    t.impedance = tissues[i].impedance;
-    t.absorption = tissues[i].absorption;
-    return t;
-}
-
-Surface load_surface(uint i) {
-    Surface s;
-    s.roughness = surfaces[i].roughness;
-    s.thickness = surfaces[i].thickness;
-    s.specularity = surfaces[i].specularity;
-    s.gain = surfaces[i].gain;
-    s.coherence = surfaces[i].coherence;
-    return s;
-}
-
 // Distance of a point from the geometric scanline in the image plane, mm.
 float off_axis(uint line, vec3 position) {
     vec3 o, d, lateral;
@@ -187,15 +169,16 @@ struct Echo {
 
 // m is the sampled micro-normal.
 void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interface at, vec3 m) {
-    Surface s = load_surface(at.surface);
-    Tissue t1 = load_tissue(at.before), t2 = load_tissue(at.behind);
+    float coherence = surfaces[at.surface].coherence;
+    Medium t1 = medium_of(at.before), t2 = medium_of(at.behind);
     float cos_m = -dot(path.direction, m);
     float r = reflection(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_m);
     float facing = 2.0 * cos_m * cos_m - 1.0; // -d . v_r
     if (facing <= 0.0) return;
-    float amplitude = path.weight * r * pow(facing, s.specularity) * s.gain * beam_weight(off_axis(line, path.origin));
+    float amplitude = path.weight * r * pow(facing, surfaces[at.surface].specularity)
+        * surfaces[at.surface].gain * beam_weight(off_axis(line, path.origin));
     uvec4 words = draw(n, echo.key, PURPOSE_THICKNESS);
-    float q = s.thickness * abs(gaussian(words.x & 0xffff0000u | words.y >> 16u));
+    float q = surfaces[at.surface].thickness * abs(gaussian(words.x & 0xffff0000u | words.y >> 16u));
     float late = path.time + q / t1.speed;
     float behind = amplitude * exp(-t1.absorption * q);
     echo.waiting = 1u;
@@ -205,14 +188,14 @@ void make_echo(inout Echo echo, inout Path path, uint line, uint n, inout Interf
         return;
     }
     echo.time = path.time;
-    echo.in_phase = vec2(s.coherence * path.share * amplitude, 0.0);
-    if (s.coherence >= 1.0) return;
+    echo.in_phase = vec2(coherence * path.share * amplitude, 0.0);
+    if (coherence >= 1.0) return;
     // Off the round numbers at which flat faces are modelled: on a cell's border the rounding of a
     // tracer would choose the phase.
     vec3 p = tissue_point(at.instance, path.origin) * 2.0 + 0.381966;
     uvec3 cell = uvec3(ivec3(floor(p)));
     vec2 phase = phasor(unit(pcg4d(uvec4(cell, n * 0x9e3779b9u + frame.seed)).w));
-    float incoherent = sqrt((1.0 - s.coherence * s.coherence) * path.share * path.probability) * behind;
+    float incoherent = sqrt((1.0 - coherence * coherence) * path.share * path.probability) * behind;
     echo.waiting = 3u;
     echo.late = late;
     echo.behind = incoherent * phase;
@@ -229,7 +212,7 @@ void meet(out Interface at, Met here, bool entering, inout Path path, uint befor
     at.shading = surface_shading_normal(hit);
     if (!entering) { at.geometric = -at.geometric; at.shading = -at.shading; }
     if (!(dot(path.direction, at.shading) < 0.0)) at.shading = at.geometric;
-    Tissue t1 = load_tissue(before), t2 = load_tissue(behind);
+    Medium t1 = medium_of(before), t2 = medium_of(behind);
     float cos_i = -dot(path.direction, at.shading);
     float width = 0.0;
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
@@ -320,6 +303,88 @@ bool take(uint piece, out uint line, out uint next, out uint last, out uint main
     return true;
 }
 
+// The next piece that there is, of at most `quota`; false: there is none.
+bool take_next(inout uint quota, inout uint line, inout uint next, inout uint last, inout uint main_path, inout uint slot) {
+    bool found = false;
+    while (quota > 0u && !found) {
+        quota -= 1u;
+        uint piece = turn == 0u ? atomicAdd(counters.taken_even, 1u) : atomicAdd(counters.taken_odd, 1u);
+        if (piece >= pieces) break;
+        found = take(piece, line, next, last, main_path, slot);
+    }
+    return found;
+}
+
+void deposit_echo(inout Echo echo, uint line, uint n) {
+    while (echo.waiting != 0u) {
+        bool behind = (echo.waiting & 1u) == 0u;
+        echo.waiting &= mix(2u, 0u, behind);
+        deposit_surface(line, mix(echo.time, echo.late, behind), mix(echo.in_phase, echo.behind, bvec2(behind)), behind,
+            line_random(line, n, echo.key, PURPOSE_DITHER));
+    }
+}
+
+// The path, which has come to the transducer's face, turns round there; what that perfect mirror sends
+// straight back is an echo.
+void bounce(inout Path path, inout Echo echo, uint line, bool heard) {
+    vec3 side = world_vector(face_normal(probe_point(path.origin)));
+    float cos_face = dot(path.direction, side);
+    float retro = path.weight * path.share * beam_weight(off_axis(line, path.origin));
+    if (cos_face < 0.0 && heard) {
+        echo.waiting = 1u;
+        echo.key = path.interactions + 32u * path.reflections;
+        echo.time = path.time;
+        echo.in_phase = vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0);
+    }
+    path.left_instance = NONE;
+    reflect_path(path, side, SPECULAR, 0.0);
+}
+
+// Splits the reflected part off a main path; whether path n follows it.
+bool branch(inout Path path, uint line, uint n, uint key, float reflectance) {
+    float wanted = clamp(ceil(float(frame.paths) * reflectance), 1.0, float(frame.paths));
+    // The fainter a branch, the rarer it is followed, and counts for as many.
+    float level = path.weight * reflectance * rows[row_of(path.time)].compensation;
+    path.survival = level < frame.branch_floor ? max(level / frame.branch_floor, LEAST_SURVIVAL) : 1.0;
+    path.branch = true;
+    path.weight *= reflectance / path.survival;
+    path.probability = path.survival;
+    path.share = 1.0 / wanted;
+    return float(n) < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
+}
+
+// What encloses the path behind one or two surfaces that it has met.
+void toggle(Met here, Met other, vec3 direction, uint copies) {
+    copy_media(after, media);
+    // A loop: every copy of the call takes drivers time to compile.
+    [[dont_unroll]] for (uint i = 0u; i < (other.hit.instance == NONE ? 1u : 2u); ++i) {
+        bool enters = dot(direction, i == 0u ? here.normal : other.normal) < 0.0;
+        if (!cross_interface(after, i == 0u ? here.hit.instance : other.hit.instance, enters)) atomicAdd(counters.stack_overflow, copies);
+    }
+}
+
+// Refracts the path at normal n into the next medium; lost to total reflection, it has no weight.
+void transmit(inout Path path, inout Interface at, vec3 n) {
+    // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
+    bool through = transmit_path(path, n, at.geometric, tissues[at.before].speed, tissues[at.behind].speed) || at.curved;
+    if (role == ROLE_MAIN) {
+        path.weight *= mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
+    } else if (!through) {
+        atomicAdd(counters.paths_lost, 1u);
+        path.weight = 0.0;
+    }
+    copy_media(media, after);
+}
+
+// Reflects or transmits by chance; whether it reflects.
+bool choose(inout Path path, uint n, uint key, float reflectance) {
+    float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
+    if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
+    bool reflects = choice < reflectance;
+    path.probability *= mix(1.0 - reflectance, reflectance, reflects);
+    return reflects;
+}
+
 void main() {
     // The next dispatch begins with nothing taken.
     if (gl_GlobalInvocationID.x == 0u) {
@@ -346,12 +411,7 @@ void main() {
 
     uint guards = 0u, quota = most;
     for (uint guard = 0u;; ++guard) {
-        while (echo.waiting != 0u) {
-            bool behind = (echo.waiting & 1u) == 0u;
-            echo.waiting &= mix(2u, 0u, behind);
-            deposit_surface(line, mix(echo.time, echo.late, behind), mix(echo.in_phase, echo.behind, bvec2(behind)), behind,
-                line_random(line, n, echo.key, PURPOSE_DITHER));
-        }
+        deposit_echo(echo, line, n);
         bool alive = going && path.interactions < frame.max_interactions && path.crossings < limit
             && path.weight * path.survival >= frame.min_weight && path.time < time_end;
         bool recalled = false;
@@ -359,14 +419,7 @@ void main() {
         if (!alive || guard == guards) {
             if (next >= last || guard == guards) {
                 if (role == ROLE_MAIN && main_path != NONE) interaction_count[main_path] = written;
-                bool found = false;
-                while (quota > 0u && !found) {
-                    quota -= 1u;
-                    uint piece = turn == 0u ? atomicAdd(counters.taken_even, 1u) : atomicAdd(counters.taken_odd, 1u);
-                    if (piece >= pieces) break;
-                    found = take(piece, line, next, last, main_path, slot);
-                }
-                if (!found) {
+                if (!take_next(quota, line, next, last, main_path, slot)) {
                     // Inside the loop: naga loses values that a loop carries when they are used after it.
                     if (rays > 0u) atomicAdd(counters.rays, rays);
                     report_counts();
@@ -393,7 +446,7 @@ void main() {
             recalled = true;
         } else {
             uint before = current_instance(media);
-            Tissue way = load_tissue(tissue_of(before));
+            Medium way = medium_of(tissue_of(before));
             bool heard = is_heard(media);
             // An acquired image is laid out at the probe's speed: so is the way to the mask.
             if (!heard) way.speed = frame.speed;
@@ -432,17 +485,7 @@ void main() {
                     advance(path, t_end, way, end);
                     path.interactions += 1u;
                     met += 1u;
-                    vec3 face_side = world_vector(face_normal(probe_point(end)));
-                    float cos_face = dot(path.direction, face_side);
-                    float retro = path.weight * path.share * beam_weight(off_axis(line, end));
-                    if (cos_face < 0.0 && heard) {
-                        echo.waiting = 1u;
-                        echo.key = path.interactions + 32u * path.reflections;
-                        echo.time = path.time;
-                        echo.in_phase = vec2(retro * max(2.0 * cos_face * cos_face - 1.0, 0.0), 0.0);
-                    }
-                    path.left_instance = NONE;
-                    reflect_path(path, face_side, SPECULAR, 0.0);
+                    bounce(path, echo, line, heard);
                     continue;
                 }
                 close = clearance(here.position);
@@ -466,12 +509,7 @@ void main() {
                 other = found;
             }
             bool entering = dot(path.direction, here.normal) < 0.0;
-            copy_media(after, media);
-            // A loop: every copy of the call takes drivers time to compile.
-            [[dont_unroll]] for (uint i = 0u; i < (other.hit.instance == NONE ? 1u : 2u); ++i) {
-                bool enters = i == 0u ? entering : dot(path.direction, other.normal) < 0.0;
-                if (!cross_interface(after, i == 0u ? here.hit.instance : other.hit.instance, enters)) atomicAdd(counters.stack_overflow, copies);
-            }
+            toggle(here, other, path.direction, copies);
             uint behind = current_instance(after);
             path.crossings += 1u;
             bool heard_after = is_heard(after);
@@ -520,21 +558,10 @@ void main() {
             if (rough) make_echo(echo, path, line, n, at, m);
             bool can_reflect = rough && path.reflections < frame.max_reflections;
             if (recalled) {
-                float wanted = clamp(ceil(float(frame.paths) * at.reflectance), 1.0, float(frame.paths));
-                // The fainter a branch, the rarer it is followed, and counts for as many.
-                float level = path.weight * at.reflectance * rows[row_of(path.time)].compensation;
-                path.survival = level < frame.branch_floor ? max(level / frame.branch_floor, LEAST_SURVIVAL) : 1.0;
-                reflects = can_reflect && float(n) < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
+                reflects = branch(path, line, n, key, at.reflectance) && can_reflect;
                 going = reflects;
-                path.branch = true;
-                path.weight *= at.reflectance / path.survival;
-                path.probability = path.survival;
-                path.share = 1.0 / wanted;
             } else {
-                float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
-                if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
-                reflects = choice < at.reflectance;
-                path.probability *= mix(1.0 - at.reflectance, at.reflectance, reflects);
+                reflects = choose(path, n, key, at.reflectance);
                 going = can_reflect || !reflects;
             }
         }
@@ -543,15 +570,6 @@ void main() {
             reflect_path(path, m, surfaces[at.surface].roughness, at.turn);
             continue;
         }
-        // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
-        bool through = transmit_path(path, mix(at.shading, m, bvec3(rough && rough_through)), at.geometric, tissues[at.before].speed,
-            tissues[at.behind].speed) || at.curved;
-        if (role == ROLE_MAIN) {
-            path.weight *= mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
-        } else if (!through) {
-            atomicAdd(counters.paths_lost, 1u);
-            path.weight = 0.0;
-        }
-        copy_media(media, after);
+        transmit(path, at, mix(at.shading, m, bvec3(rough && rough_through)));
     }
 }

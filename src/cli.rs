@@ -15,6 +15,7 @@ mod order;
 mod reconstruct;
 mod register;
 mod render;
+mod report;
 mod serve;
 mod study;
 mod vary;
@@ -58,6 +59,7 @@ enum Command {
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
 pub fn run() -> ExitCode {
+    report::install();
     let result = match Cli::parse().command {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),

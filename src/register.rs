@@ -13,6 +13,7 @@ pub mod landmarks;
 pub mod placement;
 pub mod points;
 pub mod surface;
+mod symmetric;
 
 pub use error::RegisterError;
 pub use icp::{Fit, Residuals};

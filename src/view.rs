@@ -9,6 +9,7 @@ mod calipers;
 mod captures;
 mod cine;
 mod console;
+mod deaths;
 pub mod engine;
 mod files;
 mod hold;
@@ -117,6 +118,12 @@ pub enum ViewError {
         #[from]
         error: IgtlError,
     },
+    /// The system has no room for another thread.
+    #[error("no thread can be started: {0}; close other programs, or raise the limit on threads")]
+    Thread(std::io::Error),
+    /// The simulation's thread died by a bug; the window lives on.
+    #[error("the simulation died by a bug")]
+    Died,
     /// The device was lost a second time in a short while.
     #[error(
         "{0}; it had been lost a moment before, so it was not opened again: lower the quality \

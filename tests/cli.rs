@@ -3,6 +3,7 @@
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
+use insonify::sim::stages;
 use serde_json::Value;
 
 /// A small frame, so that a software driver takes well under a second.
@@ -76,7 +77,7 @@ fn render_writes_picture_stages_and_figures_without_a_validation_message() {
         for key in ["settings", "device", "stages_ms", "frame_ms", "memory", "counters"] {
             assert!(figures[key].is_object(), "{key}");
         }
-        for stage in ["origin", "trace", "scatter", "beam", "axial", "display"] {
+        for stage in stages::IMAGE.map(|pass| pass.name) {
             assert!(figures["stages_ms"][stage]["p99"].as_f64() > Some(0.0), "{stage}");
         }
         assert!(figures["memory"]["device_peak_bytes"].as_u64() > Some(100_000));
@@ -234,7 +235,11 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
             .output()
             .expect("the program starts")
     };
-    for name in ["origin", "trace", "scatter_rigid", "beam", "axial", "detect", "display"] {
+    let names = stages::IMAGE.map(|pass| pass.name).map(|name| match name {
+        "scatter" => "scatter_rigid",
+        name => name,
+    });
+    for name in names.into_iter().chain(["detect"]) {
         let out = kernels(name);
         let said = text(&out.stdout) + &text(&out.stderr);
         assert!(out.status.success(), "{said}");

@@ -1,11 +1,15 @@
 //! The same on two Vulkan drivers: kernels against their twins, and pictures of two scenes. The second
-//! driver is the one that `tools/setup.sh` unpacks into `target/second-driver`; where there is none,
-//! these tests say that they are skipped.
+//! driver is the one that `tools/setup.sh` unpacks into `target/second-driver`; without it these tests are
+//! skipped.
+
+#[path = "common/skip.rs"]
+mod skip;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use image::GrayImage;
+use skip::{Lacking, skip};
 
 /// Share of a picture's pixels that may differ by more than one grey level between two drivers.
 const APART: f64 = 1e-3;
@@ -23,7 +27,7 @@ fn second_driver() -> Option<PathBuf> {
     if manifest.exists() {
         return Some(manifest);
     }
-    println!("skipped: no second driver in target/second-driver (./tools/setup.sh unpacks one)");
+    skip(Lacking::Tool, "no second driver in target/second-driver (./tools/setup.sh unpacks one)");
     None
 }
 

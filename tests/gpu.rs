@@ -15,6 +15,8 @@ mod commands;
 mod dynamic;
 #[path = "gpu/sheet.rs"]
 mod sheet;
+#[path = "common/skip.rs"]
+mod skip;
 
 /// Group size of `add.comp` in these tests; not its default.
 const ADD_GROUP: u32 = 32;

@@ -1,9 +1,20 @@
 //! Every kernel against its f64 twin: random, empty, of size one, of odd sizes, with NaN and
 //! infinity; and an error planted into each kernel's outputs is caught.
 
+#[path = "../tools/harness/mod.rs"]
+mod harness;
+
+use std::path::Path;
+
+use harness::{Case, Element, Job, SUBJECTS, Size, dump};
 use insonify::gpu::{Kernel, test_device};
-use insonify::harness::{self, Case, SUBJECTS, Size};
-use insonify::sim::shaders::{Library, source};
+use insonify::output::npy;
+use insonify::sim::shaders::Library;
+use insonify::sim::stages;
+
+/// Kernels of pictures for the user, without a twin: tests/survey.rs and tests/fusion.rs hold them to
+/// closed forms.
+const CLOSED_FORMS: [&str; 3] = ["survey_bvh", "survey_query", "tint"];
 
 fn subject(name: &str) {
     let subject = SUBJECTS.iter().find(|s| s.name == name).unwrap();
@@ -14,11 +25,11 @@ fn subject(name: &str) {
     );
     let library = Library::embedded();
     let mut wrong = Vec::new();
-    for stem in subject.stems {
+    for stem in subject.stems(&library) {
         let kernel = Kernel::new(&device, stem, library.words(stem), &[]).unwrap();
         for case in Case::ALL {
             let job = (subject.job)(case, Size::Small);
-            let extent = (subject.extent)(&job);
+            let extent = subject.extent(&job);
             let mut outputs = harness::run(&device, &kernel, &job, &extent).unwrap().outputs;
             for check in (subject.check)(&job, &outputs) {
                 println!("{stem} {case:?}: {check}");
@@ -47,13 +58,12 @@ macro_rules! subjects {
         fn no_kernel_lacks_a_test() {
             let tested = [$(stringify!($name)),*];
             assert_eq!(tested, SUBJECTS.map(|s| s.name));
-            let mut stems: Vec<&str> = SUBJECTS.iter().flat_map(|s| s.stems).copied().collect();
+            let library = Library::embedded();
+            let mut stems: Vec<&str> = SUBJECTS.iter().flat_map(|s| s.stems(&library)).collect();
+            stems.extend(CLOSED_FORMS);
             stems.sort_unstable();
             stems.dedup(); // `detect` is the last step of `axial`
-            let dir = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
-            let variants = source::variants(dir.as_ref()).unwrap();
-            let kernels = variants.iter().filter(|v| !v.keep_names).map(|v| v.stem.as_str());
-            assert_eq!(stems, kernels.collect::<Vec<_>>());
+            assert_eq!(stems, Library::embedded().stems().collect::<Vec<_>>());
         }
     };
 }
@@ -80,7 +90,86 @@ subjects!(
     difference,
     reduce,
     collapse,
-    fuse,
-    survey,
-    tint
+    fuse
 );
+
+/// What the source of a kernel binds, by number; a ray query's `tlas` stands where others have `nodes`.
+fn declared(kernel: &str) -> Vec<String> {
+    let source = std::fs::read_to_string(Path::new(GLSL).join(format!("{kernel}.comp"))).unwrap();
+    let mut names = Vec::new();
+    for line in source.lines().filter(|line| line.starts_with("layout(") && !line.contains("tlas"))
+    {
+        let Some((_, rest)) = line.split_once("binding = ") else { continue };
+        let (number, rest) = rest.split_once(')').unwrap();
+        assert_eq!(number.parse(), Ok(names.len()), "{kernel}: {line}");
+        // Of a block its only member, of a texture itself.
+        let member = rest.split_once('{').map_or(rest, |(_, member)| member);
+        let declaration = member.split(';').next().unwrap().trim();
+        let name = declaration.split(' ').next_back().unwrap();
+        names.push(name.split('[').next().unwrap().to_owned());
+    }
+    names
+}
+
+#[test]
+fn what_stages_and_jobs_bind_has_the_names_of_the_sources() {
+    for pass in stages::all() {
+        assert_eq!(declared(pass.name), pass.binds, "{}", pass.name);
+    }
+    for subject in &SUBJECTS {
+        let kernel = subject.pass.map_or(subject.name, |pass| pass.name);
+        let job = (subject.job)(Case::One, Size::Small);
+        let names: Vec<&str> = job.inputs.iter().map(|input| input.name).collect();
+        assert_eq!(declared(kernel), names, "{}", subject.name);
+    }
+}
+
+/// Whether a dispatch binds a buffer or what one of its own stands for, its array says who fills it.
+#[test]
+fn every_array_that_a_stage_binds_is_made_by_one() {
+    // Filled level by level, and the volume.
+    let given = ["level", "fine", "coarse", "coarse_change", "change", "acquired"];
+    for pass in stages::all() {
+        for name in pass.binds {
+            assert!(stages::array(name).is_some() != given.contains(name), "{}: {name}", pass.name);
+        }
+    }
+}
+
+fn contents(job: &Job) -> Vec<Vec<u8>> {
+    job.inputs.iter().map(|i| i.bytes.clone()).collect()
+}
+
+#[test]
+fn every_job_survives_the_folder() {
+    for subject in &SUBJECTS {
+        for case in Case::ALL {
+            let job = (subject.job)(case, Size::Small);
+            let dir = tempfile::tempdir().unwrap();
+            dump::write(dir.path(), &job, &contents(&job)).unwrap();
+            let mut again = (subject.job)(Case::One, Size::Small);
+            dump::read(dir.path(), subject, &mut again).unwrap();
+            assert_eq!(again, job, "{} {case:?}", subject.name);
+        }
+    }
+}
+
+#[test]
+fn a_folder_of_nothing_and_arrays_too_small_are_refused() {
+    let subject = SUBJECTS.iter().find(|s| s.name == "axial").unwrap();
+    let mut job = (subject.job)(Case::Odd, Size::Small);
+    let dir = tempfile::tempdir().unwrap();
+    let empty = dump::read(dir.path(), subject, &mut job).unwrap_err();
+    assert!(empty.contains("frame, rows, lateral, iq"), "{empty}");
+    let path = dir.path().join("lateral.npy");
+    let at = job.index("lateral");
+    let words = job.inputs[at].bytes.len() / 4;
+    for (words, fits) in [(words, true), (words - 2, false)] {
+        let lateral = &job.inputs[at].bytes[..4 * words];
+        npy::write(&path, Element::Float, &[words], lateral).unwrap();
+        match dump::read(dir.path(), subject, &mut job) {
+            Ok(found) => assert!(fits && found == ["lateral"], "{found:?}"),
+            Err(e) => assert!(!fits && e.contains("lateral has"), "{e}"),
+        }
+    }
+}

@@ -1,9 +1,11 @@
-//! `sim::layout` mirrors `glsl/shared.glsl`: names, offsets and strides, by reflection of SPIR-V.
+//! `sim::layout` mirrors `glsl/shared.glsl`: names, offsets and strides by reflection of SPIR-V, the
+//! constants as they are written there.
 
 use std::mem::size_of;
 
 use insonify::sim::layout::{
-    Counters, Frame, Fusion, Instance, Interaction, Row, Scanline, Segment, Surface, Survey, Tissue,
+    CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Row, Scanline, Segment, Surface,
+    Survey, Tissue,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -112,6 +114,61 @@ fn every_structure_has_the_names_offsets_and_size_of_its_mirror() {
             .unwrap_or_else(|| panic!("{} is not in layout.comp", mirror.name));
         assert_eq!(difference(structure, *stride, mirror), None);
     }
+}
+
+/// Names and values of the constants in `glsl/shared.glsl`: numbers, and sums with another one's name.
+fn shader_constants() -> Vec<(String, f64)> {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl/shared.glsl");
+    let mut found: Vec<(String, f64)> = Vec::new();
+    for line in std::fs::read_to_string(path).unwrap().lines() {
+        let Some(declaration) = line.strip_prefix("const ") else { continue };
+        let (name, value) = declaration.split_once(';').unwrap().0.split_once(" = ").unwrap();
+        let name = name.split_once(' ').unwrap().1;
+        let term = |term: &str| {
+            let number = term.trim_end_matches('u');
+            let hexadecimal = number.strip_prefix("0x").map(|digits| {
+                f64::from(u32::from_str_radix(digits, 16).expect("a hexadecimal number"))
+            });
+            let known = found.iter().find(|(known, _)| known == number).map(|(_, value)| *value);
+            hexadecimal.or(known).unwrap_or_else(|| {
+                number.parse().unwrap_or_else(|_| panic!("{name}: {number} is no number"))
+            })
+        };
+        let value = value.split(" + ").map(term).sum();
+        found.push((name.to_owned(), value));
+    }
+    found
+}
+
+/// In what the constants of the shaders differ from ours: values as single precision has them.
+fn differing(shader: &[(String, f64)], ours: &[(&str, f64)]) -> Vec<String> {
+    let mut wrong = Vec::new();
+    for (name, value) in shader {
+        match ours.iter().find(|(ours, _)| ours == name) {
+            Some((_, ours)) if *ours as f32 == *value as f32 => {}
+            Some((_, ours)) => wrong.push(format!("{name}: {ours} here, {value} in the shader")),
+            None => wrong.push(format!("{name}: not in sim::layout")),
+        }
+    }
+    for (name, _) in ours.iter().filter(|(ours, _)| shader.iter().all(|(name, _)| name != ours)) {
+        wrong.push(format!("{name}: not in shared.glsl"));
+    }
+    wrong
+}
+
+#[test]
+fn every_constant_has_the_value_of_its_mirror() {
+    let shader = shader_constants();
+    assert!(shader.len() > 50, "{shader:?}");
+    assert_eq!(differing(&shader, CONSTANTS), Vec::<String>::new());
+    // Each of another value, and one that either side lacks, are noticed.
+    for at in 0..shader.len() {
+        let mut planted = shader.clone();
+        planted[at].1 = 1.001 * planted[at].1 + 1.0;
+        assert_eq!(differing(&planted, CONSTANTS).len(), 1);
+    }
+    assert_eq!(differing(&shader[1..], CONSTANTS).len(), 1);
+    assert_eq!(differing(&shader, &CONSTANTS[1..]).len(), 1);
 }
 
 #[test]

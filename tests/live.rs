@@ -105,7 +105,7 @@ fn levels_take_turns_in_the_same_buffers_and_leave_no_trace() {
         level.apply(&mut scene);
         let taken = picture(&mut used, &scene);
         assert_eq!(memory(), before, "nothing is made anew");
-        assert!(!used.fit(&library, &scene).expect("fits"), "and nothing has to be");
+        assert!(!used.fit(&scene).expect("fits"), "and nothing has to be");
         if level.layers == 1 {
             assert_eq!(taken, picture(&mut new(), &scene), "{level}");
         }

@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use insonify::gpu::test_device;
+use insonify::matching::{self, Adjusted, Matching, Options, Stage, depths};
 use insonify::scene::{Imaging, Scene};
-use insonify::sim::matching::{self, Adjusted, Matching, Options, Stage, depths};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use shared_data::shared_data;

@@ -1,11 +1,12 @@
 //! What a fused frame does not compute: around the masks sound goes straight on, and what nobody
 //! hears is not traced.
 
-use std::path::Path;
+#[path = "../tools/harness/mod.rs"]
+mod harness;
+
 use std::sync::Arc;
 
-use insonify::gpu::{Device, Kernel, test_device};
-use insonify::harness::{self, Case, SUBJECTS, Size};
+use insonify::gpu::{Device, test_device};
 use insonify::scene::Scene;
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
@@ -210,21 +211,8 @@ fn origin_and_trace_of_a_fused_frame_equal_their_twins() {
     let folder = tempfile::tempdir().expect("a folder");
     dump::frame(&mut simulator, &scene, folder.path()).expect("dumped");
     for name in ["origin", "trace"] {
-        checked(&device, &library, folder.path(), name);
-    }
-}
-
-/// Runs a kernel on what the frame dumped and compares it with its twin.
-fn checked(device: &Arc<Device>, library: &Library, dump: &Path, name: &str) {
-    let subject = SUBJECTS.iter().find(|s| s.name == name).expect(name);
-    let mut job = (subject.job)(Case::One, Size::Small);
-    let found = harness::dump::read(dump, subject, &mut job).expect(name);
-    assert!(found.len() >= 2, "{name}: {found:?}");
-    let stem = subject.stems[0];
-    let kernel = Kernel::new(device, stem, library.words(stem), &[]).expect(stem);
-    let extent = (subject.extent)(&job);
-    let outcome = harness::run(device, &kernel, &job, &extent).expect(stem);
-    for check in (subject.check)(&job, &outcome.outputs) {
-        assert!(check.passed(), "{name}: {check}");
+        for check in harness::dump::check(&device, &library, folder.path(), name) {
+            assert!(check.passed(), "{name}: {check}");
+        }
     }
 }

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use std::{env, fs};
 
 use insonify::output;
-use insonify::sim::shaders::stamp::{self, Entry};
-use insonify::sim::shaders::{Error, bytes_of, compiler, source, validate};
+use insonify::sim::shaders::authors::stamp::{self, Entry};
+use insonify::sim::shaders::authors::{Error, bytes_of, compiler, source, validate};
 
 fn main() -> ExitCode {
     let check = match env::args().skip(1).collect::<Vec<_>>().as_slice() {

@@ -1,14 +1,17 @@
 //! Runs single kernels against their f64 twins:
 //! `cargo run --release --bin kernels -- list | run NAME [--input DIR] [--output DIR] | check`.
 
+#[path = "harness/mod.rs"]
+mod harness;
+
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand, ValueEnum};
+use harness::{Case, SUBJECTS, Size, Subject, dump};
 use insonify::gpu::{Device, DeviceOptions, Kernel, prepare_process};
-use insonify::harness::{self, Case, SUBJECTS, Size, Subject, dump};
 use insonify::output;
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
@@ -64,7 +67,7 @@ fn main() -> Result<ExitCode> {
     let arguments = Arguments::parse();
     let library = Library::embedded();
     if let Command::List = arguments.command {
-        list();
+        list(&library);
         return Ok(ExitCode::SUCCESS);
     }
     let device = Device::new(&DeviceOptions {
@@ -77,7 +80,7 @@ fn main() -> Result<ExitCode> {
     let passed = match arguments.command {
         Command::List => true,
         Command::Run { name, input, output, size } => {
-            let subject = find(&name)?;
+            let subject = find(&name, &library)?;
             let size = match size {
                 Extent::Small => Size::Small,
                 Extent::Standard => Size::Standard,
@@ -93,17 +96,17 @@ fn main() -> Result<ExitCode> {
     Ok(ExitCode::from(u8::from(!passed || !messages.is_empty())))
 }
 
-fn find(name: &str) -> Result<&'static Subject> {
+fn find(name: &str, library: &Library) -> Result<&'static Subject> {
     let names: Vec<_> = SUBJECTS.iter().map(|s| s.name).collect();
-    let found = SUBJECTS.iter().find(|s| s.name == name || s.stems.contains(&name));
+    let found = SUBJECTS.iter().find(|s| s.name == name || s.stems(library).contains(&name));
     found.ok_or_else(|| miette!("no kernel '{name}'; there are {}", names.join(", ")))
 }
 
-fn list() {
+fn list(library: &Library) {
     for subject in &SUBJECTS {
         let bindings: Vec<_> =
             (subject.job)(Case::One, Size::Small).inputs.iter().map(|i| i.name).collect();
-        output::line(format_args!("{:<9} {}", subject.name, subject.stems.join(" ")));
+        output::line(format_args!("{:<9} {}", subject.name, subject.stems(library).join(" ")));
         output::line(format_args!("          bindings:  {}", bindings.join(" ")));
         output::line(format_args!("          tolerance: {}", subject.tolerance));
     }
@@ -112,7 +115,7 @@ fn list() {
 /// Variants of a subject that the device can run.
 fn kernels(device: &Arc<Device>, library: &Library, subject: &Subject) -> Result<Vec<Kernel>> {
     let mut kernels = Vec::new();
-    for stem in subject.stems {
+    for stem in subject.stems(library) {
         if stem.ends_with("_query") && !device.supports_ray_query() {
             output::line(format_args!("{stem}: not run, the device has no ray query"));
             continue;
@@ -136,7 +139,7 @@ fn run(
         output::line(format_args!("from {}: {}", dir.display(), found.join(", ")));
     }
     output::line(format_args!("tolerance: {}", subject.tolerance));
-    let extent = (subject.extent)(&job);
+    let extent = subject.extent(&job);
     let mut passed = true;
     for kernel in kernels(device, library, subject)? {
         let mut fastest = f64::INFINITY;
@@ -174,7 +177,7 @@ fn check(device: &Arc<Device>, library: &Library) -> Result<bool> {
         for kernel in kernels(device, library, subject)? {
             for case in Case::ALL {
                 let job = (subject.job)(case, Size::Small);
-                let extent = (subject.extent)(&job);
+                let extent = subject.extent(&job);
                 let outcome = harness::run(device, &kernel, &job, &extent).into_diagnostic()?;
                 output::line(format_args!(
                     "{} {case:?}: {:.3} ms",

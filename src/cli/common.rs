@@ -1,10 +1,10 @@
 //! Arguments and actions common to all commands that simulate.
 
+use std::io::{IsTerminal, stderr};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, cache_folder};
@@ -250,29 +250,39 @@ pub fn unseen(scene: &Scene, mask: usize) -> String {
     )
 }
 
-/// Progress on standard error. Hidden where that is no terminal; silent under a second.
+/// How long nothing is said of progress, s.
+const QUIET: f64 = 1.0;
+
+/// Progress on standard error: a line that is written over, where that is a terminal.
 pub struct Progress {
-    bar: ProgressBar,
+    count: u32,
+    noun: String,
     start: Instant,
+    /// When the line is written next, s.
+    next: f64,
 }
 
 impl Progress {
     /// Progress of `count` items, each a `noun`.
     pub fn new(count: u32, noun: &str) -> Self {
-        let template = format!("{{wide_bar}} {{pos}}/{{len}} {noun}, {{eta}} left");
-        let style = ProgressStyle::with_template(&template).expect("a valid template");
-        Self { bar: ProgressBar::new(u64::from(count)).with_style(style), start: Instant::now() }
+        Self { count, noun: noun.to_owned(), start: Instant::now(), next: QUIET }
     }
 
     /// Shows that `count` items are done.
     pub fn done(&mut self, count: u32) {
-        if self.start.elapsed().as_secs() >= 1 {
-            self.bar.set_position(u64::from(count));
+        let gone = self.start.elapsed().as_secs_f64();
+        if gone >= self.next && stderr().is_terminal() {
+            self.next = gone + 0.1;
+            let left = gone / f64::from(count.max(1)) * f64::from(self.count.saturating_sub(count));
+            // The end of a longer line before it is erased (ECMA-48, EL).
+            eprint!("\r{count}/{} {}, {left:.0} s left\x1b[K", self.count, self.noun);
         }
     }
 
     /// Ends the display: all items are done.
     pub fn finish(self) {
-        self.bar.finish_and_clear();
+        if self.next > QUIET {
+            eprint!("\r\x1b[K");
+        }
     }
 }

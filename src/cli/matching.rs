@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use insonify::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::output;
 use insonify::scene::Imaging;
 use insonify::scene::file::{self, Entry, save};
 use insonify::settings::Group;
-use insonify::sim::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::sim::shaders::Library;
 use miette::{Result, miette};
 

@@ -1,6 +1,6 @@
 //! The random order in which images are shown.
 
-use insonify::reference::random::pcg4d;
+use insonify::random::pcg4d;
 
 /// A permutation of `count` images, drawn by `seed` (Fisher and Yates). Each `stream` draws an order of
 /// its own.

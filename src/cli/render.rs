@@ -11,12 +11,13 @@ use super::common::{self, Common, Progress};
 use super::images::Images;
 use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
-use insonify::movie::Movie;
 use insonify::output;
+use insonify::output::movie::Movie;
 use insonify::scene::{Scene, file};
 use insonify::settings::ScatterMode;
 use insonify::sim::calibration::Calibration;
 use insonify::sim::dump;
+use insonify::sim::facts;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::statistics::Statistics;
@@ -109,7 +110,7 @@ pub fn run(args: &Render) -> Result<()> {
         let memory = device.memory();
         let report = json!({
             "scene": args.scene.display().to_string(),
-            "settings": output::settings(&scene.probe, &scene.simulation, &scene.imaging),
+            "settings": facts::settings(&scene.probe, &scene.simulation, &scene.imaging),
             "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
             "tracer": tracer.to_string(),
             "triangles": scene.triangles(),

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use insonify::output;
+use insonify::output::sheet::{Sheet, Tile};
 use insonify::scene::Scene;
-use insonify::sheet::{Sheet, Tile};
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 

@@ -21,6 +21,8 @@ const LARGE: usize = 1024;
 /// own threads: scenes are loaded with those meanwhile.
 static MAKERS: LazyLock<ThreadPool> = LazyLock::new(|| {
     let threads = ThreadPoolBuilder::new().thread_name(|at| format!("pipelines {at}"));
+    // A panic would end the process. Who needs the pipeline makes it itself, and meets the same.
+    let threads = threads.panic_handler(|_| ());
     threads.build().expect("threads for pipelines")
 });
 

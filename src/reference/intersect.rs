@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::scene::Scene;
+use crate::scene::{Scene, triangle};
 
 /// Where a ray meets a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,26 +19,6 @@ pub struct Hit {
     pub v: f64,
 }
 
-/// Ray parameter and barycentric weights (t, u, v) where a ray meets the triangle of these
-/// `corners`; unbounded in t. Edges count as inside.
-///
-/// The edge functions are scalar triple products (Pluecker coordinates of the ray and the edge), of
-/// which two triangles that share an edge compute exactly opposite values: no ray passes between.
-pub fn triangle(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<[f64; 3]> {
-    let [a, b, c] = corners.map(|corner| corner - origin);
-    let weights = [direction.dot(c.cross(b)), direction.dot(a.cross(c)), direction.dot(b.cross(a))];
-    if weights.iter().any(|&w| w < 0.0) && weights.iter().any(|&w| w > 0.0) {
-        return None;
-    }
-    let sum: f64 = weights.iter().sum();
-    if sum == 0.0 {
-        return None;
-    }
-    let [wa, wb, wc] = weights.map(|w| w / sum);
-    let t = (a * wa + b * wb + c * wc).dot(direction) / direction.length_squared();
-    Some([t, wb, wc])
-}
-
 /// All surfaces with t > `t_min` along `origin + t * direction` (world space, mm), by increasing t.
 /// A ray through an edge meets both its triangles.
 pub fn all_hits(scene: &Scene, origin: DVec3, direction: DVec3, t_min: f64) -> Vec<Hit> {
@@ -53,7 +33,7 @@ pub fn all_hits(scene: &Scene, origin: DVec3, direction: DVec3, t_min: f64) -> V
         for index in 0..mesh.triangles.len() {
             let corners = mesh.triangles[index]
                 .map(|i| DVec3::from(mesh.positions[i as usize].map(f64::from)));
-            if let Some([t, u, v]) = triangle(corners, o, d)
+            if let Some([t, u, v]) = triangle::crossing(corners, o, d)
                 && t > t_min
             {
                 hits.push(Hit { t, instance, triangle: index, u, v });
@@ -76,22 +56,4 @@ pub fn closest_hit(
         .into_iter()
         .find(|hit| Some(hit.instance) != skip)
         .filter(|hit| hit.t < t_max)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn triangle_in_closed_form() {
-        let corners = [DVec3::ZERO, 2.0 * DVec3::X, 4.0 * DVec3::Y];
-        let at = |x, y| triangle(corners, DVec3::new(x, y, -3.0), DVec3::new(0.0, 0.0, 0.5));
-        // Weights are x/2 and y/4; the plane z = 0 lies six half-unit directions away. Binary fractions: exact.
-        assert_eq!(at(0.5, 1.0), Some([6.0, 0.25, 0.25]));
-        assert_eq!(at(1.0, 0.0), Some([6.0, 0.5, 0.0]), "edges are inside");
-        assert_eq!(at(0.0, 0.0), Some([6.0, 0.0, 0.0]), "vertices are inside");
-        assert_eq!(at(-1e-9, 1.0), None);
-        assert_eq!(at(1.5, 1.5), None);
-        assert_eq!(triangle(corners, DVec3::ZERO, DVec3::X), None, "a ray in the plane misses");
-    }
 }

@@ -1,4 +1,4 @@
-//! The f64 twin of every kernel: plain loops that share nothing with the device's code.
+//! The f64 twin of every kernel of the image: plain loops that share nothing with the device's code.
 //!
 //! One module per kernel, with the kernel's name; what each computes is docs/kernels.md. The inputs
 //! are the structures that the kernels bind ([`layout`](crate::sim::layout)), widened to f64.
@@ -34,9 +34,7 @@ pub mod scatter;
 pub mod segment;
 pub mod shadow;
 pub mod stack;
-pub mod survey;
 pub mod texture;
-pub mod tint;
 pub mod trace;
 pub mod way;
 pub mod world;

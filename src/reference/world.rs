@@ -3,8 +3,8 @@
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::field::Field;
-use super::intersect;
 use super::stack::Stack;
+use crate::scene::triangle;
 use crate::sim::layout::{Frame, Instance, NONE, Row, Rows, Surface, Tissue};
 
 /// Crossings of one instance from one side closer together than this, mm, are one crossing: a ray
@@ -107,7 +107,7 @@ impl World<'_> {
             let first = instance.first_triangle as usize;
             for triangle in first..first + instance.triangles as usize {
                 let corners = self.corners(triangle);
-                if let Some([t, u, v]) = intersect::triangle(corners, o, d)
+                if let Some([t, u, v]) = triangle::crossing(corners, o, d)
                     && t > t_min
                     && t < t_max
                 {

@@ -6,9 +6,9 @@
 //! far off have no pull, and no step makes the fit worse.
 
 use glam::{DAffine3, DQuat, DVec3};
-use nalgebra::{SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 
+use super::symmetric::{Square, eigen};
 use super::{RegisterError, Surface, Transformation, scale_of};
 use crate::statistics::Statistics;
 
@@ -33,8 +33,7 @@ const LOOSE: f64 = 1e-3;
 
 /// Number of components of a motion: shift, rotation and growth, all in mm of a typical point's movement.
 const FREEDOMS: usize = 7;
-type Motion = SVector<f64, FREEDOMS>;
-type Normal = SMatrix<f64, FREEDOMS, FREEDOMS>;
+type Motion = [f64; FREEDOMS];
 
 /// Result of a fit of points to a surface.
 #[derive(Clone, Debug)]
@@ -135,7 +134,7 @@ pub fn fit(
         settled = true;
         while damping < 1e9 {
             let motion = system.step(damping);
-            if motion.norm() < STILL {
+            if dot(&motion, &motion).sqrt() < STILL {
                 break;
             }
             let next = system.increment(&motion) * transform;
@@ -222,7 +221,8 @@ fn cost(matched: &[Matched], cutoff: f64) -> f64 {
 
 /// Normal equations of the distances, linear in a small motion about the points' centre.
 struct System {
-    matrix: Normal,
+    /// Eigenvalues of the matrix, and their directions.
+    axes: [(f64, Motion); FREEDOMS],
     gradient: Motion,
     weight: f64,
     centre: DVec3,
@@ -236,8 +236,8 @@ impl System {
         let centre = matched.iter().map(|m| m.at).sum::<DVec3>() / count;
         let squares = matched.iter().map(|m| m.at.distance_squared(centre));
         let reach = (squares.sum::<f64>() / count).sqrt();
-        let mut out =
-            Self { matrix: Normal::zeros(), gradient: Motion::zeros(), weight: 0.0, centre, reach };
+        let mut matrix: Square<FREEDOMS> = Default::default();
+        let (mut gradient, mut total) = (Motion::default(), 0.0);
         for m in matched.iter().filter(|m| m.off < cutoff) {
             let weight = (1.0 - (m.off / cutoff).powi(2)).powi(2);
             let arm = (m.at - centre) / reach;
@@ -246,21 +246,34 @@ impl System {
                 Transformation::Rigid => 0.0,
                 Transformation::Similarity => arm.dot(m.away),
             };
-            let row = Motion::from([shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, growth]);
-            out.matrix += weight * row * row.transpose();
-            out.gradient += weight * m.off * row;
-            out.weight += weight;
+            let row = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, growth];
+            for i in 0..FREEDOMS {
+                for j in 0..FREEDOMS {
+                    matrix[i][j] += weight * row[i] * row[j];
+                }
+                gradient[i] += weight * m.off * row[i];
+            }
+            total += weight;
         }
-        out
+        Self { axes: eigen(matrix), gradient, weight: total, centre, reach }
     }
 
     /// The motion that lowers the sum; the more damping, the shorter. Components that the points do not determine
     /// are zero.
     fn step(&self, damping: f64) -> Motion {
-        // The identity separates components without an equation, such as growth in a rigid fit.
-        let held = Normal::identity() * (damping * self.matrix.trace() / FREEDOMS as f64);
-        let solved = (self.matrix + held).cholesky();
-        solved.map_or_else(Motion::zeros, |c| -c.solve(&self.gradient))
+        let trace: f64 = self.axes.iter().map(|(value, _)| value).sum();
+        let mut motion = Motion::default();
+        for (value, axis) in &self.axes {
+            // Damped, so that it is positive also without an equation, such as for growth in a rigid fit.
+            let stiffness = value + damping * trace / FREEDOMS as f64;
+            if stiffness > 0.0 {
+                let way = -dot(axis, &self.gradient) / stiffness;
+                for (m, a) in motion.iter_mut().zip(axis) {
+                    *m += way * a;
+                }
+            }
+        }
+        motion
     }
 
     fn increment(&self, motion: &Motion) -> DAffine3 {
@@ -275,10 +288,9 @@ impl System {
 
     /// Motions that hardly change any distance.
     fn loose(&self, transformation: Transformation) -> Vec<String> {
-        let eigen = SymmetricEigen::new(self.matrix / self.weight.max(f64::MIN_POSITIVE));
-        let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+        let least = LOOSE * self.weight.max(f64::MIN_POSITIVE);
         let mut out = Vec::new();
-        for (_, vector) in pairs.filter(|(value, _)| **value < LOOSE) {
+        for (_, vector) in self.axes.iter().filter(|(value, _)| *value < least) {
             let part = |i: usize| DVec3::new(vector[i], vector[i + 1], vector[i + 2]);
             let (shift, turn, growth) = (part(0), part(3), vector[6].abs());
             let largest = shift.length().max(turn.length()).max(growth);
@@ -299,6 +311,10 @@ impl System {
         }
         out
     }
+}
+
+fn dot(a: &Motion, b: &Motion) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 use std::sync::LazyLock;
 
 use super::*;
-use crate::reference::random::{gaussian, pcg4d, unit};
+use crate::random::{gaussian, pcg4d, unit};
 use crate::register::surface::{Triangle, samples};
 use crate::scene::{Mesh, shapes};
 

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use super::issue::Issue;
 use super::mesh::{Soup, Units};
 use super::topology::{self, Edges};
+use crate::issue::Issue;
 
 mod coincident;
 mod fusion;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::issue::Issue;
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
+use crate::issue::Issue;
 
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
     let issues = scan(path, bytes);

@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use super::issue::Issue;
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
+use crate::issue::Issue;
 
 /// Bytes of a binary file before its triangles, and of each triangle.
 const HEADER: usize = 84;

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::issue::Issue;
 use super::{Mesh, check, load_gltf, load_obj, load_stl};
+use crate::issue::Issue;
 
 mod animated;
 mod keyframes;

@@ -11,7 +11,6 @@ pub mod contact;
 pub mod file;
 pub mod fusion;
 pub mod graph;
-pub mod issue;
 pub mod keyframes;
 mod load_gltf;
 mod load_obj;
@@ -23,13 +22,14 @@ pub mod shapes;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;
+pub mod triangle;
 pub mod vary;
 
+pub use crate::issue::{Issue, Severity, Warning};
 pub use contact::Contact;
 pub use file::SceneError;
 pub use fusion::Acquired;
 pub use graph::Graph;
-pub use issue::{Issue, Severity, Warning};
 pub use keyframes::{Keyframes, Strategy};
 pub use origin::{Origin, Origins};
 pub use tracker::Tracker;
@@ -95,6 +95,34 @@ pub struct Wire {
     pub spacing: f64,
     /// Amplitude of each point relative to a perfect flat mirror.
     pub amplitude: f64,
+}
+
+impl Wire {
+    /// Most points of all wires of a scene file, and of one wire that the model's scale makes longer meanwhile.
+    pub const MOST: u32 = 1_000_000;
+
+    /// Stretches between its points: of `spacing` each, rounded so that both ends have a point; none of a
+    /// single point.
+    pub fn steps(&self) -> u32 {
+        match self.stretches() {
+            0.0 => 0,
+            steps => steps.clamp(1.0, f64::from(Self::MOST - 1)) as u32,
+        }
+    }
+
+    /// The same without an end.
+    fn stretches(&self) -> f64 {
+        let [a, b] = self.ends.map(glam::DVec3::from);
+        match a.distance(b) {
+            0.0 => 0.0,
+            length => (length / self.spacing).round().max(1.0),
+        }
+    }
+
+    /// Points that `spacing` asks for.
+    pub(crate) fn asks_for(&self) -> f64 {
+        self.stretches() + 1.0
+    }
 }
 
 /// Everything that a frame depends on.

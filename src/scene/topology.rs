@@ -5,8 +5,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::issue::Issue;
 use super::mesh::Soup;
+use crate::issue::Issue;
 
 mod winding;
 

@@ -19,15 +19,13 @@ use obvhs::{
     ploc::{PlocSearchDistance, SortPrecision},
 };
 
-use super::layout::NONE;
+use super::layout::{BVH_STACK, NONE};
 use crate::scene::Mesh;
 pub use refit::{Levels, levels};
 
 /// A node as the kernel reads it: 80 bytes.
 pub type Node = [u32; 20];
 
-/// Entries of the kernel's stack.
-pub const STACK: usize = 32;
 /// Left on the stack by the top level while a mesh is walked, beside one entry per level.
 const ENTRY: usize = 1;
 
@@ -55,7 +53,7 @@ const FAST: BvhBuildParams = BvhBuildParams {
 pub enum BvhError {
     /// The traversal stack would overflow.
     #[error(
-        "the hierarchy needs {0} stack entries and the compute tracer has {STACK}: \
+        "the hierarchy needs {0} stack entries and the compute tracer has {BVH_STACK}: \
          remove degenerate triangles, or use the ray-query tracer"
     )]
     TooDeep(usize),
@@ -269,7 +267,7 @@ impl SceneBvh {
         }
         let wide = bvh2_to_cwbvh(&self.top, 1, true, false);
         let needed = depth(&wide.nodes) + ENTRY + self.deepest;
-        if needed > STACK {
+        if needed > BVH_STACK {
             return Err(BvhError::TooDeep(needed));
         }
         self.nodes[0][0] = if boxes.is_empty() { NONE } else { 1 };

@@ -1,118 +1,141 @@
-//! `#[repr(C)]` mirror of `glsl/shared.glsl`; a test compares every offset by reflection.
+//! `#[repr(C)]` mirror of `glsl/shared.glsl`; a test compares every offset by reflection, and every
+//! constant.
 
 use bytemuck::{Pod, Zeroable};
 
 /// Rows of a 3x4 matrix: rotation row, translation.
 pub type Rows = [[f32; 4]; 3];
 
-/// No instance.
-pub const NONE: u32 = u32::MAX;
-/// Media that may enclose one point.
-pub const MAX_STACK: usize = 16;
-/// Words that `origin` leaves of a line: number of media and media; distance and weight at which its
-/// paths begin, and the interactions up to there.
-pub const START_WORDS: usize = MAX_STACK + 4;
+macro_rules! constants {
+    ($($(#[$doc:meta])* pub const $name:ident: $ty:ty = $value:expr;)*) => {
+        $($(#[$doc])* pub const $name: $ty = $value;)*
 
-/// Pieces of the level of what is transmitted along a line.
-pub const MAX_PIECES: usize = 64;
-/// Where a piece begins that is none: behind every sample.
-pub const FAR_PIECE: f32 = 1e30;
+        /// Name and value of each, for the comparison with those of `glsl/shared.glsl`.
+        pub const CONSTANTS: &[(&str, f64)] = &[$((stringify!($name), $name as f64)),*];
+    };
+}
 
-/// Neighbouring scanlines of one sample that a thread of `beam` makes.
-pub const BEAM_LINES: u32 = 8;
-/// Neighbouring samples of one scanline that a thread of `axial` makes.
-pub const AXIAL_SAMPLES: u32 = 8;
-/// Neighbouring sums of one column that a thread of `blur` makes.
-pub const BLUR_SUMS: u32 = 16;
+constants! {
+    /// No instance.
+    pub const NONE: u32 = u32::MAX;
+    /// Media that may enclose one point.
+    pub const MAX_STACK: usize = 16;
+    /// Words that `origin` leaves of a line: number of media and media; distance and weight at which its
+    /// paths begin, and the interactions up to there.
+    pub const START_WORDS: usize = MAX_STACK + 4;
 
-/// The blurred mask weighs the acquired image.
-pub const BLEND_LINEAR: u32 = 0;
-/// Its smoothstep does.
-pub const BLEND_SMOOTH: u32 = 1;
-/// A pyramid of the mask weighs those of the images.
-pub const BLEND_MULTIBAND: u32 = 2;
-/// Samples go through masks at the probe's speed.
-pub const MASK_SPEED_PROBE: u32 = 0;
-/// At that of the tissue which the masking mesh encloses.
-pub const MASK_SPEED_ENCLOSING: u32 = 1;
+    /// Elevation layers of a frame at most.
+    pub const MAX_ELEVATION_LAYERS: u32 = crate::probe::MAX_ELEVATION_LAYERS;
+    /// Entries of the compute tracer's stack: deeper trees are refused.
+    pub const BVH_STACK: usize = 32;
+    /// Magnitude at and beyond which accumulators may have lost an echo; an i32 has one more bit.
+    pub const ECHO_LIMIT: f64 = (1u32 << 30) as f64;
 
-/// The transmitted path always continues, reflected branches are spawned.
-pub const SAMPLING_MAIN_PATH: u32 = 0;
-/// Independent paths.
-pub const SAMPLING_PLAIN: u32 = 1;
-/// Paths that part at the first interaction.
-pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
+    /// Pieces of the level of what is transmitted along a line.
+    pub const MAX_PIECES: usize = 64;
+    /// Where a piece begins that is none: behind every sample.
+    pub const FAR_PIECE: f32 = 1e30;
 
-/// Number of the coarsest lattice of scatterers.
-pub const LATTICE_LEVELS: u32 = 48;
-/// Lattices after which cells have twice the volume.
-pub const LEVELS_PER_OCTAVE: f32 = 2.0;
-/// Part of a level over which the next one takes over.
-pub const LEVEL_FADE: f32 = 0.15;
-/// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice,
-/// whatever drowns it.
-pub const ALL_LEVELS: f32 = -1000.0;
-/// Samples that one workgroup of `scatter` gathers.
-pub const SCATTER_WINDOW: u32 = 1024;
-/// Samples in which a thread of it walks one stretch.
-pub const SCATTER_BIN: u32 = 64;
-/// Samples in which deformed tissue is searched at once.
-pub const SCATTER_PIECE: u32 = 32;
-/// Share of its volume to which tissue can be squeezed; to 1 over it, it can be stretched. A coarse field may say more.
-pub const LEAST_GROWTH: f32 = 0.05;
-/// Samples over which stretches are held against each other.
-pub const SCATTER_SLOT: u32 = 16;
-/// Of a sample: about halfway between two samples, both get a share of a scatterer's echo.
-pub const SAMPLE_BLEND: f32 = 0.0625;
-/// Point targets that share a bounding sphere.
-pub const POINT_GROUP: u32 = 8;
-/// log2(10): 20 dB under black nothing is summed.
-pub const UNHEARD: f32 = std::f32::consts::LOG2_10;
-/// Paths that echo and choose one way at every surface.
-pub const ROLE_WHOLE: u32 = 0;
-/// Main paths, which write their interactions down.
-pub const ROLE_MAIN: u32 = 1;
-/// Echoes at the interactions written down, and what is reflected there.
-pub const ROLE_BRANCHES: u32 = 2;
-/// Of the faint branches no smaller part is followed.
-pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
-/// Paths that one thread takes one after the other at an interaction.
-pub const ECHO_BLOCK: u32 = 8;
+    /// Neighbouring scanlines of one sample that a thread of `beam` makes.
+    pub const BEAM_LINES: u32 = 8;
+    /// Scanlines on each side that `beam` smooths over at most.
+    pub const LATERAL_REACH: i32 = 16;
+    /// Samples on each side that `axial` smooths over at most.
+    pub const AXIAL_REACH: i32 = 32;
+    /// Neighbouring samples of one scanline that a thread of `axial` makes.
+    pub const AXIAL_SAMPLES: u32 = 8;
+    /// Neighbouring sums of one column that a thread of `blur` makes.
+    pub const BLUR_SUMS: u32 = 16;
 
-/// Curved array.
-pub const KIND_CONVEX: u32 = 0;
-/// Flat array.
-pub const KIND_LINEAR: u32 = 1;
-/// All lines from one point.
-pub const KIND_PHASED: u32 = 2;
+    /// The blurred mask weighs the acquired image.
+    pub const BLEND_LINEAR: u32 = 0;
+    /// Its smoothstep does.
+    pub const BLEND_SMOOTH: u32 = 1;
+    /// A pyramid of the mask weighs those of the images.
+    pub const BLEND_MULTIBAND: u32 = 2;
+    /// Samples go through masks at the probe's speed.
+    pub const MASK_SPEED_PROBE: u32 = 0;
+    /// At that of the tissue which the masking mesh encloses.
+    pub const MASK_SPEED_ENCLOSING: u32 = 1;
 
-/// Transmitted rays refract at the sampled micro-normal.
-pub const FLAG_ROUGH_TRANSMISSION: u32 = 1;
-/// Reflected paths bounce off the transducer's face.
-pub const FLAG_FACE_REFLECTION: u32 = 2;
-/// Some instances share triangles exactly.
-pub const FLAG_COINCIDENT: u32 = 4;
-/// The scatterer lattice rests in the world.
-pub const FLAG_WORLD_TEXTURE: u32 = 8;
-/// Surface coherence as in the paper, no split.
-pub const FLAG_COHERENT: u32 = 16;
-/// Paper-like voxel grid instead of the lattice.
-pub const FLAG_VOXEL: u32 = 32;
-/// Reflectances of curved surfaces averaged over the beam.
-pub const FLAG_FOOTPRINT: u32 = 64;
-/// Paths draw from a Sobol sequence.
-pub const FLAG_SOBOL: u32 = 128;
-/// Ray query: several top-level entries of an instance share a mask bit.
-pub const FLAG_SLOTS: u32 = 256;
-/// Only what a masking instance encloses is heard.
-pub const FLAG_MASKED: u32 = 512;
+    /// The transmitted path always continues, reflected branches are spawned.
+    pub const SAMPLING_MAIN_PATH: u32 = 0;
+    /// Independent paths.
+    pub const SAMPLING_PLAIN: u32 = 1;
+    /// Paths that part at the first interaction.
+    pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
 
-/// What lies before the image plane is cut away.
-pub const SURVEY_CUT: u32 = 1;
-/// The B-mode image is shown where it lies.
-pub const SURVEY_IMAGE: u32 = 2;
-/// Of some instance the opacity is 0.
-pub const SURVEY_SOME_HIDDEN: u32 = 4;
+    /// Number of the coarsest lattice of scatterers.
+    pub const LATTICE_LEVELS: u32 = 48;
+    /// Lattices after which cells have twice the volume.
+    pub const LEVELS_PER_OCTAVE: f32 = 2.0;
+    /// Part of a level over which the next one takes over.
+    pub const LEVEL_FADE: f32 = 0.15;
+    /// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice,
+    /// whatever drowns it.
+    pub const ALL_LEVELS: f32 = -1000.0;
+    /// Samples that one workgroup of `scatter` gathers.
+    pub const SCATTER_WINDOW: u32 = 1024;
+    /// Samples in which a thread of it walks one stretch.
+    pub const SCATTER_BIN: u32 = 64;
+    /// Samples in which deformed tissue is searched at once.
+    pub const SCATTER_PIECE: u32 = 32;
+    /// Share of its volume to which tissue can be squeezed; to 1 over it, it can be stretched. A coarse field may say more.
+    pub const LEAST_GROWTH: f32 = 0.05;
+    /// Samples over which stretches are held against each other.
+    pub const SCATTER_SLOT: u32 = 16;
+    /// Of a sample: about halfway between two samples, both get a share of a scatterer's echo.
+    pub const SAMPLE_BLEND: f32 = 0.0625;
+    /// Point targets that share a bounding sphere.
+    pub const POINT_GROUP: u32 = 8;
+    /// log2(10): 20 dB under black nothing is summed.
+    pub const UNHEARD: f32 = std::f32::consts::LOG2_10;
+    /// Paths that echo and choose one way at every surface.
+    pub const ROLE_WHOLE: u32 = 0;
+    /// Main paths, which write their interactions down.
+    pub const ROLE_MAIN: u32 = 1;
+    /// Echoes at the interactions written down, and what is reflected there.
+    pub const ROLE_BRANCHES: u32 = 2;
+    /// Of the faint branches no smaller part is followed.
+    pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
+    /// Paths that one thread takes one after the other at an interaction.
+    pub const ECHO_BLOCK: u32 = 8;
+
+    /// Curved array.
+    pub const KIND_CONVEX: u32 = 0;
+    /// Flat array.
+    pub const KIND_LINEAR: u32 = 1;
+    /// All lines from one point.
+    pub const KIND_PHASED: u32 = 2;
+
+    /// Transmitted rays refract at the sampled micro-normal.
+    pub const FLAG_ROUGH_TRANSMISSION: u32 = 1;
+    /// Reflected paths bounce off the transducer's face.
+    pub const FLAG_FACE_REFLECTION: u32 = 2;
+    /// Some instances share triangles exactly.
+    pub const FLAG_COINCIDENT: u32 = 4;
+    /// The scatterer lattice rests in the world.
+    pub const FLAG_WORLD_TEXTURE: u32 = 8;
+    /// Surface coherence as in the paper, no split.
+    pub const FLAG_COHERENT: u32 = 16;
+    /// Paper-like voxel grid instead of the lattice.
+    pub const FLAG_VOXEL: u32 = 32;
+    /// Reflectances of curved surfaces averaged over the beam.
+    pub const FLAG_FOOTPRINT: u32 = 64;
+    /// Paths draw from a Sobol sequence.
+    pub const FLAG_SOBOL: u32 = 128;
+    /// Ray query: several top-level entries of an instance share a mask bit.
+    pub const FLAG_SLOTS: u32 = 256;
+    /// Only what a masking instance encloses is heard.
+    pub const FLAG_MASKED: u32 = 512;
+
+    /// What lies before the image plane is cut away.
+    pub const SURVEY_CUT: u32 = 1;
+    /// The B-mode image is shown where it lies.
+    pub const SURVEY_IMAGE: u32 = 2;
+    /// Of some instance the opacity is 0.
+    pub const SURVEY_SOME_HIDDEN: u32 = 4;
+}
 
 macro_rules! shared {
     ($($(#[$doc:meta])* struct $name:ident { $($field:ident: $ty:ty),* $(,)? })*) => { $(

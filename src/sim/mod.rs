@@ -1,22 +1,26 @@
 //! The frame: scene and probe to B-mode image on the device.
 
+mod batches;
+mod buffers;
 pub mod bvh;
 pub mod calibration;
 pub mod contact;
 pub mod dump;
+pub mod facts;
 pub mod fields;
 pub mod fusion;
 pub mod layout;
-pub mod matching;
 pub mod memory;
+pub mod pass;
 mod passes;
 pub mod placement;
 mod read_out;
 mod resize;
+mod results;
 pub mod rounds;
 pub mod shaders;
 pub mod special;
-mod stages;
+pub mod stages;
 pub mod survey;
 pub mod tables;
 pub mod tracer;
@@ -25,19 +29,21 @@ pub mod world;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::gpu::{Abandon, AdapterKind, Buffer, Device, FrameTimings, Frames, GpuError, Image};
+use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
 use crate::settings::Machine;
+use batches::Room;
+use buffers::Buffers;
 use bvh::Splits;
 use contact::Touch;
 use fusion::{Fused, Tint};
 pub use memory::Memory;
-use passes::{Passes, frame_constants};
+use passes::{Kernels, Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
-use stages::{Buffers, Kernels, Room};
+use stages::{AXIAL, BEAM, DISPLAY, ORIGIN, SCATTER};
 use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
@@ -159,8 +165,8 @@ impl Simulator {
         let room = Room::of(device);
         let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);
         let tables = Tables::new(scene);
-        let buffers = Buffers::new(device, &frame, &batches.rounds, &tables)?;
-        let fusion = Fused::new(device, library, scene, &frame, tracer, None)?;
+        let buffers = Buffers::new(device, scene, batches.sizes(&frame, &tables))?;
+        let fusion = Fused::new(device, scene, None)?;
         let simulator = Self {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
@@ -176,7 +182,7 @@ impl Simulator {
             read_out: ReadOut::default(),
             update_time: Duration::ZERO,
             passes: Passes {
-                kernels: Kernels::new(device, library, &batches.rounds, &world, false)?,
+                kernels: Kernels::new(device, library, scene, &world, false)?,
                 buffers,
                 fusion,
                 skins: contact::Skins::default(),
@@ -192,15 +198,9 @@ impl Simulator {
     }
 
     fn upload_tables(&self) -> Result<(), GpuError> {
-        let (b, t) = (&self.passes.buffers, &self.tables);
-        self.device.upload_many(&[
-            (&b.scanlines, 0, bytemuck::cast_slice(&t.scanlines)),
-            (&b.rows, 0, bytemuck::cast_slice(&t.rows)),
-            (&b.tissues, 0, bytemuck::cast_slice(&t.tissues)),
-            (&b.surfaces, 0, bytemuck::cast_slice(&t.surfaces)),
-            (&b.points, 0, bytemuck::cast_slice(&t.points)),
-            (&b.grey, 0, bytemuck::cast_slice(&t.grey)),
-        ])
+        let buffers = &self.passes.buffers;
+        let arrays = self.tables.arrays().map(|(name, bytes)| (&buffers[name], 0, bytes));
+        self.device.upload_many(&arrays)
     }
 
     /// Simulates one frame of `scene` as it stands: pose, placements and settings may differ from
@@ -218,17 +218,17 @@ impl Simulator {
         self.update_time = exchanged + passes.update(&mut cmd, scene, self.coincident, index)?;
         passes.touch(&mut cmd, scene)?;
         passes.clear(&mut cmd);
-        passes.origin(&mut cmd)?;
+        passes.run(&mut cmd, &ORIGIN)?;
         let mut turn = 0;
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
             passes.trace(&mut cmd, begin, &mut turn)?;
-            passes.scatter(&mut cmd)?;
+            passes.run(&mut cmd, &SCATTER)?;
         }
-        passes.beam(&mut cmd)?;
-        passes.axial(&mut cmd)?;
+        passes.run(&mut cmd, &BEAM)?;
+        passes.run(&mut cmd, &AXIAL)?;
         // The picture before is replaced as a whole.
         cmd.keep_on();
-        passes.display(&mut cmd)?;
+        passes.run(&mut cmd, &DISPLAY)?;
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
             cmd.copy_to_image(passes.pixels(self.fused), image)?;
@@ -275,7 +275,7 @@ impl Simulator {
 
     /// True where the first frame will wait for the driver's compiler: its kernels have never run here.
     pub fn compiles(&self) -> bool {
-        self.passes.kernels.scatter.is_new()
+        self.passes.kernels.of(&SCATTER).is_new()
     }
 
     /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
@@ -286,12 +286,8 @@ impl Simulator {
         self.frames.wait()?;
         let shapers = world::Kernels::new(&self.device, library)?;
         let world = &self.passes.world;
-        let kernels =
-            Kernels::new(&self.device, library, &self.passes.batches.rounds, world, self.counting)?;
-        if let Some(fusion) = &mut self.passes.fusion {
-            fusion.reload(&self.device, library, world.tracer())?;
-        }
-        self.passes.kernels = kernels;
+        let kernels = &self.passes.kernels;
+        self.passes.kernels = kernels.again(&self.device, library, world, self.counting)?;
         self.surveyor = None;
         self.passes.world.reload(shapers);
         Ok(())
@@ -369,67 +365,5 @@ impl Simulator {
     /// What the user should know of how the scene was uploaded.
     pub fn warning(&self) -> Option<&str> {
         self.passes.fusion.as_ref().and_then(Fused::warning)
-    }
-
-    /// What the last frame counted.
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn counters(&mut self) -> Result<layout::Counters, SimError> {
-        let bytes = self.read(|b| &b.counters)?;
-        Ok(bytemuck::pod_read_unaligned(&bytes[..size_of::<layout::Counters>()]))
-    }
-
-    /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K].
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn echoes(&mut self) -> Result<[Vec<i32>; 2], SimError> {
-        let surface = self.read(|b| &b.surface_echoes)?;
-        let volume = self.read(|b| &b.volume_echoes)?;
-        Ok([surface, volume].map(|bytes| bytemuck::pod_collect_to_vec(&bytes)))
-    }
-
-    /// Segments of the last frame per line e * scanlines + l, in no particular order; where the paths
-    /// were traced in several batches, those of the last batch.
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn segments(&mut self) -> Result<Vec<Vec<layout::Segment>>, SimError> {
-        let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read(|b| &b.segment_count)?);
-        let segments: Vec<layout::Segment> =
-            bytemuck::pod_collect_to_vec(&self.read(|b| &b.segments)?);
-        let capacity = self.passes.frame.segment_capacity as usize;
-        let lines = segments.chunks(capacity).zip(&counts);
-        Ok(lines.map(|(line, &count)| line[..capacity.min(count as usize)].to_vec()).collect())
-    }
-
-    /// Echoes after the lateral stage, with noise, before the axial kernel: complex pairs, [L][K].
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn lateral(&mut self) -> Result<Vec<f32>, SimError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read(|b| &b.lateral)?))
-    }
-
-    /// Complex baseband before TGC, relative to a perfect mirror: complex pairs, [L][K].
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn iq(&mut self) -> Result<Vec<f32>, SimError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read(|b| &b.iq)?))
-    }
-
-    /// Log-compressed envelope, 0..1: [L][K].
-    ///
-    /// # Errors
-    /// What Vulkan says.
-    pub fn log_image(&mut self) -> Result<Vec<f32>, SimError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read(|b| &b.log_image)?))
-    }
-
-    fn read(&mut self, buffer: impl Fn(&Buffers) -> &Buffer) -> Result<Vec<u8>, SimError> {
-        self.frames.wait()?;
-        Ok(self.device.read_back(buffer(&self.passes.buffers))?)
     }
 }

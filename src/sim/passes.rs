@@ -1,13 +1,20 @@
-//! The stages of a frame, each recorded with its bindings and the barrier behind it.
+//! Recording of the stages of a frame, each with what it binds and the barrier behind it.
 
+use std::cmp::Reverse;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::batches::{Batches, Room};
+use super::buffers::Buffers;
 use super::contact::{self, Coupling, Skins, Touch};
-use super::fusion::{Fused, Simulated, Tint};
-use super::stages::{Batches, Buffers, Kernels, Room, lines};
+use super::fusion::Fused;
+use super::pass::{Extent, Pass, Variants};
+use super::shaders::Library;
+use super::stages::{self, CONVERT, DARKEN, FUSE, MASK, SHADOW, TRACE};
 use super::{SimError, World, layout, tables};
-use crate::gpu::{Binding, Buffer, Commands, GpuError, Kernel, Stage};
+use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
+use crate::settings::Blend;
 
 /// What the stages work on.
 pub(super) struct Passes {
@@ -38,12 +45,15 @@ impl Passes {
         let began = Instant::now();
         self.world.update(cmd, scene)?;
         // A frame of fewer lines than the buffers were made for must not want more segments.
-        let room =
-            Room { segments: self.buffers.segments.size(), at_once: self.batches.rounds.at_once };
+        let room = Room {
+            segments: self.buffers["segments"].size(),
+            at_once: self.batches.rounds.at_once,
+        };
         (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, &room);
-        cmd.write(&self.buffers.frame, 0, bytemuck::bytes_of(&self.frame))?;
+        self.buffers.add(cmd.device(), stages::needed(scene))?;
+        cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
-            fusion.update(cmd, scene)?;
+            fusion.update(cmd, scene, &self.buffers)?;
         }
         Ok(began.elapsed())
     }
@@ -52,40 +62,62 @@ impl Passes {
     pub(super) fn touch(&mut self, cmd: &mut Commands, scene: &Scene) -> Result<(), GpuError> {
         let coupling = Coupling::of(scene, &mut self.skins);
         let shares = contact::table(scene, coupling.as_ref());
-        cmd.write(&self.buffers.contact, 0, bytemuck::cast_slice(&shares))?;
+        cmd.write(&self.buffers["contact"], 0, bytemuck::cast_slice(&shares))?;
         self.touch = coupling.map(|coupling| coupling.touch);
         Ok(())
     }
 
     pub(super) fn clear(&self, cmd: &mut Commands) {
-        let b = &self.buffers;
-        for buffer in [&b.surface_echoes, &b.volume_echoes, &b.segment_count, &b.counters] {
-            cmd.fill(buffer, 0);
-        }
+        self.buffers.clear(cmd);
         cmd.barrier(Stage::Transfer, Stage::Compute);
     }
 
-    pub(super) fn origin(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let (b, w) = (&self.buffers, &self.world);
-        cmd.scope("origin");
-        cmd.dispatch(
-            &self.kernels.origin,
-            [lines(&self.frame), 1, 1],
-            &[],
-            &[
-                Binding::Buffer(&b.frame),
-                Binding::Buffer(w.instances()),
-                Binding::Buffer(w.vertices()),
-                Binding::Buffer(w.triangles()),
-                w.structure(),
-                Binding::Buffer(&b.stacks),
-                Binding::Buffer(&b.counters),
-                Binding::Buffer(&b.tissues),
-                Binding::Buffer(&b.scanlines),
-            ],
-        )?;
-        cmd.barrier(Stage::Compute, Stage::Compute);
+    /// Records a pass as it says itself.
+    pub(super) fn run(&self, cmd: &mut Commands, pass: &Pass) -> Result<(), GpuError> {
+        self.run_with(cmd, pass, &[])
+    }
+
+    /// As [`Self::run`], with the buffers `given` instead of those of their names.
+    pub(super) fn run_with(
+        &self,
+        cmd: &mut Commands,
+        pass: &Pass,
+        given: &[(&str, &Buffer)],
+    ) -> Result<(), GpuError> {
+        cmd.scope(pass.name);
+        let extent = pass.extent.expect("what runs as it says has an extent");
+        self.record(cmd, pass, extent(&self.frame), &[], given)
+    }
+
+    /// Records a dispatch of a pass and the barrier behind it; `given` as for [`Self::run_with`].
+    pub(super) fn record(
+        &self,
+        cmd: &mut Commands,
+        pass: &Pass,
+        extent: Extent,
+        push: &[u8],
+        given: &[(&str, &Buffer)],
+    ) -> Result<(), GpuError> {
+        let kernel = self.kernels.of(pass);
+        // By number: what a kernel declares and does not use is not in its SPIR-V.
+        let binds = kernel.bindings().iter().map(|info| pass.binds[info.binding as usize]);
+        let bindings: Vec<Binding> = binds.map(|name| self.binding(name, given)).collect();
+        match extent {
+            Extent::Threads(threads) => cmd.dispatch(kernel, threads, push, &bindings)?,
+            Extent::Groups(groups) => cmd.dispatch_groups(kernel, groups, push, &bindings)?,
+        }
+        cmd.barrier(Stage::Compute, pass.then);
         Ok(())
+    }
+
+    fn binding<'a>(&'a self, name: &str, given: &[(&str, &'a Buffer)]) -> Binding<'a> {
+        if let Some((_, buffer)) = given.iter().find(|(of, _)| *of == name) {
+            return Binding::Buffer(buffer);
+        }
+        match (name, &self.fusion) {
+            ("acquired", Some(fusion)) => Binding::Image(fusion.shown()),
+            _ => self.world.binding(name).unwrap_or_else(|| Binding::Buffer(&self.buffers[name])),
+        }
     }
 
     /// Traces a batch of paths; `turn` as in [`super::rounds::Rounds::of`].
@@ -95,117 +127,19 @@ impl Passes {
         path_begin: u32,
         turn: &mut u32,
     ) -> Result<(), GpuError> {
-        let (b, w) = (&self.buffers, &self.world);
         if path_begin > 0 {
             cmd.barrier(Stage::Compute, Stage::Transfer);
-            cmd.fill(&b.segment_count, 0);
+            cmd.fill(&self.buffers["segment_count"], 0);
             cmd.barrier(Stage::Transfer, Stage::Compute);
         }
         let path_end = self.frame.paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
-        let paths = path_begin..path_end;
-        for round in self.batches.rounds.of(&self.frame, paths, turn) {
-            cmd.dispatch(
-                &self.kernels.trace[round.role as usize],
-                [round.workers, 1, 1],
-                bytemuck::cast_slice(&round.push),
-                &[
-                    Binding::Buffer(&b.frame),
-                    Binding::Buffer(&b.tissues),
-                    Binding::Buffer(&b.surfaces),
-                    Binding::Buffer(w.instances()),
-                    Binding::Buffer(w.vertices()),
-                    Binding::Buffer(w.normals()),
-                    Binding::Buffer(w.triangles()),
-                    w.structure(),
-                    Binding::Buffer(&b.stacks),
-                    Binding::Buffer(&b.rows),
-                    Binding::Buffer(&b.surface_echoes),
-                    Binding::Buffer(&b.segments),
-                    Binding::Buffer(&b.segment_count),
-                    Binding::Buffer(&b.counters),
-                    Binding::Buffer(w.fields()),
-                    Binding::Buffer(&b.interactions),
-                    Binding::Buffer(&b.interaction_count),
-                    Binding::Buffer(&b.scanlines),
-                ],
-            )?;
-            cmd.barrier(Stage::Compute, Stage::Compute);
+        for round in self.batches.rounds.of(&self.frame, path_begin..path_end, turn) {
+            let threads = Extent::Threads([round.workers, 1, 1]);
+            let push = bytemuck::cast_slice(&round.push);
+            self.record(cmd, &TRACE[round.role as usize], threads, push, &[])?;
         }
         Ok(())
-    }
-
-    pub(super) fn scatter(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let (b, w) = (&self.buffers, &self.world);
-        // Lists of many paths are shared among workgroups: each clears and flushes its own window.
-        let chunks = self.batches.paths_with_segments(&self.frame).div_ceil(8).clamp(1, 16);
-        let bindings = [
-            &b.frame,
-            &b.tissues,
-            w.instances(),
-            &b.rows,
-            &b.points,
-            &b.segments,
-            &b.segment_count,
-            &b.volume_echoes,
-            &b.counters,
-            &b.scanlines,
-            w.fields(),
-        ]
-        .map(Binding::Buffer);
-        // The last one is the deforming kernel's alone.
-        let bound = bindings.len() - usize::from(!w.deforms());
-        cmd.scope("scatter");
-        cmd.dispatch_groups(
-            &self.kernels.scatter,
-            [self.frame.scanlines, chunks, self.frame.samples.div_ceil(layout::SCATTER_WINDOW)],
-            &[],
-            &bindings[..bound],
-        )?;
-        cmd.barrier(Stage::Compute, Stage::Compute);
-        Ok(())
-    }
-
-    pub(super) fn beam(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let b = &self.buffers;
-        let bindings = [
-            &b.frame,
-            &b.rows,
-            &b.surface_echoes,
-            &b.volume_echoes,
-            &b.counters,
-            &b.lateral,
-            &b.contact,
-        ];
-        let threads = [self.frame.samples, self.frame.scanlines.div_ceil(layout::BEAM_LINES)];
-        self.per_sample(cmd, &self.kernels.beam, threads, &bindings)
-    }
-
-    pub(super) fn axial(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let b = &self.buffers;
-        let threads = [self.frame.samples.div_ceil(layout::AXIAL_SAMPLES), self.frame.scanlines];
-        let bindings = [&b.frame, &b.rows, &b.lateral, &b.iq, &b.log_image];
-        self.per_sample(cmd, &self.kernels.axial, threads, &bindings)
-    }
-
-    fn per_sample(
-        &self,
-        cmd: &mut Commands,
-        kernel: &Kernel,
-        [x, y]: [u32; 2],
-        buffers: &[&Buffer],
-    ) -> Result<(), GpuError> {
-        let bindings: Vec<Binding> = buffers.iter().map(|b| Binding::Buffer(b)).collect();
-        cmd.scope(kernel.name());
-        cmd.dispatch(kernel, [x, y, 1], &[], &bindings)?;
-        cmd.barrier(Stage::Compute, Stage::Compute);
-        Ok(())
-    }
-
-    /// The finished image.
-    pub(super) fn pixels(&self, fused: bool) -> &Buffer {
-        let fused = self.fusion.as_ref().filter(|_| fused);
-        fused.map_or(&self.buffers.pixels, |f| &f.pixels)
     }
 
     /// Mixes the image with the acquired volume, if there is one.
@@ -213,44 +147,101 @@ impl Passes {
         let (Some(fused), Some(fusion)) = (&self.fusion, &scene.fusion) else {
             return Ok(false);
         };
-        let b = &self.buffers;
-        let simulated = Simulated {
-            frame: &self.frame,
-            constants: &b.frame,
-            scanlines: &b.scanlines,
-            tissues: &b.tissues,
-            rows: &b.rows,
-            stacks: &b.stacks,
-            counters: &b.counters,
-            pixels: &b.pixels,
-        };
-        fused.record(cmd, &self.world, fusion, &simulated)?;
+        // What `display` has left is read, not only copied.
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        self.run(cmd, &MASK)?;
+        let mut prescan = &self.buffers["prescan"];
+        if fusion.background_shadows {
+            self.run(cmd, &SHADOW)?;
+            self.run(cmd, &DARKEN)?;
+            prescan = &self.buffers["shaded"];
+        }
+        self.run_with(cmd, &CONVERT, &[("prescan", prescan)])?;
+        // Where it is not blended by bands, the kernel does not read their change.
+        let mut change = &self.buffers["background"];
+        match fusion.blend {
+            Blend::Multiband => {
+                self.bands(cmd, &fused.pyramid, fusion.levels())?;
+                change = fused.pyramid.change();
+            }
+            Blend::Linear | Blend::Smooth => self.blur(cmd)?,
+        }
+        self.run_with(cmd, &FUSE, &[("change", change)])?;
         Ok(true)
     }
 
-    /// Colours what of the mixed image is acquired.
-    pub(super) fn tint(&mut self, cmd: &mut Commands, tint: &Tint) -> Result<&Buffer, GpuError> {
-        let fused = self.fusion.as_mut().expect("the frame was fused");
-        let size = [self.frame.image_width, self.frame.image_height];
-        fused.tint(cmd, &self.buffers.frame, size, tint)
+    /// The finished image.
+    pub(super) fn pixels(&self, fused: bool) -> &Buffer {
+        &self.buffers[if fused { "fused" } else { "pixels" }]
+    }
+}
+
+/// The kernels of the passes that frames of a scene may run.
+pub(super) struct Kernels(Vec<Made>);
+
+struct Made {
+    pass: &'static Pass,
+    kernel: Kernel,
+    /// Whether the frames that the scene began with run it.
+    needed: bool,
+}
+
+impl Kernels {
+    pub(super) fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        world: &World,
+        counting: bool,
+    ) -> Result<Self, GpuError> {
+        let passes = stages::of(scene).map(|pass| (pass, (pass.needed)(scene)));
+        Self::of_passes(device, library, passes, world, counting)
     }
 
-    pub(super) fn display(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let b = &self.buffers;
-        cmd.scope("display");
-        cmd.dispatch(
-            &self.kernels.display,
-            [self.frame.image_width, self.frame.image_height, 1],
-            &[],
-            &[
-                Binding::Buffer(&b.frame),
-                Binding::Buffer(&b.log_image),
-                Binding::Buffer(&b.grey),
-                Binding::Buffer(&b.pixels),
-            ],
-        )?;
-        cmd.barrier(Stage::Compute, Stage::Transfer);
-        Ok(())
+    /// The same of another library, or that count or do not.
+    pub(super) fn again(
+        &self,
+        device: &Arc<Device>,
+        library: &Library,
+        world: &World,
+        counting: bool,
+    ) -> Result<Self, GpuError> {
+        let passes = self.0.iter().map(|made| (made.pass, made.needed));
+        Self::of_passes(device, library, passes, world, counting)
+    }
+
+    fn of_passes(
+        device: &Arc<Device>,
+        library: &Library,
+        passes: impl Iterator<Item = (&'static Pass, bool)>,
+        world: &World,
+        counting: bool,
+    ) -> Result<Self, GpuError> {
+        let mut kernels = Vec::new();
+        for (pass, needed) in passes {
+            let tracer = world.tracer().suffix();
+            let suffix = match pass.variants {
+                Variants::One => None,
+                Variants::Counting if counting => Some("count"),
+                Variants::Tracer | Variants::Counting => Some(tracer),
+                Variants::Tissue if world.deforms() => Some("deforming"),
+                Variants::Tissue => Some("rigid"),
+            };
+            let stem = suffix.map_or(pass.name.into(), |suffix| format!("{}_{suffix}", pass.name));
+            let kernel = Kernel::when_needed(device, &stem, library.words(&stem), pass.constants)?;
+            kernels.push(Made { pass, kernel, needed });
+        }
+        // What takes longest is begun first.
+        let mut due: Vec<_> = kernels.iter().filter(|made| made.needed).collect();
+        due.sort_by_key(|made| Reverse(library.words(made.kernel.name()).len()));
+        due.iter().for_each(|made| made.kernel.prepare());
+        Ok(Self(kernels))
+    }
+
+    pub(super) fn of(&self, pass: &Pass) -> &Kernel {
+        let is =
+            |made: &&Made| made.pass.name == pass.name && made.pass.constants == pass.constants;
+        &self.0.iter().find(is).expect("a pass of the scene").kernel
     }
 }
 

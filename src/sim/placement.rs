@@ -5,7 +5,7 @@ use glam::DAffine3;
 use super::layout::Rows;
 
 /// Rows of a 3x4 matrix, rounded to single precision.
-pub fn rows(matrix: &DAffine3) -> Rows {
+pub fn matrix_rows(matrix: &DAffine3) -> Rows {
     std::array::from_fn(|i| matrix.matrix3.row(i).extend(matrix.translation[i]).as_vec4().into())
 }
 
@@ -71,7 +71,7 @@ mod tests {
         );
         let p = DVec3::new(0.5, -0.25, 2.0);
         let expected = matrix.transform_point3(p);
-        for (i, row) in rows(&matrix).iter().enumerate() {
+        for (i, row) in matrix_rows(&matrix).iter().enumerate() {
             let value = f64::from(row[0]) * p.x
                 + f64::from(row[1]) * p.y
                 + f64::from(row[2]) * p.z

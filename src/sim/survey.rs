@@ -175,7 +175,7 @@ impl Surveyor {
         passes: &super::Passes,
         fused: bool,
     ) -> Result<(), GpuError> {
-        let (frame, world) = (&passes.buffers.frame, &passes.world);
+        let (frame, world) = (&passes.buffers["frame"], &passes.world);
         // The last frame may have been abandoned.
         let constants = sight.constants(&passes.shown);
         cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;

@@ -1,10 +1,9 @@
 //! What the kernels read: a scene as the structures of [`layout`](super::layout), computed in f64.
 
-use glam::DAffine3;
-
 use super::calibration::{Calibration, LATERAL_CUT, amplitude};
 use super::contact::reach;
-use super::layout::{self, Rows};
+use super::layout;
+use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
 use crate::scene::{Scene, Surface, Wire};
@@ -16,14 +15,6 @@ const LEAST_WEIGHT: f32 = 1e-30;
 const DECIBEL_PER_OCTAVE: f64 = 6.020_599_913;
 /// Roughness at and above which a surface is a perfect mirror.
 const MIRROR: f64 = 1e9;
-
-/// The rows of a 3x4 matrix.
-pub fn matrix_rows(m: &DAffine3) -> Rows {
-    std::array::from_fn(|i| {
-        let row = m.matrix3.row(i);
-        [row.x, row.y, row.z, m.translation[i]].map(|x| x as f32)
-    })
-}
 
 /// Kernels read 0 as "none"; infinity is no number to compute with.
 fn finite_or_zero(x: f64) -> f32 {
@@ -91,11 +82,11 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         volume_scale: volume_scale as f32,
         background: scene.background as u32,
         instances: scene.instances.len() as u32,
-        points: scene.wires.iter().map(|w| wire_points(w).len() as u32).sum(),
+        points: scene.wires.iter().map(|wire| wire.steps() + 1).sum(),
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,
         noise: calibration.noise() as f32,
-        inverse_reference: amplitude(imaging.gain) as f32,
+        inverse_reference: calibration.display_gain() as f32,
         inverse_range: imaging.dynamic_range.recip() as f32,
         frame_index,
         image_width: image_width as u32,
@@ -134,6 +125,18 @@ impl Tables {
             points: with_spheres(points(scene)),
             grey: grey_map(&scene.imaging),
         }
+    }
+
+    /// The buffers that they fill, by name, with their content.
+    pub fn arrays(&self) -> [(&'static str, &[u8]); 6] {
+        [
+            ("scanlines", bytemuck::cast_slice(&self.scanlines)),
+            ("rows", bytemuck::cast_slice(&self.rows)),
+            ("tissues", bytemuck::cast_slice(&self.tissues)),
+            ("surfaces", bytemuck::cast_slice(&self.surfaces)),
+            ("points", bytemuck::cast_slice(&self.points)),
+            ("grey", bytemuck::cast_slice(&self.grey)),
+        ]
     }
 }
 
@@ -255,15 +258,16 @@ pub fn surfaces(scene: &Scene) -> Vec<layout::Surface> {
 /// ends carry a point. Infinite for a single point.
 pub fn wire_spacing(wire: &Wire) -> f64 {
     let [a, b] = wire.ends.map(glam::DVec3::from);
-    let length = a.distance(b);
-    let steps = (length / wire.spacing).round().max(1.0);
-    if length == 0.0 { f64::INFINITY } else { length / steps }
+    match wire.steps() {
+        0 => f64::INFINITY,
+        steps => a.distance(b) / f64::from(steps),
+    }
 }
 
 /// World positions of a wire's points, mm.
 pub fn wire_points(wire: &Wire) -> Vec<[f64; 3]> {
     let [a, b] = wire.ends.map(glam::DVec3::from);
-    let steps = (a.distance(b) / wire_spacing(wire)).round() as u32;
+    let steps = wire.steps();
     (0..=steps).map(|i| a.lerp(b, f64::from(i) / f64::from(steps.max(1))).to_array()).collect()
 }
 

@@ -269,21 +269,6 @@ impl World {
         self.tracer
     }
 
-    /// Instance rows, in the order of [`Scene::instances`].
-    pub fn instances(&self) -> &Buffer {
-        &self.geometry.instances
-    }
-
-    /// Vertex positions, object space, mm: three floats each.
-    pub fn vertices(&self) -> &Buffer {
-        &self.geometry.vertices
-    }
-
-    /// Shading normals, object space: three floats each.
-    pub fn normals(&self) -> &Buffer {
-        &self.geometry.normals
-    }
-
     /// Three indices into the vertices per triangle.
     pub fn triangles(&self) -> &Buffer {
         &self.geometry.triangles
@@ -292,6 +277,20 @@ impl World {
     /// Displacement fields of deforming tissue: four floats per vector.
     pub fn fields(&self) -> &Buffer {
         &self.geometry.fields
+    }
+
+    /// What kernels bind as `name`, where it is a part of the anatomy ([`super::stages::ANATOMY`]).
+    pub fn binding(&self, name: &str) -> Option<Binding<'_>> {
+        let geometry = &self.geometry;
+        Some(Binding::Buffer(match name {
+            "nodes" => return Some(self.structure()),
+            "instances" => &geometry.instances,
+            "vertices" => &geometry.vertices,
+            "normals" => &geometry.normals,
+            "triangles" => &geometry.triangles,
+            "fields" => &geometry.fields,
+            _ => return None,
+        }))
     }
 
     /// Whether any instance's tissue deforms.

@@ -8,9 +8,10 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::window::WindowId;
 
+use super::deaths::Deaths;
 use super::link::Link;
 use super::open::{Open, Plan};
-use super::session::Wake;
+use super::session::{Wake, waker};
 use super::statistics::Times;
 use super::{Options, ViewError};
 use crate::gpu::{GpuError, Shot, ValidationLog};
@@ -25,6 +26,7 @@ pub(super) struct App {
     plan: Plan,
     open: Option<Open>,
     statistics: Times,
+    /// When device and simulation were made anew last.
     lost: Option<Instant>,
     log: Option<ValidationLog>,
     failure: Option<ViewError>,
@@ -32,8 +34,11 @@ pub(super) struct App {
 
 impl App {
     pub(super) fn new(scene: Scene, options: Options, proxy: EventLoopProxy<Wake>) -> Self {
+        let deaths = Deaths::default();
+        deaths.watch(waker(proxy.clone()));
+        let plan = Plan { scene, options, proxy, link: Link::default(), deaths };
         Self {
-            plan: Plan { scene, options, proxy, link: Link::default() },
+            plan,
             open: None,
             statistics: Times::default(),
             lost: None,
@@ -80,24 +85,30 @@ impl App {
         }
     }
 
-    /// Goes on with a new device where the device was lost; ends at any other error.
+    /// Goes on with a new device and simulation where one of them is gone. Where that has just been done, the
+    /// window ends without a device; without a simulation it stays, with what is not saved.
     fn fail(&mut self, events: &ActiveEventLoop, error: ViewError) {
-        let lost = is_lost(&error);
         let again = self.lost.is_some_and(|at| at.elapsed() < PATIENCE);
-        let error = match again {
-            true => lost_again(error),
-            false => error,
-        };
-        match self.open.take() {
-            Some(open) if lost && !again => {
-                self.lost = Some(Instant::now());
-                let opened = open.again(&self.plan, &error);
-                self.adopt(events, opened.map_err(lost_again));
+        match (&error, &mut self.open) {
+            (ViewError::Died, Some(open)) if again || open.is_empty() => open.stop(),
+            (ViewError::Died, _) => self.restart(events, None),
+            (lost, _) if is_lost(lost) && !again => {
+                self.restart(events, Some(format!("{error}. It was opened again.")));
             }
             _ => {
-                self.failure = Some(error);
+                self.open = None;
+                self.failure = Some(if again { lost_again(error) } else { error });
                 events.exit();
             }
+        }
+    }
+
+    /// Another simulation on a new device, with what there is to say of it.
+    fn restart(&mut self, events: &ActiveEventLoop, problem: Option<String>) {
+        if let Some(open) = self.open.take() {
+            self.lost = Some(Instant::now());
+            let opened = open.again(&self.plan, problem);
+            self.adopt(events, opened.map_err(lost_again));
         }
     }
 
@@ -117,6 +128,7 @@ impl App {
                 self.failure = self.save(&shot).err();
                 events.exit();
             }
+            Ok(None) if open.restarts() => self.restart(events, None),
             Ok(None) => {}
             Err(error) => self.fail(events, error.into()),
         }
@@ -149,7 +161,7 @@ impl ApplicationHandler<Wake> for App {
         let plan = &mut self.plan;
         let failed = self.open.as_mut().map(|open| open.listen(plan));
         if let Some(Err(error)) = failed {
-            self.fail(events, error.into());
+            self.fail(events, error);
         }
     }
 

@@ -11,9 +11,10 @@ use std::thread::JoinHandle;
 use serde_json::{Map, Value};
 
 use self::files::{Claim, grey_png, scaled};
+use super::deaths::CAPTURE;
 use super::engine::Frame;
 use crate::gpu::{GpuError, Shot};
-use crate::movie::{Movie, MovieError};
+use crate::output::movie::{Movie, MovieError};
 
 /// The settings written beside a picture: see `docs/window.md`.
 pub(super) type Sidecar = Map<String, Value>;
@@ -35,6 +36,9 @@ pub(super) enum CaptureError {
     /// The image cannot be read back.
     #[error("the image cannot be read back: {0}")]
     Gpu(#[from] GpuError),
+    /// The system has no room for another thread.
+    #[error("no thread can be started: {0}. Close other programs and save again; nothing is lost")]
+    Thread(std::io::Error),
 }
 
 impl CaptureError {
@@ -192,15 +196,16 @@ impl Captures {
             cancelled: AtomicBool::new(false),
         });
         let (of_thread, sender, wake) = (progress.clone(), self.done.0.clone(), self.wake.clone());
-        let thread = std::thread::Builder::new()
-            .name("capture".into())
-            .spawn(move || {
-                // The receiver lives until this thread was waited for.
-                let _ = sender.send(work(&of_thread));
-                wake();
-            })
-            .expect("a thread can be started");
-        self.jobs.push(Job { progress, thread });
+        let thread = std::thread::Builder::new().name(CAPTURE.into()).spawn(move || {
+            // The receiver lives until this thread was waited for.
+            let _ = sender.send(work(&of_thread));
+            wake();
+        });
+        match thread {
+            Ok(thread) => self.jobs.push(Job { progress, thread }),
+            // The receiver is this one's own.
+            Err(error) => drop(self.done.0.send(Err(CaptureError::Thread(error)))),
+        }
     }
 
     /// Progress of the captures under way.
@@ -218,7 +223,7 @@ impl Captures {
     /// Waits until no capture is under way.
     pub(super) fn wait(&mut self) {
         for job in self.jobs.drain(..) {
-            // A panic of the thread has been printed by itself.
+            // A panic of the thread is told by `deaths`.
             let _ = job.thread.join();
         }
     }

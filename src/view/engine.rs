@@ -1,5 +1,6 @@
 //! The simulation on its own thread: it takes the newest order and hands over finished pictures.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -7,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
+use super::deaths::SIMULATION;
 use super::link::Link;
 use super::look::{Look, Pictured};
 use super::model::{Order, Settings};
@@ -126,7 +128,12 @@ pub enum News {
     NotOpened(String),
     /// The simulation has ended.
     Failed(SimError),
+    /// Nothing more will come: the thread died by a bug.
+    Died,
 }
+
+/// Tells the window that there is news.
+type Wake = Arc<dyn Fn() + Send + Sync>;
 
 struct State {
     /// The newest order, not yet taken.
@@ -190,16 +197,19 @@ pub struct Engine {
 }
 
 impl Engine {
-    /// Uploads `scene` and carries out `order`. Clients of `link` receive every picture. The thread calls
-    /// `wake` for each news.
+    /// Uploads `scene` and carries out `order`. Clients of `link` receive every picture. `wake` is
+    /// called, from the thread, for each news.
+    ///
+    /// # Errors
+    /// The system has no room for another thread.
     pub(super) fn start(
         device: &Arc<Device>,
         library: Arc<Library>,
         scene: Scene,
         order: Order,
         link: Link,
-        wake: impl Fn() + Send + 'static,
-    ) -> Self {
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> std::io::Result<Self> {
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 order: Some(order),
@@ -216,13 +226,17 @@ impl Engine {
             changed: Condvar::new(),
             newer: AtomicBool::new(false),
         });
-        let wake = Box::new(wake);
+        let wake: Wake = Arc::new(wake);
+        let (mourner, bell) = (shared.clone(), wake.clone());
         let worker = Worker::new(device, library, scene, link, shared.clone(), wake);
-        let thread = std::thread::Builder::new()
-            .name("simulation".into())
-            .spawn(move || worker.run())
-            .expect("a thread can be started");
-        Self { shared, thread: Some(thread) }
+        let thread = std::thread::Builder::new().name(SIMULATION.into()).spawn(move || {
+            // The worker is gone with its panic; what is shared stays whole (`Shared::lock`).
+            if catch_unwind(AssertUnwindSafe(|| worker.run())).is_err() {
+                mourner.lock().news.push(News::Died);
+                bell();
+            }
+        })?;
+        Ok(Self { shared, thread: Some(thread) })
     }
 
     /// Replaces the order that was not taken yet. While `frozen`, no order is carried out.
@@ -277,7 +291,7 @@ impl Drop for Engine {
         state.stop = true;
         self.shared.interrupt(state);
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been printed by itself.
+            // It tells its panic as news.
             let _ = thread.join();
         }
     }

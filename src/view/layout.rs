@@ -13,7 +13,7 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    calipers, cine, files, keys, mmode, notice, planes, saved, strip, style, survey, timing,
+    calipers, cine, deaths, files, keys, mmode, notice, planes, saved, strip, style, survey, timing,
 };
 
 /// Width of the toggles and the loop beside each other, points.
@@ -136,6 +136,7 @@ pub(super) fn show(
             state.problem = None;
         }
     }
+    deaths::show(ui.ctx(), model, state);
     files::dialog(ui.ctx(), model, &mut state.files, now);
     if state.help {
         help(ui.ctx(), &mut state.help);

@@ -8,6 +8,7 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
+use super::deaths::Deaths;
 use super::engine::{Frame, News};
 use super::files::Files;
 use super::inputs::{self, Inputs};
@@ -23,7 +24,7 @@ use super::{Model, Options, ViewError, keys, planes, style, survey};
 use crate::gpu::{Device, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
-use crate::sim::{self, SimError};
+use crate::sim;
 
 mod gestures;
 mod paint;
@@ -73,13 +74,13 @@ pub(super) struct Plan {
     pub(super) proxy: EventLoopProxy<Wake>,
     /// The OpenIGTLink server stays whatever becomes of the device.
     pub(super) link: Link,
+    pub(super) deaths: Deaths,
 }
 
 impl Plan {
     fn tools(&self, device: &Device) -> Tools {
         let (folder, proxy) = (self.options.captures.clone(), self.proxy.clone());
-        // An event loop that has ended needs no news.
-        Tools::new(device.info(), folder, move || drop(proxy.send_event(Wake)))
+        Tools::new(device.info(), folder, session::waker(proxy))
     }
 
     fn session(
@@ -144,6 +145,9 @@ impl Open {
             heap: device.info().memory_bytes,
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
+            deaths: plan.deaths.clone(),
+            stopped: false,
+            restart: false,
             preparing: "Opening the device",
             tools: plan.tools(&device),
             inputs,
@@ -156,11 +160,12 @@ impl Open {
         Ok((Self::with(session, model, state, input, window), log))
     }
 
-    /// The same window on a new device, after `error`. The log is the new device's.
+    /// The same window with another simulation on a new device, with what there is to say of it. The log is the
+    /// new device's.
     pub(super) fn again(
         self,
         plan: &Plan,
-        error: &ViewError,
+        problem: Option<String>,
     ) -> Result<(Self, ValidationLog), ViewError> {
         let Self {
             frame, pictured, session, model, mut state, input, window, title, opening, ..
@@ -174,7 +179,8 @@ impl Open {
         let device = session::device(&plan.options, &window)?;
         // Its texture is lost with the device.
         state.mmode = Default::default();
-        state.problem = Some(format!("{error}. It was opened again."));
+        state.problem = problem;
+        (state.stopped, state.restart) = (false, false);
         let input = interface(&window, input.egui_ctx().zoom_factor(), &device);
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
@@ -213,8 +219,9 @@ impl Open {
         }
     }
 
-    /// Takes over the news of simulation and devices; returns an error after which no more will come.
-    pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), SimError> {
+    /// Takes over what simulation and devices have to say; an error after which nothing more will
+    /// come.
+    pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), ViewError> {
         let (mut failed, mut pictures_only) = (Ok(()), true);
         self.receive(plan);
         for news in self.session.engine.news() {
@@ -247,7 +254,11 @@ impl Open {
                 }
                 News::Opened => self.adopt(plan),
                 News::NotOpened(problem) => self.refuse(problem),
-                News::Failed(error) => failed = Err(error),
+                News::Failed(error) => failed = Err(error.into()),
+                News::Died => {
+                    self.state.deaths.simulation_died();
+                    failed = Err(ViewError::Died);
+                }
             }
         }
         self.look();
@@ -329,7 +340,27 @@ impl Open {
         keys::apply_pads(&word, &mut self.model, &mut self.state, Instant::now());
     }
 
-    /// Returns whether the user wants to leave.
+    /// Goes on without a simulation until the user wants it again.
+    pub(super) fn stop(&mut self) {
+        self.state.stopped = true;
+        self.awaited = false;
+        if self.coming.take().is_some() {
+            self.state.files.opening = self.opening.is_some();
+        }
+        self.window.request_redraw();
+    }
+
+    /// There has been no image yet.
+    pub(super) fn is_empty(&self) -> bool {
+        self.frame.is_none()
+    }
+
+    /// The user wants the simulation again.
+    pub(super) fn restarts(&self) -> bool {
+        self.state.restart
+    }
+
+    /// The user wants to leave.
     pub(super) fn is_done(&self) -> bool {
         self.state.quit
     }

@@ -2,11 +2,12 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Instant;
 
 use winit::event_loop::EventLoopProxy;
 
+use super::deaths::OPENING;
 use super::model::{File, Model};
 use super::session::Wake;
 use super::{Options, Refusal};
@@ -37,8 +38,10 @@ impl Opening {
     ) -> Self {
         let (sender, loaded) = channel();
         let (file, set) = (path.clone(), overrides.clone());
-        std::thread::spawn(move || {
-            // A closed window needs neither.
+        let thread = std::thread::Builder::new().name(OPENING.into());
+        // What is not started sends nothing, and that is told.
+        let _ = thread.spawn(move || {
+            // A window that is gone needs neither.
             let _ = sender.send(Scene::load(&file, &set));
             let _ = proxy.send_event(Wake);
         });
@@ -52,7 +55,11 @@ impl Opening {
         device: &Arc<Device>,
         now: Instant,
     ) -> Option<Result<Opened, String>> {
-        let loaded = self.loaded.try_recv().ok()?;
+        let loaded = match self.loaded.try_recv() {
+            Ok(loaded) => loaded,
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => return Some(Err(self.unread())),
+        };
         Some(match loaded {
             Ok((scene, warnings)) => {
                 for warning in &warnings {
@@ -63,6 +70,12 @@ impl Opening {
             }
             Err(error) => Err(super::files::said(&error)),
         })
+    }
+
+    /// The thread is gone without a word.
+    fn unread(&self) -> String {
+        let file = self.path.display();
+        format!("{file} was not read: the thread that reads it died. Try again; the image goes on.")
     }
 }
 

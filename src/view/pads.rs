@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 
 use gilrs::{EventType, GamepadId, Gilrs};
 
+use super::deaths::PADS;
 use super::link::Bell;
 use super::model::{Axis, Control, Pad, Press};
 
@@ -55,8 +56,8 @@ impl Pads {
     pub(super) fn start(bell: Bell) -> Self {
         let word = Arc::<Mutex<Word>>::default();
         let listener = Listener { word: word.clone(), bell };
-        let thread = std::thread::Builder::new().name("game pads".to_owned());
-        // Without another thread there are no pads, but still the keyboard.
+        let thread = std::thread::Builder::new().name(PADS.to_owned());
+        // Without another thread there are no pads, and the keyboard is left.
         if let Err(error) = thread.spawn(move || listener.run()) {
             lock(&word).problem = Some(format!("no game pads: {error}"));
         }

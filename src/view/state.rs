@@ -1,5 +1,6 @@
 //! The state of the window itself: open panels and choices; not saved.
 
+use super::deaths::Deaths;
 use super::files::Files;
 use super::inputs::Inputs;
 use super::mmode;
@@ -39,7 +40,13 @@ pub(super) struct State {
     pub(super) files: Files,
     /// The last error, until the next success.
     pub(super) problem: Option<String>,
-    /// The work under way before the first picture.
+    /// Threads that died by a bug.
+    pub(super) deaths: Deaths,
+    /// The simulation's thread is dead, and not started again.
+    pub(super) stopped: bool,
+    /// It is to be started again.
+    pub(super) restart: bool,
+    /// What is done before there is a picture.
     pub(super) preparing: &'static str,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,

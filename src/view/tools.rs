@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
-use super::captures::{CaptureError, Captures, Clip, Format, Sidecar, Still};
+use super::captures::{Captures, Clip, Format, Sidecar, Still};
 use super::engine::Frame;
 use super::model::cine::Limit;
 use super::model::sheet::{Moment, Sheet};
@@ -15,7 +15,7 @@ use super::model::sidecar::{self, Area};
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
 use crate::gpu::{DeviceInfo, Image, Shot};
-use crate::output;
+use crate::sim::facts;
 
 /// Most frames of the loop.
 const FRAMES: usize = 256;
@@ -234,9 +234,7 @@ impl Tools {
             match outcome {
                 Ok(Some(file)) => self.notices.saved(format!("Saved {}", file.display())),
                 Ok(None) => self.notices.saved("Cancelled; nothing was saved".into()),
-                Err(error @ (CaptureError::File { .. } | CaptureError::Gpu(_))) => {
-                    self.notices.failed(error.to_string());
-                }
+                Err(error) => self.notices.failed(error.to_string()),
             }
         }
     }
@@ -256,7 +254,7 @@ fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     counts.set(&mut settings.probe, &mut settings.simulation, &mut settings.imaging);
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
-    let all = output::settings(&settings.probe, &settings.simulation, &settings.imaging);
+    let all = facts::settings(&settings.probe, &settings.simulation, &settings.imaging);
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()

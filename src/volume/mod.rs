@@ -8,8 +8,8 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
-/// A finding about a volume that could be loaded.
-pub use crate::scene::Warning;
+/// What is worth knowing about a volume that could be loaded.
+pub use crate::issue::Warning;
 
 mod dicom;
 mod error;

@@ -146,7 +146,7 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
         format!("{line}\n")
     };
     for (from, to, noticed) in [
-        (row("period"), String::new(), "selector.period is not described"),
+        (row("period"), String::new(), "transform.motion.period is not described"),
         (row("sphere.radius"), String::new(), "mesh.shape.sphere.radius is not described"),
         (
             row("pause"),

@@ -29,7 +29,9 @@ impl Line {
     }
 
     fn text(&self) -> String {
-        format!("| {} |", self.cells.join(" | ")).replace("|  |", "| |")
+        let cell =
+            |cell: &String| if cell.is_empty() { " |".to_owned() } else { format!(" {cell} |") };
+        format!("|{}", self.cells.iter().map(cell).collect::<String>())
     }
 }
 

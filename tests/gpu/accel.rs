@@ -1,4 +1,4 @@
-//! Acceleration structures and ray queries; on a device without them the tests say so.
+//! Acceleration structures and ray queries; skipped on a device without them.
 
 use std::sync::Arc;
 
@@ -7,6 +7,7 @@ use insonify::gpu::{
     Kernel, Stage, Tlas, TlasInstance, build_times, refit_times, test_device,
 };
 
+use super::skip::{Lacking, skip};
 use super::{assert_clean, words};
 
 const ONE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -24,7 +25,7 @@ fn shifted(z: f32) -> [[f32; 4]; 3] {
 pub fn ray_query_device() -> Option<Arc<Device>> {
     let device = test_device();
     if !device.supports_ray_query() {
-        eprintln!("skipped: '{}' has no ray queries", device.name());
+        skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
         return None;
     }
     Some(device)

@@ -4,7 +4,7 @@ use std::sync::{Arc, Weak};
 
 use glam::DVec3;
 use insonify::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Tlas};
-use insonify::reference::intersect::triangle;
+use insonify::scene::triangle;
 
 use super::words;
 
@@ -88,7 +88,7 @@ impl Rays {
             let origin = DVec3::new(place[0].into(), place[1].into(), 0.0);
             let all = triangles.iter().enumerate().filter_map(|(i, t)| {
                 let corners = t.map(|v| DVec3::from(vertices[v as usize].map(f64::from)));
-                triangle(corners, origin, DVec3::Z).map(|[t, ..]| (t, i))
+                triangle::crossing(corners, origin, DVec3::Z).map(|[t, ..]| (t, i))
             });
             let expected: Vec<_> = all.collect();
             let nearest = expected.iter().map(|e| e.0).fold(f64::INFINITY, f64::min);

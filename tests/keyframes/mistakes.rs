@@ -129,7 +129,7 @@ fn of_moving_nodes() {
             Mistake {
                 change: |json| json["animations"][1]["channels"][0]["sampler"] = json!(7),
                 animation: Some("all"),
-                said: &["is not a valid glTF file"],
+                said: &["/animations/1/channels/0/sampler: names samplers[7]"],
             },
             Mistake {
                 change: |json| {

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 
 use insonify::gpu;
-pub use insonify::plot::{Curve, Plot};
+pub use insonify::output::plot::{Curve, Plot};
 
 use crate::render::{Renderer, renderers};
 
@@ -23,7 +23,7 @@ pub struct Check {
     pub name: &'static str,
     /// The closed form, and its source.
     pub claim: &'static str,
-    /// The error that the comparison must notice.
+    /// The error that every figure must notice, but for those that name one of their own ([`Figure::unlike`]).
     pub planted: &'static str,
     pub run: fn(&Bench, Physics) -> Outcome,
 }
@@ -37,6 +37,8 @@ pub struct Figure {
     pub expected: f64,
     /// Largest allowed |measured - expected|.
     pub tolerance: f64,
+    /// An error that moves this figure, and what would then be expected.
+    pub other: Option<(&'static str, f64)>,
 }
 
 impl Figure {
@@ -44,11 +46,22 @@ impl Figure {
     pub fn holds(&self) -> bool {
         (self.measured - self.expected).abs() <= self.tolerance
     }
+
+    /// Names an error that would be noticed by this figure alone, and what the figure would be with it: for one that
+    /// the check's planted error leaves as it is.
+    pub fn unlike(&mut self, error: &'static str, value: f64) {
+        self.other = Some((error, value));
+    }
+
+    /// It would not hold with the error that it names.
+    fn tells(&self) -> bool {
+        self.other.is_some_and(|(_, value)| (self.measured - value).abs() > self.tolerance)
+    }
 }
 
 impl std::fmt::Display for Figure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { what, measured, expected, tolerance } = self;
+        let Self { what, measured, expected, tolerance, .. } = self;
         write!(f, "{what}: {measured}, expected {expected} within {tolerance}")
     }
 }
@@ -87,8 +100,9 @@ impl Outcome {
         measured: f64,
         expected: f64,
         tolerance: f64,
-    ) {
-        self.figures.push(Figure { what: what.into(), measured, expected, tolerance });
+    ) -> &mut Figure {
+        let figure = Figure { what: what.into(), measured, expected, tolerance, other: None };
+        self.figures.push_mut(figure)
     }
 
     /// Every plot and every picture can be shown.
@@ -134,13 +148,21 @@ pub struct Examined {
 }
 
 impl Examined {
-    /// The planted error showed.
-    pub fn noticed(&self) -> bool {
-        !self.planted.holds()
+    /// Figures that hold with the planted error as well, and with the one that they name: they prove nothing.
+    pub fn blind(&self) -> Vec<&Figure> {
+        let moved = |figure: &Figure| {
+            let mut planted = self.planted.figures.iter();
+            planted.any(|other| other.what == figure.what && !other.holds())
+        };
+        self.right.figures.iter().filter(|figure| !moved(figure) && !figure.tells()).collect()
     }
 
-    /// Every figure holds and can be shown, the planted error showed, and the validation layers are
-    /// silent.
+    /// The planted error showed in every figure, or the figure's own.
+    pub fn noticed(&self) -> bool {
+        self.blind().is_empty()
+    }
+
+    /// Every figure holds and can be shown and has noticed an error, and the validation layers are silent.
     pub fn holds(&self) -> bool {
         self.right.holds() && self.right.is_drawable() && self.noticed() && self.messages.is_empty()
     }
@@ -155,7 +177,10 @@ impl Examined {
             lines.push("a plot or picture cannot be drawn".into());
         }
         if !self.noticed() {
-            let figures = self.planted.figures.iter().map(|f| format!("\n        {f}"));
+            let figures = self.blind().into_iter().map(|figure| {
+                let other = figure.other.map(|(error, value)| format!(", nor {error}: {value}"));
+                format!("\n        {figure}{}", other.unwrap_or_default())
+            });
             let figures: String = figures.collect();
             lines.push(format!("not noticed: {}{figures}", check.planted));
         }

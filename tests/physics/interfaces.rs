@@ -232,7 +232,8 @@ fn snells_law(bench: &Bench, physics: Physics) -> Outcome {
             let got = transmitted(&lines).iter().flatten().count();
             let what =
                 format!("{name}: rays from fat into bone {side} degree from the critical angle");
-            out.compare(what, got as f64, passes, 0.0);
+            let figure = out.compare(what, got as f64, passes, 0.0);
+            figure.unlike("a speed a thousandth too small behind the wall", 1.0);
         }
     }
     let mut curves = law_curves(|a, b, i| snell(a, b, i).map(f64::to_degrees));
@@ -284,10 +285,10 @@ fn transmission(bench: &Bench, physics: Physics) -> Outcome {
     let mut curves = vec![Curve::line("attenuation and transmission", line)];
     for (name, lines) in traced(bench, &scene) {
         let got = &lines[0];
-        let count = weights.len() as f64;
-        out.compare(format!("{name}: segments"), got.len() as f64, count, 0.0);
-        for ((_, expected), (segment, tissue)) in weights.iter().zip(got.iter().zip(&truth.tissues))
-        {
+        assert_eq!(got.len(), weights.len(), "{name}: a segment for each tissue");
+        let entered = weights.iter().zip(got.iter().zip(&truth.tissues));
+        // A path begins with a weight of 1.
+        for ((_, expected), (segment, tissue)) in entered.skip(1) {
             let what = format!("{name}: weight on entering {}", tissue.name);
             out.compare(what, segment.weight, *expected, 1e-5 * expected);
         }

@@ -128,7 +128,8 @@ fn closest_hits(bench: &Bench, physics: Physics) -> Outcome {
         let half = rays.len() / 2;
         let mut figure = |what, count: usize, allowed: usize| {
             let what = format!("{tracer}: of {half} rays {what}, other hits than by brute force");
-            out.compare(what, count as f64, 0.0, allowed as f64);
+            out.compare(what, count as f64, 0.0, allowed as f64)
+                .unlike("every second ray slips through", half as f64 / 2.0);
         };
         figure("at vertices and edges", aimed, slips(tracer, half));
         figure("elsewhere", elsewhere, 0);

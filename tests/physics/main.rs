@@ -17,6 +17,8 @@ mod full_wave;
 mod fusion;
 mod fusion_shadows;
 mod grain;
+#[path = "../../tools/harness/mod.rs"]
+mod harness;
 mod hilbert;
 mod interfaces;
 mod intersections;
@@ -39,6 +41,8 @@ mod selectors;
 mod shadow;
 #[path = "../common/signal.rs"]
 mod signal;
+#[path = "../common/skip.rs"]
+mod skip;
 mod speckle;
 mod squeeze;
 mod stages;

@@ -9,7 +9,7 @@ use insonify::reference::{Accumulator, Owned, Segment};
 use insonify::reference::{axial, beam, detect, display, scatter};
 use insonify::scene::Scene;
 use insonify::sim::contact::{self, Coupling, Skins};
-use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
+use insonify::sim::{Simulator, Tracer, layout, placement, shaders::Library, tables};
 
 use crate::check::Picture;
 
@@ -29,9 +29,9 @@ impl Inputs {
         };
         for (i, placed) in scene.instances.iter().enumerate() {
             let mesh = &scene.meshes[placed.mesh];
-            let object_from_world = tables::matrix_rows(&placed.world_from_object.inverse());
+            let object_from_world = placement::matrix_rows(&placed.world_from_object.inverse());
             let instance = layout::Instance {
-                world_from_object: tables::matrix_rows(&placed.world_from_object),
+                world_from_object: placement::matrix_rows(&placed.world_from_object),
                 object_from_world,
                 texture_from_world: object_from_world,
                 tissue: placed.tissue as u32,

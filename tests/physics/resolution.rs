@@ -33,7 +33,7 @@ pub fn a_point_is_as_long_as_its_pulse() -> Check {
             height, 0.162 mm at 7 MHz and 60 %. Points on and between samples; the split over two \
             samples widens by f (1 - f) of a squared sample about the mean that the kernel corrects, \
             hence 3 % at twice the samples and 8 % at the sample pitch of the Table I preset.",
-        planted: "A twelfth more bandwidth.",
+        planted: "A sixth more bandwidth.",
         run: axial_widths,
     }
 }
@@ -56,10 +56,9 @@ fn pulse((_, render): &Renderer, samples: u32, shift: f64, bandwidth: f64) -> Ve
 fn axial_widths(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let sigma = 1.540 / 2.0 * (2.0 * LN_2).sqrt() / (PI * 0.6 * 7.0);
-    out.compare("closed form at 7 MHz and 60 %, mm", FWHM * sigma, 0.162, 5e-4);
     let bandwidth = match physics {
         Physics::Right => 0.6,
-        Physics::Planted => 0.65,
+        Physics::Planted => 0.7,
     };
     for renderer in &bench.renderers {
         for (samples, share) in [(4096, 0.03), (2048, 0.08)] {
@@ -146,7 +145,8 @@ fn lateral_widths(bench: &Bench, physics: Physics) -> Outcome {
                 Physics::Planted => FWHM * 0.6 * WAVELENGTH * 2.0,
             };
             let what = format!("{name}: width at {z} mm, mm");
-            out.compare(what, got, expected, 0.05 * expected);
+            out.compare(what, got, expected, 0.05 * expected)
+                .unlike("the transmit beam alone", FWHM * gaussian_beam(2.0, 50.0, z));
             dots.push([z, got]);
         }
         curves.push(Curve::dots(*name, dots));

@@ -20,6 +20,7 @@ pub fn tissue(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
         texture_length: 1.0,
         surface: mirror(),
         source: "test".into(),
+        ..Tissue::shipped("liver").expect("shipped")
     }
 }
 

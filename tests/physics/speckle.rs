@@ -118,7 +118,8 @@ pub fn fully_developed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         critical_distance(apart.len()),
     );
     // Liver is 45 dB under a perfect mirror; 22 000 cells make 0.03 dB, the depth's calibration less than 0.1.
-    out.compare(format!("{name}: RMS level, dB re mirror"), decibel(power), -45.0, 0.2);
+    out.compare(format!("{name}: RMS level, dB re mirror"), decibel(power), -45.0, 0.2)
+        .unlike("one of the two components of an echo lost", -45.0 - decibel(2.0));
     out.plots.push(histogram(&e, power));
     out
 }
@@ -230,7 +231,8 @@ fn kurtosis_law(scene: &Scene, density: f64) -> f64 {
     2.0 + depths.map(at).sum::<f64>() / f64::from(STEPS)
 }
 
-/// Edge of a cell, mm, and density. The last two tell the law from that with q = 1, which has 2.10 instead of 2.22.
+/// Edge of a cell, mm, and density. Over many seeds the last two tell the law from that with q = 1, which has 2.10
+/// instead of 2.22.
 const SPARSE: [[f64; 2]; 6] =
     [[0.15, 0.05], [0.15, 0.1], [0.15, 0.2], [0.15, 1.0], [0.3, 0.4], [0.3, 1.0]];
 
@@ -249,7 +251,9 @@ pub fn sparse(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         let measured = kurtosis(&intensities(&frame, &scene, DEPTHS, 1).concat());
         let expected = kurtosis_law(&scene, density);
         let what = format!("{name}: kurtosis, cells of {h} mm, density {density}");
-        out.compare(what, measured, expected, 0.05 * expected);
+        scene.simulation.cell = 2.0 * h;
+        out.compare(what, measured, expected, 0.05 * expected)
+            .unlike("cells twice as large", kurtosis_law(&scene, density));
         dots[usize::from(h > 0.2)].push([density, measured]);
     }
     let curves = [0.15, 0.3].into_iter().zip(dots).flat_map(|(h, points)| {

@@ -53,20 +53,23 @@ fn slab(bench: &Bench, physics: Physics) -> Outcome {
                 Physics::Planted => (tilt.tan() / scale).atan(),
             };
             for (name, lines) in traced(bench, &scene) {
-                let [mut time, mut turned, mut weight] = [0.0_f64; 3];
+                let [mut time, mut other, mut turned, mut weight] = [0.0_f64; 4];
                 for (l, line) in lines.iter().enumerate() {
                     let into = line.iter().find(|s: &&Segment| s.instance == 0);
                     let into = into.unwrap_or_else(|| panic!("{name}: line {l} meets the slab"));
                     let x = scene.probe.ray(l as u32, 0).0.x;
                     let arrival = (FRONT - x * slope) / BEFORE[0];
                     time = time.max((into.time / arrival - 1.0).abs());
+                    let inverse = (FRONT - x * tilt.tan() / scale) / BEFORE[0];
+                    other = other.max((into.time / inverse - 1.0).abs());
                     let refracted = (SLAB[0] / BEFORE[0] * normal.sin()).asin();
                     turned = turned.max((angle(into.direction) - (normal - refracted)).abs());
                     let through = fresnel(BEFORE, SLAB, normal);
                     weight = weight.max((into.weight / through - 1.0).abs());
                 }
                 let what = format!("{name}, {:.0} degrees times {scale}", tilt.to_degrees());
-                out.compare(format!("{what}: time, relative"), time, 0.0, 1e-5);
+                out.compare(format!("{what}: time, relative"), time, 0.0, 1e-5)
+                    .unlike("points that are scaled by the inverse", other);
                 out.compare(format!("{what}: direction, rad"), turned, 0.0, 1e-4);
                 out.compare(format!("{what}: weight, relative"), weight, 0.0, 1e-4);
             }

@@ -4,10 +4,13 @@ use std::sync::Arc;
 
 use bytemuck::Pod;
 use insonify::gpu::{Device, Kernel};
-use insonify::harness::{self, Element, Extent, Input, Job, Role};
 use insonify::probe::Probe;
-use insonify::sim::layout::{self, Counters, Frame, Row};
+use insonify::sim::layout::{Counters, Frame, Row};
+use insonify::sim::pass::Pass;
 use insonify::sim::shaders::Library;
+use insonify::sim::stages::{AXIAL, BEAM, DISPLAY};
+
+use crate::harness::{self, Extent, Input, Job};
 
 /// Device and kernels.
 pub struct Stages {
@@ -15,17 +18,16 @@ pub struct Stages {
     library: Library,
 }
 
-fn input<T: Pod>(name: &'static str, values: &[T]) -> Input {
-    Input {
-        name,
-        role: Role::Read,
-        element: Element::Word,
-        bytes: bytemuck::cast_slice(values).to_vec(),
-    }
+/// What a run left behind.
+struct Left {
+    job: Job,
+    outputs: Vec<Vec<u8>>,
 }
 
-fn values<T: Pod>(bytes: &[u8]) -> Vec<T> {
-    bytemuck::pod_collect_to_vec(bytes)
+impl Left {
+    fn values<T: Pod>(&self, name: &str) -> Vec<T> {
+        self.job.after(&self.outputs, name)
+    }
 }
 
 /// What `beam` reads of the contact where every element is coupled.
@@ -39,15 +41,16 @@ impl Stages {
         Self { device: device.clone(), library: Library::embedded() }
     }
 
-    /// Content of the bindings after a run; no validation message may have come.
-    fn run(&self, stem: &str, inputs: Vec<Input>, threads: [u32; 2]) -> Vec<Vec<u8>> {
-        let kernel = Kernel::new(&self.device, stem, self.library.words(stem), &[])
-            .expect("the kernel fits the device");
-        let job = Job { inputs, push: vec![] };
-        let extent = Extent::Threads([threads[0], threads[1], 1]);
+    /// Runs a stage on what it reads beside the frame; no validation message may come.
+    fn run(&self, pass: &Pass, frame: &Frame, mut given: Vec<Input>) -> Left {
+        let words = self.library.words(pass.name);
+        let kernel = Kernel::new(&self.device, pass.name, words, &[]).expect("it fits the device");
+        given.push(Input::words("frame", &[*frame]));
+        let job = Job::of(pass, given, Vec::new());
+        let extent = Extent::Once(pass.extent.expect("its own")(frame));
         let outcome = harness::run(&self.device, &kernel, &job, &extent).expect("the kernel runs");
         assert_eq!(self.device.validation_messages(), Vec::<String>::new());
-        outcome.outputs
+        Left { job, outputs: outcome.outputs }
     }
 
     /// Accumulators to complex samples; also the saturated samples.
@@ -58,57 +61,37 @@ impl Stages {
         surface: &[i32],
         volume: &[i32],
     ) -> (Vec<f32>, u32) {
-        let inputs = vec![
-            input("frame", &[*frame]),
-            input("rows", rows),
-            input("surface", surface),
-            input("volume", volume),
-            input("counters", &[Counters::default()]),
-            input("lateral", &vec![0f32; surface.len()]),
-            input("contact", &joined(frame)),
+        let given = vec![
+            Input::words("rows", rows),
+            Input::words("surface_echoes", surface),
+            Input::words("volume_echoes", volume),
+            Input::words("contact", &joined(frame)),
         ];
-        let after =
-            self.run("beam", inputs, [frame.samples, frame.scanlines.div_ceil(layout::BEAM_LINES)]);
-        let counters: Vec<Counters> = values(&after[4]);
-        (values(&after[5]), counters[0].saturated)
+        let left = self.run(&BEAM, frame, given);
+        (left.values("lateral"), left.values::<Counters>("counters")[0].saturated)
     }
 
     /// Complex samples through the axial kernel.
     pub fn axial(&self, frame: &Frame, lateral: &[f32]) -> Vec<f32> {
         let rows = vec![Row::default(); frame.samples as usize];
-        self.detected(frame, &rows, lateral).0
+        self.detected(frame, &rows, lateral).values("iq")
     }
 
     /// Log-compressed envelope of samples as they are.
     pub fn detect(&self, frame: &Frame, rows: &[Row], iq: &[f32]) -> Vec<f32> {
         let sharp = Frame { axial_sigma: 0.0, ..*frame };
-        self.detected(&sharp, rows, iq).1
+        self.detected(&sharp, rows, iq).values("log_image")
     }
 
-    /// Complex samples through the axial kernel, and their log-compressed envelope.
-    fn detected(&self, frame: &Frame, rows: &[Row], lateral: &[f32]) -> (Vec<f32>, Vec<f32>) {
-        let inputs = vec![
-            input("frame", &[*frame]),
-            input("rows", rows),
-            input("lateral", lateral),
-            input("iq", &vec![0f32; lateral.len()]),
-            input("log image", &vec![0f32; lateral.len() / 2]),
-        ];
-        let threads = [frame.samples.div_ceil(layout::AXIAL_SAMPLES), frame.scanlines];
-        let after = self.run("axial", inputs, threads);
-        (values(&after[3]), values(&after[4]))
+    fn detected(&self, frame: &Frame, rows: &[Row], lateral: &[f32]) -> Left {
+        let given = vec![Input::words("rows", rows), Input::words("lateral", lateral)];
+        self.run(&AXIAL, frame, given)
     }
 
     /// Pixels.
     pub fn display(&self, frame: &Frame, log: &[f32], grey: &[u32]) -> Vec<u32> {
-        let size = [frame.image_width, frame.image_height];
-        let inputs = vec![
-            input("frame", &[*frame]),
-            input("log image", log),
-            input("grey map", grey),
-            input("pixels", &vec![0u32; (size[0] * size[1]) as usize]),
-        ];
-        values(&self.run("display", inputs, size)[3])
+        let given = vec![Input::words("log_image", log), Input::words("grey", grey)];
+        self.run(&DISPLAY, frame, given).values("pixels")
     }
 }
 

@@ -1,7 +1,7 @@
 //! A model and a volume of which is known how they lie to each other.
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::reference::random::{gaussian, pcg4d, unit};
+use insonify::random::{gaussian, pcg4d, unit};
 use insonify::register::surface::{Triangle, samples};
 use insonify::scene::{Mesh, Scene, shapes};
 

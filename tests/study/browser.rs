@@ -9,6 +9,8 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use ureq::Agent;
 
+use crate::skip::{Lacking, skip};
+
 /// Keys as WebDriver names them.
 pub const ENTER: &str = "\u{e007}";
 pub const SPACE: &str = " ";
@@ -33,7 +35,7 @@ impl Browser {
     pub fn start() -> Option<Self> {
         let chromium = found(&["chromium", "chromium-browser", "google-chrome"]);
         let (Some(chromium), Some(driver)) = (chromium, found(&["chromedriver"])) else {
-            println!("skipped: no chromium with chromedriver (./tools/setup.sh installs both)");
+            skip(Lacking::Tool, "no chromium with chromedriver (./tools/setup.sh installs both)");
             return None;
         };
         let folder = tempfile::tempdir().expect("a folder");

@@ -14,6 +14,8 @@ mod stopped;
 
 #[path = "../common/program.rs"]
 mod program;
+#[path = "../common/skip.rs"]
+mod skip;
 
 /// Speckle of one tissue down to a plate at 14 mm, in a volume.
 const SCENE: &str = r#"

@@ -9,6 +9,8 @@ use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::protocol::xproto::{self, ConnectionExt as _, ImageFormat, InputFocus};
 use x11rb::rust_connection::RustConnection;
 
+use super::skip::{Lacking, skip};
+
 /// Longest wait for anything: a debug build on a busy machine takes its time to upload a scene.
 const PATIENCE: Duration = Duration::from_secs(240);
 
@@ -78,7 +80,7 @@ impl Display {
         let mut server = match started {
             Ok(server) => server,
             Err(error) => {
-                println!("skipped: no X server (Xvfb: {error})");
+                skip(Lacking::Tool, &format!("no X server (Xvfb: {error})"));
                 return None;
             }
         };

@@ -4,6 +4,7 @@ use std::process::Command;
 use std::time::Duration;
 
 use super::desk::{Desk, Display, Key};
+use super::skip::{Lacking, skip};
 use super::{IMAGE, SCENE, brightness, difference};
 
 #[test]
@@ -107,7 +108,7 @@ fn layer() -> Option<tempfile::TempDir> {
     match built {
         Ok(status) => assert!(status.success(), "the layer does not compile"),
         Err(error) => {
-            println!("skipped: no C compiler (cc: {error})");
+            skip(Lacking::Tool, &format!("no C compiler (cc: {error})"));
             return None;
         }
     }
@@ -163,4 +164,62 @@ fn a_lost_device_is_opened_again_and_a_second_loss_says_what_to_do() {
     for words in ["lost", "last pass", "--quality draft", "--device"] {
         assert!(text.contains(words), "{text}");
     }
+}
+
+/// The left half of the image, beside what is told over it.
+const BESIDE: [u16; 4] = [60, 100, 320, 500];
+/// What is told, and its first button.
+const TOLD: [u16; 4] = [420, 70, 440, 60];
+const START: (u16, u16) = (455, 112);
+
+#[test]
+fn a_simulation_that_dies_is_told_and_started_again() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (die, told) = (folder.path().join("die"), folder.path().join("told"));
+    let mortal = |_: &std::path::Path, command: &mut Command| {
+        command.env("INSONIFY_TEST_DEATH", &die);
+        command.stderr(std::fs::File::create(&told).expect("made"));
+    };
+    let Some(mut desk) = Desk::open_on(display, SCENE, &["--validate"], mortal) else {
+        return;
+    };
+    let kill = |desk: &mut Desk| {
+        std::fs::write(&die, "").expect("written");
+        desk.press(Key::Right);
+        desk.wait_for("the death", |_| !die.exists());
+    };
+    desk.wait_for("an image", |d| brightness(&d.grab(BESIDE)) > 10.0);
+    // A setting that has to outlast the simulation.
+    desk.press(Key::Letter('-'));
+    let (before, bare) = (desk.settle(BESIDE), desk.grab(TOLD));
+    kill(&mut desk);
+    desk.wait_for("what is told", |d| difference(&d.grab(TOLD), &bare) > 5.0);
+    desk.press(Key::Home);
+    desk.wait_for("the same image", |d| difference(&d.grab(BESIDE), &before) < 1.5);
+    let moves = |desk: &mut Desk| {
+        (0..6).for_each(|_| desk.press(Key::Right));
+        desk.wait_for("the image to move", |d| {
+            let now = d.grab(BESIDE);
+            difference(&now, &before) > 4.0 && brightness(&now) > 5.0
+        });
+    };
+    moves(&mut desk);
+    // Where the one after it dies as well, it stands still.
+    kill(&mut desk);
+    std::fs::write(&die, "").expect("written");
+    let still = desk.settle(BESIDE);
+    // It is still there where the first of the two came too soon after the last.
+    let _ = std::fs::remove_file(&die);
+    desk.press(Key::Right);
+    desk.press(Key::Right);
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(difference(&desk.grab(BESIDE), &still) < 0.5, "there is nothing new");
+    desk.click(START);
+    moves(&mut desk);
+    desk.quit();
+    let text = std::fs::read_to_string(&told).expect("there");
+    assert!(text.contains("a test has asked for it"), "{text}");
 }

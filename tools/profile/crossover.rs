@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::plot::{Curve, Plot};
+use insonify::output::plot::{Curve, Plot};
 use insonify::scene::{Graph, Keyframes, Mesh, Scene, Strategy, shapes};
 use insonify::settings::Words;
 use insonify::sim::Tracer;

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use insonify::output;
 use insonify::scene::Scene;
-use insonify::sim::{Tracer, layout::Counters};
+use insonify::sim::{Tracer, layout::Counters, stages};
 use miette::{IntoDiagnostic, Result, miette};
 use serde_json::{Value, json};
 
@@ -22,11 +22,11 @@ const PROBE: [(&str, &str); 6] = [
     ("probe.elevation_layers", "7"),
     ("probe.samples", "2048"),
 ];
-/// The passes of a frame, in its order.
-const STAGES: [&str; 11] = [
-    "update", "origin", "trace", "scatter", "beam", "axial", "display", "mask", "convert", "blur",
-    "fuse",
-];
+/// The parts of a frame that are timed, in its order.
+fn parts() -> Vec<&'static str> {
+    [vec!["update"], stages::names()].concat()
+}
+
 /// The same scene in two ways.
 pub struct Scenes {
     simulated: Scene,
@@ -63,12 +63,12 @@ impl Way {
     fn new(machine: &Machine, scene: &Scene, tracer: Tracer) -> Result<Self> {
         let mut rig = Rig::new(machine, scene.clone(), tracer)?;
         rig.frame()?;
-        Ok(Self { rig, stages: vec![Vec::new(); STAGES.len()], frames: Vec::new() })
+        Ok(Self { rig, stages: vec![Vec::new(); parts().len()], frames: Vec::new() })
     }
 
     fn measure(&mut self) -> Result<()> {
         let (timings, host) = self.rig.timings()?;
-        for (name, times) in STAGES.iter().zip(&mut self.stages) {
+        for (name, times) in parts().iter().zip(&mut self.stages) {
             let own = if *name == "update" { host } else { 0.0 };
             // A pass that is not in this frame takes no time.
             let pass = timings.of(name);
@@ -126,16 +126,19 @@ pub fn run(machine: &Machine, scenes: &Scenes, tracer: Tracer, frames: u32) -> R
             format!("{:+.1} %", 100.0 * (simulated - fused) / frame[0]),
         ]);
     };
-    for (i, name) in STAGES.iter().enumerate() {
-        row(name, [stages[0][i], stages[1][i]]);
+    for (i, name) in parts().iter().enumerate() {
+        let both = [stages[0][i], stages[1][i]];
+        if both != [0.0; 2] {
+            row(name, both);
+        }
     }
     row("frame", frame);
     table.print();
     table.csv(&machine.output, &format!("fusion-{tracer}"))?;
     explain(&counters, frame);
     let by_stage = |i: usize| -> Value {
-        let pairs = STAGES.iter().zip(&stages[i]);
-        pairs.map(|(name, ms)| ((*name).to_owned(), json!(ms))).collect()
+        let pairs = parts().into_iter().zip(&stages[i]);
+        pairs.map(|(name, ms)| (name.to_owned(), json!(ms))).collect()
     };
     let count = |c: &Counters| {
         json!({

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use insonify::plot::{Curve, Plot};
+use insonify::output::plot::{Curve, Plot};
 use insonify::scene::graph::NodeKind;
 use insonify::scene::{Scene, Strategy};
 use insonify::settings::Words;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use insonify::output;
-use insonify::plot::{Plot, svg};
+use insonify::output::plot::{Plot, svg};
 use miette::{Context, IntoDiagnostic, Result};
 use serde_json::Value;
 

@@ -6,7 +6,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::check::{Check, Examined, Figure, Picture};
-use insonify::plot::{escape, svg};
+use insonify::output::plot::{escape, svg};
 
 /// Rows of the validation table.
 pub const ROWS: u32 = 35;
@@ -41,7 +41,7 @@ pub fn page(origin: &[(&str, &str)], rows: &[&str], examined: &[(Check, Examined
          <h1>insonify: the picture obeys acoustics</h1>\n\
          <p>Every figure below is measured in a picture or a path that the simulator computed and held \
          against a closed form. The same comparisons are the project's tests. Each is also made with an error \
-         planted and has to notice it. <b>twins</b> are implementations in double precision on the \
+         planted, which every figure has to notice, but for those beside which another error is named. <b>twins</b> are implementations in double precision on the \
          CPU; <b>bvh</b> and <b>query</b> (<b>ray-query</b>) are the device with the compute tracer and with hardware ray queries.</p>\n\
          <table>{origin}<tr><th>Verdict</th><td class='{}'>{verdict}</td></tr></table>\n",
         if failing == 0 { "yes" } else { "no" },
@@ -151,10 +151,13 @@ fn section(out: &mut String, check: &Check, found: &Examined) {
         "</div>\n<table><tr><th>Figure</th><th>Measured</th><th>Expected</th><th>Tolerance</th><th>Verdict</th></tr>\n",
     );
     for f in &found.right.figures {
+        let other = f.other.map(|(error, value)| format!(" (not {}: {error})", number(value)));
+        let other = other.unwrap_or_default();
         let _ = writeln!(
             out,
-            "<tr><td>{}</td><td class='n'>{}</td><td class='n'>{}</td><td class='n'>{}</td>{}</tr>",
+            "<tr><td>{}{}</td><td class='n'>{}</td><td class='n'>{}</td><td class='n'>{}</td>{}</tr>",
             escape(&f.what),
+            escape(&other),
             number(f.measured),
             number(f.expected),
             number(f.tolerance),

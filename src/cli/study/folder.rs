@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use insonify::files;
+use insonify::output::files;
 use insonify::scene::file::Plan;
 use insonify::study::key::crc32;
 use miette::{Context, IntoDiagnostic, Result, miette};

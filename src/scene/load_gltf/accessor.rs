@@ -4,15 +4,13 @@ use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions, sparse};
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// Where the bytes are.
 pub(super) struct Reader<'a> {
     pub path: &'a Path,
     /// Bytes by buffer index; those that no geometry needs are absent.
     pub buffers: &'a [Option<Vec<u8>>],
-    /// The file's number of each accessor.
-    pub accessors: &'a [usize],
 }
 
 /// A run of elements inside a buffer.
@@ -32,8 +30,7 @@ impl<'a> Run<'a> {
 
 impl<'a> Reader<'a> {
     fn fault(&self, accessor: &gltf::Accessor<'_>, message: &str) -> Issue {
-        let number = self.accessors.get(accessor.index());
-        let place = format!("/accessors/{}", number.unwrap_or(&accessor.index()));
+        let place = format!("/accessors/{}", accessor.index());
         Issue::error(self.path, 1, message, "export it again").of(&place)
     }
 

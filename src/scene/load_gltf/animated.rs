@@ -10,7 +10,7 @@ use super::skin::Skin;
 use super::surface::Surfaces;
 use super::tree::Tree;
 use super::{File, open};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::{AnimatedNode, Choice, Placement, Soup, bounded};
 
 /// Content of a file for one of its animations.

@@ -3,7 +3,7 @@
 use serde_json::{Map, Value};
 
 use super::validate::{EXPORT_AGAIN, Finding};
-use crate::scene::issue::Severity;
+use crate::issue::Severity;
 
 /// Most values that are compared in all, component by component.
 const MOST_VALUES: usize = 50_000_000;

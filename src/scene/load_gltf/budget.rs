@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// Most numbers held at a time, 128 MB.
 const HELD: usize = 16_000_000;

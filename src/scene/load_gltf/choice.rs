@@ -4,7 +4,7 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::Choice;
 use crate::settings::suggest;
 

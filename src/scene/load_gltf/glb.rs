@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 const MAGIC: &[u8] = b"glTF";
 const JSON: u32 = 0x4E4F_534A;

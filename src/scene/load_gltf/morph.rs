@@ -5,7 +5,7 @@ use gltf::accessor::Dimensions;
 use super::accessor::Reader;
 use super::budget::Budget;
 use super::sampler::Motion;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// A surface with morph targets; without targets it has one shape.
 pub(super) struct Morph {

@@ -8,8 +8,8 @@ use gltf::animation::{Interpolation, Property};
 
 use super::accessor::Reader;
 use super::budget::Budget;
+use crate::issue::Issue;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
-use crate::scene::issue::Issue;
 
 /// The animation of one node.
 #[derive(Debug, Default)]

@@ -6,7 +6,7 @@ use gltf::accessor::Dimensions;
 
 use super::accessor::Reader;
 use super::budget::Budget;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// A row of zeros and a one, up to the exporter's rounding.
 const AFFINE_TOLERANCE: f64 = 1e-4;

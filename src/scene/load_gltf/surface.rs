@@ -4,7 +4,7 @@ use gltf::mesh::Mode;
 
 use super::File;
 use super::accessor::Reader;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::MAX_ELEMENTS;
 
 /// Triangles of a primitive as stored, metres.
@@ -23,7 +23,7 @@ pub(super) struct Surfaces<'a> {
 impl<'a> Surfaces<'a> {
     pub fn new(file: &'a File<'_>) -> Self {
         Self {
-            reader: Reader { path: file.path, buffers: &file.buffers, accessors: &file.accessors },
+            reader: Reader { path: file.path, buffers: &file.buffers },
             issues: Vec::new(),
             elements: 0,
         }

@@ -8,8 +8,8 @@ use gltf::scene::Transform;
 
 use super::budget::Budget;
 use super::sampler::Motion;
+use crate::issue::Issue;
 use crate::scene::animation::{Track, Trs};
-use crate::scene::issue::Issue;
 use crate::scene::mesh::{AnimatedNode, Placement};
 
 /// All nodes of a file; lengths in mm.

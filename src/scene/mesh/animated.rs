@@ -6,9 +6,9 @@ use glam::DAffine3;
 
 use super::keyframes::shapes;
 use super::{Kind, Options, Units, read_bounded};
+use crate::issue::Issue;
 use crate::scene::Mesh;
 use crate::scene::animation::{Track, Trs};
-use crate::scene::issue::Issue;
 use crate::scene::load_gltf::{self, AnimatedParts, Part};
 
 /// Number of times at which a skin is sampled unless [`Options::keyframes`] is set.

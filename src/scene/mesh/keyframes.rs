@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::recipe::Recipe;
 use super::{Inspected, Options, Soup, Units, load, read_raw};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::{Mesh, check};
 
 /// Most vertices and triangles of all shapes of a surface together. Some 0.5 GB during reading.

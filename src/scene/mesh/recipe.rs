@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::{CREASE, Soup};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::normals::{self, Split};
 use crate::scene::{Mesh, topology};
 

@@ -195,6 +195,8 @@ fn tissue(row: &(&str, Bulk, Speckle, Skin)) -> Tissue {
         speed: speed.0,
         density: density.0,
         attenuation: attenuation.0,
+        // Single numbers per MHz are what most sources give.
+        attenuation_exponent: 1.0,
         echogenicity,
         density_of_scatterers,
         mean_over_sigma: 0.0,

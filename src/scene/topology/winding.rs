@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{Edges, six_volumes, volume};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::Soup;
 
 /// Turns triangles so that neighbours agree, by the majority of each connected piece; then turns a

@@ -148,17 +148,11 @@ fn an_empty_scene_has_no_root() {
 #[test]
 fn too_deep_a_tree_is_refused() {
     let mut tree = MeshBvh::build(&sheet(3));
-    tree.depth = STACK - 1;
+    tree.depth = BVH_STACK - 1;
     let mut scene = SceneBvh::new(1);
     scene.add(&tree, 0);
     let error = scene.place(&places(&[(0, 0.0)], &[tree]), false).unwrap_err();
     assert!(matches!(error, BvhError::TooDeep(33)), "{error}");
-}
-
-#[test]
-fn the_kernel_has_the_stack_that_is_promised() {
-    let glsl = include_str!("../../../glsl/intersect_bvh.glsl");
-    assert!(glsl.contains(&format!("const uint BVH_STACK = {STACK}u;")));
 }
 
 #[test]

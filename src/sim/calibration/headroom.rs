@@ -5,11 +5,9 @@ use std::f64::consts::TAU;
 use super::{Calibration, amplitude};
 use crate::scene::Tissue;
 use crate::settings::ScatterMode;
-use crate::sim::layout::LEVELS_PER_OCTAVE;
-use crate::sim::tables::{wire_points, wire_spacing};
+use crate::sim::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE};
+use crate::sim::tables::wire_spacing;
 
-/// Fixed-point accumulators stay below this magnitude; i32 has one more bit.
-const HEADROOM: f64 = (1u32 << 30) as f64;
 /// Largest fixed-point scale: one unit is -120 dB re a perfect mirror.
 const LARGEST_SCALE: f64 = (1u32 << 20) as f64;
 
@@ -87,7 +85,7 @@ impl Calibration<'_> {
             .wires
             .iter()
             .map(|wire| {
-                let count = wire_points(wire).len() as f64;
+                let count = f64::from(wire.steps()) + 1.0;
                 let spacing = wire_spacing(wire);
                 let weights = 1.0 + TAU.sqrt() * widest / spacing.max(1e-9);
                 wire.amplitude.abs() * weights.min(count)
@@ -136,7 +134,7 @@ impl Calibration<'_> {
 /// Largest power of two up to 2^20 whose product with `bound` is below 2^30.
 fn scale(bound: f64) -> f64 {
     let mut scale = LARGEST_SCALE;
-    while scale * bound >= HEADROOM {
+    while scale * bound >= ECHO_LIMIT {
         scale /= 2.0;
     }
     scale

@@ -8,8 +8,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::ray::Ray;
 
-use crate::reference::intersect;
-use crate::scene::{Mesh, Scene};
+use crate::scene::{Mesh, Scene, triangle};
 use crate::sim::bvh;
 
 /// Crossings of one mesh from one side closer together than this, mm, are one crossing: a line through
@@ -112,7 +111,7 @@ impl Tree {
         self.boxes.ray_traverse_anyhit(ray, |_, leaf| {
             let triangle = self.triangles[self.boxes.primitive_indices[leaf] as usize];
             let corners = triangle.map(|i| self.positions[i as usize]);
-            if let Some([t, ..]) = intersect::triangle(corners, origin, direction) {
+            if let Some([t, ..]) = triangle::crossing(corners, origin, direction) {
                 let [a, b, c] = corners;
                 let normal = (b - a).cross(c - a);
                 found.push(Crossing { t, entry: direction.dot(normal) < 0.0, normal });

@@ -4,60 +4,14 @@
 //! `tools/compile.rs` writes it; `tests/spirv.rs` fails when it is stale or invalid.
 
 #[cfg(feature = "compile")]
-pub mod compiler;
+pub mod authors;
 #[cfg(feature = "compile")]
 mod reload;
-pub mod source;
-pub mod stamp;
-pub mod validate;
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 /// Stem and bytes of every kernel that the program uses; written by `tools/compile.rs`.
 const EMBEDDED: &[(&str, &[u8])] = include!("../../../spirv/embedded.rs");
-
-/// What goes wrong between GLSL and usable SPIR-V; all of these are mistakes in a kernel's source
-/// or files that cannot be read.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// A file or folder that cannot be read or written.
-    #[error("{path}: {cause}")]
-    File {
-        /// The file.
-        path: PathBuf,
-        /// What the system says.
-        cause: std::io::Error,
-    },
-    /// A directive in a kernel that is malformed, or an include that does not exist.
-    #[error("{file}:{line}: {message}")]
-    Source {
-        /// The GLSL file.
-        file: PathBuf,
-        /// Line, from 1.
-        line: usize,
-        /// Cause and remedy.
-        message: String,
-    },
-    /// The compiler refused a kernel; its message names file and line.
-    #[error("{stem}: {message}")]
-    Compile {
-        /// Kernel variant.
-        stem: String,
-        /// The compiler's message.
-        message: String,
-    },
-    /// A validator refused a module.
-    #[error("{stem}: refused by {validator}: {message}")]
-    Invalid {
-        /// Kernel variant.
-        stem: String,
-        /// "naga" or "spirv-val".
-        validator: &'static str,
-        /// The validator's message.
-        message: String,
-    },
-}
 
 /// The SPIR-V of every kernel: the embedded modules, or (feature `compile`) the last ones that
 /// compiled from a folder of sources.
@@ -103,9 +57,4 @@ pub fn words_of(bytes: &[u8]) -> Vec<u32> {
     let (words, rest) = bytes.as_chunks::<4>();
     assert!(rest.is_empty(), "SPIR-V is whole words");
     words.iter().map(|w| u32::from_le_bytes(*w)).collect()
-}
-
-/// Words as the bytes of a SPIR-V file.
-pub fn bytes_of(words: &[u32]) -> Vec<u8> {
-    words.iter().flat_map(|w| w.to_le_bytes()).collect()
 }

@@ -1,12 +1,16 @@
 //! The trial on the software driver's ray query, and on results that are wrong.
 
 use bytemuck::Zeroable;
+use skip::{Lacking, skip};
 
 use super::{RayHit, Trial, agree, id};
 use crate::gpu::test_device;
 use crate::scene::Scene;
 use crate::sim::layout::NONE;
 use crate::sim::shaders::Library;
+
+#[path = "../../../tests/common/skip.rs"]
+mod skip;
 
 fn hit(instance: u32, t: f32) -> RayHit {
     RayHit { instance, t, ..RayHit::zeroed() }
@@ -16,7 +20,7 @@ fn hit(instance: u32, t: f32) -> RayHit {
 fn the_ray_query_finds_the_surfaces_of_a_scene() {
     let (device, library) = (test_device(), Library::embedded());
     if !device.supports_ray_query() {
-        // Not every driver has it; those with one are tried by the program itself.
+        skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
         return;
     }
     let (scene, _) = Scene::load("scenes/phantom.toml".as_ref(), &[]).unwrap();

@@ -7,7 +7,7 @@ use super::joined::Sets;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
-use crate::sim::placement::{rigid, rows as matrix_rows};
+use crate::sim::placement::{matrix_rows, rigid};
 
 /// Mask bit of everything that does not go by mask.
 const ALWAYS: u8 = 1;

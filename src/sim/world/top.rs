@@ -12,7 +12,7 @@ use crate::gpu::{
 };
 use crate::scene::Scene;
 use crate::sim::bvh::SceneBvh;
-use crate::sim::placement::rows;
+use crate::sim::placement::matrix_rows;
 
 /// What the tracer walks.
 enum Structure {
@@ -94,7 +94,7 @@ impl Top {
                             Geometry::Union => unreachable!("refused with the ray query"),
                         }
                         .expect("entries have triangles, and these a structure"),
-                        transform: rows(&entry.world_from_object),
+                        transform: matrix_rows(&entry.world_from_object),
                         custom_index: entry.instance,
                         mask: entry.mask,
                     })

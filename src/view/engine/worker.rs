@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::{Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared, State, WINDOW_PATIENCE};
+use super::{
+    Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared, State, WINDOW_PATIENCE, Wake,
+};
 use crate::gpu::{Abandon, Device, GpuError};
 use crate::live::{self, Pace};
 use crate::scene::Scene;
@@ -66,7 +68,7 @@ pub(super) struct Worker {
     pace: Pace,
     /// End and duration of the last picture of the anatomy.
     surveyed: (Instant, Duration),
-    wake: Box<dyn Fn() + Send>,
+    wake: Wake,
 }
 
 impl Worker {
@@ -76,7 +78,7 @@ impl Worker {
         scene: Scene,
         link: Link,
         shared: Arc<Shared>,
-        wake: Box<dyn Fn() + Send>,
+        wake: Wake,
     ) -> Self {
         let machine = sim::machine(device);
         Self {
@@ -351,7 +353,7 @@ impl Worker {
         let fitted = match &self.fitted {
             Some(fitted) if **fitted == *settings => fitted.clone(),
             _ => {
-                simulator.fit(&self.library, &self.scene)?;
+                simulator.fit(&self.scene)?;
                 self.fitted.insert(Arc::new(settings.clone())).clone()
             }
         };
@@ -363,6 +365,8 @@ impl Worker {
         simulator: &mut Option<(Simulator, Tracer)>,
         taken: &Taken,
     ) -> Result<(Frame, Option<Pixels>), SimError> {
+        #[cfg(debug_assertions)]
+        die_where_asked();
         let began = Instant::now();
         let (order, pose, seconds) = (&taken.order, taken.pose, taken.seconds);
         order.settings.apply(&mut self.scene);
@@ -444,5 +448,14 @@ impl Worker {
             image_bytes: self.ring.bytes(),
         };
         Ok((frame, pixels))
+    }
+}
+
+/// Panics once the file that a test names is there, and takes it away.
+#[cfg(debug_assertions)]
+fn die_where_asked() {
+    let asked = std::env::var_os("INSONIFY_TEST_DEATH");
+    if asked.is_some_and(|file| std::fs::remove_file(file).is_ok()) {
+        panic!("a test has asked for it");
     }
 }

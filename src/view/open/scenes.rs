@@ -5,12 +5,19 @@ use std::time::Instant;
 use super::{Open, Plan};
 use crate::view::opening::{Opened, Opening};
 
+/// Why no scene is opened.
+const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
+
 impl Open {
     /// Begins to open the scene that the user wants.
     pub(in crate::view) fn begin(&mut self, plan: &Plan) {
         let files = &mut self.state.files;
         if let Some(path) = files.wanted.take() {
-            // Overrides belong to this file; another one has none.
+            if self.state.stopped {
+                return self.refuse(STOPPED.to_owned());
+            }
+            let files = &mut self.state.files;
+            // Said of this file; another one speaks for itself.
             let of_this = path == self.model.file.path;
             let overrides = self.model.file.overrides.iter().filter(|_| of_this).cloned();
             files.opening = true;

@@ -30,6 +30,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     nodes(findings);
     tree(findings);
     meshes(findings);
+    channels(findings);
 }
 
 fn list<'a>(findings: &Findings<'a>, name: &str) -> &'a [Value] {
@@ -303,6 +304,23 @@ fn meshes(findings: &mut Findings<'_>) {
                 findings.note(
                     &format!("{at}/targets"),
                     "morph targets are not read unless an animation is asked for",
+                );
+            }
+        }
+    }
+}
+
+/// The only index into a list that is not at the top.
+fn channels(findings: &mut Findings<'_>) {
+    for (a, animation) in list(findings, "animations").iter().enumerate() {
+        let parts = |name| animation.get(name).and_then(Value::as_array).into_iter().flatten();
+        let held = parts("samplers").count();
+        for (c, channel) in parts("channels").enumerate() {
+            let sampler = number(channel, "sampler");
+            if let Some(i) = sampler.filter(|i| !(0..held as i64).contains(i)) {
+                findings.fault(
+                    &format!("/animations/{a}/channels/{c}/sampler"),
+                    format!("names samplers[{i}], which does not exist ({held} do)"),
                 );
             }
         }

@@ -1,0 +1,74 @@
+//! How the paths of a frame are dealt out, so that their segments find room.
+
+use super::layout;
+use super::pass::{Sizes, lines};
+use super::rounds::{self, Rounds, one_speaks_for_all};
+use super::tables::Tables;
+use crate::gpu::Device;
+
+/// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
+const SEGMENT_BUDGET: u64 = 96 << 20;
+
+/// Segments and threads that a frame may have of a device.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Room {
+    /// For segments, bytes.
+    pub(super) segments: u64,
+    /// Threads that the device runs at once, about.
+    pub(super) at_once: u32,
+}
+
+impl Room {
+    /// On a device where no buffers have been made yet.
+    pub(super) fn of(device: &Device) -> Self {
+        Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once() }
+    }
+}
+
+/// How the paths of a frame are dealt out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Batches {
+    /// Segments that one line may hold; no batch can exceed it.
+    pub(super) capacity: u32,
+    /// Paths traced before their segments are scattered.
+    pub(super) paths: u32,
+    /// How `trace` goes over them.
+    pub(super) rounds: Rounds,
+}
+
+impl Batches {
+    /// As many paths together as `room` has segments for.
+    pub(super) fn new(frame: &layout::Frame, room: &Room) -> Self {
+        let per_path = per_path(frame);
+        let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
+        let affordable = u32::try_from(room.segments / line_bytes.max(1)).unwrap_or(u32::MAX);
+        if one_speaks_for_all(frame) {
+            return Self {
+                capacity: per_path.min(affordable.max(1)),
+                paths: frame.paths,
+                rounds: Rounds::new(frame, frame.paths, room.at_once),
+            };
+        }
+        let most = (affordable / per_path).min(rounds::most_paths(frame));
+        let paths = most.clamp(1, frame.paths);
+        Self { capacity: paths * per_path, paths, rounds: Rounds::new(frame, paths, room.at_once) }
+    }
+
+    /// What sizes of buffers follow from, of a frame dealt out so.
+    pub(super) fn sizes(&self, frame: &layout::Frame, tables: &Tables) -> Sizes {
+        Sizes {
+            frame: *frame,
+            tissues: tables.tissues.len() as u64,
+            main_paths: self.rounds.main_paths(),
+            interactions: self.rounds.interactions(),
+        }
+    }
+}
+
+/// Segments for which a path has room. One of B interactions has at most B + 1; one of the main-path
+/// scheme also those of its branches, three times as many, most of which end under the volume floor:
+/// what does not fit is counted and reported.
+pub(super) fn per_path(frame: &layout::Frame) -> u32 {
+    let branches = frame.sampling == layout::SAMPLING_MAIN_PATH;
+    (frame.max_interactions + 1) * if branches { 4 } else { 1 }
+}

@@ -1,0 +1,42 @@
+//! `blur`: mask and weight summed over a box, down the columns, each time exchanged with the rows.
+
+use super::super::layout::BLUR_SUMS;
+use super::super::pass::{Array, Extent, Pass, Sizes};
+use super::super::passes::Passes;
+use crate::gpu::{Commands, GpuError};
+use crate::output::npy::Element::Float;
+use crate::scene::Scene;
+
+/// The stage, once for each direction.
+pub const BLUR: Pass = Pass {
+    name: "blur",
+    binds: &["frame", "fusion", "mask", "sums"],
+    makes: &[
+        Array::new("sums", Float, 2, Sizes::pixels),
+        // Those of the columns alone, column by column.
+        Array::new("down", Float, 2, Sizes::pixels),
+    ],
+    // `fuse` binds the sums, also where it does not read them.
+    needed: Scene::shows_volume,
+    ..Pass::USUAL
+};
+
+/// Threads for an image, `turned` where columns are read as rows.
+pub fn extent([width, height]: [u32; 2], turned: bool) -> Extent {
+    let [width, height] = if turned { [height, width] } else { [width, height] };
+    Extent::Threads([width, height.div_ceil(BLUR_SUMS), 1])
+}
+
+impl Passes {
+    /// Sums the mask over the box.
+    pub(in crate::sim) fn blur(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
+        let size = [self.frame.image_width, self.frame.image_height];
+        let down = &self.buffers["down"];
+        for (turned, given) in [(false, ("sums", down)), (true, ("mask", down))] {
+            cmd.scope(BLUR.name);
+            let push = u32::from(turned);
+            self.record(cmd, &BLUR, extent(size, turned), bytemuck::bytes_of(&push), &[given])?;
+        }
+        Ok(())
+    }
+}

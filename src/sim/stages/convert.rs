@@ -1,0 +1,19 @@
+//! `convert`: mask and acquired volume from the scanlines to the pixels.
+
+use super::super::pass::{Array, Pass, Sizes, per_pixel};
+use crate::output::npy::Element::Float;
+use crate::scene::Scene;
+
+/// The stage.
+pub const CONVERT: Pass = Pass {
+    name: "convert",
+    binds: &["frame", "prescan", "mask", "background"],
+    makes: &[
+        // Mask and weight of every pixel.
+        Array::new("mask", Float, 2, Sizes::pixels),
+        Array::new("background", Float, 1, Sizes::pixels),
+    ],
+    extent: Some(per_pixel),
+    needed: Scene::shows_volume,
+    ..Pass::USUAL
+};

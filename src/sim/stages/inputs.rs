@@ -1,0 +1,35 @@
+//! What the processor gives the kernels of a frame.
+
+use super::super::layout::{
+    Counters, Frame, Instance, POINT_GROUP, Row, Scanline, Surface, Tissue,
+};
+use super::super::pass::Array;
+use crate::output::npy::Element::{Float, Word};
+
+/// The frame's constants, the scene's tables, what the probe touches; and the counters, which every
+/// kernel may add to.
+pub static INPUTS: [Array; 9] = [
+    Array::of::<Frame>("frame", Word, |_| 1),
+    Array::of::<Scanline>("scanlines", Float, |s| u64::from(s.frame.scanlines) + 1),
+    Array::of::<Row>("rows", Float, |s| s.frame.samples.into()),
+    Array::of::<Tissue>("tissues", Word, |s| s.tissues),
+    // Two sides of every instance.
+    Array::of::<Surface>("surfaces", Float, |s| 2 * u64::from(s.frame.instances)),
+    // Points, and the spheres around groups of them.
+    Array::new("points", Float, 4, |s| {
+        u64::from(s.frame.points) + u64::from(s.frame.points.div_ceil(POINT_GROUP))
+    }),
+    Array::new("grey", Word, 1, |_| 256),
+    Array::new("contact", Float, 1, |s| 2 * u64::from(s.frame.scanlines) + 1),
+    Array::of::<Counters>("counters", Word, |_| 1).zeroed(),
+];
+
+/// The anatomy, which [`super::super::World`] holds.
+pub static ANATOMY: [Array; 6] = [
+    Array::anatomy("instances", Word, size_of::<Instance>() / 4),
+    Array::anatomy("vertices", Float, 3),
+    Array::anatomy("normals", Float, 3),
+    Array::anatomy("triangles", Word, 3),
+    Array::anatomy("nodes", Word, 20),
+    Array::anatomy("fields", Float, 4),
+];

@@ -1,0 +1,34 @@
+//! `mask`, of frames that show an acquired volume: masking meshes and volume along the scanlines.
+
+use super::super::layout::{Frame, Fusion};
+use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
+use crate::output::npy::Element::{Float, Word};
+use crate::scene::Scene;
+
+/// The stage.
+pub const MASK: Pass = Pass {
+    name: "mask",
+    variants: Variants::Tracer,
+    binds: &[
+        "frame",
+        "instances",
+        "vertices",
+        "normals",
+        "triangles",
+        "nodes",
+        "fusion",
+        "acquired",
+        "counters",
+        "prescan",
+        "scanlines",
+        "tissues",
+    ],
+    makes: &[
+        Array::of::<Fusion>("fusion", Word, |_| 1),
+        // Mask and grey level of every sample.
+        Array::new("prescan", Float, 2, Sizes::samples),
+    ],
+    extent: Some(|frame: &Frame| Extent::Groups([frame.scanlines, 1, 1])),
+    needed: Scene::shows_volume,
+    ..Pass::USUAL
+};

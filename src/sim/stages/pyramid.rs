@@ -1,0 +1,119 @@
+//! `difference`, `reduce`, `collapse`: blending by bands, over a pyramid of what is simulated minus what
+//! was acquired.
+
+use std::sync::Arc;
+
+use super::super::pass::{Extent, Pass, per_pixel};
+use super::super::passes::Passes;
+use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
+use crate::scene::Scene;
+use crate::settings::Blend;
+
+/// The finest level.
+pub const DIFFERENCE: Pass = Pass {
+    name: "difference",
+    binds: &["frame", "pixels", "background", "mask", "level"],
+    extent: Some(per_pixel),
+    needed: is_banded,
+    ..Pass::USUAL
+};
+
+/// A coarser level from the one below.
+pub const REDUCE: Pass =
+    Pass { name: "reduce", binds: &["fine", "coarse"], needed: is_banded, ..Pass::USUAL };
+
+/// What a level and the coarser ones add.
+pub const COLLAPSE: Pass = Pass {
+    name: "collapse",
+    binds: &["fine", "coarse", "coarse_change", "change"],
+    needed: is_banded,
+    ..Pass::USUAL
+};
+
+/// Whether frames of a scene are blended by bands.
+pub(in crate::sim) fn is_banded(scene: &Scene) -> bool {
+    scene.shows_volume() && scene.fusion.as_ref().is_some_and(|f| f.blend == Blend::Multiband)
+}
+
+/// A level of the pyramid.
+struct Level {
+    /// Difference and weights per pixel, three floats.
+    sums: Buffer,
+    /// What this level and the coarser ones add to the acquired image.
+    change: Buffer,
+}
+
+/// The levels, the finest first, once they are wanted.
+#[derive(Default)]
+pub(in crate::sim) struct Pyramid(Vec<Level>);
+
+impl Pyramid {
+    /// Makes room for `levels` levels above the finest, of images of up to `pixels` pixels, whatever
+    /// their shape.
+    pub(in crate::sim) fn fit(
+        &mut self,
+        device: &Arc<Device>,
+        pixels: u64,
+        levels: u32,
+    ) -> Result<(), GpuError> {
+        while self.0.len() <= levels as usize {
+            // ceil(w / 2) ceil(h / 2) <= (w h + 1) / 2, for an image one pixel wide with equality.
+            let pixels = (0..self.0.len()).fold(pixels, |pixels, _| pixels.div_ceil(2));
+            let new = |name: &str, each: u64| {
+                device.buffer(name, (each * pixels).max(16), BufferKind::Storage)
+            };
+            self.0.push(Level { sums: new("band sums", 12)?, change: new("band change", 4)? });
+        }
+        Ok(())
+    }
+
+    /// What is added to each pixel of the acquired image.
+    pub(in crate::sim) fn change(&self) -> &Buffer {
+        &self.0[0].change
+    }
+}
+
+impl Passes {
+    /// Fills [`Pyramid::change`], over `top` levels above the finest.
+    pub(in crate::sim) fn bands(
+        &self,
+        cmd: &mut Commands<'_>,
+        pyramid: &Pyramid,
+        top: u32,
+    ) -> Result<(), GpuError> {
+        let (levels, top) = (&pyramid.0, top as usize);
+        let size = [self.frame.image_width, self.frame.image_height];
+        let threads = |level: usize| {
+            let [width, height] = size_at(size, level);
+            Extent::Threads([width, height, 1])
+        };
+        self.run_with(cmd, &DIFFERENCE, &[("level", &levels[0].sums)])?;
+        cmd.scope(REDUCE.name);
+        for level in 0..top {
+            let given = [("fine", &levels[level].sums), ("coarse", &levels[level + 1].sums)];
+            let push = size_at(size, level);
+            self.record(cmd, &REDUCE, threads(level + 1), bytemuck::bytes_of(&push), &given)?;
+        }
+        cmd.scope(COLLAPSE.name);
+        for level in (0..=top).rev() {
+            let [width, height] = size_at(size, level);
+            // The coarsest level reads nothing above itself.
+            let coarsest = level == top;
+            let (here, above) = (&levels[level], &levels[(level + 1).min(top)]);
+            let given = [
+                ("fine", &here.sums),
+                ("coarse", &above.sums),
+                ("coarse_change", if coarsest { &above.sums } else { &above.change }),
+                ("change", &here.change),
+            ];
+            let push = [width, height, u32::from(coarsest)];
+            self.record(cmd, &COLLAPSE, threads(level), bytemuck::bytes_of(&push), &given)?;
+        }
+        Ok(())
+    }
+}
+
+/// Pixels of level `level` of an image of `size` pixels.
+fn size_at(size: [u32; 2], level: usize) -> [u32; 2] {
+    (0..level).fold(size, |size, _| size.map(|n| n.div_ceil(2)))
+}

@@ -1,0 +1,65 @@
+//! `tint`: which pixels are acquired and which are simulated, as the mixed image once more, coloured.
+
+use super::super::pass::{Array, Pass, Sizes, per_pixel};
+use super::super::passes::Passes;
+use super::super::{SimError, Simulator};
+use crate::gpu::{Buffer, Commands, GpuError, Image, Stage};
+use crate::output::npy::Element::Word;
+
+/// The stage.
+pub const TINT: Pass = Pass {
+    name: "tint",
+    binds: &["frame", "fusion", "fused", "mask", "sums", "tinted"],
+    makes: &[Array::new("tinted", Word, 1, Sizes::pixels)],
+    extent: Some(per_pixel),
+    then: Stage::Transfer,
+    // By nothing in the scene: it is asked for.
+    needed: |_| false,
+    ..Pass::USUAL
+};
+
+/// How acquired pixels are coloured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tint {
+    /// Red, green and blue.
+    pub colour: [u8; 3],
+    /// Of the colour over a pixel that is all acquired, 0..=1; mixed ones by their share.
+    pub opacity: f32,
+}
+
+impl Passes {
+    /// Colours the mixed image into a buffer of its own, ready to be copied; after [`Self::fuse`].
+    pub(in crate::sim) fn tint(
+        &mut self,
+        cmd: &mut Commands<'_>,
+        tint: &Tint,
+    ) -> Result<&Buffer, GpuError> {
+        self.buffers.add(cmd.device(), TINT.makes.iter())?;
+        let mut push = tint.opacity.to_ne_bytes().to_vec();
+        let [r, g, b] = tint.colour;
+        push.extend(u32::from_le_bytes([r, g, b, 0]).to_ne_bytes());
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        cmd.scope(TINT.name);
+        self.record(cmd, &TINT, per_pixel(&self.frame), &push, &[])?;
+        Ok(&self.buffers["tinted"])
+    }
+}
+
+impl Simulator {
+    /// Colours the acquired pixels of the next frames in an image of their size beside the one of
+    /// [`Self::show_on`], which does not change; stops that where there is none. Frames that show no
+    /// acquired volume leave it as it is.
+    pub fn tint_on(&mut self, tinted: Option<(Image, Tint)>) {
+        self.tinted_on = tinted;
+    }
+
+    /// The last frame with its acquired pixels coloured, RGBA bytes row by row; none where it was not
+    /// asked for or showed no acquired volume.
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
+        let asked = self.fused && self.tinted_on.is_some() && self.passes.buffers.has("tinted");
+        asked.then(|| self.read("tinted")).transpose()
+    }
+}

@@ -1,0 +1,147 @@
+//! Random inputs and the frames that the cases have in common.
+
+use glam::DAffine3;
+
+use super::{Case, Input, Size};
+use insonify::reference::geometry;
+use insonify::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row};
+use insonify::sim::placement::matrix_rows;
+use insonify::sim::tables;
+
+/// SplitMix64 (Steele, Lea, Flood 2014): unrelated to the generator under test.
+pub struct Random(pub u64);
+
+impl Random {
+    /// 32 uniform bits.
+    pub fn word(&mut self) -> u32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        (z >> 32) as u32
+    }
+
+    /// Uniform in [low, high).
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * f64::from(self.word()) / 4_294_967_296.0
+    }
+
+    /// `count` numbers uniform in [low, high).
+    pub fn floats(&mut self, count: usize, low: f64, high: f64) -> Vec<f32> {
+        (0..count).map(|_| self.within(low, high) as f32).collect()
+    }
+}
+
+/// Scanlines, layers, samples of a case.
+pub fn dimensions(case: Case, size: Size) -> [u32; 3] {
+    match (case, size) {
+        (Case::Random, Size::Standard) => [192, 7, 2048],
+        (Case::Random, Size::Small) => [48, 3, 320],
+        // No lines: a frame without samples has no sample pitch.
+        (Case::Empty, _) => [0, 1, 16],
+        (Case::One, _) => [1, 1, 1],
+        (Case::Odd, _) => [23, 5, 131],
+        (Case::Modes, _) => [31, 4, 260],
+        (Case::NotFinite, _) => [12, 2, 130],
+    }
+}
+
+/// A convex, linear or phased frame by the case, depth 60 mm; every number that a kernel might read
+/// is plausible.
+pub fn frame(case: Case, size: Size) -> Frame {
+    let [scanlines, layers, samples] = dimensions(case, size);
+    let kind = match case {
+        Case::Odd => KIND_LINEAR,
+        Case::One | Case::Modes => KIND_PHASED,
+        _ => KIND_CONVEX,
+    };
+    let identity = matrix_rows(&DAffine3::IDENTITY);
+    let depth = 60.0;
+    Frame {
+        world_from_probe: identity,
+        probe_from_world: identity,
+        kind,
+        scanlines,
+        layers,
+        samples,
+        depth,
+        radius: if kind == KIND_CONVEX { 40.0 } else { 0.0 },
+        field_of_view: 1.1,
+        width: 38.0,
+        slice_thickness: 5.0,
+        speed: 1.54,
+        sample_pitch: depth / samples as f32,
+        frequency: 3.5,
+        paths: 4,
+        max_interactions: 8,
+        max_reflections: 3,
+        min_weight: 1e-4,
+        volume_floor: 1e-6,
+        branch_floor: 0.02,
+        seed: 0x5eed,
+        origin_jitter: 0.05,
+        emission_lobe: 3000.0,
+        ray_mask: 0xff,
+        beam_width: 4.0,
+        cell: 0.3,
+        elevation_reach: 0.9,
+        lateral_cut: 2.5,
+        surface_scale: 65536.0,
+        volume_scale: 65536.0,
+        segment_capacity: 256,
+        face_height: 4.4,
+        axial_sigma: 2.3,
+        inverse_reference: 1.0,
+        inverse_range: 1.0 / 60.0,
+        frame_index: 5,
+        image_width: 1,
+        image_height: 1,
+        pixel_pitch: 0.25,
+        ..Frame::default()
+    }
+}
+
+/// One row per sample; widths grow with depth.
+pub fn rows(frame: &Frame) -> Vec<Row> {
+    (0..frame.samples)
+        .map(|k| {
+            let depth = k as f32 * frame.sample_pitch;
+            let sigmas = [0.4 + 0.01 * depth, 0.9 + 0.005 * depth];
+            let gain = 1.0 + 0.01 * depth;
+            let level = 0.5 + 0.05 * depth;
+            Row {
+                shape: tables::beam_shape(sigmas.map(f64::from), gain.into(), level.into()),
+                sigma_lateral: sigmas[0],
+                sigma_elevation: sigmas[1],
+                volume_gain: gain,
+                point_gain: 0.8,
+                surface_gain: 1.2 - 0.005 * depth,
+                incoherent_gain: 1.5 + 0.01 * depth,
+                volume_undo: 1.0 / 65536.0,
+                surface_undo: 1.0 / (65536.0 * (1.2 - 0.005 * depth)),
+                lateral_lines: 0.03 + 0.06 * depth,
+                tgc: 1.0 + 0.1 * depth,
+                compensation: 1.0 + 0.02 * depth,
+                receive_reach: 0.5 + 0.3 * depth,
+                black: -12.0 + 0.02 * depth,
+                ..Row::default()
+            }
+        })
+        .collect()
+}
+
+/// The table of the frame's scanlines.
+pub fn scanlines(frame: &Frame) -> Input {
+    let table = tables::scanlines(&geometry::probe(frame));
+    Input::floats("scanlines", bytemuck::cast_slice(&table))
+}
+
+/// Index l K + k of every sample.
+pub fn samples(frame: &Frame) -> usize {
+    frame.scanlines as usize * frame.samples as usize
+}
+
+/// Lines of a frame.
+pub fn lines(frame: &Frame) -> usize {
+    frame.scanlines as usize * frame.layers as usize
+}

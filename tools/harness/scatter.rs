@@ -1,0 +1,184 @@
+//! `scatter`: echoes of scatterers and points along segments.
+
+use super::check::relative_norm;
+use super::inputs::{Random, lines, rows, scanlines};
+use super::{Case, Check, Input, Job, Size, Subject, trace, worlds};
+use insonify::reference::{Segment, origin, scatter};
+use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
+use insonify::sim::stages;
+use insonify::sim::tables::with_spheres;
+
+/// Samples beyond the first window of one case; no multiple of a bin or a slot.
+const BEYOND: u32 = 211;
+
+/// The kernel for worlds in which tissue deforms.
+pub const DEFORMING: Subject = Subject { name: "scatter_deforming", job, ..RIGID };
+
+/// The kernel for worlds in which none does.
+pub const RIGID: Subject = Subject {
+    name: "scatter_rigid",
+    tolerance: "norm within 0.2 %: distances of 100 mm round at 8e-6 mm, 3e-4 rad of the carrier, and \
+                a scatterer at the edge of the beam may count or not, and one of those at the ends of the \
+                slab, which are 3.2e-5 mm of its height; in voxel mode 3 %, since 1e-4 \
+                of the samples fall on the other side of a voxel's face",
+    job: |case, size| job_of(stiff(scene(case, size)), case),
+    check,
+    plant: |job, outputs| {
+        // Everything one sample too late.
+        job.edit(outputs, "volume_echoes", |echoes: &mut [i32]| {
+            echoes.rotate_right(2);
+        });
+    },
+    ..Subject::of(&stages::SCATTER)
+};
+
+/// Segments as `trace`'s twin finds them, in the device's slots.
+fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
+    let owned = worlds::owned(job);
+    let mut world = owned.world();
+    let rows = rows(frame);
+    world.rows = &rows;
+    let (stacks, _) = origin::origin(&world);
+    let traced = insonify::reference::trace::trace(&world, &stacks);
+    let capacity = frame.segment_capacity as usize;
+    let mut slots = vec![layout::Segment::default(); lines(frame) * capacity];
+    let mut counts = Vec::new();
+    for (slot, found) in slots.chunks_mut(capacity).zip(&traced.segments) {
+        for (slot, segment) in slot.iter_mut().zip(found) {
+            *slot = narrow(segment);
+        }
+        counts.push(found.len().min(capacity) as u32);
+    }
+    (slots, counts)
+}
+
+fn narrow(s: &Segment) -> layout::Segment {
+    let four = |v: glam::DVec3, w: f64| v.extend(w).as_vec4().to_array();
+    layout::Segment {
+        origin_length: four(s.origin, s.length),
+        direction_time: four(s.direction, s.time),
+        lateral_weight: four(s.lateral, s.weight),
+        spread: four(s.spread.into(), s.share),
+        tissue: s.tissue,
+        instance: s.instance,
+        line: s.line,
+        handedness: s.handedness as f32,
+    }
+}
+
+fn job(case: Case, size: Size) -> Job {
+    job_of(scene(case, size), case)
+}
+
+/// The world of a case. Finite tissues: here the segments are not.
+fn scene(case: Case, size: Size) -> Job {
+    let case = match case {
+        Case::NotFinite => Case::Random,
+        case => case,
+    };
+    let mut job = Job { inputs: trace::scene(case, size), push: Vec::new() };
+    if case == Case::Modes {
+        // As many samples that the work groups of a second window have some.
+        let mut frame: Frame = job.one("frame");
+        frame.samples = layout::SCATTER_WINDOW + BEYOND;
+        frame.sample_pitch = frame.depth / frame.samples as f32;
+        job.inputs[0] = Input::words("frame", &[frame]);
+    }
+    job
+}
+
+/// The same world with no displacement fields.
+fn stiff(mut job: Job) -> Job {
+    let mut instances: Vec<layout::Instance> = job.get("instances");
+    instances.iter_mut().for_each(|i| i.field = layout::NONE);
+    let at = job.index("instances");
+    job.inputs[at] = Input::words("instances", &instances);
+    job
+}
+
+fn job_of(mut job: Job, case: Case) -> Job {
+    let mut frame: Frame = job.one("frame");
+    let mut random = Random(9);
+    // Little wires: most stretches are far from most of them.
+    let wires = if case == Case::Empty { 0 } else { 10 };
+    let points: Vec<[f32; 4]> = (0..wires)
+        .flat_map(|_| {
+            let mut within = |low, high| random.within(low, high) as f32;
+            let [x, z] = [within(-15.0, 15.0), within(2.0, 58.0)];
+            [(); 4].map(|()| [x, within(-3.0, 3.0), z, within(0.5, 2.0)])
+        })
+        .collect();
+    frame.points = points.len() as u32;
+    let points = with_spheres(points);
+    if case == Case::Odd {
+        frame.flags |= FLAG_VOXEL;
+    }
+    job.inputs[0] = Input::words("frame", &[frame]);
+    let (mut segments, counts) = segments(&job, &frame);
+    if case == Case::NotFinite {
+        spoil(&mut segments, &counts, frame.segment_capacity as usize);
+    }
+    let given = ["frame", "tissues", "instances", "fields"].map(|name| job.input(name).clone());
+    let mut given = given.to_vec();
+    given.extend([
+        Input::floats("rows", bytemuck::cast_slice(&rows(&frame))),
+        Input::floats("points", points.as_flattened()),
+        Input::words("segments", &segments),
+        Input::words("segment_count", &counts),
+        scanlines(&frame),
+    ]);
+    Job::of(&stages::SCATTER, given, Vec::new())
+}
+
+/// One bad number in the first segment of each of nine lines.
+fn spoil(segments: &mut [layout::Segment], counts: &[u32], capacity: usize) {
+    let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
+    let firsts = (0..counts.len()).filter(|&line| counts[line] > 0);
+    for (i, line) in firsts.take(9).enumerate() {
+        let segment = &mut segments[line * capacity];
+        match i / 3 {
+            0 => segment.origin_length[i % 3] = bad[i % 3],
+            1 => segment.origin_length[3] = bad[i % 3],
+            _ => segment.direction_time[3] = bad[i % 3],
+        }
+    }
+}
+
+fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
+    let owned = worlds::owned(job);
+    let world = owned.world();
+    let frame = world.frame;
+    let segments: Vec<layout::Segment> = job.get("segments");
+    let counts: Vec<u32> = job.get("segment_count");
+    let held: Vec<Segment> = segments
+        .chunks(frame.segment_capacity as usize)
+        .zip(&counts)
+        .flat_map(|(slots, &count)| slots.iter().take(count as usize))
+        .map(Segment::from)
+        .collect();
+    let twin = scatter::scatter(&world, &held);
+    let echoes: Vec<i32> = job.after(outputs, "volume_echoes");
+    let echoes: Vec<f64> = echoes.into_iter().map(f64::from).collect();
+    // A cell whose middle lies within 8e-6 mm of either end of the layer's slab may count or not: that share
+    // of the scatterers, and of their power.
+    let at_an_end = 4.0 * 8e-6 / (2.0 * f64::from(frame.elevation_reach));
+    let allowed =
+        if frame.flags & FLAG_VOXEL == 0 { (2e-3_f64.powi(2) + at_an_end).sqrt() } else { 3e-2 };
+    let fixed: Vec<f64> = twin.fixed.iter().map(|&x| x as f64).collect();
+    let counters: Counters = job.after(outputs, "counters")[0];
+    let beyond = |echoes: &[f64]| {
+        let lines = echoes.chunks(2 * frame.samples.max(1) as usize);
+        let late = lines.flat_map(|line| line.iter().skip(2 * layout::SCATTER_WINDOW as usize));
+        late.copied().collect::<Vec<f64>>()
+    };
+    let [late, late_fixed] = [&echoes, &fixed].map(|echoes| beyond(echoes));
+    let heard = late_fixed.is_empty() || late_fixed.iter().any(|&echo| echo != 0.0);
+    let echoed = twin.deposits.iter().any(|&n| n > 0) as u32;
+    vec![
+        Check::one("echo norm", relative_norm(&echoes, &fixed), allowed),
+        Check::one("beyond a window, norm", relative_norm(&late, &late_fixed), allowed),
+        Check::equal("anything beyond it", &[heard], &[true]),
+        Check::equal("saturated", &[counters.saturated], &[twin.saturated]),
+        Check::equal("echoes at all", &[u32::from(echoes.iter().any(|&e| e != 0.0))], &[echoed]),
+    ]
+}
