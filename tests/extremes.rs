@@ -226,7 +226,7 @@ fn tabled(scene: &Scene) -> Option<&'static str> {
 fn saved(case: &Case, folder: &Path, scene: &Scene) {
     let file = File::new(folder.join("scene.toml"), case.set.clone(), scene);
     let mut model = Model::new(scene, file, Tracer::Bvh, 0.0, Instant::now());
-    let _ = (model.order(), model.survey.sight([64, 64]));
+    let _ = (model.order(), model.view3d.sight([64, 64]));
     let copy = folder.join("copy.toml");
     model.save(Some(&copy), true).unwrap_or_else(|error| panic!("not saved: {error}"));
     Scene::load(&copy, &[]).unwrap_or_else(|error| panic!("not loaded again: {error}"));
@@ -263,7 +263,7 @@ fn pictured(
         },
     };
     let levels = simulator
-        .fit(&library, scene)
+        .fit(scene)
         .and_then(|_| simulator.frame(scene, 0))
         .and_then(|_| simulator.log_image());
     if case.is_setting() {

@@ -12,9 +12,11 @@ use insonify::output::npy;
 use insonify::sim::shaders::Library;
 use insonify::sim::stages;
 
-/// Kernels of pictures for the user, without a twin: tests/survey.rs and tests/fusion.rs compare them with
+const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
+
+/// Kernels of pictures for the user, without a twin: tests/view3d.rs and tests/fusion.rs compare them with
 /// closed forms.
-const CLOSED_FORMS: [&str; 3] = ["survey_bvh", "survey_query", "tint"];
+const CLOSED_FORMS: [&str; 3] = ["view3d_bvh", "view3d_query", "tint"];
 
 fn subject(name: &str) {
     let subject = SUBJECTS.iter().find(|s| s.name == name).unwrap();

@@ -5,7 +5,7 @@ use std::mem::size_of;
 
 use insonify::sim::layout::{
     CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Row, Scanline, Segment, Surface,
-    Survey, Tissue,
+    Tissue, View3d,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -35,7 +35,7 @@ fn mirrors() -> [Mirror; 11] {
         Segment,
         Counters,
         Fusion,
-        Survey,
+        View3d,
         Interaction,
         Scanline
     )

@@ -400,8 +400,8 @@ fn a_real_heart_s_field_fits_its_surfaces_and_does_not_fold() {
     assert!(alone > 0.01 * largest, "a field that ignores the ventricles is caught: {alone}");
 }
 
-/// The body of [`scene`], of one shape, below a transform that scales it by `factors` about its middle in world axes; at
-/// `seconds` of a movement whose period is 4 s.
+/// The body of [`scene`], of one shape, below a transform that scales it by `factors` about its middle in world
+/// axes; at `seconds` of a movement whose period is 4 s.
 fn squeezed(factors: DVec3, seconds: f64) -> Scene {
     let mut scene = scene(|p| p);
     scene.instances[0].keyframes = Keyframes::default();

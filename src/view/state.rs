@@ -15,7 +15,7 @@ pub(super) struct State {
     /// True while the timing panel is open.
     pub(super) timing: bool,
     /// The 3D view.
-    pub(super) survey: super::survey::State,
+    pub(super) view3d: super::view3d::State,
     /// Planes through the acquired volume, in place of the 3D view.
     pub(super) planes: super::planes::State,
     /// The shown page of the timing panel.

@@ -58,7 +58,7 @@ fn seen(point: DVec3) -> (u16, u16) {
     let file = File::new(file, Vec::new(), &scene);
     let model = Model::new(&scene, file, Tracer::Bvh, 0.0, Instant::now());
     let [left, top, width, height] = VIEW.map(f64::from);
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     let at = camera.project(DVec2::new(width, height), point);
     let at = at.expect("in front of the eye") + DVec2::new(left, top);
     (at.x as u16, at.y as u16)

@@ -14,10 +14,10 @@ mod planes;
 mod robust;
 #[path = "../common/skip.rs"]
 mod skip;
-mod survey;
 mod tools;
 mod tracker;
 mod trajectory;
+mod view3d;
 
 use std::time::Duration;
 
