@@ -250,7 +250,7 @@ pub fn unseen(scene: &Scene, mask: usize) -> String {
     )
 }
 
-/// How long nothing is said of progress, s.
+/// Time without a word of progress, s.
 const QUIET: f64 = 1.0;
 
 /// Progress on standard error: a line that is written over, where that is a terminal.

@@ -18,7 +18,7 @@ const MARGIN: f32 = 1e-6;
 
 /// A surface with a search for the nearest point.
 pub struct Surface {
-    /// Those with area.
+    /// The triangles with area.
     triangles: Vec<Triangle>,
     boxes: Bvh2,
     centre: DVec3,
@@ -74,7 +74,7 @@ impl Surface {
     pub fn nearest(&self, p: DVec3) -> Nearest {
         let (mut best, mut nearest) = (f64::INFINITY, Nearest { point: p, normal: DVec3::ZERO });
         let reach = |node: u32| from_box(self.boxes.nodes[node as usize].aabb(), p);
-        // Nodes still to be looked at, with the least squared distance of what they hold.
+        // Nodes still to be visited, with the least squared distance of their content.
         let mut open = vec![(reach(0), 0)];
         while let Some((least, index)) = open.pop() {
             let node = &self.boxes.nodes[index as usize];

@@ -46,7 +46,7 @@ pub(super) struct State {
     pub(super) stopped: bool,
     /// It is to be started again.
     pub(super) restart: bool,
-    /// What is done before there is a picture.
+    /// The work being done before the first picture.
     pub(super) preparing: &'static str,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,

@@ -231,7 +231,7 @@ mod tests {
         Check { row: "T5", name, claim: "Two millimetres.", planted: "Three.", run }
     }
 
-    /// What is right, what is wrong, and what would not notice: the page says of each what its test says.
+    /// A right check, a wrong one, and one that would not notice: the page's verdict is the test's for each.
     #[test]
     fn verdicts_of_the_page_are_those_of_the_tests() {
         let checks = [
