@@ -36,11 +36,11 @@ pub struct Adjusted {
 /// Difference of two settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change {
-    /// Of gain and sliders together, the largest over the depths that were compared, dB.
+    /// Difference of gain and sliders together, the largest over the compared depths, dB.
     pub level: f64,
-    /// Of the dynamic range, relative.
+    /// Difference of the dynamic range, relative.
     pub range: f64,
-    /// Of the point-spread function, relative.
+    /// Difference of the point-spread function, relative.
     pub size: f64,
 }
 

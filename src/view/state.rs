@@ -44,7 +44,7 @@ pub(super) struct State {
     pub(super) deaths: Deaths,
     /// The simulation's thread is dead, and not started again.
     pub(super) stopped: bool,
-    /// It is to be started again.
+    /// True where the simulation is to be started again.
     pub(super) restart: bool,
     /// The work being done before the first picture.
     pub(super) preparing: &'static str,
