@@ -1,8 +1,8 @@
-//! Who may use whom (ARCHITECTURE.md), read from the sources.
+//! Dependencies between modules (ARCHITECTURE.md), read from the sources.
 
 use std::path::Path;
 
-/// Module and the crate's modules that it must not name.
+/// Modules, and the crate's modules that each must not name.
 const FORBIDDEN: [(&str, &[&str]); 5] = [
     ("gpu", &["scene", "probe", "sim", "reference", "harness", "view"]),
     ("scene", &["gpu", "sim", "reference", "harness", "view"]),
