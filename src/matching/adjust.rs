@@ -223,5 +223,4 @@ pub(super) fn change(probe: &Probe, a: &Imaging, b: &Imaging, used: &[f64]) -> C
 }
 
 #[cfg(test)]
-#[path = "adjust_tests.rs"]
 mod tests;

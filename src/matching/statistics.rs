@@ -299,5 +299,4 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
 }
 
 #[cfg(test)]
-#[path = "statistics_tests.rs"]
 mod tests;

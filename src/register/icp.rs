@@ -318,5 +318,4 @@ fn dot(a: &Motion, b: &Motion) -> f64 {
 }
 
 #[cfg(test)]
-#[path = "icp_tests.rs"]
 mod tests;

@@ -216,5 +216,4 @@ pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, StudyError
 }
 
 #[cfg(test)]
-#[path = "answers_tests.rs"]
 pub(in crate::study) mod tests;

@@ -268,5 +268,4 @@ fn id(rows: &[Row]) -> Result<String, String> {
 }
 
 #[cfg(test)]
-#[path = "key_tests.rs"]
 pub(in crate::study) mod tests;

@@ -210,5 +210,4 @@ fn pairs(backgrounds: &[&str], blocks: &[Vec<usize>]) -> Vec<Pair> {
 }
 
 #[cfg(test)]
-#[path = "results_tests.rs"]
 mod tests;

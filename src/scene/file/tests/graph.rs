@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 
-use super::tests::Case;
-use super::*;
+use super::Case;
+use crate::scene::file::*;
 use crate::scene::graph::NodeKind;
 use crate::scene::{Instance, Strategy};
 
