@@ -34,9 +34,9 @@ mod state;
 mod statistics;
 mod strip;
 mod style;
-mod survey;
 mod timing;
 mod tools;
+mod view3d;
 
 use std::net::IpAddr;
 use std::path::PathBuf;

@@ -21,9 +21,9 @@ pub mod rounds;
 pub mod shaders;
 pub mod special;
 pub mod stages;
-pub mod survey;
 pub mod tables;
 pub mod tracer;
+pub mod view3d;
 pub mod world;
 
 use std::sync::Arc;
@@ -44,9 +44,9 @@ use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
 use stages::{AXIAL, BEAM, DISPLAY, ORIGIN, SCATTER};
-use survey::Surveyor;
 use tables::Tables;
 pub use tracer::Tracer;
+use view3d::Viewer3d;
 use world::World;
 
 /// Why a scene cannot be simulated.
@@ -83,7 +83,7 @@ pub struct Simulator {
     /// Where the next frames are copied.
     shown_on: Option<Image>,
     /// Once the anatomy was looked at.
-    surveyor: Option<Surveyor>,
+    viewer3d: Option<Viewer3d>,
     tinted_on: Option<(Image, Tint)>,
     read_out: ReadOut,
     update_time: Duration,
@@ -177,7 +177,7 @@ impl Simulator {
             counting: false,
             fused: false,
             shown_on: None,
-            surveyor: None,
+            viewer3d: None,
             tinted_on: None,
             read_out: ReadOut::default(),
             update_time: Duration::ZERO,
@@ -243,7 +243,7 @@ impl Simulator {
         Ok(self.frames.take_timings())
     }
 
-    /// Frames and surveys to come are made only as long as nothing newer is wanted: while they are being
+    /// Frames and 3D views to come are made only as long as nothing newer is wanted: while they are being
     /// recorded, which where the window shares the queue takes about as long as they do, `wanted_no_longer`
     /// is asked now and then. They then fail with [`GpuError::Abandoned`], and the picture before stays.
     pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
@@ -288,7 +288,7 @@ impl Simulator {
         let world = &self.passes.world;
         let kernels = &self.passes.kernels;
         self.passes.kernels = kernels.again(&self.device, library, world, self.counting)?;
-        self.surveyor = None;
+        self.viewer3d = None;
         self.passes.world.reload(shapers);
         Ok(())
     }

@@ -104,7 +104,7 @@ pub struct Frame {
 
 /// While something moves, the 3D view waits this many times the duration of its last picture before
 /// the next one: it gets a seventh of the time.
-const SURVEY_PUT_OFF: u32 = 6;
+const VIEW3D_PUT_OFF: u32 = 6;
 
 /// Longest wait of the next image for the window to draw the last one, where they share a queue: neither then
 /// slows the other, and the image contains the newest input. A window that takes longer is not waited for until it
@@ -117,7 +117,7 @@ pub enum News {
     /// which the loop holds hundreds.
     Frame(Box<Frame>, Option<Pixels>),
     /// A picture of the anatomy.
-    Survey(Box<Pictured>),
+    View3d(Box<Pictured>),
     /// The work under way before the first picture.
     Preparing(&'static str),
     /// An order could not be carried out; the next one may.
@@ -163,7 +163,7 @@ enum Job {
     /// The last image once more, at a finer level.
     Refined(usize),
     /// Only the anatomy, while something moves or at rest.
-    Survey {
+    View3d {
         moving: bool,
     },
 }

@@ -9,9 +9,9 @@ use super::model::hold::Seen;
 use super::model::skin::Spot;
 use super::model::{Axis, Camera, Model, Source};
 use super::style;
-use super::survey::Place;
+use super::view3d::Place;
 use crate::probe::Probe;
-use crate::sim::survey::{HANDLE, HEAD};
+use crate::sim::view3d::{HANDLE, HEAD};
 
 /// Distance within which the pointer means the probe, points.
 const NEAR: f32 = 16.0;
@@ -115,7 +115,7 @@ fn turn(ui: &Ui, model: &mut Model, now: Instant) -> bool {
 
 /// The action of a drag that begins at `at`; none where there is neither probe nor skin.
 fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Drag> {
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     let on_probe = is_probe(at, place, &camera, &model.pose, &model.settings.probe);
     let spot = spot_at(at, place, model, now);
     if !on_probe && spot.is_none() {
@@ -129,7 +129,7 @@ fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) ->
     }
     let held = model.spot_held(now)?;
     let off = place.project(&camera, held.point)? - at;
-    Some(match model.survey.cut {
+    Some(match model.view3d.cut {
         true => Drag::InPlane(off),
         false => Drag::Over(off),
     })
@@ -137,16 +137,16 @@ fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) ->
 
 /// The skin seen at a screen position.
 fn spot_at(at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Spot> {
-    let seen = match model.survey.cut {
+    let seen = match model.view3d.cut {
         true => Seen::BehindPlane,
         false => Seen::Whole,
     };
-    let ray = place.ray(&model.survey.camera, at);
+    let ray = place.ray(&model.view3d.camera, at);
     model.spot_seen(&ray, seen, now)
 }
 
 fn carry_out(drag: Drag, at: Pos2, delta: Vec2, place: &Place, model: &mut Model, now: Instant) {
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     match drag {
         Drag::Over(off) => {
             // Over hidden skin and beside the skin the probe stays.
@@ -223,7 +223,7 @@ fn encloses(polygon: &[Pos2], at: Pos2) -> bool {
 
 /// Shows where the probe would go on a press at `at`.
 fn hover(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) {
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     if is_probe(at, place, &camera, &model.pose, &model.settings.probe) {
         ui.ctx().set_cursor_icon(CursorIcon::Grab);
         return;

@@ -35,7 +35,7 @@ enum Action {
     Save,
     Load,
     Console,
-    Survey,
+    View3d,
     Planes,
     Hold,
     Timing,
@@ -165,7 +165,7 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "C V G T M B",
         &[
             (Key::C, false, Action::Console),
-            (Key::V, false, Action::Survey),
+            (Key::V, false, Action::View3d),
             (Key::G, false, Action::Planes),
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
@@ -297,7 +297,7 @@ fn carry_out(
         Action::Save => state.files.save(model),
         Action::Load => state.files.ask(Purpose::Load, model),
         Action::Console => state.console = !state.console,
-        Action::Survey => state.survey.open = !state.survey.open,
+        Action::View3d => state.view3d.open = !state.view3d.open,
         Action::Planes => state.planes.open = !state.planes.open,
         Action::Hold => {
             let stays = model.hold.as_ref().is_some_and(|hold| hold.stays);

@@ -13,7 +13,7 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    calipers, cine, deaths, files, keys, mmode, notice, planes, saved, strip, style, survey, timing,
+    calipers, cine, deaths, files, keys, mmode, notice, planes, saved, strip, style, timing, view3d,
 };
 
 /// Width of the toggles and the loop beside each other, points.
@@ -30,7 +30,7 @@ pub(super) struct Places {
     /// The B-mode image.
     pub(super) image: Option<Place>,
     /// The 3D view.
-    pub(super) survey: Option<survey::Place>,
+    pub(super) view3d: Option<view3d::Place>,
 }
 
 /// Draws the interface; returns the places of the pictures.
@@ -86,17 +86,17 @@ pub(super) fn show(
     }
     // Transparent: the pictures are below the interface.
     let planes = state.planes.open && model.registration.is_some();
-    let beside = state.survey.open || planes;
-    let room = survey::width(ui.available_width()).filter(|_| beside && !alone);
+    let beside = state.view3d.open || planes;
+    let room = view3d::width(ui.available_width()).filter(|_| beside && !alone);
     if let Some(width) = room.filter(|_| planes) {
         let panel = Panel::right("planes").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
         panel.show(ui, |ui| planes::show(ui, model, &mut state.planes, now));
     }
-    let survey = room.filter(|_| !planes).map(|width| {
-        let panel = Panel::right("survey").resizable(false).exact_size(width);
+    let view3d = room.filter(|_| !planes).map(|width| {
+        let panel = Panel::right("view3d").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
-        let shown = panel.show(ui, |ui| survey::show(ui, model, &mut state.survey, pictured));
+        let shown = panel.show(ui, |ui| view3d::show(ui, model, &mut state.view3d, pictured));
         shown.inner
     });
     let centre = CentralPanel::default().frame(Space::NONE);
@@ -141,14 +141,14 @@ pub(super) fn show(
     if state.help {
         help(ui.ctx(), &mut state.help);
     }
-    Places { image: place.inner, survey }
+    Places { image: place.inner, view3d }
 }
 
 /// Buttons that open the panels.
 fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     for (open, name, tip) in [
         (&mut state.console, "Console", "Settings (C)"),
-        (&mut state.survey.open, "3D", "Anatomy, probe and fan from outside (V)"),
+        (&mut state.view3d.open, "3D", "Anatomy, probe and fan from outside (V)"),
         (&mut state.timing, "Timings", "Where the time goes (T)"),
         (&mut state.help, "Keys", "What the keyboard does (?)"),
     ] {

@@ -5,7 +5,7 @@ use glam::DAffine3;
 use super::model::Camera;
 use crate::gpu::Image;
 use crate::probe::Probe;
-use crate::sim::survey::Sight;
+use crate::sim::view3d::Sight;
 
 /// The wanted view of the anatomy.
 #[derive(Clone, Debug, PartialEq)]

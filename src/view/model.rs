@@ -20,8 +20,8 @@ mod settings;
 pub mod sheet;
 pub mod sidecar;
 pub mod skin;
-mod survey;
 pub mod trajectory;
+mod view3d;
 mod ways;
 
 use std::time::Instant;
@@ -43,8 +43,8 @@ use real::Real;
 use registration::Registration;
 pub use saving::File;
 pub use settings::Settings;
-pub use survey::{Shown, Survey};
 use trajectory::Replay;
+pub use view3d::{Shown, View3d};
 pub use ways::{Kept, Ways};
 
 use super::engine::{Frame, Pixels};
@@ -75,7 +75,7 @@ pub struct Model {
     /// The placed meshes, as [`Settings::surfaces`].
     pub meshes: Vec<Placed>,
     /// The 3D view; changes of it are no new revision, since the image stays.
-    pub survey: Survey,
+    pub view3d: View3d,
     /// The settings of the scene file.
     pub loaded: Settings,
     /// The pose of the scene file.
@@ -179,7 +179,7 @@ impl Model {
                     switch: scene.origins.instances.get(index).map(entries::switch),
                 })
                 .collect(),
-            survey: Survey::new(scene),
+            view3d: View3d::new(scene),
             home: scene.world_from_probe,
             hold: Hold::of(scene),
             registration: Registration::of(scene),

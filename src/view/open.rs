@@ -20,7 +20,7 @@ use super::session::{self, Session, Wake};
 use super::state::State;
 use super::timing;
 use super::tools::Tools;
-use super::{Model, Options, ViewError, keys, planes, style, survey};
+use super::{Model, Options, ViewError, keys, planes, style, view3d};
 use crate::gpu::{Device, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
@@ -132,7 +132,7 @@ impl Open {
         let state = State {
             console: true,
             timing: false,
-            survey: survey::State::default(),
+            view3d: view3d::State::default(),
             planes: planes::State::default(),
             times: timing::Page::default(),
             help: false,
@@ -225,7 +225,7 @@ impl Open {
         let (mut failed, mut pictures_only) = (Ok(()), true);
         self.receive(plan);
         for news in self.session.engine.news() {
-            pictures_only &= matches!(news, News::Survey(_));
+            pictures_only &= matches!(news, News::View3d(_));
             match news {
                 News::Frame(frame, pixels) => {
                     self.awaited = false;
@@ -237,14 +237,14 @@ impl Open {
                         self.model.film(&frame, &pixels);
                     }
                     self.state.tools.record((*frame).clone());
-                    self.state.survey.pace(frame.grade.budget_ms);
+                    self.state.view3d.pace(frame.grade.budget_ms);
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;
                 }
-                News::Survey(pictured) => {
+                News::View3d(pictured) => {
                     self.pictures_ms.push(pictured.ms);
-                    self.state.survey.learn(&pictured);
+                    self.state.view3d.learn(&pictured);
                     self.pictured = Some(*pictured);
                 }
                 News::Preparing(what) => self.state.preparing = what,

@@ -15,7 +15,7 @@ pub(super) struct State {
     /// True while the timing panel is open.
     pub(super) timing: bool,
     /// The 3D view.
-    pub(super) survey: super::survey::State,
+    pub(super) view3d: super::view3d::State,
     /// Planes through the acquired volume, in place of the 3D view.
     pub(super) planes: super::planes::State,
     /// The shown page of the timing panel.
@@ -44,9 +44,9 @@ pub(super) struct State {
     pub(super) deaths: Deaths,
     /// The simulation's thread is dead, and not started again.
     pub(super) stopped: bool,
-    /// It is to be started again.
+    /// True where the simulation is to be started again.
     pub(super) restart: bool,
-    /// What is done before there is a picture.
+    /// The work being done before the first picture.
     pub(super) preparing: &'static str,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,

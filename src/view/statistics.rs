@@ -34,7 +34,7 @@ pub(super) struct Times {
     /// Durations of the window's own frames, from the start of drawing to the screen.
     interface: VecDeque<f64>,
     /// Durations of the 3D view's pictures on the device.
-    survey: VecDeque<f64>,
+    view3d: VecDeque<f64>,
 }
 
 impl Times {
@@ -48,13 +48,13 @@ impl Times {
     }
 
     /// Notes a picture of the 3D view, ms on the device.
-    pub(super) fn add_survey(&mut self, ms: f64) {
-        push(&mut self.survey, ms);
+    pub(super) fn add_view3d(&mut self, ms: f64) {
+        push(&mut self.view3d, ms);
     }
 
     /// Times of the 3D view's pictures, ms.
-    pub(super) fn survey(&self) -> Vec<f64> {
-        self.survey.iter().copied().collect()
+    pub(super) fn view3d(&self) -> Vec<f64> {
+        self.view3d.iter().copied().collect()
     }
 
     /// Times of the window's own frames, ms.
@@ -127,7 +127,7 @@ impl Times {
             "latency_ms": both(&self.live(|s| s.latency)),
             "settled_ms": both(&self.settled()),
             "live": self.levels(),
-            "survey_ms": both(&self.survey()),
+            "view3d_ms": both(&self.view3d()),
             "interface_ms": both(&self.interface()),
         })
     }

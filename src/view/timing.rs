@@ -168,7 +168,7 @@ fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
                 "From the last input to the image at the scene's own quality",
                 &times.settled(),
             ),
-            ("3D view", "A picture of the 3D view on the device", &times.survey()),
+            ("3D view", "A picture of the 3D view on the device", &times.view3d()),
             (
                 "interface",
                 "A frame of this window, from the start of drawing to the screen",

@@ -1,4 +1,4 @@
-//! Who may use whom: the table of ARCHITECTURE.md, held against the paths in the code.
+//! Dependencies between the folders of `src`: the table of ARCHITECTURE.md, held against the paths in the code.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;

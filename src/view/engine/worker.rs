@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 
 use super::{
-    Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared, State, WINDOW_PATIENCE, Wake,
+    Frame, Job, News, Pixels, Sector, Shared, State, VIEW3D_PUT_OFF, WINDOW_PATIENCE, Wake,
 };
 use crate::gpu::{Abandon, Device, GpuError};
 use crate::live::{self, Pace};
@@ -67,7 +67,7 @@ pub(super) struct Worker {
     /// Chooses the counts of the next picture.
     pace: Pace,
     /// End and duration of the last picture of the anatomy.
-    surveyed: (Instant, Duration),
+    view3d_made: (Instant, Duration),
     wake: Wake,
 }
 
@@ -85,7 +85,7 @@ impl Worker {
             shared,
             ring: Ring::new(device, "B-mode"),
             broadcast: Broadcast::new(link, device),
-            pictures: Ring::new(device, "survey"),
+            pictures: Ring::new(device, "view3d"),
             device: device.clone(),
             library,
             scene,
@@ -94,7 +94,7 @@ impl Worker {
             last: None,
             left: None,
             pace: Pace::new(machine),
-            surveyed: (Instant::now(), Duration::ZERO),
+            view3d_made: (Instant::now(), Duration::ZERO),
             wake,
         }
     }
@@ -105,7 +105,7 @@ impl Worker {
         let mut index = 0;
         while let Some(job) = self.next() {
             let taken = match job {
-                Job::Survey { moving } => {
+                Job::View3d { moving } => {
                     if !self.look(&mut simulator, moving) {
                         return;
                     }
@@ -165,7 +165,7 @@ impl Worker {
         let began = Instant::now();
         simulator.abandon_when((!moving).then(|| self.newer()));
         let pictured = self.picture(simulator).transpose();
-        self.surveyed = (Instant::now(), began.elapsed());
+        self.view3d_made = (Instant::now(), began.elapsed());
         match pictured {
             // It is still to be made, after the newer job.
             Some(Err(SimError::Gpu(GpuError::Abandoned))) => {
@@ -174,7 +174,7 @@ impl Worker {
                 true
             }
             Some(pictured) => {
-                let told = pictured.map(|pictured| News::Survey(Box::new(pictured)));
+                let told = pictured.map(|pictured| News::View3d(Box::new(pictured)));
                 self.report(told, false)
             }
             None => true,
@@ -251,14 +251,14 @@ impl Worker {
             }
             // While something moves the next order is about to come: a job begun before would be in its way.
             let moving = due || touched < live::REST;
-            let (ended, took) = self.surveyed;
+            let (ended, took) = self.view3d_made;
             let looks = state.looks_new && left.is_some();
             let put_off = match moving {
-                true => (SURVEY_PUT_OFF * took).saturating_sub(ended.elapsed()),
+                true => (VIEW3D_PUT_OFF * took).saturating_sub(ended.elapsed()),
                 false => Duration::ZERO,
             };
             if looks && put_off.is_zero() {
-                return Some(Job::Survey { moving });
+                return Some(Job::View3d { moving });
             }
             if due {
                 let again = || running.expect("due without an order").again(Instant::now());
@@ -315,7 +315,7 @@ impl Worker {
             return Ok(None);
         }
         let image = self.pictures.free(look.sight.size)?;
-        let timings = simulator.survey(&self.library, &look.sight, &image)?;
+        let timings = simulator.view3d(&self.library, &look.sight, &image)?;
         Ok(Some(Pictured {
             image,
             look,

@@ -45,10 +45,10 @@ impl Open {
         let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
         let model = &self.model;
         let image = shown.as_ref().map(|frame| real::image(frame, model));
-        let survey = self.pictured.as_ref().map(|pictured| &pictured.image);
+        let view3d = self.pictured.as_ref().map(|pictured| &pictured.image);
         let rects = [
             (image, places.image.as_ref().map(|place| place.rect)),
-            (survey, places.survey.map(|place| place.rect)),
+            (view3d, places.view3d.map(|place| place.rect)),
         ];
         let placed: Vec<Placed> = (rects.into_iter())
             .filter_map(|(image, rect)| {
@@ -98,8 +98,8 @@ impl Open {
 
     /// Sends the view of the anatomy to the simulation.
     fn point(&mut self, places: &Places, scale: f32) {
-        let (model, state) = (&self.model, &self.state.survey);
-        let look = (places.survey).map(|place| place.look(model, state, scale));
+        let (model, state) = (&self.model, &self.state.view3d);
+        let look = (places.view3d).map(|place| place.look(model, state, scale));
         if look != self.look {
             if look.is_none() {
                 self.pictured = None;
@@ -123,7 +123,7 @@ impl Open {
 
     /// Notes that the picture has been handed to the screen.
     fn seen(&mut self, times: &mut Times) {
-        (self.pictures_ms.drain(..)).for_each(|ms| times.add_survey(ms));
+        (self.pictures_ms.drain(..)).for_each(|ms| times.add_view3d(ms));
         if !std::mem::take(&mut self.fresh) {
             return;
         }

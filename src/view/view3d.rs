@@ -147,8 +147,8 @@ impl Place {
         let detail = state.detail(pixels.x * pixels.y, Instant::now());
         let size = (pixels * detail).round().max(DVec2::ONE);
         Look {
-            sight: model.survey.sight([size.x as u32, size.y as u32]),
-            camera: model.survey.camera,
+            sight: model.view3d.sight([size.x as u32, size.y as u32]),
+            camera: model.view3d.camera,
         }
     }
 }
@@ -167,16 +167,16 @@ pub(super) fn show(
     pictured: Option<&Pictured>,
 ) -> Place {
     let place = Place { rect: ui.max_rect() };
-    let id = ui.id().with("survey");
+    let id = ui.id().with("view3d");
     let response = ui.interact(place.rect, id, Sense::click_and_drag());
-    let before = model.survey.camera;
+    let before = model.view3d.camera;
     if !hold::show(ui, &response, &place, model, &mut state.hold) {
-        navigate(ui, &response, &place, &mut model.survey.camera);
+        navigate(ui, &response, &place, &mut model.view3d.camera);
     }
-    state.watch(ui, model, before != model.survey.camera);
+    state.watch(ui, model, before != model.view3d.camera);
     let painter = ui.painter_at(place.rect);
     if let Some(pictured) = pictured {
-        fan::show(&painter, &place, pictured, &model.survey.wires);
+        fan::show(&painter, &place, pictured, &model.view3d.wires);
     } else {
         let (middle, font) = (place.rect.center(), FontId::proportional(14.0));
         let text = "Preparing the 3D view";
@@ -195,7 +195,7 @@ pub(super) fn show(
     painter.text(below, Align2::LEFT_BOTTOM, hint, font, style::FAINT);
     buttons(ui, &place, model, state);
     if state.tissues {
-        tissues::show(ui, place.rect, &mut model.survey.shown);
+        tissues::show(ui, place.rect, &mut model.view3d.shown);
     }
     place
 }
@@ -230,20 +230,20 @@ fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut State) {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.toggle_value(&mut state.tissues, "Tissues")
                 .on_hover_text("Which tissues are shown, and which as glass");
-            ui.toggle_value(&mut model.survey.cut, "Cut")
+            ui.toggle_value(&mut model.view3d.cut, "Cut")
                 .on_hover_text("Cut away what lies between the eye and the image plane");
             ui.separator();
             let tip = "Look at the image plane as the B-mode image shows it";
             if ui.button("Front").on_hover_text(tip).clicked() {
-                model.survey.camera.face(&pose);
+                model.view3d.camera.face(&pose);
             }
             let tip = "Look along the probe into the body";
             if ui.button("Along").on_hover_text(tip).clicked() {
-                model.survey.camera.along(&pose);
+                model.view3d.camera.along(&pose);
             }
             let tip = "Probe and fan from the side, all of them in view";
             if ui.button("Reset").on_hover_text(tip).clicked() {
-                model.survey.reset(&pose, &model.settings.probe);
+                model.view3d.reset(&pose, &model.settings.probe);
             }
             hold::button(ui, model);
         });

@@ -6,7 +6,7 @@ use super::camera::Camera;
 use super::palette::{self, Show};
 use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
-use crate::sim::survey::Sight;
+use crate::sim::view3d::Sight;
 
 /// Opacity of a see-through surface, looked at squarely.
 const GLASS: f32 = 0.17;
@@ -46,7 +46,7 @@ impl Shown {
 
 /// The state of the 3D view.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Survey {
+pub struct View3d {
     /// The camera.
     pub camera: Camera,
     /// True where the side of the image plane towards the camera is cut away.
@@ -59,7 +59,7 @@ pub struct Survey {
     pub wires: Vec<[DVec3; 2]>,
 }
 
-impl Survey {
+impl View3d {
     /// The view of a scene that shows probe, fan and the organs around it.
     pub fn new(scene: &Scene) -> Self {
         let mut shown: Vec<Shown> = Vec::new();
@@ -203,25 +203,25 @@ mod tests {
 
     #[test]
     fn what_is_around_is_glass_and_hiding_comes_back() {
-        let mut survey = Survey::new(&scene());
-        let shows: Vec<Show> = survey.shown.iter().map(|s| s.show).collect();
+        let mut view3d = View3d::new(&scene());
+        let shows: Vec<Show> = view3d.shown.iter().map(|s| s.show).collect();
         assert_eq!(shows, [Show::SeeThrough, Show::Hidden, Show::Solid, Show::Solid]);
-        let opacities = |survey: &Survey| survey.sight([4, 4]).looks.iter().map(|l| l[3]).collect();
-        let before: Vec<f32> = opacities(&survey);
+        let opacities = |view3d: &View3d| view3d.sight([4, 4]).looks.iter().map(|l| l[3]).collect();
+        let before: Vec<f32> = opacities(&view3d);
         assert_eq!(before, [GLASS, 0.0, 1.0, 1.0]);
-        survey.shown[2].toggle();
-        let hidden: Vec<f32> = opacities(&survey);
+        view3d.shown[2].toggle();
+        let hidden: Vec<f32> = opacities(&view3d);
         assert_eq!(hidden, [GLASS, 0.0, 0.0, 1.0]);
-        survey.shown[2].toggle();
-        assert_eq!(before, opacities(&survey) as Vec<f32>);
-        survey.shown[1].toggle();
-        assert_eq!(survey.shown[1].show, Show::SeeThrough);
+        view3d.shown[2].toggle();
+        assert_eq!(before, opacities(&view3d) as Vec<f32>);
+        view3d.shown[1].toggle();
+        assert_eq!(view3d.shown[1].show, Show::SeeThrough);
     }
 
     #[test]
     fn probe_and_fan_are_in_view_at_the_start() {
         let scene = scene();
-        let camera = Survey::new(&scene).camera;
+        let camera = View3d::new(&scene).camera;
         let panel = DVec2::new(300.0, 500.0);
         let depth = scene.probe.depth;
         for point in [[0.0, 0.0, -20.0], [0.0, 0.0, depth]] {
@@ -233,13 +233,13 @@ mod tests {
 
     #[test]
     fn a_sight_sees_what_the_camera_says() {
-        let survey = Survey::new(&scene());
+        let view3d = View3d::new(&scene());
         let size = [320, 200];
-        let sight = survey.sight(size);
+        let sight = view3d.sight(size);
         let place = DVec2::new(30.5, 177.5);
         let off = place - DVec2::new(160.0, 100.0);
         let along = sight.forward + off.x * sight.right + off.y * sight.down;
-        let ray = survey.camera.ray(DVec2::new(320.0, 200.0), place);
+        let ray = view3d.camera.ray(DVec2::new(320.0, 200.0), place);
         assert!((along.normalize() - ray.direction).length() < 1e-12);
         assert_eq!(sight.eye, ray.origin);
     }

@@ -20,7 +20,7 @@ layout(binding = 5) uniform accelerationStructureEXT tlas;
 #else
 layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 6) readonly buffer SurveyBuffer { Survey survey; };
+layout(std430, binding = 6) readonly buffer View3dBuffer { View3d view3d; };
 // Per instance: colour, opacity; 0: it is not there.
 layout(std430, binding = 7) readonly buffer LookBuffer { vec4 looks[]; };
 layout(std430, binding = 8) readonly buffer PixelBuffer { uint pixels[]; };
@@ -37,13 +37,13 @@ int least;
 // What fills the point at which a cut anatomy begins.
 uint filled;
 
-bool survey_skips(uint i) {
+bool view3d_skips(uint i) {
     bool known = i < 32u * SEEN_WORDS && (seen[min(i / 32u, SEEN_WORDS - 1u)] >> (i % 32u) & 1u) != 0u;
     return known || instances[i].priority < least || looks[i].w <= 0.0;
 }
 
-#define RAY_SKIPS(i) survey_skips(i)
-#define RAY_SELECTS ((survey.flags & (SURVEY_CUT | SURVEY_SOME_HIDDEN)) != 0u)
+#define RAY_SKIPS(i) view3d_skips(i)
+#define RAY_SELECTS ((view3d.flags & (VIEW3D_CUT | VIEW3D_SOME_HIDDEN)) != 0u)
 #include "triangle.glsl"
 #ifdef RAY_QUERY
 #define RAY_MASK frame.ray_mask
@@ -69,8 +69,8 @@ void lay(vec3 shade, float opacity) {
 vec3 lit(vec3 base, vec3 n, vec3 d) {
     float side = dot(n, d) > 0.0 ? -1.0 : 1.0;
     vec3 towards = side * n;
-    vec3 key = normalize(-survey.forward.xyz
-        - 0.45 * normalize(survey.right.xyz) - 0.7 * normalize(survey.down.xyz));
+    vec3 key = normalize(-view3d.forward.xyz
+        - 0.45 * normalize(view3d.right.xyz) - 0.7 * normalize(view3d.down.xyz));
     float facing = -dot(towards, d);
     float spot = max(dot(towards, normalize(key - d)), 0.0);
     float spot4 = spot * spot * spot * spot;
@@ -173,11 +173,11 @@ void look(vec3 o, vec3 d, float wide, vec3 background) {
     vec3 from = probe_point(o);
     vec3 to = probe_vector(d);
     float plane = from.y * to.y < 0.0 ? -from.y / to.y : BEYOND;
-    bool cut = (survey.flags & SURVEY_CUT) != 0u;
+    bool cut = (view3d.flags & VIEW3D_CUT) != 0u;
     float begin = cut ? plane : 0.0;
     float end = BEYOND;
     vec3 last = background;
-    if ((survey.flags & SURVEY_IMAGE) != 0u && plane < BEYOND) {
+    if ((view3d.flags & VIEW3D_IMAGE) != 0u && plane < BEYOND) {
         vec3 on = from + plane * to;
         vec2 place = (on.xz - vec2(frame.image_left, frame.image_top)) / frame.pixel_pitch;
         float level;
@@ -200,24 +200,24 @@ void look(vec3 o, vec3 d, float wide, vec3 background) {
 void main() {
     uint i = gl_GlobalInvocationID.x;
     uint j = gl_GlobalInvocationID.y;
-    if (i >= survey.width || j >= survey.height) return;
+    if (i >= view3d.width || j >= view3d.height) return;
     for (uint word = 0u; word < SEEN_WORDS; ++word) seen[word] = 0u;
     least = LEAST;
     filled = NONE;
     colour = vec3(0.0);
     clear = 1.0;
-    vec2 off = vec2(float(i), float(j)) + 0.5 - 0.5 * vec2(float(survey.width), float(survey.height));
-    vec3 o = survey.eye.xyz;
-    vec3 d = survey.forward.xyz + off.x * survey.right.xyz + off.y * survey.down.xyz;
+    vec2 off = vec2(float(i), float(j)) + 0.5 - 0.5 * vec2(float(view3d.width), float(view3d.height));
+    vec3 o = view3d.eye.xyz;
+    vec3 d = view3d.forward.xyz + off.x * view3d.right.xyz + off.y * view3d.down.xyz;
     float size = length(d);
     d /= size;
-    float down = (float(j) + 0.5) / float(survey.height);
+    float down = (float(j) + 0.5) / float(view3d.height);
     vec3 background = mix(vec3(0.075, 0.085, 0.1), vec3(0.02, 0.022, 0.027), down);
     // NaN, too, is no ray.
     bool is_ray = all(lessThan(abs(o), vec3(1e6))) && all(lessThan(abs(d), vec3(2.0)))
         && all(lessThan(abs(probe_point(o)), vec3(1e7))) && all(lessThan(abs(probe_vector(d)), vec3(2.0)));
-    if (is_ray) look(o, d, length(survey.right.xyz) / size, background);
+    if (is_ray) look(o, d, length(view3d.right.xyz) / size, background);
     else lay(background, 1.0);
     uvec3 bytes = uvec3(clamp(colour, 0.0, 1.0) * 255.0 + 0.5);
-    picture[j * survey.width + i] = 0xff000000u | (bytes.z << 16u) | (bytes.y << 8u) | bytes.x;
+    picture[j * view3d.width + i] = 0xff000000u | (bytes.z << 16u) | (bytes.y << 8u) | bytes.x;
 }

@@ -44,23 +44,23 @@ pub struct Sight {
 
 impl Sight {
     /// As the kernel reads it, for a probe.
-    pub fn constants(&self, frame: &Frame) -> layout::Survey {
+    pub fn constants(&self, frame: &Frame) -> layout::View3d {
         let vector = |v: DVec3| {
             let [x, y, z] = v.as_vec3().to_array();
             [x, y, z, 0.0]
         };
         let flag = |on: bool, flag: u32| if on { flag } else { 0 };
         let hidden = self.looks.iter().any(|look| look[3] <= 0.0);
-        layout::Survey {
+        layout::View3d {
             eye: vector(self.eye),
             right: vector(self.right),
             down: vector(self.down),
             forward: vector(self.forward),
             width: self.size[0],
             height: self.size[1],
-            flags: flag(self.cut, layout::SURVEY_CUT)
-                | flag(self.image, layout::SURVEY_IMAGE)
-                | flag(hidden, layout::SURVEY_SOME_HIDDEN),
+            flags: flag(self.cut, layout::VIEW3D_CUT)
+                | flag(self.image, layout::VIEW3D_IMAGE)
+                | flag(hidden, layout::VIEW3D_SOME_HIDDEN),
             unused0: 0,
             housing: housing(frame),
         }
@@ -83,26 +83,26 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
 }
 
 /// Kernel and buffers of the picture, as large as the largest so far.
-pub(super) struct Surveyor {
+pub(super) struct Viewer3d {
     kernel: Kernel,
     constants: Buffer,
     looks: Buffer,
     picture: Buffer,
 }
 
-impl Surveyor {
+impl Viewer3d {
     fn new(
         device: &Arc<Device>,
         library: &Library,
         tracer: Tracer,
         sight: &Sight,
     ) -> Result<Self, GpuError> {
-        let stem = format!("survey_{}", tracer.suffix());
-        let size = size_of::<layout::Survey>() as u64;
+        let stem = format!("view3d_{}", tracer.suffix());
+        let size = size_of::<layout::View3d>() as u64;
         let [looks, picture] = buffers(device, sight)?;
         Ok(Self {
             kernel: Kernel::new(device, &stem, library.words(&stem), &[])?,
-            constants: device.buffer("survey", size, BufferKind::Storage)?,
+            constants: device.buffer("view3d", size, BufferKind::Storage)?,
             looks,
             picture,
         })
@@ -125,7 +125,7 @@ fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError>
     let [looks, picture] = bytes(sight);
     Ok([
         device.buffer("looks", looks, BufferKind::Storage)?,
-        device.buffer("survey picture", picture, BufferKind::Storage)?,
+        device.buffer("view3d picture", picture, BufferKind::Storage)?,
     ])
 }
 
@@ -138,7 +138,7 @@ impl Simulator {
     ///
     /// # Panics
     /// When `looks` are not as many as the scene's instances.
-    pub fn survey(
+    pub fn view3d(
         &mut self,
         library: &Library,
         sight: &Sight,
@@ -146,28 +146,28 @@ impl Simulator {
     ) -> Result<FrameTimings, SimError> {
         let passes = &self.passes;
         assert_eq!(sight.looks.len(), passes.world.rows().len(), "looks");
-        let mut surveyor = match self.surveyor.take() {
+        let mut viewer3d = match self.viewer3d.take() {
             Some(made) => made,
-            None => Surveyor::new(&self.device, library, passes.world.tracer(), sight)?,
+            None => Viewer3d::new(&self.device, library, passes.world.tracer(), sight)?,
         };
-        if !surveyor.holds(sight) {
+        if !viewer3d.holds(sight) {
             // The pipeline stays: a window that is dragged larger asks for many sizes.
             self.frames.wait()?;
-            [surveyor.looks, surveyor.picture] = buffers(&self.device, sight)?;
+            [viewer3d.looks, viewer3d.picture] = buffers(&self.device, sight)?;
         }
         // It stays where the picture is abandoned.
-        let surveyor = self.surveyor.insert(surveyor);
+        let viewer3d = self.viewer3d.insert(viewer3d);
         let mut cmd = self.frames.begin()?;
-        cmd.scope("survey");
-        surveyor.record(&mut cmd, sight, passes, self.fused)?;
-        cmd.copy_to_image(&surveyor.picture, image)?;
+        cmd.scope("view3d");
+        viewer3d.record(&mut cmd, sight, passes, self.fused)?;
+        cmd.copy_to_image(&viewer3d.picture, image)?;
         cmd.submit()?;
         self.frames.wait()?;
         Ok(self.frames.take_timings().pop().unwrap_or_default())
     }
 }
 
-impl Surveyor {
+impl Viewer3d {
     fn record(
         &self,
         cmd: &mut Commands<'_>,
