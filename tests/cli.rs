@@ -169,6 +169,18 @@ fn mistakes_are_explained() {
 }
 
 #[test]
+fn a_mistake_in_a_file_is_shown_where_it_stands() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("scene.toml");
+    std::fs::write(&file, "name = \"a\"\n[probe]\n  dept = 3\n").unwrap();
+    let out = insonify(&["render", path(&file)]);
+    let said = text(&out.stderr);
+    let lines = " 2 | [probe]\n 3 |   dept = 3\n   |   ^^^^\n  help: did you mean `depth`?\n";
+    assert!(!out.status.success() && said.starts_with("error: "), "{said}");
+    assert!(said.contains("scene.toml:3:3: ") && said.ends_with(lines), "{said}");
+}
+
+#[test]
 fn info_lists_this_machine() {
     let out = insonify(&["info"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
