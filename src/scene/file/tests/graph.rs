@@ -35,7 +35,8 @@ pub(in crate::scene::file) fn beating(name: &str, files: &str) -> String {
     mesh(name, &format!("parent = \"beat\"\nkeyframes = [{files}]"))
 }
 
-pub(in crate::scene::file) const BEAT: &str = "[[selector]]\nname = \"beat\"\nperiod = \"600 ms\"\n";
+pub(in crate::scene::file) const BEAT: &str =
+    "[[selector]]\nname = \"beat\"\nperiod = \"600 ms\"\n";
 
 fn named<'s>(scene: &'s Scene, name: &str) -> &'s Instance {
     let mut all = scene.instances.iter();
