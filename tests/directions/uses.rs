@@ -24,7 +24,7 @@ pub fn of_library(root: &Path) -> BTreeMap<String, Uses> {
             let name = module.ident.to_string();
             let mut uses = Uses::default();
             let folder = root.parent().expect("a folder");
-            uses.file(&found(folder, &name, &module.attrs), &[name.clone()]);
+            uses.file(&found(folder, &name, &module.attrs), std::slice::from_ref(&name));
             out.insert(name, uses);
         }
     }

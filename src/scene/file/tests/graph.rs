@@ -104,9 +104,9 @@ fn a_strategy_is_set_from_outside() {
     let (set, (keyframe, weight)) = strategy(&[("selector.beat.strategy", "interpolate")]);
     assert_eq!((set, keyframe), (Strategy::Interpolate, 1));
     assert!((weight - 0.5).abs() < 1e-9);
-    for strategy_name in <Strategy as crate::settings::Words>::ALL.iter().copied() {
+    for strategy_name in <Strategy as crate::settings::Words>::ALL {
         let name = strategy_name.to_string();
-        assert_eq!(strategy(&[("selector.0.strategy", &name)]).0, strategy_name);
+        assert_eq!(strategy(&[("selector.0.strategy", &name)]).0, *strategy_name);
     }
 }
 
