@@ -1,4 +1,4 @@
-//! Subcommands, one module each: its arguments and what it does.
+//! Subcommands, one module each: arguments and execution.
 
 use std::process::ExitCode;
 
@@ -50,7 +50,7 @@ enum Command {
     /// Make a user study of realism (form and key), or tables of what was answered
     Study(study::Study),
     /// Render a scene many times, one parameter at a time, onto one labelled sheet
-    // It was called `sweep`, which is a path of the probe.
+    // Its old name was `sweep`, which now means a path of the probe.
     #[command(alias = "sweep")]
     Vary(Box<vary::Vary>),
     /// Open a window: the live image, the probe under the keyboard, every setting

@@ -21,9 +21,9 @@ use bands::Bands;
 use statistics::Gathered;
 pub use statistics::{DEVELOPED, Level, Statistics, Width, depths};
 
-/// Settings nearer than this to those proposed are left alone, so that matching what is matched changes
-/// nothing: level in dB, dynamic range and sizes relative. All are finer than statistics of a few
-/// hundred patches of speckle know them.
+/// Changes smaller than these are not made, so that a second matching changes
+/// nothing: level in dB, dynamic range and sizes relative. All are finer than the precision of statistics
+/// over a few hundred patches of speckle.
 const SETTLED: adjust::Change = adjust::Change { level: 0.3, range: 0.01, size: 0.02 };
 /// Most rounds. Each proposal would be exact, but for clipping and for the sampling of narrow beams.
 const ROUNDS: usize = 8;
@@ -33,24 +33,24 @@ const WHOLE: usize = 3;
 const BLACK: f32 = 0.03;
 /// Patches of speckle that each side needs: spread and size are then known to a tenth.
 const CELLS: f64 = 60.0;
-/// Near the border the beam reaches over it, where nothing is heard: up to this many of its lateral
-/// deviations. The pulse of an echo of the border itself reaches farther: axial deviations.
+/// Margins inside the border. The beam reaches over it, where nothing echoes: up to this many of its
+/// lateral deviations. The pulse of an echo of the border itself reaches farther: axial deviations.
 const MARGIN: (f64, f64) = (1.5, 3.0);
-/// What lies less than this above the electronic noise is taken for noise, dB.
+/// Level above the electronic noise up to which a sample is taken for noise, dB.
 const ABOVE_NOISE: f64 = 6.0;
 
-/// How to match.
+/// Settings of a matching.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
     /// Width of the bands on either side of the mask's border, mm.
     pub band: f64,
     /// Realisations of the simulated speckle that are averaged, at least 1.
     pub frames: u32,
-    /// What may change.
+    /// The settings that may change.
     pub adjusted: Adjusted,
 }
 
-/// Settings and what they look like.
+/// Settings and the simulation with them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage {
     /// The settings.
@@ -59,27 +59,27 @@ pub struct Stage {
     pub simulated: Statistics,
 }
 
-/// What matching found.
+/// Result of a matching.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matching {
     /// The acquired volume in the band outside the mask.
     pub acquired: Statistics,
-    /// As the scene was.
+    /// Settings and simulation before the first round.
     pub before: Stage,
-    /// As it is now.
+    /// Settings and simulation after the last round.
     pub after: Stage,
     /// Indices into [`depths`] at which both sides are compared.
     pub compared: Vec<usize>,
     /// Rounds of changes.
     pub rounds: usize,
-    /// Whether a further round would change next to nothing.
+    /// True if a further round would change next to nothing.
     pub settled: bool,
-    /// What could not be matched, or only in part, and why.
+    /// Properties that could not be matched, or only in part, with the reason.
     pub notes: Vec<String>,
 }
 
 impl Matching {
-    /// What is missing to the acquired volume's brightness at each of the compared depths, dB of the
+    /// Differences from the acquired volume's brightness at each of the compared depths, dB of the
     /// simulation.
     pub fn level_errors(&self, stage: &Stage) -> Vec<f64> {
         let range = stage.imaging.dynamic_range;
@@ -92,7 +92,7 @@ impl Matching {
     }
 }
 
-/// Why a scene cannot be matched.
+/// Reason for which a scene cannot be matched.
 #[derive(Debug, Error)]
 pub enum MatchError {
     /// The simulation failed.
@@ -101,9 +101,9 @@ pub enum MatchError {
     /// There are no two bands to compare.
     #[error("{cause}")]
     Nothing {
-        /// What is missing.
+        /// The missing thing.
         cause: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: String,
     },
 }
@@ -113,11 +113,11 @@ fn nothing(cause: impl Into<String>, remedy: &str) -> MatchError {
 }
 
 /// Changes `scene.imaging` until the simulation looks like the acquired volume near the mask's border.
-/// `told` hears of each round's settings before it is simulated.
+/// `told` is called with each round's settings before it is simulated.
 ///
 /// # Errors
-/// A scene that shows no volume or no border of its mask, a side without speckle, what the device says.
-/// `scene` is then as it was.
+/// A scene that shows no volume or no border of its mask, a side without speckle, an error of the device.
+/// `scene` is then unchanged.
 pub fn fit(
     simulator: &mut Simulator,
     scene: &mut Scene,
@@ -192,7 +192,7 @@ fn settle(
     }
 }
 
-/// Says what was left as it is because one side does not show it.
+/// Notes the settings left unchanged because one side does not show their effect.
 fn unmeasured(a: &Statistics, b: &Statistics, adjusted: Adjusted, notes: &mut Vec<String>) {
     let here = |w: Option<Width>| w.is_some_and(|w| !w.open);
     for (wanted, what, simulated, acquired) in [
@@ -220,7 +220,7 @@ fn bands(simulator: &mut Simulator, scene: &Scene) -> Result<Bands, MatchError> 
     Ok(Bands::new(scene, acquired, simulator.constants(), &steps))
 }
 
-/// The volume's levels as the log image has them: before the grey map.
+/// The volume's levels in the scale of the log image: before the grey map.
 fn background(simulator: &mut Simulator, scene: &Scene) -> Result<Vec<f32>, MatchError> {
     let steps = simulator.fusion_steps()?.expect("the frame was fused");
     let exponent = scene.imaging.grey_gamma.recip() as f32;
@@ -228,7 +228,7 @@ fn background(simulator: &mut Simulator, scene: &Scene) -> Result<Vec<f32>, Matc
     Ok(prescan.iter().map(|s| s[1].powf(exponent)).collect())
 }
 
-/// What the volume looks like outside the mask.
+/// Returns the statistics of the volume outside the mask.
 fn acquired(
     simulator: &mut Simulator,
     scene: &Scene,
@@ -265,7 +265,7 @@ fn acquired(
     )
 }
 
-/// What the simulation looks like inside the mask.
+/// Simulates the scene and returns its statistics inside the mask.
 fn simulate(
     simulator: &mut Simulator,
     scene: &mut Scene,

@@ -1,5 +1,5 @@
-//! What the program writes: lines to standard output, whose reader may leave at any time, and files. Knows
-//! nothing of what it writes.
+//! Output of the program: lines to standard output, whose reader may leave at any time, and files. Independent
+//! of their content.
 
 pub mod files;
 pub mod movie;
@@ -11,12 +11,12 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write, stdout};
 use std::sync::OnceLock;
 
-/// Why standard output took no more lines, if it did not.
+/// The first error that kept a line from standard output, if there was one.
 static FAILURE: OnceLock<String> = OnceLock::new();
 
-/// Writes a line to standard output. Where nobody reads any more (`insonify info | head -1`) it is
-/// dropped, and the program goes on: its files and its exit code are wanted all the same. So it does where the line
-/// cannot be written for another reason, as on a full disk; [`failure`] tells of it then.
+/// Writes a line to standard output. Where its reader is gone (`insonify info | head -1`) the line is
+/// dropped, and the program goes on: its files and its exit code are wanted all the same. It goes on too where the
+/// line cannot be written for another reason, as on a full disk; [`failure`] then returns that reason.
 pub fn line(text: impl Display) {
     if let Err(error) = writeln!(stdout(), "{text}")
         && error.kind() != ErrorKind::BrokenPipe
@@ -25,7 +25,7 @@ pub fn line(text: impl Display) {
     }
 }
 
-/// Why lines are missing in standard output, if some are.
+/// Returns the reason for which lines are missing in standard output, if some are.
 pub fn failure() -> Option<&'static str> {
     FAILURE.get().map(String::as_str)
 }

@@ -1,5 +1,5 @@
-//! Levels by brute force: lattices of random scatterers summed in f64 with the numbers that the
-//! kernels read must show the brightness that the tables promise.
+//! Levels by brute force: lattices of random scatterers, summed in f64 with the numbers that the kernels
+//! read, must have the brightness that the tables promise.
 
 #[path = "common/signal.rs"]
 mod signal;
@@ -81,7 +81,7 @@ fn tolerance(realisations: u32) -> f64 {
     4.0 * 10.0 / std::f64::consts::LN_10 / f64::from(realisations).sqrt()
 }
 
-// Steps of half an octave: no fewer than wanted, and no more than the square root of 2 times as many.
+// Steps of half an octave: no fewer than asked for, and at most the square root of 2 times as many.
 #[test]
 fn a_resolution_cell_holds_as_many_scatterers_as_are_wanted_at_every_depth() {
     let mut scene = scene(Probe::abdominal());
@@ -133,7 +133,7 @@ fn a_missing_elevation_factor_is_caught() {
 #[test]
 fn the_full_slab_needs_no_correction() {
     // The slab covers +-4 sigma_e at the lens focus: nothing of the beam is missing.
-    // Beyond the ellipse of 2.5 sigmas lie exp(-2.5^2) = 0.2 % of the power, less what slabs keep of it.
+    // Beyond the ellipse of 2.5 sigmas lie exp(-2.5^2) = 0.2 % of the power, less the part that slabs keep.
     let scene = scene(Probe::paper_table1());
     let power = Calibration::new(&scene).beam_power(60.0);
     assert!((power - 1.001).abs() < 1e-3, "{power}");

@@ -1,5 +1,5 @@
-//! What is within the documented ranges never panics, is refused with a remedy or pictured, and every picture
-//! consists of numbers: both ends of every key of `docs/scenes.md` alone, two of them at a time, and all keys at once.
+//! Values within the documented ranges never panic: they are refused with a remedy or pictured, and every picture
+//! consists of numbers. Both ends of every key of `docs/scenes.md` alone, two of them at a time, and all keys at once.
 
 #[path = "common/signal.rs"]
 #[allow(dead_code, reason = "only random numbers")]
@@ -19,7 +19,7 @@ use insonify::view::Model;
 use insonify::view::model::File;
 use signal::Random;
 
-/// A scene in which every table stands, and so small that a picture takes some milliseconds.
+/// A scene with every table, small enough that a picture takes some milliseconds.
 const SCENE: &str = r#"
 [probe]
 preset = "PRESET"
@@ -61,7 +61,7 @@ rotate = { axis = [0, 0, 1], angle = 0 }
 MORE
 "#;
 
-/// What a fused image needs.
+/// The tables of a fused image.
 const FUSED: &str = r#"
 [volume]
 file = "volume.mha"
@@ -74,7 +74,7 @@ background_shadows = true
 const VOLUME: &str = "NDims = 3\nDimSize = 2 2 2\nElementSpacing = 60 60 60\nElementType = MET_UCHAR\n\
                       ElementDataFile = LOCAL\n01234567";
 
-/// A key that takes numbers, as a scene file writes its ends.
+/// A key that takes numbers, with its ends as in a scene file.
 struct Key {
     path: String,
     kind: String,
@@ -82,7 +82,7 @@ struct Key {
 }
 
 impl Key {
-    /// A value as a scene file has it: one number or several alike.
+    /// A value as in a scene file: one number, or several equal ones.
     fn written(&self, value: f64) -> String {
         if self.kind == "integer" {
             return format!("{}", value.round() as i64);
@@ -114,7 +114,7 @@ impl Key {
     }
 }
 
-/// "0.1 to 100 MHz (more)" or "at least 1": the ends.
+/// The ends of a range such as "0.1 to 100 MHz (more)" or "at least 1".
 fn range(cell: &str) -> Option<[f64; 2]> {
     let words: Vec<_> = cell.split_whitespace().collect();
     match words.as_slice() {
@@ -159,7 +159,7 @@ struct Case {
 }
 
 impl Case {
-    /// A preset that has the keys, in turns.
+    /// A case with a preset that has the keys, in turns.
     fn new(set: Vec<(String, String)>, turn: usize) -> Self {
         let has = |key: &str| set.iter().any(|(path, _)| path == key);
         let preset = match (has("probe.width"), has("probe.radius")) {
@@ -175,7 +175,7 @@ impl Case {
         self.set.iter().any(|(path, _)| path.starts_with("volume") || path.starts_with("fusion"))
     }
 
-    /// Only probe, simulation and image differ.
+    /// Returns whether only probe, simulation and image differ.
     fn is_setting(&self) -> bool {
         let tables = ["probe.", "simulation.", "imaging."];
         self.set.iter().all(|(path, _)| tables.iter().any(|table| path.starts_with(table)))
@@ -200,7 +200,7 @@ impl Case {
     }
 }
 
-/// Everything that is made of a scene before it is pictured; what in it is no number.
+/// Makes all tables of a scene before a picture; returns the name of one that has a value that is no number.
 fn tabled(scene: &Scene) -> Option<&'static str> {
     let frame = tables::frame(scene, 0);
     let (rows, tissues) = (tables::rows(scene), tables::tissues(scene));
@@ -222,7 +222,7 @@ fn tabled(scene: &Scene) -> Option<&'static str> {
     .find_map(|(name, nan)| nan.then_some(name))
 }
 
-/// The window opens it, and what it saves can be loaded.
+/// Asserts that the window opens it, and that its saved file can be loaded.
 fn saved(case: &Case, folder: &Path, scene: &Scene) {
     let file = File::new(folder.join("scene.toml"), case.set.clone(), scene);
     let mut model = Model::new(scene, file, Tracer::Bvh, 0.0, Instant::now());
@@ -232,7 +232,7 @@ fn saved(case: &Case, folder: &Path, scene: &Scene) {
     Scene::load(&copy, &[]).unwrap_or_else(|error| panic!("not loaded again: {error}"));
 }
 
-/// Whether a picture of it takes a moment only.
+/// Returns whether a picture of it takes a moment only.
 fn is_small(scene: &Scene) -> bool {
     let probe = &scene.probe;
     let lines = u64::from(probe.scanlines) * u64::from(probe.elevation_layers);
@@ -244,10 +244,10 @@ fn is_small(scene: &Scene) -> bool {
         && points < 1 << 16
 }
 
-/// A simulator of each preset's own scene, for settings with which the window goes on with the same.
+/// A simulator of each preset's own scene, for settings with which the window keeps its simulator.
 type Kept = BTreeMap<&'static str, Simulator>;
 
-/// Pictures it; what is wrong with the picture. What the device refuses is none of this.
+/// Pictures a case; returns the fault of the picture. A refusal by the device is no fault.
 fn pictured(
     device: &Arc<Device>,
     case: &Case,
@@ -277,7 +277,7 @@ fn pictured(
     }
 }
 
-/// What is wrong with a case, if anything is.
+/// The fault of a case, if there is one.
 fn examine(case: &Case, device: &Arc<Device>, folder: &Path, kept: &mut Kept) -> Option<String> {
     let began = Instant::now();
     let found = catch_unwind(AssertUnwindSafe(|| match case.load(folder) {

@@ -14,7 +14,7 @@ use insonify::sim::stages;
 
 const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 
-/// Kernels of pictures for the user, without a twin: tests/view3d.rs and tests/fusion.rs hold them to
+/// Kernels of pictures for the user, without a twin: tests/view3d.rs and tests/fusion.rs compare them with
 /// closed forms.
 const CLOSED_FORMS: [&str; 3] = ["view3d_bvh", "view3d_query", "tint"];
 
@@ -95,7 +95,7 @@ subjects!(
     fuse
 );
 
-/// What the source of a kernel binds, by number; a ray query's `tlas` stands where others have `nodes`.
+/// Names of a kernel's bindings in its source, by number; a ray query's `tlas` takes the place of `nodes`.
 fn declared(kernel: &str) -> Vec<String> {
     let source = std::fs::read_to_string(Path::new(GLSL).join(format!("{kernel}.comp"))).unwrap();
     let mut names = Vec::new();
@@ -104,7 +104,7 @@ fn declared(kernel: &str) -> Vec<String> {
         let Some((_, rest)) = line.split_once("binding = ") else { continue };
         let (number, rest) = rest.split_once(')').unwrap();
         assert_eq!(number.parse(), Ok(names.len()), "{kernel}: {line}");
-        // Of a block its only member, of a texture itself.
+        // For a block its only member, for a texture its own name.
         let member = rest.split_once('{').map_or(rest, |(_, member)| member);
         let declaration = member.split(';').next().unwrap().trim();
         let name = declaration.split(' ').next_back().unwrap();
@@ -126,7 +126,7 @@ fn what_stages_and_jobs_bind_has_the_names_of_the_sources() {
     }
 }
 
-/// Whether a dispatch binds a buffer or what one of its own stands for, its array says who fills it.
+/// For each buffer that a dispatch binds, or its stand-in, the array names the stage that fills it.
 #[test]
 fn every_array_that_a_stage_binds_is_made_by_one() {
     // Filled level by level, and the volume.

@@ -1,11 +1,11 @@
-//! `spirv/` holds what `glsl/` compiles to, and every module is valid. Needs no GLSL compiler.
+//! Checks that `spirv/` is compiled from `glsl/`, and that every module is valid. Needs no GLSL compiler.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use insonify::sim::shaders::Library;
 
-// A user's build has no part of it, and so neither has the library that is tested without `compile`.
+// A user's build does not contain it, nor does the library that is tested without `compile`.
 #[allow(dead_code)]
 #[path = "../src/sim/shaders/authors/mod.rs"]
 mod authors;

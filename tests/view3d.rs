@@ -1,5 +1,5 @@
-//! The 3D view's picture against closed forms: what a perspective makes of a sphere, where the
-//! image plane's corners are seen, which half is cut away.
+//! The 3D view's picture against closed forms: the outline of a sphere in perspective, the places of the image
+//! plane's corners, the half that is cut away.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -14,7 +14,7 @@ use insonify::view::model::{Show, View3d};
 
 const SIZE: [u32; 2] = [240, 200];
 
-/// A ball of bone in liver, 30 mm deep; a fine mesh, so that it is a ball.
+/// A ball of bone in liver, 30 mm deep; its mesh is fine, close to a ball.
 fn scene(ball: &str) -> Scene {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("scene.toml");
@@ -68,14 +68,14 @@ fn pictures(scene: &Scene, sight: &Sight) -> [Vec<[u8; 4]>; 2] {
     made
 }
 
-/// A ball's own colour, which nothing else in these pictures has.
+/// Returns whether a pixel has the ball's own colour, which nothing else in these pictures has.
 fn is_ball(pixel: &[u8; 4]) -> bool {
     let [r, g, b, _] = pixel.map(i32::from);
     r - b > 20 && g - b > 5
 }
 
-/// Area in pixels of what a pinhole sees of a ball: its outline is a cone of half angle asin(R / D)
-/// about the direction to its centre, an ellipse in the picture.
+/// Area in pixels of a ball seen by a pinhole: its outline is a cone of half angle asin(R / D) about the direction
+/// to its centre, an ellipse in the picture.
 fn shadow(view3d: &View3d, centre: DVec3, radius: f64) -> f64 {
     let panel = DVec2::from(SIZE.map(f64::from));
     let camera = &view3d.camera;
@@ -129,7 +129,7 @@ fn what_is_before_the_image_plane_is_cut_away_and_only_that() {
     for (across, is_cut) in [(20.0, true), (-20.0, false)] {
         let (scene, mut view3d, _) = view(9.0, across);
         let count = |view3d: &View3d| {
-            // Without the image, which would hide what is behind it.
+            // Without the image, which would hide things behind it.
             let sight = Sight { image: false, ..view3d.sight(SIZE) };
             let pictures = pictures(&scene, &sight);
             pictures.map(|p| p.iter().filter(|p| is_ball(p)).count())
@@ -163,7 +163,7 @@ fn a_ball_in_the_plane_shows_its_section() {
     }
 }
 
-/// A colour as the kernel's light leaves it on a surface of this normal, turned against the ray.
+/// A colour under the kernel's light on a surface of this normal, turned against the ray.
 fn lit(sight: &Sight, colour: DVec3, normal: DVec3, d: DVec3) -> DVec3 {
     let key = -sight.forward - 0.45 * sight.right.normalize() - 0.7 * sight.down.normalize();
     let key = key.normalize();
@@ -171,7 +171,7 @@ fn lit(sight: &Sight, colour: DVec3, normal: DVec3, d: DVec3) -> DVec3 {
     colour * (0.16 - 0.5 * normal.dot(d) + 0.42 * normal.dot(key).max(0.0)) + 0.14 * shine
 }
 
-/// Colour of a pixel that looks through a ball of glass: its near wall, its far wall, the background.
+/// Colour of a pixel seen through a ball of glass: its near wall, its far wall, the background.
 fn through(sight: &Sight, [i, j]: [u32; 2], centre: DVec3, radius: f64, opacity: f64) -> DVec3 {
     let colour = DVec3::from_slice(&sight.looks[0].map(f64::from));
     let [off_x, off_y] =
@@ -184,7 +184,7 @@ fn through(sight: &Sight, [i, j]: [u32; 2], centre: DVec3, radius: f64, opacity:
     for t in [middle - half, middle + half] {
         let normal = (sight.eye + t * d - centre) / radius;
         let normal = -normal * normal.dot(d).signum();
-        // Edge on there is more of a thin wall.
+        // Edge on, a thin wall is more opaque.
         let opacity = opacity + (1.0 - opacity) * 0.75 * (1.0 + normal.dot(d)).powi(3);
         seen += clear * opacity * lit(sight, colour, normal, d);
         clear *= 1.0 - opacity;
@@ -239,7 +239,7 @@ fn the_image_lies_where_its_corners_are_seen() {
     };
     let depth = plain.probe.depth;
     for (with, without) in with.iter().zip(&without) {
-        // Two millimetres within each corner the image is seen, two beside it it is not.
+        // Two millimetres inside each corner the image is seen, two outside it is not.
         for (x, z) in [(-1.0, depth), (1.0, depth)] {
             let corner = |by: f64| at(x * (width / 2.0 + by), z + by);
             assert_ne!(with[corner(-2.0)], without[corner(-2.0)], "{x}");

@@ -34,7 +34,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Compiles everything; writes what differs, or with `check` names it.
+/// Compiles everything; writes the files that differ, or with `check` only names them.
 fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String>, Error> {
     let lock = root.join("Cargo.lock");
     let lock = fs::read_to_string(&lock).map_err(|cause| Error::File { path: lock, cause })?;

@@ -1,18 +1,18 @@
-//! How an error is told: message and causes, the lines of the file that it is about, the remedy.
+//! The text of an error: message and causes, the lines of the file that it is about, the remedy.
 
 use std::fmt::{Error, Formatter, Result, Write as _};
 use std::io::{IsTerminal, stderr};
 
 use miette::{Diagnostic, ReportHandler, SourceCode, SourceSpan};
 
-/// Has errors of all commands told so.
+/// Makes errors of all commands appear in this form.
 pub fn install() {
     let red = stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
     miette::set_hook(Box::new(move |_| Box::new(Teller { red }))).expect("set once");
 }
 
 struct Teller {
-    /// In colour.
+    /// True for text in colour.
     red: bool,
 }
 
@@ -78,7 +78,7 @@ mod tests {
         };
         assert_eq!(shown("\"3\""), " 2 | # \u{b5}s\n 3 | \tpitch = \"3\"\n   | \t        ^^^");
         assert_eq!(shown("[probe]"), " 1 | [probe]\n   | ^^^^^^^");
-        // Of a span over several lines the first is marked.
+        // Of a span over several lines only the first is marked.
         assert_eq!(shown("4\n"), " 3 | \tpitch = \"3\"\n 4 | width = 4\n   |         ^");
         assert_eq!(lines(&text, &(900, 2).into()), None);
     }

@@ -146,7 +146,7 @@ impl Instance {
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-        // What shaders access is checked by default in older layers, on request in newer ones.
+        // Accesses by shaders are checked by default in older layers, on request in newer ones.
         let yes = [vk::TRUE];
         let settings = [c"validate_sync", c"syncval_shader_accesses_heuristic"]
             .map(|name| switched_on(name, &yes));

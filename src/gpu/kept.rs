@@ -280,5 +280,4 @@ fn forget_oldest(folder: &Path) -> std::io::Result<()> {
 }
 
 #[cfg(test)]
-#[path = "kept_tests.rs"]
 mod tests;

@@ -1,27 +1,26 @@
-//! From what two bands look like to the settings that make them alike.
+//! The settings that make two bands alike, from the statistics of both.
 
 use super::statistics::{DEVELOPED, Statistics, depths};
 use crate::probe::Probe;
 use crate::scene::Imaging;
 
-/// What sliders are expected to do: standard deviation of how two neighbours differ, and of how a
-/// slider differs from the mean of its neighbours, doubled; dB. A scanner's sliders are set to a gentle
-/// curve. Where there is no data these alone act: the curve goes on flat.
+/// Expected standard deviation of the difference of two neighbouring sliders, and, doubled, of the
+/// difference of a slider from the mean of its neighbours; dB. A scanner's sliders are set to a gentle
+/// curve. Where there are no data these alone act: the curve goes on flat.
 const SLOPE: f64 = 12.0;
 const BEND: f64 = 8.0;
-/// How much tissue beside tissue differs anyway, dB.
+/// Natural difference between neighbouring tissues, dB.
 const INHOMOGENEOUS: f64 = 1.0;
 /// Independent patches of speckle that a depth needs on either side.
 const FEWEST: f64 = 6.0;
-/// Bounds of what is set. Sliders: what scanners have, and some more.
-/// Dynamic range: with less, speckle alone spans
-/// black to white; the largest is that of the scene file. Size: a narrower point-spread function is
-/// lost between samples and lines; of a wider one the differences go no farther.
+/// Bounds of the settings. Sliders: those of scanners, and some more. Dynamic range: with less, speckle
+/// alone spans black to white; the largest is that of the scene file. Size: a narrower point-spread
+/// function is lost between samples and scanlines; for a wider one differences are not taken far enough.
 const SLIDER: f64 = 30.0;
 const RANGE: (f64, f64) = (20.0, 200.0);
 const SCALE: (f64, f64) = (0.25, 4.0);
 
-/// Which settings may change.
+/// The settings that may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Adjusted {
     /// `imaging.gain`
@@ -34,14 +33,14 @@ pub struct Adjusted {
     pub size: bool,
 }
 
-/// How far two settings are apart.
+/// Difference of two settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Change {
-    /// Of gain and sliders together, the largest over the depths that were compared, dB.
+    /// Difference of gain and sliders together, the largest over the compared depths, dB.
     pub level: f64,
-    /// Of the dynamic range, relative.
+    /// Difference of the dynamic range, relative.
     pub range: f64,
-    /// Of the point-spread function, relative.
+    /// Difference of the point-spread function, relative.
     pub size: f64,
 }
 
@@ -74,8 +73,8 @@ fn gain_at(probe: &Probe, imaging: &Imaging, z: f64) -> f64 {
     imaging.gain + sliders.map(|(w, s)| w * s).sum::<f64>()
 }
 
-/// The settings with which the simulated band should look like the acquired one, given what it looks
-/// like with `imaging`, and what could not be set or only in part.
+/// Returns the settings with which the simulated band should look like the acquired one, from its statistics
+/// with `imaging`, and notes on what could not be set or only in part.
 pub(super) fn proposal(
     probe: &Probe,
     imaging: &Imaging,
@@ -114,7 +113,7 @@ pub(super) fn proposal(
             }
         }
     }
-    // Levels are 1 + (echo + gain) / range: what gain turns the same echoes into the levels there?
+    // Levels are 1 + (echo + gain) / range: solve for the gain that turns the same echoes into the levels there.
     let places = depths(probe);
     let wanted: Vec<_> = common(simulated, acquired)
         .iter()
@@ -153,15 +152,15 @@ pub(super) fn proposal(
     (out, notes)
 }
 
-/// A value that is written with few digits, and used as it is written.
+/// Rounds a value so that it is written with few digits, and is used as it is written.
 fn round(value: f64, step: f64) -> f64 {
     // Dividing by a whole number gives the nearest binary number to the decimal one.
     let per_unit = (1.0 / step).round();
     (value * per_unit).round() / per_unit
 }
 
-/// Values at the eight sliders whose interpolation is nearest to (depth mm, dB, variance dB2) and that
-/// are no less smooth than sliders are: penalised least squares (Whittaker 1923; Eilers and Marx 1996).
+/// Values at the eight sliders whose interpolation is nearest to (depth mm, dB, variance dB2), as smooth as
+/// sliders are: penalised least squares (Whittaker 1923; Eilers and Marx 1996).
 fn smooth(probe: &Probe, wanted: &[(f64, f64, f64)]) -> [f64; 8] {
     // Normal equations, the right side in the last column.
     let mut a = [[0.0; 9]; 8];
@@ -196,7 +195,7 @@ fn smooth(probe: &Probe, wanted: &[(f64, f64, f64)]) -> [f64; 8] {
     std::array::from_fn(|i| a[i][8] / a[i][i])
 }
 
-/// Half the way from `a` to `b`.
+/// Returns the settings half-way from `a` to `b`.
 pub(super) fn halfway(a: &Imaging, b: &Imaging) -> Imaging {
     let between = |a: f64, b: f64, step: f64| round((a + b) / 2.0, step);
     Imaging {
@@ -208,7 +207,7 @@ pub(super) fn halfway(a: &Imaging, b: &Imaging) -> Imaging {
     }
 }
 
-/// How far apart they are, levels at the depths in use.
+/// Returns the difference of `a` and `b`, levels at the depths in use.
 pub(super) fn change(probe: &Probe, a: &Imaging, b: &Imaging, used: &[f64]) -> Change {
     let level = used
         .iter()
@@ -224,5 +223,4 @@ pub(super) fn change(probe: &Probe, a: &Imaging, b: &Imaging, used: &[f64]) -> C
 }
 
 #[cfg(test)]
-#[path = "adjust_tests.rs"]
 mod tests;

@@ -1,29 +1,29 @@
-//! Which samples of the scanlines lie near the mask's border, and on which side.
+//! The samples of the scanlines near the mask's border, by side.
 
 use crate::probe::Probe;
 use crate::scene::{Acquired, Scene};
 use crate::sim::fusion::Steps;
 use crate::sim::layout::Frame;
 
-/// Of what lies within [`NEAR`] more than this share has to be above black; else it is fluid, shadow, or
-/// was never acquired, and no speckle.
+/// Least share of samples above black within [`NEAR`]; with less the place is fluid, shadow, or
+/// was never acquired, and shows no speckle.
 const ECHOING: f64 = 0.5;
-/// Half the edge of the surroundings in which a sample is judged, mm.
+/// Half the edge of the square around a sample in which it is judged, mm.
 const NEAR: f64 = 1.0;
 
-/// Where the samples lie, [L][K].
+/// Places of the samples, [L][K].
 pub(super) struct Bands {
     /// Distance from the mask's border in the image, mm: negative inside the mask. NaN where a sample
     /// lies outside the image or the image shows one side only.
     distance: Vec<f32>,
-    /// Whether the acquired volume has a value there.
+    /// True where the acquired volume has a value.
     acquired: Vec<bool>,
     lines: usize,
     samples: usize,
 }
 
 impl Bands {
-    /// Places of the samples of `scene`, whose last frame was `frame` and left `steps`.
+    /// Places of the samples of `scene`, whose last frame was `frame` with the intermediate `steps`.
     pub fn new(scene: &Scene, acquired: &Acquired, frame: &Frame, steps: &Steps) -> Self {
         let probe = &scene.probe;
         let (lines, samples) = (probe.scanlines as usize, probe.samples as usize);
@@ -75,7 +75,7 @@ impl Bands {
         self.distance.iter().map(near).collect()
     }
 
-    /// Takes away what was not acquired.
+    /// Removes the samples that were not acquired.
     pub fn keep_acquired(&self, chosen: &mut [bool]) {
         for (chosen, &acquired) in chosen.iter_mut().zip(&self.acquired) {
             *chosen &= acquired;
@@ -92,10 +92,10 @@ impl Bands {
         self.distance.iter().enumerate().map(near).collect()
     }
 
-    /// Takes away the samples around which most is black: `floor` of the row.
+    /// Removes the samples around which most is black: `floor` of the row.
     pub fn keep_echoing(&self, probe: &Probe, levels: &[f32], floor: &[f32], chosen: &mut [bool]) {
         let (lines, samples) = (self.lines, self.samples);
-        // Sums of both over all lines and rows before.
+        // Sums of both over all scanlines and rows before.
         let mut sums = vec![[0u32; 2]; (lines + 1) * (samples + 1)];
         for l in 0..lines {
             let mut row = [0u32; 2];

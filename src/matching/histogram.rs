@@ -1,9 +1,9 @@
-//! Grey levels, counted: what is robust against a few outliers and against what is clipped.
+//! Histogram of grey levels: means that are robust against a few outliers and against clipping.
 
-/// Classes over 0..1. With a dynamic range of 60 dB one is 0.015 dB.
+/// Classes over 0..1. With a dynamic range of 60 dB a class is 0.015 dB.
 const CLASSES: usize = 4096;
 
-/// How many values of 0..=1 lie where; what is beyond counts at the ends.
+/// Number of values by class of 0..=1; values beyond count at the ends.
 #[derive(Clone)]
 pub(super) struct Histogram {
     counts: Vec<u32>,
@@ -18,7 +18,7 @@ impl Default for Histogram {
 
 impl Histogram {
     pub fn add(&mut self, value: f32) {
-        // The cast turns NaN and what is negative into 0.
+        // The cast turns NaN and negative values into 0.
         let class = (value * CLASSES as f32) as usize;
         self.counts[class.min(CLASSES - 1)] += 1;
         self.total += 1;
@@ -28,9 +28,9 @@ impl Histogram {
         self.total
     }
 
-    /// Mean of the middle half of the values. Of anything that is known of a quarter at either end
-    /// only that it is there (clipped, or an outlier) it takes no notice: none where a quarter or more
-    /// lies in the first class or in the last, whose values may be any.
+    /// Mean of the middle half of the values. It ignores the quarter at either end, whose values may be
+    /// clipped or outliers. None where a quarter or more lies in the first class or in the last,
+    /// whose values may be anything.
     pub fn midmean(&self) -> Option<f64> {
         let end = |class: usize| 4 * u64::from(self.counts[class]) >= self.total;
         if self.total == 0 || end(0) || end(CLASSES - 1) {
@@ -40,12 +40,12 @@ impl Histogram {
     }
 
     /// As [`Self::midmean`], of values that are not clipped at the ends: differences. Those of `beyond`
-    /// are only known to be larger than what they are counted at, by an exponential amount of mean
+    /// are only known to be larger than the value they are counted at, by an exponential amount of mean
     /// `tail`.
     pub fn middle(&self, beyond: &Self, tail: f64) -> f64 {
         let total = (self.total + beyond.total) as f64;
         let (from, to) = (0.25 * total, 0.75 * total);
-        // What of an exponential amount reaches into the next class.
+        // The part of an exponential amount that reaches into the next class.
         let kept = match tail > 0.0 {
             true => (-1.0 / (tail * CLASSES as f64)).exp(),
             false => 0.0,
@@ -82,7 +82,7 @@ mod tests {
                 _ => v,
             });
         }
-        // Half a class.
+        // Tolerance: half a class.
         assert!((plain.midmean().expect("some") - 0.5).abs() < 2e-4);
         assert_eq!(plain.midmean(), clipped.midmean());
     }
@@ -99,7 +99,7 @@ mod tests {
         let tail = 0.05;
         let expected = (0.1 + 0.2 + tail * (1.0 - 2f64.ln())) / 2.0;
         let found = known.middle(&beyond, tail);
-        // A class.
+        // Tolerance: a class.
         assert!((found - expected).abs() < 2.5e-4, "{found} {expected}");
         let without = known.middle(&beyond, 0.0);
         assert!((without - 0.15).abs() < 2.5e-4, "{without}");

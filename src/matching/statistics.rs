@@ -1,4 +1,4 @@
-//! What the eye compares where two speckles meet: brightness by depth, spread, size.
+//! Statistics of speckle that the eye compares at a border: brightness by depth, spread, size.
 //!
 //! All come from the log-compressed levels 0..1. Brightness is the mean of the middle half of the
 //! values of a depth ([`Histogram::midmean`]). Spread and size come from differences of two samples,
@@ -15,7 +15,7 @@
 use super::histogram::Histogram;
 use crate::probe::Probe;
 
-/// Far: differences at this many half widths of the correlation. A Gaussian correlation has fallen to
+/// Begin and end of the far distances, half widths of the correlation. A Gaussian correlation has fallen to
 /// 2^-9 at the first; up to the second, anatomy has changed little.
 const FAR: (f64, f64) = (3.0, 5.0);
 /// Longest distance at which differences are taken, along the scanlines and across them, standard
@@ -24,11 +24,11 @@ const FAR: (f64, f64) = (3.0, 5.0);
 const LONGEST: [f64; 2] = [48.0, 24.0];
 /// Half width of the largest speckle for which that is enough, in the same unit.
 const LARGEST: f64 = 4.8;
-/// Far begins no later than at this part of the longest distance.
+/// Latest begin of the far distances, as a part of the longest distance.
 const LATEST: f64 = 0.8;
 /// Width of a class of distances, in the same unit.
 const CLASS: f64 = 0.25;
-/// Length of a depth at which brightness is measured, mm; at least, and at most as many depths.
+/// Least length of a depth interval over which brightness is measured, mm; and the largest number of intervals.
 const DEPTH: (f64, usize) = (2.0, 40);
 
 /// Standard deviation of fully developed speckle after log compression, dB: 20 / ln 10 * pi / sqrt(24)
@@ -39,23 +39,23 @@ pub const DEVELOPED: f64 = 5.57;
 /// are exponential, the difference of two log intensities logistic, with quantiles 2 artanh(p) of its
 /// magnitude: 10 / ln 10 * 4 (p artanh p + ln(1 - p^2) / 2) from p = 1/4 to 3/4.
 const DEVELOPED_DIFFERENCE: f64 = 4.947;
-/// Mean of what lies below black, in such differences: 10 / ln 10 dB.
+/// Mean excess of a value below black, in such differences: 10 / ln 10 dB.
 const BELOW_BLACK: f64 = 4.343 / DEVELOPED_DIFFERENCE;
-/// Correlations that still tell of the width; below, chance decides.
+/// Smallest correlation that still depends on the width; below, chance decides.
 const TELLING: f64 = 0.2;
 
 /// Differences at one distance.
 #[derive(Clone, Default)]
 struct Lag {
     differences: Histogram,
-    /// Those to a black sample: the least that they are.
+    /// Differences to a black sample: lower bounds.
     beyond: Histogram,
     /// Sum of the distances, point-spread deviations.
     distances: f64,
 }
 
 impl Lag {
-    /// Takes the difference of two levels beyond what their depths differ by.
+    /// Adds the difference of two levels, less the trend between their depths.
     fn add(&mut self, distance: f64, [a, b]: [f32; 2], trend: f32) {
         let (black, white) = ([a <= 0.0, b <= 0.0], [a >= 1.0, b >= 1.0]);
         if black == [true; 2] || white == [true; 2] {
@@ -89,11 +89,11 @@ pub(super) struct Gathered {
 /// Correlation of speckle along one direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Width {
-    /// Distance at which it is 1/2, standard deviations of the point-spread function at scale 1.
+    /// Distance at which the correlation is 1/2, standard deviations of the point-spread function at scale 1.
     pub relative: f64,
     /// The same at the band's mean depth, mm.
     pub mm: f64,
-    /// Whether differences still grow at the longest distance: the width is at least this. Structure, or
+    /// True where differences still grow at the longest distance: the width is at least this. Structure, or
     /// speckle that was averaged away.
     pub open: bool,
 }
@@ -101,13 +101,13 @@ pub struct Width {
 /// Brightness at one depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Level {
-    /// Mean of the middle half, 0..1; none where a quarter is black or white, or nothing is there.
+    /// Mean of the middle half, 0..1; none where a quarter is black or white, or there is no sample.
     pub level: Option<f64>,
     /// Area, mm2.
     pub area: f64,
 }
 
-/// What one band looks like.
+/// Statistics of one band.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Statistics {
     /// Brightness by depth: `depths(probe)` of the same length.
@@ -117,11 +117,11 @@ pub struct Statistics {
     pub spread: Option<f64>,
     /// Size along the scanlines; none without pairs of samples.
     pub axial: Option<Width>,
-    /// Size across them.
+    /// Size across the scanlines.
     pub lateral: Option<Width>,
     /// Area, mm2.
     pub area: f64,
-    /// Independent patches of speckle in it.
+    /// Number of independent patches of speckle.
     pub cells: f64,
 }
 
@@ -165,7 +165,7 @@ impl Gathered {
         }
         let trend = trend(&here, samples);
         let sigma = probe.sigma_axial();
-        // Of a point-spread function three samples per deviation say all.
+        // Three samples per deviation of a point-spread function are enough.
         let step = ((sigma / 3.0 / dz) as usize).max(1);
         let farthest = ((LONGEST[0] * sigma / dz) as usize).min(samples);
         for k in (0..samples).step_by(step) {
@@ -207,7 +207,7 @@ impl Gathered {
             c.map(|c| Width { relative: c.half, mm: c.half * sigma, open: c.open })
         };
         let (axial, lateral) = (width(axial, sigma_axial), width(lateral, sigma_lateral));
-        // The integral of a Gaussian that is 1/2 at h is h sqrt(pi / ln 2). What has no end counts as the
+        // The integral of a Gaussian that is 1/2 at h is h sqrt(pi / ln 2). A width without an end counts as the
         // largest speckle that would have one.
         let extent = |w: Option<Width>, sigma: f64| {
             let half = w.map_or(LARGEST * sigma, |w| w.mm);
@@ -226,7 +226,7 @@ impl Gathered {
     }
 }
 
-/// Brightness by row, linear between the middles of depths at which there is some.
+/// Brightness by row, linear between the middles of the depths with samples.
 fn trend(levels: &[Histogram], samples: usize) -> Vec<f32> {
     let rows = samples as f64 / levels.len() as f64;
     let none = Histogram::default();
@@ -247,14 +247,14 @@ fn trend(levels: &[Histogram], samples: usize) -> Vec<f32> {
 
 #[derive(Clone, Copy)]
 struct Correlation {
-    /// Distance at which it is 1/2.
+    /// Distance at which the correlation is 1/2.
     half: f64,
     /// Mean of the middle half of far differences.
     far: f64,
     open: bool,
 }
 
-/// Half width and far differences, which need one another: what is far begins at three half widths.
+/// Half width and mean of the far differences, found together, since far begins at three half widths.
 /// None where there are no far pairs.
 fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
     let lags: Vec<_> = lags.iter().filter(|lag| lag.count() > 0.0).collect();
@@ -280,7 +280,7 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
             if r < TELLING && sums[1] > 0.0 {
                 break;
             }
-            // The first may be beyond already, where lines lie wide apart.
+            // The first may be beyond already, where scanlines lie wide apart.
             let r = r.max(0.05);
             let weight = lag.count() * r * r * u * u;
             sums[0] += weight * -r.min(1.0).ln();
@@ -291,7 +291,7 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
         if (next - half).abs() < 1e-4 * half && (tail / (far * BELOW_BLACK) - 1.0).abs() < 1e-4 {
             break;
         }
-        // Where lines lie wide apart what is far changes by leaps: half steps end between two.
+        // Where scanlines lie wide apart the set of far pairs changes in jumps: half steps converge between two.
         half = (half + next) / 2.0;
         tail = far * BELOW_BLACK;
     }
@@ -299,5 +299,4 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
 }
 
 #[cfg(test)]
-#[path = "statistics_tests.rs"]
 mod tests;

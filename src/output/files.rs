@@ -7,7 +7,7 @@ use std::path::Path;
 /// failure leaves half a file. A link stays one; permissions stay as they were.
 ///
 /// # Errors
-/// What the file system says; `path` is then as it was.
+/// Errors of the file system; `path` is then unchanged.
 pub fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -22,7 +22,7 @@ pub fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         std::fs::rename(&beside, &path)
     };
     written().inspect_err(|_| {
-        // What is left of it helps nobody; the first error is the one to tell.
+        // A partial file is of no use; the first error is the one to report.
         let _ = std::fs::remove_file(&beside);
     })
 }

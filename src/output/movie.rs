@@ -5,13 +5,13 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use gif::{Encoder, Frame, Repeat};
-/// Why an animation was not written.
+/// Reason for which an animation was not written.
 #[derive(Debug, thiserror::Error)]
 #[error("writing {}: {cause}", path.display())]
 pub struct MovieError {
     /// The file.
     pub path: PathBuf,
-    /// What the system says, or the format.
+    /// Message of the system or of the format.
     pub cause: String,
 }
 
@@ -20,11 +20,11 @@ pub struct MovieError {
 pub struct Movie {
     path: PathBuf,
     state: State,
-    /// Hundredths of a second that the frames so far are shown.
+    /// Time for which the frames so far are shown, hundredths of a second.
     shown: f64,
 }
 
-/// The format wants to know the size of the first frame before anything else.
+/// State of the file: the format needs the size of the first frame before anything else.
 enum State {
     Empty(BufWriter<File>),
     Begun(Encoder<BufWriter<File>>),
@@ -32,16 +32,16 @@ enum State {
 }
 
 impl Movie {
-    /// Whether `path` names one.
+    /// Returns whether `path` names an animation, by its extension.
     pub fn is_meant(path: &Path) -> bool {
         let extension = path.extension().and_then(|e| e.to_str());
         extension.is_some_and(|e| e.eq_ignore_ascii_case("gif"))
     }
 
-    /// Begins a file, over one that there is.
+    /// Begins a file; replaces an existing one.
     ///
     /// # Errors
-    /// What the file system says.
+    /// Errors of the file system.
     pub fn new(path: &Path) -> Result<Self, MovieError> {
         let file = File::create(path).map_err(|e| failed(path, e))?;
         Ok(Self { path: path.to_owned(), state: State::Empty(BufWriter::new(file)), shown: 0.0 })
@@ -51,7 +51,7 @@ impl Movie {
     /// by row, of the size of the first one.
     ///
     /// # Errors
-    /// What the file system says; an image larger than the format can be.
+    /// Errors of the file system; an image larger than the format allows.
     pub fn add(
         &mut self,
         width: u32,
@@ -100,11 +100,11 @@ fn failed(path: &Path, cause: impl ToString) -> MovieError {
     MovieError { path: path.to_owned(), cause: cause.to_string() }
 }
 
-/// How long a frame that begins at so many hundredths of a second is shown until `end`, s, in the
-/// hundredths that the format counts in: rounded such that the error does not add up.
+/// Returns how long a frame that begins at `begin`, hundredths of a second, is shown until `end`, s, in the
+/// format's hundredths: rounded such that the error does not add up.
 fn centiseconds(begin: f64, end: f64) -> u16 {
     let shown = (100.0 * end).round() - begin.round();
-    // Viewers slow down what is shorter than two hundredths.
+    // Viewers slow down frames shorter than two hundredths.
     shown.clamp(2.0, 65_535.0) as u16
 }
 

@@ -3,7 +3,7 @@
 use std::io::Write;
 use std::path::Path;
 
-/// How to read the 32-bit words of an array.
+/// Type of the 32-bit words of an array.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
     /// `f32`.
@@ -30,7 +30,7 @@ impl Element {
 /// When the shape does not hold exactly these words.
 ///
 /// # Errors
-/// What the file system says.
+/// Errors of the file system.
 pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> std::io::Result<()> {
     assert_eq!(
         4 * shape.iter().product::<usize>(),
@@ -59,7 +59,7 @@ pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> st
 /// Reads the data of an array of 32-bit words of any shape, as bytes in C order.
 ///
 /// # Errors
-/// A sentence naming the file, the cause and the remedy.
+/// A sentence with the file, the cause and the remedy.
 pub fn read(path: &Path) -> Result<Vec<u8>, String> {
     let bytes = std::fs::read(path).map_err(|e| format!("{}: {e}", path.display()))?;
     parse(&bytes).map_err(|cause| format!("{}: {cause}", path.display()))

@@ -2,49 +2,49 @@
 
 use std::fmt::Write;
 
-/// One line, or one cloud of dots.
+/// One curve: a line or a set of dots.
 #[derive(Clone, Debug)]
 pub struct Curve {
     /// Its name in the legend.
     pub label: String,
     /// Places on both axes.
     pub points: Vec<[f64; 2]>,
-    /// Drawn as a line: closed forms; else as dots: measurements.
+    /// True for a line: closed forms; false for dots: measurements.
     pub line: bool,
 }
 
 /// Curves over two axes.
 #[derive(Clone, Debug)]
 pub struct Plot {
-    /// What it shows.
+    /// Title of the plot.
     pub title: String,
-    /// What the axes show, with units.
+    /// Quantities on the axes, with units.
     pub axes: [String; 2],
-    /// Decades instead of a linear scale, per axis.
+    /// True for decades instead of a linear scale, per axis.
     pub logarithmic: [bool; 2],
-    /// What is drawn, with a legend in this order.
+    /// The curves, in the order of the legend.
     pub curves: Vec<Curve>,
 }
 
 impl Curve {
-    /// What was measured.
+    /// A curve of measurements.
     pub fn dots(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
         Self { label: label.into(), points, line: false }
     }
 
-    /// The closed form.
+    /// A curve of a closed form.
     pub fn line(label: impl Into<String>, points: Vec<[f64; 2]>) -> Self {
         Self { line: true, ..Self::dots(label, points) }
     }
 }
 
 impl Plot {
-    /// On linear axes.
+    /// A plot on linear axes.
     pub fn linear(title: impl Into<String>, axes: [&str; 2], curves: Vec<Curve>) -> Self {
         Self { title: title.into(), axes: axes.map(String::from), logarithmic: [false; 2], curves }
     }
 
-    /// It has names, something to draw, and only points that its axes can show.
+    /// Returns whether the plot has names, something to draw, and only points that its axes can show.
     pub fn is_drawable(&self) -> bool {
         let shows = |p: &[f64; 2]| {
             let on = |i: usize| p[i].is_finite() && (!self.logarithmic[i] || p[i] > 0.0);
@@ -66,11 +66,11 @@ const LEFT: f64 = 70.0;
 const TOP: f64 = 28.0;
 const FRAME: [f64; 2] = [SIZE[0] - LEFT - 12.0, SIZE[1] - TOP - 60.0];
 
-/// Told apart by people who see colours differently (Okabe and Ito 2008), without the yellow.
+/// Colours that people with colour blindness can tell apart (Okabe and Ito 2008), without the yellow.
 const COLOURS: [&str; 7] =
     ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#555555"];
 
-/// One axis: the range that it shows, in decades if logarithmic, and where its ticks are.
+/// One axis: the range that it shows, in decades if logarithmic, and its ticks.
 struct Axis {
     logarithmic: bool,
     low: f64,
@@ -86,13 +86,13 @@ impl Axis {
         Self { logarithmic, low: low - margin, high: high + margin }
     }
 
-    /// 0 at the low end, 1 at the high one.
+    /// Position on the axis: 0 at the low end, 1 at the high one.
     fn place(&self, v: f64) -> f64 {
         let v = if self.logarithmic { v.log10() } else { v };
         (v - self.low) / (self.high - self.low)
     }
 
-    /// About seven round values.
+    /// Returns about seven round values.
     fn ticks(&self) -> Vec<f64> {
         let rough = (self.high - self.low) / 7.0;
         let decade = 10f64.powf(rough.log10().floor());
@@ -120,7 +120,7 @@ impl Axis {
     }
 }
 
-/// What a tick is labelled with.
+/// Label of a tick.
 fn label(v: f64) -> String {
     let size = v.abs();
     if size != 0.0 && !(1e-3..1e5).contains(&size) {
@@ -211,8 +211,8 @@ fn grid(out: &mut String, plot: &Plot, axes: &[Axis; 2]) {
     );
 }
 
-/// Radius and looks of dots that follow `before` others: rings around those, so that all show where
-/// measurements agree.
+/// Radius and look of dots that follow `before` others: rings around those, so that all are visible
+/// where measurements agree.
 fn dot(colour: &str, before: usize) -> String {
     match before {
         0 => format!("r='2.4' fill='{colour}'"),

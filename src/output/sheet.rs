@@ -3,17 +3,17 @@
 use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 use image::{GrayImage, Luma, imageops};
 
-/// Grey level of the page, and of what is written on it: paper and ink.
+/// Grey level of the page, and of the text on it: paper and ink.
 const PAPER: u8 = 255;
 const INK: u8 = 0;
-/// Line around each image: a white mask would end nowhere.
+/// Grey level of the frame around each image: without it a white mask would have no visible end.
 const LINE: u8 = 128;
 /// Smallest letters that can be read, px.
 const SMALLEST: f32 = 11.0;
 /// Largest letters as a share of an image's width: 26 letters of this font in a line.
 const LARGEST: f32 = 1.0 / 16.0;
 
-/// What fills one place of a sheet.
+/// Content of one tile of a sheet.
 #[derive(Clone, Debug)]
 pub enum Tile<'a> {
     /// An image, shown pixel by pixel, with its caption below.
@@ -30,11 +30,11 @@ pub enum Tile<'a> {
 /// A page of tiles, row by row.
 #[derive(Clone, Debug)]
 pub struct Sheet<'a> {
-    /// One line above them.
+    /// One line above the tiles.
     pub title: String,
     /// Tiles side by side, at least 1.
     pub columns: usize,
-    /// What is shown.
+    /// The tiles, row by row.
     pub tiles: Vec<Tile<'a>>,
 }
 
@@ -60,7 +60,7 @@ impl Letters {
         Self { font, size }
     }
 
-    /// px.
+    /// Width of a text, px.
     fn width(&self, text: &str) -> f32 {
         let font = self.font.as_scaled(PxScale::from(self.size));
         text.chars().map(|c| font.h_advance(font.glyph_id(c))).sum()
@@ -71,7 +71,7 @@ impl Letters {
         (1.4 * self.size).ceil() as u32
     }
 
-    /// Writes one line whose left upper corner is at (`left`, `top`); what is beyond the page is cut.
+    /// Writes one line whose left upper corner is at (`left`, `top`); text beyond the page is cut.
     fn write(&self, page: &mut GrayImage, [left, top]: [u32; 2], text: &str) {
         let font = self.font.as_scaled(PxScale::from(self.size));
         let baseline = top as f32 + 0.2 * self.size + font.ascent();
@@ -100,7 +100,7 @@ impl Letters {
 }
 
 impl Sheet<'_> {
-    /// Draws it. All places are as large as the largest image; letters are as large as the longest
+    /// Draws the sheet. All tiles are as large as the largest image; letters are as large as the longest
     /// line allows.
     ///
     /// # Panics
@@ -147,7 +147,7 @@ impl Sheet<'_> {
         Page { image: page, places }
     }
 
-    /// Letters with which every caption fits below its image, and every text into its place.
+    /// Letters with which every caption fits below its image, and every text into its tile.
     fn letters(&self, width: u32, height: u32) -> Letters {
         let unit = Letters::new(1.0);
         let share = |tile: &Tile| match tile {

@@ -5,19 +5,19 @@ use glam::{DAffine3, DMat3, DQuat, DVec3};
 use super::symmetric::eigen;
 use super::{RegisterError, Transformation};
 
-/// Share of their length by which landmarks have to spread across it: below it they are as good as on
-/// a line, and errors of a few mm turn what they place right about it. Those that leave a plane by less
-/// do not tell a structure from its mirror image.
+/// Least breadth of landmarks as a share of their length: below it they are nearly on a line, and errors of a
+/// few mm turn everything right about it. Landmarks that leave a plane by less do not distinguish a structure
+/// from its mirror image.
 const BREADTH: f64 = 0.02;
 
-/// A point that is known in both frames, mm.
+/// A point known in both frames, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmark {
     /// Name.
     pub name: String,
-    /// Where it is in the volume.
+    /// Position in the volume.
     pub from: DVec3,
-    /// Where it is in the model.
+    /// Position in the model.
     pub to: DVec3,
 }
 
@@ -77,13 +77,13 @@ pub fn closed_form(
 }
 
 /// Root mean square of the distances that `transform` leaves between landmarks, mm: the fiducial
-/// registration error. Zero of none.
+/// registration error. Zero without landmarks.
 pub fn rms(transform: &DAffine3, landmarks: &[Landmark]) -> f64 {
     let squares = landmarks.iter().map(|l| off(transform, l).powi(2));
     (squares.sum::<f64>() / landmarks.len().max(1) as f64).sqrt()
 }
 
-/// The landmark that `transform` leaves farthest off, and how far, mm; none of none.
+/// The landmark that `transform` leaves farthest off, and its distance, mm; none without landmarks.
 pub fn worst<'l>(transform: &DAffine3, landmarks: &'l [Landmark]) -> Option<(&'l Landmark, f64)> {
     let all = landmarks.iter().map(|l| (l, off(transform, l)));
     all.max_by(|a, b| a.1.total_cmp(&b.1))
@@ -126,7 +126,7 @@ impl Cloud {
         Self { mean, squares: points.map(|p| p.distance_squared(mean)).sum(), covariance }
     }
 
-    /// Whether the points lie in a plane. Fails where they leave a rotation open.
+    /// Returns whether the points lie in a plane. Fails where they leave a rotation open.
     fn spread(&self, side: &str) -> Result<bool, RegisterError> {
         let [length, breadth, height] =
             eigen(self.covariance.to_cols_array_2d()).map(|(square, _)| square.max(0.0).sqrt());
@@ -205,7 +205,7 @@ mod tests {
                 }
             }
         }
-        // Planted: the inverse is not taken for it.
+        // Planted: the inverse is not mistaken for it.
         assert!(rms(&made.inverse(), &all) > 10.0 * least);
     }
 

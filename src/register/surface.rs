@@ -13,12 +13,12 @@ use super::RegisterError;
 /// A triangle, mm.
 pub type Triangle = [DVec3; 3];
 
-/// Boxes are widened by this much of the largest coordinate, so that single precision cuts nothing off.
+/// Share of the largest coordinate by which boxes are widened, so that single precision cuts nothing off.
 const MARGIN: f32 = 1e-6;
 
-/// A surface that can be asked for its nearest point.
+/// A surface with a search for the nearest point.
 pub struct Surface {
-    /// Those with area.
+    /// The triangles with area.
     triangles: Vec<Triangle>,
     boxes: Bvh2,
     centre: DVec3,
@@ -28,14 +28,14 @@ pub struct Surface {
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
-    /// Where, mm.
+    /// Position, mm.
     pub point: DVec3,
-    /// Unit normal of a triangle that it lies on.
+    /// Unit normal of a triangle at the point.
     pub normal: DVec3,
 }
 
 impl Surface {
-    /// The surface of these triangles, of any order and orientation; those without area do not count.
+    /// The surface of these triangles, of any order and orientation; triangles without area do not count.
     ///
     /// # Errors
     /// Coordinates that are no numbers; no triangle that has area.
@@ -74,7 +74,7 @@ impl Surface {
     pub fn nearest(&self, p: DVec3) -> Nearest {
         let (mut best, mut nearest) = (f64::INFINITY, Nearest { point: p, normal: DVec3::ZERO });
         let reach = |node: u32| from_box(self.boxes.nodes[node as usize].aabb(), p);
-        // Nodes still to be looked at, with the least squared distance of what they hold.
+        // Nodes still to be visited, with the least squared distance of their content.
         let mut open = vec![(reach(0), 0)];
         while let Some((least, index)) = open.pop() {
             let node = &self.boxes.nodes[index as usize];
@@ -113,7 +113,7 @@ impl Surface {
     }
 }
 
-/// `count` points spread evenly over the area of the triangles; the same each time. None of no area.
+/// `count` points spread evenly over the area of the triangles; the same each time. None for no area.
 pub fn samples(triangles: &[Triangle], count: usize) -> Vec<DVec3> {
     let mut total = 0.0;
     let sums: Vec<f64> = triangles

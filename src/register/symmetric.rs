@@ -11,7 +11,7 @@ const SWEEPS: usize = 50;
 /// and Van Loan, Matrix Computations, 4th edition, section 8.5).
 pub fn eigen<const N: usize>(matrix: Square<N>) -> [(f64, [f64; N]); N] {
     let mut a = matrix;
-    let mut vectors: Square<N> = std::array::from_fn(|i| unit(i));
+    let mut vectors: Square<N> = std::array::from_fn(unit);
     let size: f64 = a.iter().flatten().map(|x| x * x).sum();
     for _ in 0..SWEEPS {
         let pairs = || (0..N).flat_map(|p| (p + 1..N).map(move |q| (p, q)));
@@ -25,10 +25,9 @@ pub fn eigen<const N: usize>(matrix: Square<N>) -> [(f64, [f64; N]); N] {
                 for row in &mut a {
                     turn(row, p, q, cosine, sine);
                 }
-                for k in 0..N {
-                    let (x, y) = (a[p][k], a[q][k]);
-                    (a[p][k], a[q][k]) = (cosine * x - sine * y, sine * x + cosine * y);
-                }
+                let (first, second) = (a[p], a[q]);
+                a[p] = std::array::from_fn(|k| cosine * first[k] - sine * second[k]);
+                a[q] = std::array::from_fn(|k| sine * first[k] + cosine * second[k]);
                 for row in &mut vectors {
                     turn(row, p, q, cosine, sine);
                 }

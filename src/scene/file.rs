@@ -244,10 +244,4 @@ fn within(
 }
 
 #[cfg(test)]
-mod graph_mistakes;
-#[cfg(test)]
-mod graph_tests;
-#[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod vary_tests;

@@ -31,7 +31,7 @@ use typed::Typed;
 /// Most commas of the JSON part: each value of the parsed tree takes some 50 bytes of memory.
 const MAX_VALUES: usize = 4_000_000;
 
-/// A file whose JSON is sound and whose buffers are read.
+/// A file with sound JSON and loaded buffers.
 struct File<'p> {
     path: &'p Path,
     gltf: gltf::Document,
@@ -91,7 +91,7 @@ impl File<'_> {
         })
     }
 
-    /// What the tree of nodes does not say.
+    /// Findings about the file that the tree of nodes does not give.
     fn remarks(&self, visited: &[bool]) -> Vec<Issue> {
         let unseen =
             self.gltf.nodes().filter(|n| n.mesh().is_some() && !visited[n.index()]).count();
@@ -155,7 +155,7 @@ fn parse(path: &Path, json: &[u8]) -> Result<serde_json::Map<String, serde_json:
     }
 }
 
-/// Nodes that are nobody's child, for files without scenes.
+/// Nodes without a parent, for files without scenes.
 fn roots(gltf: &gltf::Document) -> Vec<gltf::Node<'_>> {
     let mut child = vec![false; gltf.nodes().len()];
     for node in gltf.nodes() {

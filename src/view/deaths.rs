@@ -1,4 +1,4 @@
-//! Threads that died by a bug: what they said, and what the user can do now.
+//! Threads that died by a bug: their last messages, and the actions left to the user.
 
 use std::panic::PanicHookInfo;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -19,7 +19,7 @@ pub(super) const CAPTURE: &str = "capture";
 /// Name of the thread that listens to game pads.
 pub(super) const PADS: &str = "game pads";
 
-/// Most deaths that are kept: what dies again and again says nothing new.
+/// Most deaths that are kept: later ones rarely tell anything new.
 const KEPT: usize = 4;
 
 /// Width of the text, points: the smallest window has room for it.
@@ -32,12 +32,12 @@ const HEIGHT: f32 = 220.0;
 pub(super) struct Death {
     /// Name of the thread.
     pub(super) thread: String,
-    /// Its last words, with the place in the source.
+    /// Its panic's message, with the place in the source.
     pub(super) said: String,
 }
 
 impl Death {
-    /// What is no more, and what to do about it.
+    /// The thing that stopped, and the remedy.
     fn remedy(&self, stopped: bool) -> &'static str {
         match self.thread.as_str() {
             SIMULATION if stopped => {
@@ -74,7 +74,7 @@ impl Deaths {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Notes from now on what panics of other threads than this one say, and calls `wake` for each. They are printed
+    /// Records from now on the panics of other threads than this one, and calls `wake` for each. They are printed
     /// as before.
     pub(super) fn watch(&self, wake: impl Fn() + Send + Sync + 'static) {
         let (deaths, here, before) =
@@ -97,7 +97,7 @@ impl Deaths {
         }
     }
 
-    /// The simulation's thread is gone. A panic that it took over from a thread of its own has that one's name.
+    /// Records that the simulation's thread is gone; a panic passed on by one of its helpers has the helper's name.
     pub(super) fn simulation_died(&self) {
         let noted = self.lock().iter().any(|death| death.thread == SIMULATION);
         if !noted {
@@ -116,7 +116,7 @@ impl Deaths {
     }
 }
 
-/// What a panic says, and where: "src/a.rs:12:5: index out of bounds".
+/// A panic's message after its place: "src/a.rs:12:5: index out of bounds".
 fn last_words(info: &PanicHookInfo) -> String {
     let said = info.payload_as_str().unwrap_or("no words");
     match info.location() {
@@ -125,7 +125,7 @@ fn last_words(info: &PanicHookInfo) -> String {
     }
 }
 
-/// Says which threads have died until the user has taken note.
+/// Shows which threads have died until the user has taken note.
 pub(super) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State) {
     let deaths = state.deaths.lock().clone();
     if deaths.is_empty() {
@@ -161,7 +161,7 @@ fn buttons(ui: &mut Ui, model: &mut Model, state: &mut State) {
     if ui.button("Copy report").clicked() {
         ui.ctx().copy_text(state.deaths.report(&state.device, model));
     }
-    // Who stands still stays on the screen.
+    // While the simulation stands still the message stays on the screen.
     if !state.stopped && ui.button("Close").clicked() {
         state.deaths.lock().clear();
     }

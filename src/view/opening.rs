@@ -39,7 +39,7 @@ impl Opening {
         let (sender, loaded) = channel();
         let (file, set) = (path.clone(), overrides.clone());
         let thread = std::thread::Builder::new().name(OPENING.into());
-        // What is not started sends nothing, and that is told.
+        // A thread that is not started sends nothing; that is reported.
         let _ = thread.spawn(move || {
             // A window that is gone needs neither.
             let _ = sender.send(Scene::load(&file, &set));
@@ -72,7 +72,7 @@ impl Opening {
         })
     }
 
-    /// The thread is gone without a word.
+    /// Message for a thread that ended without a result.
     fn unread(&self) -> String {
         let file = self.path.display();
         format!("{file} was not read: the thread that reads it died. Try again; the image goes on.")

@@ -44,9 +44,9 @@ pub(super) struct State {
     pub(super) deaths: Deaths,
     /// The simulation's thread is dead, and not started again.
     pub(super) stopped: bool,
-    /// It is to be started again.
+    /// True where the simulation is to be started again.
     pub(super) restart: bool,
-    /// What is done before there is a picture.
+    /// The work being done before the first picture.
     pub(super) preparing: &'static str,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,

@@ -42,7 +42,7 @@ pub(super) enum Coding {
 /// Bytes before the first voxel, after decompression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Skip {
-    /// So many bytes.
+    /// This number of bytes.
     Bytes(u64),
     /// The voxels are the last bytes.
     AllButLast,

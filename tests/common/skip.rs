@@ -1,27 +1,27 @@
-//! What a test does on a machine that lacks what it needs.
+//! The skipping of a test on a machine that lacks something it needs.
 
-/// What is lacking.
+/// Kind of the missing thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Lacking {
-    /// What `tools/setup.sh` installs, or a device with all features.
+    /// A tool that `tools/setup.sh` installs, or a device with all features.
     Tool,
     /// Data of others, which do not ship.
     Data,
 }
 
-/// Says that a test, or part of it, is not run, and why: "no X server". `cargo test` keeps that to itself where
-/// the test passes, so the environment can forbid it: with `INSONIFY_NO_SKIP=1` a lacking tool fails the
-/// test, with `INSONIFY_NO_SKIP=all` lacking data do so as well. Every skip goes through here.
+/// Reports that a test, or part of it, is not run, and why: "no X server". `cargo test` hides that where the test
+/// passes, so the environment can forbid it: with `INSONIFY_NO_SKIP=1` a missing tool fails the test, with
+/// `INSONIFY_NO_SKIP=all` missing data do so as well. Every skip calls this.
 ///
 /// # Panics
-/// Where the environment forbids it, or says something else.
+/// The environment forbids it, or has another value.
 pub fn skip(lacking: Lacking, why: &str) {
     let rule = std::env::var("INSONIFY_NO_SKIP").ok();
     assert!(!is_forbidden(lacking, rule.as_deref()), "not run: {why} (INSONIFY_NO_SKIP)");
     println!("skipped: {why}");
 }
 
-/// Whether a rule forbids to skip.
+/// Returns whether a rule forbids the skip.
 fn is_forbidden(lacking: Lacking, rule: Option<&str>) -> bool {
     match rule {
         None | Some("" | "0") => false,

@@ -1,4 +1,4 @@
-//! Frames that repeat. The shipped scenes at their own settings are in `tests/frame.rs`.
+//! Repetition of frames. The shipped scenes at their own settings are in `tests/frame.rs`.
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Instance, Keyframes, Scene, Surface, shapes};
@@ -7,7 +7,7 @@ use insonify::sim::{Simulator, Tracer, shaders::Library};
 use crate::check::{Bench, Check, Outcome, Physics, Picture};
 use crate::scenes::{linear, tissue};
 
-/// T34.
+/// Check T34.
 pub fn a_frame_repeats_bit_for_bit_and_both_tracers_show_it() -> Check {
     Check {
         row: "T34",

@@ -1,4 +1,4 @@
-//! Beside a full-wave simulator: the numbers of `tools/oracle/table.json`, made by k-Wave.
+//! Comparison with a full-wave simulator: the numbers of `tools/oracle/table.json`, made by k-Wave.
 
 use glam::DVec3;
 use insonify::reference::Segment;
@@ -11,7 +11,7 @@ use crate::refraction::{AXIS, RADIUS, offset, rays, traced};
 use crate::reverberation::mean_line;
 use crate::scenes::{add_layer, linear, silent};
 
-/// What outside simulators found.
+/// Results of outside simulators.
 pub fn table() -> Value {
     let text = include_str!("../../tools/oracle/table.json");
     serde_json::from_str(text).expect("the table is JSON")
@@ -22,7 +22,7 @@ pub fn number(v: &Value) -> f64 {
     v.as_f64().expect("a number")
 }
 
-/// T35.
+/// Check T35.
 pub fn a_slab_echoes_as_in_a_full_wave_simulation() -> Check {
     Check {
         row: "T35",
@@ -119,7 +119,7 @@ fn slab_echoes(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T35.
+/// Check T35.
 pub fn a_cylinder_shadows_as_in_a_full_wave_simulation() -> Check {
     Check {
         row: "T35",
@@ -136,7 +136,7 @@ pub fn a_cylinder_shadows_as_in_a_full_wave_simulation() -> Check {
     }
 }
 
-/// Where a path's last stretch crosses the plane `behind` the axis, mm.
+/// Lateral place where a path's last stretch crosses the plane `behind` the axis, mm.
 fn place(path: &[Segment], behind: f64) -> f64 {
     let last = path.last().expect("a path");
     let from = last.origin - DVec3::Z * AXIS;
@@ -164,7 +164,7 @@ fn cylinder_shadow(bench: &Bench, physics: Physics) -> Outcome {
             let behind = number(&row["behind_axis"]);
             let at = |l: usize| place(&paths[l], behind);
             let own = (0..paths.len()).filter(|&l| paths[l].len() == 3);
-            // The caustic: as far as the rays of one side reach on that side.
+            // The caustic: the reach of the rays of one side on that side.
             let reach = own.map(|l| at(l) * offset(&scene, l).signum()).fold(0.0, f64::max);
             bright.push([behind, reach]);
             let called = |what: &str| format!("{name}: {what} at {behind} mm");
@@ -184,7 +184,7 @@ fn cylinder_shadow(bench: &Bench, physics: Physics) -> Outcome {
             )
             .unlike("no diffraction", edge);
             if behind < 11.0 {
-                // Lines 0.02 mm apart about the axis.
+                // Scanlines 0.02 mm apart about the axis.
                 let (a, b) = (255, 265);
                 let spread = (at(b) - at(a)) / (offset(&scene, b) - offset(&scene, a));
                 out.compare(

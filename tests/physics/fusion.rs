@@ -1,5 +1,5 @@
-//! Fusion with an acquired volume: the mask of a ball, the volume along oblique scanlines, and how
-//! the two images meet.
+//! Fusion with an acquired volume: the mask of a ball, the volume along oblique scanlines, and the blending of the
+//! two images.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::scenes::{add_body, add_box, add_sphere, linear, silent, tissue};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
-/// The steps of the frame, its grey levels (transparent is none), and their width.
+/// The steps of the frame, its grey levels (none where transparent), and their width.
 struct Fused {
     steps: Steps,
     levels: Vec<Option<u8>>,
@@ -78,7 +78,7 @@ fn mask(scene: &mut Scene, count: usize, blend: Blend) {
     });
 }
 
-/// T29.
+/// Check T29.
 pub fn the_mask_fades_over_the_box_and_leaves_both_images_alone_beyond_it() -> Check {
     Check {
         row: "T29",
@@ -114,7 +114,7 @@ fn boxed(x: [f64; 2], z: [f64; 2], blend: Blend) -> Scene {
     mask(&mut scene, 1, blend);
     let to_world = DAffine3::from_translation(DVec3::new(-40.0, -4.0, -3.0))
         * DAffine3::from_scale(DVec3::new(0.8, 1.0, 0.7));
-    // Steep, so that no two neighbouring pixels show one level.
+    // Steep, so that no two neighbouring pixels have one level.
     let value = |p: DVec3| 0.5 + 0.3 * (p.x / 3.0).sin() + 0.2 * (p.z / 2.0).cos();
     scene.volume = Some(volume([101, 9, 81], to_world, value));
     scene
@@ -129,7 +129,7 @@ fn ramp(i: u32, edge: u32, n: i64, first: i64) -> f64 {
 
 fn borders(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
-    // What the model says of a box of 32 pixels.
+    // The model's box of 32 pixels.
     let (n, first) = match physics {
         Physics::Right => (32, -16),
         Physics::Planted => (31, -15),
@@ -177,7 +177,7 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                     ),
                 ],
             ));
-            // Inside the mask both ramps are low: 1 - M is the product of what is left of each.
+            // Inside the mask both ramps are low: 1 - M is the product of their rests.
             let corner = |i: u32, j: u32| {
                 let inside = (1.0 - ramp(i, right, n, first)) * ramp(j, top, n, first);
                 1.0 - inside
@@ -258,7 +258,7 @@ fn picture(title: String, got: &Fused) -> Picture {
     Picture { title, width: got.width, grey: got.levels.iter().map(|l| l.unwrap_or(255)).collect() }
 }
 
-/// T29.
+/// Check T29.
 pub fn bands_fade_over_their_own_widths_and_need_nothing_where_images_agree() -> Check {
     Check {
         row: "T29",
@@ -397,7 +397,7 @@ fn pixels_as_volume(got: &Fused) -> Acquired {
     volume([width, 3, height], place, level)
 }
 
-/// T30.
+/// Check T30.
 pub fn the_mask_of_a_ball_is_its_chord_on_every_scanline() -> Check {
     Check {
         row: "T30",
@@ -491,7 +491,7 @@ fn balls(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T30.
+/// Check T30.
 pub fn a_linear_volume_is_exact_along_oblique_scanlines() -> Check {
     Check {
         row: "T30",
@@ -615,7 +615,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T30.
+/// Check T30.
 pub fn both_borders_of_a_mask_lie_where_its_surface_echoes() -> Check {
     Check {
         row: "T30",

@@ -12,7 +12,7 @@ use insonify::volume::Voxels;
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::scenes::{add_box, linear, silent};
 
-/// T30.
+/// Check T30.
 pub fn a_slab_throws_its_shadow_into_the_volume() -> Check {
     Check {
         row: "T30",
@@ -29,12 +29,12 @@ pub fn a_slab_throws_its_shadow_into_the_volume() -> Check {
 }
 
 const DEPTH: f64 = 50.0;
-/// Mask and slab in it: depth of the front face and thickness, mm.
+/// Depth of the front face and thickness, mm, of the mask and of a slab in it.
 const MASK: [f64; 2] = [8.0, 30.0];
 const SLAB: [f64; 2] = [16.0, 6.0];
 /// Grey level of the volume.
 const LEVEL: f32 = 0.9;
-/// dB/(cm MHz) of what is around the mask.
+/// Attenuation around the mask, dB/(cm MHz).
 const AROUND: f64 = 0.5;
 
 /// A slab of `slab` in a mask of `host`.
@@ -70,7 +70,7 @@ fn scene(host: Tissue, slab: Tissue) -> Scene {
     scene
 }
 
-/// What a frame showed, pixel by pixel.
+/// Result of a frame, pixel by pixel.
 struct Shown {
     background: Vec<f32>,
     simulated: Vec<u8>,
@@ -89,7 +89,7 @@ fn column(shown: &Shown) -> Vec<[f64; 2]> {
     (0..250).map(|j| [(j as f64 + 0.5) * DEPTH / 250.0, at(j)]).collect()
 }
 
-/// Change along the depths in the image, dB: at their places by the probe's own speed.
+/// Expected change along the image's depths, dB; depths are computed with the probe's own speed.
 fn expected(scene: &Scene, depth: f64, physics: Physics) -> f64 {
     let [around, host, slab] = [0, 1, 2].map(|i| &scene.tissues[i]);
     let passes = |a: &Tissue, b: &Tissue| {
@@ -109,7 +109,7 @@ fn expected(scene: &Scene, depth: f64, physics: Physics) -> f64 {
         if depth < at {
             break;
         }
-        // In the image what is slower is thicker.
+        // In the image a slower medium is thicker.
         let stretch = scene.probe.speed / tissue.speed;
         let inside = (depth - at).min(thickness * stretch) / stretch;
         let excess = tissue.attenuation - AROUND;

@@ -1,4 +1,4 @@
-//! Brightness over depth, and the sector that it is shown in.
+//! Brightness over depth, and the sector of the picture.
 
 use insonify::probe::{Kind, Probe};
 use insonify::scene::Scene;
@@ -9,7 +9,7 @@ use crate::scenes::{linear, tissue};
 
 const RANGE: f64 = 120.0;
 
-/// Homogeneous speckle attenuating `attenuation` dB/(cm MHz), seen over a range that clips nothing.
+/// Homogeneous speckle attenuating `attenuation` dB/(cm MHz), shown over a range that clips nothing.
 fn homogeneous(attenuation: f64) -> Scene {
     let mut scene = linear(48, 30.0, tissue(1.540, 1.630, attenuation));
     scene.imaging.dynamic_range = RANGE;
@@ -30,7 +30,7 @@ fn powers(frame: &Frame) -> Vec<f64> {
     (1..10).map(|i| 10.0 * mean(i).log10()).collect()
 }
 
-/// T27.
+/// Check T27.
 pub fn matched_compensation_makes_homogeneous_tissue_flat() -> Check {
     Check {
         row: "T27",
@@ -76,7 +76,7 @@ fn flatness(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T27.
+/// Check T27.
 pub fn sliders_add_their_decibels_at_their_depths() -> Check {
     Check {
         row: "T27",
@@ -122,7 +122,7 @@ fn sliders(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T28.
+/// Check T28.
 pub fn sectors_have_the_area_of_their_geometry() -> Check {
     Check {
         row: "T28",

@@ -1,4 +1,4 @@
-// What frames must show whatever computes them: closed forms of acoustics and image formation.
+// Properties of frames whatever computes them: closed forms of acoustics and image formation.
 // Each expectation is worked out in its test and takes nothing from the code under test.
 // tools/validate.rs includes this file: the report shows what the tests prove.
 

@@ -18,7 +18,7 @@ const DEPTH: f64 = 20.0;
 /// Attempts at a normal whose reflection leaves the surface, after which there is no echo.
 const ATTEMPTS: i32 = 8;
 
-/// T22.
+/// Check T22.
 pub fn rough_surfaces_have_the_power_cosine_lobe() -> Check {
     Check {
         row: "T22",
@@ -118,7 +118,7 @@ fn lobe(bench: &Bench, physics: Physics) -> Outcome {
             let expected = moment(s, 1.0);
             let error = ((moment(s, 2.0) - expected.powi(2)) / f64::from(PATHS)).sqrt();
             let [measured, _] = echo(&scene, &shot.surface[0], DEPTH / 1.540, 2);
-            // And what rounding to the fixed point does to shares of 1 / N: half a unit of 64.
+            // The rounding to the fixed point of shares of 1 / N: half a unit of 64.
             let tolerance = 4.0 * error + 0.5 / 64.0 * expected;
             let what = format!("{name}: mean echo, n = {n}");
             out.compare(what, measured, expected, tolerance)

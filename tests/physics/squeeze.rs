@@ -1,4 +1,4 @@
-//! What transforms scale along one axis: planes, their normals, and what goes through them.
+//! Transforms that scale along one axis: planes, their normals, and refraction at them.
 
 use glam::{DAffine3, DVec3};
 use insonify::reference::Segment;
@@ -16,7 +16,7 @@ const SLAB: [f64; 2] = [1.58, 1.65];
 /// Depth of its front on the axis, mm.
 const FRONT: f64 = 40.0;
 
-/// T31.
+/// Check T31.
 pub fn a_squeezed_slab_is_met_and_refracts_at_its_squeezed_planes() -> Check {
     Check {
         row: "T31",
@@ -30,7 +30,7 @@ pub fn a_squeezed_slab_is_met_and_refracts_at_its_squeezed_planes() -> Check {
     }
 }
 
-/// Lines that meet the slab tilted by `tilt` rad and then scaled along z about its front's middle.
+/// Scanlines that meet the slab tilted by `tilt` rad and then scaled along z about its front's middle.
 fn scene(tilt: f64, scale: f64) -> Scene {
     let mut scene = linear(9, 24.0, tissue(BEFORE[0], BEFORE[1], 0.0));
     let at = DAffine3::from_translation(DVec3::new(0.0, 0.0, FRONT))
@@ -46,7 +46,7 @@ fn slab(bench: &Bench, physics: Physics) -> Outcome {
     for tilt in [15.0_f64, 40.0].map(f64::to_radians) {
         for scale in [0.5, 1.6] {
             let scene = scene(tilt, scale);
-            // Of the plane through (0, FRONT); of the normal, what the planted error makes another's.
+            // The plane through (0, FRONT), and its normal, which the planted error changes.
             let slope = scale * tilt.tan();
             let normal = match physics {
                 Physics::Right => slope.atan(),

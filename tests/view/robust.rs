@@ -1,4 +1,4 @@
-//! What displays and devices do to a window: many sizes at once, a large scale, a lost device.
+//! Effects of displays and devices on a window: many sizes at once, a large scale, a lost device.
 
 use std::process::Command;
 use std::time::Duration;
@@ -14,7 +14,7 @@ fn a_window_that_is_torn_about_shows_its_image_at_last() {
     };
     desk.wait_for("an image", |d| brightness(&d.grab(IMAGE)) > 10.0);
     for step in 0..60_u16 {
-        // Sizes that differ from one event to the next, among them the least that a window can have.
+        // Sizes that differ from one event to the next, among them the least size of a window.
         let size = match step % 5 {
             0 => (1, 1),
             n => (300 + 200 * n + 3 * step, 250 + 90 * n + step),
@@ -72,7 +72,7 @@ fn a_zoomed_interface_keeps_its_clicks() {
         return;
     };
     desk.wait_for("an image", |d| brightness(&d.grab([60, 150, 500, 400])) > 10.0);
-    // What moves in the 3D view has tests of its own.
+    // Movement in the 3D view has tests of its own.
     desk.press(Key::Letter('v'));
     let part = [60, 150, 500, 400];
     let before = desk.settle(part);
@@ -97,8 +97,8 @@ fn a_zoomed_interface_keeps_its_clicks() {
     desk.quit();
 }
 
-/// The folder of a Vulkan layer that loses the device, built by the C compiler; nothing where there is
-/// none.
+/// The folder of a Vulkan layer that loses the device, built by the C compiler; none where there is no
+/// compiler.
 fn layer() -> Option<tempfile::TempDir> {
     let folder = tempfile::tempdir().expect("a folder");
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/view/loss.c");
@@ -158,7 +158,7 @@ fn a_lost_device_is_opened_again_and_a_second_loss_says_what_to_do() {
     let status = desk.ended();
     assert_eq!(status.code(), Some(1));
     let text = std::fs::read_to_string(&told).expect("there");
-    // It is broken into lines with a bar at the left.
+    // It is wrapped into text lines with a bar at the left.
     let words = text.split_whitespace().filter(|word| *word != "│");
     let text = words.collect::<Vec<_>>().join(" ");
     for words in ["lost", "last pass", "--quality draft", "--device"] {
@@ -166,9 +166,9 @@ fn a_lost_device_is_opened_again_and_a_second_loss_says_what_to_do() {
     }
 }
 
-/// The left half of the image, beside what is told over it.
+/// The left half of the image, beside the message over it.
 const BESIDE: [u16; 4] = [60, 100, 320, 500];
-/// What is told, and its first button.
+/// The message, and its first button.
 const TOLD: [u16; 4] = [420, 70, 440, 60];
 const START: (u16, u16) = (455, 112);
 
@@ -208,7 +208,7 @@ fn a_simulation_that_dies_is_told_and_started_again() {
         });
     };
     moves(&mut desk);
-    // Where the one after it dies as well, it stands still.
+    // Where the next one dies as well, it stands still.
     kill(&mut desk);
     std::fs::write(&die, "").expect("written");
     let still = desk.settle(BESIDE);

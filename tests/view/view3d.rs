@@ -3,7 +3,7 @@
 use super::desk::{Desk, Key};
 use super::{CONSOLE, IMAGE, SCENE, brightness, difference};
 
-/// The middle of the view, between the image and the console; buttons and lines of text are not in it.
+/// The middle of the view, between the image and the console; without buttons and text.
 const VIEW: [u16; 4] = [500, 60, 420, 560];
 
 #[test]

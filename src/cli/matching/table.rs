@@ -1,4 +1,4 @@
-//! What matching found, as text.
+//! The result of matching as text.
 
 use insonify::matching::{Matching, Stage, Statistics, Width, depths};
 use insonify::output;

@@ -1,4 +1,4 @@
-//! `insonify study answers`: tables of what was answered.
+//! `insonify study answers`: tables of the answers.
 
 use std::path::{Path, PathBuf};
 

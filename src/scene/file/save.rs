@@ -328,5 +328,4 @@ impl Moved {
 }
 
 #[cfg(test)]
-#[path = "save_tests.rs"]
 mod tests;

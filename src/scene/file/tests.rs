@@ -1,3 +1,7 @@
+pub(super) mod graph;
+mod mistakes;
+mod vary;
+
 use std::path::PathBuf;
 
 use super::*;

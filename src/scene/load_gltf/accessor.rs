@@ -1,4 +1,4 @@
-//! Typed views of glTF buffers, every access checked against the bytes that are there.
+//! Typed views of glTF buffers; every access is checked against the existing bytes.
 
 use std::path::Path;
 
@@ -6,10 +6,10 @@ use gltf::accessor::{DataType, Dimensions, sparse};
 
 use crate::issue::Issue;
 
-/// Where the bytes are.
+/// Access to the bytes.
 pub(super) struct Reader<'a> {
     pub path: &'a Path,
-    /// Bytes by buffer index; those that no geometry needs are absent.
+    /// Bytes by buffer index; buffers that no geometry needs are absent.
     pub buffers: &'a [Option<Vec<u8>>],
 }
 
@@ -67,8 +67,8 @@ impl<'a> Reader<'a> {
         self.vectors(accessor, Dimensions::Vec3, "positions must be of type VEC3")
     }
 
-    /// Elements of N components, normalised integers as the numbers that they stand for; `otherwise`
-    /// is what is said where the accessor is not of type `kind`.
+    /// Elements of N components, normalised integers as the numbers that they represent; `otherwise`
+    /// is the message where the accessor is not of type `kind`.
     pub fn vectors<const N: usize>(
         &self,
         accessor: &gltf::Accessor<'_>,

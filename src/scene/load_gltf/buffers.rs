@@ -10,13 +10,13 @@ use percent_encoding::percent_decode_str;
 use crate::issue::Issue;
 use crate::scene::mesh::MAX_FILE;
 
-/// Buffers by index, absent where they cannot be loaded, and why not.
+/// Buffers by index; for those that cannot be loaded, the reason.
 pub(super) struct Buffers {
     pub bytes: Vec<Option<Vec<u8>>>,
     pub issues: Vec<Issue>,
 }
 
-/// Loads all buffers; only failing to load a `needed` one is an error. Files are looked for
+/// Loads all buffers; only failing to load a `needed` one is an error. Files are searched
 /// beside `path`, never at absolute addresses.
 pub(super) fn load(
     path: &Path,

@@ -16,7 +16,7 @@ pub(super) enum Kind {
     /// Index into a top-level list.
     Id(&'static str),
     Object(&'static Table),
-    /// Elements, least and most of them, whether all differ.
+    /// Elements: least and largest number, and whether all differ.
     List(&'static Kind, usize, usize, bool),
     /// Any keys.
     Map(&'static Kind),

@@ -1,6 +1,6 @@
-//! What makes triangles, as the types of the `gltf` crate; for an animation also what moves them. It is
-//! taken from the tree that was parsed and validated, so that a file is parsed once and no material or
-//! texture can stop its geometry.
+//! The data that make triangles, as the types of the `gltf` crate; for an animation also those that move them.
+//! They are taken from the tree that was parsed and validated, so that a file is parsed once and no material or
+//! texture can prevent the loading of its geometry.
 
 use gltf::json::accessor::sparse::{Indices, Sparse, Values};
 use gltf::json::accessor::{ComponentType, GenericComponentType, IndexComponentType, Type};
@@ -58,7 +58,7 @@ impl Typed {
         Self { root, without_data }
     }
 
-    /// Buffers that the geometry needs.
+    /// Returns the buffers that the geometry needs.
     pub fn buffers(&self) -> Vec<usize> {
         let root = &self.root;
         let primitives = root.meshes.iter().flat_map(|mesh| &mesh.primitives).flat_map(|p| {
@@ -205,9 +205,9 @@ fn skin(value: &Value) -> Skin {
     }
 }
 
-/// None where positions or indices are not stored.
+/// A primitive; none where positions or indices are not stored.
 fn primitive(accessors: &[Accessor], value: &Value, animated: bool) -> Option<Primitive> {
-    // Without any bytes an accessor stands for zeros, which enclose nothing.
+    // Without any bytes an accessor means zeros, which enclose nothing.
     let stored = |value: Option<&Value>| {
         let at: Index<Accessor> = index(value)?;
         let accessor = accessors.get(at.value())?;
@@ -250,7 +250,7 @@ fn primitive(accessors: &[Accessor], value: &Value, animated: bool) -> Option<Pr
     })
 }
 
-/// Where a vertex is, and what moves it; nothing of how it looks.
+/// Returns the meaning of an attribute of position or motion; none for colour, texture and the like.
 fn semantic(name: &str) -> Option<Semantic> {
     if name == "POSITION" {
         return Some(Semantic::Positions);

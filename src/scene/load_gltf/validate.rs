@@ -30,13 +30,13 @@ pub(super) struct Finding {
     pub remedy: &'static str,
 }
 
-/// What helps against files that break the rules.
+/// Remedy for files that break the rules.
 pub(super) const EXPORT_AGAIN: &str = "export it again";
 
 /// All findings on a file.
 pub(super) struct Findings<'a> {
     root: &'a Map<String, Value>,
-    /// Whether animations are read, too.
+    /// True if animations are read, too.
     animated: bool,
     list: Vec<Finding>,
 }

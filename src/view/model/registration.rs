@@ -247,5 +247,4 @@ fn corners(volume: &Acquired) -> [DVec3; 2] {
 }
 
 #[cfg(test)]
-#[path = "registration_tests.rs"]
 mod tests;

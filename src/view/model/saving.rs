@@ -22,7 +22,6 @@ pub struct File {
 }
 
 #[cfg(test)]
-#[path = "saving_tests.rs"]
 mod tests;
 
 impl File {

@@ -178,5 +178,4 @@ impl<'s> Hand<'s> {
 }
 
 #[cfg(test)]
-#[path = "skin_tests.rs"]
 mod tests;

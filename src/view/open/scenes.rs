@@ -5,7 +5,7 @@ use std::time::Instant;
 use super::{Open, Plan};
 use crate::view::opening::{Opened, Opening};
 
-/// Why no scene is opened.
+/// Reason for which no scene is opened.
 const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
 
 impl Open {
@@ -17,7 +17,7 @@ impl Open {
                 return self.refuse(STOPPED.to_owned());
             }
             let files = &mut self.state.files;
-            // Said of this file; another one speaks for itself.
+            // Overrides belong to this file, not to another one.
             let of_this = path == self.model.file.path;
             let overrides = self.model.file.overrides.iter().filter(|_| of_this).cloned();
             files.opening = true;
@@ -50,7 +50,7 @@ impl Open {
         let Opened { scene, model } = opened.expect("nothing else was handed over");
         self.told = model.revision();
         self.model = model;
-        // It shows the scene before, as do all measurements on it.
+        // The last frame shows the scene before, as do all measurements on it.
         self.frame = None;
         (self.pictured, self.look) = (None, None);
         (self.state.tissue, self.state.mesh) = (0, 0);

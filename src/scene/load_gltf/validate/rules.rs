@@ -87,7 +87,7 @@ fn extensions(findings: &mut Findings<'_>) {
     }
 }
 
-/// What cannot change the triangles is not examined beyond its types, and that is said.
+/// Notes the lists that do not affect the triangles: only their types are checked.
 fn unread(findings: &mut Findings<'_>) {
     for name in ["animations", "skins", "cameras", "images"] {
         let count = list(findings, name).len();
@@ -244,7 +244,7 @@ fn tree(findings: &mut Findings<'_>) {
     }
     for start in 0..nodes.len() {
         let mut at = parent[start];
-        // A path longer than all nodes goes round in circles.
+        // A path longer than the number of nodes is a cycle.
         let mut steps = 0;
         while let Some(up) = at.filter(|&up| up != start && steps <= nodes.len()) {
             at = parent[up];

@@ -5,7 +5,7 @@ use crate::random::{gaussian, pcg4d, unit};
 use crate::register::surface::{Triangle, samples};
 use crate::scene::{Mesh, shapes};
 
-/// An ellipsoid with a bump beside its longest axis: no motion takes it to itself.
+/// An ellipsoid with a bump beside its longest axis: no motion maps it onto itself.
 static MODEL: LazyLock<Vec<Triangle>> = LazyLock::new(|| {
     let mesh = shapes::ellipsoid([40.0, 28.0, 22.0], 5);
     let bump = DVec3::new(0.7, 0.5, 0.5).normalize();
@@ -35,7 +35,7 @@ fn noise(i: usize) -> DVec3 {
     DVec3::from([0, 1, 2].map(|axis| gaussian(words[axis])))
 }
 
-/// Points of the model where the volume has them, `share` of them anywhere in twice their box.
+/// Points of the model at their places in the volume, `share` of them anywhere in twice their box.
 fn cloud(truth: &DAffine3, count: usize, sigma: f64, share: f64) -> Vec<DVec3> {
     let lps_from_model = truth.inverse();
     let mut out: Vec<DVec3> = samples(&MODEL, count)
@@ -56,8 +56,8 @@ fn cloud(truth: &DAffine3, count: usize, sigma: f64, share: f64) -> Vec<DVec3> {
     out
 }
 
-/// How far `found` takes the model's surface from where `truth` has it (largest, mm), and the angle
-/// between their rotations (degrees).
+/// Largest distance between the places of the model's surface by `found` and by `truth`, mm, and the angle
+/// between their rotations, degrees.
 fn error(found: &DAffine3, truth: &DAffine3) -> (f64, f64) {
     let off = samples(&MODEL, 500).into_iter().map(|p| {
         let volume = truth.inverse().transform_point3(p);
@@ -98,7 +98,7 @@ fn noise_averages_out_and_is_measured() {
     // About its longest axis the ellipsoid is nearly round: there the standard error is 0.1 degrees.
     assert!(off < 0.1 && angle < 0.3, "{off} {angle}");
     let r = &made.residuals;
-    // Only what is across the surface is seen of it; median and 95 % are those of a normal law.
+    // Only motion across the surface shows; median and 95 % are those of a normal law.
     assert!((r.rms / 0.3 - 1.0).abs() < 0.06, "{r:?}");
     assert!((r.median / (0.6745 * 0.3) - 1.0).abs() < 0.08, "{r:?}");
     assert!((r.p95 / (1.96 * 0.3) - 1.0).abs() < 0.08, "{r:?}");
@@ -114,7 +114,7 @@ fn points_of_something_else_do_no_harm() {
     assert!(off < 0.3 && angle < 0.3, "{off} {angle}");
     let trimmed = made.residuals.trimmed();
     assert!((0.15..0.2).contains(&trimmed), "{trimmed}");
-    // Planted: least squares over all of them are pulled away.
+    // Planted: least squares over all points are pulled away.
     let mut transform = DAffine3::IDENTITY;
     for _ in 0..50 {
         let matched = matches(&points, &surface(), &transform);
@@ -181,7 +181,7 @@ fn what_the_surface_leaves_open_stays_and_is_said() {
     let floor: Vec<_> = quarter.iter().copied().filter(|t| t.iter().all(|p| p.z < 0.0)).collect();
     let points = samples(&floor, 500);
     let plane = Surface::new(&floor).expect("a plane");
-    // Its rim would hold what is larger.
+    // Its rim would hold larger ones.
     let small: Vec<_> = points.into_iter().map(|p| p * DVec3::new(0.5, 0.5, 1.0)).collect();
     let made = fit(&small, &plane, DAffine3::IDENTITY, Transformation::Similarity).expect("found");
     let words = made.loose.join("; ");

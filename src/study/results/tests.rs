@@ -1,4 +1,4 @@
-//! Tables of answers made up by hand, against numbers worked out by hand.
+//! Tables of invented answers, compared with numbers worked out by hand.
 
 use serde_json::json;
 
@@ -122,10 +122,10 @@ fn texts_hold_the_tables() {
     let ratings = ratings(&key, &all);
     assert_eq!(ratings.lines().count(), 13);
     let second: Vec<&str> = ratings.lines().filter(|l| l.starts_with("fedc")).collect();
-    // Its first case: another image than the scene's own, degree 5, second of three.
+    // The form's first case: another image than the scene's own, degree 5, second of three.
     let rated = "lying,none,1,1,gain,-6,0.5,dB,5,2,";
     assert!(second[0].ends_with(rated), "{}", second[0]);
-    // Its last: the scene itself, neither rated nor ranked.
+    // The form's last case: the scene itself, neither rated nor ranked.
     let bare = "standing,none,6,1,none,,,,,,";
     assert!(second[5].ends_with(bare), "{}", second[5]);
     let one = Results::new(&key, &all[..1]);

@@ -101,10 +101,13 @@ impl Desk {
 /// Draws a number between two ends.
 type Draw<'d> = &'d mut dyn FnMut([f64; 2]) -> f64;
 
+/// Changes a setting to a value that it draws.
+type Apply = dyn Fn(&mut Settings, Draw<'_>);
+
 /// A setting by its path, and a function that changes it.
 struct Change {
     path: String,
-    apply: Box<dyn Fn(&mut Settings, Draw<'_>)>,
+    apply: Box<Apply>,
 }
 
 /// Another value that a key may have.

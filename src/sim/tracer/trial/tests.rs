@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::sim::layout::NONE;
 use crate::sim::shaders::Library;
 
-#[path = "../../../tests/common/skip.rs"]
+#[path = "../../../../tests/common/skip.rs"]
 mod skip;
 
 fn hit(instance: u32, t: f32) -> RayHit {

@@ -3,7 +3,7 @@ use super::*;
 
 const ALL: Adjusted = Adjusted { gain: true, tgc: true, range: true, size: true };
 
-/// A band in which `level` is the brightness at a depth; of 60 patches at each.
+/// A band with the brightness `level` by depth; 60 patches at each.
 fn band(probe: &Probe, level: impl Fn(f64) -> Option<f64>) -> Statistics {
     let places = depths(probe);
     let levels = places.iter().map(|&z| Level { level: level(z), area: 6.0 });
@@ -53,7 +53,7 @@ fn settings_that_are_linear_between_the_sliders_are_found() {
         // Two roundings to 0.1 dB, and the pull of the flat curve: 1 dB a slider against 12.
         assert!(error.abs() < 0.3, "{z} mm: {error} dB");
     }
-    // From there nothing changes: the curve is that of the same data.
+    // From here on nothing changes: the curve is that of the same data.
     let simulated = band(&probe, |z| Some(shown(&probe, &found, echo, z)));
     let same = Statistics { spread: simulated.spread, ..acquired.clone() };
     let same = Statistics { axial: simulated.axial, lateral: simulated.lateral, ..same };

@@ -117,7 +117,7 @@ fn spread_and_size_are_those_of_the_speckle() {
         let lateral = ratio(found.lateral, reference.lateral);
         assert!(close(axial, scale[0], both), "{axial} {scale:?} {both}");
         assert!(close(lateral, scale[1] / 1.5, both), "{lateral} {scale:?} {both}");
-        // A size that is off by a quarter is seen.
+        // A size that is wrong by a quarter is noticed.
         assert!(!close(axial, 1.25 * scale[0], both), "{both}");
         let spread = found.spread.expect("far pairs") * 40.0;
         assert!(close(spread, DEVELOPED, both), "{spread} dB");
@@ -146,10 +146,10 @@ fn slow_changes_and_clipping_are_not_taken_for_speckle() {
         let (here, there) = (here.level.expect("grey"), there.level.expect("grey"));
         let expected = 60.0 * (there - 1.0) + 13.5 - 12.0 * z / probe.depth;
         let error = 30.0 * (here - 1.0) - expected;
-        // The trend within a depth of 2 mm turns a few values about: 0.05 dB.
+        // The trend within a depth of 2 mm changes the order of a few values: 0.05 dB.
         assert!(error.abs() < 0.05, "{z} mm: {error} dB");
     }
-    // With 8 dB less, half of the deepest samples are black: nothing is said of them.
+    // With 8 dB less, half of the deepest samples are black: they have no level.
     let darker = shown(&probe, &echoes, 30.0, |z| -19.5 - 12.0 * z / probe.depth);
     assert_eq!(measured(&probe, &darker).levels.last().expect("some").level, None);
 }
@@ -158,7 +158,7 @@ fn slow_changes_and_clipping_are_not_taken_for_speckle() {
 fn structure_that_goes_on_has_no_size() {
     let probe = probe();
     let samples = probe.samples as usize;
-    // A ramp across the lines: differences grow with distance for ever.
+    // A ramp across the scanlines: differences grow with distance without end.
     let lines = probe.scanlines as usize;
     let ramp = |i: usize| 0.2 + 0.6 * (i / samples) as f32 / lines as f32;
     let levels: Vec<f32> = (0..lines * samples).map(ramp).collect();

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
-/// What is worth knowing about a volume that could be loaded.
+/// A finding on a volume that could be loaded.
 pub use crate::issue::Warning;
 
 mod dicom;

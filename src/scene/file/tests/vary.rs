@@ -1,5 +1,5 @@
-use super::tests::Case;
-use super::*;
+use super::Case;
+use crate::scene::file::*;
 use crate::scene::vary::Parameter;
 
 const SCENE: &str = r#"

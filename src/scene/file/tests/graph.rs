@@ -2,13 +2,13 @@
 
 use glam::DVec3;
 
-use super::tests::Case;
-use super::*;
+use super::Case;
+use crate::scene::file::*;
 use crate::scene::graph::NodeKind;
 use crate::scene::{Instance, Strategy};
 
 /// A folder with three cubes of 10, 20 and 30 mm and one that is cut differently.
-pub(super) fn case() -> Case {
+pub(in crate::scene::file) fn case() -> Case {
     let case = Case::new();
     let cube = std::fs::read_to_string(case.folder.path().join("cube.obj")).expect("there");
     for (name, edge) in [("a", "10"), ("b", "20"), ("c", "30")] {
@@ -20,22 +20,23 @@ pub(super) fn case() -> Case {
     case
 }
 
-pub(super) fn write(case: &Case, name: &str, text: &str) {
+pub(in crate::scene::file) fn write(case: &Case, name: &str, text: &str) {
     std::fs::write(case.folder.path().join(name), text).expect("written");
 }
 
-pub(super) fn mesh(name: &str, more: &str) -> String {
+pub(in crate::scene::file) fn mesh(name: &str, more: &str) -> String {
     format!("[[mesh]]\nname = \"{name}\"\ntissue = \"liver\"\n{more}\n")
 }
 
 /// A mesh with keyframes under a selector called beat.
-pub(super) fn beating(name: &str, files: &str) -> String {
+pub(in crate::scene::file) fn beating(name: &str, files: &str) -> String {
     let files: Vec<_> = files.split(' ').map(|f| format!("\"{f}.obj\"")).collect();
     let files = files.join(", ");
     mesh(name, &format!("parent = \"beat\"\nkeyframes = [{files}]"))
 }
 
-pub(super) const BEAT: &str = "[[selector]]\nname = \"beat\"\nperiod = \"600 ms\"\n";
+pub(in crate::scene::file) const BEAT: &str =
+    "[[selector]]\nname = \"beat\"\nperiod = \"600 ms\"\n";
 
 fn named<'s>(scene: &'s Scene, name: &str) -> &'s Instance {
     let mut all = scene.instances.iter();
@@ -103,9 +104,9 @@ fn a_strategy_is_set_from_outside() {
     let (set, (keyframe, weight)) = strategy(&[("selector.beat.strategy", "interpolate")]);
     assert_eq!((set, keyframe), (Strategy::Interpolate, 1));
     assert!((weight - 0.5).abs() < 1e-9);
-    for strategy_name in <Strategy as crate::settings::Words>::ALL.iter().copied() {
+    for strategy_name in <Strategy as crate::settings::Words>::ALL {
         let name = strategy_name.to_string();
-        assert_eq!(strategy(&[("selector.0.strategy", &name)]).0, strategy_name);
+        assert_eq!(strategy(&[("selector.0.strategy", &name)]).0, *strategy_name);
     }
 }
 

@@ -1,4 +1,4 @@
-//! Keys: read back as written, refused where something was changed.
+//! Keys: read back as written, refused where changed.
 
 use super::*;
 

@@ -1,6 +1,6 @@
 //! Every mistake in nodes, selectors, motions, animations and trajectories of scene files.
 
-use super::graph_tests::{BEAT, beating, case, mesh, write};
+use super::graph::{BEAT, beating, case, mesh, write};
 
 #[test]
 fn mistakes_in_the_family_are_placed() {

@@ -1,4 +1,4 @@
-//! Files of answers: what is read, what is refused and why.
+//! Files of answers: accepted ones, refused ones, and reasons.
 
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ pub(in crate::study) fn content() -> Value {
     })
 }
 
-/// The file that a form would save.
+/// A file as the form would save it.
 pub(in crate::study) fn file(key: &Key, content: &Value) -> Value {
     json!({
         "format": FORMAT,

@@ -11,7 +11,7 @@ mod reload;
 use std::collections::BTreeMap;
 
 /// Stem and bytes of every kernel that the program uses; written by `tools/compile.rs`.
-const EMBEDDED: &[(&str, &[u8])] = include!("../../../spirv/embedded.rs");
+const EMBEDDED: &[(&str, &[u8])] = include!("../../spirv/embedded.rs");
 
 /// The SPIR-V of every kernel: the embedded modules, or (feature `compile`) the last ones that
 /// compiled from a folder of sources.

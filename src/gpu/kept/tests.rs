@@ -87,7 +87,8 @@ fn device(folder: &Path) -> Arc<Device> {
 #[test]
 fn a_kernel_that_has_run_is_known_at_the_next_start() {
     let folder = tempfile::tempdir().unwrap();
-    let spirv: Vec<u32> = bytemuck::pod_collect_to_vec(include_bytes!("../../tests/gpu/add.spv"));
+    let spirv: Vec<u32> =
+        bytemuck::pod_collect_to_vec(include_bytes!("../../../tests/gpu/add.spv"));
     let kernel = |device: &Arc<Device>, factor: u32| {
         Kernel::new(device, "add", &spirv, &[(0, 32), (1, factor)]).unwrap()
     };

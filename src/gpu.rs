@@ -9,6 +9,9 @@
 //!   against them;
 //! - everything that a submission uses is kept alive until its fence has been waited for.
 
+// Here alone: Cargo.toml denies it.
+#![allow(unsafe_code)]
+
 mod accel;
 mod adapter;
 mod ahead;
