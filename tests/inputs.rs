@@ -66,7 +66,7 @@ fn every_mesh_is_loaded_or_refused_with_a_reason() {
     }
     // Nearly all are samples of the size of a house; that is found after all shapes are made.
     println!("{animated} files with animations on which something is said");
-    assert!(animated >= 20, "animations are tried");
+    assert!(animated >= 15, "animations are tried");
     println!("{:30} clean, warnings, refused", "set");
     for (set, [clean, warned, refused]) in &counts {
         println!("{set:30} {clean:5} {warned:9} {refused:8}");

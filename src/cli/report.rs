@@ -45,7 +45,7 @@ impl ReportHandler for Teller {
 
 /// The line in which `span` begins, with the one before it, and a mark below the span.
 fn lines(source: &dyn SourceCode, span: &SourceSpan) -> Option<String> {
-    let text = source.read_span(span, 1, 0).ok()?;
+    let text = source.read_span(span, 1, 1).ok()?;
     let shown = str::from_utf8(text.data()).ok()?;
     let before = shown.get(..span.offset() - text.span().offset())?;
     let first = text.line() + 1;
@@ -77,6 +77,7 @@ mod tests {
             lines(&text, &(at, from.len()).into()).expect("shown")
         };
         assert_eq!(shown("\"3\""), " 2 | # \u{b5}s\n 3 | \tpitch = \"3\"\n   | \t        ^^^");
+        assert_eq!(shown("pitch"), " 2 | # \u{b5}s\n 3 | \tpitch = \"3\"\n   | \t^^^^^");
         assert_eq!(shown("[probe]"), " 1 | [probe]\n   | ^^^^^^^");
         // Of a span over several lines only the first is marked.
         assert_eq!(shown("4\n"), " 3 | \tpitch = \"3\"\n 4 | width = 4\n   |         ^");

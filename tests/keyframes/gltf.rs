@@ -31,8 +31,8 @@ const ASSIMP: &str = "gltf-samples/assimp-glTF2/MorphStressTest/glTF/MorphStress
 
 #[rustfmt::skip]
 const SAMPLES: &[Sample] = &[
-    Sample { file: FOX, animation: "View3d", units: "mm", keyframes: None, planted: BETWEEN },
-    Sample { file: FOX, animation: "View3d", units: "mm", keyframes: Some(100), planted: SKIN },
+    Sample { file: FOX, animation: "Survey", units: "mm", keyframes: None, planted: BETWEEN },
+    Sample { file: FOX, animation: "Survey", units: "mm", keyframes: Some(100), planted: SKIN },
     Sample { file: FOX, animation: "Walk", units: "mm", keyframes: None, planted: SKIN },
     Sample { file: FOX, animation: "Run", units: "mm", keyframes: Some(11), planted: BETWEEN },
     Sample { file: STRESS, animation: "Individuals", units: "cm", keyframes: None, planted: MORPH },
