@@ -15,7 +15,7 @@ layout(std430, binding = 4) buffer RowBuffer { Row rows[]; };
 layout(std430, binding = 5) buffer SegmentBuffer { Segment segments[]; };
 layout(std430, binding = 6) buffer CountersBuffer { Counters counters[]; };
 layout(std430, binding = 7) buffer FusionBuffer { Fusion fusions[]; };
-layout(std430, binding = 8) buffer SurveyBuffer { Survey surveys[]; };
+layout(std430, binding = 8) buffer View3dBuffer { View3d views[]; };
 layout(std430, binding = 9) buffer InteractionBuffer { Interaction interactions[]; };
 layout(std430, binding = 10) buffer ScanlineBuffer { Scanline scanlines[]; };
 
@@ -28,7 +28,7 @@ void main() {
     segments[0].line = 0u;
     counters[0].rays = 0u;
     fusions[0].blur = 0u;
-    surveys[0].flags = 0u;
+    views[0].flags = 0u;
     interactions[0].path = 0u;
     scanlines[0].x = 0.0;
 }

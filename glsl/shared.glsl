@@ -173,12 +173,12 @@ struct Fusion {
     uint blend; uint mask_speed;                  // BLEND_*, MASK_SPEED_*
 };
 
-const uint SURVEY_CUT = 1u;         // what lies before the image plane is cut away
-const uint SURVEY_IMAGE = 2u;       // the B-mode image is shown where it lies
-const uint SURVEY_SOME_HIDDEN = 4u; // of some instance the opacity is 0
+const uint VIEW3D_CUT = 1u;         // what lies before the image plane is cut away
+const uint VIEW3D_IMAGE = 2u;       // the B-mode image is shown where it lies
+const uint VIEW3D_SOME_HIDDEN = 4u; // of some instance the opacity is 0
 
 // How the anatomy is looked at from outside.
-struct Survey {
+struct View3d {
     vec4 eye;          // world, mm
     vec4 right;        // world: one pixel to the right, at distance 1
     vec4 down;         // one pixel down

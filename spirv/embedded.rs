@@ -26,10 +26,10 @@
     ("scatter_rigid", include_bytes!("scatter_rigid.spv")),
     ("shadow_bvh", include_bytes!("shadow_bvh.spv")),
     ("shadow_query", include_bytes!("shadow_query.spv")),
-    ("survey_bvh", include_bytes!("survey_bvh.spv")),
-    ("survey_query", include_bytes!("survey_query.spv")),
     ("tint", include_bytes!("tint.spv")),
     ("trace_bvh", include_bytes!("trace_bvh.spv")),
     ("trace_count", include_bytes!("trace_count.spv")),
     ("trace_query", include_bytes!("trace_query.spv")),
+    ("view3d_bvh", include_bytes!("view3d_bvh.spv")),
+    ("view3d_query", include_bytes!("view3d_query.spv")),
 ]

@@ -1,8 +1,8 @@
-//! Tracked-sweep acquisition: B-mode frames of a scene with the pose of the probe at each, as a
-//! tracked ultrasound system records them, and the volume that they make.
+//! Acquisition of tracked sweeps: B-mode frames of a scene with the probe's pose at each, as a tracked
+//! ultrasound system records them, and the volume made from them.
 //!
-//! The world of the scene is the frame `Tracker`. `Reference`, in which PLUS reconstructs volumes, is
-//! the same: a reconstructed volume lies where the scene's anatomy lies.
+//! The world of the scene is the frame `Tracker`. `Reference`, in which PLUS reconstructs volumes, is the
+//! same: a reconstructed volume lies at the place of the scene's anatomy.
 
 use std::collections::BTreeMap;
 
@@ -20,9 +20,9 @@ use crate::volume::{
 
 mod sweep;
 
-pub use sweep::{Station, Sweep, stations_at, stations_of};
+pub use sweep::{Station, Sweep, poses_at, stations_at, stations_of};
 
-/// Most pixels of all frames, bytes: the sequence is in memory as a whole.
+/// Most pixels of all frames, bytes: the whole sequence is in memory.
 const MAX_PIXELS: u64 = 2 << 30;
 
 /// Name of the transform from pixels to the probe.
@@ -32,7 +32,7 @@ const TRACKED: &str = "ProbeToTracker";
 /// Name of the transform from the frame of volumes to the world: the identity.
 const REFERENCE: &str = "ReferenceToTracker";
 
-/// Why nothing was acquired.
+/// The reason why nothing was acquired.
 #[derive(Debug, Error)]
 pub enum AcquireError {
     /// A frame could not be simulated.
@@ -41,17 +41,17 @@ pub enum AcquireError {
     /// The frames would not fit into memory.
     #[error("{frames} frames of {width} x {height} pixels are more than {} GiB", MAX_PIXELS >> 30)]
     TooLarge {
-        /// Frames.
+        /// Number of frames.
         frames: usize,
-        /// Pixels along x.
+        /// Number of pixels along x.
         width: u32,
-        /// Pixels along y.
+        /// Number of pixels along y.
         height: u32,
     },
 }
 
-/// Pixels (integers at their centres; x along the scanlines' order, y with depth, z so that the three
-/// are right-handed) to probe space, mm: the calibration of PLUS and 3D Slicer.
+/// Transform from pixels (integers at their centres; x along the scanlines' order, y with depth, z so that the
+/// three are right-handed) to probe space, mm: the calibration of PLUS and 3D Slicer.
 pub fn probe_from_image(frame: &Frame) -> DAffine3 {
     let pitch = f64::from(frame.pixel_pitch);
     let centre = |first: f32| f64::from(first) + 0.5 * pitch;
@@ -61,7 +61,7 @@ pub fn probe_from_image(frame: &Frame) -> DAffine3 {
     )
 }
 
-/// The part of the image that holds echoes, pixels; none where it is all of it.
+/// The part of the image that holds echoes, pixels; none where it is the whole image.
 fn fan(scene: &Scene, probe_from_image: &DAffine3) -> Option<Fan> {
     let (radius, angle) = match scene.probe.kind {
         Kind::Convex { radius, field_of_view } => (radius, field_of_view),
@@ -79,12 +79,12 @@ fn fan(scene: &Scene, probe_from_image: &DAffine3) -> Option<Fan> {
     })
 }
 
-/// Images `scene` from each of `stations` and calls `done` after each with its number. With `moving`
-/// the anatomy moves on from the time given (s) as the timestamps do; without, it stands as it is. The
+/// Images `scene` from each of `stations` and calls `done` after each with its number. With `moving` the
+/// anatomy moves on from the given time (s) with the timestamps; without it the anatomy stands still. The
 /// scene is left at the last station.
 ///
 /// # Errors
-/// What the device says; frames that would not fit into memory.
+/// An error of the device; frames that would not fit into memory.
 ///
 /// # Panics
 /// Without stations.
@@ -142,8 +142,8 @@ pub fn acquire(
     })
 }
 
-/// Reconstructs a volume from an acquired sequence, along the axes of the probe at its middle frame.
-/// `settings` go by those axes; where they name no fan it is the sequence's.
+/// Reconstructs a volume from an acquired sequence, along the axes of the probe at its middle frame. The
+/// axes of `settings` are those too; without a fan in them the sequence's fan is used.
 ///
 /// # Errors
 /// As [`reconstruct`].

@@ -1,4 +1,4 @@
-//! Subcommands, one module each: its arguments and what it does.
+//! Subcommands, one module each: arguments and execution.
 
 use std::process::ExitCode;
 
@@ -15,6 +15,7 @@ mod order;
 mod reconstruct;
 mod register;
 mod render;
+mod report;
 mod serve;
 mod study;
 mod vary;
@@ -49,7 +50,7 @@ enum Command {
     /// Make a user study of realism (form and key), or tables of what was answered
     Study(study::Study),
     /// Render a scene many times, one parameter at a time, onto one labelled sheet
-    // It was called `sweep`, which is a path of the probe.
+    // Its old name was `sweep`, which now means a path of the probe.
     #[command(alias = "sweep")]
     Vary(Box<vary::Vary>),
     /// Open a window: the live image, the probe under the keyboard, every setting
@@ -58,6 +59,7 @@ enum Command {
 
 /// Runs the command line. An error is printed once, with its remedy; the exit code is then 1.
 pub fn run() -> ExitCode {
+    report::install();
     let result = match Cli::parse().command {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),

@@ -1,28 +1,25 @@
 //! insonify: real-time ultrasound by Monte-Carlo path tracing on Vulkan.
 //!
-//! `scene` and `probe` say what is imaged and with what; `gpu` knows Vulkan and no ultrasound;
+//! `scene` and `probe` describe the anatomy and the instrument; `gpu` knows Vulkan and no ultrasound;
 //! `sim` is the frame, `view` the window; `reference` is the f64 twin of every kernel
 //! of the image. Units: mm, microseconds, MHz.
 
-// Of what others may use: tools and tests have no such items.
+// For the library's public items: tools and tests have none.
 #![warn(missing_docs)]
 
 pub mod acquire;
-pub mod files;
 pub mod gpu;
 pub mod igtl;
+pub mod issue;
 pub mod live;
-pub mod movie;
-pub mod npy;
+pub mod matching;
 pub mod output;
-pub mod plot;
 pub mod probe;
 pub mod random;
 pub mod reference;
 pub mod register;
 pub mod scene;
 pub mod settings;
-pub mod sheet;
 pub mod sim;
 pub mod statistics;
 pub mod study;

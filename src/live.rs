@@ -1,8 +1,8 @@
-//! Live quality: with how many lines, layers, samples and paths a frame is made while something moves, so
-//! that a device keeps its budget of time; at rest the frame is the scene's own again.
+//! Live quality: the numbers of scanlines, layers, samples and paths of a frame while something moves, chosen so
+//! that a device keeps its time budget; at rest the frame has the scene's own again.
 //!
-//! Nothing here knows a device: [`Ladder`] says what there is to choose from, [`Governor`] chooses from the
-//! times that frames took, and [`Pace`] is both for one scene at a time.
+//! Nothing here knows a device: [`Ladder`] holds the levels, [`Governor`] chooses one from the times of frames,
+//! and [`Pace`] is both for one scene at a time.
 
 mod governor;
 mod ladder;
@@ -18,33 +18,33 @@ pub use ladder::{Ladder, Level};
 use crate::scene::Scene;
 use crate::settings::Machine;
 
-/// What was imaged is at rest when nothing has moved for this long.
+/// Time without movement after which the image counts as at rest.
 pub const REST: Duration = Duration::from_millis(150);
 
-/// How finely a picture was made.
+/// Quality of a picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grade {
     /// Level of the ladder; 0 is the scene's own.
     pub level: usize,
-    /// How many there are.
+    /// Number of levels.
     pub levels: usize,
-    /// Its counts.
+    /// Counts of the level.
     pub counts: Level,
-    /// It was made at rest, of what the picture before shows.
+    /// True where it was made at rest, of the scene in the picture before.
     pub at_rest: bool,
-    /// What a picture may take while something moves, ms.
+    /// Time budget of a picture while something moves, ms.
     pub budget_ms: f64,
-    /// What pictures take at present while something moves, ms; none before the first few.
+    /// Present time of pictures while something moves, ms; none before the first few.
     pub pace_ms: Option<f64>,
 }
 
 impl Grade {
-    /// Whether it has the scene's own counts.
+    /// Returns whether it has the scene's own counts.
     pub fn is_full(&self) -> bool {
         self.level == 0
     }
 
-    /// As sidecars say it.
+    /// The quality as in sidecars.
     pub fn json(&self) -> Value {
         json!({
             "level": self.level,
@@ -63,31 +63,31 @@ impl fmt::Display for Grade {
     }
 }
 
-/// Keeps the pace of one scene on one device.
+/// Live quality of one scene on one device.
 pub struct Pace {
     machine: Machine,
     ladder: Option<(Ladder, Governor)>,
-    /// Part of the budget that an image may take.
+    /// Share of the budget for an image.
     share: f64,
 }
 
 impl Pace {
-    /// For a machine, before the first frame.
+    /// The pace for a machine, before the first frame.
     pub fn new(machine: Machine) -> Self {
         Self { machine, ladder: None, share: 1.0 }
     }
 
-    /// Another scene is imaged from now on.
+    /// Forgets the scene: another one is imaged from now on.
     pub fn forget(&mut self) {
         self.ladder = None;
     }
 
-    /// An image may take no more than this part of the budget.
+    /// Sets the share of the budget for an image.
     pub fn share(&mut self, share: f64) {
         self.share = share;
     }
 
-    /// The level of the next frame of `scene`, with its own counts, while something moves.
+    /// Chooses the level of the next frame of `scene`, given with its own counts, while something moves.
     pub fn moving(&mut self, scene: &Scene) -> usize {
         let ladder = Ladder::of(scene);
         let budget = self.share * scene.live.budget_ms(self.machine);
@@ -104,26 +104,26 @@ impl Pace {
         level
     }
 
-    /// The level at which to make at rest what is shown at level `shown`, if at any.
+    /// The level for making the image of level `shown` again at rest, if any.
     pub fn refined(&self, shown: usize) -> Option<usize> {
         self.ladder.as_ref()?.1.refined(shown)
     }
 
-    /// Gives a scene the counts of a level that this has named.
+    /// Gives a scene the counts of a level chosen here.
     pub fn apply(&self, level: usize, scene: &mut Scene) {
         if let Some((ladder, _)) = &self.ladder {
             ladder.levels()[level].apply(scene);
         }
     }
 
-    /// Learns what a frame took, ms.
+    /// Learns the time of a frame, ms.
     pub fn finished(&mut self, level: usize, ms: f64) {
         if let Some((_, governor)) = &mut self.ladder {
             governor.finished(level, ms);
         }
     }
 
-    /// What is to be said of a frame made at a level of `scene`, with these counts.
+    /// The quality of a frame made at a level of `scene`, which has these counts.
     pub fn grade(&self, level: usize, scene: &Scene, at_rest: bool) -> Grade {
         let ladder = self.ladder.as_ref();
         Grade {

@@ -1,8 +1,8 @@
-//! A model registered with an acquired volume by surfaces (Starkov et al. 2019, figure 3): points of a
-//! structure that was segmented in the volume are laid onto the same structure of the model.
+//! Registration of a model with an acquired volume by surfaces (Starkov et al. 2019, figure 3): points of a
+//! structure segmented in the volume are fitted to the same structure of the model.
 //!
-//! Everything here is in the scene's world, mm: points of the volume have been through the placement
-//! that the scene gives it. What is found is the similarity that takes them from there to the model.
+//! Everything here is in the scene's world, mm: points of the volume have been transformed by the scene's
+//! placement of it. The result is the similarity that takes them from there to the model.
 //! [`landmarks`] give a start in closed form; [`icp`] does the rest.
 
 use glam::DAffine3;
@@ -13,18 +13,19 @@ pub mod landmarks;
 pub mod placement;
 pub mod points;
 pub mod surface;
+mod symmetric;
 
 pub use error::RegisterError;
 pub use icp::{Fit, Residuals};
 pub use placement::Placement;
 pub use surface::Surface;
 
-/// What a registration may change. Neither mirrors.
+/// Degrees of freedom of a registration. Neither mirrors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Transformation {
     /// Rotation and shift.
     Rigid,
-    /// Those and one scale for all axes.
+    /// Rotation, shift and one scale for all axes.
     Similarity,
 }
 

@@ -1,10 +1,10 @@
-//! What many measurements of one thing come to.
+//! Order statistics of repeated measurements.
 
 use serde::Serialize;
 
 pub mod ranks;
 
-/// Order statistics by nearest rank; NaN of nothing.
+/// Order statistics by nearest rank; NaN without values.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Statistics {
     /// Half of the values are at most this.
@@ -16,7 +16,7 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Those of `values`.
+    /// Statistics of `values`.
     pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
         let mut sorted: Vec<f64> = values.into_iter().collect();
         sorted.sort_by(f64::total_cmp);

@@ -1,6 +1,6 @@
-//! User studies: images rated blind by people who know ultrasound, as in section III-B of Starkov et
-//! al. 2019. Cases of many images go into a form ([`form`]), what they are into a key ([`key`]) that the
-//! assessor does not see; answers ([`answers`]) and key make tables ([`results`]).
+//! User studies: images rated blind by people who know ultrasound, as in section III-B of Starkov et al. 2019.
+//! Cases of many images go into a form ([`form`]), their identities into a key ([`key`]) that the assessor
+//! does not see; answers ([`answers`]) and key make tables ([`results`]).
 
 pub mod answers;
 pub mod form;
@@ -10,7 +10,7 @@ pub mod results;
 use miette::Diagnostic;
 use thiserror::Error;
 
-/// What is wrong with a key or with answers, and what to do about it.
+/// An error in a key or in answers, with a remedy.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{file}: {message}")]
 pub struct StudyError {
@@ -18,7 +18,7 @@ pub struct StudyError {
     pub file: String,
     /// Cause.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     #[help]
     pub remedy: String,
 }
@@ -29,7 +29,7 @@ impl StudyError {
     }
 }
 
-/// Text of a file of at most `most` bytes, or why there is none.
+/// Text of a file of at most `most` bytes, or the reason why there is none.
 fn text_of(file: &std::path::Path, most: u64, remedy: &str) -> Result<String, StudyError> {
     let fail = |cause: String| StudyError::new(file, cause, remedy);
     let info = std::fs::metadata(file).map_err(|e| fail(format!("cannot be read: {e}")))?;

@@ -1,7 +1,7 @@
 //! The window: the live image, a console for everything that the model exposes, timings.
 //!
-//! The simulation runs on a thread of its own ([`engine`]); the window shows its last finished
-//! picture and never waits for it. What is shown and set is a plain [`Model`].
+//! The simulation runs on a thread of its own ([`engine`]). The window shows the last finished
+//! picture and never waits for it. A plain [`Model`] holds what is shown and set.
 
 mod app;
 mod bmode;
@@ -9,6 +9,7 @@ mod calipers;
 mod captures;
 mod cine;
 mod console;
+mod deaths;
 pub mod engine;
 mod files;
 mod hold;
@@ -33,9 +34,9 @@ mod state;
 mod statistics;
 mod strip;
 mod style;
-mod survey;
 mod timing;
 mod tools;
+mod view3d;
 
 use std::net::IpAddr;
 use std::path::PathBuf;
@@ -52,35 +53,35 @@ use crate::scene::animation::Track;
 use crate::sim::shaders::Library;
 use crate::sim::{SimError, Tracer};
 
-/// What a window is opened with.
+/// Options of the window.
 pub struct Options {
     /// The scene file.
     pub file: PathBuf,
-    /// What the command line says in its place.
+    /// Settings of the command line, which replace those of the file.
     pub overrides: Vec<(String, String)>,
-    /// Which device; that it serves a window is set by [`run`].
+    /// The device to take; [`run`] adds that it must serve a window.
     pub device: DeviceOptions,
     /// The kernels.
     pub library: Arc<Library>,
     /// Time of the scene at the start, s.
     pub seconds: f64,
-    /// Size of the interface, 1 as the display asks for it.
+    /// Scale of the interface; 1 is the display's own.
     pub scale: f32,
     /// Writes the window's picture into this file (PNG) once it shows an image, and ends.
     pub screenshot: Option<PathBuf>,
     /// Writes the timings into this file at the end.
     pub json: Option<PathBuf>,
-    /// A trajectory that the probe goes along from the start, and the file that it is from.
+    /// A trajectory that the probe follows from the start, and its file.
     pub trajectory: Option<(Track, PathBuf)>,
-    /// Where OpenIGTLink clients are listened for from the start; nowhere without it.
+    /// Address at which OpenIGTLink clients are awaited from the start; none without it.
     pub listen: Option<Listen>,
     /// Folder of stills and clips.
     pub captures: PathBuf,
-    /// Suits path and scatterer counts to the device, and chooses a tracer that it has.
+    /// Fits path and scatterer counts to the device, and chooses a tracer that it has.
     pub prepare: Prepare,
 }
 
-/// Where OpenIGTLink clients are listened for.
+/// The address at which OpenIGTLink clients are awaited.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Listen {
     /// Address of this machine.
@@ -89,54 +90,60 @@ pub struct Listen {
     pub port: u16,
 }
 
-/// See [`Options::prepare`].
+/// The type of [`Options::prepare`].
 pub type Prepare = Box<dyn Fn(&Arc<Device>, &mut Scene) -> Result<Tracer, Refusal>>;
 
-/// Why a device does not suit.
+/// The reason why a device does not suit.
 pub type Refusal = Box<dyn std::error::Error + Send + Sync>;
 
-/// Why there is no window, or no more.
+/// The reason why there is no window, or no more.
 #[derive(Debug, thiserror::Error)]
 pub enum ViewError {
     /// There is no display, or it cannot be reached.
     #[error("no window can be opened: {0}; `insonify render` needs no display")]
     Display(String),
-    /// The device.
+    /// An error of the device.
     #[error(transparent)]
     Gpu(#[from] GpuError),
     /// The device does not suit.
     #[error("{0}")]
     Refused(Refusal),
-    /// The simulation, before its first image.
+    /// An error of the simulation before its first image.
     #[error(transparent)]
     Sim(#[from] SimError),
-    /// Nobody can be listened for.
+    /// The OpenIGTLink server cannot listen.
     #[error("{error}: {}", error.remedy())]
     Igtl {
-        /// Why.
+        /// The cause.
         #[from]
         error: IgtlError,
     },
+    /// The system has no room for another thread.
+    #[error("no thread can be started: {0}; close other programs, or raise the limit on threads")]
+    Thread(std::io::Error),
+    /// The simulation's thread died by a bug; the window lives on.
+    #[error("the simulation died by a bug")]
+    Died,
     /// The device was lost a second time in a short while.
     #[error(
         "{0}; it had been lost a moment before, so it was not opened again: lower the quality \
          (--quality draft), choose another --device, or install a newer driver"
     )]
     LostAgain(Box<ViewError>),
-    /// A file that was asked for.
+    /// A file that was asked for cannot be written.
     #[error("writing {}: {reason}", file.display())]
     Unwritten {
         /// The file.
         file: PathBuf,
-        /// What the system says.
+        /// The system's message.
         reason: String,
     },
-    /// The validation layers had something to say, and were asked for.
+    /// The validation layers were asked for and have found something.
     #[error("{count} validation messages, the first: {first}")]
     Validation {
-        /// How many.
+        /// Number of messages.
         count: usize,
-        /// The first.
+        /// The first message.
         first: String,
     },
 }

@@ -1,5 +1,5 @@
-//! Tracked sweeps of known geometry: where points end up in the volume, what of the speckle is kept,
-//! poses read back, and the command.
+//! Tracked sweeps of known geometry: places of points in the volume, preservation of speckle, poses
+//! read back, and the command.
 
 #[path = "common/program.rs"]
 mod program;
@@ -16,11 +16,11 @@ use insonify::sim::{Simulator, Tracer};
 use insonify::volume::{Fan, Sequence, Settings, Transforms, Volume, reconstruct};
 use program::insonify;
 
-/// Points in the world, mm: apart from each other in every direction, none in the middle.
+/// Points in the world, mm: separated in every direction, none in the middle.
 const POINTS: [[f64; 3]; 4] =
     [[-9.0, -3.2, 14.3], [6.4, 2.1, 17.6], [-3.7, 4.4, 26.2], [10.1, -1.3, 24.9]];
 
-/// The points in fluid without scatterers, of the speed that the machine assumes.
+/// A scene of the points in fluid without scatterers, at the machine's assumed speed of sound.
 fn points(probe: &str) -> Scene {
     let wires = POINTS.map(|p| format!("[[wire]]\nfrom = {p:?}\namplitude = \"-20 dB\"\n"));
     let text = format!(
@@ -94,8 +94,8 @@ fn farthest(volume: &Volume) -> f64 {
     away.into_iter().fold(0.0, f64::max)
 }
 
-/// A point lies within a voxel of where it is: half a voxel by rounding to the nearest, and what the
-/// frames' distance does to its centre across the slice.
+/// Asserts that a point lies within a voxel of its place: half a voxel by rounding to the nearest, and the
+/// error of its centre across the slice by the frames' distance.
 fn assert_in_place(sequence: &Sequence, spacing: DVec3) {
     let made = acquire::volume(sequence, Settings::new(spacing)).expect("a volume");
     let off = farthest(&made.volume);
@@ -143,7 +143,7 @@ fn points_lie_in_place_after_a_turn() {
     assert_in_place(&sequence, DVec3::splat(0.6));
 }
 
-/// On voxels that coincide with the pixels every grey level is kept.
+/// Where voxels coincide with pixels, every grey level is kept.
 #[test]
 fn speckle_is_kept_to_the_last_grey_level() {
     let mut scene = scene(
@@ -188,7 +188,7 @@ fn speckle_is_kept_to_the_last_grey_level() {
     assert!(share < 0.2, "{share} of the voxels");
 }
 
-/// Black corners beside a fan do not darken what another frame of the same plane shows there.
+/// Black corners beside a fan do not darken what another frame shows there in the same plane.
 #[test]
 fn a_fan_leaves_the_corners_out() {
     let mut scene = scene(&format!(
@@ -271,12 +271,26 @@ fn a_file_of_poses_is_followed() {
     let rows = [(1.0, [0.0, 0.0, 0.0]), (3.0, [4.0, 0.0, 2.0]), (4.0, [4.0, 8.0, 2.0])];
     assert_eq!(at(None), rows);
     assert_eq!(at(Some(4))[1], (2.0, [2.0, 0.0, 1.0]));
-    // What the file leaves out is the scene's.
+    // Quantities that the file lacks are the scene's.
     let turned = stations_of(&track, &scene, None)[2].world_from_probe.matrix3;
     let off = turned - scene.world_from_probe.matrix3;
     assert!(off.to_cols_array().iter().all(|v| v.abs() < 1e-12), "{off}");
     let error = load_trajectory(&folder.path().join("none.csv")).expect_err("no file");
     assert!(error.to_string().contains("none.csv"), "{error}");
+}
+
+/// More frames than memory holds are counted before they are made: 10000 a second over thirty years.
+#[test]
+fn a_file_of_poses_that_makes_too_many_frames_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let text = "[probe]\nscanlines = 2\nsamples = 16\nelevation_layers = 1\n[imaging]\nimage_height = 16\n";
+    std::fs::write(folder.path().join("a.toml"), text).expect("written");
+    let way = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n1e9,5,0,0\n";
+    std::fs::write(folder.path().join("way.csv"), way).expect("written");
+    let render = ["render", "a.toml", "--trajectory", "way.csv", "--fps", "10000", "-o", "a.gif"];
+    let (fine, told) = insonify(folder.path(), &render);
+    assert!(!fine && told.contains("makes 10000000000001 frames"), "{told}");
+    assert!(told.contains("a lower --fps"), "{told}");
 }
 
 #[test]
@@ -304,7 +318,7 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     let (fine, text) = run(&["check", "a.igs.mha"]);
     assert!(fine && text.contains("pose ProbeToTracker: 4, 4 of them OK"), "{text}");
     assert!(!text.contains("keys are not used"), "{text}");
-    // The same volume without a word about geometry: the probe's axes are the world's here.
+    // The same volume without any geometry arguments: the probe's axes are the world's here.
     let (fine, text) = run(&["reconstruct", "a.igs.mha", "--spacing", "1,2,1", "-o", "b.mha"]);
     assert!(fine && text.contains("4 of 4 frames"), "{text}");
     let load = |name: &str| Volume::load(&folder.path().join(name)).expect("a volume").0;
@@ -326,7 +340,7 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     }
 }
 
-/// Volumes over a period: each is what the same sweep makes of the anatomy at its time.
+/// Volumes over a period: each equals the one that the same sweep makes of the anatomy at its time.
 #[test]
 fn the_command_writes_volumes_over_time() {
     let folder = tempfile::tempdir().expect("a folder");

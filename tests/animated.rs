@@ -36,7 +36,7 @@ fn volume(mesh: &Mesh) -> f64 {
     six / 6000.0
 }
 
-/// Directed edges without their reverse, corners at one place taken for one: the loader splits
+/// Number of directed edges without their reverse; corners at one place count as one, since the loader splits
 /// vertices at creases.
 fn open_edges(mesh: &Mesh) -> usize {
     let at = |i: u32| mesh.positions[i as usize].map(f32::to_bits);
@@ -50,7 +50,7 @@ fn open_edges(mesh: &Mesh) -> usize {
     edges.values().filter(|n| **n != 0).count()
 }
 
-/// Whether a point is inside: crossings of a ray along no axis and through no vertex.
+/// Returns whether a point is inside: crossings of a ray along no axis and through no vertex.
 fn inside(mesh: &Mesh, point: DVec3) -> bool {
     let along = DVec3::new(0.611, 0.357, -0.706);
     let crossings = corners(mesh).filter(|t| {
@@ -63,14 +63,14 @@ fn inside(mesh: &Mesh, point: DVec3) -> bool {
     crossings.count() % 2 == 1
 }
 
-/// Vertices of `a`, every third, that lie inside `b`.
+/// Number of vertices of `a`, counting every third, that lie inside `b`.
 fn common(a: &Mesh, b: &Mesh) -> usize {
     let points = a.positions.iter().step_by(3);
     let points = points.map(|p| DVec3::from(p.map(f64::from)));
     points.filter(|p| inside(b, *p)).count()
 }
 
-/// Every animated mesh of a scene: `count` closed, outward keyframes with equal triangles.
+/// Asserts that every animated mesh of a scene has `count` closed, outward keyframes with equal triangles.
 fn sound(scene: &Scene, count: usize) {
     let animated = |i: &&Instance| !i.keyframes.meshes.is_empty();
     for at in scene.instances.iter().filter(animated) {
@@ -92,10 +92,10 @@ const CHAMBERS: [&str; 4] = ["left-ventricle", "right-ventricle", "left-atrium",
 fn the_heart_has_eight_sound_keyframes() {
     let scene = shipped("heart");
     sound(&scene, 8);
-    // As many as the heart of Starkov et al. 2019, Table III; thinning stops within two.
+    // As many as in the heart of Starkov et al. 2019, Table III; thinning stops within two.
     assert_eq!(scene.triangles().div_ceil(100), 73);
 
-    // The comparison sees a hole and a turned triangle.
+    // The comparison notices a hole and a turned triangle.
     let mut broken = keyframes(&scene, "left-atrium")[3].clone();
     broken.triangles[7].swap(0, 1);
     assert!(open_edges(&broken) > 0);
@@ -152,7 +152,7 @@ fn the_hearts_chambers_are_apart_in_every_keyframe() {
             }
         }
     }
-    // The comparison sees an atrium that has sunk by 8 mm.
+    // The comparison notices an atrium that has sunk by 8 mm.
     let mut sunk = chambers[2][0].clone();
     for p in &mut sunk.positions {
         p[2] -= 8.0;

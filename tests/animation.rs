@@ -66,15 +66,15 @@ fn every_strategy_shows_the_same_image() {
                 if expected.len() == i {
                     expected.push(found.clone());
                 }
-                // The two tracers may see a seam differently; one tracer sees what it saw.
+                // The two tracers may see a seam differently; each tracer repeats exactly.
                 let allowed = if tracer == Tracer::Bvh { 0 } else { found.len() / 1000 };
                 let far = match strategy {
                     // A billionth of a second from its keyframe: single precision may see that.
                     Strategy::Interpolate => {
                         differing(&found, &expected[i]).saturating_sub(found.len() / 1000)
                     }
-                    // Which of an edge's two triangles a ray along it meets is a matter of the tree where their
-                    // distances differ by rounding: a pixel of 100,000 may be another grey.
+                    // At an edge, the tree decides which of its two triangles a ray meets where their distances differ
+                    // only by rounding: a pixel of 100,000 may differ.
                     Strategy::Refit => {
                         differing(&found, &expected[i]).saturating_sub(found.len() / 100_000)
                     }
@@ -97,7 +97,7 @@ fn every_strategy_shows_the_same_image() {
     assert!(messages.is_empty(), "{messages:#?}");
 }
 
-/// What moves looks as the same anatomy that stands there: nothing of the animation is left in it.
+/// A moving scene looks like the same anatomy at rest: the animation leaves no trace.
 #[test]
 fn a_moving_scene_looks_like_the_still_one() {
     let device = test_device();
@@ -148,7 +148,7 @@ fn between_keyframes_the_device_moves_vertices_as_the_host_does() {
     assert!(messages.is_empty(), "{messages:#?}");
 }
 
-/// The ray query has no node with a union box; the message says what to take instead.
+/// The ray query has no node with a union box; the message names a strategy to take instead.
 #[test]
 fn the_ray_query_refuses_a_selector_node() {
     let device = test_device();

@@ -1,4 +1,4 @@
-//! The command line as a user meets it: files written, figures reported, mistakes explained.
+//! The command line as a user sees it: files written, figures reported, mistakes explained.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -147,7 +147,7 @@ fn quality_sets_the_counts_that_the_user_does_not() {
     let mixed = counts(&["--quality", "reference", "--set", "simulation.paths=3"]);
     assert_eq!(mixed["paths_per_line"], 3);
     assert_eq!(mixed["cell_mm"], proof["cell_mm"]);
-    // Which draft depends on the device, and that it is less than the proof does not.
+    // The kind of draft depends on the device, but it is always less than the proof.
     let draft = counts(&["--quality", "draft"]);
     assert!(draft["paths_per_line"].as_u64() < Some(128));
 }
@@ -169,13 +169,25 @@ fn mistakes_are_explained() {
 }
 
 #[test]
+fn a_mistake_in_a_file_is_shown_where_it_stands() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("scene.toml");
+    std::fs::write(&file, "name = \"a\"\n[probe]\n  dept = 3\n").unwrap();
+    let out = insonify(&["render", path(&file)]);
+    let said = text(&out.stderr);
+    let lines = " 2 | [probe]\n 3 |   dept = 3\n   |   ^^^^\n  help: did you mean `depth`?\n";
+    assert!(!out.status.success() && said.starts_with("error: "), "{said}");
+    assert!(said.contains("scene.toml:3:3: ") && said.ends_with(lines), "{said}");
+}
+
+#[test]
 fn info_lists_this_machine() {
     let out = insonify(&["info"]);
     assert!(out.status.success(), "{}", text(&out.stderr));
     assert!(text(&out.stdout).contains("Vulkan 1."), "{}", text(&out.stdout));
 }
 
-/// A program whose reader has left before the first line.
+/// Runs a program whose reader has left before the first line of output.
 fn unread(program: &str, args: &[&str]) -> Output {
     let (reader, writer) = std::io::pipe().expect("a pipe");
     drop(reader);
@@ -204,8 +216,8 @@ fn a_closed_pipe_is_no_error() {
     }
 }
 
-/// Of a wire's points, half a millimetre apart, none lies on the border of two layers, where
-/// rounding decides which of them sees it; and one kind of cylinder reflects.
+/// Options for which no point of a wire, half a millimetre apart, lies on the border of two layers, where rounding
+/// decides which of them sees it; and one kind of cylinder reflects.
 const REPLAYED: [&str; 12] = [
     "--set",
     "probe.scanlines=12",
@@ -246,7 +258,7 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
         let from = said.lines().find(|l| l.starts_with("from "));
         assert!(from.is_some_and(|l| l.contains("frame, ")), "{said}");
     }
-    // An array that is cut off is refused, and named.
+    // A truncated array is refused, and named.
     let rows = dump.join("kernels/rows.npy");
     let mut bytes = std::fs::read(&rows).expect("rows");
     bytes.truncate(bytes.len() / 2);
@@ -256,7 +268,7 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
     assert!(text(&out.stderr).contains("rows.npy"), "{}", text(&out.stderr));
 }
 
-/// Kernels compiled from the checked-in sources are the checked-in kernels.
+/// Kernels compiled from the checked-in sources equal the checked-in kernels.
 #[cfg(feature = "compile")]
 #[test]
 fn kernels_from_a_folder_of_sources_make_the_same_picture() {
@@ -302,7 +314,7 @@ name = "unseen"
 parent = "blink"
 "#;
 
-/// Row of the brightest line, as a share of the picture's height.
+/// Row of the brightest plate echo, as a share of the picture's height.
 fn brightest(image: &image::GrayImage) -> f64 {
     let sum = |y: u32| -> u64 { (0..image.width()).map(|x| u64::from(image[(x, y)].0[0])).sum() };
     let row = (0..image.height()).max_by_key(|&y| sum(y)).expect("rows");
@@ -350,7 +362,7 @@ fn time_moves_the_scene_and_frames_become_an_animation() {
     }
 }
 
-/// A full disk behind standard output is the user's to hear of, not a bug; what was asked for is there.
+/// A full disk behind standard output is reported to the user, not a bug; the requested files are written.
 #[cfg(target_os = "linux")]
 #[test]
 fn lines_that_cannot_be_written_are_told_and_files_are_there_all_the_same() {

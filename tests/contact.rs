@@ -1,5 +1,5 @@
-//! Elements that do not touch the skin neither send nor receive: closed forms of which they are, and of
-//! what is left of a line, by both tracers.
+//! Elements that do not touch the skin neither send nor receive: closed forms of which elements these are, and of
+//! the remaining brightness of a scanline, by both tracers.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -48,12 +48,12 @@ fn rocked(angle: f64, gel: f64) -> Scene {
         -19.0 * sin,
         -sin
     ));
-    // Echoes of the skin's own flat surface would tell nothing more.
+    // Echoes of the skin's own flat surface would add nothing.
     scene.instances[0].surface[0].gain = -100.0;
     scene
 }
 
-/// Complex samples per line, before the axial kernel.
+/// Complex samples per scanline, before the axial kernel.
 fn lines(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> Vec<Vec<f32>> {
     let mut simulator = Simulator::new(device, &Library::embedded(), scene, tracer).expect("one");
     simulator.frame(scene, 0).expect("a frame");
@@ -66,7 +66,7 @@ fn coupling(scene: &Scene) -> Coupling {
     Coupling::of(scene, &mut Skins::default()).expect("the scene asks for contact")
 }
 
-/// Elements that are coupled, in elements.
+/// Number of coupled elements.
 fn coupled(scene: &Scene) -> f64 {
     coupling(scene).elements.iter().sum()
 }
@@ -75,7 +75,7 @@ fn coupled(scene: &Scene) -> f64 {
 fn columns_whose_gap_exceeds_the_gel_are_dark_and_the_others_as_they_were() {
     let device = test_device();
     let angle = 10f64.to_radians();
-    // Apertures of 1 mm: 1.3 lines to each side, and one for the grid of points.
+    // Apertures of 1 mm: 1.3 scanlines to each side, and one for the grid of points.
     let narrow = |gel: f64| {
         let mut scene = rocked(angle, gel);
         scene.probe.f_number_transmit = scene.probe.focus;
@@ -179,7 +179,7 @@ fn on_a_sphere_the_coupled_elements_and_the_depth_are_those_of_the_closed_form()
     let planted = coupled(&ball(0.5));
     assert!((planted - elements(0.5, 1.8)).abs() > 1.0, "2 mm are not 1.8");
     assert_eq!(coupled(&ball(2.01)), 0.0);
-    // Mean of sqrt(R^2 - x^2) - (R - p) over where it is above 0.
+    // Mean of sqrt(R^2 - x^2) - (R - p) over the range where it is above 0.
     let press = 1.5_f64;
     let half = (60f64.powi(2) - (60.0 - press).powi(2)).sqrt();
     let steps = 10_000;
@@ -257,7 +257,7 @@ fn the_skin_is_where_its_transforms_and_selectors_put_it() {
     };
     let phase = |t: f64| 4.0 * (std::f64::consts::TAU * t).sin();
     for t in [0.0, 0.1, 0.25, 0.6, 0.75] {
-        // The skin's top lies at the sine: above 1 mm of gap nothing is coupled, below 0 it is pressed.
+        // The skin's top follows a sine: above 1 mm of gap nothing is coupled, below 0 it is pressed.
         let (touch, top) = (at(t), phase(t));
         assert_eq!(touch.share, if top <= 1.0 { 1.0 } else { 0.0 }, "{t}");
         assert!((touch.depth - (-top).max(0.0)).abs() < 1e-6, "{t}: {touch:?}");
@@ -307,7 +307,7 @@ fn layers_that_touch_are_one_body_and_any_placement_will_do() {
     assert_eq!(away, None, "it looks away from the body");
 }
 
-/// The scenes that ship with a skin are held to it whole, at all times: their images are what they were.
+/// The scenes that ship with a skin are in full contact at all times: their images stay as they were.
 #[test]
 fn shipped_scenes_are_in_full_contact_and_look_as_without_it() {
     let load = |name: &str| {
@@ -353,13 +353,13 @@ fn every_kind_of_probe_has_a_face_as_wide_as_it_is() {
         scene.probe.kind = kind;
         scene.probe.aperture = 19.0;
         assert_eq!(scene.probe.face_width(), width);
-        // Neighbouring points are as far apart as their share of the width says.
+        // Neighbouring points are as far apart as their share of the width implies.
         let (a, n) = scene.probe.face(0.2, 0.0);
         let (b, _) = scene.probe.face(0.201, 0.0);
         assert!((a.distance(b) - 0.001 * width).abs() < 1e-6);
         assert!((b - a).dot(n).abs() < 1e-3 * width * 1e-3);
-        // With the middle of the face on the skin a convex face is joined as far as its edge is not
-        // higher than the gel: r (1 / cos a - 1) <= gel along the beam.
+        // With the middle of the face on the skin a convex face is coupled where its edge is not higher than the
+        // gel: r (1 / cos a - 1) <= gel along the beam.
         let expected = match kind {
             Kind::Convex { radius, .. } => (2.0 * (radius / (radius + 3.0)).acos()).min(1.0),
             _ => 1.0,

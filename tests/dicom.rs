@@ -1,5 +1,5 @@
-//! DICOM files that are cut, changed or hostile, and those of scanners that are no volumes. What
-//! sound files hold is compared in tests/volumes.rs.
+//! DICOM files that are cut, changed or hostile, and those of scanners that are no volumes. The content of
+//! sound files is compared in tests/volumes.rs.
 
 #[path = "common/limited.rs"]
 mod limited;
@@ -25,7 +25,7 @@ fn explicit() -> Vec<u8> {
     std::fs::read(path.expect("it ships")).expect("readable")
 }
 
-/// Places of the values of an element with types written down, little endian.
+/// Places of the values of an element with written types, little endian.
 fn places(file: &[u8], group: u16, element: u16, kind: &str) -> Vec<usize> {
     let head = [&group.to_le_bytes()[..], &element.to_le_bytes(), kind.as_bytes()].concat();
     let short = !["OB", "OW", "SQ"].contains(&kind);
@@ -51,7 +51,7 @@ impl Folder {
         assert!(error.contains(cause), "{error}, not {cause}");
     }
 
-    /// The program itself refuses it within its bounds of memory and time.
+    /// Asserts that the program itself refuses the file within its bounds of memory and time.
     fn refused_within_bounds(&self, bytes: &[u8], cause: &str) {
         let path = self.0.path().join("b.dcm");
         std::fs::write(&path, bytes).expect("written");
@@ -144,7 +144,7 @@ fn cut_and_changed_files_never_panic() {
         let whole = std::fs::read(&path).expect("readable");
         // Of a deflated file the last bytes are an end and padding.
         let end = whole.len() - if name.starts_with("deflated") { 8 } else { 0 };
-        // Every seventh place, and all of the last: odd, so that all fields are met.
+        // Every seventh place, and all of the last ones: an odd step, so that all fields are met.
         for len in (0..end).filter(|len| len % 7 == 0 || len + 20 > end) {
             assert!(folder.load(&whole[..len]).is_err(), "{name} cut at {len}");
         }
@@ -170,7 +170,7 @@ fn hostile_sizes_and_bombs_stay_within_bounds() {
         let cause = if group == 2 { "TransferSyntaxUID" } else { "declares 4294967280 bytes" };
         folder.refused_within_bounds(&bad, cause);
     }
-    // Rows and columns of 65535 in every way to write pixels.
+    // Rows and columns of 65535 in every encoding of pixels.
     for path in shipped() {
         let mut bad = std::fs::read(&path).expect("readable");
         for element in [0x0010, 0x0011] {
@@ -211,7 +211,7 @@ fn hostile_sizes_and_bombs_stay_within_bounds() {
     folder.refused_within_bounds(&bomb, "unpacks to more than 64 times its size");
 }
 
-/// Films and single images of scanners are no volumes, and each refusal says why.
+/// Films and single images of scanners are no volumes, and each refusal gives the reason.
 #[test]
 fn files_of_scanners_are_refused_with_the_reason() {
     let Some(data) = shared_data() else { return };

@@ -1,16 +1,19 @@
-//! The same on two Vulkan drivers: kernels against their twins, and pictures of two scenes. The second
-//! driver is the one that `tools/setup.sh` unpacks into `target/second-driver`; where there is none,
-//! these tests say that they are skipped.
+//! Comparison of two Vulkan drivers: kernels against their twins, and pictures of two scenes. The second driver
+//! is the one that `tools/setup.sh` unpacks into `target/second-driver`; without it these tests are skipped.
+
+#[path = "common/skip.rs"]
+mod skip;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use image::GrayImage;
+use skip::{Lacking, skip};
 
 /// Share of a picture's pixels that may differ by more than one grey level between two drivers.
 const APART: f64 = 1e-3;
 
-/// What of a scene's size is enough here; all of it is compared by hand (docs/kernels.md).
+/// Reduced sizes that are enough here; the full size is compared by hand (docs/kernels.md).
 const SIZE: [&str; 2] = ["probe.scanlines=96", "probe.elevation_layers=3"];
 
 fn root() -> &'static Path {
@@ -23,11 +26,11 @@ fn second_driver() -> Option<PathBuf> {
     if manifest.exists() {
         return Some(manifest);
     }
-    println!("skipped: no second driver in target/second-driver (./tools/setup.sh unpacks one)");
+    skip(Lacking::Tool, "no second driver in target/second-driver (./tools/setup.sh unpacks one)");
     None
 }
 
-/// A program on the driver of `manifest`, or on the machine's own.
+/// A program on the driver of `manifest`, or on the machine's default one.
 fn on(manifest: Option<&Path>, program: &str) -> Command {
     let mut command = Command::new(program);
     if let Some(manifest) = manifest {
@@ -98,7 +101,7 @@ fn kernels_agree_with_their_twins_on_the_second() {
     assert!(!text.contains("WRONG"), "{text}");
 }
 
-/// Angles of pixels that are as far off as a device's own sine may be.
+/// Angles of pixels with the largest error that a device's own sine may have.
 #[cfg(feature = "compile")]
 #[test]
 fn a_sine_of_the_least_accuracy_that_vulkan_demands_is_noticed() {

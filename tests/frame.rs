@@ -27,7 +27,7 @@ fn small(file: &str) -> Scene {
     Scene::load(&path, &smaller).expect(file).0
 }
 
-/// What a frame left behind.
+/// The result of a frame.
 #[derive(PartialEq)]
 struct Shot {
     echoes: [Vec<i32>; 2],
@@ -61,14 +61,14 @@ fn differing(a: &[u8], b: &[u8]) -> f64 {
     far.count() as f64 / inside.len() as f64
 }
 
-/// Image by the other tracer, echoes weaker by `decibels`: an error planted in the device's path.
+/// The other tracer's image with echoes weaker by `decibels`: an error planted on the device.
 fn fainter(device: &Arc<Device>, scene: &Scene, decibels: f64) -> Vec<u8> {
     let mut scene = scene.clone();
     scene.imaging.gain -= decibels;
     shoot(device, &scene, Tracer::Bvh).pixels
 }
 
-/// Accumulators are integers, so the order of additions leaves no trace: two runs are equal bit
+/// Shots of two runs. Accumulators are integers, so the order of additions leaves no trace: the runs are equal bit
 /// for bit.
 fn repeats(device: &Arc<Device>, scene: &Scene) -> [Shot; 2] {
     let shots = [Tracer::Bvh, Tracer::RayQuery].map(|tracer| {
@@ -83,9 +83,8 @@ fn repeats(device: &Arc<Device>, scene: &Scene) -> [Shot; 2] {
     shots
 }
 
-/// Both tracers work out alike where a ray meets the triangle that they found; 99.9 % of the pixels
-/// within one grey level leaves room for the few rays near an edge for which a device's own test
-/// finds the neighbour.
+/// Asserts that both tracers agree. Both compute the hit on the found triangle alike; 99.9 % of the pixels within
+/// one grey level allows for the few rays near an edge for which a device's own test finds the neighbour.
 fn agree(device: &Arc<Device>, scene: &Scene, [bvh, query]: &[Shot; 2]) {
     let share = differing(&bvh.pixels, &query.pixels);
     assert!(share <= 0.001, "{:.3} % of the pixels differ", 100.0 * share);
@@ -99,7 +98,7 @@ fn repeats_and_agrees(file: &str) {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-/// What one simulator shows after its settings were changed is what a new one shows.
+/// A simulator shows changed settings as a new one does.
 #[test]
 fn changed_settings_take_effect_from_frame_to_frame() {
     let device = test_device();
@@ -126,7 +125,7 @@ fn changed_settings_take_effect_from_frame_to_frame() {
     assert!(changed == shoot(&device, &after, Tracer::Bvh));
 }
 
-/// Without a least weight paths end where the image ends: the same frame as with a tiny one.
+/// Without a least weight paths end at the image's end: the same frame as with a tiny one.
 #[test]
 fn no_least_weight_is_a_tiny_one() {
     let device = test_device();
@@ -150,7 +149,7 @@ fn the_abdomen_repeats_and_both_tracers_agree() {
     repeats_and_agrees("scenes/abdomen.toml");
 }
 
-/// Where triangles are cut, every echo is what it is where none is, to the last bit.
+/// Cutting triangles changes no bit of any echo.
 #[test]
 fn cut_triangles_are_imaged_as_whole_ones() {
     let device = test_device();
@@ -166,7 +165,7 @@ fn cut_triangles_are_imaged_as_whole_ones() {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-/// Anatomy from patients, as it comes: open valves closed by coincident caps, crossing vessels.
+/// Anatomy from patients, unchanged: open valves closed by coincident caps, crossing vessels.
 #[test]
 fn both_tracers_agree_on_real_anatomy() {
     if shared_data().is_none() {

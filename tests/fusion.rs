@@ -1,4 +1,4 @@
-//! Fusion from the scene file to the frame: what is refused, what is heard, what is dumped.
+//! Fusion from the scene file to the frame: refusals, echoes, dumps.
 
 #[path = "../tools/harness/mod.rs"]
 mod harness;
@@ -145,15 +145,15 @@ fn shoot(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> ([Vec<i32>; 2],
     (simulator.echoes().expect("echoes"), pixels)
 }
 
-/// Distance to which an echo is heard beside its place, mm: the cells that the beam reaches over, and
-/// a sample to either side.
+/// Distance to which an echo is heard beside its place, mm: the cells that the beam covers, and a sample to
+/// either side.
 const REACH: f64 = 0.4;
-/// Of the loudest echo: a stretch that is cut at the mask's border starts elsewhere, and single precision
-/// rounds its distances and phases (400 cycles of the carrier) anew.
+/// Tolerance as a share of the loudest echo: a stretch cut at the mask's border starts elsewhere, and single
+/// precision rounds its distances and phases (400 cycles of the carrier) anew.
 const ROUNDING: f64 = 1e-3;
 
-/// Echoes of `masked` that lie outside the ball, and samples inside it at which they are not those of
-/// `whole`; also how many of `whole` lie outside.
+/// Number of echoes of `masked` outside the ball, of samples inside it at which they differ from `whole`, and of
+/// echoes of `whole` outside.
 fn compare(scene: &Scene, masked: &[Vec<i32>; 2], whole: &[Vec<i32>; 2]) -> [usize; 3] {
     let ball = scene.instances[0].world_from_object.translation;
     let (mut stray, mut other, mut silenced) = (0, 0, 0);
@@ -198,7 +198,7 @@ fn only_what_the_mask_encloses_is_heard_and_it_is_what_it_was() {
             let [stray, other, silenced] = compare(&scene, &echoes, &whole);
             assert_eq!([stray, other], [0; 2], "{tracer} {surroundings}");
             assert!(silenced > 10_000, "{silenced}");
-            // The same comparison sees a ball that is heard as a whole.
+            // The same comparison notices a ball that is heard as a whole.
             assert!(compare(&scene, &whole, &whole)[0] > 10_000);
             assert!(fused != pixels, "{tracer} {surroundings}");
         }
@@ -229,7 +229,7 @@ mask = ["sac"]
 "#;
 const RADII: [f64; 2] = [5.0, 8.0];
 
-/// Samples of the mask on the wrong side of the ball that `seconds` show, but for one beside its surface; and samples inside.
+/// Numbers of mask samples on the wrong side of the ball at `seconds`, except beside its surface; and inside it.
 fn wrong_of_ball(scene: &Scene, prescan: &[f32], seconds: f64) -> (usize, usize) {
     let sway = (std::f64::consts::TAU * seconds / 4.0).sin();
     let centre = DVec3::new(0.7 + 4.0 * sway, 0.2, 20.3 + 3.0 * sway);
@@ -276,7 +276,7 @@ fn a_mask_follows_its_transform_and_its_selector_by_every_strategy() {
             scene.set_time(0.0);
             let mut simulator =
                 Simulator::new(&device, &library, &scene, tracer).expect("a simulator");
-            // Keyframes as they are, in the middle of their turns and at their begin: between them some strategies blend.
+            // Keyframes themselves, in the middle of their turns and at their begin: some strategies blend between.
             let times = [0.0, 1.0, 2.0, 3.0, 5.0];
             for (i, seconds) in times.into_iter().enumerate() {
                 scene.set_time(seconds);
@@ -386,7 +386,7 @@ fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
 }
 
 /// One voxel more along an axis than the device's images have texels: pairs are averaged, and a linear
-/// function stays where it was.
+/// function stays in place.
 #[test]
 fn a_volume_beyond_the_devices_limit_is_averaged_with_a_warning() {
     let device = test_device();
@@ -462,7 +462,7 @@ fn a_sac_in_a_real_acquired_volume() {
     assert!(differ.count() * 1000 < images[0].len(), "the tracers differ");
 }
 
-/// What lies behind a bone in a real volume is darker, and all beside the mask is what it was.
+/// The volume behind a bone is darker, and everything beside the mask stays as it was.
 #[test]
 fn a_bone_throws_its_shadow_into_a_real_acquired_volume() {
     if shared_data().is_none() {
@@ -509,7 +509,7 @@ fn a_bone_throws_its_shadow_into_a_real_acquired_volume() {
     }
 }
 
-/// Levels of a pixel, of which `share` is acquired before the blend's curve, over which a colour lies.
+/// Levels of a pixel under a colour; `share` of it is acquired, before the blend's curve.
 fn tint_of(grey: &[u8], tint: &Tint, share: f32, is_smooth: bool) -> [f64; 3] {
     // Scan conversion may leave a mask a rounding above 1.
     let m = f64::from(share).min(1.0);
@@ -520,7 +520,7 @@ fn tint_of(grey: &[u8], tint: &Tint, share: f32, is_smooth: bool) -> [f64; 3] {
     })
 }
 
-/// Whether an opaque pixel shows these levels, rounded; 1e-4 from the middle between two either does
+/// Returns whether an opaque pixel shows these levels, rounded; 1e-4 from the middle between two either is right
 /// (single precision of numbers to 255).
 fn is_shown(pixel: &[u8], levels: [f64; 3]) -> bool {
     let near = |(byte, level): (&u8, f64)| (f64::from(*byte) - level).abs() < 0.5001;
@@ -576,7 +576,7 @@ fn the_tint_marks_the_acquired_pixels_and_leaves_the_image_alone() {
         assert!(acquired > 1000 && simulated > 1000, "{settings}");
         // A hard mask is mixed only where its border passes between two samples.
         assert_eq!(mixed > 2000, !is_hard, "{settings}: {mixed}");
-        // Another frame without it is the same again.
+        // Another frame without it is again the same.
         simulator.tint_on(None);
         simulator.frame(&scene, 0).unwrap();
         assert!(simulator.pixels().unwrap() == plain);

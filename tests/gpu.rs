@@ -15,11 +15,13 @@ mod commands;
 mod dynamic;
 #[path = "gpu/sheet.rs"]
 mod sheet;
+#[path = "common/skip.rs"]
+mod skip;
 
 /// Group size of `add.comp` in these tests; not its default.
 const ADD_GROUP: u32 = 32;
 
-/// Drops the device and fails if the layers have said anything until then, leaks included.
+/// Drops the device and fails if the layers have given a message by then, leaks included.
 fn assert_clean(device: Arc<Device>) {
     assert_eq!(Arc::strong_count(&device), 1, "drop what was made of the device first");
     let log = device.validation_log();
@@ -32,7 +34,7 @@ fn words(spirv: &[u8]) -> Vec<u32> {
     bytemuck::pod_collect_to_vec(spirv)
 }
 
-/// target = factor * source + value.
+/// A kernel for target = factor * source + value.
 fn add_kernel(device: &Arc<Device>, factor: u32) -> Kernel {
     let spirv = words(include_bytes!("gpu/add.spv"));
     Kernel::new(device, "add", &spirv, &[(0, ADD_GROUP), (1, factor)]).unwrap()

@@ -27,7 +27,7 @@ impl Outcome {
     }
 }
 
-/// What is wrong with an outcome, if anything.
+/// The fault of an outcome, if there is one.
 fn verdict(path: &Path, outcome: &Outcome) -> Option<String> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let names_file = |kind: &str| {
@@ -95,7 +95,7 @@ fn what_the_gltf_validator_refuses_is_not_loaded_in_silence() {
         }
         refused += 1;
         let outcome = check(&path);
-        // That these tiny files hold no triangles is true but not the reason.
+        // These tiny files hold no triangles, but that is not the reason.
         let reasons = outcome.text.lines().filter(|line| {
             (line.starts_with("error:") || line.starts_with("warning:"))
                 && !line.contains("holds no triangles")
@@ -109,7 +109,7 @@ fn what_the_gltf_validator_refuses_is_not_loaded_in_silence() {
     assert!(silent.is_empty(), "{}", silent.join("\n"));
 }
 
-/// The comparator of the tests above rejects what it is there to reject.
+/// The comparison of the tests above rejects what it should.
 #[test]
 fn planted_outcomes_are_rejected() {
     let path = Path::new("folder/a.obj");
@@ -139,7 +139,7 @@ fn a_file_that_is_too_large_is_not_read() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let path = folder.path().join("huge.stl");
     let file = std::fs::File::create(&path).expect("created");
-    // Sparse on disk; larger than what is read.
+    // Sparse on disk; larger than the limit for reading.
     file.set_len(600 << 20).expect("sized");
     let outcome = check(&path);
     assert_eq!(outcome.code, Some(1), "{}", outcome.text);

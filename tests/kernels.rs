@@ -8,15 +8,15 @@ use std::path::Path;
 
 use harness::{Case, Element, Job, SUBJECTS, Size, dump};
 use insonify::gpu::{Kernel, test_device};
-use insonify::npy;
-use insonify::sim::shaders::{Library, source};
+use insonify::output::npy;
+use insonify::sim::shaders::Library;
 use insonify::sim::stages;
 
 const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 
-/// Kernels of pictures for the user, without a twin: tests/survey.rs and tests/fusion.rs hold them to
+/// Kernels of pictures for the user, without a twin: tests/view3d.rs and tests/fusion.rs compare them with
 /// closed forms.
-const CLOSED_FORMS: [&str; 3] = ["survey_bvh", "survey_query", "tint"];
+const CLOSED_FORMS: [&str; 3] = ["view3d_bvh", "view3d_query", "tint"];
 
 fn subject(name: &str) {
     let subject = SUBJECTS.iter().find(|s| s.name == name).unwrap();
@@ -65,9 +65,7 @@ macro_rules! subjects {
             stems.extend(CLOSED_FORMS);
             stems.sort_unstable();
             stems.dedup(); // `detect` is the last step of `axial`
-            let variants = source::variants(Path::new(GLSL)).unwrap();
-            let kernels = variants.iter().filter(|v| !v.keep_names).map(|v| v.stem.as_str());
-            assert_eq!(stems, kernels.collect::<Vec<_>>());
+            assert_eq!(stems, Library::embedded().stems().collect::<Vec<_>>());
         }
     };
 }
@@ -97,7 +95,7 @@ subjects!(
     fuse
 );
 
-/// What the source of a kernel binds, by number; a ray query's `tlas` stands where others have `nodes`.
+/// Names of a kernel's bindings in its source, by number; a ray query's `tlas` takes the place of `nodes`.
 fn declared(kernel: &str) -> Vec<String> {
     let source = std::fs::read_to_string(Path::new(GLSL).join(format!("{kernel}.comp"))).unwrap();
     let mut names = Vec::new();
@@ -106,7 +104,7 @@ fn declared(kernel: &str) -> Vec<String> {
         let Some((_, rest)) = line.split_once("binding = ") else { continue };
         let (number, rest) = rest.split_once(')').unwrap();
         assert_eq!(number.parse(), Ok(names.len()), "{kernel}: {line}");
-        // Of a block its only member, of a texture itself.
+        // For a block its only member, for a texture its own name.
         let member = rest.split_once('{').map_or(rest, |(_, member)| member);
         let declaration = member.split(';').next().unwrap().trim();
         let name = declaration.split(' ').next_back().unwrap();
@@ -128,7 +126,7 @@ fn what_stages_and_jobs_bind_has_the_names_of_the_sources() {
     }
 }
 
-/// Whether a dispatch binds a buffer or what one of its own stands for, its array says who fills it.
+/// For each buffer that a dispatch binds, or its stand-in, the array names the stage that fills it.
 #[test]
 fn every_array_that_a_stage_binds_is_made_by_one() {
     // Filled level by level, and the volume.

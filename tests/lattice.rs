@@ -1,5 +1,5 @@
-//! Lattices that follow the resolution cell: speckle is fully developed and equally bright at every depth of
-//! every probe, no level shows where it takes over, and it rests in the tissue while the probe moves.
+//! Lattices that follow the resolution cell: speckle is fully developed and equally bright at every depth of every
+//! probe, no transition between levels shows, and it rests in the tissue while the probe moves.
 
 #[path = "common/signal.rs"]
 #[allow(dead_code, reason = "no random numbers here")]
@@ -15,7 +15,7 @@ use insonify::sim::calibration::Calibration;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, tables};
 
-/// Complex baseband per line.
+/// Complex baseband per scanline.
 type Lines = Vec<Vec<[f64; 2]>>;
 
 /// Lossless fully developed speckle without noise.
@@ -50,7 +50,7 @@ impl Bench {
     }
 }
 
-/// Sums of envelopes, intensities and how many, per band of equal depth.
+/// Sums of envelopes and of intensities, and their number, per band of equal depth.
 fn bands(lines: &Lines, count: usize) -> Vec<[f64; 3]> {
     let mut sums = vec![[0.0; 3]; count];
     for line in lines {
@@ -81,7 +81,7 @@ fn measured(scene: &Scene, seeds: u32, count: usize) -> Vec<[f64; 2]> {
     sums.into_iter().map(figures).collect()
 }
 
-/// Every probe with fewer lines, which lie apart: neighbours tell little new.
+/// Every probe with fewer scanlines, which lie apart: neighbours would add little.
 fn probes() -> impl Iterator<Item = (&'static str, Probe)> {
     let fewer = |(name, probe): &(&'static str, fn() -> Probe)| {
         let probe = probe();
@@ -97,7 +97,7 @@ fn speckle_is_fully_developed_and_level_at_every_depth_of_every_probe() {
     for (name, probe) in probes() {
         let scene = speckle(probe);
         let all = measured(&scene, 4, 8);
-        // Lines of a small face lie upon each other at its side.
+        // Scanlines of a small face overlap at the face.
         let first = usize::from(!matches!(scene.probe.kind, Kind::Linear { .. }));
         for (i, [ratio, level]) in all.into_iter().enumerate().skip(first) {
             let rayleigh = (PI / (4.0 - PI)).sqrt();
@@ -132,7 +132,7 @@ fn no_seam_shows_where_one_lattice_takes_over_from_another() {
     for (i, v) in all.iter().enumerate().skip(1) {
         assert!((v[0] - 1.913).abs() < 0.08, "band {i}: {:.3}", v[0]);
     }
-    // Planted: amplitudes that do not grow as cells do lose 3 dB per level.
+    // Planted: amplitudes that do not grow with the cells lose 3 dB per level.
     let planted: Vec<f64> = (got.iter().zip(&levels))
         .map(|(level, number)| level - 3.01 * number.floor().max(0.0))
         .collect();
@@ -155,8 +155,8 @@ fn correlation(scene: &Scene, a: &Lines, b: &Lines, depths: [f64; 2]) -> f64 {
     re.hypot(im) / (aa * bb).sqrt()
 }
 
-// Two Gaussian beams d apart share exp(-d^2 / 4 sigma^2) of their scatterers' sum. 64 lines of 30 mm hold some
-// 3000 cells; what a step loses is known to a few per cent of itself, and beams end at 2.5 sigma.
+// Two Gaussian beams d apart share exp(-d^2 / 4 sigma^2) of their scatterers' sum. 64 scanlines of 30 mm hold some
+// 3000 cells; the loss of a step is known to a few per cent of itself, and beams end at 2.5 sigma.
 #[test]
 fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
     let probe = Probe {
@@ -202,7 +202,7 @@ fn a_moving_probe_leaves_of_speckle_what_its_beams_share() {
     }
 }
 
-// Neighbouring lines of a sector, the outermost too: at depth z they are z + R apart times their angle.
+// Neighbouring scanlines of a sector, the outermost too: at depth z they are z + R apart times their angle.
 #[test]
 fn neighbouring_lines_share_speckle_as_their_beams_overlap() {
     let probe = Probe {

@@ -1,11 +1,11 @@
-//! `sim::layout` mirrors `glsl/shared.glsl`: names, offsets and strides by reflection of SPIR-V, the
-//! constants as they are written there.
+//! Checks that `sim::layout` mirrors `glsl/shared.glsl`: names, offsets and strides by reflection of SPIR-V, the
+//! constants by their text there.
 
 use std::mem::size_of;
 
 use insonify::sim::layout::{
     CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Row, Scanline, Segment, Surface,
-    Survey, Tissue,
+    Tissue, View3d,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -35,7 +35,7 @@ fn mirrors() -> [Mirror; 11] {
         Segment,
         Counters,
         Fusion,
-        Survey,
+        View3d,
         Interaction,
         Scanline
     )
@@ -48,7 +48,7 @@ fn buffers(words: &[u32]) -> Vec<Type> {
     variables.filter(|v| matches!(v, Variable::Descriptor { .. })).map(|v| v.ty().clone()).collect()
 }
 
-/// Structures that stand as elements (with the array's stride) or members of storage blocks.
+/// Structures that are elements (with the array's stride) or members of storage blocks.
 fn structures(ty: &Type, stride: Option<usize>, found: &mut Vec<(StructType, Option<usize>)>) {
     match ty {
         Type::Array(array) => structures(&array.element_ty, array.stride, found),
@@ -73,7 +73,7 @@ fn offsets(structure: &StructType) -> Vec<usize> {
     structure.members.iter().map(|m| m.offset.unwrap()).collect()
 }
 
-/// In what `structure` of the shader, an array's element, differs from its mirror.
+/// The difference of `structure` of the shader, an array's element, from its mirror.
 fn difference(structure: &StructType, stride: Option<usize>, mirror: &Mirror) -> Option<String> {
     let shader: Vec<_> = structure
         .members
@@ -140,7 +140,7 @@ fn shader_constants() -> Vec<(String, f64)> {
     found
 }
 
-/// In what the constants of the shaders differ from ours: values as single precision has them.
+/// The differences of the shaders' constants from ours, with values in single precision.
 fn differing(shader: &[(String, f64)], ours: &[(&str, f64)]) -> Vec<String> {
     let mut wrong = Vec::new();
     for (name, value) in shader {
@@ -161,7 +161,7 @@ fn every_constant_has_the_value_of_its_mirror() {
     let shader = shader_constants();
     assert!(shader.len() > 50, "{shader:?}");
     assert_eq!(differing(&shader, CONSTANTS), Vec::<String>::new());
-    // Each of another value, and one that either side lacks, are noticed.
+    // Every changed value, and one that either side lacks, is noticed.
     for at in 0..shader.len() {
         let mut planted = shader.clone();
         planted[at].1 = 1.001 * planted[at].1 + 1.0;
@@ -188,9 +188,9 @@ fn a_planted_mismatch_is_noticed() {
     assert!(planted(Surface::OFFSETS, 32).is_none());
 }
 
-/// Optimisation strips the names, but a kernel that lays a shared structure out otherwise (`std140`,
-/// `scalar`, an edited copy) has offsets or a stride that no mirror has. Kernels may have
-/// structures of their own if they are made of vec4 and scalars without a hole.
+/// Optimisation strips the names, but a kernel that lays out a shared structure differently (`std140`, `scalar`,
+/// an edited copy) has offsets or a stride that no mirror has. Kernels may have structures of their own if
+/// they are made of vec4 and scalars without a hole.
 #[test]
 fn the_kernels_use_the_same_layout() {
     let library = Library::embedded();

@@ -8,14 +8,14 @@ use insonify::scene::{Scene, Tissue};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
-/// A difference of brightness that nobody sees, dB.
+/// A difference of brightness that nobody notices, dB.
 const SEEN: f64 = 0.3;
 
 fn device() -> std::sync::Arc<Device> {
     Device::new(&DeviceOptions::default()).expect("a device")
 }
 
-/// Liver without structure of its own, as wide and deep as the speckle's mean needs it.
+/// Liver without structure of its own, wide and deep enough for the speckle's mean.
 fn phantom() -> Scene {
     let mut liver = Tissue::shipped("liver").expect("shipped");
     liver.texture_depth = 0.0;
@@ -31,8 +31,8 @@ fn phantom() -> Scene {
     scene
 }
 
-/// Mean level of the speckle, dB relative to white, over depths that are neither at the face nor at the
-/// end: over log-compressed samples, so that what is compared is what is seen.
+/// Mean level of the speckle, dB relative to white, over depths neither at the face nor at the end: of
+/// log-compressed samples, so that the visible brightness is compared.
 fn level(simulator: &mut Simulator, scene: &Scene) -> f64 {
     simulator.frame(scene, 0).expect("a frame");
     let log = simulator.log_image().expect("read back");
@@ -97,7 +97,7 @@ fn levels_take_turns_in_the_same_buffers_and_leave_no_trace() {
     };
     let memory = || device.memory().current;
     let first = picture(&mut used, &own);
-    // Both slots have what they need to hand over.
+    // Both slots have their buffers for handing over.
     assert_eq!(picture(&mut used, &own), first);
     let before = memory();
     for level in ladder.levels().iter().rev() {

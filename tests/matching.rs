@@ -1,5 +1,5 @@
 //! `insonify match`: the closed form (an image of the simulator itself, made with other settings), a real
-//! volume, and what is said where nothing can be matched.
+//! volume, and the messages where nothing can be matched.
 
 #[path = "common/shared_data.rs"]
 mod shared_data;
@@ -8,8 +8,8 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use insonify::gpu::test_device;
+use insonify::matching::{self, Adjusted, Matching, Options, Stage, depths};
 use insonify::scene::{Imaging, Scene};
-use insonify::sim::matching::{self, Adjusted, Matching, Options, Stage, depths};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use shared_data::shared_data;
@@ -41,7 +41,7 @@ translate = [0, 0, 19]
 
 const FUSED: &str = "[volume]\nfile = \"acquired.mha\"\n[fusion]\nmask = [\"island\"]\n";
 
-/// What the volume was acquired with.
+/// The settings with which the volume was acquired.
 fn truth() -> Imaging {
     Imaging {
         gain: 23.0,
@@ -59,8 +59,8 @@ fn options(band: f64) -> Options {
     Options { band, frames: 2, adjusted: ALL }
 }
 
-/// The scanlines of a linear array are a grid: its log image, with another seed and the settings of
-/// `truth`, is a volume of one slice whose voxels are the samples. Written beside the scene, in bytes.
+/// Writes a volume beside the scene, in bytes. The scanlines of a linear array are a grid: its log image, with another
+/// seed and the settings of `truth`, is a volume of one slice whose voxels are the samples.
 fn acquire(folder: &Path) {
     let file = folder.join("scene.toml");
     std::fs::write(&file, SCENE).expect("written");
@@ -105,8 +105,8 @@ fn level(scene: &Scene, imaging: &Imaging, z: f64) -> f64 {
     imaging.gain + a + (position - i as f64) * (b - a)
 }
 
-/// By what settings differ from the truth: level (the largest over the compared depths, dB), dynamic
-/// range and both sizes (relative).
+/// Errors of settings: level (the largest over the compared depths, dB), dynamic range and both sizes
+/// (relative).
 fn errors(scene: &Scene, made: &Matching, imaging: &Imaging) -> [f64; 4] {
     let truth = truth();
     let places = depths(&scene.probe);
@@ -121,9 +121,9 @@ fn errors(scene: &Scene, made: &Matching, imaging: &Imaging) -> [f64; 4] {
     ]
 }
 
-/// Three deviations of what the speckle of the two bands can tell. Spread and sizes over n patches
-/// scatter by 0.8 / sqrt(n) on either side, and are left alone up to 1 and 2 %; brightness at a depth by
-/// 5.6 dB / sqrt(n at that depth), of which the sliders' smoothness leaves about half, and up to 0.3 dB.
+/// Three deviations of the estimates from the speckle of the two bands. Spread and sizes over n patches scatter by
+/// 0.8 / sqrt(n) on either side, and are left alone up to 1 and 2 %; brightness at a depth by 5.6 dB / sqrt(n at
+/// that depth), of which the sliders' smoothness leaves about half, and up to 0.3 dB.
 fn allowed(made: &Matching) -> [f64; 4] {
     let sides = 1.0 / made.acquired.cells + 1.0 / made.after.simulated.cells;
     let relative = 3.0 * 0.8 * sides.sqrt();
@@ -156,7 +156,7 @@ fn settings_of_the_simulators_own_image_are_recovered() {
         found.iter().zip(&allowed).all(|(e, a)| e <= a)
     };
     assert!(recovered(&scene.imaging), "{found:?} {allowed:?}");
-    // Each of them off by little is seen.
+    // A small error of each of them is noticed.
     let truth = truth();
     for planted in [
         Imaging { gain: truth.gain + 1.0, ..truth.clone() },
@@ -169,7 +169,7 @@ fn settings_of_the_simulators_own_image_are_recovered() {
         assert!(!recovered(&planted), "{planted:?}");
     }
     assert!(recovered(&truth));
-    // Once more changes nothing.
+    // A second fit changes nothing.
     let again = fit(&mut scene, &options(8.0));
     assert_eq!((again.rounds, &again.after), (0, &made.after));
 }
@@ -190,7 +190,7 @@ fn only_what_is_asked_for_is_fitted() {
         let errors = made.level_errors(stage);
         errors.iter().sum::<f64>() / errors.len() as f64
     };
-    // What is left alone, and the weights of the depths, which differ.
+    // 0.6 dB: errors that are left alone, and the weights of the depths, which differ.
     let (was, is) = (mean(&made.before), mean(&made.after));
     assert!(was.abs() > 3.0 && is.abs() < 0.6, "{was} {is} dB");
 }
@@ -205,7 +205,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// `insonify match` of the scene, by the tracer that runs everywhere.
+/// Runs `insonify match` on the scene, with the tracer that runs everywhere.
 fn run(scene: &str, more: &[&str]) -> Output {
     insonify(&[&["match", scene, "--tracer", "bvh", "--frames", "1"], more].concat())
 }
@@ -242,7 +242,7 @@ fn the_scene_file_is_written_and_nothing_else_in_it_changes() {
     let kept = |line: &&str| !["gain", "dynamic", "tgc", "psf"].iter().any(|k| line.starts_with(k));
     let lines = |text: &str| text.lines().filter(kept).map(str::to_owned).collect::<Vec<_>>();
     assert_eq!(lines(&after), lines(&before));
-    // What is matched stays as it is, to the byte.
+    // A matched file stays as it is, to the byte.
     let out = run(&scene, &[]);
     assert!(text(&out.stdout).contains("matched already"), "{}", text(&out.stdout));
     assert_eq!(read("scene.toml"), after);

@@ -1,5 +1,5 @@
-//! A sweep of PLUS against the volume that PLUS made of it: first ours, then PLUS's arithmetic
-//! written down here, which explains the difference.
+//! A sweep of PLUS, compared with the volume that PLUS made of it: first by our reconstruction, then by PLUS's
+//! arithmetic written here, which explains the difference.
 
 #[path = "common/shared_data.rs"]
 mod shared_data;
@@ -10,10 +10,10 @@ use glam::{DAffine3, DVec3};
 use insonify::volume::{Compounding, Config, Sequence, Volume, reconstruct};
 use shared_data::shared_data;
 
-/// What a volume differs by from the stored one.
+/// Differences of a volume from the stored one.
 #[derive(Debug)]
 struct Figures {
-    /// Share of voxels that are equal, and that are within 2 grey levels.
+    /// Shares of voxels that are equal, and that are within 2 grey levels.
     equal: f64,
     close: f64,
     /// Mean difference and root of the mean square, grey levels.
@@ -49,7 +49,7 @@ struct Sweep {
     stored: Volume,
 }
 
-/// Over a phantom of a spine, with PLUS's own configuration: linear, mean, sticks of 9.
+/// A sweep over a phantom of a spine, with PLUS's own configuration: linear, mean, sticks of 9.
 fn spine(data: &Path) -> Sweep {
     let data = data.join("us-plus");
     let (config, images) = (data.join("ConfigFiles/Testing"), data.join("TestImages"));
@@ -62,9 +62,9 @@ fn spine(data: &Path) -> Sweep {
     Sweep { poses: poses.expect("joined"), config, sequence, stored: stored.expect("a volume").0 }
 }
 
-/// Nine voxels in ten are within the 2 grey levels that PLUS's own tests allow between machines,
-/// and the brightness is the same. The stored volume has one plane less: PLUS used to cut the
-/// extent where it rounds it now.
+/// Nine voxels in ten are within the 2 grey levels that PLUS's own tests allow between machines, and the
+/// brightness is the same. The stored volume has one plane less: PLUS used to truncate the extent, which it
+/// rounds now.
 #[test]
 fn a_volume_is_what_plus_made_of_the_sweep() {
     let Some(data) = shared_data() else { return };
@@ -81,7 +81,7 @@ fn a_volume_is_what_plus_made_of_the_sweep() {
     let figures = of(&made.volume);
     println!("{figures:?}");
     assert!(holds(&figures), "{figures:?}");
-    // Planted: three pixels off, half a voxel, and another way to compound.
+    // Planted: three pixels off, half a voxel, and another method of compounding.
     let off = DAffine3::from_translation(DVec3::new(0.0, 3.0, 0.0));
     let planted: Vec<_> = poses.iter().map(|p| p.map(|p| p * off)).collect();
     let mut settings = config.settings.clone();
@@ -93,7 +93,7 @@ fn a_volume_is_what_plus_made_of_the_sweep() {
     assert!(!holds(&of(&made.volume)));
 }
 
-/// Fraction bits of PLUS's fixed-point numbers (its `Optimization="FULL"`).
+/// Number of fraction bits of PLUS's fixed-point numbers (its `Optimization="FULL"`).
 const BITS: u32 = 14;
 
 fn fixed(value: f64) -> i32 {
@@ -122,7 +122,7 @@ impl Voxels {
         inside.then(|| i + self.size[0] * (j + self.size[1] * k))
     }
 
-    /// A pixel at a position in fixed point. Without `rounded` the mean keeps its fractions.
+    /// Inserts a pixel at a position in fixed point. Without `rounded` the mean keeps its fractions.
     fn insert(&mut self, at: [i32; 3], pixel: f64, rounded: bool) {
         let low = at.map(|v| v >> BITS);
         let part = [0, 1, 2].map(|a| at[a] - (low[a] << BITS));
@@ -163,7 +163,7 @@ impl Voxels {
         None
     }
 
-    /// A hole between the ends of the shortest lines of at most 9 voxels; PLUS cuts fractions off.
+    /// The value of a hole between the ends of the shortest lines of at most 9 voxels; PLUS cuts fractions off.
     fn filled(&self, at: [i32; 3]) -> f64 {
         let mut lines: Vec<(f64, f64)> = Vec::new();
         let around = -1..=1;
@@ -191,9 +191,9 @@ impl Voxels {
     }
 }
 
-/// Written as PLUS computes it, the volume comes out as stored: the difference of ours is its
-/// arithmetic. Positions and weights have 14 fraction bits, and a voxel is rounded to 8 bits after
-/// every one of the hundreds of pixels that reach it.
+/// Computed as by PLUS, the volume comes out as stored: the difference of ours is its arithmetic. Positions and
+/// weights have 14 fraction bits, and a voxel is rounded to 8 bits after every one of the hundreds of pixels
+/// that reach it.
 #[test]
 fn the_arithmetic_of_plus_explains_the_difference() {
     let Some(data) = shared_data() else { return };
@@ -226,8 +226,8 @@ fn the_arithmetic_of_plus_explains_the_difference() {
     };
     let (plus, exact) = (run(true), run(false));
     println!("PLUS's arithmetic {plus:?}\nwithout its rounding {exact:?}");
-    // Half a percent still differs, nearly all of it by a grey level. The stored volume was made by
-    // an older PLUS than the one that is followed here, as its extent shows.
+    // Half a percent still differs, nearly all of it by a grey level. The stored volume was made by an older PLUS
+    // than the one modelled here, as its extent shows.
     assert!(plus.equal > 0.99 && plus.close > 0.999, "{plus:?}");
     // Planted: without the rounding it is no better than ours.
     assert!(exact.close < 0.95, "{exact:?}");

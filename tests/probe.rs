@@ -1,4 +1,4 @@
-//! The probe's geometry on the CPU, and what kernels make of its table: the same lines.
+//! The probe's geometry on the CPU, compared with the scanlines and layers that kernels compute from its table.
 
 use glam::DVec3;
 use insonify::gpu::{Binding, BufferKind, Device, Kernel, test_device};

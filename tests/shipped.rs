@@ -1,4 +1,4 @@
-//! The scenes that come with the program: sound, and holding what their default view should show.
+//! The scenes that come with the program: sound, and with the expected content in their default view.
 
 use std::path::Path;
 
@@ -67,7 +67,7 @@ fn the_abdomen_shows_its_organs_in_the_default_view() {
     for (point, expected) in view {
         assert_eq!(tissue(&scene, point), expected, "at {point:?}");
     }
-    // The comparison sees priorities: a liver above its cyst hides it.
+    // The comparison notices priorities: a liver above its cyst hides it.
     for instance in &mut scene.instances {
         if instance.name == "liver" {
             instance.priority = 1000;
@@ -151,7 +151,7 @@ fn the_early_pregnancy_has_embryo_and_yolk_sac_in_a_small_volume() {
 fn the_ectopic_pregnancy_has_its_ring_beside_the_middle_of_a_small_volume() {
     let scene = shipped("ectopic");
     for (point, expected) in [
-        // Where the empty uterus is in the volume.
+        // Place of the empty uterus in the volume.
         ([-20.0, 0.0, 38.0], "mother"),
         ([24.0, 0.0, 30.0], "decidua"),
         ([24.0, 0.0, 35.0], "amniotic_fluid"),
@@ -163,8 +163,8 @@ fn the_ectopic_pregnancy_has_its_ring_beside_the_middle_of_a_small_volume() {
     holds_its_view("ectopic", &scene, [1.0, 79.0], 10.0);
 }
 
-/// What the default view shows between two depths lies in the scene's volume, and so do views `beside`
-/// mm from it; mm. The volume is small enough for a repository.
+/// Asserts that the default view between two depths lies in the scene's volume, and so do views `beside` mm from
+/// it; mm. The volume is small enough for a repository.
 fn holds_its_view(name: &str, scene: &Scene, depths: [f64; 2], beside: f64) {
     assert!(scene.shows_volume() && scene.masks_off_the_image().is_empty());
     let acquired = scene.volume.as_ref().expect("a volume");
@@ -190,8 +190,8 @@ fn holds_its_view(name: &str, scene: &Scene, depths: [f64; 2], beside: f64) {
     assert!(bytes < 3_200_000, "{bytes} bytes in the repository");
 }
 
-/// The rim of a mask in the picture: middle, half-axes of the ellipse in the middle of the rim, and the
-/// half of its width as a share of them; lateral and depth, mm.
+/// The rim of a mask in the picture: middle, half-axes of the ellipse in the middle of the rim, and half of its
+/// width as a share of them; lateral and depth, mm.
 struct Rim {
     middle: [f64; 2],
     radii: [f64; 2],
@@ -216,9 +216,9 @@ fn the_ectopic_pregnancys_simulation_is_as_bright_as_its_volume() {
     is_as_bright("ectopic", 128, &rim);
 }
 
-/// In front of the sac nothing of what floats in it shades its rim: there the volume, swept over a pelvis
-/// with all its layers, and the simulation, through one medium that stands for them, show the same
-/// tissue.
+/// Asserts equal brightness on both sides of a sac's rim. In front of the sac nothing that floats in it shades the rim:
+/// there the volume, swept over a pelvis with all its layers, and the simulation, through one medium in their
+/// place, show the same tissue.
 fn is_as_bright(name: &str, scanlines: u32, rim: &Rim) {
     let mut scene = shipped(name);
     scene.probe.scanlines = scanlines;
@@ -261,7 +261,7 @@ fn is_as_bright(name: &str, scanlines: u32, rim: &Rim) {
         }
         mean
     };
-    // 12 grey levels are 2.8 of the 60 dB: what a reader of two grey wedges side by side overlooks.
+    // 12 grey levels are 2.8 of the 60 dB: a reader of two grey wedges side by side overlooks that.
     let alike = |d: [f64; 3]| d.iter().all(|d| d.abs() < 12.0);
     let found = differences(&scene);
     println!("{name}: simulation above volume by {found:.1?} grey levels");

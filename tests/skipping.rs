@@ -1,5 +1,5 @@
-//! What a fused frame does not compute: around the masks sound goes straight on, and what nobody
-//! hears is not traced.
+//! The work that a fused frame saves: around the masks sound goes straight on, and paths that nobody hears are
+//! not traced.
 
 #[path = "../tools/harness/mod.rs"]
 mod harness;
@@ -12,8 +12,8 @@ use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, dump, tables};
 
-/// Two balls, the second behind the first, both beside the middle; a plate that is as fast as
-/// everything around it lies in front of parts of both. No refraction.
+/// Two balls, the second behind the first, both beside the middle; a plate with the surrounding speed lies in
+/// front of parts of both. No refraction.
 const SCENE: &str = r#"
 background = "around"
 [probe]
@@ -70,7 +70,7 @@ fn load(more: &str, overrides: &[(&str, &str)]) -> Scene {
     Scene::load(&at("scene.toml"), &overrides).expect("sound").0
 }
 
-/// Surface and volume echoes, and what was counted.
+/// Surface and volume echoes, and counters.
 fn shoot(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> ([Vec<i32>; 2], Counters) {
     let mut simulator =
         Simulator::new(device, &Library::embedded(), scene, tracer).expect("a simulator");
@@ -79,13 +79,13 @@ fn shoot(device: &Arc<Device>, scene: &Scene, tracer: Tracer) -> ([Vec<i32>; 2],
     (simulator.echoes().expect("echoes"), counters)
 }
 
-/// Distance from a ball's surface within which its own echo and the beam's width reach, mm.
+/// Distance from a ball's surface that its own echo and the beam's width reach, mm.
 const REACH: f64 = 0.4;
-/// Of the loudest echo: a stretch that is cut at the mask's border starts elsewhere, and single precision
-/// rounds its distances and phases (400 cycles of the carrier) anew.
+/// Tolerance as a share of the loudest echo: a stretch cut at the mask's border starts elsewhere, and single
+/// precision rounds its distances and phases (400 cycles of the carrier) anew.
 const ROUNDING: f64 = 1e-3;
 
-/// Places in `echoes` of the samples well inside one of the first two meshes, which are balls.
+/// Indices in `echoes` of the samples well inside one of the first two meshes, which are balls.
 fn inside(scene: &Scene) -> Vec<usize> {
     let balls = [(0, 5.0), (1, 6.0)];
     let mut places = Vec::new();
@@ -106,7 +106,7 @@ fn inside(scene: &Scene) -> Vec<usize> {
     places
 }
 
-/// Samples inside the balls at which the echoes differ by more than rounding.
+/// Number of samples inside the balls at which the echoes differ by more than rounding.
 fn unequal(scene: &Scene, fused: &[Vec<i32>; 2], whole: &[Vec<i32>; 2]) -> usize {
     let places = inside(scene);
     assert!(places.len() > 5_000, "{}", places.len());
@@ -132,7 +132,7 @@ fn inside_two_masks_in_a_row_the_echoes_are_those_of_the_whole_scene_for_less_wo
         // The comparison notices a ball that is 0.03 mm, a fifth of a wavelength, lower.
         let (other, _) = shoot(&device, &shifted, tracer);
         assert!(unequal(&fused, &other, &expected) > 100, "{tracer}");
-        // Two thirds of the lines meet no mask; the others end behind the second.
+        // Two thirds of the scanlines meet no mask; the others end behind the second.
         assert!(4 * kept.rays < 3 * all.rays, "{} of {}", kept.rays, all.rays);
         assert!(2 * kept.segments < all.segments, "{kept:?} of {all:?}");
         assert!(3 * kept.candidates < all.candidates, "{kept:?} of {all:?}");
@@ -154,8 +154,8 @@ fn a_mask_off_the_image_costs_no_ray() {
     }
 }
 
-/// An oblique plate of bone in front of the masks: through it sound goes straight, in the time that
-/// the probe assumes, absorbed along its way and weakened twice by 1 - R.
+/// An oblique plate of bone in front of the masks: sound goes straight through it, in the time that the probe
+/// assumes, absorbed along its path and weakened twice by 1 - R.
 #[test]
 fn a_plate_in_front_of_the_mask_weakens_what_is_heard_and_moves_nothing() {
     let device = test_device();

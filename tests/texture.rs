@@ -1,5 +1,5 @@
-//! Speckle rests in the tissue: it moves with an instance, follows a deformation whose displacements
-//! are known, and slides where a setting says so.
+//! Speckle rests in the tissue: it moves with an instance, follows a deformation of known displacements, and
+//! slides where a setting demands it.
 
 #[path = "common/shared_data.rs"]
 mod shared_data;
@@ -23,9 +23,9 @@ use shared_data::shared_data;
 /// Depths between which speckle is measured, mm: inside the body, off its faces.
 const DEPTHS: [f64; 2] = [10.0, 38.0];
 
-/// What the device made of a scene.
+/// Result of the device for a scene.
 struct Shot {
-    /// Complex baseband per line.
+    /// Complex baseband per scanline.
     iq: Vec<Vec<[f64; 2]>>,
     grey: Vec<u8>,
 }
@@ -46,8 +46,8 @@ fn shoot(scene: &Scene) -> Shot {
     }
 }
 
-/// A body of speckle from depth 4 to 44 mm in silence, seen by 64 lines over 20 mm. Its keyframes are the
-/// body as it is and moved by `map`, which is shown; its lattice lies oblique to the beam.
+/// A body of speckle from depth 4 to 44 mm in silence, seen by 64 scanlines over 20 mm. Its keyframes are the body
+/// at rest and moved by `map`, which is shown; its lattice lies oblique to the beam.
 fn scene(map: impl Fn(DVec3) -> DVec3) -> Scene {
     let probe = Probe {
         kind: Kind::Linear { width: 20.0 },
@@ -95,7 +95,7 @@ fn scene(map: impl Fn(DVec3) -> DVec3) -> Scene {
     scene
 }
 
-/// Samples between [`DEPTHS`] of all lines.
+/// Samples between [`DEPTHS`] of all scanlines.
 fn inside<'a>(scene: &Scene, shot: &'a Shot) -> impl Iterator<Item = &'a [[f64; 2]]> {
     let [a, b] = DEPTHS.map(|z| (z / scene.probe.sample_pitch()) as usize);
     shot.iq.iter().map(move |line| &line[a..b])
@@ -168,8 +168,8 @@ fn a_probe_that_moves_with_tissue_sees_the_same_speckle() {
     assert!(correlation < 1.0 - 1e-4, "20 um beside it is caught: {correlation}");
 }
 
-/// Correlation that is left, over those depths, of echoes of beams `shift` mm apart: autocorrelation of
-/// exp(-x^2 / 2 sigma^2), by the power measured.
+/// Remaining correlation, over those depths, of echoes of beams `shift` mm apart: autocorrelation of
+/// exp(-x^2 / 2 sigma^2), weighted by the measured power.
 fn expected_overlap(scene: &Scene, shot: &Shot, shift: f64) -> f64 {
     let calibration = Calibration::new(scene);
     let pitch = scene.probe.sample_pitch();
@@ -204,9 +204,8 @@ fn in_the_world_anatomy_slides_through_speckle_as_the_beam_overlaps() {
     }
 }
 
-/// Axial displacement, mm, of the speckle around depth `z` from frame `a` to frame `b`: the shift of
-/// the largest normalised cross-correlation of envelopes over all lines and 3 mm, between samples by
-/// a parabola.
+/// Axial displacement, mm, of the speckle around depth `z` from frame `a` to frame `b`: the shift of the largest
+/// normalised cross-correlation of envelopes over all scanlines and 3 mm, between samples by a parabola.
 fn tracked(scene: &Scene, a: &Shot, b: &Shot, z: f64) -> f64 {
     let pitch = scene.probe.sample_pitch();
     let (middle, half) = ((z / pitch) as usize, (1.5 / pitch) as usize);
@@ -272,7 +271,7 @@ fn speckle_is_displaced_as_the_tissue_is_strained() {
     }
 }
 
-/// Scatterers heard in a frame.
+/// Number of scatterers heard in a frame.
 fn heard(scene: &Scene) -> f64 {
     let device = test_device();
     let mut simulator =
@@ -281,8 +280,8 @@ fn heard(scene: &Scene) -> f64 {
     f64::from(simulator.counters().expect("counters").deposits)
 }
 
-/// Scatterers in the beams between two depths: their cross-section is the lateral cut's; so many cells of
-/// the lattice hold one as make the tissue's speckle by amplitudes of one modulus.
+/// Number of scatterers in the beams between two depths: their cross-section is the lateral cut's; the number of
+/// lattice cells per scatterer follows from the tissue's speckle by amplitudes of one modulus.
 fn in_the_beams(scene: &Scene, [from, to]: [f64; 2]) -> f64 {
     const STEPS: u32 = 1000;
     let calibration = Calibration::new(scene);
@@ -295,9 +294,9 @@ fn in_the_beams(scene: &Scene, [from, to]: [f64; 2]) -> f64 {
     cells * calibration.scatterer_density(&scene.tissues[0])
 }
 
-// A deformation makes scatterers as much denser as it makes the volume smaller. Each line hears some
-// 1e4, and those of neighbours are the same: 2e5 in all of one per cell, whose number varies by less
-// than a random one's, 0.2 %.
+// A deformation makes scatterers denser by the factor by which the volume shrinks. Each scanline hears some 1e4,
+// and those of neighbours are the same: 2e5 in all of one per cell, whose number varies by less than a random
+// one's, 0.2 %.
 #[test]
 fn no_scatterer_of_deformed_tissue_is_lost_or_doubled() {
     let rigid = DMat3::IDENTITY;
@@ -318,8 +317,8 @@ fn no_scatterer_of_deformed_tissue_is_lost_or_doubled() {
     }
 }
 
-/// Vertices and triangles of an OBJ file that has nothing else, as they stand: welding would make
-/// another topology of every phase.
+/// Vertices and triangles of an OBJ file with nothing else, unchanged: welding would give every phase another
+/// topology.
 fn unwelded(path: &std::path::Path) -> Mesh {
     let mut mesh = Mesh::default();
     for line in std::fs::read_to_string(path).expect("an OBJ file").lines() {
@@ -342,8 +341,8 @@ fn wide(p: [f32; 3]) -> DVec3 {
     DVec3::from(p.map(f64::from))
 }
 
-/// Of a beating heart's myocardium, whose field is made from its three surfaces, over all phases: root
-/// mean square misfit at their vertices and largest displacement, mm; least volume that tissue keeps.
+/// Figures of a beating heart's myocardium, whose field is made from its three surfaces, over all phases: root mean
+/// square misfit at their vertices and largest displacement, mm; least remaining volume of the tissue.
 fn heart(grouped: bool) -> Option<[f64; 3]> {
     let folder = shared_data()?.join("heart-4d-bivme/obj");
     let mut scene = scene(|p| p);
@@ -401,8 +400,8 @@ fn a_real_heart_s_field_fits_its_surfaces_and_does_not_fold() {
     assert!(alone > 0.01 * largest, "a field that ignores the ventricles is caught: {alone}");
 }
 
-/// The body of [`scene`], of one shape, below a transform that scales it by `factors` about its middle in world axes; at
-/// `seconds` of a movement whose period is 4 s.
+/// The body of [`scene`], of one shape, below a transform that scales it by `factors` about its middle in world
+/// axes; at `seconds` of a movement whose period is 4 s.
 fn squeezed(factors: DVec3, seconds: f64) -> Scene {
     let mut scene = scene(|p| p);
     scene.instances[0].keyframes = Keyframes::default();
@@ -425,8 +424,8 @@ fn squeezed(factors: DVec3, seconds: f64) -> Scene {
     scene
 }
 
-// The map is exact in the field of one cell, and good to 32 bits of displacements of 10 mm in the one that is made
-// from keyframes: 1e-6 mm, 1e-4 rad of the carrier.
+// The map is exact in the field of one cell, and good to 32 bits of displacements of 10 mm in the one made from
+// keyframes: 1e-6 mm, 1e-4 rad of the carrier.
 #[test]
 fn tissue_below_a_transform_that_scales_is_squeezed_as_its_keyframes_would_be() {
     let factors = DVec3::new(0.9, 1.1, 0.85);
@@ -477,7 +476,7 @@ fn squeezed_tissue_is_as_bright_as_at_rest() {
         [DVec3::new(0.8, 1.0, 0.8), DVec3::new(1.2, 1.2, 0.9), DVec3::new(1.0, 0.7, 0.85)]
     {
         let [rest, now] = [0.0, 1.0].map(|seconds| power(&squeezed(factors, seconds)));
-        // What as many scatterers in less room would be.
+        // The change for equally many scatterers in less room.
         let denser = -10.0 * factors.element_product().log10();
         let change = now - rest;
         println!("{factors}: {change:+.2} dB; without compensation {denser:+.2}");

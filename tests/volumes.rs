@@ -1,5 +1,5 @@
-//! Volumes of others: values and positions against those that ITK reads from the same files, and
-//! the program on every file at hand, cut and changed too.
+//! Volumes of other programs: values and positions compared with ITK's from the same files, and the program on
+//! every file at hand, also cut and changed.
 
 #[path = "common/limited.rs"]
 mod limited;
@@ -22,7 +22,7 @@ fn volumes(folder: &Path) -> Vec<PathBuf> {
     files(folder, is_volume)
 }
 
-/// What ITK reads, by file: `size=(..)`, `comp=1`, `sp=(..)`, `origin=(..)`, `min=`, `max=`, `mean=`.
+/// ITK's results by file: `size=(..)`, `comp=1`, `sp=(..)`, `origin=(..)`, `min=`, `max=`, `mean=`.
 fn facts(data: &Path) -> BTreeMap<PathBuf, String> {
     let mut out = BTreeMap::new();
     for set in SETS {
@@ -46,7 +46,7 @@ fn numbers(facts: &str, key: &str) -> Vec<f64> {
     words.filter_map(|w| w.parse().ok()).collect()
 }
 
-/// What differs between a volume and what ITK reads of its file, with this error put in.
+/// The difference of a volume from ITK's results for its file, with this error planted.
 fn difference(volume: &Volume, facts: &str, planted: f64) -> Option<String> {
     let facts = format!(" {facts}");
     let mut size = volume.size.map(|n| n as f64).to_vec();
@@ -96,7 +96,7 @@ fn values_and_positions_are_those_that_itk_reads() {
         }
         let (volume, _) = loaded.unwrap_or_else(|e| panic!("{e}"));
         if !facts.contains("comp=1 ") {
-            // Only the first channel is read: values over all are no comparison.
+            // Only the first channel is read: values over all are not comparable.
             continue;
         }
         compared += 1;
@@ -110,7 +110,7 @@ fn values_and_positions_are_those_that_itk_reads() {
     assert!(compared >= 30, "{compared}");
 }
 
-/// Values of a NRRD type in a byte order and an encoding.
+/// Values in a NRRD type, byte order and encoding.
 fn encode(values: &[i16], kind: &str, big: bool, encoding: &str) -> Vec<u8> {
     if encoding == "ascii" {
         let words: Vec<_> = values.iter().map(i16::to_string).collect();
@@ -173,8 +173,8 @@ fn every_encoding_of_the_ball_gives_the_same_voxels() {
     ] {
         assert!(load(name) == plain, "{name}");
     }
-    // And written anew, from the voxels: every type that holds them, both byte orders, every way
-    // to write, in the header's file and beside it.
+    // Also written anew, from the voxels: every type that holds them, both byte orders, every encoding, in the
+    // header's file and beside it.
     let Voxels::I16(ball) = &plain else { panic!("16 bits") };
     let folder = tempfile::tempdir().expect("a folder");
     for kind in ["uint16", "int16", "int32", "uint32", "float", "double"] {
@@ -204,8 +204,8 @@ fn every_encoding_of_the_ball_gives_the_same_voxels() {
     assert!(load("_nifti.nhdr") != plain);
 }
 
-/// PLUS's own sequences are read, and written so that they read back equal; poses that it marked
-/// as lost are marked here.
+/// PLUS's own sequences are read, and written so that they read back equal; poses that it marked as lost are
+/// marked here.
 #[test]
 fn sequences_of_plus_are_written_back_equal() {
     let Some(data) = shared_data() else { return };
@@ -227,7 +227,7 @@ fn sequences_of_plus_are_written_back_equal() {
             Err(_) => refused.push(name),
         }
     }
-    // Poses alone, and a file whose pixels are missing.
+    // Poses only, and a file whose pixels are missing.
     assert_eq!(
         refused,
         [
@@ -242,7 +242,7 @@ fn sequences_of_plus_are_written_back_equal() {
     let poses: Vec<_> = sequence.frames.iter().flat_map(|f| f.poses.values()).collect();
     let ok = poses.iter().filter(|p| p.is_ok()).count();
     assert_eq!((sequence.frames.len(), poses.len(), ok), (97, 291, 194));
-    // Numbers of the header, as they stand there.
+    // Numbers of the header, as written there.
     let first = &sequence.frames[0];
     assert_eq!(first.timestamp, Some(345.627957));
     let probe = first.poses["ProbeToTracker"].transform;
@@ -250,8 +250,8 @@ fn sequences_of_plus_are_written_back_equal() {
     assert_eq!(probe.translation.x, -190.886);
 }
 
-/// Small files that SimpleITK and pydicom wrote, and what they read from them
-/// (tools/oracle/volumes.py): every format, type and way to write, oblique and mirrored directions,
+/// Small files written by SimpleITK and pydicom, with the values that these read from them
+/// (tools/oracle/volumes.py): every format, type and encoding, oblique and mirrored directions,
 /// anisotropic spacing.
 #[test]
 fn files_written_by_others_give_their_voxels_and_places() {
@@ -266,7 +266,7 @@ fn files_written_by_others_give_their_voxels_and_places() {
         let (volume, _) = Volume::load(&folder.join(name)).unwrap_or_else(|e| panic!("{e}"));
         assert_eq!(volume.size.map(|n| n as f64).to_vec(), numbers("size"), "{name}");
         let found: Vec<_> = (0..volume.voxels.len()).map(|i| volume.voxels.get(i)).collect();
-        // Of JPEG the standard allows a decoder a grey level; all others are exact.
+        // For JPEG the standard allows a decoder a grey level; all others are exact.
         let tolerance = f64::from(u8::from(name.starts_with("jpeg")));
         // Nine digits name a single-precision number.
         let values: Vec<_> = numbers("values").iter().map(|v| f64::from(*v as f32)).collect();
@@ -293,7 +293,7 @@ fn files_written_by_others_give_their_voxels_and_places() {
     assert!(all.len() >= 27, "{}", all.len());
 }
 
-/// A slope of zero means that nothing is scaled.
+/// A slope of zero means no scaling.
 #[test]
 fn slopes_of_nifti_are_applied_to_every_type() {
     let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/volumes");
@@ -354,7 +354,7 @@ fn cut_and_changed_files_are_refused_within_bounds() {
             let refused = Volume::load(&copy).is_err();
             assert!(refused || beside, "{} cut at {part}", path.display());
         }
-        // Sizes blown up in place of what they are; nothing may be allocated for them.
+        // Huge sizes in place of the real ones; nothing may be allocated for them.
         let text = String::from_utf8_lossy(&whole[..whole.len().min(400)]).into_owned();
         for (key, huge) in [("sizes: ", "60000 60000 1"), ("DimSize = ", "1500 1500 1700")] {
             let Some(at) = text.find(key) else { continue };

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use std::{env, fs};
 
 use insonify::output;
-use insonify::sim::shaders::stamp::{self, Entry};
-use insonify::sim::shaders::{Error, bytes_of, compiler, source, validate};
+use insonify::sim::shaders::authors::stamp::{self, Entry};
+use insonify::sim::shaders::authors::{Error, bytes_of, compiler, source, validate};
 
 fn main() -> ExitCode {
     let check = match env::args().skip(1).collect::<Vec<_>>().as_slice() {
@@ -34,7 +34,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Compiles everything; writes what differs, or with `check` names it.
+/// Compiles everything; writes the files that differ, or with `check` only names them.
 fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String>, Error> {
     let lock = root.join("Cargo.lock");
     let lock = fs::read_to_string(&lock).map_err(|cause| Error::File { path: lock, cause })?;

@@ -1,5 +1,5 @@
-//! What animation costs, acceleration structures made anew against those that are switched; what fusion
-//! with an acquired volume saves; what the stages of a frame take.
+//! Measures the costs of animation (acceleration structures rebuilt, against those that are switched),
+//! the saving by fusion with an acquired volume, and the time of each stage of a frame.
 //!
 //! ```text
 //! cargo run --release --bin profile -- strategies scenes/heart.toml
@@ -82,7 +82,7 @@ enum Command {
     Builds(builds::Arguments),
 }
 
-/// What all measurements share.
+/// Device, shaders, tracers and output folder of all measurements.
 struct Machine {
     device: Arc<Device>,
     library: Library,

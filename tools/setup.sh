@@ -57,13 +57,25 @@ if [ "$mode" != run ]; then
 fi
 driver=
 has_driver || driver=mesa-vulkan-drivers
+# Root's own apt-get, or sudo's where that asks nothing.
+apt_quietly() {
+  local as=()
+  [ "$(id -u)" = 0 ] || as=(sudo -n)
+  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get "$@" >/dev/null 2>&1
+}
+# Whether Debian's packages are known here; a fresh machine has no lists of them yet.
+knows() {
+  command -v apt-get >/dev/null || return 1
+  apt-cache show "$1" >/dev/null 2>&1 && return
+  grep -qs '^ID=debian' /etc/os-release && apt_quietly update -qq && apt-cache show "$1" >/dev/null 2>&1
+}
 # A second driver shows what the first one forgives: SwiftShader, two files out of Debian's package
 # chromium-common, in target/second-driver, where only the tests look. Nothing is installed.
 second_driver() {
   local into package=chromium-common
   into=$(cd "$(dirname "$0")/.." && pwd)/target/second-driver
   [ -s "$into/vk_swiftshader_icd.json" ] && return
-  if ! command -v apt-get >/dev/null || ! command -v dpkg-deb >/dev/null || ! apt-cache show "$package" >/dev/null 2>&1; then
+  if ! command -v dpkg-deb >/dev/null || ! knows "$package"; then
     say "no package $package here (Debian has it): tests on a second driver are skipped"
     return
   fi
@@ -80,16 +92,14 @@ second_driver() {
 
 # The form of a user study is filled in by a browser. Ubuntu's package is a snap, which needs a daemon.
 browser() {
-  command -v chromedriver >/dev/null && return
-  if ! command -v apt-get >/dev/null || ! grep -qs '^ID=debian' /etc/os-release; then
+  command -v chromedriver >/dev/null && command -v chromium chromium-browser google-chrome >/dev/null && return
+  if ! grep -qs '^ID=debian' /etc/os-release || ! knows chromium-driver; then
     say "no chromium with chromedriver here: tests in a browser are skipped"
     return
   fi
   say "installing chromium and chromium-driver, in which tests fill in a form"
-  local as=()
-  [ "$(id -u)" = 0 ] || as=(sudo -n)
-  "${as[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends \
-    chromium chromium-driver >/dev/null 2>&1 || say "that failed: tests in a browser are skipped"
+  apt_quietly install -y -qq --no-install-recommends chromium chromium-driver ||
+    say "that failed: tests in a browser are skipped"
 }
 tests_only() {
   [ "$mode" = run ] && return

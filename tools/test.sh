@@ -1,7 +1,12 @@
 #!/usr/bin/env bash
 # Every test, with all set-up that they need, but for those that compile kernels: `--features compile`
 # adds them, with SHADERC_LIB_DIR set as in .ci/run. As the first argument, `--long` adds the tests
-# that take minutes: statistics over many seeds. Other arguments go to `cargo test`.
+# that take minutes or need a quiet machine: statistics over many seeds, how little the processor does for a
+# window at rest. Other arguments go to `cargo test`.
+#
+# Where something is missing, tests say that they are skipped, which `cargo test` shows with `-- --nocapture` only.
+# With INSONIFY_NO_SKIP=1 they fail instead, but for those on data that do not ship; with INSONIFY_NO_SKIP=all
+# these fail, too.
 set -eu
 cd "$(dirname "$0")/.."
 long=()

@@ -11,7 +11,7 @@ use miette::{IntoDiagnostic, Result, WrapErr, miette};
 #[path = "common/provenance.rs"]
 mod provenance;
 
-// The tests' own modules: what they prove is what the page shows.
+// The tests' own modules: the page shows the very checks that they run.
 include!("../tests/physics/main.rs");
 
 #[derive(Parser)]

@@ -1,11 +1,11 @@
-//! Ways that a probe takes.
+//! Sweeps and trajectories of a probe, as lists of poses.
 
 use glam::{DAffine3, DVec3};
 
 use crate::scene::Scene;
 use crate::scene::animation::{Track, Trs};
 
-/// Where the probe is at a moment.
+/// Pose of the probe at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Station {
     /// Timestamp, s.
@@ -17,16 +17,16 @@ pub struct Station {
 /// A sweep about the pose that the scene gives the probe, in the probe's own axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Sweep {
-    /// Along the elevation axis, so many mm from the first frame to the last.
+    /// Shift along the elevation axis by so many mm from the first frame to the last.
     Linear(f64),
-    /// About the lateral axis through the face's centre (a fan), so many rad from first to last.
+    /// Turn about the lateral axis through the face's centre (a fan) by so many rad from first to last.
     Tilt(f64),
-    /// About the depth axis, so many rad from first to last.
+    /// Turn about the depth axis by so many rad from first to last.
     Rotate(f64),
 }
 
 impl Sweep {
-    /// Evenly spaced poses, the scene's own in the middle, `rate` of them a second from time 0 on.
+    /// Evenly spaced poses, the scene's own in the middle, `rate` of them per second from time 0 on.
     pub fn stations(self, scene: &Scene, frames: u32, rate: f64) -> Vec<Station> {
         let last = f64::from(frames.max(2) - 1);
         (0..frames)
@@ -43,7 +43,7 @@ impl Sweep {
             .collect()
     }
 
-    /// The middle pose from the one at `part` of the way, -1/2 to 1/2.
+    /// The transform of the middle pose at `part` of the sweep, -1/2 to 1/2.
     fn at(self, part: f64) -> DAffine3 {
         match self {
             Self::Linear(length) => DAffine3::from_translation(DVec3::Y * (part * length)),
@@ -53,8 +53,8 @@ impl Sweep {
     }
 }
 
-/// Poses of the probe in the world from a trajectory: one at each of its times, or `frames` evenly
-/// from its first time to its last. What it leaves out, position or rotation, stays the scene's.
+/// Poses of the probe in the world from a trajectory: one at each of its times, or `frames` evenly from its
+/// first time to its last. Position or rotation that it lacks stays the scene's.
 pub fn stations_of(track: &Track, scene: &Scene, frames: Option<u32>) -> Vec<Station> {
     let times: Vec<f64> = match (frames, track.span()) {
         (Some(frames), Some((first, last))) => {
@@ -71,13 +71,18 @@ pub fn stations_of(track: &Track, scene: &Scene, frames: Option<u32>) -> Vec<Sta
     stations(track, scene, times)
 }
 
-/// The same, `rate` poses a second from its first time on: `frames` of them, or up to its last time.
-pub fn stations_at(track: &Track, scene: &Scene, rate: f64, frames: Option<u32>) -> Vec<Station> {
+/// The same, `rate` poses a second from its first time on.
+pub fn stations_at(track: &Track, scene: &Scene, rate: f64, frames: u32) -> Vec<Station> {
+    let (first, _) = track.span().unwrap_or_default();
+    let times = (0..frames).map(|i| first + f64::from(i) / rate);
+    stations(track, scene, times.collect())
+}
+
+/// Poses from a trajectory's first time up to its last at `rate` a second; there may be more than anything holds.
+pub fn poses_at(track: &Track, rate: f64) -> f64 {
     let (first, last) = track.span().unwrap_or_default();
     // The last one must not be lost to rounding.
-    let all = || ((last - first) * rate + 1e-6) as u32 + 1;
-    let times = (0..frames.unwrap_or_else(all)).map(|i| first + f64::from(i) / rate);
-    stations(track, scene, times.collect())
+    ((last - first) * rate + 1e-6).floor() + 1.0
 }
 
 fn stations(track: &Track, scene: &Scene, times: Vec<f64>) -> Vec<Station> {

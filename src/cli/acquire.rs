@@ -56,7 +56,7 @@ pub struct Acquire {
     common: Common,
 }
 
-/// `--sweep`.
+/// Value of `--sweep`.
 #[derive(Clone, Debug)]
 enum Way {
     /// About the scene's pose.
@@ -105,7 +105,7 @@ fn period(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Refuses names that cannot be written before minutes have gone into what they are for.
+/// Refuses names that cannot be written, before minutes of work for them.
 fn writable(path: &Path) -> Result<()> {
     let extension = path.extension().and_then(|e| e.to_str());
     if !extension.is_some_and(|e| e.eq_ignore_ascii_case("mha")) {
@@ -129,7 +129,7 @@ fn writable(path: &Path) -> Result<()> {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user or the device can get wrong, said once.
+/// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Acquire) -> Result<()> {
     for path in args.output.iter().chain(&args.volume) {
         writable(path)?;
@@ -186,7 +186,7 @@ fn stations(args: &Acquire, scene: &Scene) -> Result<Vec<Station>> {
     }
 }
 
-/// Follows the sweep once, or once for each of the volumes; `taken` has the frames of each.
+/// Follows the sweep once, or once for each of the volumes; `taken` gets the frames of each.
 fn simulate(
     args: &Acquire,
     scene: &mut Scene,

@@ -1,10 +1,10 @@
-//! What commands that simulate take and do alike.
+//! Arguments and actions common to all commands that simulate.
 
+use std::io::{IsTerminal, stderr};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use indicatif::{ProgressBar, ProgressStyle};
 use miette::{IntoDiagnostic, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, cache_folder};
@@ -57,7 +57,7 @@ pub enum TracerChoice {
     Bvh,
 }
 
-/// `--quality`.
+/// Value of `--quality`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum QualityChoice {
     /// A first look. Software driver: 2 paths, 5 scatterers per resolution cell. GPU: 8 paths, 8 scatterers.
@@ -74,10 +74,10 @@ pub fn seconds(text: &str) -> Result<f64, String> {
 }
 
 impl Common {
-    /// The device that was asked for.
+    /// The requested device.
     ///
     /// # Errors
-    /// None of that name, or none at all.
+    /// No device of that name, or none at all.
     pub fn device(&self) -> Result<Arc<Device>> {
         Device::new(&DeviceOptions {
             without_acceleration_structures: self.tracer == TracerChoice::Bvh,
@@ -86,7 +86,7 @@ impl Common {
         .into_diagnostic()
     }
 
-    /// The device that was asked for, for both tracers.
+    /// Options for the requested device, for both tracers.
     pub fn device_options(&self) -> DeviceOptions {
         DeviceOptions {
             selector: self.device.clone(),
@@ -103,7 +103,7 @@ impl Common {
     /// The device has no ray query.
     pub fn tracer(&self, device: &Arc<Device>, scene: &Scene) -> Result<Tracer> {
         let wanted = match self.tracer {
-            // Its selector nodes are the compute tracer's.
+            // The selector nodes of `--paper` need the compute tracer.
             TracerChoice::Auto if self.paper => Some(Tracer::Bvh),
             TracerChoice::Auto => None,
             TracerChoice::RayQuery => Some(Tracer::RayQuery),
@@ -123,17 +123,17 @@ impl Common {
         Ok(tracer)
     }
 
-    /// What of the scene file at `path` is overridden: by `--paper`, and by `--set` after that.
+    /// Overrides of the scene file at `path`: by `--paper`, and by `--set` after that.
     pub fn overrides(&self, path: &Path) -> Vec<(String, String)> {
         let selectors = self.tracer != TracerChoice::RayQuery;
         let of_paper = self.paper.then(|| file::paper(path, selectors));
         [of_paper.unwrap_or_default(), self.overrides.clone()].concat()
     }
 
-    /// Loads a scene with the overrides, and says on standard error what it warns of.
+    /// Loads a scene with the overrides, and prints its warnings on standard error.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    /// The fault of the file.
     pub fn scene(&self, path: &Path) -> Result<Scene> {
         let (scene, warnings) = Scene::load(path, &self.overrides(path))?;
         for warning in &warnings {
@@ -142,13 +142,13 @@ impl Common {
         Ok(scene)
     }
 
-    /// Puts seed, time and quality into a scene that was loaded.
+    /// Sets seed, time and quality of a loaded scene.
     pub fn settle(&self, scene: &mut Scene, device: &Device) {
         self.settle_simulation(&mut scene.simulation, device);
         scene.set_time(self.time);
     }
 
-    /// Puts seed and quality into the settings of a scene that was loaded.
+    /// Sets seed and quality in the settings of a loaded scene.
     pub fn settle_simulation(&self, simulation: &mut Simulation, device: &Device) {
         if let Some(seed) = self.seed {
             simulation.seed = seed;
@@ -158,7 +158,7 @@ impl Common {
         }
     }
 
-    /// Fails on what the validation layers said, where they were asked for.
+    /// Fails on any message of the validation layers, where they were asked for.
     ///
     /// # Errors
     /// The first message.
@@ -173,10 +173,10 @@ impl Common {
     }
 }
 
-/// Uploads a scene, and says on standard error what of it the device does not take as it is.
+/// Uploads a scene, and reports on standard error which parts of it the device had to change.
 ///
 /// # Errors
-/// What the device refuses.
+/// An error of the device.
 pub fn simulator(
     device: &Arc<Device>,
     library: &Library,
@@ -190,7 +190,7 @@ pub fn simulator(
     Ok(simulator)
 }
 
-/// Takes the counts of `quality` for this device, but for those that the user set by hand.
+/// Sets the counts of `quality` for this device, except those that the user set by hand.
 fn set_quality(
     simulation: &mut Simulation,
     quality: QualityChoice,
@@ -218,7 +218,7 @@ fn set_quality(
     }
 }
 
-/// What a frame lost, and what to do about it.
+/// The losses of a frame, each with a remedy.
 pub fn lost(counters: &Counters) -> Vec<String> {
     let mut out = Vec::new();
     if counters.saturated > 0 {
@@ -242,7 +242,7 @@ pub fn lost(counters: &Counters) -> Vec<String> {
     out
 }
 
-/// What to say of a masking mesh that lies off the image.
+/// The warning about a masking mesh that lies off the image.
 pub fn unseen(scene: &Scene, mask: usize) -> String {
     format!(
         "the mask `{}` never meets the image: nothing is simulated in it; move the mesh or the probe",
@@ -250,29 +250,39 @@ pub fn unseen(scene: &Scene, mask: usize) -> String {
     )
 }
 
-/// Progress on standard error. Hidden where that is no terminal; silent under a second.
+/// Time without a word of progress, s.
+const QUIET: f64 = 1.0;
+
+/// Progress on standard error: a line that is written over, where that is a terminal.
 pub struct Progress {
-    bar: ProgressBar,
+    count: u32,
+    noun: String,
     start: Instant,
+    /// When the line is written next, s.
+    next: f64,
 }
 
 impl Progress {
-    /// `count` of what is called `noun`.
+    /// Progress of `count` items, each a `noun`.
     pub fn new(count: u32, noun: &str) -> Self {
-        let template = format!("{{wide_bar}} {{pos}}/{{len}} {noun}, {{eta}} left");
-        let style = ProgressStyle::with_template(&template).expect("a valid template");
-        Self { bar: ProgressBar::new(u64::from(count)).with_style(style), start: Instant::now() }
+        Self { count, noun: noun.to_owned(), start: Instant::now(), next: QUIET }
     }
 
-    /// So many are done.
+    /// Shows that `count` items are done.
     pub fn done(&mut self, count: u32) {
-        if self.start.elapsed().as_secs() >= 1 {
-            self.bar.set_position(u64::from(count));
+        let gone = self.start.elapsed().as_secs_f64();
+        if gone >= self.next && stderr().is_terminal() {
+            self.next = gone + 0.1;
+            let left = gone / f64::from(count.max(1)) * f64::from(self.count.saturating_sub(count));
+            // The end of a longer line before it is erased (ECMA-48, EL).
+            eprint!("\r{count}/{} {}, {left:.0} s left\x1b[K", self.count, self.noun);
         }
     }
 
-    /// All are done.
+    /// Ends the display: all items are done.
     pub fn finish(self) {
-        self.bar.finish_and_clear();
+        if self.next > QUIET {
+            eprint!("\r\x1b[K");
+        }
     }
 }

@@ -3,22 +3,22 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Where each of some frames is written.
+/// File names of a number of frames.
 #[derive(Debug)]
 pub struct Images {
-    /// What stands before the number, or the whole name where there is none.
+    /// The part before the number, or the whole name where there is none.
     before: String,
-    /// Least digits of the number, and what stands behind it.
+    /// Least digits of the number, and the part after it.
     numbered: Option<(usize, String)>,
     frames: u32,
 }
 
 impl Images {
-    /// The number takes the place of the first `{}` or `%04d` in the file name of `output`; several
-    /// frames without either are numbered before the extension.
+    /// The number takes the place of the first `{}` or `%04d` in the file name of `output`; several frames
+    /// without either are numbered before the extension.
     pub fn new(output: &Path, frames: u32) -> Self {
         let text = output.to_string_lossy();
-        // Every number as long as the last, so that names sort.
+        // All numbers are as long as the last, so that names sort.
         let digits = frames.saturating_sub(1).to_string().len().max(4);
         let parts = braces(&text, digits)
             .or_else(|| percent(&text))
@@ -41,7 +41,7 @@ impl Images {
     }
 }
 
-/// The file, or the first and the last.
+/// Writes the file name, or the first and the last.
 impl fmt::Display for Images {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}", self.path(0).display())?;
@@ -59,7 +59,7 @@ fn braces(text: &str, digits: usize) -> Option<Parts> {
     Some((before.to_owned(), digits, after.to_owned()))
 }
 
-/// `%d` and `%04d`, as in printf.
+/// Splits a name at `%d` or `%04d`, as in printf.
 fn percent(text: &str) -> Option<Parts> {
     text.match_indices('%').find_map(|(at, _)| {
         let (width, after) = text[at + 1..].split_once('d')?;

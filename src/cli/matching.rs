@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use insonify::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::output;
 use insonify::scene::Imaging;
 use insonify::scene::file::{self, Entry, save};
 use insonify::settings::Group;
-use insonify::sim::matching::{self, Adjusted, MatchError, Matching, Options};
 use insonify::sim::shaders::Library;
 use miette::{Result, miette};
 
@@ -40,7 +40,7 @@ pub struct Match {
     common: Common,
 }
 
-/// `--fit`.
+/// Value of `--fit`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Fitted {
     /// Gain.
@@ -65,7 +65,7 @@ fn band(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user or the device can get wrong, said once; the scene file is then untouched.
+/// Every mistake of the user and every error of the device, reported once; the scene file is then untouched.
 pub fn run(args: &Match) -> Result<()> {
     let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
@@ -112,7 +112,7 @@ pub fn run(args: &Match) -> Result<()> {
     write(args, &made)
 }
 
-/// Writes what has changed, unless nothing has and no other file is wanted.
+/// Writes the changes, unless there is none and no other file is wanted.
 fn write(args: &Match, made: &Matching) -> Result<()> {
     let settings = settings(made, &args.common.overrides);
     for (path, value) in settings.iter().filter_map(|(p, v)| Some((p, v.as_ref()?))) {
@@ -130,8 +130,8 @@ fn write(args: &Match, made: &Matching) -> Result<()> {
     Ok(())
 }
 
-/// Entries of the scene file that have changed, as `--set` takes them; those that were overridden count,
-/// since the file may say something else.
+/// Entries of the scene file that have changed, as `--set` takes them; overridden ones count as changed,
+/// since the file may give another value.
 fn settings(made: &Matching, overrides: &[(String, String)]) -> Vec<Entry> {
     let after = file::entries(&made.after.imaging, Imaging::TABLE);
     let changed = file::changes(&made.before.imaging, &made.after.imaging, Imaging::TABLE);

@@ -1,9 +1,9 @@
-//! In which order images are shown.
+//! The random order in which images are shown.
 
 use insonify::random::pcg4d;
 
-/// Which of `count` images stands at each place, drawn by `seed` (Fisher and Yates). Each `stream` draws
-/// an order of its own.
+/// A permutation of `count` images, drawn by `seed` (Fisher and Yates). Each `stream` draws an order of
+/// its own.
 pub fn order(count: usize, seed: u32, stream: u32) -> Vec<usize> {
     let mut order: Vec<usize> = (0..count).collect();
     for last in (1..count).rev() {
@@ -30,8 +30,8 @@ mod tests {
         assert_eq!(sorted, (0..23).collect::<Vec<_>>());
     }
 
-    /// Every image is as often at every place: chi-squared over 25 pairs, 16 degrees of freedom, of
-    /// which 39.25 is exceeded once in a thousand.
+    /// Every image is equally often at every place: chi-squared over 25 pairs, 16 degrees of freedom, with
+    /// 39.25 exceeded once in a thousand.
     #[test]
     fn every_image_comes_to_every_place() {
         let runs = 5000;

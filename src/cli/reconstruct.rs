@@ -55,7 +55,7 @@ pub struct Reconstruct {
     output: PathBuf,
 }
 
-/// `--interpolation`.
+/// Value of `--interpolation`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum InterpolationChoice {
     /// The voxel it lies in.
@@ -64,7 +64,7 @@ enum InterpolationChoice {
     Linear,
 }
 
-/// `--compounding`.
+/// Value of `--compounding`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum CompoundingChoice {
     /// Their mean.
@@ -85,7 +85,7 @@ fn numbers<T: std::str::FromStr>(text: &str) -> Result<Vec<T>, String> {
     numbers.map_err(|_| format!("'{text}' is no list of such numbers"))
 }
 
-/// `--spacing`: one number for all axes, or one for each, mm.
+/// Value of `--spacing`: one number for all axes, or one for each, mm.
 pub fn spacing(text: &str) -> Result<DVec3, String> {
     match numbers::<f64>(text)?.as_slice() {
         [all] => Ok(DVec3::splat(*all)),
@@ -116,7 +116,7 @@ fn clip(text: &str) -> Result<[i32; 4], String> {
 /// Runs the command.
 ///
 /// # Errors
-/// What is wrong with the files or the settings, said once.
+/// Every fault of files and settings, reported once.
 pub fn run(args: &Reconstruct) -> Result<()> {
     let (sequence, warnings) = Sequence::load(&args.sequence)?;
     for warning in &warnings {
@@ -172,7 +172,7 @@ pub fn run(args: &Reconstruct) -> Result<()> {
     Ok(())
 }
 
-/// Says what was made of `frames` frames.
+/// Prints the result for `frames` frames.
 pub fn tell(path: &Path, made: &Reconstruction, frames: usize) {
     output::line(path.display());
     output::line(&made.volume);

@@ -80,7 +80,7 @@ pub struct Register {
     json: Option<PathBuf>,
 }
 
-/// `--frame`.
+/// Value of `--frame`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum FrameChoice {
     /// Left, posterior, superior: DICOM, ITK, files of 3D Slicer.
@@ -89,7 +89,7 @@ enum FrameChoice {
     Ras,
 }
 
-/// `--transformation`.
+/// Value of `--transformation`.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum TransformationChoice {
     /// Rotation and shift.
@@ -98,7 +98,7 @@ enum TransformationChoice {
     Similarity,
 }
 
-/// `--start`.
+/// Value of `--start`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Start {
     /// As the scene places the volume now.
@@ -123,24 +123,24 @@ impl Register {
     }
 }
 
-/// What a registration comes to. Transforms are from the world as the volume lies in it now to the world
-/// as the model lies in it.
+/// Result of a registration. Transforms are from the world with the volume at its present place to the world
+/// of the model.
 struct Registered {
     landmarks: Vec<Landmark>,
-    /// Where the search began.
+    /// Transform at the start of the search.
     start: DAffine3,
-    /// Where it ended.
+    /// Transform at its end.
     transform: DAffine3,
-    /// How the surface fits; none where landmarks were all there was.
+    /// Fit of the surface; none where there were only landmarks.
     fit: Option<Fit>,
-    /// Mean of what was registered, as the volume lies now.
+    /// Mean of the registered points, with the volume at its present place.
     middle: DVec3,
 }
 
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user can get wrong, said once; the scene file is then untouched.
+/// Every mistake of the user, reported once; the scene file is then untouched.
 pub fn run(args: &Register) -> Result<()> {
     let (mut scene, found) = Scene::load(&args.scene, &[])?;
     for warning in &found {
@@ -157,7 +157,7 @@ pub fn run(args: &Register) -> Result<()> {
     let target = Target::of(args, &scene, &volume)?;
     let mut warnings = Vec::new();
     let made = search(args, &scene, &volume, &mut warnings);
-    // They may say why there is nothing.
+    // The warnings may explain why there is no result.
     let made = made.inspect_err(|_| told::warn(&warnings))?;
     let placement = Placement::of(&target.placed(&made.transform), args.transformation());
     warnings.extend(told::doubts(&made));
@@ -177,7 +177,7 @@ pub fn run(args: &Register) -> Result<()> {
     Ok(())
 }
 
-/// Lays the volume onto the model.
+/// Searches the transform from the volume to the model.
 fn search(
     args: &Register,
     scene: &Scene,
@@ -225,13 +225,13 @@ fn search(
     })
 }
 
-/// The placement that is changed.
+/// The placement to be changed.
 struct Target {
     /// Its table in the scene file.
     table: String,
-    /// The placement now.
+    /// The present placement.
     rest: DAffine3,
-    /// Of a node, the world from its parent; none of the volume, which is what moves otherwise.
+    /// The world from its parent for a node; none for the volume, which is moved by default.
     world_from_parent: Option<DAffine3>,
 }
 
@@ -253,11 +253,11 @@ impl Target {
         })
     }
 
-    /// The placement after `model_from_volume`, which takes the world about the volume to the model.
+    /// The placement after `model_from_volume`, which moves the world about the volume to the model.
     fn placed(&self, model_from_volume: &DAffine3) -> DAffine3 {
         match self.world_from_parent {
             None => *model_from_volume * self.rest,
-            // The model goes the way back, in its parent's axes.
+            // The model moves by the inverse, in its parent's axes.
             Some(world_from_parent) => {
                 let volume_from_model = model_from_volume.inverse();
                 world_from_parent.inverse() * volume_from_model * world_from_parent * self.rest

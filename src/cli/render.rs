@@ -11,17 +11,18 @@ use super::common::{self, Common, Progress};
 use super::images::Images;
 use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
-use insonify::movie::Movie;
 use insonify::output;
+use insonify::output::movie::Movie;
 use insonify::scene::{Scene, file};
 use insonify::settings::ScatterMode;
 use insonify::sim::calibration::Calibration;
 use insonify::sim::dump;
+use insonify::sim::facts;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::statistics::Statistics;
 
-/// Frames of an animation shown per second where the scene's time stands still.
+/// Frames per second of an animation whose scene time stands still.
 const SHOWN: f64 = 10.0;
 
 /// Arguments of `insonify render`.
@@ -77,7 +78,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user or the device can get wrong, said once.
+/// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Render) -> Result<()> {
     let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
@@ -109,7 +110,7 @@ pub fn run(args: &Render) -> Result<()> {
         let memory = device.memory();
         let report = json!({
             "scene": args.scene.display().to_string(),
-            "settings": output::settings(&scene.probe, &scene.simulation, &scene.imaging),
+            "settings": facts::settings(&scene.probe, &scene.simulation, &scene.imaging),
             "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
             "tracer": tracer.to_string(),
             "triangles": scene.triangles(),
@@ -141,7 +142,7 @@ pub fn run(args: &Render) -> Result<()> {
     args.common.validated(&device)
 }
 
-/// Scatterers per resolution cell over depth, of the tissue that has most; none in voxel mode.
+/// Scatterers per resolution cell over depth, of the tissue with most; none in voxel mode.
 fn scatterers(scene: &Scene) -> Option<Vec<Value>> {
     if scene.simulation.scatter_mode == ScatterMode::Voxel {
         return None;
@@ -156,7 +157,7 @@ fn scatterers(scene: &Scene) -> Option<Vec<Value>> {
     Some((0..=8).map(depth).map(row).collect())
 }
 
-/// What the rays of one more frame come to, per ray.
+/// Counts of one more frame, per ray.
 fn steps(
     simulator: &mut Simulator,
     library: &Library,
@@ -193,8 +194,8 @@ fn library(_: &Render) -> Result<Library> {
     Ok(Library::embedded())
 }
 
-/// Takes over kernels whose sources have changed; a mistake in them is told, and the last good ones
-/// stay.
+/// Takes over kernels whose sources have changed; reports a mistake in them and keeps the last good
+/// ones.
 #[cfg(feature = "compile")]
 fn reload(simulator: &mut Simulator, library: &mut Library) {
     match library.poll() {
@@ -210,7 +211,7 @@ fn reload(simulator: &mut Simulator, library: &mut Library) {
 #[cfg(not(feature = "compile"))]
 fn reload(_: &mut Simulator, _: &mut Library) {}
 
-/// What a frame shows.
+/// Time and pose of a frame.
 struct Moment {
     /// Time of the scene, s.
     seconds: f64,
@@ -227,18 +228,22 @@ fn moments(args: &Render, scene: &Scene) -> Result<Vec<Moment>> {
         return Ok((0..args.frames.unwrap_or(1)).map(moment).collect());
     };
     let track = file::load_trajectory(path)?;
+    let few = |frames: f64| match frames <= 100_000.0 {
+        true => Ok(frames as u32),
+        false => Err(miette!(
+            help = "give --frames or a lower --fps",
+            "{} makes {frames} frames; at most 100000 are rendered",
+            path.display()
+        )),
+    };
     let stations = match args.fps {
-        Some(fps) => acquire::stations_at(&track, scene, fps, args.frames),
+        Some(fps) => {
+            let frames = args.frames.map_or_else(|| acquire::poses_at(&track, fps), f64::from);
+            acquire::stations_at(&track, scene, fps, few(frames)?)
+        }
         None => acquire::stations_of(&track, scene, args.frames),
     };
-    if stations.len() > 100_000 {
-        return Err(miette!(
-            help = "give --frames or a lower --fps",
-            "{} makes {} frames; at most 100000 are rendered",
-            path.display(),
-            stations.len()
-        ));
-    }
+    few(stations.len() as f64)?;
     let first = stations[0].time;
     let moment = |station: &Station| Moment {
         seconds: start + station.time - first,
@@ -247,7 +252,7 @@ fn moments(args: &Render, scene: &Scene) -> Result<Vec<Moment>> {
     Ok(stations.iter().map(moment).collect())
 }
 
-/// Frames per second of a trajectory's rows, in the mean.
+/// Mean frames per second of a trajectory's rows.
 fn pace(args: &Render, moments: &[Moment]) -> Option<f64> {
     args.trajectory.as_ref()?;
     let (first, last) = (moments.first()?, moments.last()?);
@@ -255,8 +260,8 @@ fn pace(args: &Render, moments: &[Moment]) -> Option<f64> {
     (seconds > 0.0).then(|| (moments.len() - 1) as f64 / seconds)
 }
 
-/// All frames, each written as an image; the device's timings of each. The scene stands at the time
-/// of the last frame afterwards.
+/// Simulates all frames and writes each as an image; returns the device's timings of each. The scene's time
+/// is then that of the last frame.
 fn simulate(
     simulator: &mut Simulator,
     library: &mut Library,
@@ -312,7 +317,7 @@ fn default_output(scene: &Path) -> PathBuf {
     PathBuf::from(scene.file_stem().unwrap_or_default()).with_extension("png")
 }
 
-/// Per stage, in frame order; a stage that ran more than once per frame counts whole.
+/// Statistics per stage, in frame order; a stage that ran more than once per frame counts in total.
 fn stage_statistics(timings: &[FrameTimings]) -> Map<String, Value> {
     let mut stages: Vec<(String, Vec<f64>)> = Vec::new();
     for (index, frame) in timings.iter().enumerate() {

@@ -1,5 +1,5 @@
-//! `insonify serve`: the simulator without a window. A tracker moves the probe over OpenIGTLink,
-//! and whoever is connected receives the images.
+//! `insonify serve`: the simulator without a window. A tracker moves the probe over OpenIGTLink, and all
+//! connected clients receive the images.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
@@ -18,9 +18,9 @@ use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use insonify::sim::{self, Simulator};
 
-/// How long to rest where nothing has changed: a tracker sends 30 to 100 poses a second.
+/// Pause where nothing has changed: a tracker sends 30 to 100 poses a second.
 const REST: Duration = Duration::from_millis(3);
-/// How often clients and errors are told.
+/// Time between reports about clients and errors.
 const TOLD: Duration = Duration::from_secs(1);
 
 /// Arguments of `insonify serve`.
@@ -56,7 +56,7 @@ fn rate(text: &str) -> Result<f64, String> {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user or the device can get wrong, said once.
+/// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Serve) -> Result<()> {
     let common = &args.common;
     let mut scene = common.scene(&args.scene)?;
@@ -77,7 +77,7 @@ pub fn run(args: &Serve) -> Result<()> {
     common.validated(&device)
 }
 
-/// The last image: the state that it shows, and its level of quality.
+/// The last image: its state of the scene, and its level of quality.
 struct Shown {
     state: (DAffine3, Vec<Placed>),
     level: usize,
@@ -127,7 +127,7 @@ fn simulate(
         simulator.frame(scene, noise).into_diagnostic()?;
         let (_, _, rgba) = simulator.pixels().into_diagnostic()?;
         own.apply(scene);
-        // The first frame at all compiles what the driver has put off.
+        // The very first frame includes kernels that the driver compiles late.
         if frames > 0 {
             pace.finished(level, start.elapsed().as_secs_f64() * 1e3);
         }
@@ -144,14 +144,14 @@ fn simulate(
 /// Placement, visibility and shape of an instance.
 type Placed = (DAffine3, bool, usize, [(usize, f64); 4]);
 
-/// What of a scene changes with time and tracker.
+/// The part of a scene that changes with time and tracker.
 fn state(scene: &Scene) -> (DAffine3, Vec<Placed>) {
     let placed = scene.instances.iter();
     let placed = placed.map(|i| (i.world_from_object, i.shown, i.mesh, i.keyframes.blend));
     (scene.world_from_probe, placed.collect())
 }
 
-/// What the user has been told already.
+/// Reports already made to the user.
 #[derive(Default)]
 struct Told {
     tracker: String,
@@ -160,7 +160,7 @@ struct Told {
 }
 
 impl Told {
-    /// Says what is new of the tracker at once, of clients and errors once a second.
+    /// Reports news of the tracker at once, of clients and errors once a second.
     fn tell(&mut self, server: &Server) {
         let tracker = match server.pose() {
             Tracked::Never => String::new(),

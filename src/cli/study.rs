@@ -1,4 +1,4 @@
-//! `insonify study`: images rated blind, and what the ratings come to.
+//! `insonify study`: images rated blind, and results of the ratings.
 
 use clap::{Args, Subcommand};
 use miette::Result;
@@ -26,7 +26,7 @@ enum Command {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user or the device can get wrong, said once.
+/// Every mistake of the user and every error of the device, reported once.
 pub fn run(study: &Study) -> Result<()> {
     match &study.command {
         Command::Make(args) => make::run(args),

@@ -1,12 +1,12 @@
-//! `insonify vary`: many images of one scene on one sheet.
+//! `insonify vary`: many images of one scene on one contact sheet.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use insonify::output;
+use insonify::output::sheet::{Sheet, Tile};
 use insonify::scene::Scene;
-use insonify::sheet::{Sheet, Tile};
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 
@@ -68,7 +68,7 @@ impl fmt::Display for Show {
 /// Runs the command.
 ///
 /// # Errors
-/// Everything that the user or the device can get wrong, said once.
+/// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Vary) -> Result<()> {
     let common = &args.common;
     let (mut scene, variants, warnings) =
@@ -108,11 +108,11 @@ pub fn run(args: &Vary) -> Result<()> {
     common.validated(&device)
 }
 
-/// Where the results go.
+/// Paths of the results.
 struct Files {
     sheet: PathBuf,
     table: PathBuf,
-    /// For the single images.
+    /// Folder for the single images.
     folder: Option<PathBuf>,
 }
 
@@ -136,7 +136,7 @@ impl Files {
     }
 }
 
-/// Writes sheet, table and single images.
+/// Writes contact sheet, table and single images.
 fn write(args: &Vary, scene: &Scene, pictures: &[Picture], files: &Files) -> Result<()> {
     let order = match args.shuffle {
         Some(seed) => order(pictures.len(), seed, 0),
@@ -154,7 +154,7 @@ fn write(args: &Vary, scene: &Scene, pictures: &[Picture], files: &Files) -> Res
             image: &picture.image,
         })
         .collect();
-    // Beside the first image, so that what lies below and above stands side by side.
+    // Beside the first image, so that the values below and above stand side by side.
     let panel = (args.show == Show::Parameters && !blind).then(|| pictures::own_values(scene));
     let shift = usize::from(panel.is_some());
     tiles.splice(1..1, panel.map(Tile::Text));
@@ -191,7 +191,7 @@ fn save(image: &image::GrayImage, path: &Path) -> Result<()> {
     image.save(path).into_diagnostic().wrap_err_with(|| format!("writing {}", path.display()))
 }
 
-/// Name of a single image. In blind rating it says nothing of what it shows.
+/// Name of a single image. In blind rating it does not reveal the content.
 fn single(number: usize, picture: &Picture, blind: bool) -> String {
     match blind {
         true => format!("{number:02}.png"),
@@ -199,7 +199,7 @@ fn single(number: usize, picture: &Picture, blind: bool) -> String {
     }
 }
 
-/// Below, above, below, above: both values of two parameters in a row.
+/// Number of columns: below, above, below, above for two parameters in a row.
 fn columns(args: &Vary) -> usize {
     match args.show {
         Show::Parameters => 4,

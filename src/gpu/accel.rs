@@ -1,5 +1,5 @@
-//! What bottom and top level share: the structure itself, its geometry and sizes, scratch memory,
-//! compacted sizes.
+//! The common part of bottom and top level: the structure itself, its geometry and sizes, scratch
+//! memory, compacted sizes.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -16,7 +16,7 @@ pub(crate) struct RawAccel {
     pub(crate) handle: vk::AccelerationStructureKHR,
     pub(crate) name: String,
     pub(crate) buffer: Buffer,
-    /// Builds and refits of a structure that changes; a top level must come after the last.
+    /// Number of builds and refits of a structure that changes; a top level must be built after the last.
     builds: AtomicU64,
     device: Arc<Device>,
 }
@@ -76,7 +76,7 @@ impl Drop for RawAccel {
     }
 }
 
-/// Opaque triangles of packed single-precision vertices and 32-bit indices at these addresses.
+/// Geometry of opaque triangles: packed single-precision vertices and 32-bit indices at these addresses.
 pub(crate) fn triangles<'a>(
     vertices: vk::DeviceAddress,
     vertex_count: u32,

@@ -1,4 +1,4 @@
-//! The physical devices of the machine: what each offers, what it lacks, and which one is taken.
+//! The physical devices of the machine: abilities, what is missing, and the choice of one.
 
 use std::ffi::{CStr, CString};
 use std::fmt::Write as _;
@@ -43,7 +43,7 @@ pub struct DeviceInfo {
     pub index: usize,
     /// Name given by the driver.
     pub name: String,
-    /// Discrete, integrated, ...
+    /// Kind of the device.
     pub kind: AdapterKind,
     /// Driver name and version.
     pub driver: String,
@@ -51,13 +51,13 @@ pub struct DeviceInfo {
     pub api_version: String,
     /// Size of the largest device-local heap in bytes.
     pub memory_bytes: u64,
-    /// The kernel with hardware ray queries can run.
+    /// True where the kernel with hardware ray queries can run.
     pub ray_query: bool,
-    /// Acceleration structures can be built (even where ray queries are absent).
+    /// True where acceleration structures can be built (even where ray queries are absent).
     pub acceleration_structure: bool,
-    /// The kernels can run at all.
+    /// True where the kernels can run at all.
     pub usable: bool,
-    /// What it lacks, each with its consequence; empty when it has all that can be used.
+    /// Missing abilities, each with its consequence; empty where nothing useful is missing.
     pub lacks: Vec<String>,
 }
 
@@ -74,9 +74,9 @@ pub(crate) struct Adapter {
     /// without ray-tracing cores have them alone.
     pub(crate) ray_tracing_pipeline: bool,
     pub(crate) robust_buffer_access: bool,
-    /// R8 and R16 images can be written by kernels.
+    /// True where kernels can write R8 and R16 images.
     pub(crate) extended_storage_formats: bool,
-    /// Pictures can be shown in a window.
+    /// True where pictures can be shown in a window.
     pub(crate) swapchain: bool,
     /// VK_KHR_portability_subset must be enabled where it is offered.
     pub(crate) portability_subset: bool,
@@ -88,7 +88,7 @@ pub fn list_devices() -> Result<Vec<DeviceInfo>, GpuError> {
     Ok(adapters(&instance)?.into_iter().map(|a| a.info).collect())
 }
 
-/// One line per device, for error messages.
+/// A row per device, for error messages.
 fn table(adapters: &[Adapter]) -> String {
     let mut text = String::new();
     for Adapter { info, .. } in adapters {
@@ -109,8 +109,8 @@ fn table(adapters: &[Adapter]) -> String {
 /// Test of a device and one of its queue families: true where it can present to the window.
 pub(crate) type Presents<'a> = &'a dyn Fn(vk::PhysicalDevice, u32) -> bool;
 
-/// The device named by `selector` (index, or part of the name in any case), or the best usable one; with
-/// the queues to take. With a window those devices come first that can show pictures in it.
+/// The device named by `selector` (index, or part of the name in any case), or the best usable one, with the
+/// queues to take. For a window, devices that can show pictures in it come first.
 pub(crate) fn choose(
     instance: &Instance,
     selector: Option<&str>,
@@ -167,8 +167,8 @@ pub(crate) fn choose(
     }
 }
 
-/// The lower, the better. Dozen, which runs on Direct3D 12, comes last: it calls itself what lies below
-/// it, and does less than the driver beside it.
+/// Rank of a device; the lower, the better. Dozen, which runs on Direct3D 12, comes last: it reports the kind of
+/// the device below it, and does less than the driver beside it.
 fn rank(kind: AdapterKind, driver: vk::DriverId) -> (bool, AdapterKind) {
     (driver == vk::DriverId::MESA_DOZEN, kind)
 }
@@ -336,7 +336,7 @@ fn version_text(version: u32) -> String {
     )
 }
 
-/// Vulkan 1.2 tells the driver's name; older drivers only a number of their own making.
+/// Name and version of the driver. Vulkan 1.2 gives the name; older drivers only a number of their own making.
 fn driver_text(driver: &vk::PhysicalDeviceDriverProperties<'_>, version: u32) -> String {
     let name = text(driver.driver_name_as_c_str().ok());
     let info = text(driver.driver_info_as_c_str().ok());

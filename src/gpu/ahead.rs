@@ -1,8 +1,8 @@
 //! Kernels compiled ahead, several at once, for a driver that compiles only when a kernel first runs.
 //!
 //! llvmpipe has one queue, which compiles kernel after kernel, each when it is first dispatched. A dispatch
-//! of no groups compiles as well, on any device, and Mesa keeps the result in its folder. So each kernel that
-//! is new here is dispatched on a device of its own, beside others, and the device that asked finds it there.
+//! of no groups compiles as well, on any device, and Mesa keeps the result in its folder. So each new kernel
+//! is dispatched on a device of its own, beside others, and the device that asked finds it in the folder.
 
 use std::sync::Arc;
 
@@ -13,8 +13,8 @@ use super::kernel::Kernel;
 use super::memory::BufferKind;
 use super::reflect::BindingKind;
 
-/// Compiles a kernel on a device of its own. What fails here fails again, and is told, where the kernel is
-/// wanted.
+/// Compiles a kernel on a device of its own. An error here occurs again, and is reported, where the kernel is
+/// needed.
 pub(super) fn compile(
     device: &str,
     name: &str,
@@ -27,12 +27,12 @@ pub(super) fn compile(
     dispatch_nothing(&device, &kernel)
 }
 
-/// Has the device compile a kernel, unless that binds more than storage buffers.
+/// Makes the device compile a kernel, unless that binds more than storage buffers.
 fn dispatch_nothing(device: &Arc<Device>, kernel: &Kernel) -> Result<(), GpuError> {
     if (kernel.bindings().iter()).any(|b| b.kind != BindingKind::StorageBuffer) {
         return Ok(());
     }
-    // As small as may be: nobody reads them.
+    // As small as possible: nobody reads them.
     let nothing = || device.buffer("nothing", 4, BufferKind::Storage);
     let made: Result<Vec<_>, _> = kernel.bindings().iter().map(|_| nothing()).collect();
     let made = made?;

@@ -1,8 +1,8 @@
 //! Stages, the global barriers between them, and a check that none is missing.
 //!
 //! The validation layers (1.3.239) see a read after a write and a write after a read, but neither a
-//! dispatch that overwrites what an earlier dispatch wrote nor a trace of an acceleration structure still being built. A
-//! software driver runs one after the other, so there the result is right all the same. The check
+//! dispatch that overwrites the output of an earlier dispatch nor a trace of an acceleration structure still
+//! being built. A software driver runs one after the other, so its result is right all the same. The check
 //! below finds both from the bindings alone. A buffer that a kernel only reads must be declared
 //! `readonly`, else two such kernels count as writers.
 
@@ -28,7 +28,7 @@ impl Stage {
         1 << self as u8
     }
 
-    /// Stage and access masks; `accel` and `ray_query` say what the device has enabled, since
+    /// Stage and access masks; `accel` and `ray_query` are true where the device has enabled them, since
     /// Vulkan refuses flags of features that are off.
     pub(crate) fn masks(
         self,
@@ -62,7 +62,7 @@ impl Stage {
     }
 }
 
-/// One access since the last barrier that covers everything.
+/// An access since the last barrier that covers everything.
 struct Access {
     stage: Stage,
     write: bool,
@@ -108,7 +108,7 @@ impl HazardCheck {
         hazard
     }
 
-    /// Notes a barrier; it also carries on what `from` itself waits for.
+    /// Notes a barrier; it also covers everything that `from` itself waits for.
     pub(crate) fn barrier(&mut self, from: Stage, to: Stage) {
         for access in self.accesses.values_mut().flatten() {
             if access.stage == from || access.seen_by & from.bit() != 0 {

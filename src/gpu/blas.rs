@@ -47,12 +47,12 @@ impl BlasInput<'_> {
     }
 }
 
-/// How to build.
+/// Options of a build.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BlasOptions {
-    /// Spend build time on fast rays; else rays on a fast build.
+    /// Spends build time on fast rays; otherwise the build is fast and rays are slower.
     pub fast_trace: bool,
-    /// Copy the structure into as little memory as it needs.
+    /// Copies the structure into as little memory as it needs.
     pub compact: bool,
 }
 
@@ -94,7 +94,7 @@ impl Blas {
         Self::build_timed(device, inputs, options).map(|(built, _)| built)
     }
 
-    /// As [`Self::build_many`], with what it took.
+    /// As [`Self::build_many`], with its times and sizes.
     pub(crate) fn build_timed(
         device: &Arc<Device>,
         inputs: &[BlasInput<'_>],
@@ -253,7 +253,7 @@ fn record_builds(
     Ok(timings.of("build"))
 }
 
-/// Copies each structure into one of the size it needs; returns milliseconds too.
+/// Copies each structure into one of the size it needs; also returns milliseconds.
 fn compact(
     device: &Arc<Device>,
     structures: &[Arc<RawAccel>],

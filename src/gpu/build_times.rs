@@ -1,8 +1,8 @@
-//! What bottom-level structures cost: milliseconds on the device, and memory.
+//! Cost of bottom-level structures: milliseconds on the device, and memory.
 //!
-//! Builds need acceleration structures alone, so this runs where ray queries are absent, as on GPUs
+//! Builds need acceleration structures only, so this runs where ray queries are absent, as on GPUs
 //! for data centres. Uploads are not timed; times are NaN on a device without timestamps. The first
-//! builds on a GPU that has rested are slow: measure several times.
+//! builds on a GPU that was idle are slow: measure several times.
 
 use std::sync::Arc;
 
@@ -16,24 +16,24 @@ use super::memory::BufferKind;
 /// Cost of meshes that are built once.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BuildTimes {
-    /// All builds, milliseconds.
+    /// Time of all builds, milliseconds.
     pub build_ms: f64,
-    /// All copies into as little memory as is needed, milliseconds; 0 without compaction.
+    /// Time of all copies into as little memory as needed, milliseconds; 0 without compaction.
     pub compact_ms: f64,
-    /// Structures as built, bytes.
+    /// Size of the structures as built, bytes.
     pub bytes: u64,
-    /// Structures that remain, bytes: as built without compaction.
+    /// Size of the structures that remain, bytes: as built without compaction.
     pub compacted_bytes: u64,
 }
 
 /// Cost of meshes that change.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct RefitTimes {
-    /// All builds, milliseconds.
+    /// Time of all builds, milliseconds.
     pub build_ms: f64,
-    /// All refits, milliseconds.
+    /// Time of all refits, milliseconds.
     pub refit_ms: f64,
-    /// Structures with the scratch memory that they keep, bytes.
+    /// Size of the structures with the scratch memory that they keep, bytes.
     pub bytes: u64,
 }
 
@@ -50,7 +50,7 @@ pub fn build_times(
 }
 
 /// Builds the meshes as [`DynamicBlas`], side by side, then refits them all. Geometry, structures and
-/// scratch memory of all are held at a time. `fast_trace` as in [`DynamicBlas::new`].
+/// scratch memory of all meshes are held at once. `fast_trace` as in [`DynamicBlas::new`].
 ///
 /// # Errors
 /// As [`Blas::build_many`].

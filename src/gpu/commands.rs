@@ -1,4 +1,4 @@
-//! Recording: scopes, barriers, dispatches.
+//! Recording of commands: scopes, barriers, dispatches.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ use super::reflect::BindingInfo;
 use super::timer::FrameTimings;
 use super::tlas::Tlas;
 
-/// What a dispatch binds at one number of its kernel.
+/// Object that a dispatch binds at one number of its kernel.
 #[derive(Clone, Copy)]
 pub enum Binding<'a> {
     /// Whole buffer, for a storage or uniform block.
@@ -70,7 +70,7 @@ impl<'a> Commands<'a> {
         self.barrier_between(&work, &work);
     }
 
-    /// The device that is recorded for.
+    /// The device of the commands.
     pub fn device(&self) -> &Arc<Device> {
         &self.slot.device
     }
@@ -129,7 +129,7 @@ impl<'a> Commands<'a> {
         }
     }
 
-    /// Ends the asking whether the submission is still wanted, for all that is recorded from here on: see [`super::Frames::abandon_when`].
+    /// Stops asking from here on whether the submission is still wanted: see [`super::Frames::abandon_when`].
     pub fn keep_on(&mut self) {
         self.slot.abandon = None;
     }
@@ -148,7 +148,7 @@ impl<'a> Commands<'a> {
         self.note(object, name, stage, write, by);
     }
 
-    /// While validating, notes that `stage` reads or writes an object that is kept otherwise.
+    /// While validating, notes that `stage` reads or writes an object that is kept alive elsewhere.
     pub(crate) fn note<T>(
         &mut self,
         object: &Arc<T>,
@@ -218,7 +218,7 @@ impl<'a> Commands<'a> {
         for (info, binding) in kernel.bindings().iter().zip(bindings) {
             self.use_binding(kernel, info, binding);
         }
-        // Commands without a scope are uploads and the like.
+        // Commands without a scope are, for instance, uploads.
         let pieces = self.slot.pieces.as_mut().filter(|_| !self.scope.is_empty());
         let Some(pieces) = pieces else {
             self.bind_and_dispatch((kernel, pipeline), push, &sets, [[0; 3], groups]);

@@ -12,13 +12,13 @@ use super::kernel::Kernel;
 use super::memory::BufferKind;
 use super::reflect::{BindingInfo, BindingKind};
 
-/// Descriptor sets of one pool; a frame has some tens of dispatches.
+/// Number of descriptor sets of one pool; a frame has some tens of dispatches.
 const SETS_PER_POOL: u32 = 128;
 
-/// Pools of one slot: reset together, and one more is made when all are full.
+/// Pools of one slot: reset together; one more is made when all are full.
 pub(crate) struct DescriptorPools {
     pools: Vec<vk::DescriptorPool>,
-    /// Index of the pool that is being filled.
+    /// Index of the pool in use.
     current: usize,
     device: Arc<Device>,
 }
@@ -28,7 +28,7 @@ impl DescriptorPools {
         Self { pools: Vec::new(), current: 0, device: device.clone() }
     }
 
-    /// Frees all sets; no submission may use them any more.
+    /// Frees all sets; no submission may still use them.
     pub(crate) fn reset(&mut self) -> Result<(), GpuError> {
         self.current = 0;
         for &pool in &self.pools {
@@ -42,7 +42,7 @@ impl DescriptorPools {
         Ok(())
     }
 
-    /// One set per layout.
+    /// Allocates one set per layout.
     pub(crate) fn allocate(
         &mut self,
         layouts: &[vk::DescriptorSetLayout],
@@ -107,7 +107,7 @@ impl Drop for DescriptorPools {
 }
 
 impl Binding<'_> {
-    /// A sentence on why `self` does not fit `info`, if so.
+    /// A sentence with the reason why `self` does not fit `info`, if so.
     fn misfit(&self, info: &BindingInfo, device: &Device) -> Option<String> {
         let fits = match self {
             Self::Buffer(_) => {

@@ -16,12 +16,12 @@ use super::memory::{MemoryUse, MemoryUseCounter};
 use super::queues::{Place, Plan, Queues};
 use super::surface::Probe;
 
-/// Blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
+/// Size of the blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
 const DEVICE_BLOCK_BYTES: u64 = 32 << 20;
 const HOST_BLOCK_BYTES: u64 = 16 << 20;
 
-/// How to open a device.
+/// Options for opening a device.
 #[derive(Clone, Debug, Default)]
 pub struct DeviceOptions {
     /// Index in [`super::list_devices`] or part of a name in any case; `None` takes the best.
@@ -32,10 +32,10 @@ pub struct DeviceOptions {
     /// Folder in which compiled kernels are kept from one start to the next, such as
     /// [`super::cache_folder`]; without it only the driver keeps them, if it does.
     pub kept_in: Option<PathBuf>,
-    /// Leaves ray queries off although the device has them; acceleration structures can be built
+    /// Leaves ray queries off although the device has them; acceleration structures can still be built
     /// where it has ray-tracing pipelines.
     pub without_ray_query: bool,
-    /// Leaves acceleration structures, and with them ray queries, off although the device has them.
+    /// Leaves acceleration structures and ray queries off although the device has them.
     pub without_acceleration_structures: bool,
 }
 
@@ -46,7 +46,7 @@ pub struct Limits {
     pub max_storage_buffer_bytes: u64,
     /// Largest uniform buffer, in bytes.
     pub max_uniform_buffer_bytes: u64,
-    /// Storage buffers that one kernel may bind; at least 4 everywhere.
+    /// Most storage buffers that one kernel may bind; at least 4 everywhere.
     pub max_storage_buffers: u32,
     /// Largest side of a 2D image, in texels.
     pub max_image_2d: u32,
@@ -54,17 +54,17 @@ pub struct Limits {
     pub max_image_3d: u32,
     /// Largest push-constant block, in bytes; at least 128 everywhere.
     pub max_push_constant_bytes: u32,
-    /// Work groups of one dispatch, per axis.
+    /// Most work groups of one dispatch, per axis.
     pub max_group_count: [u32; 3],
-    /// Threads of one work group, per axis.
+    /// Most threads of one work group, per axis.
     pub max_group_size: [u32; 3],
-    /// Threads of one work group in all.
+    /// Most threads of one work group in all.
     pub max_group_threads: u32,
-    /// Shared memory of one work group, in bytes.
+    /// Largest shared memory of one work group, in bytes.
     pub max_shared_bytes: u32,
 }
 
-/// What acceleration structures need to know of the device.
+/// Properties of the device for acceleration structures.
 pub(crate) struct AccelSupport {
     pub(crate) functions: khr::acceleration_structure::Device,
     pub(crate) scratch_alignment: u64,
@@ -84,7 +84,7 @@ pub struct Device {
     pub(crate) memory_use: MemoryUseCounter,
     pub(crate) kept: Kept,
     ray_query: bool,
-    /// Mesa's driver for the processor.
+    /// True for Mesa's driver for the processor.
     jit: bool,
     info: DeviceInfo,
     limits: Limits,
@@ -99,7 +99,7 @@ impl Device {
     /// Opens the chosen device with one compute queue.
     ///
     /// # Errors
-    /// No such device, or none that can be used; what is missing for validation.
+    /// No such device, or no usable one; missing parts for validation.
     pub fn new(options: &DeviceOptions) -> Result<Arc<Self>, GpuError> {
         Self::open(options, None)
     }
@@ -205,13 +205,13 @@ impl Device {
         }))
     }
 
-    /// What the device is and lacks.
+    /// Properties of the device, and what it lacks.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
     }
 
-    /// Threads that it runs at once, about: where a dispatch has fewer, part of the device is idle. Vulkan
-    /// does not say; the largest GPUs have room for a quarter of a million. Drivers without a GPU run one
+    /// Estimate of the threads that the device runs at once: a dispatch with fewer leaves part of it idle. Vulkan
+    /// does not tell; the largest GPUs have room for a quarter of a million. Drivers without a GPU run one
     /// work group per core: a few for each, so that all cores end at about the same time.
     pub fn threads_at_once(&self) -> u32 {
         let cores = std::thread::available_parallelism().map_or(1, |n| n.get() as u32);
@@ -241,17 +241,17 @@ impl Device {
         &self.limits
     }
 
-    /// Kernels with ray queries can run.
+    /// Returns whether kernels with ray queries can run.
     pub fn supports_ray_query(&self) -> bool {
         self.ray_query
     }
 
-    /// Acceleration structures can be built.
+    /// Returns whether acceleration structures can be built.
     pub fn supports_acceleration_structure(&self) -> bool {
         self.accel.is_some()
     }
 
-    /// The validation layers are on.
+    /// Returns whether the validation layers are on.
     pub fn is_validating(&self) -> bool {
         self.instance.validating
     }
@@ -271,18 +271,18 @@ impl Device {
         self.memory_use.read()
     }
 
-    /// True for a number that [`Self::remember`] was given for this device and driver, at this start or
+    /// Returns true for a number given to [`Self::remember`] for this device and driver, at this start or
     /// an earlier one.
     pub fn remembers(&self, what: u64) -> bool {
         self.kept.knows(what)
     }
 
-    /// True for a driver that compiles a kernel only when it first runs, and then keeps it for every device.
+    /// Returns true for a driver that compiles a kernel only when it first runs, and then keeps it for every device.
     pub(crate) fn compiles_late(&self) -> bool {
         self.jit && !kept::llvmpipe_has_nothing()
     }
 
-    /// Keeps a number for later starts, where anything is kept.
+    /// Keeps a number for later starts, if a folder for that is set.
     pub fn remember(&self, what: u64) {
         self.kept.learn([what]);
     }
@@ -353,7 +353,7 @@ fn create_device(
     plan: &Plan,
     window: bool,
 ) -> Result<ash::Device, GpuError> {
-    // The window's picture is not to wait for the simulation's.
+    // The window's picture should not wait for the simulation's.
     let priority = |family, index| match window && plan.window == (Place { family, index }) {
         true => 1.0,
         false => 0.5,

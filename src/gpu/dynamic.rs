@@ -13,26 +13,26 @@ use super::device::Device;
 use super::error::GpuError;
 use super::memory::{Buffer, BufferKind, RawBuffer};
 
-/// Where on the device a mesh lies: in storage buffers that may hold others too.
+/// Place of a mesh on the device: in storage buffers that may hold others too.
 #[derive(Clone, Copy)]
 pub struct DynamicSource<'a> {
     /// Packed positions, three floats each, mm.
     pub vertices: &'a Buffer,
-    /// The position that index 0 means.
+    /// Position of index 0.
     pub first_vertex: u32,
-    /// Positions from there on, of which no index lies beyond.
+    /// Number of positions from there on; every index is below it.
     pub vertex_count: u32,
     /// Packed triangles, three 32-bit indices each.
     pub triangles: &'a Buffer,
-    /// The first of the mesh's triangles.
+    /// The mesh's first triangle.
     pub first_triangle: u32,
-    /// Its triangles.
+    /// Number of its triangles.
     pub triangle_count: u32,
 }
 
-/// What a refit may not change.
+/// Properties that a refit may not change.
 struct Built {
-    /// The buffer of the triangles, which may be gone by now.
+    /// The buffer of the triangles, which may have been dropped.
     triangles: Weak<RawBuffer>,
     first_triangle: u32,
     triangle_count: u32,
@@ -53,10 +53,10 @@ pub struct DynamicBlas {
 impl DynamicBlas {
     /// Reserves memory for a mesh of up to `max_triangles` triangles whose indices lie below
     /// `max_vertices`; it must be built before it is placed. `fast_trace` spends build time on fast
-    /// rays; without it rays are spent on a fast build.
+    /// rays; otherwise the build is fast and rays are slower.
     ///
     /// # Errors
-    /// When the device has no acceleration structures, or none of this size, or no memory.
+    /// The device has no acceleration structures, or none of this size, or no memory.
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -99,12 +99,12 @@ impl DynamicBlas {
         self.blas.bytes() + self.scratch.buffer.size()
     }
 
-    /// Records a build from scratch; a mesh of another size and other triangles is welcome. It waits
+    /// Records a build from scratch; size and triangles of the mesh may differ from the last. It waits
     /// for the dispatches and copies before it in the submission, and builds of top levels wait for
     /// it; builds of several meshes run side by side.
     ///
     /// # Errors
-    /// When the mesh does not lie within its buffers or exceeds what was reserved.
+    /// The mesh does not lie within its buffers, or exceeds the reserved size.
     pub fn build(
         &mut self,
         commands: &mut Commands<'_>,
@@ -115,15 +115,15 @@ impl DynamicBlas {
         self.record(commands, source, mode)
     }
 
-    /// Records a refit: the boxes follow the vertices, which triangles they hold stays. Cheaper, but
+    /// Records a refit: the boxes follow the vertices and keep their triangles. Cheaper, but
     /// rays get slower the further neighbours have parted since the build. Waits as [`Self::build`].
     ///
-    /// The triangles must be those of the build, unchanged; their vertices may be written anew or lie
+    /// The triangles must be those of the build, unchanged; their vertices may be rewritten or lie
     /// elsewhere (`first_vertex`). They must be finite, or not finite where they were not at the
     /// build: on the device nothing checks that.
     ///
     /// # Errors
-    /// When nothing was built, or another range of triangles or another number of vertices.
+    /// Nothing was built, or the range of triangles or the number of vertices differs.
     pub fn refit(
         &mut self,
         commands: &mut Commands<'_>,

@@ -1,4 +1,4 @@
-//! What can go wrong on the device, with the Vulkan result code kept and a remedy where one is known.
+//! Errors of the device, with the Vulkan result code and a remedy where one is known.
 
 use ash::vk;
 
@@ -10,7 +10,7 @@ pub enum GpuError {
         "no usable Vulkan loader: {reason}; install the package libvulkan1 (Debian, Ubuntu), vulkan-loader (Fedora) or vulkan-icd-loader (Arch)"
     )]
     Loader {
-        /// The loader's own words.
+        /// The loader's message.
         reason: String,
     },
     /// No Vulkan device at all, or none that can run the kernels.
@@ -24,19 +24,19 @@ pub enum GpuError {
     /// `--device` names no device or one that cannot run the kernels.
     #[error("device '{selector}' {problem}; devices are:\n{available}")]
     UnknownDevice {
-        /// What was asked for.
+        /// The selector that was asked for.
         selector: String,
-        /// Why it cannot be used.
+        /// The reason why it cannot be used.
         problem: String,
-        /// One line per device: index, name, driver.
+        /// A row per device: index, name, driver.
         available: String,
     },
-    /// Validation was asked for, but cannot be had.
+    /// Validation was asked for, but is not available.
     #[error(
         "validation was asked for, but {reason}; install the package vulkan-validationlayers, or run without --validate and INSONIFY_VALIDATE"
     )]
     ValidationUnavailable {
-        /// Which layer or extension is missing.
+        /// The missing layer or extension.
         reason: String,
     },
     /// A Vulkan call failed.
@@ -44,7 +44,7 @@ pub enum GpuError {
     Vulkan {
         /// The result code as Vulkan gave it.
         code: vk::Result,
-        /// What was being done, with the name of the object.
+        /// The operation, with the name of the object.
         what: String,
     },
     /// The device stopped answering (driver reset, a kernel that ran past the watchdog).
@@ -52,27 +52,27 @@ pub enum GpuError {
         "the Vulkan device was lost (ERROR_DEVICE_LOST) while {what}; the last pass that had begun is '{last_pass}', of the passes: {passes}"
     )]
     DeviceLost {
-        /// What the host was doing.
+        /// The host's operation.
         what: String,
         /// The last timer scope that began on the device.
         last_pass: String,
         /// All scopes of the submission in order.
         passes: String,
     },
-    /// The submission was given up because its result is not wanted any more: see [`super::Frames::abandon_when`].
+    /// The submission was abandoned because its result is no longer wanted: see [`super::Frames::abandon_when`].
     #[error("it was abandoned for something newer")]
     Abandoned,
-    /// Device memory could not be had.
+    /// Device memory could not be allocated.
     #[error("no memory for '{name}' ({bytes} bytes): {reason}")]
     Allocation {
         /// Name of the buffer or image.
         name: String,
         /// Its size in bytes.
         bytes: u64,
-        /// The allocator's own words.
+        /// The allocator's message.
         reason: String,
     },
-    /// A buffer or image beyond what the device takes.
+    /// A buffer or image is larger than the device takes.
     #[error(
         "'{name}' of {what} exceeds the device's {limit_name} of {limit}; lower the quality, or choose another device"
     )]
@@ -105,7 +105,7 @@ pub enum GpuError {
     Kernel {
         /// Name of the kernel.
         kernel: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// The bindings of a dispatch do not fit the kernel.
@@ -115,7 +115,7 @@ pub enum GpuError {
         kernel: String,
         /// Name, set and number of the binding.
         binding: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// The push constants of a dispatch do not fit the kernel.
@@ -143,7 +143,7 @@ pub enum GpuError {
     Geometry {
         /// Name of the mesh.
         name: String,
-        /// What is wrong.
+        /// The problem.
         problem: String,
     },
     /// A device that cannot show pictures in the window.
@@ -153,21 +153,21 @@ pub enum GpuError {
     Window {
         /// Name of the device.
         device: String,
-        /// What is missing.
+        /// The missing ability.
         reason: String,
     },
-    /// Something this device does not offer.
+    /// The device lacks a feature.
     #[error("'{device}' has no {feature}")]
     Unsupported {
         /// Name of the device.
         device: String,
-        /// What is missing.
+        /// The missing feature.
         feature: String,
     },
 }
 
-/// Turns a bare result code into an error that says what was being done; `what` completes the
-/// sentence "Vulkan error X while ...".
+/// Turns a bare result code into an error with the operation; `what` completes the sentence "Vulkan
+/// error X while ...".
 pub(crate) fn during(what: impl Into<String>) -> impl FnOnce(vk::Result) -> GpuError {
     move |code| GpuError::Vulkan { code, what: what.into() }
 }

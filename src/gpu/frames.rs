@@ -1,4 +1,4 @@
-//! Slots: what one submission in flight owns, and the two of them that frames take in turn.
+//! Slots: the resources of one submission in flight. Frames take two of them in turn.
 
 use std::any::Any;
 use std::sync::Arc;
@@ -17,14 +17,14 @@ use super::pieces::Pieces;
 use super::queues::Lane;
 use super::timer::{FrameTimings, Timer};
 
-/// Frames that may be under way at a time. What the CPU writes per frame through
+/// Number of frames that may be under way at a time. What the CPU writes per frame through
 /// [`Commands::write`] is held once per slot; everything else is held once.
 pub const FRAMES_IN_FLIGHT: usize = 2;
 
 /// Smallest staging buffer, in bytes.
 const MIN_STAGING_BYTES: u64 = 64 << 10;
 
-/// Says whether what is being made is wanted no longer.
+/// A function that returns whether the result under way is no longer wanted.
 pub type Abandon = Arc<dyn Fn() -> bool + Send + Sync>;
 
 /// Command buffer, fence, descriptors, timer and staging memory of one submission.
@@ -34,27 +34,27 @@ pub(crate) struct Slot {
     pub(crate) descriptors: DescriptorPools,
     pub(crate) timer: Timer,
     pub(crate) hazards: HazardCheck,
-    /// Of a frame's slot.
+    /// Pieces of a frame; none for other submissions.
     pub(crate) pieces: Option<Pieces>,
-    /// When the first piece was handed over.
+    /// Time when the first piece was handed over.
     began: Option<Instant>,
     /// Kernels of this submission that have not run on the device before.
     new_kernels: Vec<u64>,
-    /// Asked between two pieces, while there is a question.
+    /// Asked between two pieces, if there is one.
     pub(crate) abandon: Option<Abandon>,
     lane: Lane,
     /// All command buffers; one more is made as soon as there are as many pieces.
     buffers: Vec<vk::CommandBuffer>,
-    /// One for each piece but the last.
+    /// A fence for each piece except the last.
     piece_fences: Vec<vk::Fence>,
-    /// Pieces of this submission that the queue has.
+    /// Number of pieces of this submission that the queue has.
     handed: usize,
     pool: vk::CommandPool,
     fence: vk::Fence,
-    /// What the submission uses, kept until it has finished.
+    /// Objects that the submission uses, kept until it has finished.
     kept: Vec<Arc<dyn Any + Send + Sync>>,
     staging: Option<Buffer>,
-    /// Bytes of `staging` taken by this submission.
+    /// Number of bytes of `staging` taken by this submission.
     staging_used: u64,
     pending: bool,
     frame: u64,
@@ -99,7 +99,7 @@ impl Slot {
         Ok(slot)
     }
 
-    /// Command buffer `index`; the first of all, or next to one that there is.
+    /// Command buffer `index`, an existing one or the next one.
     fn buffer(&mut self, index: usize) -> Result<vk::CommandBuffer, vk::Result> {
         if index == self.buffers.len() {
             let info = vk::CommandBufferAllocateInfo::default()
@@ -143,9 +143,9 @@ impl Slot {
         unsafe { self.device.raw.begin_command_buffer(self.commands, &info) }
     }
 
-    /// Hands over what is recorded so far and goes on recording, once no more than this piece and
-    /// the one before are under way. Fails where the rest is wanted no longer; what was recorded before
-    /// is on its way all the same.
+    /// Hands over the commands recorded so far and goes on recording, once no more than this piece and
+    /// the one before are under way. Fails where the rest is no longer wanted; the commands recorded before
+    /// run all the same.
     pub(crate) fn cut(&mut self) -> Result<(), GpuError> {
         self.hand_over().map_err(|code| self.failure(code, "submitting a piece of a frame"))?;
         match self.abandon.as_ref().is_some_and(|wanted_no_longer| wanted_no_longer()) {
@@ -183,8 +183,8 @@ impl Slot {
         self.open()
     }
 
-    /// Waits for pieces whose last one was perhaps never handed over. A lost device returns at
-    /// once, and the next call on it says so.
+    /// Waits for pieces whose last one was perhaps never handed over. A lost device returns at once, and
+    /// the next call on it fails.
     fn wait_for_pieces(&mut self) {
         let handed = &self.piece_fences[..std::mem::take(&mut self.handed)];
         if !handed.is_empty() {
@@ -254,7 +254,7 @@ impl Slot {
         Ok(Some(timings))
     }
 
-    /// An error that names the last pass where the device is lost.
+    /// An error for `code`, with the last pass where the device is lost.
     pub(crate) fn failure(&self, code: vk::Result, what: &str) -> GpuError {
         if code != vk::Result::ERROR_DEVICE_LOST {
             return during(what)(code);
@@ -340,7 +340,7 @@ impl Frames {
     }
 
     /// Number of the frame that [`Self::begin`] starts next; modulo [`FRAMES_IN_FLIGHT`] it is the
-    /// index of what the CPU holds per slot.
+    /// index of the data that the CPU holds per slot.
     pub fn next_frame(&self) -> u64 {
         self.next
     }
@@ -355,9 +355,9 @@ impl Frames {
         Commands::begin(slot, frame)
     }
 
-    /// From the next [`Self::begin`] on asks between the pieces of a submission whether it is wanted no
-    /// longer; recording then fails with [`GpuError::Abandoned`], and the submission ends with the pieces
-    /// that the queue has. Where the window has a queue of its own there are no pieces, and all is made.
+    /// Makes submissions from the next [`Self::begin`] on ask between their pieces whether they are no longer
+    /// wanted. Recording then fails with [`GpuError::Abandoned`], and the submission ends with the pieces that
+    /// the queue has. Where the window has a queue of its own there are no pieces, and every frame is finished.
     pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
         self.abandon = wanted_no_longer;
     }
@@ -386,8 +386,8 @@ impl Frames {
         Ok(())
     }
 
-    /// Times of the frames that have finished since the last call, oldest first. Take them now
-    /// and then: they are collected until then.
+    /// Times of the frames that have finished since the last call, oldest first. They are collected until
+    /// this call, so call it now and then.
     pub fn take_timings(&mut self) -> Vec<FrameTimings> {
         std::mem::take(&mut self.finished)
     }

@@ -32,7 +32,7 @@ pub enum ImageFormat {
 }
 
 impl ImageFormat {
-    /// Bytes of one texel.
+    /// Number of bytes of one texel.
     pub const fn texel_bytes(self) -> u64 {
         match self {
             Self::R8Unorm => 1,
@@ -61,7 +61,7 @@ pub(crate) struct RawImage {
     dim: ImageDim,
     format: ImageFormat,
     filterable: bool,
-    /// `Some` but while the image is created or dropped.
+    /// `Some` except while the image is created or dropped.
     memory: Option<Memory>,
     device: Arc<Device>,
 }
@@ -147,7 +147,7 @@ impl Image {
         Ok(image)
     }
 
-    /// Whether there is no other clone, not even of a submission that was not waited for.
+    /// Returns whether there is no other clone, not even of a submission that was not waited for.
     pub fn is_unshared(&self) -> bool {
         Arc::strong_count(&self.0) == 1
     }
@@ -186,7 +186,7 @@ impl Image {
         texels * self.0.format.texel_bytes()
     }
 
-    /// A sampler with [`Filter::Linear`] may be used with it.
+    /// Returns whether a sampler with [`Filter::Linear`] may be used with it.
     pub fn filters_linearly(&self) -> bool {
         self.0.filterable
     }
@@ -281,7 +281,7 @@ fn check_extent(
     })
 }
 
-/// How a sampler reads between texels.
+/// Interpolation of a sampler between texels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
     /// The nearest texel.
@@ -290,7 +290,7 @@ pub enum Filter {
     Linear,
 }
 
-/// What a sampler reads outside the image.
+/// Value of a sampler outside the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AddressMode {
     /// The texel at the edge.

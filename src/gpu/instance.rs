@@ -9,7 +9,7 @@ use super::error::{GpuError, during};
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
 
-/// What a window of each system needs; those that the loader offers are enabled.
+/// Extensions for windows of each system; those that the loader offers are enabled.
 const SURFACES: [&CStr; 6] = [
     khr::surface::NAME,
     khr::xlib_surface::NAME,
@@ -19,12 +19,12 @@ const SURFACES: [&CStr; 6] = [
     ext::metal_surface::NAME,
 ];
 
-/// Messages kept at most; a mistake in a loop would otherwise fill the memory.
+/// Most messages kept; a mistake in a loop would otherwise fill the memory.
 const MAX_MESSAGES: usize = 1000;
 
 /// Warnings and errors of the validation layers and of this layer's own hazard check.
 ///
-/// Clones share one list, so that a test can read what was said while the device was destroyed.
+/// Clones share one list, so that a test can read the messages from the device's destruction.
 #[derive(Clone, Debug, Default)]
 pub struct ValidationLog(Arc<Mutex<Vec<String>>>);
 
@@ -52,8 +52,8 @@ impl ValidationLog {
     }
 }
 
-/// The loader (1.4.309) walks its lists of instances, drivers and devices without a lock when an
-/// object is named through a layer: whoever changes the lists writes, whoever names reads.
+/// Lock for the loader's lists. The loader (1.4.309) reads its lists of instances, drivers and devices without a
+/// lock when an object is named through a layer: a change of the lists locks for writing, naming for reading.
 pub(super) static LOADER_LISTS: RwLock<()> = RwLock::new(());
 
 struct Messenger {
@@ -65,7 +65,7 @@ struct Messenger {
 pub(crate) struct Instance {
     pub(crate) raw: ash::Instance,
     pub(crate) api_version: u32,
-    /// Object names and labels are possible.
+    /// True where object names and labels are possible.
     pub(crate) debug_utils: bool,
     pub(crate) validating: bool,
     pub(crate) log: ValidationLog,
@@ -100,8 +100,8 @@ fn load() -> Result<ash::Entry, ash::LoadingError> {
 
 impl Instance {
     /// Opens the loader and makes an instance; with `validate` also the validation layer with
-    /// synchronization validation, which must then be installed; with `window` also what windows
-    /// need, as far as it is there.
+    /// synchronization validation, which must then be installed; with `window` also the extensions for
+    /// windows, as far as offered.
     pub(crate) fn new(validate: bool, window: bool) -> Result<Self, GpuError> {
         let loader = |reason: String| GpuError::Loader { reason };
         let entry = load().map_err(|e| loader(e.to_string()))?;
@@ -126,7 +126,7 @@ impl Instance {
         if debug_utils {
             extensions.push(ext::debug_utils::NAME.as_ptr());
         }
-        // Without it the loader hides MoltenVK's devices.
+        // Otherwise the loader hides MoltenVK's devices.
         let portability = has(khr::portability_enumeration::NAME);
         if portability {
             extensions.push(khr::portability_enumeration::NAME.as_ptr());
@@ -146,7 +146,7 @@ impl Instance {
         let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
         let mut features =
             vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
-        // What shaders access is checked by default in older layers, on request in newer ones.
+        // Accesses by shaders are checked by default in older layers, on request in newer ones.
         let yes = [vk::TRUE];
         let settings = [c"validate_sync", c"syncval_shader_accesses_heuristic"]
             .map(|name| switched_on(name, &yes));
@@ -240,7 +240,7 @@ fn extension_names(
         .collect())
 }
 
-/// The extensions of the validation layer, or an error saying what is missing.
+/// The extensions of the validation layer, or an error with the missing part.
 fn validation_extensions(entry: &ash::Entry) -> Result<Vec<std::ffi::CString>, GpuError> {
     let unavailable = |reason: &str| GpuError::ValidationUnavailable { reason: reason.into() };
     // SAFETY: the entry is loaded.

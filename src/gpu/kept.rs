@@ -1,10 +1,10 @@
-//! Compiled pipelines, kept in a folder from one start to the next, and word of it where a start has
-//! to compile.
+//! Compiled pipelines, kept in a folder from one start to the next, and a message to the user where a
+//! start has to compile.
 //!
 //! Drivers keep compiled kernels themselves, but not all, and not everywhere (containers, MoltenVK).
-//! One file per device and driver holds the driver's own pipeline cache and which kernels have run
-//! there before. A file that is broken, or of another device, is no error: its kernels are compiled
-//! again.
+//! One file per device and driver holds the driver's own pipeline cache and the list of kernels that
+//! have run there before. A file that is broken, or of another device, is no error: its kernels are
+//! compiled again.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -23,26 +23,26 @@ const MAGIC: &[u8] = b"insonify pipelines 1\n";
 /// Largest file that is written or read, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// Files kept at most: one per device and driver version. The oldest go first.
+/// Most files kept: one per device and driver version. The oldest are removed first.
 const MAX_FILES: usize = 8;
 
-/// After so long a wait the user is told what for.
+/// Length of a wait after which the user is told its reason.
 const PATIENCE: Duration = Duration::from_secs(1);
 
-/// Where this program keeps what it can make again: a folder of its own in the user's cache folder;
-/// none where the system names none.
+/// The folder for files that this program can make again: its own in the user's cache folder; none
+/// where the system names none.
 pub fn cache_folder() -> Option<PathBuf> {
     dirs::cache_dir().map(|folder| folder.join("insonify").join("pipelines"))
 }
 
-/// The folder for what Mesa compiles for this program, see [`super::prepare_process`]; none where the system
-/// names no cache folder.
+/// The folder for kernels that Mesa compiles for this program, see [`super::prepare_process`]; none where the
+/// system names no cache folder.
 pub(crate) fn mesa_folder() -> Option<PathBuf> {
     dirs::cache_dir().map(|folder| folder.join("insonify").join("mesa"))
 }
 
-/// Whether Mesa, which compiles for the processor when a kernel first runs, has nothing from before. It
-/// makes the folder when a device is opened.
+/// Returns whether Mesa, which compiles for the processor when a kernel first runs, has kept nothing from before.
+/// It makes the folder when a device is opened.
 pub(crate) fn llvmpipe_has_nothing() -> bool {
     let named = |name| std::env::var_os(name).map(PathBuf::from);
     let folder = named("MESA_SHADER_CACHE_DIR").or_else(dirs::cache_dir);
@@ -54,23 +54,23 @@ pub(crate) fn llvmpipe_has_nothing() -> bool {
     !entries.is_some_and(|mut entries| entries.any(|entry| entry.is_ok_and(ours)))
 }
 
-/// The pipeline cache of a device, and what of it is on disk.
+/// The pipeline cache of a device, and the content of its file.
 pub(crate) struct Kept {
     raw: ash::Device,
     cache: vk::PipelineCache,
     device: String,
-    /// Nothing is kept without one.
+    /// The file; without one nothing is kept.
     file: Option<PathBuf>,
-    /// Kernels that have run on this device with this driver, and what else was to be remembered of
+    /// Kernels that have run on this device with this driver, and further numbers to be remembered for
     /// them.
     known: Mutex<BTreeSet<u64>>,
-    /// The user knows what takes so long.
+    /// True once the user has been told the reason for the wait.
     told: Arc<AtomicBool>,
 }
 
 impl Kept {
-    /// Takes over what `folder` has for a device; `forgotten`: the driver has nothing any more of what
-    /// it compiled before.
+    /// Takes over the content of `folder` for a device; `forgotten`: the driver has lost everything that it
+    /// compiled before.
     pub(crate) fn new(
         raw: &ash::Device,
         properties: &vk::PhysicalDeviceProperties,
@@ -116,17 +116,17 @@ impl Kept {
         self.known.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether it was learnt.
+    /// Returns whether a number was learnt.
     pub(crate) fn knows(&self, what: u64) -> bool {
         self.known().contains(&what)
     }
 
-    /// Whether a kernel has never run here before; nobody knows where nothing is kept.
+    /// Returns whether a kernel has never run here before; false where nothing is kept.
     pub(crate) fn is_new(&self, kernel: u64) -> bool {
         self.file.is_some() && !self.known().contains(&kernel)
     }
 
-    /// Tells the user what takes so long, once, if what is returned is not dropped within a second
+    /// Tells the user the reason for the wait, once, if the returned value is not dropped within a second
     /// and one of `kernels` is new here.
     pub(crate) fn patience(&self, kernels: impl IntoIterator<Item = u64>) -> Option<Patience> {
         let new = kernels.into_iter().any(|kernel| self.is_new(kernel));
@@ -144,7 +144,7 @@ impl Kept {
         Some(Patience { _done: done })
     }
 
-    /// These kernels have run; what the driver made of them is written if any is new.
+    /// Notes that these kernels have run; writes the driver's data if any is new.
     pub(crate) fn learn(&self, kernels: impl IntoIterator<Item = u64>) {
         let Some(file) = &self.file else { return };
         let mut known = self.known();
@@ -170,12 +170,12 @@ impl Kept {
     }
 }
 
-/// Dropped when the wait is over.
+/// Guard of a wait, dropped when it is over.
 pub(crate) struct Patience {
     _done: Sender<()>,
 }
 
-/// One name per device, driver and driver version.
+/// Name of the file: one per device, driver and driver version.
 fn file_name(properties: &vk::PhysicalDeviceProperties) -> String {
     let hex = |bytes: &[u8]| -> String { bytes.iter().map(|b| format!("{b:02x}")).collect() };
     format!(
@@ -194,7 +194,7 @@ fn check_sum(bytes: &[u8]) -> u64 {
     crc::Crc::<u64>::new(&crc::CRC_64_XZ).checksum(bytes)
 }
 
-/// Magic, check sum of what follows, number of kernels, their ids, the driver's data.
+/// The bytes of a file: magic, check sum of the rest, number of kernels, their ids, the driver's data.
 fn encode(known: &BTreeSet<u64>, data: &[u8]) -> Vec<u8> {
     let mut rest = (known.len() as u64).to_le_bytes().to_vec();
     rest.extend(known.iter().flat_map(|id| id.to_le_bytes()));
@@ -219,7 +219,7 @@ fn decode(bytes: &[u8]) -> Option<Content> {
     Some((known, data.to_vec()))
 }
 
-/// Whether a pipeline cache's header names this device: drivers should look themselves, and not all do.
+/// Returns whether a pipeline cache's header names this device: drivers should check that themselves, but not all do.
 fn is_of(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
     let word = |at: usize| {
         let bytes = data.get(4 * at..4 * at + 4)?;
@@ -233,7 +233,7 @@ fn is_of(data: &[u8], properties: &vk::PhysicalDeviceProperties) -> bool {
             && data.get(16..32) == Some(&properties.pipeline_cache_uuid[..]))
 }
 
-/// What a file holds for a device; nothing where there is no file, and a problem where it cannot be used.
+/// Content of a file for a device; none where there is no file, and a problem where it cannot be used.
 fn read(
     file: &Path,
     properties: &vk::PhysicalDeviceProperties,
@@ -252,7 +252,7 @@ fn read(
     }
 }
 
-/// Writes a file as a whole or not at all, whoever else does at the same time.
+/// Writes a file as a whole or not at all, even if others write it at the same time.
 fn write(file: &Path, bytes: &[u8]) -> std::io::Result<()> {
     if bytes.len() as u64 > MAX_BYTES {
         return Err(std::io::Error::other("more than 64 MiB"));
@@ -280,5 +280,4 @@ fn forget_oldest(folder: &Path) -> std::io::Result<()> {
 }
 
 #[cfg(test)]
-#[path = "kept_tests.rs"]
 mod tests;

@@ -1,7 +1,7 @@
 //! Compute pipelines whose layouts come from their SPIR-V.
 //!
 //! A driver may take seconds for a pipeline. So pipelines are made on threads of their own while the
-//! caller goes on, or not before they are needed; the first dispatch waits for its own.
+//! caller goes on, or only when they are needed; the first dispatch waits for its own.
 
 use std::ffi::CString;
 use std::sync::{Arc, LazyLock, Once, OnceLock};
@@ -14,13 +14,15 @@ use super::device::Device;
 use super::error::{GpuError, during};
 use super::reflect::{BindingInfo, BindingKind, Reflection, reflect};
 
-/// Larger modules are worth a device of their own to be compiled on, words.
+/// Size above which a module is compiled on a device of its own, words.
 const LARGE: usize = 1024;
 
-/// Makes pipelines, as many at once as there are processors, in the order of asking. Not on rayon's own
-/// threads: scenes are loaded with those meanwhile.
+/// Threads that make pipelines, as many at once as there are processors, in the order of the requests. Not rayon's
+/// own threads: scenes are loaded with those meanwhile.
 static MAKERS: LazyLock<ThreadPool> = LazyLock::new(|| {
     let threads = ThreadPoolBuilder::new().thread_name(|at| format!("pipelines {at}"));
+    // A panic would end the process. Who needs the pipeline makes it itself, and meets the same.
+    let threads = threads.panic_handler(|_| ());
     threads.build().expect("threads for pipelines")
 });
 
@@ -28,12 +30,12 @@ static MAKERS: LazyLock<ThreadPool> = LazyLock::new(|| {
 pub(crate) struct RawKernel {
     pub(crate) name: String,
     pub(crate) reflection: Reflection,
-    /// One per set, empty for numbers that are not used.
+    /// One per set, empty for unused numbers.
     pub(crate) set_layouts: Vec<vk::DescriptorSetLayout>,
     pub(crate) layout: vk::PipelineLayout,
-    /// Same for the same SPIR-V and constants.
+    /// Number that is the same for the same SPIR-V and constants.
     pub(crate) id: u64,
-    /// `Some` but while the kernel is created.
+    /// `Some` except while the kernel is created.
     pipeline: Option<Arc<Pipeline>>,
     named: Once,
     device: Arc<Device>,
@@ -48,7 +50,7 @@ impl Kernel {
     /// thread. `specialization` gives constants by id, each as its 32 bits.
     ///
     /// # Errors
-    /// A module that does not fit the device. What the driver says of it is told by the first dispatch.
+    /// A module that does not fit the device. An error of the driver is reported by the first dispatch.
     pub fn new(
         device: &Arc<Device>,
         name: &str,
@@ -110,17 +112,17 @@ impl Kernel {
         Self::when_needed(&self.0.device, name, &pipeline.spirv, specialization)
     }
 
-    /// Has the pipeline made on another thread, if nobody has yet.
+    /// Starts making the pipeline on another thread, unless that has been started.
     pub fn prepare(&self) {
         if let Some(pipeline) = self.0.pipeline.clone() {
-            // Who needs it asks for its result.
+            // The user of the pipeline gets the result.
             MAKERS.spawn_fifo(move || {
                 let _ = pipeline.get();
             });
         }
     }
 
-    /// The pipeline; waits where it is still being made, and makes it where nobody does.
+    /// The pipeline; waits where it is being made, and makes it where nobody does.
     pub(crate) fn pipeline(&self) -> Result<vk::Pipeline, GpuError> {
         let kernel = &self.0;
         let pipeline = kernel.pipeline.as_ref().expect("set at creation");
@@ -137,7 +139,7 @@ impl Kernel {
         Ok(made)
     }
 
-    /// True for a kernel that has never run on this device and driver, where that is kept: its first run waits
+    /// Returns true for a kernel that has never run on this device and driver, where that is kept: its first run waits
     /// for the driver's compiler.
     pub fn is_new(&self) -> bool {
         self.0.device.kept.is_new(self.0.id)
@@ -148,7 +150,7 @@ impl Kernel {
         &self.0.name
     }
 
-    /// Threads of one work group per axis, as specialized.
+    /// Number of threads of one work group per axis, as specialized.
     pub fn local_size(&self) -> [u32; 3] {
         self.0.reflection.local_size
     }
@@ -165,7 +167,7 @@ impl Kernel {
 }
 
 impl Kernel {
-    /// Whether it asks how many groups there are: a dispatch of part of them would tell it less.
+    /// Returns whether it reads the number of groups: a dispatch of a part of them would give it less.
     pub(crate) fn counts_groups(&self) -> bool {
         self.0.reflection.counts_groups
     }
@@ -245,10 +247,10 @@ impl RawKernel {
     }
 }
 
-/// What a pipeline is made of and, once that has happened, the pipeline or the driver's refusal. It
-/// does not hold the device: the kernel does, and ends what is under way before it lets go.
+/// The inputs of a pipeline and, once made, the pipeline or the driver's error. It does not hold the
+/// device: the kernel does, and waits for the work under way before it releases the device.
 struct Pipeline {
-    /// Names of the device and the kernel, where it is first to be compiled on another one.
+    /// Names of the device and the kernel, where another device is to compile it first.
     ahead: Option<[String; 2]>,
     spirv: Vec<u32>,
     specialization: Vec<(u32, u32)>,
@@ -266,7 +268,7 @@ impl Pipeline {
 
     fn make(&self) -> Result<vk::Pipeline, vk::Result> {
         if let Some([device, kernel]) = &self.ahead {
-            // What fails there is told here, by the driver of the device in use.
+            // An error there occurs here again, from the driver of the device in use.
             let _ = ahead::compile(device, kernel, &self.spirv, &self.specialization);
         }
         let info = vk::ShaderModuleCreateInfo::default().code(&self.spirv);
@@ -301,7 +303,7 @@ impl Pipeline {
     }
 }
 
-/// The same number for the same SPIR-V and constants, also in another process.
+/// A number that is the same for the same SPIR-V and constants, also in another process.
 fn id(spirv: &[u32], specialization: &[(u32, u32)]) -> u64 {
     let crc = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = crc.digest();
@@ -314,7 +316,7 @@ fn id(spirv: &[u32], specialization: &[(u32, u32)]) -> u64 {
 
 impl Drop for RawKernel {
     fn drop(&mut self) {
-        // What is being made is waited for, and what is not begun never will be.
+        // Work under way is waited for; work not begun never will be.
         let made = (self.pipeline.as_ref())
             .and_then(|p| p.made.get_or_init(|| Err(vk::Result::NOT_READY)).ok());
         // SAFETY: submissions keep the kernels they use alive; null handles are ignored.

@@ -10,7 +10,7 @@ use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use super::device::Device;
 use super::error::{GpuError, during};
 
-/// Bytes taken from the allocator by buffers, images and acceleration structures.
+/// Bytes that buffers, images and acceleration structures take from the allocator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MemoryUse {
     /// Bytes in use now.
@@ -43,11 +43,11 @@ impl MemoryUseCounter {
     }
 }
 
-/// What fresh memory holds while validating: a kernel that reads what nobody wrote then differs from
-/// one that does not. Large as a number, far from 0 as a float, and no valid index.
+/// Content of fresh memory while validating: a kernel that reads unwritten memory then differs from one that
+/// does not. Large as a number, far from 0 as a float, and no valid index.
 pub(crate) const POISON: u32 = 0xcdcd_cdcd;
 
-/// What a buffer is for.
+/// Purpose of a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferKind {
     /// In device memory, read and written by kernels (as storage or uniform block) and copies; read
@@ -66,7 +66,7 @@ pub enum BufferKind {
 }
 
 impl BufferKind {
-    /// `accel`: whether acceleration structures are on, without which their usages are unknown.
+    /// Usage flags; `accel` is true where acceleration structures are on, without which their flags are unknown.
     fn usage(self, accel: bool) -> vk::BufferUsageFlags {
         use vk::BufferUsageFlags as Usage;
         let build_input =
@@ -91,8 +91,8 @@ impl BufferKind {
 
     fn location(self) -> MemoryLocation {
         match self {
-            // Copies are read once: host memory does, and leaves alone the little of the device's that
-            // the CPU can write.
+            // Copies are read once, so host memory is good enough: the small part of the device's memory that
+            // the CPU can write stays free.
             Self::Upload => MemoryLocation::GpuToCpu,
             Self::Readback => MemoryLocation::GpuToCpu,
             _ => MemoryLocation::GpuOnly,
@@ -156,12 +156,12 @@ pub(crate) struct RawBuffer {
     pub(crate) name: String,
     pub(crate) size: u64,
     pub(crate) kind: BufferKind,
-    /// `Some` but while the buffer is created or dropped.
+    /// `Some` except while the buffer is created or dropped.
     memory: Option<Memory>,
     device: Arc<Device>,
 }
 
-/// A named buffer. Clones refer to the same memory, which is released when the last clone is gone
+/// A named buffer. Clones refer to the same memory, which is released when the last clone is dropped
 /// and no submission uses it any more.
 #[derive(Clone)]
 pub struct Buffer(pub(crate) Arc<RawBuffer>);

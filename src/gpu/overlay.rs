@@ -1,4 +1,4 @@
-//! The interface's own drawing: egui's primitives through egui-ash-renderer.
+//! Drawing of the interface: egui's primitives through egui-ash-renderer.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -18,8 +18,8 @@ use super::queues::Lane;
 pub(crate) struct Overlay {
     /// `None` only while it is dropped.
     renderer: Option<Renderer<DefaultAllocator>>,
-    /// All texels of each texture: the renderer's own updates of parts of one discard the rest
-    /// (from the layout UNDEFINED), so that it always gets the whole.
+    /// All texels of each texture: the renderer's own updates of a part discard the rest (from the layout
+    /// UNDEFINED), so it always gets the whole texture.
     textures: HashMap<egui::TextureId, egui::ColorImage>,
     /// Textures that the frames under way may still show, oldest first.
     leaving: Vec<Vec<egui::TextureId>>,
@@ -27,7 +27,7 @@ pub(crate) struct Overlay {
     device: Arc<Device>,
 }
 
-/// Where to draw.
+/// Render pass, framebuffer and size to draw on.
 pub(crate) type Target = (vk::RenderPass, vk::Framebuffer, vk::Extent2D);
 
 impl Overlay {
@@ -56,7 +56,7 @@ impl Overlay {
         Ok(made)
     }
 
-    /// Takes over textures. The frame before the last must have been waited for.
+    /// Takes over changed textures. The frame before the last must have been waited for.
     pub(crate) fn update(&mut self, mut delta: egui::TexturesDelta) -> Result<(), GpuError> {
         let renderer = self.renderer.as_mut().expect("not being dropped");
         for (id, changes) in delta.set.drain() {
@@ -104,14 +104,14 @@ impl Overlay {
 
 impl Drop for Overlay {
     fn drop(&mut self) {
-        // Its objects are of the device, which outlives it.
+        // Its objects belong to the device, which outlives it.
         self.renderer = None;
         // SAFETY: the painter has waited for the queue; the pool's buffers are done with.
         unsafe { self.device.raw.destroy_command_pool(self.pool, None) };
     }
 }
 
-/// Puts a change into the texture that it belongs to.
+/// Puts a change into its texture.
 fn patch(
     textures: &mut HashMap<egui::TextureId, egui::ColorImage>,
     id: egui::TextureId,

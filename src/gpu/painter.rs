@@ -1,7 +1,7 @@
-//! Draws a window: images of the device, and an egui interface over them.
+//! The painter of a window: images of the device, and an egui interface over them.
 //!
-//! Images are blitted, so that their grey levels reach the screen as they are; egui's own renderer
-//! would take them through its colour space.
+//! Images are blitted, so that their grey levels reach the screen unchanged; egui's own renderer would
+//! convert them to its colour space.
 
 use std::sync::Arc;
 
@@ -20,11 +20,11 @@ use super::queues::Lane;
 use super::surface::Surface;
 use super::swapchain::{Acquired, Swapchain};
 
-/// An image and where it is shown.
+/// An image and its place in the window.
 pub struct Placed<'a> {
-    /// What is shown.
+    /// The image.
     pub image: &'a Image,
-    /// Where, in pixels of the window: left, top, right, bottom. What lies outside is cut off.
+    /// Place in pixels of the window: left, top, right, bottom. Parts outside are cut off.
     pub to: [f32; 4],
 }
 
@@ -46,20 +46,20 @@ pub struct Shot {
     pub rgba: Vec<u8>,
 }
 
-/// What painting brought.
+/// Result of painting.
 pub enum Painted {
     /// The picture is on its way to the screen; with its pixels where they were asked for.
     Shown(Option<Shot>),
-    /// Nothing was drawn: the window has no area, or the window system no room for a picture.
+    /// Nothing was drawn: the window has no area, or the window system has no picture free.
     Skipped,
 }
 
-/// Draws one window.
+/// Painter of one window.
 pub struct Painter {
     overlay: Overlay,
     swapchain: Option<Swapchain>,
     slots: [Slot; FRAMES_IN_FLIGHT],
-    /// One per slot: signalled when the picture that it draws on is free.
+    /// One per slot: signalled when its picture is free for drawing.
     free: [vk::Semaphore; FRAMES_IN_FLIGHT],
     pass: vk::RenderPass,
     next: u64,
@@ -68,7 +68,7 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// For a window and a device that was opened with [`super::DeviceOptions::window`].
+    /// A painter for a window and a device that was opened with [`super::DeviceOptions::window`].
     ///
     /// # Errors
     /// A device that cannot show pictures in this window, with the remedy.
@@ -99,7 +99,7 @@ impl Painter {
     /// too, and returns its pixels.
     ///
     /// # Errors
-    /// A lost device, no memory, a window system that lets no one read its pictures.
+    /// A lost device, no memory, a window system that does not allow reading its pictures.
     pub fn paint(
         &mut self,
         size: [u32; 2],
@@ -158,12 +158,12 @@ impl Painter {
         Ok(Painted::Shown(Some(self.shot(&buffer, extent))))
     }
 
-    /// Whether the pixels of the window can be had.
+    /// Returns whether the pixels of the window can be read.
     pub fn can_be_read(&self) -> bool {
         self.swapchain.as_ref().is_some_and(|chain| chain.readable)
     }
 
-    /// The next picture, of a new swapchain where the window has changed; none where there is none.
+    /// The next picture, of a new swapchain where the window has changed; none where none is available.
     fn acquire(&mut self, size: [u32; 2], slot: usize) -> Result<Option<usize>, GpuError> {
         // A window that is being dragged may change again before the picture is there.
         for _ in 0..3 {
@@ -199,7 +199,7 @@ impl Painter {
         Shot { size: [extent.width, extent.height], rgba }
     }
 
-    /// Waits until nothing of the window is under way any more.
+    /// Waits until no work of the window is under way.
     fn wait(&mut self) -> Result<(), GpuError> {
         for slot in &mut self.slots {
             slot.wait()?;
@@ -231,7 +231,7 @@ impl Drop for Painter {
 /// Layout, stages and accesses of a picture between two uses.
 type Use = (vk::ImageLayout, vk::PipelineStageFlags, vk::AccessFlags);
 
-/// As the window system hands it over: the semaphore is waited for before TRANSFER.
+/// State in which the window system hands it over: the semaphore is waited for before TRANSFER.
 const UNDEFINED: Use =
     (vk::ImageLayout::UNDEFINED, vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::empty());
 const COPY_TO: Use = (
@@ -258,7 +258,7 @@ const SHOWN: Use = (
     vk::AccessFlags::empty(),
 );
 
-/// One colour attachment that keeps what was blitted, in [`DRAWN`] before and after.
+/// A render pass with one colour attachment that keeps the blitted images, in [`DRAWN`] before and after.
 fn render_pass(device: &Device, format: vk::Format) -> Result<vk::RenderPass, GpuError> {
     let attachments = [vk::AttachmentDescription::default()
         .format(format)
@@ -300,7 +300,7 @@ impl Commands<'_> {
             let raw = &self.device().raw;
             raw.cmd_clear_color_image(self.raw(), image, COPY_TO.0, &black, &[whole()]);
         }
-        // What is cleared is written again by blits.
+        // The cleared area is written again by blits.
         self.move_window(image, COPY_TO, COPY_TO);
     }
 

@@ -2,46 +2,46 @@
 //!
 //! A queue runs in order, so a window that shares it and submits behind a frame of a second waits for a
 //! second. In pieces of a few milliseconds, of which no more than two are ever handed over, it waits for
-//! two of them. Where nobody waits the pieces are longer, but no dispatch runs so long that a driver
-//! takes the device for hung (Windows: 2 s). How long a dispatch takes follows from what one of its work
-//! groups took in the frame before, which may have had fewer of them.
+//! two of them. Without a waiting window the pieces are longer, but no dispatch runs so long that a driver
+//! takes the device for hung (Windows: 2 s). The duration of a dispatch is estimated from that of one of its
+//! work groups in the frame before, which may have had fewer of them.
 
 use std::collections::HashMap;
 
 use super::timer::FrameTimings;
 
-/// Longest time on the device that one piece should take where the window shares the queue, ms: two of
-/// them fit into an interface frame of 1/60 s.
+/// Longest time of one piece on the device where the window shares the queue, ms: two of them fit into
+/// an interface frame of 1/60 s.
 const SHARED_MS: f64 = 7.0;
 
-/// The same elsewhere, ms: a tenth of what Windows allows, so that a frame that suddenly takes several
-/// times as long as the one before is no loss.
+/// Longest time elsewhere, ms: a tenth of the limit of Windows, so that a frame that suddenly takes several
+/// times as long as the one before does no harm.
 const ALONE_MS: f64 = 200.0;
 
-/// Pieces of a dispatch that was never timed.
+/// Number of pieces of a dispatch that was never timed.
 const UNTIMED: usize = 16;
 
 /// A box of work groups: first one and extent, per axis.
 pub(crate) type Groups = [[u32; 3]; 2];
 
-/// How much the piece that is being recorded holds, and what is known of the dispatches to come.
+/// The load of the piece being recorded, and estimates for the dispatches to come.
 pub(crate) struct Pieces {
-    /// What one piece should take at most, ms.
+    /// Longest time of one piece, ms.
     budget_ms: f64,
     /// Mean time of one work group in scopes of each name, ms.
     group_ms: HashMap<String, f64>,
-    /// Work groups of this frame by scope.
+    /// Number of work groups of this frame by scope.
     groups: HashMap<String, f64>,
-    /// What the last frame took by the clock, ms, and its dispatches, where the queue has no timestamps.
+    /// Wall-clock time of the last frame, ms, and its number of dispatches, where the queue has no timestamps.
     whole: Option<(f64, usize)>,
-    /// Dispatches of this frame.
+    /// Number of dispatches of this frame.
     dispatches: usize,
-    /// What the commands recorded since the last cut will take, ms.
+    /// Estimated time of the commands recorded since the last cut, ms.
     load_ms: f64,
 }
 
 impl Pieces {
-    /// `shared`: the window waits behind them.
+    /// Pieces of a frame; `shared`: the window waits behind them.
     pub(crate) fn new(shared: bool) -> Self {
         Self {
             budget_ms: if shared { SHARED_MS } else { ALONE_MS },
@@ -60,8 +60,8 @@ impl Pieces {
         self.groups.clear();
     }
 
-    /// Takes over what the last frame took: its scopes or, where they were not timed, all of it by the
-    /// clock.
+    /// Takes over the times of the last frame: its scopes or, where they were not timed, the whole
+    /// wall-clock time.
     pub(crate) fn learn(&mut self, timings: &FrameTimings, wall_ms: f64) {
         self.whole = (timings.passes.is_empty()).then_some((wall_ms, self.dispatches.max(1)));
         for (name, groups) in &self.groups {
@@ -72,8 +72,8 @@ impl Pieces {
         }
     }
 
-    /// Cuts a dispatch of `scope` into boxes; `whole` kernels know the number of groups along y and
-    /// z and are only cut along x.
+    /// Cuts a dispatch of `scope` into boxes; `whole` kernels use the number of groups along y and z and
+    /// are only cut along x.
     pub(crate) fn cut(&mut self, scope: &str, groups: [u32; 3], whole: bool) -> (Vec<Groups>, f64) {
         self.dispatches += 1;
         *self.groups.entry(scope.to_owned()).or_default() += product(groups);
@@ -91,7 +91,7 @@ impl Pieces {
         (cut(groups, count, whole), each_ms)
     }
 
-    /// Notes a dispatch of `ms`; whether the commands before it have to go first.
+    /// Notes a dispatch of `ms`; returns whether the commands before it have to go first.
     pub(crate) fn add(&mut self, ms: f64) -> bool {
         let full = self.load_ms > 0.0 && self.load_ms + ms > self.budget_ms;
         self.load_ms = if full { ms } else { self.load_ms + ms };
@@ -103,7 +103,7 @@ fn product(groups: [u32; 3]) -> f64 {
     groups.map(f64::from).iter().product()
 }
 
-/// About `count` boxes of equal size that fill `groups`, cut along x, and along y where x is spent.
+/// About `count` boxes of equal size that fill `groups`, cut along x, and along y where x is used up.
 fn cut(groups: [u32; 3], count: usize, whole: bool) -> Vec<Groups> {
     let count = u32::try_from(count).unwrap_or(u32::MAX);
     let along = |length: u32, count: u32| {

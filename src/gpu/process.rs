@@ -1,17 +1,17 @@
-//! What is set for the whole process before a driver is opened.
+//! Settings of the whole process before a driver is opened.
 
 use super::kept;
 
-/// Has llvmpipe, Mesa's driver for the processor, compile kernels for vectors of four: that takes it a third of the
-/// time that vectors of eight do, frames take as long within a twentieth, and bits are the same (benches/RESULTS.md).
-/// What it compiled goes to a folder of this program's own: Mesa does not tell the two apart, and to run what was
-/// compiled for the other width would end the process. Who sets `LP_NATIVE_VECTOR_WIDTH` or `MESA_SHADER_CACHE_DIR`
-/// has both as they are.
+/// Makes llvmpipe, Mesa's driver for the processor, compile kernels for vectors of four: that takes it a third of the
+/// time for vectors of eight, frames take as long within a twentieth, and bits are the same (benches/RESULTS.md).
+/// Its compiled kernels go to a folder of this program's own: Mesa does not distinguish the two widths, and running
+/// a kernel compiled for the other width would end the process. If `LP_NATIVE_VECTOR_WIDTH` or
+/// `MESA_SHADER_CACHE_DIR` is set, both stay as they are.
 ///
-/// And has glibc make no heap for each thread: what drivers free on one of those after compiling stays there, 25 MB
-/// in two threads.
+/// Also keeps glibc from making a heap for each thread: memory that drivers free there after compiling is not
+/// given back, 25 MB in two threads.
 ///
-/// To be called first in `main`. Once there are other threads, nothing is done.
+/// To be called first in `main`. Once there are other threads, it does nothing.
 pub fn prepare_process() {
     const NAMES: [&str; 2] = ["LP_NATIVE_VECTOR_WIDTH", "MESA_SHADER_CACHE_DIR"];
     let alone = std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() == 1);

@@ -1,10 +1,10 @@
-//! The queues of a device, and who submits to which.
+//! The queues of a device, and their users.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ash::vk;
 
-/// Who submits.
+/// User of a queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Lane {
     /// The simulation, and everything without a window.
@@ -13,14 +13,14 @@ pub(crate) enum Lane {
     Window,
 }
 
-/// A queue by its family and its number in it.
+/// A queue by its family and its index there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     pub(crate) family: u32,
     pub(crate) index: u32,
 }
 
-/// Which queue each lane takes; both may be the same.
+/// The queue of each lane; both may be the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Plan {
     pub(crate) work: Place,
@@ -28,8 +28,8 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// Without a window one queue of a family with compute, with graphics if there is one: every
-    /// driver runs it at full speed. None where no family computes.
+    /// The plan without a window: one queue of a family with compute, with graphics if there is one, since
+    /// every driver runs that at full speed. None where no family computes.
     pub(crate) fn alone(families: &[vk::QueueFamilyProperties]) -> Option<Self> {
         let (compute, graphics) = (vk::QueueFlags::COMPUTE, vk::QueueFlags::GRAPHICS);
         let found = find(families, |_, flags| flags.contains(compute | graphics))
@@ -37,7 +37,7 @@ impl Plan {
         Some(Self { work: found, window: found })
     }
 
-    /// With a window: it takes a family with graphics that presents to it, and the simulation a family
+    /// The plan with a window: it takes a family with graphics that presents to it, and the simulation a family
     /// for compute alone, so that neither waits for the other; else a second queue of the window's
     /// family; else the window's queue. None where no family can show pictures.
     pub(crate) fn with_window(
@@ -54,7 +54,7 @@ impl Plan {
         Some(Self { work, window })
     }
 
-    /// Queues to make, per family.
+    /// Number of queues to make, per family.
     pub(crate) fn families(&self) -> Vec<(u32, u32)> {
         match self.work.family == self.window.family {
             true => vec![(self.work.family, 1 + self.work.index.max(self.window.index))],
@@ -75,12 +75,12 @@ fn find(
     Some(Place { family, index: 0 })
 }
 
-/// The queues of a plan. Between two families nothing has to change owners: images are shared by both,
-/// and buffers belong to one lane.
+/// The queues of a plan. No ownership has to move between two families: images are shared by both, and
+/// buffers belong to one lane.
 pub(crate) struct Queues {
     plan: Plan,
     work: Mutex<vk::Queue>,
-    /// Where it is another one.
+    /// The window's queue, where it is another one.
     window: Option<Mutex<vk::Queue>>,
     with_window: bool,
 }
@@ -99,8 +99,8 @@ impl Queues {
         }
     }
 
-    /// The queue of `lane`, kept from other threads meanwhile. A handle stays usable after a panic
-    /// elsewhere, so poisoning is ignored.
+    /// Locks the queue of `lane` against other threads. A handle stays usable after a panic elsewhere, so
+    /// poisoning is ignored.
     pub(crate) fn lock(&self, lane: Lane) -> MutexGuard<'_, vk::Queue> {
         let queue = match (lane, &self.window) {
             (Lane::Window, Some(window)) => window,
@@ -117,13 +117,13 @@ impl Queues {
         }
     }
 
-    /// The families that use the same images, where these are several.
+    /// The families that use the same images, if there are two.
     pub(crate) fn sharing(&self) -> Option<[u32; 2]> {
         let [work, window] = [Lane::Work, Lane::Window].map(|lane| self.family(lane));
         (work != window).then_some([work, window])
     }
 
-    /// Whether the window has to wait behind what the simulation has submitted.
+    /// Returns whether the window has to wait for submissions of the simulation.
     pub(crate) fn are_shared(&self) -> bool {
         self.with_window && self.window.is_none()
     }

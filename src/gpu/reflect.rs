@@ -1,4 +1,4 @@
-//! What a kernel's SPIR-V says of its bindings, push constants and work-group size.
+//! The bindings, push constants and work-group size of a kernel, from its SPIR-V.
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ use super::workgroup::shared_bytes;
 /// First word of every SPIR-V module of this byte order.
 const SPIRV_MAGIC: u32 = 0x0723_0203;
 
-/// What is bound at one number.
+/// Kind of object bound at one number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BindingKind {
     /// `buffer` block.
@@ -55,9 +55,9 @@ pub struct BindingInfo {
     pub binding: u32,
     /// Name in the source, where the SPIR-V has kept it.
     pub name: Option<String>,
-    /// What is bound.
+    /// Kind of object.
     pub kind: BindingKind,
-    /// Declared without `readonly` (buffers, storage images).
+    /// True if declared without `readonly` (buffers, storage images).
     pub written: bool,
     /// 2 or 3 for images, else 0.
     pub image_dimensions: u32,
@@ -76,7 +76,7 @@ impl std::fmt::Display for BindingInfo {
     }
 }
 
-/// All that the pipeline layout and the checks of a dispatch need.
+/// Everything that the pipeline layout and the checks of a dispatch need.
 #[derive(Debug)]
 pub(crate) struct Reflection {
     pub(crate) entry_point: String,
@@ -84,9 +84,9 @@ pub(crate) struct Reflection {
     pub(crate) bindings: Vec<BindingInfo>,
     pub(crate) push_constant_bytes: u32,
     pub(crate) local_size: [u32; 3],
-    /// gl_NumWorkGroups is read.
+    /// True where gl_NumWorkGroups is read.
     pub(crate) counts_groups: bool,
-    /// Shared memory of a work group.
+    /// Shared memory of a work group, bytes.
     pub(crate) shared_bytes: u32,
 }
 
@@ -186,7 +186,7 @@ fn binding(variable: &Variable) -> Result<BindingInfo, String> {
     })
 }
 
-/// Blocks without an instance name are known by the block's own.
+/// Name of a block. Blocks without an instance name are known by the block's own.
 fn block_name(ty: &Type) -> Option<String> {
     match ty {
         Type::Struct(block) => block.name.clone(),
@@ -195,13 +195,13 @@ fn block_name(ty: &Type) -> Option<String> {
 }
 
 /// Constants as specialized, read from the words: spirq does not report the `WorkgroupSize`
-/// built-in, which is where `local_size_x_id` ends up.
+/// built-in, which holds `local_size_x_id`.
 #[derive(Default)]
 struct Constants {
     ids: Vec<u32>,
     local_size: Option<[u32; 3]>,
     counts_groups: bool,
-    /// By id in the module.
+    /// Values by id in the module.
     value_of: HashMap<u32, u32>,
 }
 

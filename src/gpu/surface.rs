@@ -1,4 +1,4 @@
-//! A window as something to present to.
+//! The Vulkan surface of a window.
 
 use std::sync::Arc;
 
@@ -11,7 +11,7 @@ use super::error::{GpuError, during};
 use super::instance::Instance;
 use super::queues::Lane;
 
-/// What of the window system `window` is for `instance`; the caller destroys it, before the window.
+/// The surface of `window` for `instance`; the caller destroys it, before the window.
 fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, String> {
     let display = window.display_handle().map_err(|e| e.to_string())?;
     let handle = window.window_handle().map_err(|e| e.to_string())?;
@@ -28,7 +28,7 @@ fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, St
     .map_err(|code| format!("the window has no Vulkan surface ({code:?})"))
 }
 
-/// Which devices and queue families can show pictures in a window; asked before a device is opened.
+/// Finds devices and queue families that can show pictures in a window; used before a device is opened.
 pub(crate) struct Probe<'a> {
     handle: vk::SurfaceKHR,
     functions: khr::surface::Instance,
@@ -36,10 +36,10 @@ pub(crate) struct Probe<'a> {
 }
 
 impl<'a> Probe<'a> {
-    /// Drop it before the instance.
+    /// Makes a probe; drop it before the instance.
     ///
     /// # Errors
-    /// What the window system says.
+    /// The window system's message.
     pub(crate) fn new(instance: &Instance, window: &'a Window) -> Result<Self, String> {
         Ok(Self {
             handle: surface_of(instance, window)?,
@@ -48,7 +48,7 @@ impl<'a> Probe<'a> {
         })
     }
 
-    /// Whether `family` of a device of the probe's instance can; a device that does not answer cannot.
+    /// Returns whether `family` of a device of the probe's instance can; false for a device that does not answer.
     pub(crate) fn presents(&self, physical: vk::PhysicalDevice, family: u32) -> bool {
         // SAFETY: surface and device are of one instance, and the device has that family.
         let answer = unsafe {
@@ -103,7 +103,7 @@ impl Surface {
         Ok(made)
     }
 
-    /// Bytes without a colour space of their own: grey levels are shown as they are computed.
+    /// The format: bytes without a colour space of their own, so that grey levels are shown as computed.
     fn choose_format(&self) -> Result<vk::SurfaceFormatKHR, GpuError> {
         // SAFETY: the surface is alive.
         let formats = unsafe {
@@ -122,8 +122,8 @@ impl Surface {
         })
     }
 
-    /// The newest picture without tearing where the window system offers that, else one picture after
-    /// the other, which every device has: that waits for the screen, one or two refreshes longer.
+    /// The newest picture without tearing where the window system offers that, else one picture after the
+    /// other, which every device has: that waits for the screen, one or two refreshes longer.
     pub(crate) fn present_mode(&self) -> Result<vk::PresentModeKHR, GpuError> {
         // SAFETY: the surface is alive.
         let modes = unsafe {

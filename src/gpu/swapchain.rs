@@ -1,4 +1,4 @@
-//! The pictures of a window, and how one after the other is shown.
+//! The pictures of a window, shown one after the other.
 
 use std::sync::Arc;
 
@@ -10,16 +10,16 @@ use super::image::whole;
 use super::queues::Lane;
 use super::surface::Surface;
 
-/// Longest wait for the window system, ns: it may keep the pictures of a window that it does not show.
+/// Longest wait for the window system, ns: it may hold back the pictures of a window that it does not show.
 const ACQUIRE_NS: u64 = 100_000_000;
 
-/// What acquiring a picture brought.
+/// Result of acquiring a picture.
 pub(crate) enum Acquired {
-    /// Its number.
+    /// Number of the picture.
     Picture(usize),
     /// The window has changed: a new swapchain is needed.
     OutOfDate,
-    /// The window system has none to give.
+    /// The window system has no picture free.
     NotNow,
 }
 
@@ -28,8 +28,8 @@ pub(crate) struct Picture {
     pub(crate) image: vk::Image,
     view: vk::ImageView,
     pub(crate) framebuffer: vk::Framebuffer,
-    /// Signalled when the picture is drawn; of its own, since nothing tells when the window
-    /// system has waited for it but that the picture comes back.
+    /// Signalled when the picture is drawn. Each picture has its own: only its return shows that the window
+    /// system has waited for it.
     pub(crate) drawn: vk::Semaphore,
 }
 
@@ -37,9 +37,9 @@ pub(crate) struct Picture {
 pub(crate) struct Swapchain {
     pub(crate) extent: vk::Extent2D,
     pub(crate) pictures: Vec<Picture>,
-    /// Pictures can be copied from.
+    /// True where pictures can be copied from.
     pub(crate) readable: bool,
-    /// The window system would like another size: it still shows what it gets.
+    /// True where the window system would like another size, but still shows the present one.
     stale: bool,
     functions: khr::swapchain::Device,
     handle: vk::SwapchainKHR,
@@ -47,8 +47,8 @@ pub(crate) struct Swapchain {
 }
 
 impl Swapchain {
-    /// Pictures for `surface` as it is now, `wanted` pixels large where it does not say itself;
-    /// nothing while it has no area. Takes the place of `old`, of which nothing may be under way.
+    /// Pictures for `surface` as it is now, of `wanted` pixels where it does not set the size itself; none
+    /// while it has no area. Takes the place of `old`, of which nothing may be under way.
     pub(crate) fn new(
         device: &Arc<Device>,
         surface: &Surface,
@@ -158,12 +158,12 @@ impl Swapchain {
         Ok(())
     }
 
-    /// Whether another one of `size` pixels should be made.
+    /// Returns whether a new swapchain of `size` pixels should be made.
     pub(crate) fn is_stale(&self, size: [u32; 2]) -> bool {
         self.stale || [self.extent.width, self.extent.height] != size
     }
 
-    /// Lets another one be made.
+    /// Marks the swapchain as stale, so that a new one is made.
     pub(crate) fn forget(&mut self) {
         self.stale = true;
     }
@@ -205,7 +205,7 @@ impl Swapchain {
     }
 }
 
-/// A lost device has its own error, which tells what can be done.
+/// Turns a lost device into an error of its own, which has a remedy.
 pub(crate) fn lost_or(what: &'static str) -> impl Fn(vk::Result) -> GpuError {
     move |code| match code {
         vk::Result::ERROR_DEVICE_LOST => GpuError::DeviceLost {

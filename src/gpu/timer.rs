@@ -1,4 +1,4 @@
-//! Named scopes of a submission: how long each took on the device, and which was running when the
+//! Named scopes of a submission: their times on the device, and the one that was running when the
 //! device was lost.
 
 use std::sync::Arc;
@@ -9,10 +9,10 @@ use super::device::Device;
 use super::error::{GpuError, during};
 use super::memory::{Buffer, BufferKind};
 
-/// Scopes in one submission at most. A frame has about ten; where its paths are traced in many batches, more.
+/// Most scopes in one submission. A frame has about ten; more where its paths are traced in many batches.
 const MAX_SCOPES: u32 = 255;
-/// From here on only names that are new begin a scope: batch after batch counts to the scope that lasts, and the
-/// stages after them still have their own.
+/// Number of scopes from which on only new names begin a scope: further batches count to the present scope, and
+/// the stages after them still get their own.
 const CROWDED: usize = 224;
 
 /// Times of one finished submission.
@@ -20,7 +20,7 @@ const CROWDED: usize = 224;
 pub struct FrameTimings {
     /// Number of the frame, counted from 0 by [`super::Frames`]; 0 elsewhere.
     pub frame: u64,
-    /// Scope name and milliseconds on the device, in the order of recording. Empty where the
+    /// Names of the scopes and milliseconds on the device, in the order of recording. Empty where the
     /// device has no timestamps.
     pub passes: Vec<(String, f64)>,
 }
@@ -31,7 +31,7 @@ impl FrameTimings {
         self.passes.iter().map(|(_, ms)| ms).sum()
     }
 
-    /// Milliseconds of the scopes of this name, in all; NaN where none was timed.
+    /// Total milliseconds of the scopes of this name; NaN where none was timed.
     pub fn of(&self, name: &str) -> f64 {
         let named = self.passes.iter().filter(|(scope, _)| scope == name);
         let times = named.map(|&(_, ms)| ms);
@@ -39,8 +39,8 @@ impl FrameTimings {
     }
 }
 
-/// Records the scopes of one slot. A scope lasts until the next begins or the submission ends, so
-/// one timestamp lies between two of them: query i is the begin of scope i.
+/// Records the scopes of one slot. A scope lasts until the next begins or the submission ends, so one
+/// timestamp lies between two of them: query i is the begin of scope i.
 pub(crate) struct Timer {
     /// `None` where the queue has no timestamps.
     queries: Option<vk::QueryPool>,
@@ -204,7 +204,7 @@ mod tests {
         // 36 valid bits, wrapped: 10 ticks before the wrap and 5 after it.
         let begin = (1 << 36) - 10;
         assert_eq!(elapsed_ms(begin, 5, 36, 1e6), 15.0);
-        // Bits above the valid ones hold anything.
+        // Bits above the valid ones are arbitrary.
         assert_eq!(elapsed_ms(1 << 40, (3 << 50) + 7, 36, 1e6), 7.0);
     }
 }

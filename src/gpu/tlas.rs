@@ -1,4 +1,4 @@
-//! The top-level acceleration structure: which meshes are where, rebuilt or refitted per frame.
+//! The top-level acceleration structure: meshes and their places, rebuilt or refitted per frame.
 
 use std::sync::Arc;
 
@@ -22,16 +22,16 @@ pub struct TlasInstance<'a> {
     pub blas: &'a Blas,
     /// World from node, three rows of four.
     pub transform: [[f32; 4]; 3],
-    /// What the kernel reads as `rayQueryGetIntersectionInstanceCustomIndexEXT`; 24 bits.
+    /// Value that the kernel reads as `rayQueryGetIntersectionInstanceCustomIndexEXT`; 24 bits.
     pub custom_index: u32,
-    /// Rays whose mask shares no bit with it pass.
+    /// Mask of the instance: rays whose mask shares no bit with it pass.
     pub mask: u8,
 }
 
 impl TlasInstance<'_> {
     /// The layout of VkAccelerationStructureInstanceKHR.
     fn bytes(&self) -> [u8; INSTANCE_BYTES] {
-        // Faces count from both sides whatever the ray's flags say, and none is transparent.
+        // Both sides of a face count, whatever the ray's flags, and none is transparent.
         let flags = vk::GeometryInstanceFlagsKHR::TRIANGLE_FACING_CULL_DISABLE
             | vk::GeometryInstanceFlagsKHR::FORCE_OPAQUE;
         let mut bytes = [0; INSTANCE_BYTES];
@@ -52,9 +52,9 @@ pub struct Tlas {
     capacity: u32,
     /// The meshes that the structure refers to.
     bottom: Arc<Vec<Blas>>,
-    /// Builds of those meshes until then, in all.
+    /// Total number of builds of those meshes at the last build.
     bottom_builds: u64,
-    /// Instances of the last build.
+    /// Number of instances of the last build.
     built: Option<u32>,
 }
 
@@ -113,9 +113,9 @@ impl Tlas {
         self.record(commands, instances, mode)
     }
 
-    /// Records a refit: cheaper, but rays get slower as instances move away from where they were
-    /// at the last build. It needs as many instances as that build; otherwise it builds. Barriers
-    /// as for [`Self::build`].
+    /// Records a refit: cheaper, but rays get slower as instances move away from their places at the last
+    /// build. It needs as many instances as that build; otherwise it builds. Barriers as for
+    /// [`Self::build`].
     pub fn refit(
         &mut self,
         commands: &mut Commands<'_>,
@@ -192,7 +192,7 @@ impl Tlas {
         self.bottom.iter().map(|blas| blas.0.builds()).sum()
     }
 
-    /// Whether a mesh was built or refitted after the last build or refit of this.
+    /// Returns whether a mesh was built or refitted after the last build or refit of this.
     pub(crate) fn is_stale(&self) -> bool {
         self.bottom_builds != self.count_bottom_builds()
     }

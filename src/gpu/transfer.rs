@@ -11,7 +11,7 @@ use super::error::GpuError;
 use super::image::{Image, ImageFormat, whole};
 use super::memory::{Buffer, BufferKind, POISON};
 
-/// Staging memory taken at a time; more bytes go in several submissions.
+/// Most staging memory taken at a time; more bytes go in several submissions.
 const CHUNK_BYTES: u64 = 32 << 20;
 
 impl Commands<'_> {
@@ -30,7 +30,7 @@ impl Commands<'_> {
         }
     }
 
-    /// Fills a new image, which the commands before have moved to its layout, with [`POISON`].
+    /// Fills a new image, which earlier commands have moved to its layout, with [`POISON`].
     pub(crate) fn poison_image(&mut self, image: &Image) {
         self.uses(&image.0, image.name(), Stage::Transfer, true, "poison");
         let texel = match image.format() {
@@ -83,9 +83,8 @@ impl Commands<'_> {
         }
     }
 
-    /// Writes bytes from the CPU at an offset; the bytes are copied at once, so `bytes` may
-    /// change after the call. This is how a frame gets its parameters: each slot has its own
-    /// staging memory.
+    /// Writes bytes from the CPU at an offset; the bytes are copied at once, so `bytes` may change after the
+    /// call. Frames get their parameters by it: each slot has its own staging memory.
     pub fn write(&mut self, buffer: &Buffer, offset: u64, bytes: &[u8]) -> Result<(), GpuError> {
         buffer.check_range("write", offset, bytes.len() as u64)?;
         if bytes.is_empty() {
@@ -195,7 +194,7 @@ impl Device {
         Ok(bytes)
     }
 
-    /// The content of a buffer as values of `T`; bytes that do not fill a value are left out.
+    /// The content of a buffer as values of `T`; a rest too short for a value is left out.
     pub fn read_back_as<T: bytemuck::Pod>(
         self: &Arc<Self>,
         buffer: &Buffer,

@@ -1,8 +1,8 @@
-//! Shared memory of a kernel, summed from its SPIR-V: a device that has less fails in ways of its own.
+//! Shared memory of a kernel, summed from its SPIR-V: a device that has less fails in unpredictable ways.
 
 use std::collections::HashMap;
 
-/// What a type takes, or points to.
+/// Size of a type, or the type that it points to.
 #[derive(Clone, Copy)]
 enum Type {
     Bytes(u64),
@@ -10,7 +10,7 @@ enum Type {
     Shared(u32),
 }
 
-/// Bytes of all variables in shared memory. `value_of` gives constants by their id, as specialized.
+/// Number of bytes of all variables in shared memory. `value_of` gives constants by their id, as specialized.
 /// The error is a sentence without the kernel's name.
 pub(crate) fn shared_bytes(words: &[u32], value_of: &HashMap<u32, u32>) -> Result<u32, String> {
     const OP_TYPE_BOOL: u32 = 20;

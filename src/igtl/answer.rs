@@ -1,7 +1,7 @@
-//! What a message from a client does, and what is answered to queries.
+//! Effects of messages from a client, and answers to its queries.
 //!
-//! A query of type GET_X, STT_X or STP_X has an answer whatever X is: an X, or an RTS_X with a
-//! status of 0 (it is so) or 1 (there is none).
+//! A query of type GET_X, STT_X or STP_X always has an answer: an X, or an RTS_X with a status of 0 (done)
+//! or 1 (there is none).
 
 use std::time::Duration;
 
@@ -13,7 +13,7 @@ use super::tracking::Tracked;
 use super::wire::Label;
 use super::{IMAGE_DEVICE, POSE_DEVICE};
 
-/// Types that a client may send to some effect.
+/// Types of messages from a client that have an effect.
 const TAKEN: [&str; 12] = [
     "TRANSFORM",
     "TDATA",
@@ -30,21 +30,21 @@ const TAKEN: [&str; 12] = [
 ];
 const OK: u8 = 0;
 const ERROR: u8 = 1;
-/// A tool with six degrees of freedom.
+/// Kind of a tool with six degrees of freedom.
 const SIX: u8 = 2;
-/// A STATUS that says that all is well, and one that says that there is no room.
+/// Codes of STATUS: all is well, and there is no room.
 const STATUS_OK: u16 = 1;
 const STATUS_BUSY: u16 = 6;
 
-/// Why a message has no effect.
+/// The reason why a message has no effect.
 pub(super) enum Refused {
-    /// It is wrong; the next may be right.
+    /// The message is wrong; the next may be right.
     Message(String),
-    /// The client is to go.
+    /// The client is to be disconnected.
     Client(String),
 }
 
-/// Whether a message's body is read here; others are skipped, as the protocol wants it.
+/// Returns whether a message's body is read here; others are skipped, as the protocol demands.
 pub(super) fn is_understood(header: &Header) -> bool {
     let kind = header.kind.text();
     ["TRANSFORM", "TDATA"].contains(&&*kind) || query(&kind).is_some()
@@ -56,10 +56,10 @@ fn query(kind: &str) -> Option<(&str, &str)> {
     ["GET_", "STT_", "STP_"].contains(&prefix).then_some((prefix, of))
 }
 
-/// Lets a message act.
+/// Carries out a message and answers it.
 ///
 /// # Errors
-/// What is wrong with it, or with who sends it.
+/// The fault of the message, or of its sender.
 pub(super) fn answer(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refused> {
     let tracking = &shared.tracking;
     match &message.content {
@@ -119,7 +119,7 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
         ("STP_", "TRANS" | "TRANSFOR") => choose(&|wants| wants.transform = false),
         ("STP_", "TDATA") => choose(&|wants| wants.tracking = None),
         ("STT_", "TDATA") => match &message.content {
-            // There is one frame, whose name is left out.
+            // There is one frame, whose name is empty.
             Content::StartTracking { resolution, coordinates } if coordinates.is_empty() => {
                 let least = Duration::from_millis((*resolution).into());
                 choose(&|wants| wants.tracking = Some(least))
@@ -134,7 +134,7 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
     }
 }
 
-/// An answer under the query's name, in its header version and under its number.
+/// An answer under the query's name, in its header version and with its number.
 fn respond(query: &Message, content: Content) -> Vec<u8> {
     let extension = query.extension.as_ref().map(|e| Extension { id: e.id, metadata: Vec::new() });
     Message { device: query.device, extension, ..Message::new("", content) }.encode()
@@ -159,7 +159,7 @@ fn status(code: u16, name: &str, text: &str) -> Content {
     }
 }
 
-/// How things are, for GET_STATUS.
+/// The present state, for GET_STATUS.
 fn state(shared: &Shared) -> Content {
     let text = match shared.tracking.now() {
         Tracked::Never => "no pose has arrived yet",
@@ -169,7 +169,7 @@ fn state(shared: &Shared) -> Content {
     status(STATUS_OK, "OK", text)
 }
 
-/// What a client is told for which there is no room.
+/// The message to a client for which there is no room.
 pub(super) fn no_room(most: usize) -> Vec<u8> {
     let text = format!("{most} clients are connected and that is all; close one of them");
     Message::new("", status(STATUS_BUSY, "Busy", &text)).encode()

@@ -1,4 +1,4 @@
-//! A connected client: what waits to be sent to it, and the thread that sends.
+//! A connected client: messages waiting for it, and the thread that sends them.
 
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Write};
@@ -11,9 +11,9 @@ use super::lock;
 use super::picture::Published;
 use super::server::Shared;
 
-/// Answers that may wait. Nobody asks for so many before reading one.
+/// Most answers that may wait. Nobody asks for so many before reading one.
 const ANSWERS: usize = 64;
-/// How often a thread that waits for the network looks whether its time is over.
+/// Time after which a thread that waits for the network checks its own time limit.
 pub(super) const LOOK: Duration = Duration::from_millis(250);
 
 /// An answer to a query. Images and poses are looked up when they are sent, so that many queries
@@ -25,17 +25,17 @@ pub(super) enum Answer {
     Tracking,
 }
 
-/// What a client receives unasked.
+/// Messages that a client receives unasked.
 pub(super) struct Wants {
     pub image: bool,
     pub transform: bool,
-    /// TDATA messages, no more often than this.
+    /// Least time between TDATA messages; none: they are not wanted.
     pub tracking: Option<Duration>,
 }
 
 struct Outbox {
     answers: VecDeque<Answer>,
-    /// The newest frame that the client has not been sent.
+    /// The newest frame not yet sent to the client.
     frame: Option<Arc<Published>>,
     wants: Wants,
     tracking_sent: Option<Instant>,
@@ -49,14 +49,14 @@ pub(super) struct Client {
     changed: Condvar,
 }
 
-/// Why nothing more can be sent.
+/// The reason why nothing more can be sent.
 enum End {
     /// The client has left, as it may at any time.
     Left,
     Fault(String),
 }
 
-/// Whether the other side has ended the connection, with or without reading what was sent to it.
+/// Returns whether the other side has ended the connection, having read everything or not.
 pub(super) fn has_left(error: &std::io::Error) -> bool {
     let kind = error.kind();
     matches!(
@@ -65,7 +65,7 @@ pub(super) fn has_left(error: &std::io::Error) -> bool {
     )
 }
 
-/// What its thread sends next.
+/// The next item that its thread sends.
 enum Next {
     Answer(Answer),
     Frame(Arc<Published>),
@@ -87,7 +87,7 @@ impl Client {
         }
     }
 
-    /// Hands over a frame. Whether it takes the place of one that was not sent yet.
+    /// Hands over a frame; returns whether it replaces one that was not sent yet.
     pub fn offer(&self, frame: Arc<Published>) -> bool {
         let mut outbox = lock(&self.outbox);
         // A client that has just come may have been given this very frame already.
@@ -98,7 +98,7 @@ impl Client {
         late
     }
 
-    /// Queues an answer. False when too many wait.
+    /// Queues an answer; returns false when too many wait.
     pub fn answer(&self, answer: Answer) -> bool {
         let mut outbox = lock(&self.outbox);
         if outbox.answers.len() >= ANSWERS {
@@ -109,7 +109,7 @@ impl Client {
         true
     }
 
-    /// Changes what it receives unasked.
+    /// Changes the messages that it receives unasked.
     pub fn choose(&self, change: impl FnOnce(&mut Wants)) {
         change(&mut lock(&self.outbox).wants);
     }
@@ -126,7 +126,7 @@ impl Client {
         lock(&self.outbox).closed
     }
 
-    /// Waits for something to send; none when the connection has ended.
+    /// Waits for the next item to send; none when the connection has ended.
     fn next(&self) -> Option<Next> {
         let mut outbox = lock(&self.outbox);
         loop {
@@ -143,7 +143,7 @@ impl Client {
         }
     }
 
-    /// Image and pose now, and whether TDATA are due.
+    /// Returns whether image, pose and TDATA are to be sent now.
     fn due(&self) -> (bool, bool, bool) {
         let outbox = &mut *lock(&self.outbox);
         let now = Instant::now();
@@ -177,7 +177,7 @@ impl Client {
         match next {
             Next::Answer(Answer::Message(bytes)) => put(&bytes),
             Next::Answer(answer) => {
-                // Asked for only where there is one, and there always is one afterwards.
+                // Queued only where there is one, and from then on there always is.
                 let frame = shared.latest().expect("a frame was published");
                 match answer {
                     Answer::Image => put(frame.image()),

@@ -30,7 +30,7 @@ pub enum Scalar {
     F64,
 }
 
-/// Code on the wire and bytes of each.
+/// Code in messages and size in bytes of each type.
 const SCALARS: [(Scalar, u8, u64); 8] = [
     (Scalar::I8, 2, 1),
     (Scalar::U8, 3, 1),
@@ -51,7 +51,7 @@ pub struct Image {
     pub scalar: Scalar,
     /// Byte order of the values.
     pub little_endian: bool,
-    /// Axes of what the matrix maps to.
+    /// Axes that the matrix maps to.
     pub axes: Axes,
     /// Pixels along i, j and k of the whole image.
     pub size: [u16; 3],
@@ -59,17 +59,17 @@ pub struct Image {
     pub steps: [[f32; 3]; 3],
     /// Middle of the whole image, between the first and the last pixel's centre along each axis, mm.
     pub centre: [f32; 3],
-    /// First pixel of the part that is sent.
+    /// First pixel of the part in the message.
     pub part_offset: [u16; 3],
-    /// Pixels of the part that is sent.
+    /// Pixels of the part in the message.
     pub part_size: [u16; 3],
     /// Values of the part, i fastest.
     pub values: Vec<u8>,
 }
 
 impl Image {
-    /// A slice of bytes, `components` for each pixel, where `patient_from_pixel` (integers at pixel
-    /// centres, mm) puts it.
+    /// A slice of bytes, `components` for each pixel, at the place given by `patient_from_pixel` (integers at
+    /// pixel centres, mm).
     ///
     /// # Panics
     /// When there are not as many values as pixels.
@@ -98,7 +98,7 @@ impl Image {
         }
     }
 
-    /// From pixel indices (integers at pixel centres) to the axes of the image, mm.
+    /// Transform from pixel indices (integers at pixel centres) to the axes of the image, mm.
     pub fn patient_from_pixel(&self) -> DAffine3 {
         let steps = self.steps.map(|v| DVec3::from(v.map(f64::from)));
         let matrix = DMat3::from_cols(steps[0], steps[1], steps[2]);

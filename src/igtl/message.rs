@@ -9,20 +9,20 @@ pub const HEADER: usize = 58;
 /// Bytes of a tool in a TDATA message.
 const TOOL: usize = 70;
 
-/// What stands in front of every message.
+/// The header of every message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Header {
     /// 1, or 2 with an extended header (3 is taken for 2: some senders write the protocol's version).
     pub version: u16,
     /// Type of the message.
     pub kind: Label<12>,
-    /// What it is about.
+    /// Device name.
     pub device: Label<20>,
-    /// When it was made.
+    /// Time of its making.
     pub time: Timestamp,
-    /// Bytes that follow.
+    /// Number of bytes that follow.
     pub body_size: u64,
-    /// Their checksum.
+    /// Checksum of those bytes.
     pub checksum: u64,
 }
 
@@ -30,7 +30,7 @@ impl Header {
     /// Reads a header.
     ///
     /// # Errors
-    /// An unknown version: what follows cannot be told then.
+    /// An unknown version: the rest cannot be read then.
     pub fn decode(bytes: &[u8; HEADER]) -> Result<Self, DecodeError> {
         let mut from = Reader::new(bytes, "a header");
         let version = from.u16()?;
@@ -57,16 +57,16 @@ impl Header {
     }
 }
 
-/// A message with what it says.
+/// A message and its content.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Message {
-    /// What it is about.
+    /// Device name.
     pub device: Label<20>,
-    /// When it was made.
+    /// Time of its making.
     pub time: Timestamp,
-    /// What header version 2 adds; none: version 1.
+    /// Extended header and metadata of header version 2; none: version 1.
     pub extension: Option<Extension>,
-    /// What it says.
+    /// Content of the message.
     pub content: Content,
 }
 
@@ -83,12 +83,12 @@ pub struct Tool {
     pub matrix: [f32; 12],
 }
 
-/// What messages say.
+/// Content of a message.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Content {
     /// TRANSFORM: the first three rows of a matrix, column after column; the last is the shift, mm.
     Transform([f32; 12]),
-    /// TDATA: where tools are.
+    /// TDATA: places of tools.
     Tracking(Vec<Tool>),
     /// IMAGE.
     Image(Box<Image>),
@@ -96,7 +96,7 @@ pub enum Content {
     Status {
         /// 1 is OK; the others are in the protocol.
         code: u16,
-        /// The sender's own.
+        /// The sender's own subcode.
         subcode: i64,
         /// Name of the error.
         name: Label<20>,
@@ -105,11 +105,11 @@ pub enum Content {
     },
     /// CAPABILITY: types that the sender takes.
     Capability(Vec<Label<12>>),
-    /// STT_TDATA: the receiver is to send TDATA.
+    /// STT_TDATA: asks the receiver to send TDATA.
     StartTracking {
         /// Least time between two messages, ms.
         resolution: u32,
-        /// Frame in which it is wanted; empty: the usual one.
+        /// Frame of the wanted poses; empty: the usual one.
         coordinates: Label<32>,
     },
     /// Any other type, and queries without content.
@@ -214,7 +214,7 @@ impl Content {
 }
 
 impl Message {
-    /// A message of now, in header version 1, which everybody reads.
+    /// A message with the present time, in header version 1, which everybody reads.
     pub fn new(device: &str, content: Content) -> Self {
         Self { device: Label::new(device), time: Timestamp::now(), extension: None, content }
     }
@@ -229,7 +229,7 @@ impl Message {
     /// The bytes to send.
     ///
     /// # Panics
-    /// With metadata beyond what the protocol can say: 65,535 entries or bytes of a key, 4 GB.
+    /// Metadata beyond the limits of the protocol: 65,535 entries or bytes of a key, 4 GB.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = vec![0; HEADER];
         let [front, back] = match &self.extension {
@@ -256,7 +256,7 @@ impl Message {
     /// Reads a message.
     ///
     /// # Errors
-    /// A body that is not the one of the header, or not of its type.
+    /// A body that does not belong to the header, or not to its type.
     pub fn decode(header: &Header, body: &[u8]) -> Result<Self, DecodeError> {
         if body.len() as u64 != header.body_size {
             return Err(DecodeError::Length { what: "a body", bytes: body.len() });

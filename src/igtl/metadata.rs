@@ -1,8 +1,8 @@
-//! What header version 2 adds to a message: an extended header, and keys with values.
+//! The additions of header version 2 to a message: an extended header, and keys with values.
 
 use super::wire::{DecodeError, Reader};
 
-/// Bytes of an extended header, at least.
+/// Least size of an extended header, bytes.
 const EXTENDED: usize = 12;
 /// Bytes of an entry in the index of the metadata.
 const INDEX: usize = 8;
@@ -28,7 +28,7 @@ pub struct Entry {
 }
 
 impl Extension {
-    /// What stands before the content, and what behind it.
+    /// Bytes before the content, and bytes after it.
     pub(super) fn encode(&self) -> [Vec<u8>; 2] {
         let short = |n: usize| u16::try_from(n).expect("within the protocol");
         let long = |n: usize| u32::try_from(n).expect("within the protocol");
@@ -55,7 +55,7 @@ impl Extension {
         let mut from = Reader::new(body, "an extended header");
         let (size, index_size) = (usize::from(from.u16()?), usize::from(from.u16()?));
         let (text_size, id) = (from.u32()? as usize, from.u32()?);
-        // What a later version may add to the extended header.
+        // Bytes that a later version may add to the extended header.
         from.take(
             size.checked_sub(EXTENDED)
                 .ok_or(DecodeError::Length { what: "an extended header", bytes: size })?,

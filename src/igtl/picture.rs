@@ -1,4 +1,4 @@
-//! What is sent: the B-mode image and where it was taken.
+//! The B-mode image and its pose, as sent to clients.
 
 use std::sync::OnceLock;
 
@@ -22,8 +22,8 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// The pixels of a frame (RGBA, row by row, at most 65,535 a side) with the frame's constants.
-    /// Grey ones are sent as one byte a pixel; what is transparent, outside the sector, is black.
+    /// The pixels of a frame (RGBA, row by row, at most 65,535 a side) with the frame's constants. Grey
+    /// pixels are sent as one byte each; transparent ones, outside the sector, are black.
     ///
     /// # Panics
     /// When the pixels are not those of the frame.
@@ -44,7 +44,7 @@ impl Picture {
 }
 
 /// Probe space from pixel indices (integers at pixel centres), mm: i goes along x, j along z. k goes
-/// along -y, so that the three are right-handed, by the thickness of the slice.
+/// along -y by the thickness of the slice, so that the three are right-handed.
 fn probe_from_pixel(frame: &layout::Frame) -> DAffine3 {
     let pitch = f64::from(frame.pixel_pitch);
     let thickness = match f64::from(frame.slice_thickness) {
@@ -62,8 +62,8 @@ fn probe_from_pixel(frame: &layout::Frame) -> DAffine3 {
     )
 }
 
-/// A picture, the pose at which it was taken, and the time. The messages are made by the first
-/// connection that wants them, so that the simulation does not wait for checksums.
+/// A picture, its pose and its time. The first connection that needs the messages makes them, so that the
+/// simulation does not wait for checksums.
 pub(super) struct Published {
     picture: Picture,
     ras_from_probe: DAffine3,
@@ -103,7 +103,7 @@ impl Published {
         self.transform.get_or_init(|| self.message(POSE_DEVICE, Content::Transform(self.matrix())))
     }
 
-    /// RAS from probe space as messages hold it.
+    /// RAS from probe space in the form of messages.
     pub fn matrix(&self) -> [f32; 12] {
         self.ras_from_probe.to_cols_array().map(|x| x as f32)
     }

@@ -9,16 +9,16 @@ use super::client::{Client, has_left};
 use super::message::{HEADER, Header, Message};
 use super::server::{Settings, Shared};
 
-/// Bytes that a message of a type which is understood here may have: a thousand tools.
+/// Most bytes of a message of a type that is read here: a thousand tools.
 const UNDERSTOOD: u64 = 70_000;
-/// Bytes a second that a long message which is skipped has to arrive with.
+/// Least rate at which a long message that is skipped has to arrive, bytes per second.
 const PACE: f64 = 1e6;
 /// Faulty messages in a row after which the connection is ended.
 const FAULTS: u32 = 16;
 
-/// What is wrong.
+/// A fault, by its effect.
 enum Fault {
-    /// One message; the next one can be found.
+    /// A fault of one message; the next one can be found.
     Message(String),
     /// The connection cannot go on.
     Connection(String),
@@ -57,7 +57,7 @@ pub(super) fn receive_all(client: &Client, shared: &Shared) {
     client.close();
 }
 
-/// The next message. False where the connection has ended between two messages.
+/// Reads the next message; returns false where the connection has ended between two messages.
 fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
     let mut source = Source::new(&client.stream, &shared.settings);
     let mut header = [0; HEADER];
@@ -94,11 +94,11 @@ fn too_long(header: &Header) -> Fault {
     Fault::Connection(format!("a message of type {kind} with {bytes} bytes"))
 }
 
-/// A stream whose reads return every now and then, and one message's time.
+/// A stream whose reads return now and then, and one message's time.
 struct Source<'s> {
     stream: &'s TcpStream,
     limit: Duration,
-    /// When the message has to be here.
+    /// Time by which the message has to be here.
     end: Instant,
 }
 
@@ -107,8 +107,8 @@ impl<'s> Source<'s> {
         Self { stream, limit: settings.message_timeout, end: Instant::now() }
     }
 
-    /// Waits for the first byte for as long as it takes; the message's time begins with it. False
-    /// where the connection has ended.
+    /// Waits for the first byte without limit; the message's time begins with it. Returns false where
+    /// the connection has ended.
     fn first(&mut self, byte: &mut [u8]) -> Result<bool, Fault> {
         loop {
             match self.stream.read(byte) {
@@ -132,7 +132,7 @@ impl<'s> Source<'s> {
         Ok(())
     }
 
-    /// Reads on without keeping anything.
+    /// Reads bytes without keeping them.
     fn skip(&mut self, mut count: u64) -> Result<(), Fault> {
         self.end += Duration::from_secs_f64(count as f64 / PACE);
         let mut scratch = [0; 16 << 10];
@@ -143,7 +143,7 @@ impl<'s> Source<'s> {
         Ok(())
     }
 
-    /// At least one byte.
+    /// Reads at least one byte.
     fn some(&mut self, bytes: &mut [u8]) -> Result<usize, Fault> {
         loop {
             match self.stream.read(bytes) {
@@ -166,7 +166,7 @@ impl<'s> Source<'s> {
     }
 }
 
-/// Whether there is just nothing to read yet.
+/// Returns whether there is merely nothing to read yet.
 fn waits(error: &std::io::Error) -> bool {
     let kind = error.kind();
     matches!(kind, ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut)

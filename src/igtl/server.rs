@@ -16,14 +16,14 @@ use super::tracking::{Tracked, Tracking};
 use super::{answer, lock, receive};
 use crate::scene::tracker::Tracker;
 
-/// How often the listener looks for clients.
+/// Time between two looks of the listener for clients.
 const LISTEN: Duration = Duration::from_millis(10);
-/// Refused clients whose last bytes are read before they are dropped, and for how long: a
+/// Most refused clients whose last bytes are read before they are dropped, and for how long: a
 /// connection that is closed over unread bytes is reset, and the refusal would never arrive.
 const LINGERING: usize = 16;
 const LINGER: Duration = Duration::from_millis(300);
 
-/// What cannot be served.
+/// The reason why the server cannot run.
 #[derive(Debug, thiserror::Error)]
 pub enum IgtlError {
     /// The address cannot be listened at.
@@ -31,13 +31,13 @@ pub enum IgtlError {
     Bind {
         /// The address.
         address: SocketAddr,
-        /// What the system says.
+        /// The system's message.
         cause: std::io::Error,
     },
 }
 
 impl IgtlError {
-    /// What the user can do about it.
+    /// The remedy for the user.
     pub fn remedy(&self) -> &'static str {
         let Self::Bind { cause, .. } = self;
         match cause.kind() {
@@ -53,12 +53,12 @@ impl IgtlError {
     }
 }
 
-/// How clients are treated.
+/// Settings for clients.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Which tool moves the probe, and how.
+    /// The tool that moves the probe, and its calibration.
     pub tracker: Tracker,
-    /// Clients at a time; more are told so and disconnected.
+    /// Most clients at a time; further ones are told so and disconnected.
     pub clients: usize,
     /// Time between the first and the last byte of a message from a client; messages that are
     /// skipped have a second more for each megabyte.
@@ -82,7 +82,7 @@ impl Settings {
     }
 }
 
-/// What has happened so far.
+/// Counts of events so far.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Status {
     /// Clients that take room now.
@@ -93,21 +93,21 @@ pub struct Status {
     pub refused: u64,
     /// Messages that were understood.
     pub messages: u64,
-    /// Poses of the tool that moves the probe, those counted that the tracker did not see.
+    /// Poses of the tool that moves the probe, including those where the tracker did not see it.
     pub poses: u64,
     /// Messages of other tools and of types that are skipped.
     pub ignored: u64,
     /// Images that clients took.
     pub images_sent: u64,
-    /// Images that clients were not sent because they were still taking an older one.
+    /// Images that were not sent to clients because they were still taking an older one.
     pub images_dropped: u64,
     /// Faulty messages and connections.
     pub errors: u64,
-    /// The last of them: who, and what.
+    /// The last of them: client and fault.
     pub last_error: Option<String>,
 }
 
-/// What all threads share.
+/// State shared by all threads.
 pub(super) struct Shared {
     pub settings: Settings,
     pub tracking: Tracking,
@@ -115,18 +115,18 @@ pub(super) struct Shared {
     clients: Mutex<Vec<Arc<Client>>>,
     status: Mutex<Status>,
     stopping: AtomicBool,
-    /// What was published last is no longer what there is to see.
+    /// True where the last published frame no longer shows the present scene.
     outdated: AtomicBool,
     told: Box<dyn Fn() + Send + Sync>,
 }
 
 impl Shared {
-    /// The frame that was published last.
+    /// The last published frame.
     pub fn latest(&self) -> Option<Arc<Published>> {
         lock(&self.latest).clone()
     }
 
-    /// What a client is sent that has just come.
+    /// The frame for a client that has just come.
     fn first(&self) -> Option<Arc<Published>> {
         match self.outdated.load(Ordering::Relaxed) {
             true => None,
@@ -134,7 +134,7 @@ impl Shared {
         }
     }
 
-    /// Says that a pose has arrived, or that clients or errors are others than before.
+    /// Reports that a pose has arrived, or that clients or errors have changed.
     pub fn tell(&self) {
         (self.told)();
     }
@@ -144,7 +144,7 @@ impl Shared {
         change(&mut lock(&self.status));
     }
 
-    /// Takes note of what a client did wrong.
+    /// Counts a client's fault.
     pub fn fault(&self, client: &Client, why: &str) {
         self.error(format!("{}: {why}", client.peer));
     }
@@ -169,13 +169,13 @@ impl Server {
     /// Listens at `address`; port 0 takes any that is free.
     ///
     /// # Errors
-    /// An address that is taken or not this machine's.
+    /// The address is taken, or not this machine's.
     pub fn bind(address: SocketAddr, settings: Settings) -> Result<Self, IgtlError> {
         Self::bind_and_tell(address, settings, || {})
     }
 
-    /// The same; `told` is called, from threads of the server, whenever a pose has arrived and when
-    /// clients or errors are others than before. It must not wait.
+    /// As [`Server::bind`]; `told` is called, from threads of the server, whenever a pose has arrived and when
+    /// clients or errors have changed. It must not wait.
     ///
     /// # Errors
     /// As [`Server::bind`].
@@ -207,23 +207,23 @@ impl Server {
         Ok(Self { shared, address: bound, listener: Some(thread) })
     }
 
-    /// Where it listens.
+    /// Address at which it listens.
     pub fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// What is known of the tracker. Does not wait for the network.
+    /// State of the tracker. Does not wait for the network.
     pub fn pose(&self) -> Tracked {
         self.shared.tracking.now()
     }
 
-    /// Goes on with another scene's tracker. Poses by the one before are forgotten.
+    /// Goes on with another scene's tracker. Poses from the one before are forgotten.
     pub fn calibrate(&self, tracker: Tracker) {
         self.shared.tracking.calibrate(tracker);
     }
 
-    /// Offers a picture and the pose at which it was taken to every client: those that are still
-    /// taking an older one get the newest when they are done. Does not wait for the network.
+    /// Offers a picture and its pose to every client: those still taking an older one get the newest
+    /// afterwards. Does not wait for the network.
     pub fn publish(&self, picture: Picture, world_from_probe: &DAffine3) {
         let axes = self.shared.tracking.tracker().axes;
         let frame = Arc::new(Published::new(picture, axes.to_ras() * *world_from_probe));
@@ -235,13 +235,13 @@ impl Server {
         self.shared.count(|status| status.images_dropped += late);
     }
 
-    /// Says that there is something else to see than what was published last, which was not worth
-    /// publishing without clients: the next client is not sent the old one unasked.
+    /// Marks the last published picture as outdated, since without clients no newer one is published: the
+    /// next client is not sent it unasked.
     pub fn outdate(&self) {
         self.shared.outdated.store(true, Ordering::Relaxed);
     }
 
-    /// What has happened so far.
+    /// Counts of events so far.
     pub fn status(&self) -> Status {
         lock(&self.shared.status).clone()
     }
@@ -251,13 +251,13 @@ impl Drop for Server {
     fn drop(&mut self) {
         self.shared.stopping.store(true, Ordering::Relaxed);
         if let Some(listener) = self.listener.take() {
-            // It has panicked only where a bug has been reported already.
+            // It panics only through a bug that has been reported already.
             let _ = listener.join();
         }
     }
 }
 
-/// Lets clients in and sees them out.
+/// Lets clients in, and removes those that have gone.
 struct Doorman {
     shared: Arc<Shared>,
     threads: Vec<(Arc<Client>, [JoinHandle<()>; 2])>,
@@ -295,7 +295,7 @@ impl Doorman {
         }
     }
 
-    /// Forgets the clients that have gone.
+    /// Removes the clients that have gone.
     fn see_out(&mut self) {
         let ended = |threads: &[JoinHandle<()>; 2]| threads.iter().all(JoinHandle::is_finished);
         self.threads.retain(|(_, threads)| !ended(threads));
@@ -359,7 +359,7 @@ impl Doorman {
         Ok(())
     }
 
-    /// Says that there is no room, which a new connection has room for in its buffers.
+    /// Refuses a client; the message fits into the buffers of a new connection.
     fn refuse(&mut self, mut stream: TcpStream, most: usize) -> std::io::Result<()> {
         stream.set_nonblocking(true)?;
         stream.write_all(&answer::no_room(most))?;

@@ -1,4 +1,4 @@
-//! The pose that the tracker last reported.
+//! The last pose from the tracker.
 
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
@@ -15,23 +15,23 @@ use crate::scene::tracker::{Tracker, rigid};
 pub struct Pose {
     /// Calibrated: world from probe space, rigid, mm.
     pub world_from_probe: DAffine3,
-    /// When it arrived here.
+    /// Time of its arrival here.
     pub arrived: Instant,
-    /// Counts the poses from 1.
+    /// Number of the pose, from 1.
     pub number: u64,
-    /// The transform or the tool.
+    /// Name of the transform or the tool.
     pub device: Label<20>,
 }
 
-/// What is known of the tracker.
+/// State of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tracked {
     /// No pose has arrived yet.
     Never,
     /// The latest pose is no older than the tracker's timeout.
     Live(Pose),
-    /// It is older, or the tracker says that it does not see the tool. The last pose: nothing has
-    /// been seen since its arrival.
+    /// It is older, or the tracker reports that it does not see the tool. The last pose: nothing has been seen
+    /// since its arrival.
     Lost(Pose),
 }
 
@@ -45,7 +45,7 @@ impl Tracked {
     }
 }
 
-/// The latest pose with what turns messages into it.
+/// The latest pose, and the calibration of messages.
 pub(super) struct Tracking {
     tracker: Mutex<Tracker>,
     last: Mutex<Option<Last>>,
@@ -53,7 +53,7 @@ pub(super) struct Tracking {
 
 struct Last {
     pose: Pose,
-    /// The tracker has said since that it does not see the tool.
+    /// True where the tracker has since reported that it does not see the tool.
     missing: bool,
 }
 
@@ -66,7 +66,7 @@ impl Tracking {
         lock(&self.tracker).clone()
     }
 
-    /// Goes on with another calibration. Poses by the one before are forgotten.
+    /// Goes on with another calibration. Poses from the one before are forgotten.
     pub fn calibrate(&self, tracker: Tracker) {
         *lock(&self.tracker) = tracker;
         *lock(&self.last) = None;
@@ -85,7 +85,7 @@ impl Tracking {
         }
     }
 
-    /// Whether this tool moves the probe. Without a choice all do, but for what was sent from here:
+    /// Returns whether this tool moves the probe. Without a choice all do, except the pose sent from here:
     /// some programs send back what they receive.
     fn is_meant(&self, device: &Label<20>) -> bool {
         match &lock(&self.tracker).device {
@@ -94,10 +94,10 @@ impl Tracking {
         }
     }
 
-    /// Takes a tool's matrix, columns first. Whether it is the tool that moves the probe.
+    /// Takes a tool's matrix, columns first; returns whether it is the tool that moves the probe.
     ///
     /// # Errors
-    /// What is wrong with the matrix.
+    /// The fault of the matrix.
     pub fn report(
         &self,
         device: Label<20>,
@@ -107,7 +107,7 @@ impl Tracking {
         if !self.is_meant(&device) {
             return Ok(false);
         }
-        // PLUS sends what it does not see with the last matrix and a status that is not OK.
+        // For a tool out of view PLUS sends the last matrix and a status that is not OK.
         let status = message.metadata("TransformStatus");
         if status.is_some_and(|status| status != "OK") {
             if let Some(last) = &mut *lock(&self.last) {

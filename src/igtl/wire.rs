@@ -7,7 +7,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use crc::{CRC_64_ECMA_182, Crc, Table};
 
-/// Sixteen tables: an image of the screen's size takes a millisecond, not five.
+/// Checksum with sixteen tables: an image of the screen's size takes a millisecond, not five.
 static CRC: Crc<u64, Table<16>> = Crc::<u64, Table<16>>::new(&CRC_64_ECMA_182);
 
 /// Checksum of a message's body.
@@ -15,32 +15,32 @@ pub fn checksum(body: &[u8]) -> u64 {
     CRC.checksum(body)
 }
 
-/// Why bytes are no message.
+/// The reason why bytes are no message.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DecodeError {
-    /// Not the protocol, or one to come.
+    /// Not the protocol, or a future version.
     #[error("header version {0} is none of OpenIGTLink's (1, 2, 3)")]
     Version(u16),
-    /// The body is not what was sent.
+    /// The body differs from the one sent.
     #[error("the body's checksum is {computed:016x}, not {stated:016x}")]
     Checksum {
-        /// In the header.
+        /// Checksum in the header.
         stated: u64,
-        /// Of the body.
+        /// Checksum of the body.
         computed: u64,
     },
     /// Bytes are missing, or left over.
     #[error("{what} of {bytes} bytes")]
     Length {
-        /// What has the wrong length.
+        /// The part with the wrong length.
         what: &'static str,
-        /// How many there are.
+        /// Number of bytes.
         bytes: usize,
     },
     /// A code that the protocol does not define.
     #[error("{what} {code}, which is not defined")]
     Code {
-        /// What is coded.
+        /// The field with the code.
         what: &'static str,
         /// The code.
         code: u64,
@@ -54,7 +54,7 @@ pub(super) struct Reader<'b> {
 }
 
 impl<'b> Reader<'b> {
-    /// `what` is named in errors.
+    /// A reader of `bytes`; errors name `what`.
     pub fn new(bytes: &'b [u8], what: &'static str) -> Self {
         Self { rest: bytes, what }
     }
@@ -107,12 +107,12 @@ impl<'b> Reader<'b> {
         Ok(out)
     }
 
-    /// All that is left.
+    /// All remaining bytes.
     pub fn rest(self) -> &'b [u8] {
         self.rest
     }
 
-    /// Fails where something is left.
+    /// Fails where bytes remain.
     pub fn end(self) -> Result<(), DecodeError> {
         match self.rest.len() {
             0 => Ok(()),
@@ -136,7 +136,7 @@ pub(super) fn put_shorts(out: &mut Vec<u8>, values: &[u16]) {
 pub struct Label<const N: usize>(pub(super) [u8; N]);
 
 impl<const N: usize> Label<N> {
-    /// The text, cut to what fits.
+    /// A label with the text, cut to N bytes.
     pub fn new(text: &str) -> Self {
         let mut end = text.len().min(N);
         while !text.is_char_boundary(end) {
@@ -147,24 +147,24 @@ impl<const N: usize> Label<N> {
         Self(bytes)
     }
 
-    /// What stands before the first zero.
+    /// The text before the first zero.
     pub fn text(&self) -> Cow<'_, str> {
         let end = self.0.iter().position(|&b| b == 0).unwrap_or(N);
         String::from_utf8_lossy(&self.0[..end])
     }
 
-    /// Whether the field holds this text.
+    /// Returns whether the field holds this text.
     pub fn is(&self, text: &str) -> bool {
         self.text() == text
     }
 
-    /// Whether it begins with a zero.
+    /// Returns whether it begins with a zero.
     pub fn is_empty(&self) -> bool {
         self.0.first().is_none_or(|&b| b == 0)
     }
 }
 
-/// Quoted, with what cannot be printed escaped: it may come from anybody.
+/// In quotes, with escapes for unprintable characters: it may come from anybody.
 impl<const N: usize> fmt::Display for Label<N> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "`{}`", self.text().escape_debug())
@@ -177,21 +177,21 @@ impl<const N: usize> fmt::Debug for Label<N> {
     }
 }
 
-/// Seconds since 1970 (UTC) in units of 2^-32 s; 0 is none.
+/// Time since 1970 (UTC) in units of 2^-32 s; 0 is none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timestamp(pub u64);
 
 impl Timestamp {
-    /// The present.
+    /// The present time.
     pub fn now() -> Self {
         let now = SystemTime::now().duration_since(UNIX_EPOCH);
-        // A clock before 1970 knows no time.
+        // A clock before 1970 gives zero.
         let now = now.unwrap_or_default();
         let fraction = (u64::from(now.subsec_nanos()) << 32) / 1_000_000_000;
         Self((now.as_secs() << 32) | fraction)
     }
 
-    /// As seconds.
+    /// Time in seconds.
     pub fn seconds(self) -> f64 {
         self.0 as f64 / 2f64.powi(32)
     }

@@ -1,59 +1,58 @@
-//! Which level the next frame is made at.
+//! The choice of the next frame's level.
 
 use std::collections::VecDeque;
 
-/// Frames whose median counts: one that something else has delayed changes nothing.
+/// Number of frames whose median counts: one frame delayed by something else changes nothing.
 const COUNTED: usize = 3;
-/// A level is left for a coarser one when it takes this many times the budget.
+/// Multiple of the budget above which a level is left for a coarser one.
 const OVER: f64 = 1.1;
-/// A finer one is taken when it is thought to take no more than this part of the budget.
+/// Share of the budget below which an estimate makes a finer level worth taking.
 const UNDER: f64 = 0.8;
-/// So many budgets it may take were its cost in proportion to its work, whatever else is thought.
+/// Most budgets that it may take by an estimate in proportion to its work, whatever else is estimated.
 const BOLD: f64 = 3.0;
-/// A finer level whose first frame takes so many budgets is left at once.
+/// Number of budgets for its first frame at which a finer level is left at once.
 const FAILED: f64 = 2.0;
-/// Frames before a level that has failed is tried again, at first and at most: each failure doubles
-/// them.
+/// Frames before a failed level is tried again, at first and at most: each failure doubles them.
 const PATIENCE: [u32; 2] = [30, 1920];
-/// Frames of which the slowest says what a finer level would take: more than those of a heartbeat.
+/// Number of frames whose slowest counts in the estimate of a finer level: more than those of a heartbeat.
 const REMEMBERED: usize = 60;
-/// At rest a level that takes up to so many budgets comes next at once.
+/// At rest, most budgets of a level that comes next at once.
 const SWIFT: f64 = 6.0;
-/// At rest a level on the way takes at most so many budgets, and so many times what is shown.
+/// At rest, most budgets of an intermediate level, and its least time as a multiple of the shown level's.
 const ON_THE_WAY: [f64; 2] = [3.0, 1.5];
 
-/// Chooses a level, from the times that frames took. What is chosen depends on nothing else: the same
-/// times give the same levels.
+/// Chooses a level from the times of frames and from nothing else: the same times give the same
+/// levels.
 ///
-/// A frame slower than the budget, by the median of three, leads to a level that is thought to keep it. A
-/// finer level is taken only where it is thought to keep the budget with a fifth to spare, judged by the
-/// slowest of the last frames, so that a scene whose cost beats stays at one level. One that turns out not
-/// to keep it is tried again after a while, each time twice as long.
+/// A frame slower than the budget, by the median of three, leads to a level expected to keep it. A finer level
+/// is taken only where it is expected to keep the budget with a fifth to spare, judged by the slowest of the
+/// last frames, so that a scene with a varying cost stays at one level. A level that fails is tried again
+/// after a while, each time twice as long.
 #[derive(Clone, Debug)]
 pub struct Governor {
-    /// What a frame may take, ms.
+    /// Time budget of a frame, ms.
     budget: f64,
-    /// What the levels are guessed to cost relative to each other.
+    /// Estimated costs of the levels relative to each other.
     works: Vec<f64>,
-    /// What a frame of each took, ms, as it would be now: where the present level becomes slower, so do
-    /// all.
+    /// Times of frames of each level, ms, at the device's present speed: where the present level becomes slower,
+    /// so do all.
     known: Vec<Option<f64>>,
     level: usize,
-    /// Times at this level, ms, newest last.
+    /// Times of frames at this level, ms, newest last.
     times: VecDeque<f64>,
-    /// Frames at this level.
+    /// Number of frames at this level.
     frames: u32,
     patience: u32,
     /// The level that was left for this one, because this one is finer.
     came_from: Option<usize>,
     /// The coarsest level that has failed.
     failed: Option<usize>,
-    /// What frames took at the level before, ms.
+    /// Time of frames at the level before, ms.
     left: Option<f64>,
 }
 
 impl Governor {
-    /// Begins at the coarsest of levels that cost `works` relative to each other, the finest first.
+    /// Begins at the coarsest of levels of relative costs `works`, the finest first.
     ///
     /// # Panics
     /// Without any level.
@@ -78,17 +77,17 @@ impl Governor {
         self.level
     }
 
-    /// What a frame may take, ms.
+    /// Time budget of a frame, ms.
     pub fn budget(&self) -> f64 {
         self.budget
     }
 
-    /// Sets it. What was learned of the levels stays.
+    /// Sets the budget. Times learned for the levels stay.
     pub fn set_budget(&mut self, budget: f64) {
         self.budget = budget;
     }
 
-    /// Goes on with other levels; with the same ones nothing changes. The device stays as fast as it was.
+    /// Goes on with other levels; with equal ones nothing changes. The device's speed is kept.
     pub fn adopt(&mut self, works: Vec<f64>) {
         if works == self.works {
             return;
@@ -101,19 +100,19 @@ impl Governor {
         }
     }
 
-    /// Median of the last frames at the present level, ms; none before the first.
+    /// Median time of the last frames at the present level, ms; none before the first.
     pub fn median(&self) -> Option<f64> {
         let last = self.times.iter().rev().take(COUNTED);
         median(last.copied().collect())
     }
 
-    /// What frames at the present level take, ms; none before there are enough of them.
+    /// Time of frames at the present level, ms; none before there are enough of them.
     pub fn pace(&self) -> Option<f64> {
         self.known[self.level].or(self.left)
     }
 
-    /// What a frame of a level is thought to take, ms: what it took, else what follows from two others
-    /// that are known, else in proportion to its work. None before the first frame.
+    /// Expected time of a frame of a level, ms: the known time, else from two other known levels, else in
+    /// proportion to its work. None before the first frame.
     fn expected(&self, level: usize) -> Option<f64> {
         if let Some(known) = self.known[level] {
             return Some(known);
@@ -132,10 +131,10 @@ impl Governor {
         works.filter_map(|(work, known)| Some((work, (*known)?)))
     }
 
-    /// Learns what a frame took that was made at `level`, ms, and chooses the next level.
+    /// Learns the time of a frame made at `level`, ms, and chooses the next level.
     pub fn finished(&mut self, level: usize, ms: f64) {
         if level != self.level {
-            // Made at rest. Of levels of a ladder before there is nothing to learn.
+            // Made at rest. Levels of an earlier ladder teach nothing.
             if let Some(known) = self.known.get_mut(level) {
                 *known = Some(ms);
             }
@@ -208,7 +207,7 @@ impl Governor {
         }
     }
 
-    /// Largest median of the frames that are remembered.
+    /// Largest median of the remembered frames.
     fn slowest(&self) -> f64 {
         let times: Vec<f64> = self.times.iter().copied().collect();
         let medians = times.windows(COUNTED).filter_map(|w| median(w.to_vec()));
@@ -223,8 +222,8 @@ impl Governor {
         self.came_from = None;
     }
 
-    /// What to make at rest of what is shown at level `shown`: the scene's own where that is thought to
-    /// come soon, else one level on the way, if it is much finer; nothing where the scene's own is shown.
+    /// The level for making the image of level `shown` again at rest: the scene's own where it is expected soon,
+    /// else an intermediate one, if it is much finer; none where the scene's own is shown.
     pub fn refined(&self, shown: usize) -> Option<usize> {
         if shown == 0 {
             return None;
@@ -253,7 +252,7 @@ mod tests {
 
     const WORKS: [f64; 8] = [1.0, 0.6, 0.36, 0.22, 0.12, 0.07, 0.04, 0.02];
 
-    /// Levels of `count` frames on a device where a frame takes `cost` of level and number.
+    /// Levels of `count` frames on a device where `cost` gives a frame's time by level and number.
     fn run(
         governor: &mut Governor,
         count: usize,
@@ -271,7 +270,7 @@ mod tests {
         levels.windows(2).filter(|w| w[0] != w[1]).count()
     }
 
-    /// What a device takes that makes the scene's own frame in `whole` ms, 2 of them whatever the level.
+    /// Frame times of a device that makes the scene's own frame in `whole` ms, 2 of them at any level.
     fn device(whole: f64) -> impl Fn(usize, usize) -> f64 {
         move |level, _| 2.0 + (whole - 2.0) * WORKS[level]
     }
@@ -316,7 +315,7 @@ mod tests {
         let left = levels.iter().position(|&level| level > settled);
         assert!(left.is_some_and(|at| at <= 3), "{levels:?}");
         assert!(3.0 * cost(governor.level(), 0) <= 66.0 * 1.1);
-        // The load is gone: it comes back, once.
+        // The load is gone: the level comes back, once.
         let levels = run(&mut governor, 400, device(300.0));
         assert_eq!(*levels.last().unwrap(), settled);
         assert_eq!(changes(&levels), 1, "{levels:?}");
@@ -338,7 +337,7 @@ mod tests {
 
     #[test]
     fn an_attempt_that_fails_is_repeated_less_and_less_often() {
-        // The guess is wrong: level 2 costs as much as the scene's own.
+        // The estimate is wrong: level 2 costs as much as the scene's own.
         let mut governor = Governor::new(66.0, WORKS.to_vec());
         let real = [300.0, 299.0, 298.0, 25.0, 15.0, 10.0, 6.0, 4.0];
         let levels = run(&mut governor, 1000, |level, _| real[level]);
@@ -371,7 +370,7 @@ mod tests {
         let next = governor.refined(shown).unwrap();
         assert!(next > 0 && next < shown, "{next} of {shown}");
         assert_eq!(governor.refined(next), Some(0));
-        // What the frames at rest took is learned, and the level that was chosen stays.
+        // The time of frames at rest is learned, and the chosen level stays.
         governor.finished(0, 300.0);
         assert_eq!((governor.level(), governor.refined(shown)), (shown, Some(0)));
     }

@@ -1,4 +1,4 @@
-//! The levels that a scene can be imaged at, from its own down to about a thirtieth of the work.
+//! The levels of a scene's quality, from its own down to about a thirtieth of the work.
 
 use std::fmt;
 
@@ -14,14 +14,14 @@ const LEAST_SCANLINES: u32 = 32;
 const LEAST_HEIGHT: u32 = 240;
 /// Fewest samples of the pulse's axial sigma: below, a surface between two samples would lose height.
 const LEAST_SIGMA_SAMPLES: f64 = 1.0;
-/// From the second step on branches that are weaker than this, dB, carry no speckle.
+/// Threshold from the second step on, dB: weaker branches carry no speckle.
 const FLOOR: f64 = -40.0;
-/// From the second step on branches that begin weaker than this, dB, are followed by chance.
+/// Threshold from the second step on, dB: branches that begin weaker are followed by chance.
 const BRANCH_FLOOR: f64 = -30.0;
 /// Fewest scatterers per resolution cell: with fewer, speckle would no longer be fully developed.
 const LEAST_SCATTERERS: f64 = 4.0;
 
-/// What one step down leaves of the scene's own counts.
+/// Shares of the scene's own counts that one step down leaves.
 struct Step {
     scanlines: f64,
     layers: f64,
@@ -38,7 +38,7 @@ const fn step(shares: [f64; 6], reflections: u32) -> Step {
     Step { scanlines, layers, samples, paths, scatterers, reflections, height }
 }
 
-/// Each about two thirds of the work of the one before. Paths and layers go first: they cost most and
+/// Steps, each about two thirds of the work of the one before. Paths and layers go first: they cost most and
 /// show least.
 const STEPS: [Step; 8] = [
     step([1.0, 0.75, 1.0, 0.5, 0.75, 1.0], 3),
@@ -54,29 +54,29 @@ const STEPS: [Step; 8] = [
 /// The counts of one level.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Level {
-    /// Scanlines.
+    /// Number of scanlines.
     pub scanlines: u32,
-    /// Elevation layers, odd where the scene's own are more: the middle of the slice then lies where the
-    /// scene has it, and so does its speckle.
+    /// Number of elevation layers, odd where the scene has more: the middle of the slice then stays in place, and
+    /// so does its speckle.
     pub layers: u32,
-    /// Samples of a scanline.
+    /// Number of samples of a scanline.
     pub samples: u32,
-    /// Paths of a line.
+    /// Number of paths of a line.
     pub paths: u32,
-    /// Scatterers per resolution cell; 0 is all there are.
+    /// Scatterers per resolution cell; 0 means all.
     pub scatterers: f64,
     /// Most reflections of a path.
     pub reflections: u32,
     /// Weakest branch that carries speckle, dB.
     pub volume_floor: f64,
-    /// Branches fainter than this are followed by chance, dB.
+    /// Level under which branches are followed by chance, dB.
     pub branch_floor: f64,
-    /// Rows of the picture.
+    /// Number of rows of the picture.
     pub image_height: u32,
 }
 
 impl Level {
-    /// The counts of a scene as it stands.
+    /// The present counts of a scene.
     pub fn of(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Self {
         Self {
             scanlines: probe.scanlines,
@@ -109,7 +109,7 @@ impl Level {
         imaging.image_height = self.image_height;
     }
 
-    /// Its counts, as sidecars and `--json` say them.
+    /// The counts as in sidecars and `--json`.
     pub fn json(&self) -> Value {
         json!({
             "scanlines": self.scanlines,
@@ -124,8 +124,8 @@ impl Level {
         })
     }
 
-    /// Work relative to `own`, by a rough count: what stages take of a frame of the scene's own counts,
-    /// times what is left of what drives them. [`super::Governor`] replaces it by what it measures.
+    /// Estimated work relative to `own`: shares of the stages in a frame of the scene's own counts, times the
+    /// remaining share of the counts behind them. [`super::Governor`] replaces it by measured times.
     fn work(&self, own: &Self) -> f64 {
         let share = |a: u32, b: u32| f64::from(a) / f64::from(b.max(1));
         let lines = share(self.scanlines, own.scanlines) * share(self.layers, own.layers);
@@ -137,7 +137,7 @@ impl Level {
             all if all <= 0.0 => 1.0,
             most => self.scatterers / most,
         };
-        // Layers share the slice's scatterers among them.
+        // The layers share the slice's scatterers.
         let speckle = share(self.scanlines, own.scanlines) * scatterers;
         0.5 * rays + 0.35 * speckle + 0.1 * samples + 0.05 * rows * rows
     }
@@ -163,8 +163,8 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// The levels of a scene. Where it mixes an acquired volume in, the picture keeps its size: the width
-    /// of the blending is counted in pixels.
+    /// The levels of a scene. Where it mixes an acquired volume in, the picture keeps its size: the width of
+    /// the blending is counted in pixels.
     pub fn of(scene: &Scene) -> Self {
         Self::new(&scene.probe, &scene.simulation, &scene.imaging, scene.shows_volume())
     }
@@ -186,7 +186,7 @@ impl Ladder {
             layers: odd(own.layers, step.layers),
             samples: part(own.samples, step.samples, least_samples),
             paths: part(own.paths, step.paths, 1),
-            // All of them stay all.
+            // 0, all scatterers, stays 0.
             scatterers: (own.scatterers * step.scatterers)
                 .max(LEAST_SCATTERERS)
                 .min(own.scatterers),
@@ -209,14 +209,14 @@ impl Ladder {
         &self.levels
     }
 
-    /// A guess of what each level costs relative to the scene's own.
+    /// Estimated cost of each level relative to the scene's own.
     pub fn works(&self) -> Vec<f64> {
         let own = &self.levels[0];
         self.levels.iter().map(|level| level.work(own)).collect()
     }
 }
 
-/// The largest odd count of no more than a share of `layers`, or all of them.
+/// The largest odd number up to a share of `layers`, or all of them.
 fn odd(layers: u32, share: f64) -> u32 {
     let most = (f64::from(layers) * share).floor() as u32;
     match most {

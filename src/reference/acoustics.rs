@@ -66,5 +66,4 @@ pub fn power_cosine(n: DVec3, roughness: f64, [u, v]: [f64; 2]) -> DVec3 {
 }
 
 #[cfg(test)]
-#[path = "acoustics_tests.rs"]
 mod tests;

@@ -98,5 +98,4 @@ pub fn blend(finest: Level, levels: u32) -> Vec<f64> {
 }
 
 #[cfg(test)]
-#[path = "pyramid_tests.rs"]
 mod tests;

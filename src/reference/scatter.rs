@@ -565,5 +565,4 @@ impl<'a> Tube<'a> {
 }
 
 #[cfg(test)]
-#[path = "scatter_tests.rs"]
 mod tests;

@@ -376,5 +376,4 @@ fn own_share(path: &Path) -> (f64, f64) {
 }
 
 #[cfg(test)]
-#[path = "trace_tests.rs"]
 mod tests;

@@ -1,22 +1,22 @@
-//! Why nothing can be registered: where, cause, and what to do about it.
+//! The reason why nothing can be registered: place, cause, and remedy.
 
 use std::path::{Path, PathBuf};
 
 use miette::Diagnostic;
 use thiserror::Error;
 
-/// A mistake in what is to be registered, or data that say too little. Nothing is changed.
+/// A mistake in the data to be registered, or too little data. Nothing is changed.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{}{cause}", self.place())]
 #[diagnostic(help("{remedy}"))]
 pub struct RegisterError {
-    /// The file that is wrong; none where it is the data as a whole.
+    /// The faulty file; none where it is the data as a whole.
     pub file: Option<PathBuf>,
-    /// Line in it, from 1; 0 for the whole file.
+    /// Line of its text, from 1; 0 for the whole file.
     pub line: u64,
     /// Cause.
     pub cause: String,
-    /// What to do about it.
+    /// Remedy.
     pub remedy: String,
 }
 
@@ -31,7 +31,7 @@ impl RegisterError {
         Self::line(file, 0, cause, remedy)
     }
 
-    /// An error on a line, from 1.
+    /// An error on a text line, from 1.
     pub(super) fn line(
         file: &Path,
         line: u64,

@@ -1,14 +1,14 @@
-//! Points laid onto a surface, whatever part of them does not belong to it.
+//! Fit of points to a surface, although part of them may not belong to it.
 //!
-//! Iterative closest points, as a least-squares problem (Fitzgibbon, Image and Vision Computing 21,
-//! 2003): each point's distance from the surface goes through Tukey's biweight, whose cutoff follows
-//! from the median distance and only ever shrinks, and Levenberg and Marquardt's method lowers their
-//! sum. So what lies far off pulls at nothing, and no step makes the fit worse.
+//! Iterative closest points, as a least-squares problem (Fitzgibbon, Image and Vision Computing 21, 2003):
+//! each point's distance from the surface goes through Tukey's biweight, whose cutoff follows from the
+//! median distance and only ever shrinks, and Levenberg and Marquardt's method lowers their sum. So points
+//! far off have no pull, and no step makes the fit worse.
 
 use glam::{DAffine3, DQuat, DVec3};
-use nalgebra::{SMatrix, SVector, SymmetricEigen};
 use rayon::prelude::*;
 
+use super::symmetric::{Square, eigen};
 use super::{RegisterError, Surface, Transformation, scale_of};
 use crate::statistics::Statistics;
 
@@ -17,7 +17,7 @@ pub const MIN_POINTS: usize = 10;
 
 /// Most steps.
 const ROUNDS: usize = 300;
-/// A step that moves a typical point by less ends the search, mm.
+/// Largest movement of a typical point, mm, at which the search ends.
 const STILL: f64 = 1e-5;
 /// Biweight cutoff in standard deviations: 95 % efficient on normal errors (Holland and Welsch 1977).
 const TUKEY: f64 = 4.685;
@@ -25,47 +25,46 @@ const TUKEY: f64 = 4.685;
 const NORMAL: f64 = 1.4826;
 /// Least cutoff, mm: below it distances are rounding.
 const EXACT: f64 = 1e-6;
-/// Factors on the scale between which a similarity stays. A cloud of points that shrinks onto a spot
-/// of the surface fits it perfectly.
+/// Least and greatest scale of a similarity. A cloud of points that shrinks onto a spot of the surface
+/// fits it perfectly.
 const GROWTH: (f64, f64) = (0.5, 2.0);
-/// Mean squared change of distance, of unit motion, below which the surface says nothing about it.
+/// Mean squared change of distance by a unit motion below which the surface does not determine the motion.
 const LOOSE: f64 = 1e-3;
 
-/// Shift, rotation and growth, all in mm of a typical point's way.
+/// Number of components of a motion: shift, rotation and growth, all in mm of a typical point's movement.
 const FREEDOMS: usize = 7;
-type Motion = SVector<f64, FREEDOMS>;
-type Normal = SMatrix<f64, FREEDOMS, FREEDOMS>;
+type Motion = [f64; FREEDOMS];
 
-/// How points lie on a surface.
+/// Result of a fit of points to a surface.
 #[derive(Clone, Debug)]
 pub struct Fit {
-    /// Takes the points to the surface: a similarity, never a reflection.
+    /// Transform of the points to the surface: a similarity, never a reflection.
     pub transform: DAffine3,
-    /// Distances that are left.
+    /// Remaining distances.
     pub residuals: Residuals,
-    /// Steps taken.
+    /// Number of steps.
     pub rounds: usize,
-    /// Whether it ended at a minimum and not at the limit of steps.
+    /// True where it ended at a minimum and not at the limit of steps.
     pub settled: bool,
     /// Motions that the surface leaves open, in words; along them the points are where they started.
     pub loose: Vec<String>,
 }
 
-/// Distances of points from a surface, mm. Those beyond the cutoff count as belonging to something
-/// else, and rms, median and 95 % are of the others.
+/// Distances of points from a surface, mm. Points beyond the cutoff count as foreign, and rms, median and
+/// 95 % are of the others.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residuals {
-    /// Points.
+    /// Number of points.
     pub points: usize,
-    /// Those that count.
+    /// Number of points that count.
     pub kept: usize,
     /// Distance from which on a point does not count.
     pub cutoff: f64,
     /// Root mean square.
     pub rms: f64,
-    /// Half of them are nearer.
+    /// Median: half of them are nearer.
     pub median: f64,
-    /// 95 of 100 are nearer.
+    /// 95th percentile: 95 of 100 are nearer.
     pub p95: f64,
 }
 
@@ -90,7 +89,7 @@ impl Residuals {
     }
 }
 
-/// A point where it is now, with the nearest of the surface.
+/// A point at its present place, and its nearest point of the surface.
 struct Matched {
     at: DVec3,
     /// Unit vector from the surface to the point.
@@ -99,8 +98,8 @@ struct Matched {
     off: f64,
 }
 
-/// Lays `points` onto `surface`, beginning with `start`: the nearest minimum from there. More than
-/// half of the points have to belong to the surface, of which they may cover a part.
+/// Fits `points` to `surface`, beginning with `start`: finds the nearest minimum. More than half of the points
+/// have to belong to the surface, of which they may cover a part.
 ///
 /// # Errors
 /// Fewer than [`MIN_POINTS`] points, points that are no numbers or coincide; a start farther off than
@@ -135,7 +134,7 @@ pub fn fit(
         settled = true;
         while damping < 1e9 {
             let motion = system.step(damping);
-            if motion.norm() < STILL {
+            if dot(&motion, &motion).sqrt() < STILL {
                 break;
             }
             let next = system.increment(&motion) * transform;
@@ -205,7 +204,7 @@ fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Mat
     points.par_iter().map(matched).collect()
 }
 
-/// Cutoff by the median distance; none that is larger than `before`.
+/// Cutoff from the median distance, at most `before`.
 fn cutoff_of(matched: &[Matched], before: f64) -> f64 {
     let median = Statistics::of(matched.iter().map(|m| m.off)).median;
     (TUKEY * NORMAL * median).max(EXACT).min(before)
@@ -222,11 +221,12 @@ fn cost(matched: &[Matched], cutoff: f64) -> f64 {
 
 /// Normal equations of the distances, linear in a small motion about the points' centre.
 struct System {
-    matrix: Normal,
+    /// Eigenvalues of the matrix, and their directions.
+    axes: [(f64, Motion); FREEDOMS],
     gradient: Motion,
     weight: f64,
     centre: DVec3,
-    /// Root mean square distance of the points from it.
+    /// Root mean square distance of the points from the centre.
     reach: f64,
 }
 
@@ -236,8 +236,8 @@ impl System {
         let centre = matched.iter().map(|m| m.at).sum::<DVec3>() / count;
         let squares = matched.iter().map(|m| m.at.distance_squared(centre));
         let reach = (squares.sum::<f64>() / count).sqrt();
-        let mut out =
-            Self { matrix: Normal::zeros(), gradient: Motion::zeros(), weight: 0.0, centre, reach };
+        let mut matrix: Square<FREEDOMS> = Default::default();
+        let (mut gradient, mut total) = (Motion::default(), 0.0);
         for m in matched.iter().filter(|m| m.off < cutoff) {
             let weight = (1.0 - (m.off / cutoff).powi(2)).powi(2);
             let arm = (m.at - centre) / reach;
@@ -246,21 +246,34 @@ impl System {
                 Transformation::Rigid => 0.0,
                 Transformation::Similarity => arm.dot(m.away),
             };
-            let row = Motion::from([shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, growth]);
-            out.matrix += weight * row * row.transpose();
-            out.gradient += weight * m.off * row;
-            out.weight += weight;
+            let row = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, growth];
+            for i in 0..FREEDOMS {
+                for j in 0..FREEDOMS {
+                    matrix[i][j] += weight * row[i] * row[j];
+                }
+                gradient[i] += weight * m.off * row[i];
+            }
+            total += weight;
         }
-        out
+        Self { axes: eigen(matrix), gradient, weight: total, centre, reach }
     }
 
-    /// The motion that lowers the sum, the shorter the more it is damped. What the points do not
-    /// determine stands still.
+    /// The motion that lowers the sum; the more damping, the shorter. Components that the points do not determine
+    /// are zero.
     fn step(&self, damping: f64) -> Motion {
-        // An identity keeps apart what has no equation, as growth of what is rigid.
-        let held = Normal::identity() * (damping * self.matrix.trace() / FREEDOMS as f64);
-        let solved = (self.matrix + held).cholesky();
-        solved.map_or_else(Motion::zeros, |c| -c.solve(&self.gradient))
+        let trace: f64 = self.axes.iter().map(|(value, _)| value).sum();
+        let mut motion = Motion::default();
+        for (value, axis) in &self.axes {
+            // Damped, so that it is positive also without an equation, such as for growth in a rigid fit.
+            let stiffness = value + damping * trace / FREEDOMS as f64;
+            if stiffness > 0.0 {
+                let way = -dot(axis, &self.gradient) / stiffness;
+                for (m, a) in motion.iter_mut().zip(axis) {
+                    *m += way * a;
+                }
+            }
+        }
+        motion
     }
 
     fn increment(&self, motion: &Motion) -> DAffine3 {
@@ -273,12 +286,11 @@ impl System {
         about * DAffine3::from_translation(-self.centre)
     }
 
-    /// Motions that change next to no distance.
+    /// Motions that hardly change any distance.
     fn loose(&self, transformation: Transformation) -> Vec<String> {
-        let eigen = SymmetricEigen::new(self.matrix / self.weight.max(f64::MIN_POSITIVE));
-        let pairs = eigen.eigenvalues.iter().zip(eigen.eigenvectors.column_iter());
+        let least = LOOSE * self.weight.max(f64::MIN_POSITIVE);
         let mut out = Vec::new();
-        for (_, vector) in pairs.filter(|(value, _)| **value < LOOSE) {
+        for (_, vector) in self.axes.iter().filter(|(value, _)| *value < least) {
             let part = |i: usize| DVec3::new(vector[i], vector[i + 1], vector[i + 2]);
             let (shift, turn, growth) = (part(0), part(3), vector[6].abs());
             let largest = shift.length().max(turn.length()).max(growth);
@@ -287,7 +299,7 @@ impl System {
                 format!("({:.2}, {:.2}, {:.2})", v.x, v.y, v.z)
             };
             if growth == largest {
-                // What is rigid does not grow.
+                // A rigid fit has no growth.
                 if transformation == Transformation::Similarity {
                     out.push("how large it is".to_owned());
                 }
@@ -301,6 +313,9 @@ impl System {
     }
 }
 
+fn dot(a: &Motion, b: &Motion) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
 #[cfg(test)]
-#[path = "icp_tests.rs"]
 mod tests;

@@ -1,28 +1,29 @@
 //! The similarity between corresponding points, in closed form.
 
-use glam::{DAffine3, DMat3, DVec3};
-use nalgebra::{Matrix3, Vector3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+use super::symmetric::eigen;
 use super::{RegisterError, Transformation};
 
-/// Share of their length by which landmarks have to spread across it: below it they are as good as on
-/// a line, and errors of a few mm turn what they place right about it. Those that leave a plane by less
-/// do not tell a structure from its mirror image.
+/// Least breadth of landmarks as a share of their length: below it they are nearly on a line, and errors of a
+/// few mm turn everything right about it. Landmarks that leave a plane by less do not distinguish a structure
+/// from its mirror image.
 const BREADTH: f64 = 0.02;
 
-/// A point that is known in both frames, mm.
+/// A point known in both frames, mm.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Landmark {
     /// Name.
     pub name: String,
-    /// Where it is in the volume.
+    /// Position in the volume.
     pub from: DVec3,
-    /// Where it is in the model.
+    /// Position in the model.
     pub to: DVec3,
 }
 
 /// The transformation that takes each landmark's `from` to its `to` with the least sum of squared
-/// distances (Umeyama, IEEE PAMI 13(4), 1991). Never a reflection.
+/// distances: the rotation by Horn (J. Opt. Soc. Am. A 4(4), 1987), the scale by Umeyama (IEEE PAMI
+/// 13(4), 1991). Never a reflection.
 ///
 /// # Errors
 /// Fewer than three landmarks; landmarks that are no numbers, coincide or lie on a line; four or more
@@ -47,27 +48,22 @@ pub fn closed_form(
     let from = Cloud::of(landmarks.iter().map(|l| l.from));
     let to = Cloud::of(landmarks.iter().map(|l| l.to));
     let is_flat = from.spread("volume")? | to.spread("model")?;
-    let mut covariance = Matrix3::zeros();
-    for l in landmarks {
-        covariance += vector(l.to - to.mean) * vector(l.from - from.mean).transpose();
-    }
-    covariance /= landmarks.len() as f64;
-    let svd = covariance.svd(true, true);
-    let (u, v_t) = (svd.u.expect("asked for"), svd.v_t.expect("asked for"));
-    let proper = (u.determinant() * v_t.determinant()).signum();
-    let with = |sign: f64| {
-        let signs = Vector3::new(1.0, 1.0, sign);
-        let rotation = u * Matrix3::from_diagonal(&signs) * v_t;
+    let covariance =
+        landmarks.iter().map(|l| outer(l.from - from.mean, l.to - to.mean)).sum::<DMat3>();
+    let turns = eigen(horn(&covariance));
+    let with = |sign: f64, (along, [w, x, y, z]): (f64, [f64; 4])| {
         let scale = match transformation {
             Transformation::Rigid => 1.0,
-            Transformation::Similarity => svd.singular_values.dot(&signs) / from.covariance.trace(),
+            Transformation::Similarity => sign * along / from.squares,
         };
-        let matrix3 = DMat3::from_cols_slice(rotation.as_slice()) * scale;
+        let matrix3 = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w)) * (sign * scale);
         DAffine3::from_mat3_translation(matrix3, to.mean - matrix3 * from.mean)
     };
-    let found = with(proper);
-    let (error, mirrored) = (rms(&found, landmarks), rms(&with(-proper), landmarks));
-    if proper < 0.0 && !is_flat && 2.0 * mirrored < error {
+    let found = with(1.0, turns[0]);
+    // The best rotation of what is reflected through the mean.
+    let mirrored = with(-1.0, turns[3]);
+    let (error, mirrored) = (rms(&found, landmarks), rms(&mirrored, landmarks));
+    if !is_flat && 2.0 * mirrored < error {
         return Err(RegisterError::data(
             format!(
                 "the landmarks are mirrored: with left and right exchanged they fit to \
@@ -81,13 +77,13 @@ pub fn closed_form(
 }
 
 /// Root mean square of the distances that `transform` leaves between landmarks, mm: the fiducial
-/// registration error. Zero of none.
+/// registration error. Zero without landmarks.
 pub fn rms(transform: &DAffine3, landmarks: &[Landmark]) -> f64 {
     let squares = landmarks.iter().map(|l| off(transform, l).powi(2));
     (squares.sum::<f64>() / landmarks.len().max(1) as f64).sqrt()
 }
 
-/// The landmark that `transform` leaves farthest off, and how far, mm; none of none.
+/// The landmark that `transform` leaves farthest off, and its distance, mm; none without landmarks.
 pub fn worst<'l>(transform: &DAffine3, landmarks: &'l [Landmark]) -> Option<(&'l Landmark, f64)> {
     let all = landmarks.iter().map(|l| (l, off(transform, l)));
     all.max_by(|a, b| a.1.total_cmp(&b.1))
@@ -97,29 +93,43 @@ fn off(transform: &DAffine3, landmark: &Landmark) -> f64 {
     transform.transform_point3(landmark.from).distance(landmark.to)
 }
 
-fn vector(v: DVec3) -> Vector3<f64> {
-    Vector3::from(v.to_array())
+/// The matrix of `a` times the transpose of `b`.
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// Horn's matrix of a sum of `outer(from, to)`: its quadratic form is the sum of how far each `from`,
+/// turned by a unit quaternion (w, x, y, z), lies along its `to`.
+fn horn(sum: &DMat3) -> [[f64; 4]; 4] {
+    let [[xx, yx, zx], [xy, yy, zy], [xz, yz, zz]] = sum.to_cols_array_2d();
+    [
+        [xx + yy + zz, yz - zy, zx - xz, xy - yx],
+        [yz - zy, xx - yy - zz, xy + yx, zx + xz],
+        [zx - xz, xy + yx, yy - xx - zz, yz + zy],
+        [xy - yx, zx + xz, yz + zy, zz - xx - yy],
+    ]
 }
 
 /// Points of one frame about their mean.
 struct Cloud {
     mean: DVec3,
-    covariance: Matrix3<f64>,
+    /// Sum of squared distances from it.
+    squares: f64,
+    covariance: DMat3,
 }
 
 impl Cloud {
     fn of(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> Self {
         let count = points.len() as f64;
         let mean = points.clone().sum::<DVec3>() / count;
-        let squares = points.map(|p| vector(p - mean) * vector(p - mean).transpose());
-        Self { mean, covariance: squares.sum::<Matrix3<f64>>() / count }
+        let covariance = points.clone().map(|p| outer(p - mean, p - mean)).sum::<DMat3>() / count;
+        Self { mean, squares: points.map(|p| p.distance_squared(mean)).sum(), covariance }
     }
 
-    /// Whether the points lie in a plane. Fails where they leave a rotation open.
+    /// Returns whether the points lie in a plane. Fails where they leave a rotation open.
     fn spread(&self, side: &str) -> Result<bool, RegisterError> {
-        let mut squares = self.covariance.symmetric_eigenvalues();
-        squares.as_mut_slice().sort_by(|a, b| b.total_cmp(a));
-        let [length, breadth, height] = [0, 1, 2].map(|i| squares[i].max(0.0).sqrt());
+        let [length, breadth, height] =
+            eigen(self.covariance.to_cols_array_2d()).map(|(square, _)| square.max(0.0).sqrt());
         let cause = if length < 1e-3 {
             format!("the landmarks of the {side} are one point")
         } else if breadth < BREADTH * length {
@@ -195,7 +205,7 @@ mod tests {
                 }
             }
         }
-        // Planted: the inverse is not taken for it.
+        // Planted: the inverse is not mistaken for it.
         assert!(rms(&made.inverse(), &all) > 10.0 * least);
     }
 

@@ -1,15 +1,15 @@
-//! A placement as a scene file writes it: scale, then rotation, then shift.
+//! A placement in the form of a scene file: scale, then rotation, then shift.
 
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::Transformation;
 use crate::scene::file::Entry;
 
-/// Steps in which shifts (mm), angles (degrees), axes and scales are written: a point 1 m away moves
-/// by nanometres.
+/// Steps per unit when writing shifts (mm), angles (degrees), axes and scales: a point 1 m away moves by
+/// nanometres.
 const STEPS: [f64; 4] = [1e6, 1e7, 1e9, 1e9];
 
-/// Scale, rotation and shift, rounded to what is written.
+/// Scale, rotation and shift, rounded as written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Size factor.
@@ -24,7 +24,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// That of a similarity, which was found as `transformation`: a rigid one leaves the scale as it is.
+    /// The placement of a similarity found as `transformation`: a rigid one leaves the scale as it is.
     pub fn of(similarity: &DAffine3, transformation: Transformation) -> Self {
         let round = |x: f64, per: f64| (x * per).round() / per + 0.0;
         let scale = super::scale_of(similarity);
@@ -44,7 +44,7 @@ impl Placement {
         }
     }
 
-    /// The similarity that a scene file of these numbers gives.
+    /// The similarity that a scene file with these numbers gives.
     pub fn similarity(&self) -> DAffine3 {
         DAffine3::from_scale_rotation_translation(
             DVec3::splat(self.scale),
@@ -53,7 +53,7 @@ impl Placement {
         )
     }
 
-    /// What the file has to say at `table`, such as `volume`.
+    /// Entries of the file at `table`, such as `volume`.
     pub fn entries(&self, table: &str) -> Vec<Entry> {
         let list = |v: DVec3| format!("[{}, {}, {}]", v.x, v.y, v.z);
         let angle = self.degrees;

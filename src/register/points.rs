@@ -21,7 +21,7 @@ const MAX_POINTS: usize = 1_000_000;
 /// Farthest coordinate, mm.
 const FAR: f64 = 1e6;
 
-/// What says where a point is, with the frame that the letters tell.
+/// Names of coordinates, and the frame that they imply.
 const COORDINATES: [([&str; 3], Frame); 3] = [
     (["x", "y", "z"], Frame::Unstated),
     (["l", "p", "s"], Frame::Lps),
@@ -33,16 +33,16 @@ const COORDINATES: [([&str; 3], Frame); 3] = [
 pub struct Point {
     /// Name.
     pub name: String,
-    /// Where it is, in LPS.
+    /// Position in LPS, mm.
     pub position: DVec3,
 }
 
-/// Reads the points of a file by its extension; .csv has the columns x, y, z (or l, p, s, or r, a, s;
-/// with _mm behind them or not), name or label, and others, which are not read, or three columns
-/// without a header. `stated`: the frame of a file that says none; without it LPS.
+/// Reads the points of a file by its extension; .csv has the columns x, y, z (or l, p, s, or r, a, s; with
+/// _mm behind them or not), name or label, and others, which are not read, or three columns without a
+/// header. `stated`: the frame of a file that states none; without it LPS.
 ///
 /// # Errors
-/// The first mistake, with its line; a file that says another frame than `stated`.
+/// The first mistake, with its line; a file that states another frame than `stated`.
 pub fn load(path: &Path, stated: Option<Frame>) -> Result<Vec<Point>, RegisterError> {
     let text = text(path)?;
     let name = path.to_string_lossy().to_ascii_lowercase();
@@ -77,7 +77,7 @@ pub fn load(path: &Path, stated: Option<Frame>) -> Result<Vec<Point>, RegisterEr
 }
 
 /// Reads landmarks from a table with the columns name, model_x, model_y, model_z and volume_x, volume_y,
-/// volume_z. `stated`: the frame of the volume's where the file says none.
+/// volume_z. `stated`: the frame of the volume's points where the file states none.
 ///
 /// # Errors
 /// The first mistake, with its line.
@@ -103,10 +103,10 @@ pub fn load_landmarks(path: &Path, stated: Option<Frame>) -> Result<Vec<Landmark
     table.rows.iter().map(landmark).collect()
 }
 
-/// Landmarks of the points that have the same name in both files, and the names that only one has.
+/// Landmarks of the points with the same name in both files, and the names that only one has.
 ///
 /// # Errors
-/// A name that a file has twice; no common name.
+/// A name that occurs twice in a file; no common name.
 pub fn pair(
     (model_file, model): (&Path, &[Point]),
     (volume_file, volume): (&Path, &[Point]),
@@ -159,7 +159,7 @@ fn named<'p>(
     Ok(out)
 }
 
-/// The frame that a mesh file of 3D Slicer says it is in, by the comment `SPACE=` near its beginning.
+/// The frame that a mesh file of 3D Slicer states in the comment `SPACE=` near its beginning.
 ///
 /// # Errors
 /// A file that cannot be read; a frame other than LPS and RAS.
@@ -178,10 +178,10 @@ pub fn frame_of_mesh(path: &Path) -> Result<Frame, RegisterError> {
     frame_named(&said.collect::<String>()).map_err(|cause| unknown_frame(path, 0, &cause))
 }
 
-/// The one frame that a file and the user state.
+/// The common frame of a file and of the user.
 ///
 /// # Errors
-/// Two that differ.
+/// The two differ.
 pub fn agreed(path: &Path, said: Frame, stated: Option<Frame>) -> Result<Frame, RegisterError> {
     match (said, stated) {
         (Frame::Unstated, stated) => Ok(stated.unwrap_or(Frame::Lps)),
@@ -194,7 +194,7 @@ pub fn agreed(path: &Path, said: Frame, stated: Option<Frame>) -> Result<Frame, 
     }
 }
 
-/// LPS or RAS, also by the numbers that old files have.
+/// LPS or RAS, also by the numbers of old files.
 fn frame_named(name: &str) -> Result<Frame, String> {
     match name.to_ascii_uppercase().as_str() {
         "LPS" | "1" => Ok(Frame::Lps),

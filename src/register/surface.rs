@@ -1,20 +1,26 @@
 //! A surface as triangles: the nearest point on it, and points spread evenly over it.
 
-use glam::DVec3;
-use parry3d_f64::math::Vector;
-use parry3d_f64::query::point::PointQueryWithLocation;
-use parry3d_f64::shape::TriMesh;
+use std::time::Duration;
+
+use glam::{DVec3, Vec3A};
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
 
 use super::RegisterError;
 
 /// A triangle, mm.
 pub type Triangle = [DVec3; 3];
 
-/// A surface that can be asked for its nearest point.
+/// Share of the largest coordinate by which boxes are widened, so that single precision cuts nothing off.
+const MARGIN: f32 = 1e-6;
+
+/// A surface with a search for the nearest point.
 pub struct Surface {
-    tree: TriMesh,
-    /// Unit normals of the triangles.
-    normals: Vec<DVec3>,
+    /// The triangles with area.
+    triangles: Vec<Triangle>,
+    boxes: Bvh2,
     centre: DVec3,
     size: f64,
 }
@@ -22,14 +28,14 @@ pub struct Surface {
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Nearest {
-    /// Where, mm.
+    /// Position, mm.
     pub point: DVec3,
-    /// Unit normal of a triangle that it lies on.
+    /// Unit normal of a triangle at the point.
     pub normal: DVec3,
 }
 
 impl Surface {
-    /// The surface of these triangles, of any order and orientation; those without area do not count.
+    /// The surface of these triangles, of any order and orientation; triangles without area do not count.
     ///
     /// # Errors
     /// Coordinates that are no numbers; no triangle that has area.
@@ -40,36 +46,60 @@ impl Surface {
                 "export its mesh again",
             ));
         }
-        let solid: Vec<&Triangle> = triangles.iter().filter(|t| area(t) > 0.0).collect();
-        let vertices = solid.iter().flat_map(|t| t.iter().map(|p| inner(*p)));
-        // Readers keep vertices under 2^32.
-        let numbers = (0..solid.len() as u32).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]);
-        let tree = TriMesh::new(vertices.collect(), numbers.collect()).map_err(|_| {
-            RegisterError::data("the surface has no triangle", "name a mesh with faces, or several")
-        })?;
-        let corners = || solid.iter().copied().flatten();
+        let solid: Vec<Triangle> = triangles.iter().filter(|t| area(t) > 0.0).copied().collect();
+        if solid.is_empty() {
+            return Err(RegisterError::data(
+                "the surface has no triangle",
+                "name a mesh with faces, or several",
+            ));
+        }
+        let corners = || solid.iter().flatten();
         let low = corners().fold(DVec3::INFINITY, |low, p| low.min(*p));
         let high = corners().fold(DVec3::NEG_INFINITY, |high, p| high.max(*p));
         let weighted = solid.iter().map(|t| (area(t), (t[0] + t[1] + t[2]) / 3.0));
         let (sum, centre) = weighted.fold((0.0, DVec3::ZERO), |(sum, centre), (area, middle)| {
             (sum + area, centre + area * middle)
         });
-        Ok(Self {
-            tree,
-            normals: solid.iter().map(|t| cross(t).normalize()).collect(),
-            centre: centre / sum,
-            size: low.distance(high),
-        })
+        let margin = Vec3A::splat(MARGIN * low.abs().max(high.abs()).max_element() as f32);
+        let around = |t: &Triangle| {
+            let tight = Aabb::from_points(&t.map(|p| p.as_vec3a()));
+            Aabb::new(tight.min - margin, tight.max + margin)
+        };
+        let around: Vec<Aabb> = solid.iter().map(around).collect();
+        let boxes = build_bvh2(&around, BvhBuildParams::medium_build(), &mut Duration::default());
+        Ok(Self { triangles: solid, boxes, centre: centre / sum, size: low.distance(high) })
     }
 
     /// The point on the surface that is nearest to `p`.
     pub fn nearest(&self, p: DVec3) -> Nearest {
-        let found = self.tree.project_local_point_and_get_location(inner(p), false);
-        let (projection, (triangle, _)) = found;
-        Nearest {
-            point: projection.point.to_array().into(),
-            normal: self.normals[triangle as usize],
+        let (mut best, mut nearest) = (f64::INFINITY, Nearest { point: p, normal: DVec3::ZERO });
+        let reach = |node: u32| from_box(self.boxes.nodes[node as usize].aabb(), p);
+        // Nodes still to be visited, with the least squared distance of their content.
+        let mut open = vec![(reach(0), 0)];
+        while let Some((least, index)) = open.pop() {
+            let node = &self.boxes.nodes[index as usize];
+            if least >= best {
+                continue;
+            }
+            let first = node.first_index;
+            if !node.is_leaf() {
+                let mut children = [first, first + 1].map(|child| (reach(child), child));
+                // The nearer one comes off the stack first.
+                children.sort_by(|a, b| b.0.total_cmp(&a.0));
+                open.extend(children);
+                continue;
+            }
+            for slot in first..first + node.prim_count {
+                let triangle =
+                    &self.triangles[self.boxes.primitive_indices[slot as usize] as usize];
+                let point = closest(triangle, p);
+                let off = point.distance_squared(p);
+                if off < best {
+                    (best, nearest) = (off, Nearest { point, normal: cross(triangle).normalize() });
+                }
+            }
         }
+        nearest
     }
 
     /// Centroid of its area, mm.
@@ -83,7 +113,7 @@ impl Surface {
     }
 }
 
-/// `count` points spread evenly over the area of the triangles; the same each time. None of no area.
+/// `count` points spread evenly over the area of the triangles; the same each time. None for no area.
 pub fn samples(triangles: &[Triangle], count: usize) -> Vec<DVec3> {
     let mut total = 0.0;
     let sums: Vec<f64> = triangles
@@ -116,9 +146,40 @@ fn area(triangle: &Triangle) -> f64 {
     cross(triangle).length() / 2.0
 }
 
-/// The library's vector, of another version of glam.
-fn inner(p: DVec3) -> Vector {
-    Vector::from_array(p.to_array())
+/// Squared distance of a box.
+fn from_box(around: &Aabb, p: DVec3) -> f64 {
+    p.distance_squared(p.clamp(around.min.as_dvec3(), around.max.as_dvec3()))
+}
+
+/// The point of a triangle that is nearest to `p`, by the corner, edge or face in whose region `p` lies
+/// (Ericson, Real-Time Collision Detection, section 5.1.5).
+fn closest([a, b, c]: &Triangle, p: DVec3) -> DVec3 {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let [a1, a2] = [ab, ac].map(|edge| edge.dot(p - *a));
+    if a1 <= 0.0 && a2 <= 0.0 {
+        return *a;
+    }
+    let [b1, b2] = [ab, ac].map(|edge| edge.dot(p - *b));
+    if b1 >= 0.0 && b2 <= b1 {
+        return *b;
+    }
+    let [c1, c2] = [ab, ac].map(|edge| edge.dot(p - *c));
+    if c2 >= 0.0 && c1 <= c2 {
+        return *c;
+    }
+    let across_ab = a1 * b2 - b1 * a2;
+    if across_ab <= 0.0 && a1 >= 0.0 && b1 <= 0.0 {
+        return *a + ab * (a1 / (a1 - b1));
+    }
+    let across_ac = c1 * a2 - a1 * c2;
+    if across_ac <= 0.0 && a2 >= 0.0 && c2 <= 0.0 {
+        return *a + ac * (a2 / (a2 - c2));
+    }
+    let across_bc = b1 * c2 - c1 * b2;
+    if across_bc <= 0.0 && b2 >= b1 && c1 >= c2 {
+        return *b + (*c - *b) * ((b2 - b1) / ((b2 - b1) + (c1 - c2)));
+    }
+    *a + (ab * across_ac + ac * across_ab) / (across_ab + across_ac + across_bc)
 }
 
 #[cfg(test)]
@@ -147,6 +208,32 @@ mod tests {
             assert!(found.point.distance(expected.into()) < 1e-12, "{p:?} {found:?}");
         }
         assert!(surface.nearest([0.0, 0.0, 9.0].into()).normal.z > 0.999);
+    }
+
+    #[test]
+    fn of_many_triangles_none_is_nearer_and_none_has_a_nearer_point() {
+        let all: Vec<Triangle> = triangles(&shapes::sphere(30.0, 3))
+            .into_iter()
+            .map(|t| t.map(|p| p * DVec3::new(1.0, 0.4, 2.0) + DVec3::new(900.0, 0.0, -80.0)))
+            .collect();
+        let surface = Surface::new(&all).expect("a surface");
+        // Points of each triangle, its edges and corners among them.
+        let steps = || {
+            (0..=20).flat_map(|i| (0..=20 - i).map(move |j| [i, j].map(|n| f64::from(n) / 20.0)))
+        };
+        let scattered = samples(&triangles(&shapes::cuboid([90.0, 50.0, 150.0])), 40);
+        for p in scattered.into_iter().map(|p| p + DVec3::new(890.0, 5.0, -70.0)) {
+            let found = surface.nearest(p).point.distance(p);
+            let each = all.iter().map(|t| closest(t, p).distance(p)).fold(f64::INFINITY, f64::min);
+            assert!((found - each).abs() < 1e-12, "{p}: {found} {each}");
+            for t in &all {
+                let closest = closest(t, p).distance(p);
+                let tried = steps().map(|[u, v]| t[0] + u * (t[1] - t[0]) + v * (t[2] - t[0]));
+                let best = tried.map(|q| q.distance(p)).fold(f64::INFINITY, f64::min);
+                let edge = (t[1] - t[0]).length().max((t[2] - t[0]).length());
+                assert!(closest <= best + 1e-12 && closest > best - edge / 20.0, "{p} {t:?}");
+            }
+        }
     }
 
     #[test]

@@ -1,10 +1,10 @@
-//! What can be wrong with a mesh, and what is worth knowing about it.
+//! Checks of a mesh: its faults, and facts worth knowing.
 
 use std::path::Path;
 
-use super::issue::Issue;
 use super::mesh::{Soup, Units};
 use super::topology::{self, Edges};
+use crate::issue::Issue;
 
 mod coincident;
 mod fusion;
@@ -87,8 +87,8 @@ pub(super) fn examine(
     (facts, issues)
 }
 
-/// Reports what is wrong with a further shape of a surface whose first shape was examined; `outward`:
-/// whether that one is closed and faces outward.
+/// Reports faults of a further shape of a surface whose first shape was examined; `outward` is true where
+/// the first one is closed and faces outward.
 pub(super) fn examine_shape(
     path: &Path,
     soup: &Soup,
@@ -177,11 +177,11 @@ fn size(path: &Path, size: f64, units: Units) -> Option<Issue> {
     if (least..=most).contains(&size) {
         return None;
     }
-    // Organs measure about a hand's breadth: the unit that comes nearest to it is proposed.
+    // Organs are about as large as a hand: the unit that comes nearest to it is proposed.
     let away = |mm: f64| (size / units.0 * mm / 150.0).ln().abs();
     let guess = Units::NAMES
         .iter()
-        // Nobody scans in inches; whoever models in them can say so.
+        // Nobody scans in inches; users who model in them can say so.
         .filter(|(name, mm)| *name != "in" && (least..=most).contains(&(size / units.0 * mm)))
         .min_by(|a, b| away(a.1).total_cmp(&away(b.1)));
     let remedy = match guess {

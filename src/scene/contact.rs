@@ -1,9 +1,9 @@
-//! Which meshes are the body's surface, and how closely the probe must be held to it.
+//! Contact of the probe with the body's surface.
 
-/// Where sound gets from the probe into the body, and back.
+/// The body's surface, and the gap that sound crosses between it and the probe.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contact {
-    /// The meshes, all closed, of which the union is the body that the probe is held to: indices into
+    /// Closed meshes whose union is the body that the probe touches: indices into
     /// [`super::Scene::instances`].
     pub skin: Vec<usize>,
     /// Widest gap between face and skin, along the beam, that sound still crosses, mm.

@@ -148,6 +148,7 @@ impl Scene {
         let model =
             (file.model.translate, file.model.rotate.as_ref(), schema::even(file.model.scale));
         scene.place_model(placing::placement(&document, "model", model)?);
+        anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
         let variants = vary::variants(&document, &file.vary, &scene, suggested)?;
@@ -243,10 +244,4 @@ fn within(
 }
 
 #[cfg(test)]
-mod graph_mistakes;
-#[cfg(test)]
-mod graph_tests;
-#[cfg(test)]
 mod tests;
-#[cfg(test)]
-mod vary_tests;

@@ -1,4 +1,4 @@
-//! An acquired volume, and how it is mixed with what is simulated.
+//! An acquired volume, and its fusion with the simulation.
 
 use std::sync::Arc;
 
@@ -11,21 +11,21 @@ use super::{Instance, Mesh, Scene};
 use crate::settings::{Display, Fusion, Surroundings};
 use crate::volume::Voxels;
 
-/// Most bytes of the volume on the device, at all its times. What is larger is averaged: a frame reads
+/// Most bytes of the volume on the device, at all its times. A larger volume is averaged: a frame reads
 /// less than a slice.
 pub const TEXTURE_BUDGET: u64 = 512 << 20;
 
-/// A volume of grey values acquired elsewhere, placed in the world. It may change with time: the grid,
-/// black and white stay.
+/// A volume of grey values acquired elsewhere, placed in the world. It may change with time, except its grid,
+/// black and white.
 #[derive(Clone, Debug)]
 pub struct Acquired {
     /// Voxels along each axis, all at least 1.
     pub size: [usize; 3],
     /// Values at each of its times, first axis fastest, all of one type; one where it does not change.
     pub volumes: Vec<Arc<Voxels>>,
-    /// The one as it is now: index into `volumes`.
+    /// Index into `volumes` of the present one.
     pub now: usize,
-    /// When each is shown; none where it does not change.
+    /// Times of the volumes; none where it does not change.
     pub sequence: Option<Sequence>,
     /// Voxel indices (integers at voxel centres) to the world, mm.
     pub world_from_voxel: DAffine3,
@@ -38,12 +38,12 @@ pub struct Acquired {
 }
 
 impl Acquired {
-    /// How it is shown.
+    /// Placement and grey levels.
     pub fn display(&self) -> Display {
         Display { world_from_lps: self.world_from_lps, black: self.black, white: self.white }
     }
 
-    /// Shows it like that from now on.
+    /// Sets placement and grey levels.
     pub fn show(&mut self, display: &Display) {
         let before = self.world_from_lps;
         if display.world_from_lps != before {
@@ -75,7 +75,7 @@ impl Acquired {
                 weight *= if far == 1 { share[axis] } else { 1.0 - share[axis] };
                 index[axis] = low[axis] as usize + far;
             }
-            // Beside an axis of one voxel there is nothing, of no weight.
+            // Beside an axis of one voxel there is no neighbour; its weight is zero.
             if weight > 0.0 {
                 let [i, j, k] = index;
                 value += weight * self.voxels().get(i + x * (j + y * k));
@@ -84,18 +84,18 @@ impl Acquired {
         Some(((value - self.black) / (self.white - self.black)).clamp(0.0, 1.0))
     }
 
-    /// Bytes of the volume on the device at all its times, where that is not larger than it holds.
+    /// Bytes of the volume on the device at all its times, before any averaging.
     pub fn texture_bytes(&self) -> u64 {
         let bytes = |v: &Arc<Voxels>| v.len() as u64 * v.kind().bytes() as u64;
         self.volumes.iter().map(bytes).sum()
     }
 
-    /// The values as they are now, first axis fastest.
+    /// The present values, first axis fastest.
     pub fn voxels(&self) -> &Voxels {
         &self.volumes[self.now]
     }
 
-    /// Takes the volume whose time it is at `seconds`.
+    /// Makes the volume for `seconds` the present one.
     pub(super) fn set_time(&mut self, seconds: f64) {
         self.now = self.sequence.as_ref().map_or(0, |s| s.step(seconds));
     }
@@ -113,7 +113,7 @@ impl Fusion {
 }
 
 /// Edges at which a mesh does not close: those with a triangle on one side only, or with more on one
-/// side than on the other. Shading splits vertices at creases without moving them: they are joined.
+/// side than on the other. Vertices that shading split at creases are joined first.
 pub fn open_edges(mesh: &Mesh) -> usize {
     let soup = weld(&Soup {
         positions: mesh.positions.clone(),
@@ -128,25 +128,25 @@ pub fn open_edges(mesh: &Mesh) -> usize {
 }
 
 impl Scene {
-    /// Whether frames show the acquired volume.
+    /// Returns whether frames show the acquired volume.
     pub fn shows_volume(&self) -> bool {
         let shown = |f: &Fusion| f.surroundings == Surroundings::Volume;
         self.volume.is_some() && self.fusion.as_ref().is_some_and(shown)
     }
 
-    /// Whether only what a masking mesh encloses is heard.
+    /// Returns whether only the inside of masking meshes is heard.
     pub fn is_masked(&self) -> bool {
         let fusion = self.fusion.as_ref();
         fusion.is_some_and(|f| f.surroundings != Surroundings::Scatterers)
     }
 
-    /// Whether instance `index` is one of the masking meshes.
+    /// Returns whether instance `index` is one of the masking meshes.
     pub fn is_mask(&self, index: usize) -> bool {
         let fusion = self.fusion.as_ref();
         fusion.is_some_and(|f| f.masks.contains(&index))
     }
 
-    /// Masking meshes that no scanline of the image meets as the scene stands: indices into
+    /// Masking meshes that no scanline of the present image meets: indices into
     /// [`Scene::instances`].
     pub fn masks_off_the_image(&self) -> Vec<usize> {
         let masks = self.fusion.iter().flat_map(|f| &f.masks).copied();
@@ -157,7 +157,7 @@ impl Scene {
         masks.filter(lies_off).collect()
     }
 
-    /// Whether some scanline in the middle of the slice starts in `instance` or enters it.
+    /// Returns whether some scanline in the middle of the slice starts in `instance` or enters it.
     fn meets_image(&self, instance: &Instance) -> bool {
         let mesh = &self.meshes[instance.mesh];
         let probe_from_object = self.world_from_probe.inverse() * instance.world_from_object;

@@ -9,10 +9,10 @@ use super::{Acquired, Instance, Scene, Strategy};
 /// Nodes, each after its parent.
 #[derive(Clone, Debug, Default)]
 pub struct Graph {
-    /// In any order in which parents come before their children.
+    /// Nodes in any order in which parents come before their children.
     pub nodes: Vec<Node>,
-    /// World from the frame in which the whole model was made: nodes without a parent, and instances that are no
-    /// node's, are placed in that frame. Scales alike in all directions.
+    /// World from the frame of the whole model, in which nodes without a parent and instances without a node are
+    /// placed. Scales alike in all directions.
     pub world_from_model: DAffine3,
 }
 
@@ -23,17 +23,17 @@ pub struct Node {
     pub name: String,
     /// Index of the parent, which is less than this node's own; none: the world.
     pub parent: Option<usize>,
-    /// Where the parent is a selector: the number of its choice with which this node is shown. None
-    /// where it is shown with every choice: keyframed meshes, which change with it.
+    /// Where the parent is a selector: the number of its choice with which this node is shown. None where
+    /// it is shown with every choice, as keyframed meshes are, which change with it.
     pub alternative: Option<usize>,
-    /// What it does.
+    /// Effect of the node.
     pub kind: NodeKind,
 }
 
-/// What a node does to those below it.
+/// Effect of a node on those below it.
 #[derive(Clone, Debug)]
 pub enum NodeKind {
-    /// Nothing: a common name.
+    /// No effect: a common name.
     Group,
     /// Places and moves: world from child is world from parent times `rest` times the motion.
     Transform {
@@ -44,7 +44,7 @@ pub enum NodeKind {
     },
     /// Shows one of its alternatives, with all below it, and one keyframe of its keyframed meshes.
     Selector(
-        /// Which, and when.
+        /// Sequence of its choices.
         Sequence,
     ),
     /// A placed mesh.
@@ -56,15 +56,15 @@ pub enum NodeKind {
     },
 }
 
-/// What an instance's place follows.
+/// The moving nodes that an instance's place depends on.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Carrier {
     /// The nearest transform above it that moves, by node.
     pub mover: Option<usize>,
-    /// Placements from there down that are not the identity, outermost first. Instances that agree in
-    /// both keep their places relative to each other.
+    /// Placements from there down that are not the identity, outermost first. Instances that agree in both
+    /// fields keep their places relative to each other.
     pub within: Vec<DAffine3>,
-    /// Whether a selector shows it at some times only.
+    /// True where a selector shows it at some times only.
     pub switched: bool,
 }
 
@@ -73,7 +73,7 @@ pub struct Carrier {
 pub struct Placed {
     /// The kind of its table: `mesh` or `transform`.
     pub kind: &'static str,
-    /// World from its parent, at the time asked for.
+    /// World from its parent, at the given time.
     pub world_from_parent: DAffine3,
     /// The placement.
     pub rest: DAffine3,
@@ -81,14 +81,14 @@ pub struct Placed {
     pub instances: Vec<usize>,
 }
 
-/// A node at a time.
+/// The state of a node at a time.
 struct State {
     world: DAffine3,
     shown: bool,
 }
 
 impl Graph {
-    /// Writes placement, visibility and shape of every mesh at `seconds` into `instances`, by its
+    /// Writes placement, visibility and shape of every mesh at `seconds` into `instances`, by the
     /// instance's own strategy.
     fn evaluate(&self, seconds: f64, instances: &mut [Instance]) {
         let mut states: Vec<State> = Vec::with_capacity(self.nodes.len());
@@ -119,7 +119,7 @@ impl Graph {
         }
     }
 
-    /// What each of `count` instances follows; nothing for those that are not in the graph.
+    /// The carrier of each of `count` instances; the default for those that are not in the graph.
     pub fn carriers(&self, count: usize) -> Vec<Carrier> {
         let mut of_nodes: Vec<Carrier> = Vec::with_capacity(self.nodes.len());
         let mut carriers = vec![Carrier::default(); count];
@@ -146,11 +146,11 @@ impl Graph {
         carriers
     }
 
-    /// World from object of each of `count` instances at rest, for those whose placements squeeze or stretch them as
-    /// time passes: where a motion scales, or turns what a placement above it scales unevenly. None for the others,
+    /// World from object of each of `count` instances at rest, for those whose placements squeeze or stretch them over
+    /// time: where a motion scales, or turns a shape that a placement above it scales unevenly. None for the others,
     /// whose tissue moves as a rigid body.
     pub fn rests(&self, count: usize) -> Vec<Option<DAffine3>> {
-        /// Placement at rest, whether it scales unevenly, and whether time squeezes.
+        /// Placement at rest, whether it scales unevenly, and whether it squeezes over time.
         type Rest = (DAffine3, bool, bool);
         let mut of_nodes: Vec<Rest> = Vec::with_capacity(self.nodes.len());
         let mut rests = vec![None; count];
@@ -175,7 +175,7 @@ impl Graph {
         rests
     }
 
-    /// What has to hold for an instance to be shown: selectors, by node, and the choice of each.
+    /// Conditions for an instance to be shown: selectors, by node, and the choice of each.
     pub(super) fn conditions(&self, instance: usize) -> Vec<(usize, usize)> {
         let is_it =
             |n: &Node| matches!(n.kind, NodeKind::Mesh { instance: i, .. } if i == instance);
@@ -188,7 +188,7 @@ impl Graph {
         out
     }
 
-    /// The world from what is below `node` at `seconds`; from the model without one.
+    /// World from the space below `node` at `seconds`; without a node, from the model's.
     fn world_from(&self, mut node: Option<usize>, seconds: f64) -> DAffine3 {
         let mut out = DAffine3::IDENTITY;
         while let Some(below) = node.map(|i| &self.nodes[i]) {
@@ -200,7 +200,7 @@ impl Graph {
         self.world_from_model * out
     }
 
-    /// The instances at `node` and below it.
+    /// Instances at `node` and below it.
     fn instances_of(&self, node: usize) -> Vec<usize> {
         let mut within = vec![false; self.nodes.len()];
         let mut out = Vec::new();
@@ -225,7 +225,7 @@ impl Graph {
     }
 }
 
-/// Whether a placement scales alike in all directions.
+/// Returns whether a placement scales alike in all directions.
 pub fn is_even(placement: &DAffine3) -> bool {
     let m = placement.matrix3;
     let gram = m.transpose() * m;
@@ -233,7 +233,7 @@ pub fn is_even(placement: &DAffine3) -> bool {
     gram.abs_diff_eq(DMat3::from_diagonal(DVec3::splat(size)), 1e-9 * size)
 }
 
-/// Takes the present keyframe, or the place between keyframes.
+/// Sets the present keyframe, or the blend of keyframes.
 fn choose(instance: &mut Instance, sequence: &Sequence, seconds: f64) {
     let keyframes = &mut instance.keyframes;
     assert_eq!(keyframes.meshes.len(), sequence.count(), "one for each turn");
@@ -245,8 +245,7 @@ fn choose(instance: &mut Instance, sequence: &Sequence, seconds: f64) {
 }
 
 impl Scene {
-    /// The mesh or transform called `name`, at `seconds`; none where nothing that has a placement is
-    /// called so.
+    /// The mesh or transform called `name`, at `seconds`; none where no such part has a placement.
     pub fn placed(&self, name: &str, seconds: f64) -> Option<Placed> {
         let named = self.origins.instances.iter().enumerate();
         let own: Vec<_> = named.filter(|(_, o)| o.mesh == name).map(|(i, _)| i).collect();
@@ -274,8 +273,8 @@ impl Scene {
         })
     }
 
-    /// Moves everything to where it is at `seconds`: placements, what selectors show, shapes, and the
-    /// acquired volume. Any time, in any order. The scene stays as it is where nothing moves.
+    /// Sets everything to its state at `seconds`: placements, choices of selectors, shapes, and the acquired
+    /// volume. Any time, in any order. Without animation the scene stays as it is.
     pub fn set_time(&mut self, seconds: f64) {
         self.graph.evaluate(seconds, &mut self.instances);
         if let Some(acquired) = &mut self.volume {
@@ -283,7 +282,7 @@ impl Scene {
         }
     }
 
-    /// Whether anything follows time: the anatomy, or the acquired volume.
+    /// Returns whether anything follows time: the anatomy, or the acquired volume.
     pub fn is_animated(&self) -> bool {
         let moves = |node: &Node| match &node.kind {
             NodeKind::Transform { motion, .. } => *motion != Motion::Still,
@@ -294,8 +293,8 @@ impl Scene {
         self.graph.nodes.iter().any(moves) || self.volume.as_ref().is_some_and(changes)
     }
 
-    /// Places the whole model, meshes and wires, in the world: probe and acquired volume stay. What the graph
-    /// places is there after [`Scene::set_time`].
+    /// Places the whole model, meshes and wires, in the world: probe and acquired volume stay. Nodes of the graph
+    /// follow at the next [`Scene::set_time`].
     pub fn place_model(&mut self, world_from_model: DAffine3) {
         let before = self.graph.world_from_model;
         if before == world_from_model {
@@ -318,8 +317,8 @@ impl Scene {
         self.graph.world_from_model = world_from_model;
     }
 
-    /// Whether all keyframes of an instance consist of the same triangles over vertices of their
-    /// own, as strategies that move vertices need it.
+    /// Returns whether all keyframes of an instance consist of the same triangles over vertices of their own,
+    /// which strategies that move vertices need.
     pub fn shares_topology(&self, instance: &Instance) -> bool {
         let mut all = instance.keyframes.meshes.iter().map(|&m| &self.meshes[m]);
         let first = all.next();

@@ -1,25 +1,25 @@
-//! Shapes that an instance takes over time, and how the device goes from one to the next.
+//! Keyframes: shapes of an instance over time, and the device's strategy for them.
 
 use super::{Mesh, Scene};
 use crate::settings::words;
 use glam::DVec3;
 
 words! {
-    /// How the structures that rays walk follow an instance that changes its shape. The same shape gives
-    /// the same image by every strategy that can show it; they differ in what is stored and what is built.
+    /// Strategy by which the ray structures follow an instance that changes its shape. The same shape gives
+    /// the same image by every strategy that can show it; they differ in storage and in builds.
     #[derive(Default, Hash)]
     pub enum Strategy {
-        /// Node exchange (Starkov et al. 2019, section II-B): every keyframe's structure is built once, and the top level is
-        /// rebuilt over the one that is shown, with its own tight box.
+        /// Node exchange (Starkov et al. 2019, section II-B): every keyframe's structure is built once, and the top
+        /// level is rebuilt over the one that is shown, with its own tight box.
         #[default]
         Exchange = "exchange",
         /// As `exchange`, but the top level is refitted. The compute tracer, whose top level is made on
         /// the host, keeps its tree and recomputes its boxes.
         Update = "update",
-        /// Every keyframe is in the top level at all times, and rays pass by all but one: nothing is built.
+        /// Every keyframe is in the top level at all times, and rays ignore all but one: no builds.
         Mask = "mask",
         /// Selector node (the same section): one entry in the top level with the union of all keyframes' boxes, whose
-        /// child is swapped: nothing is built. Compute tracer only.
+        /// child is swapped: no builds. Compute tracer only.
         Selector = "selector",
         /// The keyframe's geometry is uploaded and its structure built, fast, when it is shown.
         Rebuild = "rebuild",
@@ -33,7 +33,7 @@ words! {
 }
 
 impl Strategy {
-    /// Whether keyframes must have equal triangles.
+    /// Returns whether keyframes must have equal triangles.
     pub fn needs_shared_topology(self) -> bool {
         matches!(self, Self::Refit | Self::Interpolate)
     }
@@ -44,18 +44,18 @@ impl Strategy {
 pub struct Keyframes {
     /// Indices into [`super::Scene::meshes`], in order; empty where the shape is constant.
     pub meshes: Vec<usize>,
-    /// How the device follows.
+    /// Strategy of the device.
     pub strategy: Strategy,
     /// Numbers of up to four keyframes and their weights, which sum to 1: the present shape under
     /// [`Strategy::Interpolate`]. Weights of cubic interpolation may be negative.
     pub blend: [(usize, f64); 4],
-    /// What changes shape together: instances of one group have keyframes of the same times, and move
-    /// the tissue between them. None: the instance alone.
+    /// Group of instances that change shape together: they have keyframes of the same times, and move the tissue
+    /// between them. None: the instance alone.
     pub group: Option<usize>,
 }
 
 impl Keyframes {
-    /// Whether the same tissue takes the same shapes, by whichever strategy.
+    /// Returns whether the same tissue takes the same shapes, by whichever strategy.
     pub fn deforms_as(&self, other: &Self) -> bool {
         self.meshes == other.meshes && self.group == other.group
     }
@@ -63,15 +63,15 @@ impl Keyframes {
     /// The keyframe nearest to the present shape: the one of largest weight.
     pub fn nearest(&self) -> usize {
         let heaviest = |a: &(usize, f64), b: &(usize, f64)| a.1.total_cmp(&b.1);
-        // The first of equals.
+        // The first of equal ones.
         let found = self.blend.iter().rev().copied().max_by(heaviest);
         found.map_or(0, |(keyframe, _)| keyframe)
     }
 }
 
 impl Scene {
-    /// The scene as it stands, without keyframes: what every strategy has to look like. Instances keep
-    /// their numbers; what is hidden has no triangles.
+    /// The present scene without keyframes, which every strategy has to match. Instances keep their numbers;
+    /// hidden ones have no triangles.
     pub fn still(&self) -> Self {
         let mut still = self.clone();
         for instance in &mut still.instances {
@@ -91,10 +91,10 @@ impl Scene {
 }
 
 impl Keyframes {
-    /// The present shape: vertices and normals weighted as [`Self::blend`] says.
+    /// The present shape: vertices and normals weighted by [`Self::blend`].
     ///
     /// # Panics
-    /// When the keyframes do not share their topology.
+    /// The keyframes do not share their topology.
     pub fn blended(&self, meshes: &[Mesh]) -> Mesh {
         let first = &meshes[self.meshes[0]];
         let mut out = Mesh {

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use glam::DMat4;
 
-use super::issue::Issue;
 use super::mesh::{self, Choice, Parts, Soup};
+use crate::issue::Issue;
 
 mod accessor;
 mod animated;
@@ -15,28 +15,27 @@ mod buffers;
 mod choice;
 mod glb;
 mod morph;
-mod reduce;
 mod sampler;
 mod schema;
 mod skin;
 mod surface;
 mod tree;
+mod typed;
 mod validate;
 
 pub(super) use animated::{AnimatedParts, Part, read_animated};
 use choice::Chosen;
 use surface::{Surface, Surfaces};
+use typed::Typed;
 
 /// Most commas of the JSON part: each value of the parsed tree takes some 50 bytes of memory.
 const MAX_VALUES: usize = 4_000_000;
 
-/// A file whose JSON is sound and whose buffers are read.
+/// A file with sound JSON and loaded buffers.
 struct File<'p> {
     path: &'p Path,
     gltf: gltf::Document,
     buffers: Vec<Option<Vec<u8>>>,
-    /// The file's number of each accessor that was kept.
-    accessors: Vec<usize>,
     /// The animation that was asked for.
     animation: Option<Chosen>,
     /// Primitives that have no stored positions or indices and are left out.
@@ -61,30 +60,17 @@ fn open<'p>(
     }
     let chosen = animation.map(|choice| Chosen::of(path, &root, choice));
     let chosen = chosen.transpose().map_err(one)?;
-    let reduced = reduce::reduce(&root, chosen.as_ref().map(|c| c.number));
-    let invalid = |cause: String| {
-        let message = format!("is not a valid glTF file: {cause}");
-        one(Issue::error(path, 1, message, "export it again"))
-    };
-    let json: gltf::json::Root =
-        serde_json::from_value(reduced.json).map_err(|e| invalid(e.to_string()))?;
-    let gltf = gltf::Document::from_json(json).map_err(|e| invalid(e.to_string()))?;
+    let typed = Typed::of(&root, chosen.as_ref().map(|c| c.number));
+    let (needed, without_data) = (typed.buffers(), typed.without_data);
+    let gltf = gltf::Document::from_json_without_validation(typed.root);
     let buffers::Buffers { bytes: buffers, issues: unread } =
-        buffers::load(path, &gltf, binary, &reduced.buffers);
+        buffers::load(path, &gltf, binary, &needed);
     issues.extend(unread);
     if issues.iter().any(Issue::is_error) {
         return Err(issues);
     }
     issues.extend(validate::issues(path, bounds::check(&root, &buffers)));
-    Ok(File {
-        path,
-        gltf,
-        buffers,
-        accessors: reduced.accessors,
-        animation: chosen,
-        without_data: reduced.without_data,
-        issues,
-    })
+    Ok(File { path, gltf, buffers, animation: chosen, without_data, issues })
 }
 
 impl File<'_> {
@@ -105,7 +91,7 @@ impl File<'_> {
         })
     }
 
-    /// What the tree of nodes does not say.
+    /// Findings about the file that the tree of nodes does not give.
     fn remarks(&self, visited: &[bool]) -> Vec<Issue> {
         let unseen =
             self.gltf.nodes().filter(|n| n.mesh().is_some() && !visited[n.index()]).count();
@@ -169,7 +155,7 @@ fn parse(path: &Path, json: &[u8]) -> Result<serde_json::Map<String, serde_json:
     }
 }
 
-/// Nodes that are nobody's child, for files without scenes.
+/// Nodes without a parent, for files without scenes.
 fn roots(gltf: &gltf::Document) -> Vec<gltf::Node<'_>> {
     let mut child = vec![false; gltf.nodes().len()];
     for node in gltf.nodes() {

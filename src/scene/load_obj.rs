@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::issue::Issue;
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
+use crate::issue::Issue;
 
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
     let issues = scan(path, bytes);
@@ -35,8 +35,8 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
     Ok(Parts { parts: parts.collect(), issues })
 }
 
-/// The lines that carry geometry or names, each face reduced to its position indices: the rest
-/// cannot change the mesh, and a fault in it should not stop the loading.
+/// The lines of text that carry geometry or names, each face reduced to its position indices: the rest cannot
+/// change the mesh, and a fault in it should not stop the loading.
 fn geometry_only(bytes: &[u8]) -> Vec<u8> {
     let mut out = Vec::with_capacity(bytes.len());
     let mut pending: Vec<u8> = Vec::new();
@@ -75,7 +75,7 @@ fn geometry_only(bytes: &[u8]) -> Vec<u8> {
     out
 }
 
-/// Whether a line ends in a backslash, which is then removed: the next line belongs to it.
+/// Returns whether a text line ends in a backslash, and removes it: the next line belongs to it.
 fn continues(line: &mut Vec<u8>) -> bool {
     while line.last() == Some(&b'\r') {
         line.pop();
@@ -88,7 +88,7 @@ fn continues(line: &mut Vec<u8>) -> bool {
     continued
 }
 
-/// What a scan has counted, each with the first line where it was met.
+/// Counts of a scan, each with the first line of its kind.
 #[derive(Default)]
 struct Tally(Vec<(&'static str, bool, usize, usize)>);
 
@@ -101,7 +101,7 @@ impl Tally {
     }
 }
 
-/// Checks each line, because the reader's own errors name no line.
+/// Checks each text line, because the reader's own errors name no line.
 fn scan(path: &Path, bytes: &[u8]) -> Vec<Issue> {
     let mut tally = Tally::default();
     let (mut vertices, mut faces) = (0usize, 0usize);
@@ -174,7 +174,7 @@ fn vertex<'a>(words: impl Iterator<Item = &'a str>, line: usize, tally: &mut Tal
     }
 }
 
-/// Returns the triangles that the face will make.
+/// Checks a face; returns the number of its triangles.
 fn face<'a>(
     words: impl Iterator<Item = &'a str>,
     vertices: usize,

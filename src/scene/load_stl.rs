@@ -3,8 +3,8 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use super::issue::Issue;
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
+use crate::issue::Issue;
 
 /// Bytes of a binary file before its triangles, and of each triangle.
 const HEADER: usize = 84;
@@ -71,7 +71,7 @@ fn declared(bytes: &[u8]) -> Option<usize> {
     Some(u32::from_le_bytes(count) as usize)
 }
 
-/// Whether the length is exactly that of a binary file with the declared count.
+/// Returns whether the length is exactly that of a binary file with the declared count.
 fn is_binary(bytes: &[u8]) -> bool {
     declared(bytes).is_some_and(|n| bytes.len() == HEADER + n * RECORD)
 }

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::issue::Issue;
 use super::{Mesh, check, load_gltf, load_obj, load_stl};
+use crate::issue::Issue;
 
 mod animated;
 mod keyframes;
@@ -58,33 +58,33 @@ impl Units {
     }
 }
 
-/// How a mesh file is read.
+/// Options for reading a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
     /// Unit; without it mm, and metres for glTF, which defines its unit.
     pub units: Option<Units>,
     /// Only this glTF node with its children, or this OBJ object or group.
     pub node: Option<String>,
-    /// Whether boundary loops are closed by fans to their centres.
+    /// True where boundary loops are closed by fans to their centres.
     pub cap_openings: bool,
     /// Most shapes that are sampled from an animated skin, at least 2; without it 24.
     pub keyframes: Option<usize>,
 }
 
-/// What was found in a file, mm; the mesh only if no finding is an error.
+/// Result of reading a file, mm; with a mesh only if no finding is an error.
 #[derive(Clone, Debug, Default)]
 pub struct Inspected {
     /// The mesh, ready to trace.
     pub mesh: Option<Mesh>,
-    /// Measured after repair.
+    /// Measures after repair.
     pub facts: check::Facts,
     /// Names of objects, groups or nodes that hold triangles.
     pub parts: Vec<String>,
-    /// Everything that is worth saying.
+    /// All findings.
     pub issues: Vec<Issue>,
 }
 
-/// What a reader hands over.
+/// Result of a reader.
 #[derive(Debug, Default)]
 pub(super) struct Parts {
     pub parts: Vec<Soup>,
@@ -121,8 +121,8 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
     found
 }
 
-/// All chosen triangles of a file, mm, as they are stored. None if it could not be read, and why is then
-/// among the issues.
+/// All chosen triangles of a file, mm, as stored. None if it could not be read; the reason is then among
+/// the issues.
 fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(Soup, Units)> {
     let kind = Kind::of(path);
     let read = read_bounded(path).and_then(|bytes| match kind {
@@ -187,7 +187,7 @@ impl Kind {
     }
 }
 
-/// Whether the extension is that of a mesh file that can be read.
+/// Returns whether the extension is that of a readable mesh file.
 pub fn is_mesh(path: &Path) -> bool {
     Kind::of(path).is_some()
 }

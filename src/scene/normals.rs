@@ -10,7 +10,7 @@ use super::topology::Edges;
 pub struct Split {
     /// Indices of split vertices, triangle by triangle as in the surface.
     pub triangles: Vec<[u32; 3]>,
-    /// The surface's vertex that each split vertex is a copy of.
+    /// The surface's vertex that each split vertex copies.
     pub source: Vec<u32>,
 }
 
@@ -52,7 +52,7 @@ impl Split {
     /// The surface with its vertices at `positions`, and the normals of that shape.
     ///
     /// The weights of the faces are the corner angles (Thurmer and Wuthrich 1998), so that a normal
-    /// does not depend on how a flat part happens to be triangulated.
+    /// does not depend on the triangulation of a flat part.
     pub fn mesh(&self, name: &str, positions: &[[f32; 3]]) -> Mesh {
         let positions: Vec<_> = self.source.iter().map(|&i| positions[i as usize]).collect();
         let mut sums = vec![Vec3::ZERO; positions.len()];
@@ -72,8 +72,8 @@ impl Split {
         let mut normals = vec![[0.0; 3]; positions.len()];
         for triangle in &self.triangles {
             for &i in triangle {
-                // Opposite faces of a folded sheet can cancel; any face normal is then as good. No ray
-                // asks for the normal of a fan without any area.
+                // Opposite faces of a folded surface can cancel; any face normal is then as good. No ray asks for the
+                // normal of a fan without any area.
                 let face = || face_normal(*triangle, &positions).try_normalize();
                 let unit = sums[i as usize].try_normalize().or_else(face);
                 normals[i as usize] = unit.unwrap_or(Vec3::Z).to_array();

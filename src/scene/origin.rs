@@ -1,22 +1,22 @@
-//! Where the scene file says what may be changed of a loaded scene: for those who write it back.
+//! Places in the scene file of the changeable parts of a loaded scene, for writing them back.
 
-/// Where a scene's parts come from; empty for a scene that was built in code.
+/// Places of a scene's parts in its file; empty for a scene that was built in code.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Origins {
-    /// Of each of [`super::Scene::instances`].
+    /// Place of each of [`super::Scene::instances`].
     pub instances: Vec<Origin>,
-    /// Of each of [`super::Scene::tissues`] the names of those from which it takes what it does not
-    /// say, the nearest first.
+    /// For each of [`super::Scene::tissues`], names of the tissues that give the values it does not state,
+    /// the nearest first.
     pub bases: Vec<Vec<String>>,
 }
 
-/// Where a scene file describes an instance. Several come from one table where its file holds several
-/// meshes that move.
+/// Place of an instance in a scene file. Several come from one table where its file holds several moving
+/// meshes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Origin {
     /// Name of its `[[mesh]]`.
     pub mesh: String,
-    /// Name of the `[[selector]]` that switches its keyframes and says by which strategy; none where
-    /// the mesh says so itself.
+    /// Name of the `[[selector]]` that switches its keyframes and sets their strategy; none where the mesh
+    /// itself does.
     pub selector: Option<String>,
 }

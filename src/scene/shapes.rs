@@ -16,7 +16,7 @@ pub fn sphere(radius: f64, subdivisions: u32) -> Mesh {
     ellipsoid([radius; 3], subdivisions)
 }
 
-/// Ellipsoid with the given semi-axes; its triangulation is that of [`sphere`], stretched.
+/// Ellipsoid with the given semi-axes, triangulated as [`sphere`] and stretched.
 pub fn ellipsoid(radii: [f64; 3], subdivisions: u32) -> Mesh {
     let radii = DVec3::from(radii);
     let (directions, triangles) = icosphere(subdivisions.min(MAX_SUBDIVISIONS));
@@ -87,7 +87,7 @@ pub fn cuboid(size: [f64; 3]) -> Mesh {
     mesh
 }
 
-/// Slab that fills `size` around the z axis from z = 0, its front, to z = `thickness`.
+/// Slab of `size` around the z axis from z = 0, its front, to z = `thickness`.
 pub fn plane(size: [f64; 2], thickness: f64) -> Mesh {
     let mut mesh = cuboid([size[0], size[1], thickness]);
     "plane".clone_into(&mut mesh.name);
@@ -178,7 +178,7 @@ mod tests {
         topology::volume(&soup)
     }
 
-    /// Closed, wound consistently, and with normals on the outer side of every face.
+    /// Asserts that a mesh is closed, wound consistently, and has normals on the outer side of every face.
     fn is_sound(mesh: &Mesh) {
         let mut places: Vec<_> = mesh.positions.clone();
         places.sort_by(|a, b| a.partial_cmp(b).expect("finite"));
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn volumes_approach_the_closed_forms() {
-        // An inscribed polyhedron falls short by O(edge^2): a quarter per subdivision.
+        // An inscribed polyhedron is smaller by O(edge^2): a quarter per subdivision.
         let exact = 4.0 / 3.0 * PI * 512.0;
         let error = |n| (exact - volume(&sphere(8.0, n))) / exact;
         assert!(error(5) > 0.0 && error(5) < 1e-3, "{}", error(5));

@@ -5,8 +5,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::issue::Issue;
 use super::mesh::Soup;
+use crate::issue::Issue;
 
 mod winding;
 
@@ -21,7 +21,7 @@ pub struct Edge {
     pub high: u32,
     /// Triangle.
     pub triangle: u32,
-    /// Whether the triangle runs from `low` to `high`.
+    /// True where the triangle runs from `low` to `high`.
     pub forward: bool,
 }
 
@@ -79,8 +79,8 @@ pub fn volume(soup: &Soup) -> f64 {
     sum / 6.0
 }
 
-/// Removes triangles that no ray can hit and those that would count one crossing twice. `others` are
-/// further positions of the same vertices: a triangle stays where it has an area in one of them.
+/// Removes triangles that no ray can hit and those that would count one crossing twice. `others` are further
+/// positions of the same vertices: a triangle with an area in one of them stays.
 pub fn clean(path: &Path, soup: &mut Soup, others: &[Vec<[f32; 3]>]) -> Vec<Issue> {
     let mut issues = Vec::new();
     let before = soup.triangles.len();
@@ -113,14 +113,14 @@ pub fn clean(path: &Path, soup: &mut Soup, others: &[Vec<[f32; 3]>]) -> Vec<Issu
     issues
 }
 
-/// Whether a triangle has an area in double precision from its stored single-precision corners. One with
-/// a corner that is not a number has, for the check that names it.
+/// Returns whether a triangle has an area in double precision from its stored single-precision corners. True for
+/// one with a corner that is not a number, so that the check for those names it.
 pub fn has_area(triangle: [u32; 3], positions: &[[f32; 3]]) -> bool {
     let [a, b, c] = triangle.map(|i| DVec3::from(positions[i as usize].map(f64::from)));
     (b - a).cross(c - a).length_squared() != 0.0
 }
 
-/// Directed open edges: from vertex to vertex as their triangle runs.
+/// Directed open edges: from vertex to vertex in their triangle's direction.
 fn open_edges(soup: &Soup) -> Vec<[u32; 2]> {
     let edges = Edges::of(soup);
     let open = edges.groups().filter_map(|group| match group {

@@ -1,14 +1,14 @@
-//! The tracker that may move the probe: which of its tools, and how their frames meet the scene's.
+//! The tracker that may move the probe: choice of its tool, and the relation of its frames to the scene's.
 
 use glam::{DAffine3, DMat3, DVec3};
 
-/// How far the axes of a rigid transform may be from unit vectors at right angles: what 32-bit
-/// floats and three written decimals leave of them.
+/// Largest deviation of the axes of a rigid transform from unit vectors at right angles: the rounding of
+/// 32-bit floats and of three written decimals.
 const RIGID: f64 = 2e-3;
-/// Beyond this distance from the origin, mm, nothing is tracked.
+/// Greatest distance from the origin at which a tool is tracked, mm.
 const FAR: f64 = 1e5;
 
-/// What x and y of the scene's world are. z grows to the head in both.
+/// Meaning of x and y of the scene's world. z grows to the head in both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Axes {
@@ -35,15 +35,15 @@ pub struct Tracker {
 }
 
 impl Tracker {
-    /// Where the probe is in the world, mm, when the tracker reports `reference_from_tool`.
+    /// World from probe, mm, when the tracker reports `reference_from_tool`.
     pub fn world_from_probe(&self, reference_from_tool: DAffine3) -> DAffine3 {
         self.world_from_reference * reference_from_tool * self.tool_from_probe
     }
 }
 
 impl Axes {
-    /// RAS, which everybody reads on the wire, from the world: half a turn about z, or nothing. Its
-    /// own inverse.
+    /// RAS, the frame of OpenIGTLink messages, from the world: half a turn about z, or the identity. Its own
+    /// inverse.
     pub fn to_ras(self) -> DAffine3 {
         match self {
             Self::Lps => DAffine3::from_scale(DVec3::new(-1.0, -1.0, 1.0)),
@@ -65,10 +65,10 @@ impl Default for Tracker {
     }
 }
 
-/// The rigid transform next to `transform`, which may be off by rounding only.
+/// The rigid transform nearest to `transform`, which may be off by rounding only.
 ///
 /// # Errors
-/// What makes it no rigid transform, in words.
+/// The reason why it is no rigid transform.
 pub fn rigid(transform: DAffine3) -> Result<DAffine3, String> {
     if !transform.is_finite() {
         return Err("it holds values that are no finite numbers".to_owned());

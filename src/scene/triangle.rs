@@ -1,4 +1,4 @@
-//! Where a line meets a triangle.
+//! The intersection of a line with a triangle.
 
 use glam::DVec3;
 

@@ -1,23 +1,23 @@
-//! One parameter at a time below and above the scene's own value: the images of which an observer
-//! picks the most realistic, as in the user study of Starkov et al. 2019, section III-B. That tuned
-//! eleven major parameters and does not list them; [`SUGGESTED`] are ours.
+//! One parameter at a time below and above the scene's own value: an observer picks the most realistic
+//! of the images, as in the user study of Starkov et al. 2019, section III-B. That tuned eleven major
+//! parameters and does not list them; [`SUGGESTED`] are ours.
 
 use super::{Imaging, Scene, Simulation};
 use crate::probe::Probe;
 use crate::settings::{Facts, Form, Group, Value};
 
-/// How far from the scene's own value a parameter is shown, below and above.
+/// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
 enum Around {
-    /// Times these factors.
+    /// The value times these factors.
     Times(f64, f64),
-    /// So much less and more.
+    /// The value minus and plus this step.
     Plus(f64),
 }
 
-/// The parameters that a scene is shown with where its file says nothing: key, what it is called on a sheet, and how
-/// far it is varied, so that the images differ to the eye. The frequencies stand to each other as the 5, 7 and 9 MHz
-/// of the paper's figure 13; the others were found by looking.
+/// The parameters that are varied where the scene file names none: key, name on the contact sheet, and distance, so
+/// that the images differ to the eye. The frequencies relate to each other as the 5, 7 and 9 MHz of the paper's
+/// figure 13; the others were found by looking.
 const SUGGESTED: [(&str, &str, Around); 11] = [
     ("frequency", "frequency", Around::Times(5.0 / 7.0, 9.0 / 7.0)),
     ("gain", "gain", Around::Plus(6.0)),
@@ -37,7 +37,7 @@ const SUGGESTED: [(&str, &str, Around); 11] = [
 pub struct Parameter {
     table: &'static str,
     facts: &'static Facts,
-    /// Which number of a list.
+    /// Index of the number in a list.
     part: Option<usize>,
 }
 
@@ -47,7 +47,7 @@ impl PartialEq for Parameter {
     }
 }
 
-/// The numbers among the settings of a table.
+/// All numbers among the settings of a table.
 fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
     T::rows().iter().flat_map(|row| {
         let facts = &row.facts;
@@ -56,14 +56,14 @@ fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
             Form::Numbers(_) => (0..facts.parts.len()).map(Some).collect(),
             _ => Vec::new(),
         };
-        // An angle of a sector that the probe may not have.
+        // An angle is left out: the probe may not be a sector.
         let belongs = facts.limits.is_none() || facts.form.is_whole();
         let parts = parts.into_iter().filter(move |_| belongs);
         parts.map(|part| Parameter { table: T::TABLE, facts, part })
     })
 }
 
-/// The number of a group's setting; none for what is absent.
+/// The number of a group's setting; none where it is absent.
 fn number<T: Group>(settings: &T, parameter: &Parameter) -> Option<f64> {
     match ((T::row(parameter.facts.key)?.get)(settings), parameter.part) {
         (Value::Number(number), _) => Some(number),
@@ -74,17 +74,17 @@ fn number<T: Group>(settings: &T, parameter: &Parameter) -> Option<f64> {
 }
 
 impl Parameter {
-    /// All of them.
+    /// All parameters.
     pub fn all() -> impl Iterator<Item = Self> {
         numbers::<Probe>().chain(numbers::<Simulation>()).chain(numbers::<Imaging>())
     }
 
-    /// Those of which a sheet consists where the file says nothing, in its order.
+    /// The parameters of a contact sheet where the file names none, in its order.
     pub fn suggested() -> impl Iterator<Item = Self> {
         SUGGESTED.iter().filter_map(|(key, ..)| Self::of(key))
     }
 
-    /// The one of this key.
+    /// The parameter with this key.
     pub fn of(key: &str) -> Option<Self> {
         Self::all().find(|parameter| parameter.key() == key)
     }
@@ -104,12 +104,12 @@ impl Parameter {
         }
     }
 
-    /// Path of the setting behind it.
+    /// Path of its setting.
     pub fn path(&self) -> String {
         format!("{}.{}", self.table, self.facts.key)
     }
 
-    /// What a value of it is given as.
+    /// Form of its values.
     pub fn form(&self) -> Form {
         match self.facts.form {
             Form::Numbers(_) | Form::Whole => Form::Number,
@@ -117,7 +117,7 @@ impl Parameter {
         }
     }
 
-    /// What it is called on a sheet.
+    /// Its name on a contact sheet.
     pub fn name(&self) -> String {
         match self.suggestion() {
             Some((_, name, _)) => (*name).to_owned(),
@@ -130,7 +130,7 @@ impl Parameter {
         self.facts.unit()
     }
 
-    /// The scene's own value, in [`Self::unit`]; none where the scene's probe has no such thing.
+    /// The scene's own value, in [`Self::unit`]; none where the scene's probe does not have it.
     pub fn value(&self, scene: &Scene) -> Option<f64> {
         match self.table {
             Probe::TABLE => number(&scene.probe, self),
@@ -139,7 +139,7 @@ impl Parameter {
         }
     }
 
-    /// A value below and one above `own`, those of [`SUGGESTED`]; none for other parameters.
+    /// A value below and one above `own`, from [`SUGGESTED`]; none for other parameters.
     pub fn around(&self, own: f64) -> Option<[f64; 2]> {
         Some(match self.suggestion()?.2 {
             Around::Times(below, above) => [round(own * below), round(own * above)],
@@ -147,7 +147,7 @@ impl Parameter {
         })
     }
 
-    /// Which values it is shown with where the file says nothing, in words; empty for parameters that are not
+    /// Text about the values where the file gives none; empty for parameters that are not
     /// suggested.
     pub fn suggested_values(&self) -> String {
         match self.suggestion() {
@@ -161,7 +161,7 @@ impl Parameter {
         }
     }
 
-    /// The entry of the scene file, path and value, that sets it to `value` in `scene`.
+    /// The entry of the scene file, path and value, for `value` in `scene`.
     pub fn setting(&self, scene: &Scene, value: f64) -> (String, String) {
         let text = match (self.part, Imaging::row(self.facts.key)) {
             (Some(part), Some(row)) => match (row.get)(&scene.imaging) {
@@ -177,7 +177,7 @@ impl Parameter {
         (self.path(), text)
     }
 
-    /// Name and value as on a sheet: "gain 10 dB", "axial PSF x 2".
+    /// Name and value for a contact sheet: "gain 10 dB", "axial PSF x 2".
     pub fn caption(&self, value: f64) -> String {
         let (name, value) = (self.name(), short(value));
         match (self.unit(), self.suggestion()) {
@@ -188,12 +188,12 @@ impl Parameter {
     }
 }
 
-/// Two digits: a suggested value may be a plain one.
+/// A value rounded to two digits: a suggested value may be a plain one.
 fn round(value: f64) -> f64 {
     format!("{value:.1e}").parse().unwrap_or(value)
 }
 
-/// At most four digits.
+/// A value as text with at most four digits.
 pub fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.3e}").parse().unwrap_or(value);
     rounded.to_string()
@@ -206,18 +206,18 @@ pub struct Variant {
     pub parameter: Parameter,
     /// Its value, in [`Parameter::unit`].
     pub value: f64,
-    /// The entry of the scene file, path and value, that says the same.
+    /// The equivalent entry of the scene file, path and value.
     pub setting: (String, String),
-    /// The transducer with it.
+    /// The transducer with the value.
     pub probe: Probe,
-    /// Path tracing and scatterers with it.
+    /// Path tracing and scatterers with the value.
     pub simulation: Simulation,
-    /// Image formation with it.
+    /// Image formation with the value.
     pub imaging: Imaging,
 }
 
 impl Variant {
-    /// Puts its settings into the scene that it was made of.
+    /// Puts its settings into the scene that it was made from.
     pub fn apply(&self, scene: &mut Scene) {
         scene.probe = self.probe.clone();
         scene.simulation = self.simulation.clone();

@@ -11,6 +11,10 @@ group! {
         /// An echo this far below a perfect mirror is white at the face.
         gain: f64 = 16.0,
             Facts::quantity(&LEVEL, -200.0, 200.0).label("Gain").usual(-20.0, 60.0);
+        /// Level of the sent pulse below full power. Echoes become as much fainter, the electronic noise does not:
+        /// what `gain` gives back lies deeper in it.
+        power: f64 = 0.0,
+            Facts::quantity(&LEVEL, -60.0, 0.0).label("Power").usual(-30.0, 0.0);
         /// From white to black.
         dynamic_range: f64 = 60.0,
             Facts::quantity(&LEVEL, 1.0, 200.0).label("Dynamic range").usual(20.0, 100.0);

@@ -87,7 +87,7 @@ measures! {
         [("g/cm3", 1.0), ("kg/m3", 1e-3), ("g/cm^3", 1.0), ("kg/m^3", 1e-3)];
     /// dB/(cm MHz).
     Attenuation, InAttenuation, ATTENUATION: "attenuation", "an attenuation", true,
-        "one way, proportional to frequency",
+        "one way, at 1 MHz",
         [("dB/cm/MHz", 1.0), ("dB/(cm MHz)", 1.0), ("dB/m/MHz", 1e-2), ("dB/mm/MHz", 10.0)];
     /// s.
     Duration, InDuration, DURATION: "duration", "a duration", true, "", [("s", 1.0), ("ms", 1e-3)];

@@ -107,9 +107,16 @@ impl<'a> Calibration<'a> {
     }
 
     /// Standard deviation of each component of the noise per sample, such that the axial kernel
-    /// brings its RMS magnitude to the wanted level.
+    /// brings its RMS magnitude to the wanted level, in units of the echo of a perfect mirror.
     pub fn noise(&self) -> f64 {
-        amplitude(self.scene.imaging.noise) / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
+        let imaging = &self.scene.imaging;
+        amplitude(imaging.noise - imaging.power)
+            / (2.0 * autocorrelation(&self.axial_taps, 0)).sqrt()
+    }
+
+    /// Factor on what is received, TGC applied, after which 1 is white.
+    pub fn display_gain(&self) -> f64 {
+        amplitude(self.scene.imaging.gain + self.scene.imaging.power)
     }
 
     /// Elevational half-width in which one layer sees scatterers, mm: its share of the slice.
@@ -199,7 +206,7 @@ impl<'a> Calibration<'a> {
         if simulation.scatterers_per_resolution_cell <= 0.0 {
             return f64::NEG_INFINITY;
         }
-        let shown = amplitude(-imaging.gain - imaging.dynamic_range);
+        let shown = amplitude(-imaging.dynamic_range) / self.display_gain();
         let level = shown / (self.speckle_target() * amplitude(self.tgc_db(z)));
         let alike = simulation.sampling == Sampling::MainPath
             && simulation.origin_jitter <= 0.0
@@ -323,5 +330,34 @@ impl<'a> Calibration<'a> {
     /// Level of all surface echoes, linear.
     pub fn surface_level(&self) -> f64 {
         amplitude(self.scene.simulation.surface_gain)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Calibration;
+    use crate::probe::Probe;
+    use crate::scene::{Scene, Tissue};
+
+    /// Noise over echo grows by what the pulse lacks, and the noise that is shown stays.
+    #[test]
+    fn with_less_power_echoes_sink_into_the_same_noise() {
+        let mut scene =
+            Scene::homogeneous(Tissue::shipped("liver").expect("shipped"), Probe::linear());
+        let shown = |scene: &Scene| {
+            let calibration = Calibration::new(scene);
+            let gain = calibration.display_gain();
+            [gain, calibration.noise() * gain].map(|v| 20.0 * v.log10())
+        };
+        let [echo, noise] = shown(&scene);
+        scene.imaging.power = -9.0;
+        let [weaker, same] = shown(&scene);
+        approx::assert_abs_diff_eq!(weaker - echo, -9.0, epsilon = 1e-9);
+        approx::assert_abs_diff_eq!(same, noise, epsilon = 1e-9);
+        // Made up for by gain, the noise is brighter.
+        scene.imaging.gain += 9.0;
+        let [back, brighter] = shown(&scene);
+        approx::assert_abs_diff_eq!(back, echo, epsilon = 1e-9);
+        approx::assert_abs_diff_eq!(brighter - noise, 9.0, epsilon = 1e-9);
     }
 }

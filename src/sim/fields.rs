@@ -261,5 +261,4 @@ fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made>
 }
 
 #[cfg(test)]
-#[path = "fields/tests.rs"]
 mod tests;

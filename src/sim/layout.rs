@@ -130,11 +130,11 @@ constants! {
     pub const FLAG_MASKED: u32 = 512;
 
     /// What lies before the image plane is cut away.
-    pub const SURVEY_CUT: u32 = 1;
+    pub const VIEW3D_CUT: u32 = 1;
     /// The B-mode image is shown where it lies.
-    pub const SURVEY_IMAGE: u32 = 2;
+    pub const VIEW3D_IMAGE: u32 = 2;
     /// Of some instance the opacity is 0.
-    pub const SURVEY_SOME_HIDDEN: u32 = 4;
+    pub const VIEW3D_SOME_HIDDEN: u32 = 4;
 }
 
 macro_rules! shared {
@@ -231,7 +231,7 @@ shared! {
         slope: f32, intercept: f32, blend: u32, mask_speed: u32,
     }
     /// How the anatomy is looked at from outside.
-    struct Survey {
+    struct View3d {
         eye: [f32; 4], right: [f32; 4], down: [f32; 4], forward: [f32; 4],
         width: u32, height: u32, flags: u32, unused0: u32,
         housing: [f32; 4],

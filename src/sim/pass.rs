@@ -4,7 +4,7 @@
 
 use super::layout::Frame;
 use crate::gpu::Stage;
-use crate::npy::Element;
+use crate::output::npy::Element;
 use crate::scene::Scene;
 
 /// The numbers from which the sizes of all buffers follow.

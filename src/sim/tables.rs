@@ -82,11 +82,11 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         volume_scale: volume_scale as f32,
         background: scene.background as u32,
         instances: scene.instances.len() as u32,
-        points: scene.wires.iter().map(|w| wire_points(w).len() as u32).sum(),
+        points: scene.wires.iter().map(|wire| wire.steps() + 1).sum(),
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,
         noise: calibration.noise() as f32,
-        inverse_reference: amplitude(imaging.gain) as f32,
+        inverse_reference: calibration.display_gain() as f32,
         inverse_range: imaging.dynamic_range.recip() as f32,
         frame_index,
         image_width: image_width as u32,
@@ -258,15 +258,16 @@ pub fn surfaces(scene: &Scene) -> Vec<layout::Surface> {
 /// ends carry a point. Infinite for a single point.
 pub fn wire_spacing(wire: &Wire) -> f64 {
     let [a, b] = wire.ends.map(glam::DVec3::from);
-    let length = a.distance(b);
-    let steps = (length / wire.spacing).round().max(1.0);
-    if length == 0.0 { f64::INFINITY } else { length / steps }
+    match wire.steps() {
+        0 => f64::INFINITY,
+        steps => a.distance(b) / f64::from(steps),
+    }
 }
 
 /// World positions of a wire's points, mm.
 pub fn wire_points(wire: &Wire) -> Vec<[f64; 3]> {
     let [a, b] = wire.ends.map(glam::DVec3::from);
-    let steps = (a.distance(b) / wire_spacing(wire)).round() as u32;
+    let steps = wire.steps();
     (0..=steps).map(|i| a.lerp(b, f64::from(i) / f64::from(steps.max(1))).to_array()).collect()
 }
 

@@ -1,4 +1,4 @@
-//! Tests on ranks: whether several judges, or one over several occasions, order things alike. All
+//! Tests on ranks for the agreement of several judges, or of one over several occasions. All
 //! exact for small numbers, without an assumption on distributions.
 
 /// Blocks up to which Friedman's statistic of three things has its exact distribution; the chi-squared
@@ -16,7 +16,7 @@ pub struct Friedman {
     pub statistic: f64,
     /// Probability of so large a statistic where every order is equally likely.
     pub p: f64,
-    /// Whether `p` is of all k!^n orders; else of chi-squared with k - 1 degrees of freedom.
+    /// True where `p` is over all k!^n orders; else of chi-squared with k - 1 degrees of freedom.
     pub exact: bool,
     /// Kendall's coefficient of concordance W, 0 to 1 (Kendall and Babington Smith, Annals of
     /// Mathematical Statistics 10, 1939).
@@ -58,7 +58,7 @@ pub fn friedman(blocks: &[Vec<usize>]) -> Option<Friedman> {
     Some(Friedman { blocks: n, statistic, p, exact, concordance: statistic / (n_ * (k_ - 1.0)) })
 }
 
-/// Sum over things of (2 (rank sum - n (k + 1) / 2))^2: an integer, so that equal is equal.
+/// Sum over things of (2 (rank sum - n (k + 1) / 2))^2: an integer, so that equal sums compare equal.
 fn doubled_squares(sums: &[u64], n: usize, k: usize) -> u64 {
     let mean = (n * (k + 1)) as u64;
     sums.iter().map(|s| (2 * s).abs_diff(mean).pow(2)).sum()
@@ -86,15 +86,15 @@ fn exact_tail(n: usize, squares: u64) -> f64 {
         let sums = [a + n, b + n, 4 * n - a - b].map(|s| s as u64);
         doubled_squares(&sums, n, 3) >= squares
     };
-    // A sum of all three that no order of ranks has is a share of nothing.
+    // Some sums have no order of ranks: their share is zero.
     let sums = (0..width).flat_map(|a| (0..width).map(move |b| [a, b]));
     let possible = sums.filter(|[a, b]| a + b <= 3 * n && a + b >= n);
     let tail = possible.filter(|&s| is_far(s)).map(|[a, b]| ways[a * width + b]);
     tail.sum::<f64>().min(1.0)
 }
 
-/// Two-sided exact sign test: probability that of so many comparisons at least as many go one way as
-/// the larger of `first` and `second`, where both ways are equally likely (Dixon and Mood, Journal of
+/// Two-sided exact sign test: probability that of so many comparisons at least as many have one result as
+/// the larger of `first` and `second`, where both results are equally likely (Dixon and Mood, Journal of
 /// the American Statistical Association 41, 1946). 1 without a comparison.
 pub fn sign_test(first: usize, second: usize) -> f64 {
     let n = first + second;
@@ -123,7 +123,7 @@ pub fn holm(p: &[f64]) -> Vec<f64> {
     out
 }
 
-/// The middle value, or the mean of the two in the middle; NaN of nothing.
+/// Returns the middle value, or the mean of the two in the middle; NaN without values.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

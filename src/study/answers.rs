@@ -1,4 +1,4 @@
-//! What an assessor answered, as the form saves it.
+//! An assessor's answers, as the form saves them.
 
 use std::path::{Path, PathBuf};
 
@@ -10,11 +10,11 @@ use super::{StudyError, text_of};
 
 /// Largest file of answers, bytes: a thousand cases with remarks.
 const MAX_TEXT: u64 = 16 << 20;
-/// What such a file calls itself.
+/// Name of the format in the file.
 pub const FORMAT: &str = "insonify study answers";
 /// Version of the format that is written and read.
 pub const VERSION: u32 = 1;
-/// Degrees of agreement.
+/// Number of degrees of agreement.
 pub const DEGREES: usize = 5;
 
 /// The whole file.
@@ -36,21 +36,21 @@ pub struct Answers {
     /// The file.
     #[serde(skip)]
     pub file: PathBuf,
-    /// Drawn when the form was opened first: the same in all that is saved of it later.
+    /// Random number of the filled form, drawn when it was first opened; the same in all later saves.
     pub response: String,
-    /// When it was saved, UTC, ISO 8601.
+    /// Time of saving, UTC, ISO 8601.
     pub saved: String,
-    /// Who filled it in.
+    /// The assessor.
     pub assessor: Assessor,
-    /// What was chosen, one per case.
+    /// Choices, one per case.
     pub cases: Vec<Choice>,
     /// Order of the chosen images, one per scenario and slice.
     pub rankings: Vec<Ranking>,
-    /// On the whole.
+    /// Remark on the whole study.
     pub remark: String,
 }
 
-/// Who rated, as far as told.
+/// The assessor, as far as stated.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Assessor {
@@ -60,7 +60,7 @@ pub struct Assessor {
     pub experience: String,
 }
 
-/// Of one case.
+/// Answer to one case.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Choice {
@@ -68,11 +68,11 @@ pub struct Choice {
     pub image: Option<usize>,
     /// Agreement with the statement about it, 1 to [`DEGREES`].
     pub agreement: Option<usize>,
-    /// On the case.
+    /// Remark on the case.
     pub remark: String,
 }
 
-/// Of one scenario and slice.
+/// Ranking for one scenario and slice.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ranking {
@@ -83,7 +83,7 @@ pub struct Ranking {
 }
 
 impl Ranking {
-    /// The ranks, where all were given.
+    /// The ranks, if all are given.
     pub fn complete(&self) -> Option<Vec<usize>> {
         self.ranks.iter().copied().collect()
     }
@@ -127,7 +127,7 @@ impl Answers {
         }
     }
 
-    /// Answers that fit the key, or why they do not.
+    /// Answers that fit the key, or the reason why they do not.
     fn of(content: Value, key: &Key) -> Result<Self, String> {
         let answers: Self =
             serde_path_to_error::deserialize(content).map_err(|e| format!("does not fit: {e}"))?;
@@ -178,8 +178,8 @@ impl Answers {
         Ok(answers)
     }
 
-    /// Cases without a choice, chosen images without a degree of agreement, and rankings that are not
-    /// complete.
+    /// Numbers of cases without a choice, of chosen images without a degree of agreement, and of incomplete
+    /// rankings.
     pub fn missing(&self) -> [usize; 3] {
         let cases = self.cases.iter();
         let open = |r: &&Ranking| r.complete().is_none();
@@ -216,5 +216,4 @@ pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, StudyError
 }
 
 #[cfg(test)]
-#[path = "answers_tests.rs"]
 pub(in crate::study) mod tests;

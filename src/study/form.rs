@@ -1,5 +1,5 @@
-//! The form that an assessor fills in: one HTML file with everything inside. It knows case and image
-//! numbers and which cases are ranked together; what an image is stands in the key alone.
+//! The form for assessors: one HTML file with everything inside. It knows the numbers of cases and images, and
+//! the cases ranked together; the identity of an image is in the key only.
 
 use std::fmt::Write as _;
 
@@ -14,15 +14,15 @@ const PAGE: &str = include_str!("form/page.html");
 const STYLE: &str = include_str!("form/style.css");
 const SCRIPT: &str = include_str!("form/script.js");
 
-/// What a form shows.
+/// Content of a form.
 pub struct Form<'a> {
     /// Id of the study: [`super::key::Key::id`].
     pub study: &'a str,
     /// Headline.
     pub title: &'a str,
-    /// What the assessor reads first: plain text, an empty line between paragraphs.
+    /// Introduction for the assessor: plain text, an empty line between paragraphs.
     pub introduction: &'a str,
-    /// What is asked.
+    /// The question.
     pub question: &'a Question,
     /// The cases, in the order of their numbers.
     pub cases: Vec<Case>,
@@ -32,10 +32,10 @@ pub struct Form<'a> {
 
 /// One case.
 pub struct Case {
-    /// What stands above its images; may be empty.
+    /// Text above its images; may be empty.
     pub title: String,
-    /// What is added to that where it is ranked with others; may be empty. Not before: it would tell
-    /// which cases belong together.
+    /// Text added to that where it is ranked with others; may be empty. Not earlier: it would reveal the cases
+    /// that belong together.
     pub slice: String,
     /// PNG files, in the order of their numbers.
     pub images: Vec<Vec<u8>>,
@@ -61,7 +61,7 @@ impl Form<'_> {
             .filter(|p| !p.is_empty())
             .map(|p| format!("<p>{}</p>\n", escaped(p)))
             .collect();
-        // No text of the plan is looked into for a place of its own.
+        // Texts of the plan are not searched for places of their own.
         filled(
             PAGE,
             &[
@@ -182,7 +182,7 @@ fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// A page with what belongs to each `{{NAME}}`.
+/// A page with the text for each `{{NAME}}`.
 fn filled(page: &str, parts: &[(&str, &str)]) -> String {
     let mut out =
         String::with_capacity(page.len() + parts.iter().map(|p| p.1.len()).sum::<usize>());
@@ -229,7 +229,7 @@ mod tests {
         assert!(html.contains("<p>First.</p>\n<p>Second &amp; last.</p>"));
         assert_eq!(html.matches("data:image/png;base64,dHdv\"").count(), 2);
         assert_eq!(html.matches("<select").count(), 2);
-        // Which cases belong together is told where they are compared.
+        // Cases that belong together are revealed only where they are compared.
         assert_eq!(html.matches("from above").count(), 1);
     }
 }

@@ -1,4 +1,4 @@
-//! The key of a study: what each image is. It stays with whoever runs the study.
+//! The key of a study: the identity of each image. It stays with the person who runs the study.
 
 use std::collections::BTreeSet;
 use std::path::Path;
@@ -15,9 +15,9 @@ const MAX_TEXT: u64 = 64 << 20;
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
-    /// Which study it belongs to: [`Key::id`].
+    /// Id of its study: [`Key::id`].
     pub study: String,
-    /// Number of the case, from 1, as the form shows it.
+    /// Number of the case, from 1, as in the form.
     pub case: usize,
     /// Number of the image in its case, from 1.
     pub image: usize,
@@ -25,9 +25,9 @@ pub struct Row {
     pub scenario: String,
     /// Name of the transducer's position in the plan.
     pub slice: String,
-    /// What surrounds the simulated part.
+    /// Surroundings of the simulated part.
     pub background: String,
-    /// What was changed; [`UNPERTURBED`] in the image of the scene as it is.
+    /// Changed parameter; [`UNPERTURBED`] in the image of the scene itself.
     pub parameter: String,
     /// Its value here.
     pub value: String,
@@ -35,7 +35,7 @@ pub struct Row {
     pub own: String,
     /// Unit of both; empty for factors.
     pub unit: String,
-    /// What `--set` makes of it, blanks between: `insonify render SCENE --set ...` is the same image.
+    /// Values for `--set`, blanks between: `insonify render SCENE --set ...` is the same image.
     pub set: String,
     /// CRC-32 of the PNG file.
     pub crc: String,
@@ -47,7 +47,7 @@ pub struct Row {
 pub const UNPERTURBED: &str = "none";
 
 impl Row {
-    /// Whether its value is below (-1) or above (1) the scene's own; 0 where it is neither.
+    /// Sign of the change: -1 below, 1 above the scene's own value; 0 where it is neither.
     pub fn direction(&self) -> i32 {
         let [value, own] = [&self.value, &self.own].map(|v| v.parse::<f64>().unwrap_or(f64::NAN));
         i32::from(value > own) - i32::from(value < own)
@@ -64,7 +64,7 @@ fn crc64(bytes: &[u8]) -> String {
     format!("{:016x}", Crc::<u64>::new(&CRC_64_XZ).checksum(bytes))
 }
 
-/// What each image of a study is, by case and number.
+/// Identity of each image of a study, by case and number.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Key {
     rows: Vec<Row>,
@@ -73,10 +73,10 @@ pub struct Key {
 }
 
 impl Key {
-    /// From rows sorted by case and image, whose field `study` is replaced by [`Key::id`].
+    /// A key from rows sorted by case and image, whose field `study` is replaced by [`Key::id`].
     ///
     /// # Errors
-    /// What of the rows cannot be a study, in words.
+    /// The reason why the rows are no study.
     pub fn new(mut rows: Vec<Row>) -> Result<Self, String> {
         let id = id(&rows)?;
         rows.iter_mut().for_each(|row| row.study.clone_from(&id));
@@ -108,7 +108,7 @@ impl Key {
         Ok(key)
     }
 
-    /// Each scene and slice has each background once.
+    /// Checks that each scene and slice has each background once.
     fn check_groups(&self) -> Result<(), String> {
         let backgrounds = self.backgrounds();
         for group in self.groups() {
@@ -129,7 +129,7 @@ impl Key {
         &self.rows
     }
 
-    /// What all rows come to, sixteen hexadecimal digits: another image, order or wording is another
+    /// Check sum of all rows, sixteen hexadecimal digits: another image, order or wording is another
     /// study.
     pub fn id(&self) -> &str {
         &self.rows[0].study
@@ -165,8 +165,8 @@ impl Key {
         &self.first(case).background
     }
 
-    /// Cases of one scenario and slice, ascending: those whose chosen images are ranked together. In
-    /// the order of their first cases, which says nothing of what they show.
+    /// Cases of one scenario and slice, ascending: their chosen images are ranked together. Groups are in the
+    /// order of their first cases, which does not reveal their content.
     pub fn groups(&self) -> Vec<Vec<usize>> {
         let mut groups: Vec<Vec<usize>> = Vec::new();
         for case in 1..=self.cases() {
@@ -208,7 +208,7 @@ impl Key {
     /// Reads a key back.
     ///
     /// # Errors
-    /// A file that cannot be read, or that is not as it was written: one edited row changes the id.
+    /// A file that cannot be read, or that was changed: one edited row changes the id.
     pub fn read(path: &Path) -> Result<Self, StudyError> {
         let fail = |cause: String| {
             let remedy = "give the file key.csv as `insonify study make` wrote it: a program for \
@@ -232,7 +232,7 @@ impl Key {
     }
 }
 
-/// What the rows come to, but for the id that they carry.
+/// Check sum of the rows, without the id that they carry.
 fn id(rows: &[Row]) -> Result<String, String> {
     if rows.is_empty() {
         return Err("there is no image".to_owned());
@@ -259,7 +259,7 @@ fn id(rows: &[Row]) -> Result<String, String> {
             &case, &image, scenario, slice, background, parameter, value, own, unit, set, crc,
             wording,
         ] {
-            // With its length: no text runs into the next.
+            // With its length, so that no text runs into the next.
             all.extend((field.len() as u64).to_le_bytes());
             all.extend(field.as_bytes());
         }
@@ -268,5 +268,4 @@ fn id(rows: &[Row]) -> Result<String, String> {
 }
 
 #[cfg(test)]
-#[path = "key_tests.rs"]
 pub(in crate::study) mod tests;

@@ -1,4 +1,4 @@
-//! What the answers of all assessors come to.
+//! Results of the answers of all assessors.
 
 use std::path::PathBuf;
 
@@ -13,14 +13,14 @@ mod tables;
 pub use ratings::ratings;
 pub use tables::{Cell, Table, csv, markdown, plain};
 
-/// How the images before one background were rated.
+/// Ratings of the images before one background.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rated {
     /// Name of the background.
     pub background: String,
-    /// How often it had each rank, from the first, in complete rankings.
+    /// Number of times it had each rank, from the first, in complete rankings.
     pub ranks: Vec<usize>,
-    /// How often each degree of agreement was given, from the least.
+    /// Number of times each degree of agreement was given, from the least.
     pub agreement: [usize; DEGREES],
 }
 
@@ -40,12 +40,12 @@ impl Rated {
     }
 }
 
-/// All backgrounds of one scenario, or of all.
+/// All backgrounds of one scenario, or of all scenarios.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Part {
     /// Name of the scenario; none for all together.
     pub scenario: Option<String>,
-    /// One per background.
+    /// Ratings, one per background.
     pub rated: Vec<Rated>,
 }
 
@@ -54,24 +54,24 @@ pub struct Part {
 pub struct Pair {
     /// Names.
     pub backgrounds: [String; 2],
-    /// In how many blocks each was before the other.
+    /// Number of blocks in which each was before the other.
     pub before: [usize; 2],
-    /// Two-sided exact sign test.
+    /// Probability of the two-sided exact sign test.
     pub p: f64,
-    /// The same corrected for the number of pairs, after Holm.
+    /// That probability corrected for the number of pairs, after Holm.
     pub corrected: f64,
 }
 
-/// How often images with one parameter changed were chosen.
+/// Number of times that images with one parameter changed were chosen.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Chosen {
     /// The parameter's key in `[vary]`.
     pub parameter: String,
-    /// Below the scene's own value, at it, above it.
+    /// Numbers of choices below the scene's own value, at it, above it.
     pub counts: [usize; 3],
 }
 
-/// All that is told of a study.
+/// All results of a study.
 #[derive(Clone, Debug)]
 pub struct Results {
     /// Its id.
@@ -80,26 +80,26 @@ pub struct Results {
     pub assessors: usize,
     /// Number of scenarios, and of slices of all scenarios.
     pub places: [usize; 2],
-    /// Each scenario, then all together.
+    /// Results of each scenario, then of all together.
     pub parts: Vec<Part>,
-    /// Over the backgrounds, with the complete rankings as blocks; none without one.
+    /// Test over the backgrounds, with the complete rankings as blocks; none without one.
     pub friedman: Option<Friedman>,
-    /// Every two backgrounds.
+    /// Comparisons of every two backgrounds.
     pub pairs: Vec<Pair>,
-    /// One per parameter of the key.
+    /// Choices, one entry per parameter of the key.
     pub chosen: Vec<Chosen>,
-    /// How often the image of the scene as it is was chosen.
+    /// Number of times that the image of the scene itself was chosen.
     pub unperturbed: usize,
-    /// How often it would be on the average if images were drawn.
+    /// The mean of that number if images were drawn at random.
     pub by_chance: f64,
-    /// How many images were chosen.
+    /// Number of chosen images.
     pub choices: usize,
-    /// Of each form: cases without an image, images without a degree, rankings not complete.
+    /// For each form: cases without an image, images without a degree, incomplete rankings.
     pub missing: Vec<(PathBuf, [usize; 3])>,
 }
 
 impl Results {
-    /// From the answers to the study of `key`, each of which fits it ([`Answers::read`]).
+    /// Results of the answers to the study of `key`, each of which fits it ([`Answers::read`]).
     pub fn new(key: &Key, all: &[Answers]) -> Self {
         let backgrounds = key.backgrounds();
         let scenarios = key.scenarios();
@@ -134,7 +134,7 @@ impl Results {
     }
 }
 
-/// Parameters of the key, in the order of the sheet.
+/// Parameters of the key, in the order of the contact sheet.
 fn parameters(key: &Key) -> Vec<&str> {
     let mut found: Vec<&str> = key.rows().iter().map(|r| &*r.parameter).collect();
     found.retain(|p| *p != UNPERTURBED);
@@ -210,5 +210,4 @@ fn pairs(backgrounds: &[&str], blocks: &[Vec<usize>]) -> Vec<Pair> {
 }
 
 #[cfg(test)]
-#[path = "results_tests.rs"]
 mod tests;

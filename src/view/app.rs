@@ -8,23 +8,25 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoopProxy};
 use winit::window::WindowId;
 
+use super::deaths::Deaths;
 use super::link::Link;
 use super::open::{Open, Plan};
-use super::session::Wake;
+use super::session::{Wake, waker};
 use super::statistics::Times;
 use super::{Options, ViewError};
 use crate::gpu::{GpuError, Shot, ValidationLog};
 use crate::scene::Scene;
 use crate::sim::SimError;
 
-/// A device that is lost again within this time will be lost the next time, too.
+/// Time within which a second loss of the device ends the program: it would be lost again.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// The application.
+/// The application: what the event loop drives.
 pub(super) struct App {
     plan: Plan,
     open: Option<Open>,
     statistics: Times,
+    /// When device and simulation were made anew last.
     lost: Option<Instant>,
     log: Option<ValidationLog>,
     failure: Option<ViewError>,
@@ -32,8 +34,11 @@ pub(super) struct App {
 
 impl App {
     pub(super) fn new(scene: Scene, options: Options, proxy: EventLoopProxy<Wake>) -> Self {
+        let deaths = Deaths::default();
+        deaths.watch(waker(proxy.clone()));
+        let plan = Plan { scene, options, proxy, link: Link::default(), deaths };
         Self {
-            plan: Plan { scene, options, proxy, link: Link::default() },
+            plan,
             open: None,
             statistics: Times::default(),
             lost: None,
@@ -42,7 +47,7 @@ impl App {
         }
     }
 
-    /// Closes everything; why it ended, if not by the user.
+    /// Closes everything; returns the error that ended it, if one did.
     pub(super) fn finish(mut self) -> Result<(), ViewError> {
         self.open = None;
         if let Some(file) = &self.plan.options.json {
@@ -62,7 +67,7 @@ impl App {
         }
     }
 
-    /// Takes over a window, or leaves.
+    /// Takes over the opened window; ends the event loop where there is none.
     fn adopt(
         &mut self,
         events: &ActiveEventLoop,
@@ -80,24 +85,30 @@ impl App {
         }
     }
 
-    /// Goes on with a new device where it was lost; ends where that does not help.
+    /// Goes on with a new device and simulation where one of them is gone. Where that has just been done, the
+    /// window ends without a device; without a simulation it stays, with what is not saved.
     fn fail(&mut self, events: &ActiveEventLoop, error: ViewError) {
-        let lost = is_lost(&error);
         let again = self.lost.is_some_and(|at| at.elapsed() < PATIENCE);
-        let error = match again {
-            true => lost_again(error),
-            false => error,
-        };
-        match self.open.take() {
-            Some(open) if lost && !again => {
-                self.lost = Some(Instant::now());
-                let opened = open.again(&self.plan, &error);
-                self.adopt(events, opened.map_err(lost_again));
+        match (&error, &mut self.open) {
+            (ViewError::Died, Some(open)) if again || open.is_empty() => open.stop(),
+            (ViewError::Died, _) => self.restart(events, None),
+            (lost, _) if is_lost(lost) && !again => {
+                self.restart(events, Some(format!("{error}. It was opened again.")));
             }
             _ => {
-                self.failure = Some(error);
+                self.open = None;
+                self.failure = Some(if again { lost_again(error) } else { error });
                 events.exit();
             }
+        }
+    }
+
+    /// Another simulation on a new device, with what there is to say of it.
+    fn restart(&mut self, events: &ActiveEventLoop, problem: Option<String>) {
+        if let Some(open) = self.open.take() {
+            self.lost = Some(Instant::now());
+            let opened = open.again(&self.plan, problem);
+            self.adopt(events, opened.map_err(lost_again));
         }
     }
 
@@ -117,6 +128,7 @@ impl App {
                 self.failure = self.save(&shot).err();
                 events.exit();
             }
+            Ok(None) if open.restarts() => self.restart(events, None),
             Ok(None) => {}
             Err(error) => self.fail(events, error.into()),
         }
@@ -149,7 +161,7 @@ impl ApplicationHandler<Wake> for App {
         let plan = &mut self.plan;
         let failed = self.open.as_mut().map(|open| open.listen(plan));
         if let Some(Err(error)) = failed {
-            self.fail(events, error.into());
+            self.fail(events, error);
         }
     }
 
@@ -171,7 +183,7 @@ impl ApplicationHandler<Wake> for App {
     }
 }
 
-/// True for an error that says that the device is gone.
+/// Returns true for an error that says that the device is gone.
 fn is_lost(error: &ViewError) -> bool {
     matches!(
         error,
@@ -180,7 +192,7 @@ fn is_lost(error: &ViewError) -> bool {
     )
 }
 
-/// An error that follows the loss of a device: with a remedy where it is another loss.
+/// The error after a device was lost once before: another loss gets a remedy.
 fn lost_again(error: ViewError) -> ViewError {
     match is_lost(&error) {
         true => ViewError::LostAgain(Box::new(error)),

@@ -8,27 +8,27 @@ use super::model::Model;
 use super::{real, style};
 use crate::probe::Kind;
 
-/// Width below which the second line has no room for both sides, points.
+/// Width below which the second row of text has no room for both sides, points.
 const NARROW: f32 = 440.0;
 
 /// Room around the image, points: left (grey bar), top (texts), right (ruler), bottom.
 const MARGINS: [f32; 4] = [52.0, 58.0, 64.0, 16.0];
 
-/// Where a picture is on the screen: whole pixels, since it is copied to whole pixels. What is drawn
-/// and clicked then lies where the picture has it.
+/// Place of a picture on the screen: whole pixels, since it is copied to whole pixels. Drawing
+/// and clicks then fit the picture.
 pub(super) struct Place {
     /// The whole image, points.
     pub(super) rect: Rect,
-    /// The image and what is written around it, points.
+    /// The image and the texts around it, points.
     pub(super) area: Rect,
-    /// Points per mm, across and down: equal but for what rounding to pixels makes of them.
+    /// Points per mm, across and down: equal except for rounding to pixels.
     scale: [f64; 2],
     left: f64,
     top: f64,
 }
 
 impl Place {
-    /// As large as fits into `area`.
+    /// The largest place that fits into `area`.
     fn new(area: Rect, frame: &Frame, pixels_per_point: f32) -> Self {
         let [width, height, _] = frame.image.extent();
         Self::of(area, [width, height], &frame.sector, pixels_per_point)
@@ -58,14 +58,14 @@ impl Place {
         }
     }
 
-    /// A point of the image plane, mm lateral and mm deep, on the screen.
+    /// Screen position of a point of the image plane, mm lateral and mm deep.
     pub(super) fn at(&self, lateral: f64, depth: f64) -> Pos2 {
         let x = (lateral - self.left) * self.scale[0];
         let y = (depth - self.top) * self.scale[1];
         self.rect.min + vec2(x as f32, y as f32)
     }
 
-    /// A point of the screen in the image plane, mm lateral and mm deep.
+    /// Point of the image plane at a screen position, mm lateral and mm deep.
     pub(super) fn mm(&self, at: Pos2) -> DVec2 {
         let from_corner = at - self.rect.min;
         dvec2(
@@ -80,9 +80,9 @@ impl Place {
     }
 }
 
-/// Draws everything around the picture, into what is left of the window.
+/// Draws everything around the picture into the remaining room of the window.
 ///
-/// `preparing` is said where there is no picture yet.
+/// `preparing` is the text while there is no picture yet.
 pub(super) fn show(
     ui: &mut Ui,
     frame: Option<&Frame>,
@@ -140,7 +140,7 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
             line = timed;
         }
     }
-    // In a narrow window the probe's settings need the room.
+    // In a narrow window the probe's settings need this room.
     if area.width() < NARROW {
         return;
     }
@@ -153,17 +153,17 @@ fn texts(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     }
 }
 
-/// Share of the face below which an examiner would see to more gel or pressure.
+/// Share of the face in contact below which an examiner would add gel or pressure.
 const GOOD_CONTACT: f64 = 0.9;
 
-/// What there is to say of the contact with the skin, and whether it is good.
+/// The text about contact with the skin, and whether contact is good.
 fn contact(frame: &Frame, model: &Model) -> Option<(String, bool)> {
     let touch = frame.contact?;
     let held = match model.hold.as_ref().is_some_and(|hold| hold.stays) {
         true => "held   ",
         false => "",
     };
-    // Rounded down: what is not whole does not say so.
+    // Rounded down: 100 % is shown only for a whole contact.
     let share = (100.0 * touch.share).floor();
     let text = format!("{held}contact {share:.0} %   pressed {:.1} mm", touch.depth);
     Some((text, touch.share >= GOOD_CONTACT))
@@ -201,7 +201,7 @@ fn ruler(painter: &egui::Painter, place: &Place, frame: &Frame) {
     painter.add(Shape::convex_polygon(corners, style::ACCENT, Stroke::NONE));
 }
 
-/// White on top, the floor of the dynamic range at the bottom, by the grey map.
+/// Draws the grey bar by the grey map: white on top, the lower end of the dynamic range at the bottom.
 fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     let imaging = &frame.settings.imaging;
     let height = (place.rect.height() * 0.4).clamp(60.0, 240.0);
@@ -237,7 +237,7 @@ fn grey_bar(painter: &egui::Painter, area: Rect, place: &Place, frame: &Frame) {
     painter.text(below, Align2::CENTER_TOP, floor, font, style::FAINT);
 }
 
-/// The probe's mark: at the side of its first scanline, which is the image's left.
+/// Draws the probe's mark, at the side of its first scanline, which is the image's left.
 fn orientation(painter: &egui::Painter, place: &Place, frame: &Frame) {
     let (start, _) = frame.probe.ray(0, 0);
     let mark = place.at(start.x, start.z) + vec2(-14.0, -2.0);

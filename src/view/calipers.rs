@@ -1,4 +1,4 @@
-//! Measurements and texts on the image: the pointer, the drawing, the table of results.
+//! Measurements and texts on the image: pointer, drawing, table of results.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use super::model::calipers::{Caliper, Kind, Reading};
 use super::model::sheet::{Sheet, Tool, What};
 use super::{keys, notes, style};
 
-/// How near the pointer has to be to take a point, points.
+/// Distance within which the pointer takes a point, points.
 const REACH: f32 = 9.0;
 /// Colours of the marks, in turn.
 const COLOURS: [Color32; 5] = [
@@ -26,7 +26,7 @@ const COLOURS: [Color32; 5] = [
     Color32::from_rgb(200, 170, 255),
 ];
 
-/// Takes what the pointer did over the picture, and draws all marks.
+/// Handles the pointer's events over the picture, and draws all marks.
 pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame) {
     let room = ui.max_rect().intersect(place.rect.expand(12.0));
     pointer(ui, sheet, place, frame, room);
@@ -56,7 +56,7 @@ pub(super) fn show(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame)
     notes::editor(ui, sheet, place);
 }
 
-/// Marks are told apart by letter and colour.
+/// Colour of a mark by its letter.
 fn colour(letter: char) -> Color32 {
     COLOURS[(u32::from(letter) - u32::from('A')) as usize % COLOURS.len()]
 }
@@ -65,7 +65,7 @@ pub(super) fn to_screen(place: &Place, point: DVec2) -> Pos2 {
     place.at(point.x, point.y)
 }
 
-/// Every event on its own: several may have come since the window was last drawn.
+/// Handles every event by itself: several may have come since the window was last drawn.
 fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: Rect) {
     let response = ui.interact(room, Id::new("image"), Sense::click_and_drag());
     let reach = f64::from(REACH) * place.mm_per_point();
@@ -117,7 +117,7 @@ fn pointer(ui: &mut Ui, sheet: &mut Sheet, place: &Place, frame: &Frame, room: R
     }
 }
 
-/// The note whose text is at a place of the screen.
+/// Index of the note whose text is at a screen position.
 fn note_at(ui: &Ui, sheet: &Sheet, place: &Place, at: Pos2) -> Option<usize> {
     let is_meant = |what: &What| match what {
         What::Note(note) => {
@@ -130,7 +130,7 @@ fn note_at(ui: &Ui, sheet: &Sheet, place: &Place, at: Pos2) -> Option<usize> {
     sheet.marks().iter().rposition(|mark| is_meant(&mark.what))
 }
 
-/// What is being drawn, with what it measures so far beside the pointer.
+/// Draws the unfinished mark, with its measurement so far beside the pointer.
 fn draft(painter: &Painter, sheet: &Sheet, place: &Place) {
     let Some(draft) = sheet.draft() else { return };
     let points: Vec<Pos2> = draft.points.iter().map(|&p| to_screen(place, p)).collect();
@@ -167,12 +167,12 @@ fn draw(painter: &Painter, place: &Place, caliper: &Caliper, colour: Color32) {
     points.iter().for_each(|&p| cross(painter, p, colour));
 }
 
-/// Dots that hide little of what is measured.
+/// Draws a dotted line, which hides little of what is measured.
 pub(super) fn dots(painter: &Painter, points: &[Pos2], colour: Color32) {
     painter.extend(Shape::dotted_line(points, colour, 5.0, 0.9));
 }
 
-/// Open in the middle, so that the point itself is seen.
+/// Draws a cross, open in the middle so that the point itself is seen.
 pub(super) fn cross(painter: &Painter, at: Pos2, colour: Color32) {
     for (arm, width, tint) in [(7.0, 3.0, Color32::from_black_alpha(150)), (6.0, 1.4, colour)] {
         let line = Stroke::new(width, tint);
@@ -193,7 +193,7 @@ fn laid_out(painter: &Painter, text: &str, colour: Color32) -> Arc<egui::Galley>
     painter.layout_no_wrap(text.to_owned(), FontId::proportional(13.0), colour)
 }
 
-/// A text on a dark ground.
+/// Draws a text on a dark ground.
 pub(super) fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
     let galley = laid_out(painter, text, colour);
     let room = Align2::LEFT_CENTER.anchor_size(at, galley.size());
@@ -201,7 +201,7 @@ pub(super) fn label(painter: &Painter, at: Pos2, text: &str, colour: Color32) {
     painter.galley(room.min, galley, colour);
 }
 
-/// What a measurement says, a line each.
+/// The texts of a measurement, one per row.
 pub(super) fn reading(reading: &Reading) -> Vec<String> {
     match reading {
         Reading::Distance(mm) => vec![format!("{mm:.1} mm")],
@@ -214,7 +214,7 @@ pub(super) fn reading(reading: &Reading) -> Vec<String> {
     }
 }
 
-/// What was measured, beside the grey bar, where a sector leaves room.
+/// Draws the table of measurements beside the grey bar, where a sector leaves room.
 pub(super) fn table(ui: &Ui, sheet: &mut Sheet, frame: &Frame) {
     let is_measured = |what: &What| matches!(what, What::Caliper(_));
     if !sheet.marks().iter().any(|mark| is_measured(&mark.what)) {
@@ -277,7 +277,7 @@ fn row(ui: &mut Ui, sheet: &mut Sheet, index: usize, frame: &Frame, removed: &mu
     ui.end_row();
 }
 
-/// The name of a measurement: chosen or typed.
+/// Draws the name of a measurement, which is chosen or typed.
 fn named(ui: &mut Ui, sheet: &mut Sheet, index: usize, kind: Kind, name: String) {
     let shown = if name.is_empty() { kind.name() } else { name.as_str() };
     let button = ui.menu_button(RichText::new(shown).size(12.0), |ui| {

@@ -11,17 +11,18 @@ use std::thread::JoinHandle;
 use serde_json::{Map, Value};
 
 use self::files::{Claim, grey_png, scaled};
+use super::deaths::CAPTURE;
 use super::engine::Frame;
 use crate::gpu::{GpuError, Shot};
-use crate::movie::{Movie, MovieError};
+use crate::output::movie::{Movie, MovieError};
 
-/// What is written beside a picture: see `docs/window.md`.
+/// The settings written beside a picture: see `docs/window.md`.
 pub(super) type Sidecar = Map<String, Value>;
 
-/// Why nothing was saved. What was to be saved is still there.
+/// The reason why nothing was saved. The data to be saved still exist.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CaptureError {
-    /// A file or folder.
+    /// A file or folder cannot be written.
     #[error(
         "{} cannot be written: {cause}. Name a folder that can be written to and has room; \
          nothing is lost", path.display()
@@ -29,12 +30,15 @@ pub(super) enum CaptureError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The system's message.
         cause: String,
     },
     /// The image cannot be read back.
     #[error("the image cannot be read back: {0}")]
     Gpu(#[from] GpuError),
+    /// The system has no room for another thread.
+    #[error("no thread can be started: {0}. Close other programs and save again; nothing is lost")]
+    Thread(std::io::Error),
 }
 
 impl CaptureError {
@@ -49,17 +53,17 @@ impl From<MovieError> for CaptureError {
     }
 }
 
-/// One image.
+/// One image to be saved.
 pub(super) struct Still {
-    /// What is saved.
+    /// The image.
     pub(super) frame: Frame,
-    /// What is written beside it, and into it.
+    /// The text written beside it and into it.
     pub(super) sidecar: Sidecar,
-    /// The same with its marks, as in the window.
+    /// The image with its marks, as in the window.
     pub(super) marked: Option<Shot>,
 }
 
-/// How a clip is written.
+/// File format of a clip.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Format {
     /// One animated GIF.
@@ -68,17 +72,17 @@ pub(super) enum Format {
     Sequence,
 }
 
-/// Images one after the other.
+/// Images one after the other, to be saved.
 pub(super) struct Clip {
-    /// Each with the time until which it is shown, s from the beginning.
+    /// Images, each with the time until which it is shown, s from the beginning.
     pub(super) frames: Vec<(Frame, f64)>,
-    /// What is written beside them.
+    /// The text written beside them.
     pub(super) sidecar: Sidecar,
-    /// How.
+    /// File format.
     pub(super) format: Format,
 }
 
-/// How far a capture is.
+/// Progress of a capture.
 pub(super) struct Progress {
     done: AtomicU32,
     total: u32,
@@ -86,12 +90,12 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// Images that are written, and all.
+    /// Number of images written, and of all.
     pub(super) fn count(&self) -> [u32; 2] {
         [self.done.load(Ordering::Relaxed), self.total]
     }
 
-    /// Nothing of it is to be kept.
+    /// Cancels the capture: nothing of it is kept.
     pub(super) fn cancel(&self) {
         self.cancelled.store(true, Ordering::Relaxed);
     }
@@ -101,7 +105,7 @@ impl Progress {
     }
 }
 
-/// What became of a capture: the file or folder, nothing where it was cancelled.
+/// Result of a capture: the file or folder; none where it was cancelled.
 pub(super) type Outcome = Result<Option<PathBuf>, CaptureError>;
 
 struct Job {
@@ -109,7 +113,7 @@ struct Job {
     thread: JoinHandle<()>,
 }
 
-/// All captures. Those under way are finished before this is gone.
+/// All captures. Dropping it finishes those under way.
 pub(super) struct Captures {
     jobs: Vec<Job>,
     done: (Sender<Outcome>, Receiver<Outcome>),
@@ -117,7 +121,7 @@ pub(super) struct Captures {
 }
 
 impl Captures {
-    /// None yet. `wake` is called, from their threads, when one has come to its end.
+    /// No captures yet. Each capture's thread calls `wake` when it ends.
     pub(super) fn new(wake: impl Fn() + Send + Sync + 'static) -> Self {
         Self { jobs: Vec::new(), done: channel(), wake: Arc::new(wake) }
     }
@@ -192,33 +196,34 @@ impl Captures {
             cancelled: AtomicBool::new(false),
         });
         let (of_thread, sender, wake) = (progress.clone(), self.done.0.clone(), self.wake.clone());
-        let thread = std::thread::Builder::new()
-            .name("capture".into())
-            .spawn(move || {
-                // The receiver lives until this thread was waited for.
-                let _ = sender.send(work(&of_thread));
-                wake();
-            })
-            .expect("a thread can be started");
-        self.jobs.push(Job { progress, thread });
+        let thread = std::thread::Builder::new().name(CAPTURE.into()).spawn(move || {
+            // The receiver lives until this thread was waited for.
+            let _ = sender.send(work(&of_thread));
+            wake();
+        });
+        match thread {
+            Ok(thread) => self.jobs.push(Job { progress, thread }),
+            // The receiver is this one's own.
+            Err(error) => drop(self.done.0.send(Err(CaptureError::Thread(error)))),
+        }
     }
 
-    /// Those that are under way.
+    /// Progress of the captures under way.
     pub(super) fn running(&self) -> impl Iterator<Item = &Arc<Progress>> {
         let running = self.jobs.iter().filter(|job| !job.thread.is_finished());
         running.map(|job| &job.progress)
     }
 
-    /// What has come to its end since the last call.
+    /// Results of the captures that ended since the last call.
     pub(super) fn finished(&mut self) -> Vec<Outcome> {
         self.jobs.retain(|job| !job.thread.is_finished());
         self.done.1.try_iter().collect()
     }
 
-    /// Waits until none is under way.
+    /// Waits until no capture is under way.
     pub(super) fn wait(&mut self) {
         for job in self.jobs.drain(..) {
-            // A panic of the thread has been printed by itself.
+            // A panic of the thread is told by `deaths`.
             let _ = job.thread.join();
         }
     }
@@ -239,7 +244,7 @@ mod tests {
 
     use super::{Captures, Progress};
 
-    /// Works until it is cancelled.
+    /// A capture that goes on until it is cancelled.
     fn endless(progress: &Progress) -> super::Outcome {
         while !progress.is_cancelled() {
             progress.done.fetch_add(1, Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! The cine bar: freeze, and what was imaged last.
+//! The cine bar: freeze, and the loop of the last images.
 
 use std::time::Instant;
 
@@ -14,12 +14,12 @@ use super::tools::Tools;
 
 /// Height of the bar, points.
 pub(super) const HEIGHT: f32 = 36.0;
-/// Room that speed and marks want beside the track, points.
+/// Room for speed and marks beside the track, points.
 const WIDE: f32 = 440.0;
-/// How fast a loop can be played.
+/// Speeds at which a loop can be played.
 const SPEEDS: [f64; 4] = [0.25, 0.5, 1.0, 2.0];
 
-/// Draws the bar into what is left of a row.
+/// Draws the bar into the rest of a row.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, tools: &mut Tools, now: Instant) {
     let cine = &mut tools.cine;
     let word = if model.frozen { "Live" } else { "Freeze" };
@@ -74,7 +74,7 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
         let back = cine.time_between(cursor, last).as_secs_f64();
         // Zero has no sign.
         let text = format!("{} / {}   {:.2} s", cursor + 1, cine.len(), 0.0 - back);
-        // As wide as it gets, so that the track stands still.
+        // A fixed width, the greatest, so that the track stands still.
         ui.add_sized(vec2(118.0, 18.0), egui::Label::new(text))
             .on_hover_text("Image of the loop; time before the newest");
         track(ui, cine);
@@ -115,7 +115,7 @@ fn choose(ui: &mut Ui, format: &mut Format) {
         .on_hover_text("How a clip is saved (F3): an animated GIF, or a folder of PNG files");
 }
 
-/// One place per image; drag to look through them.
+/// The track: one place per image; a drag looks through them.
 fn track(ui: &mut Ui, cine: &mut Cine<Frame>) {
     let size = vec2(ui.available_width().max(40.0), HEIGHT - 12.0);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());

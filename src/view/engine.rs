@@ -1,5 +1,6 @@
 //! The simulation on its own thread: it takes the newest order and hands over finished pictures.
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
@@ -7,6 +8,7 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
+use super::deaths::SIMULATION;
 use super::link::Link;
 use super::look::{Look, Pictured};
 use super::model::{Order, Settings};
@@ -21,7 +23,7 @@ use worker::Worker;
 
 mod worker;
 
-/// Where the image lies in the probe's space.
+/// Place of the image in the probe's space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sector {
     /// Lateral place of the image's left edge, mm.
@@ -63,9 +65,9 @@ impl Pixels {
 pub struct Frame {
     /// The B-mode image; nobody writes it while there are clones.
     pub image: Image,
-    /// The same with its acquired pixels coloured, where that was asked for and there are some.
+    /// The same image with its acquired pixels coloured; only where asked for and where there are some.
     pub tinted: Option<Image>,
-    /// Where it lies.
+    /// Place of the image in the probe's space.
     pub sector: Sector,
     /// The probe that it was made with.
     pub probe: Probe,
@@ -73,82 +75,87 @@ pub struct Frame {
     pub settings: Arc<Settings>,
     /// World from probe.
     pub pose: DAffine3,
-    /// How the probe touches the skin; none where the scene asks for no contact.
+    /// Contact of the probe with the skin; none where the scene asks for no contact.
     pub contact: Option<Touch>,
     /// Time of the scene, s.
     pub seconds: f64,
-    /// How finely it was made.
+    /// Quality of the picture.
     pub grade: Grade,
-    /// [`Order::revision`] of what it shows.
+    /// [`Order::revision`] of the order that it shows.
     pub revision: u64,
-    /// When what it shows was decided: the input that moved the probe, or, while time passes, the
-    /// moment at which the clock was read.
+    /// Moment at which its content was decided: the input that moved the probe or, while time passes,
+    /// the reading of the clock.
     pub at: Instant,
     /// Time on the device by stage.
     pub timings: FrameTimings,
-    /// When it was finished.
+    /// Moment at which it was finished.
     pub finished: Instant,
     /// From reading the order to the finished picture, ms.
     pub wall_ms: f64,
-    /// What the processor took to bring acceleration structures up to date, ms.
+    /// Time of the processor to bring acceleration structures up to date, ms.
     pub update_ms: f64,
     /// Memory of the device.
     pub memory: MemoryUse,
-    /// Of that, what the scene takes.
+    /// The scene's share of it.
     pub scene_memory: Memory,
-    /// Of that, images, those of the loop included, bytes.
+    /// The images' share of it, those of the loop included, bytes.
     pub image_bytes: u64,
 }
 
-/// While something moves, pictures of the 3D view are made only after so many times what the last one took:
-/// a seventh of the time is theirs.
-const SURVEY_PUT_OFF: u32 = 6;
+/// While something moves, the 3D view waits this many times the duration of its last picture before
+/// the next one: it gets a seventh of the time.
+const VIEW3D_PUT_OFF: u32 = 6;
 
-/// Longest wait of the next image for the window to draw the last one, where they share a queue: neither then slows
-/// the other, and what has happened meanwhile is in the image. A window that takes longer is not waited for until
-/// it draws again.
+/// Longest wait of the next image for the window to draw the last one, where they share a queue: neither then
+/// slows the other, and the image contains the newest input. A window that takes longer is not waited for until it
+/// draws again.
 const WINDOW_PATIENCE: Duration = Duration::from_millis(40);
 
-/// What the simulation has to say.
+/// News from the simulation for the window.
 pub enum News {
-    /// A picture; its pixels, where [`Order::reads_back`]. They are not the frame's, of which the loop
-    /// holds hundreds.
+    /// A picture, and its pixels where [`Order::reads_back`]. The pixels are kept out of the frame, of
+    /// which the loop holds hundreds.
     Frame(Box<Frame>, Option<Pixels>),
     /// A picture of the anatomy.
-    Survey(Box<Pictured>),
-    /// What is done before there is a picture.
+    View3d(Box<Pictured>),
+    /// The work under way before the first picture.
     Preparing(&'static str),
     /// An order could not be carried out; the next one may.
     Refused(String),
-    /// The scene that was to be opened is there: pictures from now on are of it.
+    /// The scene that was to be opened is loaded: pictures from now on show it.
     Opened,
-    /// It cannot be; the one before goes on.
+    /// The scene cannot be opened; the one before goes on.
     NotOpened(String),
-    /// Nothing more will come.
+    /// The simulation has ended.
     Failed(SimError),
+    /// Nothing more will come: the thread died by a bug.
+    Died,
 }
 
+/// Tells the window that there is news.
+type Wake = Arc<dyn Fn() + Send + Sync>;
+
 struct State {
-    /// The newest order that was not taken yet.
+    /// The newest order, not yet taken.
     order: Option<Order>,
-    /// A scene to go on with, and what to show of it.
+    /// A scene to open, and the first order for it.
     opening: Option<(Box<Scene>, Order)>,
     frozen: bool,
-    /// How the anatomy is looked at, if it is.
+    /// The wanted view of the anatomy, if it is shown.
     look: Option<Look>,
-    /// It is not pictured like this yet.
+    /// The anatomy has not been pictured from this view yet.
     looks_new: bool,
     stop: bool,
     /// The last picture is to be sent once more.
     resend: bool,
-    /// When an order was given last, or the eye of the 3D view moved.
+    /// Moment of the last order, or of the last movement of the 3D view's camera.
     touched: Instant,
-    /// Since when the window has an image that it has not drawn, where drawing it is to come first.
+    /// Moment since which the window has an undrawn image, where drawing it comes first.
     undrawn: Option<Instant>,
     news: Vec<News>,
 }
 
-/// What there is to do next.
+/// The next job of the thread.
 enum Job {
     /// An image.
     Image(Order),
@@ -156,7 +163,7 @@ enum Job {
     /// The last image once more, at a finer level.
     Refined(usize),
     /// Only the anatomy, while something moves or at rest.
-    Survey {
+    View3d {
         moving: bool,
     },
 }
@@ -164,17 +171,17 @@ enum Job {
 struct Shared {
     state: Mutex<State>,
     changed: Condvar,
-    /// There is something newer to do than what was made at rest and is under way.
+    /// Something newer is to be done than the job at rest that is under way.
     newer: AtomicBool,
 }
 
 impl Shared {
-    /// The lists stay whole after a panic of the other thread, so poisoning is ignored.
+    /// Locks the state. The lists stay whole after a panic of the other thread, so poisoning is ignored.
     fn lock(&self) -> MutexGuard<'_, State> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// There is something to do that does not wait for what is made at rest.
+    /// Wakes the thread for something that does not wait for a job at rest.
     fn interrupt(&self, mut state: MutexGuard<'_, State>) {
         state.touched = Instant::now();
         drop(state);
@@ -183,7 +190,7 @@ impl Shared {
     }
 }
 
-/// The simulation's thread; it ends when this is dropped, after the frame under way.
+/// The simulation's thread. When this is dropped, it ends after the frame under way.
 pub struct Engine {
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
@@ -192,14 +199,17 @@ pub struct Engine {
 impl Engine {
     /// Uploads `scene` and carries out `order`. Clients of `link` receive every picture. `wake` is
     /// called, from the thread, for each news.
+    ///
+    /// # Errors
+    /// The system has no room for another thread.
     pub(super) fn start(
         device: &Arc<Device>,
         library: Arc<Library>,
         scene: Scene,
         order: Order,
         link: Link,
-        wake: impl Fn() + Send + 'static,
-    ) -> Self {
+        wake: impl Fn() + Send + Sync + 'static,
+    ) -> std::io::Result<Self> {
         let shared = Arc::new(Shared {
             state: Mutex::new(State {
                 order: Some(order),
@@ -216,16 +226,20 @@ impl Engine {
             changed: Condvar::new(),
             newer: AtomicBool::new(false),
         });
-        let wake = Box::new(wake);
+        let wake: Wake = Arc::new(wake);
+        let (mourner, bell) = (shared.clone(), wake.clone());
         let worker = Worker::new(device, library, scene, link, shared.clone(), wake);
-        let thread = std::thread::Builder::new()
-            .name("simulation".into())
-            .spawn(move || worker.run())
-            .expect("a thread can be started");
-        Self { shared, thread: Some(thread) }
+        let thread = std::thread::Builder::new().name(SIMULATION.into()).spawn(move || {
+            // The worker is gone with its panic; what is shared stays whole (`Shared::lock`).
+            if catch_unwind(AssertUnwindSafe(|| worker.run())).is_err() {
+                mourner.lock().news.push(News::Died);
+                bell();
+            }
+        })?;
+        Ok(Self { shared, thread: Some(thread) })
     }
 
-    /// Replaces the order that was not taken yet. While `frozen` nothing is carried out.
+    /// Replaces the order that was not taken yet. While `frozen`, no order is carried out.
     pub fn order(&self, order: Order, frozen: bool) {
         let mut state = self.shared.lock();
         state.order = Some(order);
@@ -246,7 +260,7 @@ impl Engine {
         self.shared.changed.notify_all();
     }
 
-    /// How the anatomy is to be pictured from now on, frozen or not; with nothing it is not.
+    /// Sets the view from which the anatomy is pictured from now on, frozen or not; with none it is not pictured.
     pub fn look(&self, look: Option<Look>) {
         let mut state = self.shared.lock();
         let camera = |look: &Option<Look>| look.as_ref().map(|look| look.camera);
@@ -259,13 +273,13 @@ impl Engine {
         }
     }
 
-    /// The window has drawn what it had.
+    /// Tells the simulation that the window has drawn its last image.
     pub(super) fn drawn(&self) {
         self.shared.lock().undrawn = None;
         self.shared.changed.notify_all();
     }
 
-    /// What has come since the last call, oldest first.
+    /// News since the last call, oldest first.
     pub fn news(&self) -> Vec<News> {
         std::mem::take(&mut self.shared.lock().news)
     }
@@ -277,7 +291,7 @@ impl Drop for Engine {
         state.stop = true;
         self.shared.interrupt(state);
         if let Some(thread) = self.thread.take() {
-            // A panic of the thread has been printed by itself.
+            // It tells its panic as news.
             let _ = thread.join();
         }
     }

@@ -9,18 +9,18 @@ use super::model::Model;
 use super::style;
 use crate::scene::SceneError;
 
-/// Scene files that are listed of a folder.
+/// Most scene files listed of a folder.
 const LISTED: usize = 60;
 
-/// Width of what is asked, points: the smallest window has room for it.
+/// Width of the dialog, points: the smallest window has room for it.
 const WIDTH: f32 = 420.0;
 
-/// What the window knows of scene files.
+/// The window's state of scene files.
 #[derive(Default)]
 pub(super) struct Files {
-    /// Saving writes the probe's pose, too.
+    /// Saving also writes the probe's pose.
     pub(super) with_pose: bool,
-    /// A scene that is to be opened.
+    /// The scene file to be opened.
     pub(super) wanted: Option<PathBuf>,
     /// A scene is being opened.
     pub(super) opening: bool,
@@ -40,7 +40,7 @@ struct Dialog {
     folder: PathBuf,
     /// Names of the scene files in `folder`.
     listed: Vec<String>,
-    /// The field has not had the keyboard yet.
+    /// The field has not yet been given the keyboard.
     fresh: bool,
 }
 
@@ -60,7 +60,7 @@ impl Dialog {
             true => Path::new("."),
             false => folder,
         };
-        // Half a name is no folder: then there is nothing to list.
+        // Half a name is no folder: nothing is listed.
         let entries = std::fs::read_dir(here).into_iter().flatten().flatten();
         let names = entries.map(|e| e.file_name().to_string_lossy().into_owned());
         self.listed = names.filter(|name| name.ends_with(".toml")).collect();
@@ -70,7 +70,7 @@ impl Dialog {
 }
 
 impl Files {
-    /// Asks for a file.
+    /// Asks the user for a file.
     pub(super) fn ask(&mut self, purpose: Purpose, model: &Model) {
         self.dialog = Some(Dialog {
             purpose,
@@ -92,7 +92,7 @@ impl Files {
         }
     }
 
-    /// Shows why a file cannot be used; gives it back where nothing is asked any more.
+    /// Shows the error of a file in the dialog; returns it where no dialog is open.
     pub(super) fn refuse(&mut self, error: String) -> Result<(), String> {
         match &mut self.dialog {
             Some(dialog) => {
@@ -103,19 +103,19 @@ impl Files {
         }
     }
 
-    /// Nothing is asked any more.
+    /// Closes the dialog.
     pub(super) fn close(&mut self) {
         self.dialog = None;
     }
 }
 
-/// Place, cause and remedy.
+/// The text of an error: place, cause and remedy.
 pub(super) fn said(error: &SceneError) -> String {
     let remedy = error.remedy.as_deref().map(|r| format!("\n{r}"));
     format!("{error}{}", remedy.unwrap_or_default())
 }
 
-/// Buttons and the name of the file, for the console.
+/// Draws buttons and the name of the file, for the console.
 pub(super) fn row(ui: &mut Ui, model: &mut Model, files: &mut Files) {
     ui.horizontal(|ui| {
         let tip = format!(
@@ -144,7 +144,7 @@ pub(super) fn row(ui: &mut Ui, model: &mut Model, files: &mut Files) {
     ui.add(egui::Label::new(RichText::new(text).size(11.0).color(style::FAINT)).truncate());
 }
 
-/// Asks for a file where that is wanted.
+/// Draws the dialog, if a file is asked for.
 pub(super) fn dialog(ctx: &egui::Context, model: &mut Model, files: &mut Files, now: Instant) {
     let Some(mut dialog) = files.dialog.take() else {
         return;
@@ -171,7 +171,7 @@ pub(super) fn dialog(ctx: &egui::Context, model: &mut Model, files: &mut Files, 
     }
 }
 
-/// Whether it has done what it was for.
+/// Draws the dialog's contents; returns whether it has done its work.
 fn contents(
     ui: &mut Ui,
     model: &mut Model,

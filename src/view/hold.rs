@@ -1,4 +1,4 @@
-//! The pointer on the 3D view where it moves the probe: it slides on the skin, leans and turns.
+//! The pointer on the 3D view where it moves the probe: slides it on the skin, leans and turns it.
 
 use std::time::Instant;
 
@@ -9,39 +9,39 @@ use super::model::hold::Seen;
 use super::model::skin::Spot;
 use super::model::{Axis, Camera, Model, Source};
 use super::style;
-use super::survey::Place;
+use super::view3d::Place;
 use crate::probe::Probe;
-use crate::sim::survey::{HANDLE, HEAD};
+use crate::sim::view3d::{HANDLE, HEAD};
 
-/// What is this near to the probe, points, means the probe.
+/// Distance within which the pointer means the probe, points.
 const NEAR: f32 = 16.0;
-/// A wheel's notch, points, turns the probe by so much, rad.
+/// Turn of the probe by one notch of the wheel, rad; a notch is so many points.
 const TURN: f64 = 2.0 * std::f64::consts::PI / 180.0;
 const NOTCH: f64 = 50.0;
-/// Most that the probe leans at one event, rad.
+/// Greatest lean of the probe at one event, rad.
 const LEAN: f64 = 0.2;
-/// Points that the handle's end has to move for a radian: what moves it less is looked along.
+/// Points per radian below which the handle counts as looked along.
 const SEEN: f64 = 30.0;
 
-/// What the pointer does with the probe.
+/// The pointer's action on the probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Drag {
-    /// Slides it to the skin under the pointer, which is so far from the place that it is held to.
+    /// Slides it over the skin; the vector leads from the pointer to the place that it is held to, points.
     Over(Vec2),
-    /// Slides it in its image plane, likewise.
+    /// Slides it within its image plane, with the same vector.
     InPlane(Vec2),
     /// Leans it.
     Lean,
 }
 
-/// What is under way; not saved.
+/// The drag under way; not saved.
 #[derive(Default)]
 pub(super) struct State {
     drag: Option<Drag>,
 }
 
-/// Moves the probe as the pointer says, and shows where it would go. Whether pointer and wheel have been
-/// used for it; else they are the eye's.
+/// Moves the probe with the pointer, and shows where it would go. Returns whether pointer and wheel were used
+/// for the probe; otherwise they move the camera.
 pub(super) fn show(
     ui: &Ui,
     response: &Response,
@@ -75,13 +75,13 @@ pub(super) fn show(
     {
         carry_out(drag, at, delta, place, model, now);
     } else if begins && let (Drag::Over(off), Some(at)) = (drag, response.interact_pointer_pos()) {
-        // Pressed on the skin beside it, the probe comes.
+        // Pressed on the skin beside the probe: the probe comes.
         carry_out(Drag::Over(off), at, delta, place, model, now);
     }
     true
 }
 
-/// The button that keeps the probe on the skin, where there is one.
+/// The button that keeps the probe on the skin, where there is a skin.
 pub(super) fn button(ui: &mut Ui, model: &mut Model) {
     let Some(stays) = model.hold.as_ref().map(|hold| hold.stays) else {
         return;
@@ -94,10 +94,10 @@ pub(super) fn button(ui: &mut Ui, model: &mut Model) {
     }
 }
 
-/// Whether the wheel with Ctrl or Alt has turned the probe about its depth axis.
+/// Turns the probe about its depth axis by the wheel with Ctrl or Alt; returns whether it did.
 fn turn(ui: &Ui, model: &mut Model, now: Instant) -> bool {
     let (modifiers, points) = ui.input(|input| {
-        // With Ctrl the wheel arrives as a zoom, by a factor of e for 200 points.
+        // With Ctrl the wheel arrives as a zoom, a factor of e for 200 points.
         let points = match input.modifiers.command {
             true => f64::from(input.zoom_delta()).ln() * 200.0,
             false => f64::from(input.smooth_scroll_delta.y + input.smooth_scroll_delta.x),
@@ -113,9 +113,9 @@ fn turn(ui: &Ui, model: &mut Model, now: Instant) -> bool {
     true
 }
 
-/// What a drag that begins at `at` does: nothing where there is neither probe nor skin.
+/// The action of a drag that begins at `at`; none where there is neither probe nor skin.
 fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Drag> {
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     let on_probe = is_probe(at, place, &camera, &model.pose, &model.settings.probe);
     let spot = spot_at(at, place, model, now);
     if !on_probe && spot.is_none() {
@@ -129,27 +129,27 @@ fn drag_at(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) ->
     }
     let held = model.spot_held(now)?;
     let off = place.project(&camera, held.point)? - at;
-    Some(match model.survey.cut {
+    Some(match model.view3d.cut {
         true => Drag::InPlane(off),
         false => Drag::Over(off),
     })
 }
 
-/// The skin that is seen at a place of the screen.
+/// The skin seen at a screen position.
 fn spot_at(at: Pos2, place: &Place, model: &mut Model, now: Instant) -> Option<Spot> {
-    let seen = match model.survey.cut {
+    let seen = match model.view3d.cut {
         true => Seen::BehindPlane,
         false => Seen::Whole,
     };
-    let ray = place.ray(&model.survey.camera, at);
+    let ray = place.ray(&model.view3d.camera, at);
     model.spot_seen(&ray, seen, now)
 }
 
 fn carry_out(drag: Drag, at: Pos2, delta: Vec2, place: &Place, model: &mut Model, now: Instant) {
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     match drag {
         Drag::Over(off) => {
-            // Over what cannot be seen of the skin, and beside it, the probe stays.
+            // Over hidden skin and beside the skin the probe stays.
             if let Some(spot) = spot_at(at + off, place, model, now) {
                 model.slide_to(&spot, now);
             }
@@ -163,8 +163,8 @@ fn carry_out(drag: Drag, at: Pos2, delta: Vec2, place: &Place, model: &mut Model
     }
 }
 
-/// Rock and tilt with which the end of the handle follows the pointer by `delta` points; least squares,
-/// damped where the handle is looked along.
+/// Rock and tilt with which the end of the handle follows the pointer by `delta` points; least squares, damped
+/// where the handle is looked along.
 fn lean(delta: Vec2, place: &Place, camera: &Camera, pose: &DAffine3) -> Option<[f64; 2]> {
     let end = |pose: &DAffine3| {
         let end = place.project(camera, pose.transform_point3(DVec3::NEG_Z * HANDLE))?;
@@ -186,7 +186,7 @@ fn lean(delta: Vec2, place: &Place, camera: &Camera, pose: &DAffine3) -> Option<
     Some(angles.map(|angle| angle.clamp(-LEAN, LEAN)))
 }
 
-/// Whether the pointer is on the probe: on its head, which is as wide as the face, or near to its handle.
+/// Returns whether the pointer is on the probe: on its head, which is as wide as the face, or near its handle.
 fn is_probe(at: Pos2, place: &Place, camera: &Camera, pose: &DAffine3, probe: &Probe) -> bool {
     let seen = |point: DVec3| place.project(camera, pose.transform_point3(point));
     let row = |lift: f64| {
@@ -211,7 +211,7 @@ fn is_near(line: &[Pos2], at: Pos2) -> bool {
     })
 }
 
-/// A ray to the right crosses the polygon an odd number of times.
+/// Returns whether a polygon encloses a point: a ray to the right crosses it an odd number of times.
 fn encloses(polygon: &[Pos2], at: Pos2) -> bool {
     let sides = polygon.iter().zip(polygon.iter().cycle().skip(1));
     let crossed = sides.filter(|(a, b)| {
@@ -221,9 +221,9 @@ fn encloses(polygon: &[Pos2], at: Pos2) -> bool {
     crossed.count() % 2 == 1
 }
 
-/// Where the probe would be if one pressed here.
+/// Shows where the probe would go on a press at `at`.
 fn hover(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) {
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     if is_probe(at, place, &camera, &model.pose, &model.settings.probe) {
         ui.ctx().set_cursor_icon(CursorIcon::Grab);
         return;
@@ -237,7 +237,7 @@ fn hover(ui: &Ui, at: Pos2, place: &Place, model: &mut Model, now: Instant) {
     ghost(&painter, place, &camera, &pose, &model.settings.probe);
 }
 
-/// Outline of the face and the way into the body.
+/// Draws the outline of the face and the direction into the body.
 fn ghost(painter: &Painter, place: &Place, camera: &Camera, pose: &DAffine3, probe: &Probe) {
     let seen = |point: DVec3| place.project(camera, pose.transform_point3(point));
     let [r, g, b, _] = style::ACCENT.to_array();
@@ -270,7 +270,7 @@ mod tests {
         Place { rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)) }
     }
 
-    // The eye stands before the image plane: rock moves the handle sideways, tilt towards the eye.
+    // The camera stands before the image plane: rock moves the handle sideways, tilt towards the camera.
     #[test]
     fn the_handle_follows_the_pointer() {
         let pose = DAffine3::from_mat3_translation(DMat3::IDENTITY, DVec3::new(3.0, 4.0, 5.0));
@@ -286,7 +286,7 @@ mod tests {
             let leaned = super::super::model::moved(&pose, Axis::Rock, rock);
             let leaned = super::super::model::moved(&leaned, Axis::Tilt, tilt);
             let went = end(&leaned) - end(&pose);
-            // The damping takes some of it.
+            // The damping takes a part of it.
             assert!((went - wanted).length() < 0.4 * wanted.length(), "{went:?} {wanted:?}");
         }
     }

@@ -13,30 +13,30 @@ use crate::igtl::{PORT, Tracked};
 use crate::scene::Tracker;
 use crate::scene::file::load_trajectory;
 
-/// Devices with what is known of them.
+/// The devices and their state.
 pub(super) struct Inputs {
     link: Link,
     bell: Bell,
-    /// How the scene calibrates the tracker.
+    /// The scene's calibration of the tracker.
     tracker: Tracker,
-    /// What to listen at once the user switches it on.
+    /// Address at which to listen once the user switches it on.
     pub(super) listen: Listen,
-    /// What the server said last; nothing while there is none.
+    /// The server's last report; none without a server.
     pub(super) report: Option<Report>,
-    /// Why there is none although the user wanted it.
+    /// The reason why there is no server although the user wanted one.
     pub(super) refused: Option<String>,
     pads: Pads,
-    /// What the game pads said last.
+    /// The last state of the game pads.
     pub(super) word: Word,
     /// The trajectory file that is written and read.
     pub(super) path: String,
-    /// What is wrong with it.
+    /// The last error of that file.
     pub(super) problem: Option<String>,
-    /// When to look again although nothing comes.
+    /// Time of the next look even if nothing arrives.
     pub(super) due: Option<Instant>,
-    /// Clients that the simulation has been told of.
+    /// Number of clients that the simulation has been told of.
     greeted: u64,
-    /// Pose of the tracker that has been taken over.
+    /// Number of the tracker's last pose taken over.
     followed: u64,
 }
 
@@ -73,7 +73,7 @@ impl Inputs {
         Ok(inputs)
     }
 
-    /// Where clients are listened for.
+    /// Address at which clients are awaited.
     pub(super) fn address(&self) -> Option<SocketAddr> {
         self.report.as_ref().map(|report| report.address)
     }
@@ -94,7 +94,7 @@ impl Inputs {
         Ok(())
     }
 
-    /// Listens for clients, or ends their connections, as the user wants it in the window.
+    /// Starts or ends the server, as the user wants it in the window.
     pub(super) fn switch(&mut self, on: bool) {
         self.refused = None;
         if on {
@@ -105,7 +105,7 @@ impl Inputs {
         }
     }
 
-    /// Writes what was recorded.
+    /// Writes the recorded trajectory into its file.
     pub(super) fn save(&mut self, ways: &mut Ways) {
         let Some(kept) = &mut ways.kept else { return };
         let Some(recording) = &kept.unsaved else {
@@ -125,7 +125,7 @@ impl Inputs {
         };
     }
 
-    /// Reads a trajectory.
+    /// Reads a trajectory from its file.
     pub(super) fn load(&mut self, ways: &mut Ways) {
         let path = Path::new(&self.path);
         self.problem = match load_trajectory(path) {
@@ -137,10 +137,10 @@ impl Inputs {
         };
     }
 
-    /// Looks what has come: the tracker moves the probe. Whether a client has come that waits for a
-    /// picture.
+    /// Takes over what has arrived: the tracker moves the probe. Returns whether a client has come that waits
+    /// for a picture.
     pub(super) fn look(&mut self, model: &mut Model) -> bool {
-        // First, so that what comes from now on is looked at again.
+        // First, so that later arrivals are looked at again.
         self.bell.answer();
         self.word = self.pads.take();
         self.report = self.link.report();
@@ -157,8 +157,8 @@ impl Inputs {
         std::mem::replace(&mut self.greeted, accepted) < accepted
     }
 
-    /// When there is something else to show although nothing comes: the tracker is lost, or the time
-    /// since then reads differently.
+    /// Time at which the shown state changes even if nothing arrives: the tracker is lost, or the age of
+    /// its last pose reads differently.
     fn next(&self) -> Option<Instant> {
         match &self.report.as_ref()?.tracked {
             Tracked::Never => None,

@@ -1,4 +1,4 @@
-//! What the keyboard does.
+//! The keyboard: keys and their actions.
 
 use std::time::Instant;
 
@@ -13,7 +13,7 @@ use super::pads::{self, Word};
 use super::state::State;
 use crate::settings::{Group, Imaging, Probe};
 
-/// What a key does.
+/// The action of a key.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Action {
     Move(Axis, f64),
@@ -35,7 +35,7 @@ enum Action {
     Save,
     Load,
     Console,
-    Survey,
+    View3d,
     Planes,
     Hold,
     Timing,
@@ -46,10 +46,10 @@ enum Action {
     Quit,
 }
 
-/// A key, whether it is held with Ctrl, and what it does.
+/// A key, whether it is held with Ctrl, and its action.
 type Binding = (Key, bool, Action);
 
-/// Every key with its line in the list of keys; lines without a text belong to the one before.
+/// Every key with its row in the list of keys; rows without a text belong to the one before.
 const BINDINGS: &[(&str, &[Binding], &str)] = &[
     (
         "Left Right",
@@ -165,7 +165,7 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "C V G T M B",
         &[
             (Key::C, false, Action::Console),
-            (Key::V, false, Action::Survey),
+            (Key::V, false, Action::View3d),
             (Key::G, false, Action::Planes),
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
@@ -182,17 +182,17 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         ],
         "this list; close it",
     ),
-    // The interface does these itself.
+    // The interface handles these itself.
     ("Ctrl+Plus Ctrl+Minus Ctrl+0", &[], "texts and controls larger, smaller, as usual"),
     ("Ctrl+Q", &[(Key::Q, true, Action::Quit)], "quit"),
 ];
 
-/// Keys and what they do, for the list on the screen.
+/// Keys and their actions, for the list on the screen.
 pub(super) fn list() -> impl Iterator<Item = (&'static str, &'static str)> {
     BINDINGS.iter().map(|(keys, _, text)| (*keys, *text))
 }
 
-/// Carries out the keys that were pressed, unless a field is being typed into.
+/// Carries out the pressed keys, unless a field is being typed into.
 pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, now: Instant) {
     if ctx.egui_wants_keyboard_input() {
         return;
@@ -211,7 +211,7 @@ pub(super) fn apply(ctx: &egui::Context, model: &mut Model, state: &mut State, n
     }
 }
 
-/// The tool that a key takes. Whoever follows the pointer takes it: a click before the key belongs to the
+/// The tool that a key takes. The code that follows the pointer calls it: a click before the key belongs to the
 /// tool before, though both may arrive at once.
 pub(super) fn tool(key: Key, modifiers: Modifiers) -> Option<Tool> {
     match action(key, modifiers) {
@@ -226,7 +226,7 @@ fn action(key: Key, modifiers: Modifiers) -> Option<Action> {
     found.next().map(|b| b.2)
 }
 
-/// What a game pad has to say: the probe goes on, and buttons do what keys do.
+/// Carries out the state of the game pads: the probe moves on, and buttons act as keys do.
 pub(super) fn apply_pads(word: &Word, model: &mut Model, state: &mut State, now: Instant) {
     for (axis, amount) in pads::steps(word.travel) {
         model.move_by(Source::Pad, axis, amount, now);
@@ -278,7 +278,7 @@ fn carry_out(
             cine.play(!cine.is_playing(), now);
         }
         Action::Frame(_) | Action::Loop => {}
-        // In turn with the pointer: see `tool`.
+        // Taken in order with the pointer's events: see `tool`.
         Action::Take(_) => {}
         Action::Delete => drop(state.tools.sheet.delete()),
         Action::Still => state.tools.want_still(),
@@ -297,7 +297,7 @@ fn carry_out(
         Action::Save => state.files.save(model),
         Action::Load => state.files.ask(Purpose::Load, model),
         Action::Console => state.console = !state.console,
-        Action::Survey => state.survey.open = !state.survey.open,
+        Action::View3d => state.view3d.open = !state.view3d.open,
         Action::Planes => state.planes.open = !state.planes.open,
         Action::Hold => {
             let stays = model.hold.as_ref().is_some_and(|hold| hold.stays);

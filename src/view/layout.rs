@@ -1,4 +1,4 @@
-//! What is where in the window.
+//! The layout of the window.
 
 use std::time::Instant;
 
@@ -13,27 +13,27 @@ use super::model::mmode::Strip;
 use super::state::State;
 use super::statistics::Times;
 use super::{
-    calipers, cine, files, keys, mmode, notice, planes, saved, strip, style, survey, timing,
+    calipers, cine, deaths, files, keys, mmode, notice, planes, saved, strip, style, timing, view3d,
 };
 
-/// Room that the toggles and the loop want beside each other, points.
+/// Width of the toggles and the loop beside each other, points.
 const BAR: f32 = 760.0;
-/// And one toggle more, where there is a volume.
+/// Width of one toggle more, where there is a volume.
 const PLANES: f32 = 62.0;
 
 /// Least height that is left to the image beside a panel of timings, points.
 const LEAST_IMAGE: f32 = 200.0;
 
-/// Where pictures belong.
+/// Places of the pictures.
 #[derive(Default)]
 pub(super) struct Places {
     /// The B-mode image.
     pub(super) image: Option<Place>,
     /// The 3D view.
-    pub(super) survey: Option<survey::Place>,
+    pub(super) view3d: Option<view3d::Place>,
 }
 
-/// Draws the interface; returns where the pictures belong.
+/// Draws the interface; returns the places of the pictures.
 pub(super) fn show(
     ui: &mut Ui,
     model: &mut Model,
@@ -49,7 +49,7 @@ pub(super) fn show(
             .exact_size(console::WIDTH)
             .show(ui, |ui| console::show(ui, model, state, now));
     }
-    // Below each other where there is no room beside each other.
+    // One below the other where there is no room beside each other.
     let more = if model.registration.is_some() { PLANES } else { 0.0 };
     let rows = if ui.available_width() < BAR + more { 2 } else { 1 };
     Panel::bottom("bar").resizable(false).exact_size(cine::HEIGHT * rows as f32).show(ui, |ui| {
@@ -86,17 +86,17 @@ pub(super) fn show(
     }
     // Transparent: the pictures are below the interface.
     let planes = state.planes.open && model.registration.is_some();
-    let beside = state.survey.open || planes;
-    let room = survey::width(ui.available_width()).filter(|_| beside && !alone);
+    let beside = state.view3d.open || planes;
+    let room = view3d::width(ui.available_width()).filter(|_| beside && !alone);
     if let Some(width) = room.filter(|_| planes) {
         let panel = Panel::right("planes").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
         panel.show(ui, |ui| planes::show(ui, model, &mut state.planes, now));
     }
-    let survey = room.filter(|_| !planes).map(|width| {
-        let panel = Panel::right("survey").resizable(false).exact_size(width);
+    let view3d = room.filter(|_| !planes).map(|width| {
+        let panel = Panel::right("view3d").resizable(false).exact_size(width);
         let panel = panel.frame(Space::NONE).show_separator_line(false);
-        let shown = panel.show(ui, |ui| survey::show(ui, model, &mut state.survey, pictured));
+        let shown = panel.show(ui, |ui| view3d::show(ui, model, &mut state.view3d, pictured));
         shown.inner
     });
     let centre = CentralPanel::default().frame(Space::NONE);
@@ -136,18 +136,19 @@ pub(super) fn show(
             state.problem = None;
         }
     }
+    deaths::show(ui.ctx(), model, state);
     files::dialog(ui.ctx(), model, &mut state.files, now);
     if state.help {
         help(ui.ctx(), &mut state.help);
     }
-    Places { image: place.inner, survey }
+    Places { image: place.inner, view3d }
 }
 
 /// Buttons that open the panels.
 fn toggles(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     for (open, name, tip) in [
         (&mut state.console, "Console", "Settings (C)"),
-        (&mut state.survey.open, "3D", "Anatomy, probe and fan from outside (V)"),
+        (&mut state.view3d.open, "3D", "Anatomy, probe and fan from outside (V)"),
         (&mut state.timing, "Timings", "Where the time goes (T)"),
         (&mut state.help, "Keys", "What the keyboard does (?)"),
     ] {

@@ -1,5 +1,5 @@
 //! OpenIGTLink beside the window: its server, which may be opened and closed at any time, and the
-//! pictures for whoever is connected.
+//! pictures for its clients.
 
 use std::net::{IpAddr, SocketAddr};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -14,8 +14,8 @@ use crate::igtl::{IgtlError, Picture, Server, Settings, Status, Tracked};
 use crate::scene::Tracker;
 use crate::sim::layout;
 
-/// Wakes the event loop once for all that has come since it looked last: whatever a device or a
-/// client sends, no more than one wake waits.
+/// Wakes the event loop once for everything that has come since it looked last: however much arrives,
+/// no more than one wake waits.
 #[derive(Clone)]
 pub(super) struct Bell {
     rung: Arc<AtomicBool>,
@@ -27,7 +27,7 @@ impl Bell {
         Self { rung: Arc::default(), proxy }
     }
 
-    /// Called by any thread after it has put something where the event loop looks.
+    /// Called by any thread after it has put something into a place that the event loop looks at.
     pub(super) fn ring(&self) {
         if !self.rung.swap(true, Ordering::AcqRel) {
             // An event loop that is gone needs no news.
@@ -41,29 +41,29 @@ impl Bell {
     }
 }
 
-/// What the server says.
+/// State of the server.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Report {
-    /// Where it listens.
+    /// Address at which it listens.
     pub(super) address: SocketAddr,
-    /// What has happened so far.
+    /// Numbers of clients and messages so far.
     pub(super) status: Status,
-    /// What is known of the tracker.
+    /// State of the tracker.
     pub(super) tracked: Tracked,
 }
 
-/// The server, if there is one; window and simulation share it. Nothing that is done under its lock
-/// waits for the network.
+/// The server, if there is one; window and simulation share it. Nothing done under its lock waits for
+/// the network.
 #[derive(Clone, Default)]
 pub(super) struct Link(Arc<Mutex<Option<Server>>>);
 
 impl Link {
-    /// A server stays whole whatever its users do, so poisoning is ignored.
+    /// Locks the server. It stays whole whatever its users do, so poisoning is ignored.
     fn lock(&self) -> MutexGuard<'_, Option<Server>> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Listens for clients in place of the server before; port 0 takes any that is free.
+    /// Starts a server in place of the one before; port 0 takes any that is free.
     pub(super) fn open(
         &self,
         (address, port): (IpAddr, u16),
@@ -90,7 +90,7 @@ impl Link {
         *self.lock() = None;
     }
 
-    /// What the server says; nothing without one.
+    /// State of the server; none without one.
     pub(super) fn report(&self) -> Option<Report> {
         self.lock().as_ref().map(|server| Report {
             address: server.address(),
@@ -100,7 +100,7 @@ impl Link {
     }
 }
 
-/// The simulation's side: its last picture, for clients.
+/// The last picture of the simulation, for clients.
 pub(super) struct Broadcast {
     link: Link,
     device: Arc<Device>,
@@ -112,8 +112,7 @@ impl Broadcast {
         Self { link, device: device.clone(), last: None }
     }
 
-    /// Offers a finished picture, with its pixels where they have been read, its constants and the pose
-    /// at which it was taken.
+    /// Offers a finished picture, with its pixels where they have been read, its constants and its pose.
     pub(super) fn offer(
         &mut self,
         image: &Image,
@@ -125,20 +124,20 @@ impl Broadcast {
         self.send(rgba)
     }
 
-    /// Offers the last picture again, as to a client that has just come.
+    /// Offers the last picture again, for a client that has just come.
     pub(super) fn again(&self) -> Result<(), GpuError> {
         self.send(None)
     }
 
-    /// The picture is copied to the host only where there is a client; who takes it when is the server's
-    /// business.
+    /// Sends the last picture. It is copied to the host only where there is a client; the server decides
+    /// which client takes it and when.
     fn send(&self, rgba: Option<&[u8]>) -> Result<(), GpuError> {
         let Some((image, constants, pose)) = &self.last else {
             return Ok(());
         };
         let clients = match &*self.link.lock() {
             Some(server) => {
-                // Until there is a client, or has been published what follows.
+                // Valid until there is a client, or until the next picture is published.
                 server.outdate();
                 server.status().clients
             }

@@ -1,18 +1,18 @@
-//! What the window and the simulation say to each other about the 3D view.
+//! Data exchanged by window and simulation for the 3D view.
 
 use glam::DAffine3;
 
 use super::model::Camera;
 use crate::gpu::Image;
 use crate::probe::Probe;
-use crate::sim::survey::Sight;
+use crate::sim::view3d::Sight;
 
-/// How the anatomy is to be pictured.
+/// The wanted view of the anatomy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
-    /// What the simulation makes of it.
+    /// The simulation's part of it.
     pub sight: Sight,
-    /// The camera that this came from.
+    /// The camera from which it was made.
     pub camera: Camera,
 }
 
@@ -21,7 +21,7 @@ pub struct Look {
 pub struct Pictured {
     /// The picture; nobody writes it while there are clones.
     pub image: Image,
-    /// How it was looked at.
+    /// The view that it shows.
     pub look: Look,
     /// The probe in it.
     pub probe: Probe,

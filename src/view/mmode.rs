@@ -1,4 +1,4 @@
-//! The M-mode strip below the image, and its line in it.
+//! The M-mode strip below the image, and its scanline in the image.
 
 use egui::{
     Align2, Color32, ColorImage, ComboBox, DragValue, FontId, PointerButton, Rect, Sense, Stroke,
@@ -17,19 +17,19 @@ pub(super) const HEIGHT: f32 = 208.0;
 /// Widest raster, pixels.
 const WIDEST: usize = 1024;
 
-/// Seconds that a strip may be wide.
+/// Choices for the width of the strip, s.
 const WINDOWS: [f64; 5] = [1.0, 2.0, 4.0, 8.0, 16.0];
 
-/// Columns below which a strip is too coarse to be read.
+/// Number of columns below which a strip is too coarse to be read.
 const FEW: usize = 40;
 
-/// What of the panel is chosen.
+/// The state of the panel.
 pub(super) struct Panel {
     /// Seconds across the strip.
     window: f64,
-    /// What is measured.
+    /// The measurement, if any.
     span: Option<Span>,
-    /// The strip on the device, and what is in it: revision, seconds across, pixels across.
+    /// The strip on the device, and its content: revision, seconds across, pixels across.
     texture: Option<(TextureHandle, (u64, f64, usize))>,
 }
 
@@ -40,13 +40,13 @@ impl Default for Panel {
 }
 
 impl Panel {
-    /// Gives the strip's texture back: the next strip begins anew.
+    /// Releases the strip's texture: the next strip begins anew.
     pub(super) fn close(&mut self) {
         self.texture = None;
     }
 }
 
-/// Opens the strip on the image's middle line, or closes it.
+/// Opens the strip on the image's middle scanline, or closes it.
 pub(super) fn toggle(model: &mut Model, now: std::time::Instant) {
     model.mmode = match model.mmode {
         Some(_) => None,
@@ -55,7 +55,7 @@ pub(super) fn toggle(model: &mut Model, now: std::time::Instant) {
     model.touch(now);
 }
 
-/// Draws strip and controls into the panel below.
+/// Draws the strip and its controls into the panel below the image.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, panel: &mut Panel) {
     let (scanlines, frozen) = (model.settings.probe.scanlines, model.frozen);
     let animated = model.animated;
@@ -172,7 +172,7 @@ fn draw(ui: &Ui, strip: &Strip, panel: &mut Panel, inner: Rect, end: f64) {
     ui.painter().image(texture.id(), inner, all, Color32::WHITE);
 }
 
-/// Depth at the right, seconds below.
+/// Draws the rulers: depth at the right, seconds below.
 fn rulers(ui: &Ui, inner: Rect, depth: f64, window: f64, end: f64) {
     let font = FontId::proportional(10.0);
     for share in [0.0, 0.5, 1.0] {
@@ -199,7 +199,7 @@ fn rulers(ui: &Ui, inner: Rect, depth: f64, window: f64, end: f64) {
     }
 }
 
-/// Draws the line into the image; the mark below it moves it.
+/// Draws the scanline into the image; the mark below it moves it.
 pub(super) fn aim(ui: &mut Ui, place: &Place, frame: &Frame, strip: &mut Strip, frozen: bool) {
     let probe = &frame.probe;
     let line = strip.line().min(probe.scanlines - 1);
@@ -208,7 +208,7 @@ pub(super) fn aim(ui: &mut Ui, place: &Place, frame: &Frame, strip: &mut Strip, 
     let ends = [place.at(start.x, start.z), place.at(end.x, end.z)];
     let dashes = egui::Shape::dashed_line(&ends, Stroke::new(1.0, style::ACCENT), 6.0, 6.0);
     ui.painter().extend(dashes);
-    // A strip that stands has nothing to show of another line.
+    // A frozen strip has nothing to show of another scanline.
     if frozen {
         return;
     }

@@ -1,4 +1,4 @@
-//! What the window shows and lets one change, without the window: settings, pose of the probe, clock.
+//! The state behind the window, without the window: settings, pose of the probe, clock.
 
 mod age;
 pub mod calipers;
@@ -20,8 +20,8 @@ mod settings;
 pub mod sheet;
 pub mod sidecar;
 pub mod skin;
-mod survey;
 pub mod trajectory;
+mod view3d;
 mod ways;
 
 use std::time::Instant;
@@ -43,8 +43,8 @@ use real::Real;
 use registration::Registration;
 pub use saving::File;
 pub use settings::Settings;
-pub use survey::{Shown, Survey};
 use trajectory::Replay;
+pub use view3d::{Shown, View3d};
 pub use ways::{Kept, Ways};
 
 use super::engine::{Frame, Pixels};
@@ -56,37 +56,37 @@ use crate::sim::fusion::Tint;
 pub struct Model {
     /// The scene's title.
     pub title: String,
-    /// What the console sets.
+    /// The settings of the console.
     pub settings: Settings,
     /// World from probe.
     pub pose: DAffine3,
-    /// Which device has the probe.
+    /// The device that has the probe.
     pub devices: Devices,
     /// The trajectory that is recorded or replayed.
     pub ways: Ways,
     /// Time of the scene.
     pub clock: Clock,
-    /// The image stands still, and so does the clock.
+    /// True while the image and the clock stand still.
     pub frozen: bool,
-    /// Whether anything in the scene follows time.
+    /// True where anything in the scene follows time.
     pub animated: bool,
-    /// The strip of one scanline, while it is drawn.
+    /// The M-mode strip of one scanline, while it is drawn.
     pub mmode: Option<Strip>,
     /// The placed meshes, as [`Settings::surfaces`].
     pub meshes: Vec<Placed>,
-    /// The 3D view; a change is no new revision, since the image stays.
-    pub survey: Survey,
+    /// The 3D view; changes of it are no new revision, since the image stays.
+    pub view3d: View3d,
     /// The settings of the scene file.
     pub loaded: Settings,
     /// The pose of the scene file.
     pub home: DAffine3,
-    /// What holds the probe to the skin, where the scene names one.
+    /// The contact of the probe with the skin, where the scene names one.
     pub hold: Option<Hold>,
-    /// How an acquired volume is laid onto the model, where there is one.
+    /// The placement of an acquired volume against the model, where there is one.
     pub registration: Option<Registration>,
     /// The scene file.
     pub file: File,
-    /// How acquired pixels are marked.
+    /// The marking of acquired pixels.
     pub real: Real,
     history: History,
     revision: u64,
@@ -94,39 +94,39 @@ pub struct Model {
     changed: Instant,
 }
 
-/// What the console needs to know of a placed mesh.
+/// The console's facts of a placed mesh.
 #[derive(Clone, Debug)]
 pub struct Placed {
     /// Name in the scene file.
     pub name: String,
-    /// What it encloses: index into [`Settings::tissues`].
+    /// The tissue inside: index into [`Settings::tissues`].
     pub tissue: usize,
     /// All its keyframes have the same triangles.
     pub shares_topology: bool,
-    /// Its shapes over time; 0 where it has one.
+    /// Number of its shapes over time; 0 where it has one.
     pub keyframes: usize,
     /// Triangles of its shape.
     pub triangles: usize,
-    /// What says by which strategy the device follows it: the same for all that one selector switches.
+    /// Path of the table with its strategy on the device: the same for all meshes that one selector switches.
     pub switch: Option<String>,
 }
 
-/// What one picture of the simulation is made from.
+/// Everything from which one picture of the simulation is made.
 #[derive(Clone, Debug)]
 pub struct Order {
     /// The console's settings.
     pub settings: Settings,
-    /// How acquired pixels are coloured in an image beside the other, if they are.
+    /// Colours of the acquired pixels in a second image, if wanted.
     pub tint: Option<Tint>,
-    /// World from probe, but for a replay.
+    /// World from probe, unless a replay moves it.
     pose: DAffine3,
-    /// The trajectory along which the probe goes.
+    /// The trajectory that the probe follows.
     replay: Option<Replay>,
     /// Time of the scene.
     pub clock: Clock,
-    /// The picture's pixels are wanted outside the device, too.
+    /// True where the picture's pixels are also wanted outside the device.
     pub reads_back: bool,
-    /// Grows with every change.
+    /// Number that grows with every change.
     pub revision: u64,
     /// When the change was made: an input event's arrival.
     pub at: Instant,
@@ -141,12 +141,12 @@ impl Order {
         }
     }
 
-    /// The same once more, decided now.
+    /// The same order, decided at `at`.
     pub fn again(&self, at: Instant) -> Self {
         Self { at, ..self.clone() }
     }
 
-    /// Whether it looks different by itself after `since`.
+    /// Returns whether its image changes by itself after `since`.
     pub fn runs(&self, since: Instant) -> bool {
         let replays = |replay: &Replay| replay.moves(&self.clock, since);
         self.clock.runs() || self.replay.as_ref().is_some_and(replays)
@@ -154,7 +154,7 @@ impl Order {
 }
 
 impl Model {
-    /// The state of a scene as loaded from `file`, standing at `seconds`; it plays if it can.
+    /// The state of a scene as loaded from `file`, at `seconds`; an animated scene plays.
     pub fn new(scene: &Scene, file: File, tracer: Tracer, seconds: f64, now: Instant) -> Self {
         let settings = Settings::of(scene, tracer);
         let animated = scene.is_animated();
@@ -179,7 +179,7 @@ impl Model {
                     switch: scene.origins.instances.get(index).map(entries::switch),
                 })
                 .collect(),
-            survey: Survey::new(scene),
+            view3d: View3d::new(scene),
             home: scene.world_from_probe,
             hold: Hold::of(scene),
             registration: Registration::of(scene),
@@ -192,12 +192,12 @@ impl Model {
         }
     }
 
-    /// Moves the probe along or about one of its axes, by mm or radians: a key was pressed.
+    /// Moves the probe along or about one of its axes, by mm or radians, for a pressed key.
     pub fn move_probe(&mut self, axis: Axis, amount: f64, now: Instant) {
         self.move_by(Source::Keyboard, axis, amount, now);
     }
 
-    /// The same by any device that shifts and turns; on the skin where the probe is to stay there.
+    /// Moves the probe for any device that shifts and turns; along the skin where the probe is to stay there.
     pub fn move_by(&mut self, source: Source, axis: Axis, amount: f64, now: Instant) {
         self.stop(now);
         let on_skin = self.moved_on_skin(axis, amount, now);
@@ -205,13 +205,13 @@ impl Model {
         self.place_probe(source, pose, now);
     }
 
-    /// Puts the probe somewhere: a device other than the tracker has moved it.
+    /// Puts the probe somewhere, for a device other than the tracker.
     pub fn place_probe(&mut self, source: Source, pose: DAffine3, now: Instant) {
         self.devices.take(source);
         self.settle(source.name(), pose, now);
     }
 
-    /// Hears where the tracker sees its `tool` (world from probe); the probe is there unless another
+    /// Takes the pose of the tracker's `tool` (world from probe); the probe goes there unless another
     /// device has moved it since.
     pub fn track(&mut self, tool: &str, pose: DAffine3, now: Instant) {
         if self.devices.track(pose) {
@@ -251,7 +251,7 @@ impl Model {
         }
     }
 
-    /// The skin goes with the model; the settings were `before`.
+    /// Moves the skin with the model; the settings were `before`.
     fn carry_skin(&mut self, before: &Settings) {
         if let Some(hold) = &mut self.hold
             && before.model != self.settings.model
@@ -284,18 +284,18 @@ impl Model {
         }
     }
 
-    /// Whether there is something to undo, and to redo.
+    /// Returns whether there is something to undo, and to redo.
     pub fn undoable(&self) -> [bool; 2] {
         self.history.depth().map(|n| n > 0)
     }
 
-    /// Grows with every change.
+    /// Number that grows with every change.
     pub fn revision(&self) -> u64 {
         self.revision
     }
 
-    /// Adds a picture to the strip of the M-mode, if it is drawn. Where nothing in the scene moves the
-    /// strip's time is that of the pictures: what moves then is the probe.
+    /// Adds a picture to the M-mode strip, if it is drawn. Where nothing in the scene moves, the strip's
+    /// time is that of the pictures: only the probe moves then.
     pub fn film(&mut self, frame: &Frame, pixels: &Pixels) {
         if let Some(strip) = &mut self.mmode {
             let seconds = match self.animated {
@@ -306,7 +306,7 @@ impl Model {
         }
     }
 
-    /// What the simulation needs to know.
+    /// The simulation's next order.
     pub fn order(&self) -> Order {
         Order {
             settings: self.settings.clone(),

@@ -6,7 +6,7 @@ use super::bmode::Place;
 use super::calipers::{label, to_screen};
 use super::model::sheet::{Note, Sheet, What};
 
-/// An arrow from a text to what it names.
+/// Draws an arrow from a text to the point it names.
 pub(super) fn arrow(painter: &Painter, from: Pos2, tip: Pos2, colour: Color32) {
     let way = (tip - from).normalized();
     let side = way.rot90();
@@ -17,7 +17,7 @@ pub(super) fn arrow(painter: &Painter, from: Pos2, tip: Pos2, colour: Color32) {
     }
 }
 
-/// A text, and the arrow to what it names.
+/// Draws a text, and the arrow to the point it names.
 pub(super) fn write(painter: &Painter, place: &Place, note: &Note, colour: Color32) {
     let at = to_screen(place, note.at);
     if let Some(tip) = note.arrow {

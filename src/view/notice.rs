@@ -1,4 +1,4 @@
-//! What the user has to see at once, over the image.
+//! The warning over the image that the tracker is lost.
 
 use egui::{Align2, Color32, FontId, Rect, Ui, vec2};
 
@@ -7,10 +7,10 @@ use super::model::age;
 use super::style;
 use crate::igtl::Tracked;
 
-/// Room for the texts to both sides, points.
+/// Room for the texts on both sides, points.
 const TEXTS: f32 = 300.0;
 
-/// Says on the image that the tracker is lost: the probe is not where its tool is.
+/// Draws the warning that the tracker is lost: the probe is not at its tool's place.
 pub(super) fn show(ui: &Ui, inputs: &Inputs) {
     let Some(Tracked::Lost(pose)) = inputs.report.as_ref().map(|report| &report.tracked) else {
         return;

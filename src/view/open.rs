@@ -1,5 +1,5 @@
-//! What exists while there is a window: input to the model, the model to the simulation, its pictures
-//! to the window.
+//! An open window: carries input to the model, the model to the simulation, and its pictures to the
+//! window.
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -8,6 +8,7 @@ use winit::event::WindowEvent;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
+use super::deaths::Deaths;
 use super::engine::{Frame, News};
 use super::files::Files;
 use super::inputs::{self, Inputs};
@@ -19,67 +20,67 @@ use super::session::{self, Session, Wake};
 use super::state::State;
 use super::timing;
 use super::tools::Tools;
-use super::{Model, Options, ViewError, keys, planes, style, survey};
+use super::{Model, Options, ViewError, keys, planes, style, view3d};
 use crate::gpu::{Device, ValidationLog};
 use crate::output;
 use crate::scene::Scene;
-use crate::sim::{self, SimError};
+use crate::sim;
 
 mod gestures;
 mod paint;
 mod scenes;
 
-/// While an image is being made, what events change is drawn with it, or after so many times what a drawing
-/// takes: on a slow device the time is the simulation's.
+/// Factor on the time of a drawing: while an image is being made, changes by events are drawn with the image, or
+/// after so long. On a slow device the time then goes to the simulation.
 const DRAWING_PUT_OFF: u32 = 8;
 
-/// A window with its simulation, and what the user has made of them.
+/// A window with its simulation and the user's state.
 pub(super) struct Open {
-    /// The picture last finished; before the session, so that its device is still there.
+    /// The last finished picture; declared before the session, so that its device still exists when it is dropped.
     frame: Option<Frame>,
-    /// The same of the 3D view.
+    /// The last finished picture of the 3D view.
     pictured: Option<Pictured>,
     session: Session,
     model: Model,
     state: State,
-    /// Revision of the model that the simulation has been told.
+    /// Revision of the model that the simulation has received.
     told: u64,
-    /// How it has been told to look at the anatomy.
+    /// View of the anatomy that the simulation has received.
     look: Option<Look>,
-    /// The picture has not been on the screen yet.
+    /// True until the picture has been on the screen.
     fresh: bool,
-    /// What the last pictures of the 3D view took, ms, until they are noted.
+    /// Times of the last pictures of the 3D view, ms, until they are noted.
     pictures_ms: Vec<f64>,
-    /// When the last input arrived.
+    /// Arrival of the last input.
     touched: Instant,
-    /// When the window was drawn last, and how long that took.
+    /// Start and duration of the last drawing of the window.
     painted: (Instant, Duration),
-    /// An image has been ordered and has not come yet.
+    /// True while an image has been ordered and has not come yet.
     awaited: bool,
-    /// When the interface wants to be drawn again.
+    /// Next time at which the interface wants to be drawn.
     again: Option<Instant>,
     input: egui_winit::State,
     window: Arc<Window>,
     title: String,
     opening: Option<Opening>,
-    /// A scene that the simulation is to go on with.
+    /// A scene that has been handed to the simulation.
     coming: Option<Opened>,
 }
 
-/// What a session is made from, again where its device is lost.
+/// Everything from which a session is made, and made again where its device is lost.
 pub(super) struct Plan {
     pub(super) scene: Scene,
     pub(super) options: Options,
     pub(super) proxy: EventLoopProxy<Wake>,
     /// The OpenIGTLink server stays whatever becomes of the device.
     pub(super) link: Link,
+    pub(super) deaths: Deaths,
 }
 
 impl Plan {
     fn tools(&self, device: &Device) -> Tools {
         let (folder, proxy) = (self.options.captures.clone(), self.proxy.clone());
-        // An event loop that is gone needs no news.
-        Tools::new(device.info(), folder, move || drop(proxy.send_event(Wake)))
+        Tools::new(device.info(), folder, session::waker(proxy))
     }
 
     fn session(
@@ -93,8 +94,8 @@ impl Plan {
     }
 }
 
-/// Input for a window on `device`, its interface `zoom` times as large as usual. Textures of an
-/// interface before are gone with its device: this one sends them again.
+/// Input for a window on `device`, its interface `zoom` times as large as usual. The textures of an
+/// earlier interface are lost with its device: this one sends them again.
 fn interface(window: &Window, zoom: f32, device: &Device) -> egui_winit::State {
     let context = egui::Context::default();
     context.set_zoom_factor(zoom);
@@ -131,7 +132,7 @@ impl Open {
         let state = State {
             console: true,
             timing: false,
-            survey: survey::State::default(),
+            view3d: view3d::State::default(),
             planes: planes::State::default(),
             times: timing::Page::default(),
             help: false,
@@ -144,6 +145,9 @@ impl Open {
             heap: device.info().memory_bytes,
             device: format!("{} ({})", device.name(), device.driver()),
             problem: None,
+            deaths: plan.deaths.clone(),
+            stopped: false,
+            restart: false,
             preparing: "Opening the device",
             tools: plan.tools(&device),
             inputs,
@@ -156,25 +160,27 @@ impl Open {
         Ok((Self::with(session, model, state, input, window), log))
     }
 
-    /// The same window on a new device, after `error`. The log is the new device's.
+    /// The same window with another simulation on a new device, with what there is to say of it. The log is the
+    /// new device's.
     pub(super) fn again(
         self,
         plan: &Plan,
-        error: &ViewError,
+        problem: Option<String>,
     ) -> Result<(Self, ValidationLog), ViewError> {
         let Self {
             frame, pictured, session, model, mut state, input, window, title, opening, ..
         } = self;
-        // What was handed over is lost with the device; it can be asked for again.
+        // A scene handed over is lost with the device; the user can open it again.
         state.files.opening = opening.is_some();
-        // All that is on the lost device ends before there is another.
+        // Everything on the lost device is dropped before there is another.
         drop((frame, pictured));
         state.tools.lose();
         drop(session);
         let device = session::device(&plan.options, &window)?;
-        // Its texture is gone with the device.
+        // Its texture is lost with the device.
         state.mmode = Default::default();
-        state.problem = Some(format!("{error}. It was opened again."));
+        state.problem = problem;
+        (state.stopped, state.restart) = (false, false);
         let input = interface(&window, input.egui_ctx().zoom_factor(), &device);
         let log = device.validation_log();
         let session = plan.session(device, &window, &model)?;
@@ -183,7 +189,7 @@ impl Open {
         Ok((made, log))
     }
 
-    /// Before the first picture.
+    /// A window before its first picture.
     fn with(
         session: Session,
         model: Model,
@@ -215,11 +221,11 @@ impl Open {
 
     /// Takes over what simulation and devices have to say; an error after which nothing more will
     /// come.
-    pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), SimError> {
+    pub(super) fn listen(&mut self, plan: &mut Plan) -> Result<(), ViewError> {
         let (mut failed, mut pictures_only) = (Ok(()), true);
         self.receive(plan);
         for news in self.session.engine.news() {
-            pictures_only &= matches!(news, News::Survey(_));
+            pictures_only &= matches!(news, News::View3d(_));
             match news {
                 News::Frame(frame, pixels) => {
                     self.awaited = false;
@@ -231,14 +237,14 @@ impl Open {
                         self.model.film(&frame, &pixels);
                     }
                     self.state.tools.record((*frame).clone());
-                    self.state.survey.pace(frame.grade.budget_ms);
+                    self.state.view3d.pace(frame.grade.budget_ms);
                     self.frame = Some(*frame);
                     self.fresh = true;
                     self.state.problem = None;
                 }
-                News::Survey(pictured) => {
+                News::View3d(pictured) => {
                     self.pictures_ms.push(pictured.ms);
-                    self.state.survey.learn(&pictured);
+                    self.state.view3d.learn(&pictured);
                     self.pictured = Some(*pictured);
                 }
                 News::Preparing(what) => self.state.preparing = what,
@@ -248,11 +254,15 @@ impl Open {
                 }
                 News::Opened => self.adopt(plan),
                 News::NotOpened(problem) => self.refuse(problem),
-                News::Failed(error) => failed = Err(error),
+                News::Failed(error) => failed = Err(error.into()),
+                News::Died => {
+                    self.state.deaths.simulation_died();
+                    failed = Err(ViewError::Died);
+                }
             }
         }
         self.look();
-        // Not left to the next drawing, which a window that is hidden may never see.
+        // Now, not with the next drawing, which may never come in a hidden window.
         self.tell();
         match pictures_only {
             true => self.draw_soon(Instant::now()),
@@ -261,7 +271,7 @@ impl Open {
         failed
     }
 
-    /// Names scene and file, and whether there is something to save.
+    /// Sets the window's title: scene and file, and a mark where something is unsaved.
     fn entitle(&mut self) {
         let (model, files) = (&self.model, &self.state.files);
         let mark = match model.is_modified(files.with_pose) {
@@ -285,7 +295,7 @@ impl Open {
         }
     }
 
-    /// Draws what an event has changed: now, or with the image that is being made where that comes soon.
+    /// Draws the changes of an event: now, or with the image that is being made where that comes soon.
     fn draw_soon(&mut self, now: Instant) {
         let (began, took) = self.painted;
         let at = began + DRAWING_PUT_OFF * took;
@@ -296,9 +306,9 @@ impl Open {
         }
     }
 
-    /// Tells the simulation what has changed.
+    /// Sends the changes to the simulation.
     fn tell(&mut self) {
-        // A scene that is coming has settings of its own.
+        // A scene to be adopted has settings of its own.
         if self.model.revision() != self.told && self.coming.is_none() {
             self.told = self.model.revision();
             let (order, frozen) = (self.model.order(), self.model.frozen);
@@ -307,7 +317,7 @@ impl Open {
         }
     }
 
-    /// Draws if it is time to; when it will be, else.
+    /// Draws if a drawing is due; else returns the time when it will be.
     pub(super) fn due(&mut self, now: Instant) -> Option<Instant> {
         if self.state.inputs.due.is_some_and(|at| at <= now) {
             // The tracker is lost, or has been for longer.
@@ -321,13 +331,33 @@ impl Open {
         self.again.into_iter().chain(self.state.inputs.due).min()
     }
 
-    /// Looks what devices have to say.
+    /// Takes over the news of the devices.
     fn look(&mut self) {
         if self.state.inputs.look(&mut self.model) {
             self.session.engine.send_again();
         }
         let word = self.state.inputs.word.clone();
         keys::apply_pads(&word, &mut self.model, &mut self.state, Instant::now());
+    }
+
+    /// Goes on without a simulation until the user wants it again.
+    pub(super) fn stop(&mut self) {
+        self.state.stopped = true;
+        self.awaited = false;
+        if self.coming.take().is_some() {
+            self.state.files.opening = self.opening.is_some();
+        }
+        self.window.request_redraw();
+    }
+
+    /// There has been no image yet.
+    pub(super) fn is_empty(&self) -> bool {
+        self.frame.is_none()
+    }
+
+    /// The user wants the simulation again.
+    pub(super) fn restarts(&self) -> bool {
+        self.state.restart
     }
 
     /// The user wants to leave.

@@ -1,12 +1,13 @@
-//! A scene that is read while the window goes on.
+//! A scene that is loaded while the window goes on.
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, channel};
+use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::time::Instant;
 
 use winit::event_loop::EventLoopProxy;
 
+use super::deaths::OPENING;
 use super::model::{File, Model};
 use super::session::Wake;
 use super::{Options, Refusal};
@@ -15,21 +16,21 @@ use crate::scene::{Scene, SceneError, Warning};
 
 type Loaded = Result<(Scene, Vec<Warning>), SceneError>;
 
-/// A scene on its way.
+/// A scene being loaded.
 pub(super) struct Opening {
     path: PathBuf,
     overrides: Vec<(String, String)>,
     loaded: Receiver<Loaded>,
 }
 
-/// A scene with what the window starts from.
+/// A scene with the window's first state of it.
 pub(super) struct Opened {
     pub(super) scene: Scene,
     pub(super) model: Model,
 }
 
 impl Opening {
-    /// Begins to read `path`; the event loop is woken when that has ended.
+    /// Begins to read `path`; wakes the event loop at the end.
     pub(super) fn begin(
         path: PathBuf,
         overrides: Vec<(String, String)>,
@@ -37,7 +38,9 @@ impl Opening {
     ) -> Self {
         let (sender, loaded) = channel();
         let (file, set) = (path.clone(), overrides.clone());
-        std::thread::spawn(move || {
+        let thread = std::thread::Builder::new().name(OPENING.into());
+        // A thread that is not started sends nothing; that is reported.
+        let _ = thread.spawn(move || {
             // A window that is gone needs neither.
             let _ = sender.send(Scene::load(&file, &set));
             let _ = proxy.send_event(Wake);
@@ -45,14 +48,18 @@ impl Opening {
         Self { path, overrides, loaded }
     }
 
-    /// What has been read, suited to the device; nothing while it is not ready.
+    /// The loaded scene, fitted to the device; none while it is not ready.
     pub(super) fn ready(
         &self,
         options: &Options,
         device: &Arc<Device>,
         now: Instant,
     ) -> Option<Result<Opened, String>> {
-        let loaded = self.loaded.try_recv().ok()?;
+        let loaded = match self.loaded.try_recv() {
+            Ok(loaded) => loaded,
+            Err(TryRecvError::Empty) => return None,
+            Err(TryRecvError::Disconnected) => return Some(Err(self.unread())),
+        };
         Some(match loaded {
             Ok((scene, warnings)) => {
                 for warning in &warnings {
@@ -64,9 +71,15 @@ impl Opening {
             Err(error) => Err(super::files::said(&error)),
         })
     }
+
+    /// Message for a thread that ended without a result.
+    fn unread(&self) -> String {
+        let file = self.path.display();
+        format!("{file} was not read: the thread that reads it died. Try again; the image goes on.")
+    }
 }
 
-/// The state of a window that opens `scene`, with counts that suit the device.
+/// The first state of a window with `scene`, with counts that suit the device.
 ///
 /// # Errors
 /// The device does not suit.

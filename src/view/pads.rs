@@ -1,4 +1,4 @@
-//! Game pads, on a thread of their own that sleeps until one of them says something.
+//! Game pads, on a thread of their own that sleeps until one of them sends an event.
 
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -6,31 +6,32 @@ use std::time::{Duration, Instant};
 
 use gilrs::{EventType, GamepadId, Gilrs};
 
+use super::deaths::PADS;
 use super::link::Bell;
 use super::model::{Axis, Control, Pad, Press};
 
-/// How often a probe moves while a stick is held, which says nothing meanwhile.
+/// Time between movements of the probe while a stick is held, which sends no events meanwhile.
 const TICK: Duration = Duration::from_millis(16);
-/// Longest time that a step stands for: a thread that could not run makes no leap.
+/// Longest time that a step counts for: a delayed thread makes no leap.
 const STEP: Duration = Duration::from_millis(50);
-/// Most button presses that wait for the window.
+/// Most button presses waiting for the window.
 const PRESSES: usize = 64;
 
-/// What the pads have to say.
+/// News of the pads.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Word {
-    /// Names of those that are connected.
+    /// Names of the connected pads.
     pub(super) names: Vec<String>,
-    /// Why there are none.
+    /// The reason why there are none.
     pub(super) problem: Option<String>,
-    /// How far the probe goes along and about its axes, mm and rad, as [`Axis::ALL`].
+    /// Movement of the probe along and about its axes, mm and rad, as [`Axis::ALL`].
     pub(super) travel: [f64; 6],
     /// Buttons that went down.
     pub(super) presses: Vec<Press>,
 }
 
 impl Word {
-    /// The probe has gone on for `step` as `pad` was held.
+    /// Moves the probe on for `step`, at the speeds that `pad` gives.
     fn go(&mut self, pad: &Pad, step: Duration) {
         let seconds = step.min(STEP).as_secs_f64();
         for (travel, speed) in self.travel.iter_mut().zip(pad.speeds()) {
@@ -55,7 +56,7 @@ impl Pads {
     pub(super) fn start(bell: Bell) -> Self {
         let word = Arc::<Mutex<Word>>::default();
         let listener = Listener { word: word.clone(), bell };
-        let thread = std::thread::Builder::new().name("game pads".to_owned());
+        let thread = std::thread::Builder::new().name(PADS.to_owned());
         // Without another thread there are no pads, and the keyboard is left.
         if let Err(error) = thread.spawn(move || listener.run()) {
             lock(&word).problem = Some(format!("no game pads: {error}"));
@@ -63,7 +64,7 @@ impl Pads {
         Self(word)
     }
 
-    /// What has come since the last call.
+    /// News since the last call.
     pub(super) fn take(&self) -> Word {
         let mut word = lock(&self.0);
         Word {
@@ -74,7 +75,7 @@ impl Pads {
     }
 }
 
-/// What is in it is whole between any two statements, so poisoning is ignored.
+/// Locks the news. They are whole between any two statements, so poisoning is ignored.
 fn lock(word: &Mutex<Word>) -> MutexGuard<'_, Word> {
     word.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -129,7 +130,7 @@ impl Listener {
         }
     }
 
-    /// Notes which pads there are.
+    /// Notes the names of the pads.
     fn names(&self, gilrs: &Gilrs) {
         let names: Vec<String> = (gilrs.gamepads()).map(|(_, pad)| pad.name().to_owned()).collect();
         let mut word = lock(&self.word);
@@ -141,7 +142,7 @@ impl Listener {
         self.bell.ring();
     }
 
-    /// Says why there are no pads, once, and that is all.
+    /// Reports once why there are no pads.
     fn give_up(&self, why: &str) {
         eprintln!("note: {why}");
         lock(&self.word).problem = Some(why.to_owned());
@@ -149,7 +150,7 @@ impl Listener {
     }
 }
 
-/// Says that there is a pad which this user must not read, where that is so.
+/// Returns a message where there is a pad that this user may not read.
 #[cfg(target_os = "linux")]
 fn unreadable() -> Option<String> {
     let devices = std::fs::read_dir("/dev/input").ok()?;
@@ -174,7 +175,7 @@ fn unreadable() -> Option<String> {
     None
 }
 
-/// Axes and the amounts of a travel, those that are not zero.
+/// The axes of a travel with their amounts, those that are not zero.
 pub(super) fn steps(travel: [f64; 6]) -> impl Iterator<Item = (Axis, f64)> {
     let all = Axis::ALL.into_iter().zip(travel);
     all.filter(|(_, amount)| *amount != 0.0)
@@ -198,11 +199,11 @@ mod tests {
         for _ in 0..10 {
             word.go(&pad, Duration::from_millis(16));
         }
-        // A thread that could not run for a second.
+        // A thread that was delayed by a second.
         word.go(&pad, Duration::from_secs(1));
         let gone: Vec<(Axis, f64)> = steps(word.travel).collect();
         let [(Axis::Lateral, mm)] = gone[..] else { panic!("{gone:?}") };
-        // 30 mm/s for 160 ms, and for the 50 ms that a step stands for at most.
+        // 30 mm/s for 160 ms, and for 50 ms, the most that a step counts for.
         assert!((mm + 30.0 * 0.21).abs() < 1e-9, "{mm}");
     }
 

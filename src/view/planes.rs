@@ -1,4 +1,4 @@
-//! Three planes through the acquired volume with the lines of the meshes in them, where the 3D view is else:
+//! Three planes through the acquired volume with the outlines of the meshes, in place of the 3D view:
 //! the pointer moves volume or model.
 
 use std::time::Instant;
@@ -14,22 +14,22 @@ use super::model::{Model, Settings};
 use super::style;
 use crate::scene::Display;
 
-/// Points of a wheel's turn that bring the planes on by a pixel.
+/// Points of a wheel's turn that move the planes on by a pixel.
 const NOTCH: f32 = 8.0;
-/// Room above the planes for the line of buttons, points.
+/// Height of the row of buttons above the planes, points.
 const BAR: f32 = 30.0;
-/// Beyond the volume.
+/// Colour outside the volume.
 const OUTSIDE: Color32 = Color32::from_rgb(10, 22, 40);
-/// Lines of masks, and of other meshes.
+/// Colours of the outlines of masks, and of other meshes.
 const LINES: [Color32; 2] =
     [Color32::from_rgb(255, 200, 60), Color32::from_rgba_premultiplied(22, 46, 52, 60)];
 
-/// What of the planes is shown; not saved.
+/// State of the planes; not saved.
 #[derive(Default)]
 pub(super) struct State {
-    /// They are shown in place of the 3D view.
+    /// True while they are shown in place of the 3D view.
     pub(super) open: bool,
-    /// Pictures of the three planes, and what they were made from.
+    /// Pictures of the three planes, with the inputs that they were made from.
     pictures: [Option<Picture>; 3],
 }
 
@@ -40,7 +40,7 @@ struct Picture {
     outlines: Vec<Outline>,
 }
 
-/// All that a plane's picture depends on.
+/// All inputs of a plane's picture.
 #[derive(Clone, PartialEq)]
 struct Key {
     volume: Option<Display>,
@@ -51,7 +51,7 @@ struct Key {
     pitch: f64,
 }
 
-/// Draws the planes into the whole of `ui`, below each other.
+/// Draws the planes into the whole of `ui`, one below the other.
 pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Instant) {
     let room = ui.max_rect();
     ui.painter_at(room).rect_filled(room, 0.0, style::BACK);
@@ -109,7 +109,7 @@ fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut 
     });
 }
 
-/// Samples the volume and cuts the meshes.
+/// Makes a plane's picture: samples the volume and cuts the meshes.
 fn make(ui: &Ui, plane: &Plane, registration: &Registration, key: Key) -> Picture {
     let levels = registration.slice(plane, key.size, key.pitch);
     let colours = levels.into_iter().map(|level| level.map_or(OUTSIDE, Color32::from_gray));
@@ -131,7 +131,7 @@ fn draw(
     let middle = rect.center();
     let place = |p: [f64; 2]| middle + vec2((p[0] / pitch) as f32, (p[1] / pitch) as f32);
     let scene = registration.scene();
-    // Masks over the others.
+    // Masks over the other meshes.
     for masks in [false, true] {
         let colour = LINES[usize::from(!masks)];
         for outline in picture.outlines.iter().filter(|o| scene.is_mask(o.instance) == masks) {
@@ -149,7 +149,7 @@ fn draw(
     painter.hline(rect.x_range(), rect.bottom(), Stroke::new(1.0, Color32::from_gray(48)));
 }
 
-/// Takes what the pointer did in a plane.
+/// Handles the pointer in a plane.
 fn act(
     ui: &Ui,
     response: &Response,

@@ -1,4 +1,4 @@
-//! Which pixels are real: the image that shows it, and its legend.
+//! The image with marked acquired pixels, and its legend.
 
 use egui::{Align2, Color32, FontId, Rect, pos2, vec2};
 
@@ -8,7 +8,7 @@ use super::model::real::COLOUR;
 use super::style;
 use crate::gpu::Image;
 
-/// The image of a frame that is wanted on the screen.
+/// The image of a frame to be shown.
 pub(super) fn image<'f>(frame: &'f Frame, model: &Model) -> &'f Image {
     let tinted = frame.tinted.as_ref().filter(|_| model.real.shown);
     tinted.unwrap_or(&frame.image)
@@ -17,7 +17,7 @@ pub(super) fn image<'f>(frame: &'f Frame, model: &Model) -> &'f Image {
 /// Grey level of the legend's samples.
 const GREY: u8 = 110;
 
-/// What the colours mean, at the upper right of `area`; where nothing is coloured, why.
+/// Draws the meaning of the colours at the upper right of `area`; where nothing is coloured, the reason.
 pub(super) fn legend(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
     if !model.real.shown {
         return;
@@ -25,7 +25,7 @@ pub(super) fn legend(painter: &egui::Painter, area: Rect, frame: &Frame, model: 
     let font = FontId::proportional(12.0);
     let mut right = area.right() - 12.0;
     let y = area.top() + 49.0;
-    // From the right, below what is written there.
+    // From the right, below the texts there.
     let text = |x: f32, words: &str| {
         let at = pos2(x, y);
         painter.text(at, Align2::RIGHT_CENTER, words, font.clone(), style::TEXT)

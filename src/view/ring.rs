@@ -4,15 +4,15 @@ use std::sync::Arc;
 
 use crate::gpu::{Device, GpuError, Image, ImageDim, ImageFormat};
 
-/// Images that nobody reads and that are kept all the same, so that none has to be made for each
-/// frame. What a loop of images has let go beyond that is given back.
+/// Unread images that are kept all the same, so that none has to be made for each frame. Further images
+/// that the loop releases are given back.
 const SPARE: usize = 2;
 
-/// Sizes of which images are kept that nobody reads: levels of quality take turns.
+/// Number of sizes of which unread images are kept: levels of quality take turns.
 const SIZES: usize = 3;
 
-/// Images. Those that the window still shows or keeps, or that a submission of its
-/// reads, are left alone, so that neither waits for the other.
+/// Images that the simulation writes. Those that the window still shows or keeps, or that one of its
+/// submissions reads, are not touched, so that neither waits for the other.
 pub(super) struct Ring {
     name: &'static str,
     images: Vec<Image>,
@@ -26,7 +26,7 @@ impl Ring {
         Self { name, images: Vec::new(), sizes: Vec::new(), device: device.clone() }
     }
 
-    /// All images, those that others keep included, bytes.
+    /// Size of all images, those held by others included, bytes.
     pub(super) fn bytes(&self) -> u64 {
         self.images.iter().map(Image::bytes).sum()
     }
@@ -107,7 +107,7 @@ mod tests {
             device.upload_image(&other, &[9; 256]).unwrap();
         }
         assert_eq!(device.read_back_image(&held).unwrap(), [7; 256]);
-        // Other sizes are other sets of images; what is held stays as it is.
+        // Other sizes are other sets of images; held images stay as they are.
         let [small, smaller] = [[4, 4], [2, 2]].map(|size| ring.free(size).unwrap());
         drop((small, smaller));
         let before = ring.images.len();

@@ -1,4 +1,4 @@
-//! What has been saved, is being saved, or could not be.
+//! Messages about saving: done, under way, or failed.
 
 use std::time::{Duration, Instant};
 
@@ -7,33 +7,33 @@ use egui::{Align2, Area, Frame, Id, ProgressBar, RichText, Sense, TextEdit, Ui, 
 use super::style;
 use super::tools::Tools;
 
-/// How long it is said that something was saved.
+/// Time for which a message about a saved file is shown.
 const SHOWN: Duration = Duration::from_secs(6);
-/// How often progress is drawn.
+/// Time between drawings of the progress.
 const STEP: Duration = Duration::from_millis(100);
 
-/// What is to be said.
+/// The messages to be shown.
 #[derive(Default)]
 pub(super) struct Notices {
     saved: Vec<(String, Instant)>,
-    /// Why the last capture was not saved, until it is dismissed.
+    /// The reason why the last capture was not saved, until it is dismissed.
     failed: Option<String>,
 }
 
 impl Notices {
-    /// Something was saved.
+    /// Adds a message that something was saved.
     pub(super) fn saved(&mut self, text: String) {
         self.failed = None;
         self.saved.push((text, Instant::now() + SHOWN));
     }
 
-    /// Something was not.
+    /// Sets the message that something could not be saved.
     pub(super) fn failed(&mut self, text: String) {
         self.failed = Some(text);
     }
 }
 
-/// Draws all of it above the bar.
+/// Draws all messages above the bar.
 pub(super) fn show(ui: &Ui, tools: &mut Tools) {
     tools.collect();
     let now = Instant::now();

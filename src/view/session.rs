@@ -1,6 +1,6 @@
-//! A window with its device: all that is made anew when the device is lost.
+//! A window with its device: everything that is made anew when the device is lost.
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
@@ -12,7 +12,7 @@ use super::{Options, ViewError};
 use crate::gpu::{Device, Painter};
 use crate::scene::Scene;
 
-/// There is news of the simulation, or of a device.
+/// Wakes the event loop: there is news of the simulation, or of a device.
 pub(super) struct Wake;
 
 /// Window, device, simulation. Fields drop in order: the simulation ends first.
@@ -20,6 +20,12 @@ pub(super) struct Session {
     pub(super) engine: Engine,
     pub(super) painter: Painter,
     pub(super) device: Arc<Device>,
+}
+
+/// Wakes the event loop, from any thread; one that is gone needs no news.
+pub(super) fn waker(proxy: EventLoopProxy<Wake>) -> impl Fn() + Send + Sync + 'static {
+    let proxy = Mutex::new(proxy);
+    move || drop(proxy.lock().unwrap_or_else(PoisonError::into_inner).send_event(Wake))
 }
 
 /// A window of the default size.
@@ -48,9 +54,10 @@ impl Session {
         link: Link,
     ) -> Result<Self, ViewError> {
         let painter = Painter::new(&device, window.clone())?;
-        // An event loop that is gone needs no news.
-        let wake = move || drop(proxy.send_event(Wake));
-        let engine = Engine::start(&device, options.library.clone(), scene, order, link, wake);
+        let wake = waker(proxy);
+        let library = options.library.clone();
+        let engine = Engine::start(&device, library, scene, order, link, wake);
+        let engine = engine.map_err(ViewError::Thread)?;
         Ok(Self { engine, painter, device })
     }
 }

@@ -1,5 +1,6 @@
-//! What of the window is open and chosen; not saved.
+//! The state of the window itself: open panels and choices; not saved.
 
+use super::deaths::Deaths;
 use super::files::Files;
 use super::inputs::Inputs;
 use super::mmode;
@@ -9,27 +10,27 @@ use crate::settings::Machine;
 
 /// State of the window itself.
 pub(super) struct State {
-    /// The console is open.
+    /// True while the console is open.
     pub(super) console: bool,
-    /// The timing panel is open.
+    /// True while the timing panel is open.
     pub(super) timing: bool,
     /// The 3D view.
-    pub(super) survey: super::survey::State,
+    pub(super) view3d: super::view3d::State,
     /// Planes through the acquired volume, in place of the 3D view.
     pub(super) planes: super::planes::State,
-    /// What of the timing panel is shown.
+    /// The shown page of the timing panel.
     pub(super) times: timing::Page,
-    /// The list of keys is open.
+    /// True while the list of keys is open.
     pub(super) help: bool,
-    /// The M-mode strip.
+    /// The M-mode panel.
     pub(super) mmode: mmode::Panel,
     /// Tissue under inspection: index into the scene's.
     pub(super) tissue: usize,
     /// Mesh under inspection: index into the scene's instances.
     pub(super) mesh: usize,
-    /// What the simulation runs on.
+    /// Facts about the machine that the simulation runs on.
     pub(super) machine: Machine,
-    /// The device has ray queries.
+    /// True where the device has ray queries.
     pub(super) ray_query: bool,
     /// Size of the device's largest heap of its own, bytes.
     pub(super) heap: u64,
@@ -37,14 +38,20 @@ pub(super) struct State {
     pub(super) device: String,
     /// Saving, loading, opening.
     pub(super) files: Files,
-    /// What went wrong last, until it goes right again.
+    /// The last error, until the next success.
     pub(super) problem: Option<String>,
-    /// What is done before there is a picture.
+    /// Threads that died by a bug.
+    pub(super) deaths: Deaths,
+    /// The simulation's thread is dead, and not started again.
+    pub(super) stopped: bool,
+    /// True where the simulation is to be started again.
+    pub(super) restart: bool,
+    /// The work being done before the first picture.
     pub(super) preparing: &'static str,
     /// Loop, measurements, texts.
     pub(super) tools: Tools,
-    /// What moves the probe.
+    /// The devices that move the probe.
     pub(super) inputs: Inputs,
-    /// The window is to be closed.
+    /// True once the window is to be closed.
     pub(super) quit: bool,
 }

@@ -7,7 +7,7 @@ use serde_json::{Map, Value, json};
 use crate::live::Grade;
 use crate::statistics::Statistics;
 
-/// Pictures that are remembered.
+/// Number of pictures remembered.
 pub(super) const REMEMBERED: usize = 240;
 
 /// Times of one picture, ms.
@@ -15,15 +15,15 @@ pub(super) const REMEMBERED: usize = 240;
 pub(super) struct Sample {
     /// Time on the device by stage.
     pub(super) stages: Vec<(String, f64)>,
-    /// From order to finished picture.
+    /// Time from order to finished picture.
     pub(super) wall: f64,
-    /// What the processor took for acceleration structures.
+    /// Time of the processor for acceleration structures.
     pub(super) update: f64,
-    /// How the device followed what changes its shape.
+    /// Strategies of the device for meshes that change their shape.
     pub(super) strategy: String,
-    /// From input to the screen.
+    /// Time from input to the screen.
     pub(super) latency: f64,
-    /// How finely it was made; none in tests of what does not look at it.
+    /// Quality of the picture; none in tests that do not look at it.
     pub(super) grade: Option<Grade>,
 }
 
@@ -31,10 +31,10 @@ pub(super) struct Sample {
 #[derive(Default)]
 pub(super) struct Times {
     samples: VecDeque<Sample>,
-    /// How long the window's own frames took, from the start of drawing to the screen.
+    /// Durations of the window's own frames, from the start of drawing to the screen.
     interface: VecDeque<f64>,
-    /// What pictures of the 3D view took on the device.
-    survey: VecDeque<f64>,
+    /// Durations of the 3D view's pictures on the device.
+    view3d: VecDeque<f64>,
 }
 
 impl Times {
@@ -48,13 +48,13 @@ impl Times {
     }
 
     /// Notes a picture of the 3D view, ms on the device.
-    pub(super) fn add_survey(&mut self, ms: f64) {
-        push(&mut self.survey, ms);
+    pub(super) fn add_view3d(&mut self, ms: f64) {
+        push(&mut self.view3d, ms);
     }
 
     /// Times of the 3D view's pictures, ms.
-    pub(super) fn survey(&self) -> Vec<f64> {
-        self.survey.iter().copied().collect()
+    pub(super) fn view3d(&self) -> Vec<f64> {
+        self.view3d.iter().copied().collect()
     }
 
     /// Times of the window's own frames, ms.
@@ -62,7 +62,7 @@ impl Times {
         self.interface.iter().copied().collect()
     }
 
-    /// One value of each picture that was made while something moved; of all where none was.
+    /// One value of each picture made while something moved; of all pictures where there is none.
     pub(super) fn live(&self, value: impl Fn(&Sample) -> f64) -> Vec<f64> {
         let moving = self.samples.iter().filter(|sample| !sample.is_refined());
         let values: Vec<f64> = moving.map(&value).collect();
@@ -72,13 +72,13 @@ impl Times {
         }
     }
 
-    /// From the last input to the scene's own quality, ms, of each time that everything came to rest.
+    /// Times from the last input to the scene's own quality, ms, one for each time that everything came to rest.
     pub(super) fn settled(&self) -> Vec<f64> {
         let own = |s: &&Sample| s.is_refined() && s.grade.as_ref().is_some_and(Grade::is_full);
         self.samples.iter().filter(own).map(|s| s.latency).collect()
     }
 
-    /// The level in force, and the levels that the last pictures had, each with its counts and times.
+    /// The present level, and the levels of the last pictures, each with its counts and times.
     fn levels(&self) -> Value {
         let grades = || self.samples.iter().filter_map(|s| s.grade.as_ref());
         let Some(last) = grades().next_back() else {
@@ -110,7 +110,7 @@ impl Times {
         })
     }
 
-    /// Everything as median and 99th percentile, ms.
+    /// All times as median and 99th percentile, ms.
     pub(super) fn report(&self) -> Value {
         let both = |values: &[f64]| {
             let found = Statistics::of(values.iter().copied());
@@ -127,7 +127,7 @@ impl Times {
             "latency_ms": both(&self.live(|s| s.latency)),
             "settled_ms": both(&self.settled()),
             "live": self.levels(),
-            "survey_ms": both(&self.survey()),
+            "view3d_ms": both(&self.view3d()),
             "interface_ms": both(&self.interface()),
         })
     }
@@ -153,7 +153,7 @@ impl Times {
         names
     }
 
-    /// The whole time that each picture spent in a stage, those that had none left out.
+    /// Total times of the pictures in a stage, without pictures that lack it.
     pub(super) fn stage(&self, name: &str) -> Vec<f64> {
         let times = self.samples.iter().filter_map(|sample| sample.stage(name));
         times.collect()
@@ -161,23 +161,23 @@ impl Times {
 }
 
 impl Sample {
-    /// The frame, or its stages where they overlap with the one before and sum up to more.
+    /// Time of the frame, or of its stages where they overlap with the one before and sum up to more.
     pub(super) fn whole(&self) -> f64 {
         self.wall.max(self.device())
     }
 
-    /// The whole time spent in a stage, if it was there.
+    /// Total time in a stage, if the picture has it.
     pub(super) fn stage(&self, name: &str) -> Option<f64> {
         let named = self.stages.iter().filter(|(stage, _)| stage == name);
         named.map(|(_, ms)| *ms).reduce(|a, b| a + b)
     }
 
-    /// It was made at rest.
+    /// Returns whether it was made at rest.
     fn is_refined(&self) -> bool {
         self.grade.as_ref().is_some_and(|grade| grade.at_rest)
     }
 
-    /// All stages.
+    /// Total time of all stages.
     pub(super) fn device(&self) -> f64 {
         self.stages.iter().map(|(_, ms)| ms).sum()
     }

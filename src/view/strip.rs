@@ -1,4 +1,4 @@
-//! The buttons of the tools: a column at the left edge.
+//! The toolbar: a column of buttons at the left edge.
 
 use std::f32::consts::FRAC_PI_4;
 
@@ -11,15 +11,15 @@ use super::model::calipers::Kind;
 use super::model::sheet::Tool;
 use super::tools::Tools;
 
-/// Height of a button with the gap below it, points; where there is little room, and else.
+/// Height of a button with the gap below it, points; where there is little room, and otherwise.
 const PITCH: [f32; 2] = [26.0, 30.0];
-/// Height that is little room, points.
+/// Height below which there is little room, points.
 const LITTLE: f32 = 420.0;
 
-/// Draws a sign into its room with a colour.
+/// Draws a sign into its room in a colour.
 type Icon = fn(&Painter, Rect, Color32);
 
-/// What the pointer does: sign and meaning.
+/// The tools of the pointer: sign and meaning.
 const TOOLS: [(Tool, &str, Icon); 4] = [
     (Tool::Measure(Kind::Distance), "Distance in mm: two clicks, or drag (L)", |p, r, c| {
         dots(p, &[r.left_bottom(), r.right_top()], c);
@@ -75,7 +75,7 @@ fn film(p: &Painter, r: Rect, c: Color32) {
     p.add(Shape::convex_polygon(corners, c, Stroke::NONE));
 }
 
-/// Draws the column into the lower left corner.
+/// Draws the toolbar into the lower left corner.
 pub(super) fn show(ui: &mut Ui, tools: &mut Tools) {
     let area = ui.max_rect();
     let has_marks = !tools.sheet.marks().is_empty();

@@ -1,8 +1,8 @@
-//! Colours and sizes: dark, as the room in which one scans.
+//! Colours and sizes: dark, as the room for scanning.
 
 use egui::{Color32, CornerRadius, Visuals};
 
-/// Behind graphs.
+/// Background of graphs.
 pub(super) const BACK: Color32 = Color32::from_rgb(14, 16, 18);
 /// Panels.
 const PANEL: Color32 = Color32::from_rgb(27, 30, 34);
@@ -12,7 +12,7 @@ pub(super) const ACCENT: Color32 = Color32::from_rgb(92, 176, 196);
 pub(super) const TEXT: Color32 = Color32::from_rgb(208, 212, 216);
 /// Less important text.
 pub(super) const FAINT: Color32 = Color32::from_rgb(140, 146, 152);
-/// What went wrong.
+/// Warnings and errors.
 pub(super) const WARN: Color32 = Color32::from_rgb(232, 170, 84);
 
 /// Sets up the interface's look.

@@ -1,4 +1,4 @@
-//! The timing panel: where the time goes, frame by frame, and what lies in the device's memory.
+//! The timing panel: times of the stages, frame by frame, and the use of the device's memory.
 
 use egui::{Color32, ScrollArea, Ui};
 
@@ -18,18 +18,18 @@ pub(super) const HEIGHT: f32 = 212.0;
 /// Width of the totals, points.
 const TOTALS: f32 = 200.0;
 
-/// Stages in a column.
+/// Number of stages in a column.
 const ROWS: usize = 8;
 
-/// What is shown beside the stages.
+/// Page beside the stages.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) enum Page {
-    /// Each of the last frames.
+    /// Times of each of the last frames.
     #[default]
     Frames,
-    /// What it costs to follow what moves.
+    /// Costs of following moving meshes.
     Structures,
-    /// What lies on the device.
+    /// Use of the device's memory.
     Memory,
 }
 
@@ -55,7 +55,7 @@ fn colour(stages: &[String], name: &str) -> Color32 {
     COLOURS[at.unwrap_or(0) % COLOURS.len()]
 }
 
-/// Milliseconds as they are written.
+/// A time as text, in milliseconds.
 fn written(ms: f64) -> String {
     match ms.is_nan() {
         true => "-".into(),
@@ -63,7 +63,7 @@ fn written(ms: f64) -> String {
     }
 }
 
-/// Median, 99th percentile.
+/// Median and 99th percentile as texts.
 fn pair(values: &[f64]) -> [String; 2] {
     let found = Statistics::of(values.iter().copied());
     [found.median, found.p99].map(written)
@@ -76,7 +76,7 @@ pub(super) fn show(
     model: &Model,
     state: &mut State,
 ) {
-    // A narrow window shows the rest on the way.
+    // In a narrow window the rest is reached by scrolling.
     ScrollArea::horizontal().show(ui, |ui| {
         ui.horizontal_top(|ui| {
             ui.vertical(|ui| {
@@ -168,7 +168,7 @@ fn totals(ui: &mut Ui, times: &Times, frame: Option<&Frame>, state: &State) {
                 "From the last input to the image at the scene's own quality",
                 &times.settled(),
             ),
-            ("3D view", "A picture of the 3D view on the device", &times.survey()),
+            ("3D view", "A picture of the 3D view on the device", &times.view3d()),
             (
                 "interface",
                 "A frame of this window, from the start of drawing to the screen",

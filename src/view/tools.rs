@@ -1,4 +1,4 @@
-//! The working tools: what is kept, measured, written on the image, and saved.
+//! The working tools: loop, measurements, texts, and saving.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -7,7 +7,7 @@ use std::time::Instant;
 use glam::{DAffine3, DVec2};
 use serde_json::{Value, json};
 
-use super::captures::{CaptureError, Captures, Clip, Format, Sidecar, Still};
+use super::captures::{Captures, Clip, Format, Sidecar, Still};
 use super::engine::Frame;
 use super::model::cine::Limit;
 use super::model::sheet::{Moment, Sheet};
@@ -15,14 +15,14 @@ use super::model::sidecar::{self, Area};
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
 use crate::gpu::{DeviceInfo, Image, Shot};
-use crate::output;
+use crate::sim::facts;
 
 /// Most frames of the loop.
 const FRAMES: usize = 256;
 /// Most bytes of the loop, where the device has sixteen times as many.
 const BYTES: u64 = 256 << 20;
 
-/// What was to be saved last.
+/// Content of the last save.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wanted {
     Still,
@@ -31,30 +31,30 @@ enum Wanted {
 
 /// State of the tools.
 pub(super) struct Tools {
-    /// The images last finished, all of one place in the probe's space: another depth begins another loop,
-    /// as on a scanner. What was made finer at rest is in the place of what it was made of.
+    /// The last images, all of one place in the probe's space: another depth begins another loop, as on a scanner.
+    /// An image made finer at rest replaces its coarser one.
     pub(super) cine: Cine<Frame>,
     /// Measurements and texts.
     pub(super) sheet: Sheet,
-    /// What is being saved.
+    /// Captures being saved.
     pub(super) captures: Captures,
-    /// Where to.
+    /// Folder of the captures.
     pub(super) folder: PathBuf,
-    /// How clips are written.
+    /// File format of clips.
     pub(super) format: Format,
-    /// What is said of it.
+    /// Messages about captures.
     pub(super) notices: Notices,
     /// Name and driver of the device.
     device: String,
-    /// To be saved once the window has been drawn.
+    /// Capture to be saved once the window has been drawn.
     due: Option<Wanted>,
     last: Wanted,
     was_frozen: bool,
 }
 
 impl Tools {
-    /// For a device. Captures go to `folder`; `wake` is called, from another thread, when one has
-    /// come to its end.
+    /// The tools for a device. Captures go to `folder`; `wake` is called, from another thread, when one
+    /// has ended.
     pub(super) fn new(
         device: &DeviceInfo,
         folder: PathBuf,
@@ -64,7 +64,7 @@ impl Tools {
             cine: Cine::new(Limit { frames: FRAMES, bytes: BYTES.min(device.memory_bytes / 16) }),
             sheet: Sheet::default(),
             captures: Captures::new(wake),
-            // What is said of it names it in full.
+            // Messages name it in full.
             folder: std::path::absolute(&folder).unwrap_or(folder),
             format: Format::Gif,
             notices: Notices::default(),
@@ -75,7 +75,7 @@ impl Tools {
         }
     }
 
-    /// Keeps a finished image.
+    /// Adds a finished image to the loop.
     pub(super) fn record(&mut self, frame: Frame) {
         let is_like = |last: &Frame| {
             let field = |frame: &Frame| (frame.probe.kind, frame.probe.depth);
@@ -93,7 +93,7 @@ impl Tools {
         }
     }
 
-    /// The image to be shown now. Live it is the newest; frozen, the one that was chosen or that plays.
+    /// The image to be shown now: live the newest; frozen, the chosen or the playing one.
     pub(super) fn shown(&mut self, model: &Model, ctx: &egui::Context) -> Option<Frame> {
         if model.frozen != self.was_frozen {
             self.was_frozen = model.frozen;
@@ -110,7 +110,7 @@ impl Tools {
     }
 
     /// Moves the selected point by pixels of the image, or a quarter where `fine`, along the axis of the
-    /// key; whether there is one.
+    /// key; returns whether there is one.
     pub(super) fn nudge(&mut self, axis: Axis, steps: f64, fine: bool) -> bool {
         let Some(frame) = self.cine.shown() else {
             return false;
@@ -124,7 +124,7 @@ impl Tools {
         }
     }
 
-    /// Saves the image that is shown, once it has been drawn with its marks.
+    /// Saves the shown image, once it has been drawn with its marks.
     pub(super) fn want_still(&mut self) {
         (self.due, self.last) = (Some(Wanted::Still), Wanted::Still);
     }
@@ -134,17 +134,17 @@ impl Tools {
         (self.due, self.last) = (Some(Wanted::Clip), Wanted::Clip);
     }
 
-    /// Saves again what was to be saved last.
+    /// Saves the last content again.
     pub(super) fn want_again(&mut self) {
         self.due = Some(self.last);
     }
 
-    /// Whether a picture of the window is wanted.
+    /// Returns whether a picture of the window is wanted.
     pub(super) fn wants_shot(&self) -> bool {
         self.due == Some(Wanted::Still) && !self.sheet.marks().is_empty()
     }
 
-    /// Saves what is wanted. `marked` is the picture of the window around the image.
+    /// Saves the wanted content. `marked` is the picture of the window around the image.
     pub(super) fn save(&mut self, model: &Model, marked: Option<Shot>) {
         let Some(wanted) = self.due.take() else {
             return;
@@ -186,7 +186,7 @@ impl Tools {
                     && last.grade.counts == frame.grade.counts
             };
             if !last.is_some_and(same) {
-                // Where the probe was is said of each frame.
+                // The probe's pose is given with each frame.
                 let mut settings = settings(model, frame, None);
                 settings.insert("from_frame".into(), index.into());
                 all_settings.push(settings.into());
@@ -204,7 +204,7 @@ impl Tools {
         Clip { frames, sidecar, format: self.format }
     }
 
-    /// What pictures and clips say alike.
+    /// The text common to pictures and clips.
     fn about(&self, model: &Model, frame: &Frame) -> Sidecar {
         let [width, height, _] = frame.image.extent();
         let area = Area {
@@ -228,43 +228,40 @@ impl Tools {
         }
     }
 
-    /// Says what has become of captures.
+    /// Adds messages about ended captures.
     pub(super) fn collect(&mut self) {
         for outcome in self.captures.finished() {
             match outcome {
                 Ok(Some(file)) => self.notices.saved(format!("Saved {}", file.display())),
                 Ok(None) => self.notices.saved("Cancelled; nothing was saved".into()),
-                Err(error @ (CaptureError::File { .. } | CaptureError::Gpu(_))) => {
-                    self.notices.failed(error.to_string());
-                }
+                Err(error) => self.notices.failed(error.to_string()),
             }
         }
     }
 
-    /// Lets go of everything that a device holds.
+    /// Drops everything that a device holds.
     pub(super) fn lose(&mut self) {
         self.captures.wait();
         self.cine.clear();
     }
 }
 
-/// What of the scene file is to be replaced to get a frame again, as `--set` takes it, and the settings in
-/// full.
+/// Keys of the scene file to replace for the same frame, as `--set` takes them, and the settings in full.
 fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
-    // Those of the level that it was made at: they give this very image.
+    // The settings of the level that it was made at: they give this very image.
     let mut settings = (*frame.settings).clone();
     let counts = &frame.grade.counts;
     counts.set(&mut settings.probe, &mut settings.simulation, &mut settings.imaging);
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
-    let all = output::settings(&settings.probe, &settings.simulation, &settings.imaging);
+    let all = facts::settings(&settings.probe, &settings.simulation, &settings.imaging);
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
 }
 
 impl Frame {
-    /// The moment that it shows.
+    /// Pose and time of the frame.
     pub(super) fn moment(&self) -> Moment {
         Moment { pose: self.pose, seconds: self.seconds }
     }

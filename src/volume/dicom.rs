@@ -1,5 +1,5 @@
-//! DICOM files (PS3.3, PS3.5): enhanced ultrasound volumes and other images of several frames
-//! whose planes are placed, and single planes that are.
+//! DICOM files (PS3.3, PS3.5): enhanced ultrasound volumes and other images of several frames with
+//! placed planes, and single planes with a place.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ mod pixels;
 
 const SAVE: &str = "export it again, or convert it to .nrrd, .mha or .nii.gz";
 
-/// A file that has been taken apart.
+/// A file with its elements.
 struct Dicom<'p> {
     path: &'p Path,
     bytes: Vec<u8>,
@@ -93,7 +93,7 @@ pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
     Ok((volume, warnings))
 }
 
-/// Bytes of so many frames as they are here, if that is no more than is read.
+/// Size in bytes of so many frames once read; none where that is more than the limit.
 fn bytes_of(image: &Image, frames: usize) -> Option<u64> {
     let factors = [image.rows, image.columns, frames, image.samples, image.kind.bytes()];
     let product = factors.iter().try_fold(1u64, |p, &n| p.checked_mul(n as u64));

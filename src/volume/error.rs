@@ -1,18 +1,18 @@
-//! Errors of volume files: where, why, and what to do about it.
+//! Errors of volume files: place, cause, and remedy.
 
 use std::path::{Path, PathBuf};
 
 use miette::Diagnostic;
 use thiserror::Error;
 
-/// Where in a file a mistake lies.
+/// Place of a mistake in a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// The file as a whole.
     File,
     /// Line of a text header, from 1.
     Line(usize),
-    /// Byte of the file, or of what it holds compressed, from 0.
+    /// Byte of the file, or of its decompressed content, from 0.
     Byte(u64),
 }
 
@@ -21,13 +21,13 @@ pub enum Place {
 #[error("{}{message}", self.prefix())]
 #[diagnostic(help("{remedy}"))]
 pub struct VolumeError {
-    /// The file that is wrong: the header, or the data file that it names.
+    /// The faulty file: the header, or the data file that it names.
     pub file: PathBuf,
-    /// Where in it.
+    /// Place in it.
     pub place: Place,
     /// Cause.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     pub remedy: String,
 }
 

@@ -1,4 +1,4 @@
-//! Keys and values of a text header, each with its line.
+//! Keys and values of a text header, each with the number of its text line.
 
 use std::path::Path;
 use std::str::FromStr;
@@ -24,12 +24,12 @@ pub(super) struct Fields<'p> {
 }
 
 impl Fields<'_> {
-    /// The first field that is called by one of `keys`; case does not matter.
+    /// The first field with one of `keys`; case does not matter.
     pub fn find(&self, keys: &[&str]) -> Option<&Field> {
         self.list.iter().find(|f| keys.iter().any(|k| f.key.eq_ignore_ascii_case(k)))
     }
 
-    /// The field of this key, which has to be there.
+    /// The field of this key; an error where it is missing.
     pub fn need(&self, key: &str) -> Result<&Field, VolumeError> {
         self.find(&[key]).ok_or_else(|| {
             VolumeError::file(

@@ -1,12 +1,12 @@
-//! Where voxels lie: the one place where frames of files become LPS.
+//! Places of voxels: the only module that turns frames of files into LPS.
 
 use glam::{DAffine3, DMat3, DVec3};
 
-/// Smallest volume of the box that the unit vectors of the axes span; below it two axes are as
-/// good as parallel (three degrees apart, the third upright) and positions mean nothing.
+/// Smallest volume of the box that the unit vectors of the axes span; below it two axes are nearly
+/// parallel (three degrees apart, the third upright) and positions mean nothing.
 const MIN_DETERMINANT: f64 = 0.05;
 
-/// Anatomical frame that a file is written in. The letters say where x, y and z grow to.
+/// Anatomical frame of a file. The letters name the directions in which x, y and z grow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Frame {
     /// Left, posterior, superior: DICOM, ITK and this program.
@@ -29,7 +29,7 @@ impl Frame {
         }
     }
 
-    /// In words.
+    /// Name in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Lps => "LPS",
@@ -42,7 +42,7 @@ impl Frame {
 
 /// Position of voxels in the frame and the unit of a file.
 pub(super) struct Grid {
-    /// Step from a voxel to the next along each axis.
+    /// Step from one voxel to the next along each axis.
     pub steps: [DVec3; 3],
     /// Centre of the first voxel.
     pub origin: DVec3,
@@ -53,10 +53,10 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Voxel indices (integers at centres) to LPS in mm.
+    /// Transform from voxel indices (integers at centres) to LPS in mm.
     ///
     /// # Errors
-    /// What is wrong with the numbers, in words.
+    /// The fault of the numbers.
     pub fn world_from_voxel(&self) -> Result<DAffine3, String> {
         let finite = self.steps.iter().all(|s| s.is_finite()) && self.origin.is_finite();
         if !finite {
@@ -69,7 +69,7 @@ impl Grid {
         }
         let [a, b, c] = self.steps.map(DVec3::normalize);
         let determinant = DMat3::from_cols(a, b, c).determinant();
-        // Also false for a step so short that it has no direction.
+        // Also false for a step too short to have a direction.
         if !determinant.is_finite() || determinant.abs() < MIN_DETERMINANT {
             return Err(format!("the direction is singular: its unit axes span {determinant:.4}"));
         }
@@ -79,8 +79,8 @@ impl Grid {
     }
 }
 
-/// Steps of a volume of two or three axes whose directions are the rows of `rows` (`n` by `n`,
-/// n at least 2; what lies beyond three is left out), of these spacings.
+/// Steps of a volume of two or three axes with these spacings, whose directions are the rows of `rows`
+/// (`n` by `n`, n at least 2; parts beyond three are ignored).
 pub(super) fn steps(n: usize, rows: &[f64], spacings: &[f64]) -> [DVec3; 3] {
     std::array::from_fn(|axis| {
         if axis >= n {

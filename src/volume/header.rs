@@ -1,4 +1,4 @@
-//! What the headers of all formats come to, and the volume that it makes.
+//! The common content of the headers of all formats, and the volume made from it.
 
 use std::path::Path;
 
@@ -9,19 +9,19 @@ use super::source::{Coding, MAX_BYTES, Payload};
 use super::voxels::{self, VoxelType, Voxels};
 use super::{Format, Statistics, Volume, Warning};
 
-/// Most volumes over time: twice what an axis of NIfTI-1 can count. Each takes memory beside its voxels.
+/// Most volumes over time: twice the largest count of an axis in NIfTI-1. Each takes memory beside its voxels.
 const MAX_VOLUMES: usize = 1 << 16;
 
-/// A header that has been read and found sound in itself.
+/// A header that has been read and checked by itself.
 pub(super) struct Header {
     pub format: Format,
     pub kind: VoxelType,
     pub big_endian: bool,
     pub layout: Layout,
-    /// Time from one volume to the next, s, where it is stated.
+    /// Time from one volume to the next, s, where stated.
     pub interval: Option<f64>,
     pub grid: Grid,
-    /// Slope and intercept of values, where they are not as written.
+    /// Slope and intercept of values, where they have an effect.
     pub scale: Option<(f64, f64)>,
     pub payload: Payload,
     pub warnings: Vec<Warning>,
@@ -33,7 +33,7 @@ impl Header {
         self.warnings.push(Warning::warning(path, count, message, remedy));
     }
 
-    /// Reads the voxels of all volumes, of each the first of its values.
+    /// Reads the voxels of all volumes; of several values per voxel the first.
     pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
         let world_from_voxel = self.grid.world_from_voxel().map_err(|cause| {
             VolumeError::file(path, cause, "correct the direction or export it again")
@@ -90,7 +90,7 @@ impl Header {
         Ok((volume, self.warnings))
     }
 
-    /// Bytes of all values in the file, if neither they nor what is held of them is too much.
+    /// Size in bytes of all values in the file; an error where that, or the size in memory, is too large.
     fn bytes(&self, path: &Path) -> Result<u64, VolumeError> {
         let layout = &self.layout;
         if layout.volumes > MAX_VOLUMES {
@@ -128,7 +128,7 @@ impl Header {
     }
 }
 
-/// A warning about keys that mean nothing here, if there are any.
+/// A warning about keys that are not used here, if there are any.
 pub(super) fn unused(path: &Path, keys: &[&str]) -> Option<Warning> {
     let named = keys.iter().take(3).copied().collect::<Vec<_>>().join(", ");
     let dots = if keys.len() > 3 { ", ..." } else { "" };

@@ -1,6 +1,6 @@
-//! Where values lie in a file: axes of space, of time and others, in any order.
+//! Layout of values in a file: axes of space, of time and others, in any order.
 
-/// What an axis of a file counts.
+/// Meaning of an axis of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Axis {
     /// Voxels along an axis of space.
@@ -11,7 +11,7 @@ pub(super) enum Axis {
     Values,
 }
 
-/// Sizes of what is read, and how far apart its values lie.
+/// Sizes of the volumes, and distances of their values in the file.
 pub(super) struct Layout {
     /// Voxels along each axis.
     pub size: [usize; 3],
@@ -26,8 +26,8 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Axes as they follow in the file, the fastest first, each with its size: up to three of space,
-    /// one of time at most. A product beyond all numbers stays at the largest, which no file holds.
+    /// The layout for axes in the file's order, the fastest first, each with its size: up to three of space, at
+    /// most one of time. A product beyond the number range stays at its maximum, which no file holds.
     pub fn new(axes: impl IntoIterator<Item = (Axis, usize)>) -> Self {
         let mut out = Self { size: [1; 3], volumes: 1, channels: 1, steps: [0; 3], pace: 0 };
         let (mut space, mut step) = (0, 1usize);
@@ -45,18 +45,18 @@ impl Layout {
         out
     }
 
-    /// Voxels of one volume, if that is a number.
+    /// Number of voxels of one volume; none beyond the number range.
     pub fn voxels(&self) -> Option<u64> {
         product(&self.size)
     }
 
-    /// All values of the file, if that is a number.
+    /// Number of all values of the file; none beyond the number range.
     pub fn values(&self) -> Option<u64> {
         let [x, y, z] = self.size;
         product(&[x, y, z, self.volumes, self.channels])
     }
 
-    /// Takes planes that follow each other in time for the slices of one volume.
+    /// Turns planes that follow each other in time into the slices of one volume.
     pub fn stack(&mut self) {
         assert_eq!(self.size[2], 1, "planes");
         (self.size[2], self.steps[2]) = (self.volumes, self.pace);

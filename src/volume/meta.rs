@@ -1,5 +1,5 @@
-//! MetaImage headers (.mha, .mhd), as MetaIO and ITK read them: the rows of the direction matrix
-//! are the directions of the axes, and the frame is LPS.
+//! MetaImage headers (.mha, .mhd), as MetaIO and ITK read them: the rows of the direction matrix are the
+//! directions of the axes, and the frame is LPS.
 
 use std::path::Path;
 
@@ -19,8 +19,8 @@ const MAX_AXES: usize = 10;
 const ORIGIN: [&str; 3] = ["Offset", "Position", "Origin"];
 const DIRECTION: [&str; 3] = ["TransformMatrix", "Rotation", "Orientation"];
 const BIG_ENDIAN: [&str; 2] = ["BinaryDataByteOrderMSB", "ElementByteOrderMSB"];
-/// Keys that are used, or that change nothing here. `AnatomicalOrientation` names the axes, which
-/// the direction gives exactly.
+/// Keys that are used, or that have no effect here. `AnatomicalOrientation` names the axes, which the
+/// direction gives exactly.
 const KNOWN: [&str; 29] = [
     "ObjectType",
     "ObjectSubType",
@@ -66,7 +66,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     Ok(out)
 }
 
-/// The header that these fields make; the voxels follow byte `data` if they are in the same file.
+/// The header made of these fields; the voxels follow byte `data` if they are in the same file.
 pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeError> {
     if let Some(object) = fields.find(&["ObjectType"])
         && !object.value.eq_ignore_ascii_case("Image")
@@ -81,7 +81,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
     let dims = fields.sizes(fields.need("DimSize")?, n)?;
     let stated = fields.find(&["ElementSpacing", "ElementSize"]);
     let stated = stated.map(|f| fields.spacings(f, n)).transpose()?;
-    // ITK and what is built on it write seconds.
+    // ITK and programs based on it write seconds.
     let interval = stated.as_ref().and_then(|s| s.get(3)).copied();
     let spacings = stated.unwrap_or_else(|| vec![1.0; n]);
     let identity = || (0..n * n).map(|i| f64::from(u8::from(i % (n + 1) == 0))).collect();
@@ -115,7 +115,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
     })
 }
 
-/// Fields up to the one that says where the voxels are, and the byte after it.
+/// Fields up to the one with the place of the voxels, and the byte after it.
 pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
     let bytes = source::prefix(path, MAX_HEADER)?;
     let mut list = Vec::new();
@@ -156,7 +156,7 @@ fn truth(field: &Field) -> bool {
 
 fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
     let field = fields.need("ElementType")?;
-    // MetaIO: a LONG has 32 bits in files.
+    // In MetaIO a LONG has 32 bits in files.
     Ok(match field.value.trim_end_matches("_ARRAY") {
         "MET_UCHAR" => VoxelType::U8,
         "MET_CHAR" => VoxelType::I8,
@@ -230,8 +230,8 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
     })
 }
 
-/// A warning where the third axis is none of space: a plane, or frames of a sequence. Plus calls
-/// the third axis of reconstructed volumes a list as well; only sequences have fields per frame.
+/// A warning where the third axis is not one of space: a plane, or frames of a sequence. Plus also calls
+/// the third axis of reconstructed volumes a list; only sequences have fields per frame.
 fn stacked(fields: &Fields) -> Option<Warning> {
     let axes = fields.find(&["NDims"]).map(|f| f.value.as_str());
     let message = match (axes, frames::in_header(fields)) {
@@ -248,7 +248,7 @@ fn stacked(fields: &Fields) -> Option<Warning> {
     ))
 }
 
-/// Fields whose keys mean nothing to a volume, but those of frames.
+/// Fields whose keys are not used for a volume, except those of frames.
 pub(super) fn unused_keys<'f>(fields: &'f Fields) -> Vec<&'f Field> {
     let known = KNOWN.iter().chain(&ORIGIN).chain(&DIRECTION).chain(&BIG_ENDIAN);
     let known: Vec<_> = known.collect();

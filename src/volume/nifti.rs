@@ -57,7 +57,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     };
     let raw = raw(path, &payload)?;
     let offset = raw.f32(108);
-    // A float that has to hold a position: 0 means the end of the header.
+    // A position as a float: 0 means the end of the header.
     if !(offset == 0.0 || (LENGTH as f64..1e9).contains(&offset)) {
         let message = format!("vox_offset is {offset}: the voxels cannot begin there");
         return Err(raw.error(108, message, EXPORT));
@@ -66,7 +66,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     let dims = dims(&raw)?;
     let (kind, channels) = kind(&raw)?;
     let (slope, intercept) = (raw.f32(112), raw.f32(116));
-    // A slope of 0 means that nothing is scaled.
+    // A slope of 0 means no scaling.
     let scale = (slope != 0.0 && (slope, intercept) != (1.0, 0.0)).then_some((slope, intercept));
     if !(slope.is_finite() && intercept.is_finite()) {
         return Err(raw.error(112, "scl_slope or scl_inter is not a finite number", EXPORT));
@@ -153,7 +153,7 @@ fn dims(raw: &Raw) -> Result<Vec<usize>, VolumeError> {
     .collect()
 }
 
-/// Type and values per voxel.
+/// Type and number of values per voxel.
 fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
     let code = raw.i16(70);
     let (kind, channels) = match code {
@@ -180,7 +180,7 @@ fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
     Ok((kind, channels))
 }
 
-/// Time from one volume to the next, s, where the fourth axis is one of time and says it; and whether
+/// Time from one volume to the next, s, where the fourth axis is one of time and states it; and whether
 /// its unit is assumed.
 fn interval(raw: &Raw) -> Result<(Option<f64>, bool), VolumeError> {
     let stated = raw.f32(92) as f32;
@@ -189,7 +189,7 @@ fn interval(raw: &Raw) -> Result<(Option<f64>, bool), VolumeError> {
             format!("pixdim[4] is {stated}: the time between volumes has to be above zero");
         return Err(raw.error(92, message, "state it, or 0 where it is not known"));
     }
-    // The decimal that was meant: 0.05 s has no exact binary value, and many of them make a period.
+    // The intended decimal: 0.05 s has no exact binary value, and many of them make a period.
     let stated: f64 = stated.to_string().parse().expect("a number");
     let per_second = match raw.bytes[123] & 0x38 {
         0 | 8 => 1.0,
@@ -242,7 +242,7 @@ fn grid(raw: &Raw) -> Result<(Grid, bool), VolumeError> {
     let unit = match raw.bytes[123] & 7 {
         1 => 1e3,
         3 => 1e-3,
-        // mm, or not stated, which is mm with everybody.
+        // mm, or not stated, which everybody takes for mm.
         _ => 1.0,
     };
     let grid = Grid { steps, origin, frame: Frame::Ras, unit };

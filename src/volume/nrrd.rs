@@ -17,7 +17,7 @@ mod space;
 /// Most axes of a NRRD file (`NRRD_DIM_MAX`).
 const MAX_AXES: usize = 16;
 
-/// Fields that are used, or that change nothing here.
+/// Fields that are used, or that have no effect here.
 const KNOWN: [&str; 32] = [
     "type",
     "dimension",

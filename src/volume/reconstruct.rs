@@ -1,5 +1,5 @@
-//! A volume from tracked frames: each pixel goes to the voxels it lies in, and what no pixel
-//! reached is filled from its surroundings. The method, its settings and their names are those of
+//! A volume from tracked frames: each pixel goes to the voxels at its place, and voxels that no pixel
+//! reached are filled from their surroundings. The method, its settings and their names are those of
 //! PLUS (vtkIGSIOVolumeReconstructor; Lasso et al., IEEE Trans. Biomed. Eng. 61:2527, 2014).
 
 use glam::{DAffine3, DVec3};
@@ -21,14 +21,14 @@ pub use fan::Fan;
 pub use grid::Lattice;
 pub use poses::Transforms;
 
-/// Why nothing can be reconstructed.
+/// The reason why nothing can be reconstructed.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{message}")]
 #[diagnostic(help("{remedy}"))]
 pub struct ReconstructError {
     /// Cause.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     pub remedy: String,
 }
 
@@ -38,16 +38,16 @@ impl ReconstructError {
     }
 }
 
-/// Where a pixel goes.
+/// Distribution of a pixel over voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Interpolation {
-    /// To the voxel that it lies in.
+    /// To the voxel at its place.
     Nearest,
     /// To the eight voxels around it, by the weights of trilinear interpolation.
     Linear,
 }
 
-/// What a voxel is that several pixels reach.
+/// Value of a voxel that several pixels reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Compounding {
     /// Their mean, by the weights of the interpolation.
@@ -58,19 +58,19 @@ pub enum Compounding {
     Latest,
 }
 
-/// A way to fill a voxel that no pixel reached.
+/// A method to fill a voxel that no pixel reached.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Filling {
-    /// Between two voxels that pixels reached, opposite to each other along one of the 13 lines
-    /// through neighbours: of the shortest such lines, `count` at least, the mean.
+    /// Interpolation between two reached voxels, opposite to each other along one of the 13 lines through
+    /// neighbours: the mean over the shortest such lines, at least `count`.
     Stick {
-        /// Voxels from the one to the other at most, with both.
+        /// Most voxels from one end to the other, both included.
         length: usize,
         /// Lines to use.
         count: usize,
     },
-    /// The mean of those nearest in a cube of at most `size` voxels along each side, where they
-    /// are more than `share` of that cube.
+    /// Mean of the nearest reached voxels in a cube of at most `size` voxels along each side, where they are
+    /// more than `share` of that cube.
     Nearest {
         /// Voxels along a side, odd.
         size: usize,
@@ -79,12 +79,12 @@ pub enum Filling {
     },
 }
 
-/// How to reconstruct.
+/// Settings of a reconstruction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Distance of voxel centres, mm.
     pub spacing: DVec3,
-    /// Centre of the first voxel (mm) and voxels along each axis. None: what holds all frames.
+    /// Centre of the first voxel (mm) and voxels along each axis. None: a volume that holds all frames.
     pub lattice: Option<(DVec3, [usize; 3])>,
     /// Rectangle of the frame to use: x, y, width and height in pixels.
     pub clip: Option<[i32; 4]>,
@@ -92,18 +92,18 @@ pub struct Settings {
     pub fan: Option<Fan>,
     /// Pixels below this value are left out.
     pub reject_below: Option<f64>,
-    /// Every how many frames one is used, from 1.
+    /// Step through the frames, from 1: 2 uses every second one.
     pub every: usize,
-    /// Where a pixel goes.
+    /// Distribution of a pixel over voxels.
     pub interpolation: Interpolation,
-    /// What a voxel is that several pixels reach.
+    /// Value of a voxel that several pixels reach.
     pub compounding: Compounding,
-    /// What is done for voxels that no pixel reached; the first that succeeds.
+    /// Methods for voxels that no pixel reached; the first that succeeds counts.
     pub holes: Vec<Filling>,
 }
 
 impl Settings {
-    /// Nearest voxels, their mean, sticks of 9 voxels, everything that the frames show.
+    /// Nearest voxels, means, sticks of 9 voxels, everything that the frames show.
     pub fn new(spacing: DVec3) -> Self {
         Self {
             spacing,
@@ -119,24 +119,24 @@ impl Settings {
     }
 }
 
-/// A reconstructed volume and how it came about.
+/// A reconstructed volume, and counts.
 #[derive(Clone, Debug)]
 pub struct Reconstruction {
     /// The volume, along the axes of the frame of reference.
     pub volume: Volume,
-    /// Frames that went into it; the others have no image or no pose.
+    /// Number of frames used; the others have no image or no pose.
     pub frames: usize,
-    /// Voxels that pixels reached.
+    /// Number of voxels that pixels reached.
     pub reached: usize,
-    /// Voxels that were filled. Of all others the value is 0.
+    /// Number of filled voxels. All others are 0.
     pub filled: usize,
 }
 
-/// Voxels that hold 8 bytes here and up to 4 in the result.
+/// Most voxels: each takes 8 bytes here and up to 4 in the result.
 const MAX_VOXELS: u64 = MAX_BYTES / 12;
 
-/// Reconstructs a volume. `reference_from_image` has one entry per frame: from pixels (integers at
-/// their centres) to mm in the frame of reference, none where it is unknown ([`Transforms`]).
+/// Reconstructs a volume. `reference_from_image` has one entry per frame: from pixels (integers at their
+/// centres) to mm in the frame of reference, none where unknown ([`Transforms`]).
 ///
 /// # Errors
 /// When no frame has both image and pose, when the orientation of the pixels is none of a B-mode
@@ -188,7 +188,7 @@ pub fn reconstruct(
     })
 }
 
-/// Values of the type of `pixels`, rounded to nearest.
+/// The values in the type of `pixels`, rounded to nearest.
 fn like(pixels: &Voxels, values: &[f32]) -> Voxels {
     let rounded = values.iter().map(|v| v.round());
     match pixels {

@@ -1,4 +1,4 @@
-//! What `insonify check` says of a volume.
+//! The text of `insonify check` about a volume.
 
 use std::fmt;
 
@@ -13,7 +13,7 @@ fn vector(v: DVec3) -> String {
 }
 
 impl fmt::Display for Volume {
-    /// Format, type, size, placement in LPS and mm, and values, line by line.
+    /// Writes format, type, size, placement in LPS and mm, and values, a row each.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let [x, y, z] = self.size;
         let spacing = self.spacing();

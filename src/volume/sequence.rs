@@ -13,7 +13,7 @@ mod summary;
 pub use frames::{Pose, TrackedFrame};
 pub use summary::Summary;
 
-/// Frames of one size with what was tracked at each.
+/// Frames of one size with the tracked poses of each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sequence {
     /// Pixels along x and y.
@@ -21,20 +21,20 @@ pub struct Sequence {
     /// `ElementSpacing`, mm. PLUS writes 1 here; the size of a pixel is then in the transform from
     /// `Image` to the probe.
     pub spacing: [f64; 2],
-    /// `UltrasoundImageOrientation`: where x and y of the pixels point to, e.g. `MF` for marked
-    /// and far (the frame of PLUS's `Image`).
+    /// `UltrasoundImageOrientation`: directions of x and y of the pixels, e.g. `MF` for marked and far (the
+    /// frame of PLUS's `Image`).
     pub orientation: Option<String>,
     /// Pixels of all frames, x fastest, frames one after another.
     pub pixels: Voxels,
     /// One entry per frame.
     pub frames: Vec<TrackedFrame>,
-    /// Keys of the header that mean nothing here, in the order of the file.
+    /// Keys of the header that are not used here, in the order of the file.
     pub fields: Vec<(String, String)>,
 }
 
 const ORIENTATION: &str = "UltrasoundImageOrientation";
 
-/// Keys of a header that mean something where its slices are frames.
+/// Keys of a header that are used where its slices are frames.
 pub(super) const KEYS: [&str; 6] = {
     let [a, b, c, d] = fan::KEYS;
     [ORIENTATION, "UltrasoundImageType", a, b, c, d]

@@ -6,12 +6,12 @@ use super::error::VolumeError;
 use super::source::MAX_BYTES;
 use super::{Statistics, Volume, Warning};
 
-/// What positions of equal grids may differ by, voxels: files round them.
+/// Largest difference of positions between equal grids, voxels: files round them.
 const SAME_PLACE: f64 = 0.01;
 
 impl Volume {
     /// Reads one file, of one volume or several over time, or several files of one volume each, in the
-    /// order of time. These must agree in grid and type. The same warning about several files is given
+    /// order of time. The files must agree in grid and type. A warning about several files is given
     /// once.
     ///
     /// # Errors
@@ -45,7 +45,7 @@ impl Volume {
         Ok((series, warnings))
     }
 
-    /// This volume and those that follow it every `interval` seconds, as one over time.
+    /// One volume over time: this one, and those that follow it every `interval` seconds.
     ///
     /// # Panics
     /// When they differ in size.
@@ -69,10 +69,10 @@ impl Volume {
         }
     }
 
-    /// Fails where `count` volumes like this one, of `file`, are more than is read.
+    /// Fails where `count` volumes like this one, of `file`, exceed the size limit.
     ///
     /// # Errors
-    /// That they are.
+    /// They exceed it.
     pub fn fits(&self, count: usize, file: &Path) -> Result<(), VolumeError> {
         let each = (self.voxels.len() * self.voxels.kind().bytes()) as u64;
         match each.checked_mul(count as u64) {
@@ -89,7 +89,7 @@ impl Volume {
         }
     }
 
-    /// In what `next` is not like this volume, in words that `in FILE` may follow.
+    /// The difference of `next` from this volume, in words that `in FILE` may follow.
     fn difference(&self, next: &Self) -> Option<String> {
         let size = |v: &Self| {
             let [x, y, z] = v.size;

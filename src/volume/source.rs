@@ -9,23 +9,23 @@ use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
 use super::error::VolumeError;
 
-/// Largest volume that is read, bytes of all its frames and channels: what fits comfortably
-/// beside the rest in the memory of a workstation.
+/// Largest volume that is read, bytes of all its frames and channels: small enough to lie beside the rest in
+/// the memory of a workstation.
 pub(super) const MAX_BYTES: u64 = 4 << 30;
-/// Bytes that one byte of DEFLATE can stand for at most: a match of 258 bytes costs two bits
+/// Most bytes for one byte of DEFLATE: a match of 258 bytes costs two bits
 /// (zlib technical details, "Maximum Compression Factor").
 pub(super) const MAX_RATIO: u64 = 1032;
 /// Longest text header, bytes. Tracked sequences of some hundred frames reach 1 MB.
 pub(super) const MAX_HEADER: u64 = 8 << 20;
-/// Bytes that may precede compressed data which are counted from their end.
+/// Most bytes before compressed data that are skipped by counting from the end.
 const MAX_LEAD: u64 = 1 << 20;
 
 const AGAIN: &str = "export or copy it again";
 
-/// How voxels are written.
+/// Encoding of voxels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Coding {
-    /// As they are.
+    /// Plain bytes.
     Raw,
     /// A gzip stream.
     Gzip,
@@ -42,28 +42,28 @@ pub(super) enum Coding {
 /// Bytes before the first voxel, after decompression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Skip {
-    /// So many.
+    /// This number of bytes.
     Bytes(u64),
     /// The voxels are the last bytes.
     AllButLast,
 }
 
-/// Where voxels lie and how.
+/// Place and encoding of voxels.
 #[derive(Clone, Debug)]
 pub(super) struct Payload {
     /// File that holds them.
     pub file: PathBuf,
-    /// Byte of the file after which the lines are counted.
+    /// Byte of the file from which the text lines are counted.
     pub offset: u64,
-    /// Lines of text before the voxels.
+    /// Number of text lines before the voxels.
     pub lines: u64,
     /// Bytes before the voxels.
     pub skip: Skip,
-    /// How they are written.
+    /// Encoding of the voxels.
     pub coding: Coding,
 }
 
-/// An ordinary file and its length. Pipes and devices, which may never end, are refused.
+/// A regular file and its length. Pipes and devices, which may never end, are refused.
 pub(super) fn open(path: &Path) -> Result<(File, u64), VolumeError> {
     let unreadable = |e: io::Error| {
         VolumeError::file(
@@ -103,7 +103,7 @@ pub(super) fn detached(header: &Path, name: &str) -> Result<PathBuf, String> {
     }
 }
 
-/// Bytes from hexadecimal digits; white space between them means nothing.
+/// Bytes from hexadecimal digits; white space between them is ignored.
 struct Hex<R>(R);
 
 impl<R: BufRead> Hex<R> {
@@ -136,8 +136,8 @@ impl<R: BufRead> Read for Hex<R> {
 }
 
 impl Payload {
-    /// Opens the stream of voxels and checks that it can hold `total` bytes, or in text as many
-    /// numbers. The voxels begin where the stream stands, unless they are its last bytes.
+    /// Opens the stream of voxels and checks that it can hold `total` bytes, or in text as many numbers. The
+    /// voxels begin at the present place of the stream, unless they are its last bytes.
     pub fn stream(&self, total: u64) -> Result<Box<dyn Read>, VolumeError> {
         let (mut file, len) = open(&self.file)?;
         let broken = |e: io::Error| self.broken(0, total, &e);
@@ -158,7 +158,7 @@ impl Payload {
             Coding::Text => held.div_ceil(2),
             Coding::Hex => held / 2,
             Coding::Gzip | Coding::Zlib => held.saturating_mul(MAX_RATIO),
-            // Runs of runs have no bound worth the name; it is unpacked up to what is declared.
+            // Runs of runs have no useful bound; it is unpacked up to the declared size.
             Coding::Bzip2 => u64::MAX,
         };
         let lead = match self.skip {
@@ -190,7 +190,7 @@ impl Payload {
         Ok(stream)
     }
 
-    /// The `total` bytes, and whether more follow. Of a compressed stream at most one byte more is
+    /// The `total` bytes, and whether more follow. At most one byte more of a compressed stream is
     /// unpacked.
     pub fn read(&self, total: u64) -> Result<(Vec<u8>, bool), VolumeError> {
         let mut stream = self.stream(total)?;

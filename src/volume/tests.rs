@@ -1,4 +1,4 @@
-//! Files written here, by other code than what reads them.
+//! Tests of the readers; the files are written here by other code than the readers'.
 
 use std::io::Write;
 use std::path::PathBuf;
@@ -60,7 +60,7 @@ fn meta(more: &str, data: &[u8]) -> Vec<u8> {
     out
 }
 
-/// `space` with the signs that turn its coordinates into LPS.
+/// A NRRD file in `space`, with the signs that turn its coordinates into LPS.
 fn nrrd(space: &str, signs: DVec3, more: &str, data: &[u8]) -> Vec<u8> {
     let vector = |v: DVec3| format!("({},{},{})", v.x * signs.x, v.y * signs.y, v.z * signs.z);
     let m = placement().matrix3;
@@ -181,7 +181,7 @@ fn every_format_and_encoding_is_the_same_volume() {
     let beside = "HeaderSize = -1\nElementDataFile = a.raw";
     let detached = "endian: little\nencoding: raw\nline skip: 1\ndata file: ./a.raw";
     let (lps, las) = ("left-posterior-superior", DVec3::new(1.0, -1.0, 1.0));
-    // Decimal text repeats an f64 exactly; what is left is the rounding of a product.
+    // Decimal text repeats an f64 exactly; only a product is rounded.
     let exact = 1e-12;
     folder.same("a.mha", &meta(LOCAL, &bytes(false)), exact);
     folder.same("b.mha", &meta(BIG, &bytes(true)), exact);
@@ -222,7 +222,7 @@ fn bounds_spacing_and_values_are_those_of_whole_voxels() {
     assert_eq!(volume.bounds(), (DVec3::new(0.5, 0.0, -0.5), DVec3::new(2.5, 4.0, 2.5)));
     assert_eq!(volume.spacing(), DVec3::new(1.0, 2.0, 3.0));
     let Statistics { min, max, mean, not_finite } = volume.statistics;
-    // Of all three volumes.
+    // The values are those of all three volumes.
     assert_eq!((min, max, not_finite), (1.0, 12.0, 1));
     assert!((mean - 74.0 / 11.0).abs() < 1e-12, "{mean}");
     assert_eq!((volume.volumes().count(), volume.interval), (3, None));

@@ -36,7 +36,7 @@ impl VoxelType {
         self.bytes().min(4)
     }
 
-    /// In words.
+    /// Name in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::U8 => "8-bit unsigned integer",
@@ -51,8 +51,8 @@ impl VoxelType {
     }
 }
 
-/// Values, first axis fastest. 8- and 16-bit integers stay what they are; everything else is f32,
-/// which is what a 3D texture can hold.
+/// Values, first axis fastest. 8- and 16-bit integers are kept as such; everything else is f32, which a 3D
+/// texture can hold.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(missing_docs)]
 pub enum Voxels {
@@ -95,12 +95,12 @@ impl Voxels {
         values!(self, v => v.len())
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Type of the values as they are here.
+    /// Type of the values as held here.
     pub fn kind(&self) -> VoxelType {
         match self {
             Self::U8(_) => VoxelType::U8,
@@ -135,7 +135,7 @@ impl Voxels {
         Self::F32(values!(self, v => v.iter().map(|&x| scale(f64::from(x))).collect()))
     }
 
-    /// One of the volumes in these bytes. Also how many values were rounded.
+    /// One of the volumes in these bytes, and the number of rounded values.
     pub(super) fn decode(
         bytes: &[u8],
         kind: VoxelType,
@@ -201,7 +201,7 @@ fn statistics(values: impl Iterator<Item = f64>) -> Statistics {
 }
 
 impl Statistics {
-    /// Those of all these volumes together.
+    /// Range and mean of all these volumes together.
     pub(super) fn of<'v>(volumes: impl IntoIterator<Item = &'v Voxels>) -> Self {
         let (mut out, mut count) = (statistics(std::iter::empty()), 0);
         for voxels in volumes {

@@ -17,7 +17,7 @@ pub(super) struct Header(String);
 
 /// The shortest text that reads back as the same number.
 pub(super) fn number(value: f64) -> String {
-    // Without an exponent a tiny number would be a line of zeros.
+    // Without an exponent a tiny number would be a row of zeros.
     if value == 0.0 || (1e-5..1e17).contains(&value.abs()) {
         value.to_string()
     } else {
@@ -26,7 +26,7 @@ pub(super) fn number(value: f64) -> String {
 }
 
 impl Header {
-    /// The entries that depend on the voxels alone.
+    /// A header with the entries that depend on the voxels alone.
     pub fn new(voxels: &Voxels, axes: usize) -> Self {
         let kind = match voxels.kind() {
             VoxelType::U8 => "MET_UCHAR",
@@ -94,8 +94,8 @@ impl Header {
     }
 }
 
-/// Writes a volume, or several over time, as MetaImage (.mha). Voxels read back equal, the placement to
-/// the rounding of 64-bit products.
+/// Writes a volume, or several over time, as MetaImage (.mha). Voxels read back equal, the placement equal
+/// within the rounding of 64-bit products.
 ///
 /// # Errors
 /// When the name is not .mha, or the file cannot be written.
@@ -109,7 +109,7 @@ pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
     let mut spacing = volume.spacing().to_array().to_vec();
     let mut origin = volume.world_from_voxel.translation.to_array().to_vec();
     let [i, j, k] = volume.directions();
-    // MetaImage lists the direction of one axis after that of the other.
+    // MetaImage lists the direction of one axis after another.
     let mut directions = DMat3::from_cols(i, j, k).to_cols_array().to_vec();
     let mut kinds = "domain domain domain".to_owned();
     if !volume.later.is_empty() {

@@ -9,7 +9,7 @@ use assert_cmd::Command;
 const SECONDS: u64 = 10;
 const KILOBYTES: u32 = 1 << 20;
 
-/// Exit code (none: killed or out of time) and what was printed.
+/// Exit code (none: killed or out of time) and printed text.
 pub struct Outcome {
     pub code: Option<i32>,
     pub text: String,
@@ -34,7 +34,7 @@ pub fn limited(script: &str, path: &Path) -> Outcome {
     Outcome { code: output.status.code(), text: String::from_utf8_lossy(&text).into_owned() }
 }
 
-/// Files below a folder that `wanted` takes, in a fixed order.
+/// Files below a folder that `wanted` accepts, in a fixed order.
 pub fn files(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Vec<PathBuf> {
     let (mut out, mut todo) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(folder) = todo.pop() {

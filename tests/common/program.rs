@@ -1,9 +1,9 @@
-//! The program as a user runs it.
+//! The program, run as by a user.
 
 use std::path::Path;
 use std::process::Command;
 
-/// Runs `insonify` in a folder: whether it went well, and all that it said, in one line, since errors
+/// Runs `insonify` in a folder; returns whether it succeeded, and all its output in one line of text, since errors
 /// are wrapped to the terminal's width.
 pub fn insonify(folder: &Path, args: &[&str]) -> (bool, String) {
     let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));

@@ -1,12 +1,15 @@
-//! Data of others that some tests read and that does not ship.
+//! Data of others that some tests read and that do not ship.
+
+#[path = "skip.rs"]
+mod skip;
 
 use std::path::{Path, PathBuf};
 
-/// The folder; without it nothing, and it is said.
+/// The folder of the data; none without it, with a message.
 pub fn shared_data() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data");
     if !folder.is_dir() {
-        println!("skipped: no shared data");
+        skip::skip(skip::Lacking::Data, "no shared data");
         return None;
     }
     Some(folder)

@@ -1,9 +1,9 @@
-//! What tests of levels and image formation share: a scene of one tissue, random numbers.
+//! Helpers of tests of levels and image formation: a scene of one tissue, random numbers.
 
 use insonify::probe::Probe;
 use insonify::scene::{Scene, Tissue};
 
-/// Fully developed speckle of liver's attenuation at `echogenicity` dB, without texture.
+/// A tissue of fully developed speckle, with liver's attenuation, at `echogenicity` dB, without texture.
 pub fn tissue(echogenicity: f64) -> Tissue {
     Tissue {
         speed: 1.54,
@@ -15,7 +15,7 @@ pub fn tissue(echogenicity: f64) -> Tissue {
     }
 }
 
-/// That tissue everywhere, seen with `probe`.
+/// A scene of that tissue everywhere, seen with `probe`.
 pub fn scene(probe: Probe) -> Scene {
     Scene::homogeneous(tissue(0.0), probe)
 }

@@ -1,6 +1,6 @@
-//! `docs/scenes.md` against the program: every key, type, choice, default, range, preset and
-//! shipped tissue, and the examples. The program is asked through what it says to mistakes, so
-//! that a key added to the schema is missed here without anyone listing it.
+//! `docs/scenes.md` against the program: every key, type, choice, default, range, preset and shipped tissue,
+//! and the examples. The program is asked through its messages about mistakes, so that a key added to the
+//! schema is missed here without a list of keys.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -56,10 +56,10 @@ fn rows(document: &str) -> Vec<Row<'_>> {
     out
 }
 
-/// What is wrong with the tables of keys.
+/// Faults of the tables of keys.
 fn of_keys(document: &str, schema: &BTreeMap<String, Takes>) -> Vec<String> {
     let mut faults = Vec::new();
-    // What has a row in the program is written by it.
+    // The rows of keys with a row in the program are written by the program.
     let mut named = settings::keys();
     for row in rows(document).iter().filter(|r| r.head[0] == "Key") {
         let &[key, kind, default, stated, _] = row.cells.as_slice() else {
@@ -133,7 +133,7 @@ fn document() -> String {
 fn the_reference_names_every_key_as_the_program_takes_it() {
     let mut schema = BTreeMap::new();
     explore("", "", "", &mut schema);
-    // Any number among the settings.
+    // Any number among the settings is allowed.
     schema.retain(|key, _| !key.starts_with("vary.") && !key.starts_with("sweep."));
     let depth = |path: &str| schema.keys().filter(|k| k.starts_with(path)).count();
     assert!(depth("mesh.shape.") >= 10 && depth("tissues.NAME.") >= 11, "{schema:?}");
@@ -176,7 +176,7 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
     }
 }
 
-/// Holds the lines that follow from the program to the document, or writes them there.
+/// Compares the text lines that follow from the program with the document, or writes them there.
 #[test]
 fn the_reference_says_of_settings_and_units_what_the_program_does() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/scenes.md");
@@ -188,7 +188,7 @@ fn the_reference_says_of_settings_and_units_what_the_program_does() {
     }
     let remedy = "INSONIFY_BLESS=1 cargo test --test docs writes it";
     assert!(real == wanted, "docs/scenes.md is not up to date: {remedy}");
-    // A line that says something else, and one that is missing.
+    // A line with another text, and a missing one.
     let paths = real.lines().find(|line| line.starts_with("| `paths` |")).expect("a row");
     for planted in [paths.replace("65535", "65536"), String::new()] {
         let wrong = real.replace(&format!("{paths}\n"), &planted);

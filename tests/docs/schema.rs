@@ -1,4 +1,4 @@
-//! What the program says about the keys of a scene file.
+//! The program's messages about the keys of a scene file.
 
 use std::collections::BTreeMap;
 
@@ -6,18 +6,18 @@ use insonify::scene::SceneError;
 
 use crate::load;
 
-/// A key that is like none that exists: the program then lists all of them.
+/// A key unlike any existing one: the program then lists all of them.
 const NO_KEY: &str = "zzzzzzzzzzzzzzzzzzzzzzzzzzzzzzzz";
 
-/// What a key takes, in the words of the program.
+/// Kind of a key's values, in the words of the program.
 #[derive(Debug, PartialEq)]
 pub enum Takes {
     Choices(Vec<String>),
     Value(String),
 }
 
-/// The names that the program offers instead of one that it does not know. For the keys of a
-/// shape they stand in the message, for all others in the remedy.
+/// The names that the program offers instead of an unknown one. For the keys of a shape they are in the
+/// message, for all others in the remedy.
 fn listed(error: &SceneError) -> Vec<String> {
     if let Some((_, keys)) = error.message.split_once("available keys: ") {
         return keys.split(", ").map(str::to_owned).collect();
@@ -27,7 +27,7 @@ fn listed(error: &SceneError) -> Vec<String> {
     names.map(str::to_owned).collect()
 }
 
-/// All keys of the table that stands between `open` and `close`, and of the tables in it.
+/// Finds all keys of the table between `open` and `close`, and of the tables in it.
 pub fn explore(open: &str, close: &str, path: &str, found: &mut BTreeMap<String, Takes>) {
     let ask =
         |inner: &str| load(&format!("{open}{inner}{close}"), &[]).map(|_| ()).expect_err(inner);
@@ -84,7 +84,7 @@ pub fn explore(open: &str, close: &str, path: &str, found: &mut BTreeMap<String,
     }
 }
 
-/// How the document calls what the program calls `wanted`.
+/// The document's word for the program's `wanted`.
 pub fn type_name(wanted: &str) -> String {
     let (count, one) = wanted.split_once(" x ").unwrap_or(("", wanted));
     let name = match one {

@@ -1,5 +1,5 @@
-//! The lines of `docs/scenes.md` that follow from the program: a row of a table for each setting, the units, and what
-//! `insonify vary` shows. `INSONIFY_BLESS=1 cargo test --test docs` writes them.
+//! The text lines of `docs/scenes.md` that follow from the program: a row of a table for each setting, the units, and
+//! the parameters of `insonify vary`. `INSONIFY_BLESS=1 cargo test --test docs` writes them.
 
 use insonify::scene::tissue::table;
 use insonify::scene::vary::Parameter;
@@ -23,7 +23,7 @@ impl Line {
         Self { section, head, cells }
     }
 
-    /// The first cell, with its blanks: what finds the line.
+    /// The first cell with its blanks, by which the line is found.
     fn start(&self) -> String {
         format!("| {} |", self.cells[0])
     }
@@ -35,7 +35,7 @@ impl Line {
     }
 }
 
-/// What the reference calls a form.
+/// The reference's word for a form.
 fn type_of(form: Form) -> String {
     match form {
         Form::Number => "number".to_owned(),
@@ -65,7 +65,7 @@ fn range_of(facts: &Facts) -> String {
     }
 }
 
-/// The default that a group gives, as the reference writes it.
+/// The default of a group's setting, in the reference's form.
 fn default_of(facts: &Facts, value: Value) -> String {
     let text = facts.text(&value).unwrap_or_default();
     match facts.form {
@@ -74,8 +74,8 @@ fn default_of(facts: &Facts, value: Value) -> String {
     }
 }
 
-/// A line for each setting of a group in the table of this heading. `before` stands before the keys; `default` is that
-/// of all; none: what the row says, or the value in `from`.
+/// A text line for each setting of a group in the table of this heading. `before` stands before the keys; `default` is
+/// the default of all; none: the row's own, or the value in `from`.
 fn of_group<T: Group>(from: Option<&T>, (before, default): (&str, Option<&str>)) -> Vec<Line> {
     let rows = T::rows().iter();
     let line = |row: &insonify::settings::Row<T>| {
@@ -124,7 +124,7 @@ pub fn lines() -> Vec<Line> {
     out
 }
 
-/// What the presets of probes hold.
+/// The values of the presets of probes.
 fn presets() -> impl Iterator<Item = Line> {
     Probe::rows().iter().map(|row| {
         let key = format!("`{}`", row.facts.key);
@@ -138,7 +138,7 @@ fn presets() -> impl Iterator<Item = Line> {
     })
 }
 
-/// What a shipped tissue is.
+/// The line of a shipped tissue.
 fn tissue(tissue: &Tissue) -> Line {
     let name = format!("`{}`", tissue.name);
     let surface = tissue.surface;
@@ -166,7 +166,7 @@ pub fn keys() -> Vec<String> {
     lines.map(|line| format!("{}.{}", line.section, line.cells[0].trim_matches('`'))).collect()
 }
 
-/// The document with these lines: those that are there are replaced, others stand below the one before.
+/// The document with these lines: existing ones are replaced, others follow the one before.
 pub fn written(document: &str, lines: &[Line]) -> String {
     let mut out: Vec<String> = document.lines().map(str::to_owned).collect();
     let mut last = 0;

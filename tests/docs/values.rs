@@ -1,4 +1,4 @@
-//! Stated defaults and ranges against what the program takes.
+//! Comparison of stated defaults and ranges with the values that the program takes.
 
 use std::fmt::Write;
 
@@ -67,7 +67,7 @@ pub fn place(path: &str) -> (String, String) {
     (text, parts.join("."))
 }
 
-/// Everything that settings decide, for comparison.
+/// All effects of settings as text, for comparison.
 pub fn said(scene: &Scene) -> String {
     let mut out = format!(
         "{:?}{:?}{:?}{:?}",
@@ -82,7 +82,7 @@ pub fn said(scene: &Scene) -> String {
     out
 }
 
-/// "0.1 to 100 MHz (more)" or "at least 1": the ends.
+/// The ends of a range such as "0.1 to 100 MHz (more)" or "at least 1".
 fn range(cell: &str) -> Option<(f64, f64)> {
     let words: Vec<_> = cell.split_whitespace().collect();
     match words.as_slice() {
@@ -92,7 +92,7 @@ fn range(cell: &str) -> Option<(f64, f64)> {
     }
 }
 
-/// What is wrong with the row of a key whose default and range are stated.
+/// Faults of a key's row with stated default and range.
 pub fn of_values(path: &str, kind: &str, default: &str, stated: &str) -> Vec<String> {
     let mut faults = Vec::new();
     let (text, at) = place(path);

@@ -1,4 +1,4 @@
-//! Acceleration structures and ray queries; on a device without them the tests say so.
+//! Acceleration structures and ray queries; skipped on a device without them.
 
 use std::sync::Arc;
 
@@ -7,6 +7,7 @@ use insonify::gpu::{
     Kernel, Stage, Tlas, TlasInstance, build_times, refit_times, test_device,
 };
 
+use super::skip::{Lacking, skip};
 use super::{assert_clean, words};
 
 const ONE: [[u32; 3]; 1] = [[0, 1, 2]];
@@ -20,11 +21,11 @@ fn shifted(z: f32) -> [[f32; 4]; 3] {
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, z]]
 }
 
-/// A device with ray queries, or `None` with a line that says that the test is not run.
+/// A device with ray queries, or `None` with a message that the test is not run.
 pub fn ray_query_device() -> Option<Arc<Device>> {
     let device = test_device();
     if !device.supports_ray_query() {
-        eprintln!("skipped: '{}' has no ray queries", device.name());
+        skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
         return None;
     }
     Some(device)
@@ -61,7 +62,7 @@ impl Rays {
         commands.dispatch(&self.kernel, [2, 1, 1], bytemuck::bytes_of(&2_u32), &bindings)
     }
 
-    /// Distance, custom index and triangle of the middle ray; the other must miss.
+    /// Distance, custom index and triangle of the middle ray's hit; the other must miss.
     fn hit(&self, device: &Arc<Device>) -> [f32; 3] {
         let hits = device.read_back_as::<[f32; 4]>(&self.hits).unwrap();
         assert_eq!(hits[1], [-1.0; 4]);
@@ -134,7 +135,7 @@ fn batches_keep_their_order_and_compaction_saves_memory() {
     let before = device.memory().current;
     let blas = Blas::build_many(&device, &inputs, BlasOptions::default()).unwrap();
     assert!(bytes(&blas) <= loose_bytes, "{} {loose_bytes}", bytes(&blas));
-    // Alignment to 256 bytes is all that may be added: inputs and scratch are gone.
+    // Only alignment to 256 bytes may be added: inputs and scratch are gone.
     let kept = device.memory().current - before;
     assert!(kept <= bytes(&blas) + 256 * 20, "{kept} {}", bytes(&blas));
 
@@ -174,7 +175,7 @@ fn rays_pass_a_scene_without_instances() {
     assert_clean(device);
 }
 
-/// The layers do not see a trace of a structure that is still being built.
+/// The validation layers do not see a trace of a structure that is still being built.
 #[test]
 fn a_missing_barrier_between_build_and_trace_is_reported() {
     let Some(device) = ray_query_device() else {
@@ -228,7 +229,7 @@ fn geometry_that_cannot_be_built_is_refused_by_name() {
     assert_clean(device);
 }
 
-/// As on a driver without the extensions: everything but rays works, and the error says why.
+/// As on a driver without the extensions: everything except rays works, and the error gives the reason.
 #[test]
 fn a_device_without_acceleration_structures_runs_kernels_and_refuses_rays() {
     let options = DeviceOptions {
@@ -289,7 +290,7 @@ fn structures_are_built_and_timed_without_ray_queries() {
     assert!(compacted.build_ms > 0.0 && compacted.compact_ms > 0.0);
     assert!(compacted.compacted_bytes <= compacted.bytes);
     assert_eq!((large.compact_ms, large.compacted_bytes), (0.0, large.bytes));
-    // Five thousand times the triangles: what is timed is the build.
+    // Five thousand times the triangles, so that the time is that of the build.
     assert!(large.build_ms > 3.0 * small.build_ms && large.bytes > 1000 * small.bytes);
     assert!(changing.build_ms > 0.0 && changing.refit_ms > 0.0 && changing.bytes > large.bytes);
 

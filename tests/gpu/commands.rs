@@ -1,4 +1,4 @@
-//! Frames in flight, their times, and the barriers between what they record.
+//! Frames in flight, their times, and the barriers between their commands.
 
 use std::sync::Arc;
 
@@ -72,7 +72,7 @@ fn what_a_submission_uses_may_be_dropped_before_it_has_run() {
     assert_clean(device);
 }
 
-/// a -> b, then `from` -> `to` (of a, b, c), with or without the barrier between; returns c.
+/// Runs a -> b, then `from` -> `to` (of a, b, c), with or without the barrier between; returns c.
 fn two_dispatches(device: &Arc<Device>, from: usize, to: usize, barrier: bool) -> Vec<u32> {
     let kernel = add_kernel(device, 1);
     let count = 1 << 16;
@@ -101,13 +101,13 @@ fn a_barrier_between_dispatches_is_enough() {
     assert!(two_dispatches(&device, 1, 2, true).iter().all(|&v| v == 3));
     two_dispatches(&device, 2, 1, true);
     two_dispatches(&device, 1, 0, true);
-    // Two dispatches that share what they only read need none.
+    // Two dispatches that share only what they read need none.
     assert!(two_dispatches(&device, 0, 2, false).iter().all(|&v| v == 2));
     assert_clean(device);
 }
 
-/// A software driver gets the right result by luck and the layers do not see every case, hence the
-/// check from the bindings.
+/// A software driver gets the right result by luck and the layers do not see every case, hence the check
+/// from the bindings.
 #[test]
 fn a_missing_barrier_between_dispatches_is_reported() {
     let cases = [

@@ -1,4 +1,4 @@
-//! Meshes that change within a frame: built anew, refitted, traced, against brute force.
+//! Meshes that change within a frame: rebuilt, refitted, traced, against brute force.
 
 use std::sync::Arc;
 
@@ -34,12 +34,12 @@ fn source<'a>(
     }
 }
 
-/// What changes a mesh before a trace.
+/// A change of a mesh before a trace.
 #[derive(Clone, Copy)]
 enum Change<'a> {
     Build(DynamicSource<'a>),
     Refit(DynamicSource<'a>),
-    /// The top level is built anew over a mesh that rests.
+    /// The top level is rebuilt over an unchanged mesh.
     None,
 }
 
@@ -66,7 +66,7 @@ fn trace(
     device.read_back_as(&hits).unwrap()
 }
 
-/// Keyframes of one topology in one buffer: vertices written anew, or another keyframe's.
+/// Keyframes of one topology in one buffer: rewritten vertices, or another keyframe's.
 #[test]
 fn a_refitted_mesh_is_where_its_vertices_are() {
     let Some(device) = ray_query_device() else {
@@ -91,7 +91,7 @@ fn a_refitted_mesh_is_where_its_vertices_are() {
         assert_eq!(rays.wrong(&found, &poses[0], &triangles), 0, "built");
         let found = trace(&rays, &mut mesh, &mut tlas, Change::Refit(at(1)));
         assert_eq!(rays.wrong(&found, &poses[1], &triangles), 0, "refitted");
-        // Overwritten, and not refitted: the comparison notices.
+        // Overwritten, but not refitted: the comparison notices.
         device.upload(&vertices, bytemuck::cast_slice(&poses[2])).unwrap();
         let found = trace(&rays, &mut mesh, &mut tlas, Change::None);
         assert!(rays.wrong(&found, &poses[2], &triangles) > RAYS / 2, "stale");
@@ -174,7 +174,7 @@ fn frames_in_flight_refit_one_structure() {
         rays.record(&mut commands, &tlas, hits).unwrap();
         commands.submit().unwrap();
     }
-    // What the last submissions use is theirs to keep.
+    // The last submissions keep what they use.
     drop((mesh, tlas, kernel));
     frames.wait().unwrap();
     for (blend, hits) in &shown {
@@ -188,7 +188,7 @@ fn frames_in_flight_refit_one_structure() {
     assert_clean(device);
 }
 
-/// Vertices and triangles of a sheet, and how many there are.
+/// Vertices and triangles of a small wavy surface, and their numbers.
 fn small_sheet(device: &Arc<Device>) -> ([Buffer; 2], [u32; 2]) {
     let (pose, triangles) = (sheet(3, 0.0), grid(3, 0));
     let buffers = [
@@ -198,8 +198,8 @@ fn small_sheet(device: &Arc<Device>) -> ([Buffer; 2], [u32; 2]) {
     (buffers, [pose.len() as u32, triangles.len() as u32])
 }
 
-/// What the device does not notice: vertices overwritten while a build may still read them, and
-/// rays through a top level that is older than its mesh.
+/// Mistakes that the device does not notice: vertices overwritten while a build may still read them, and rays
+/// through a top level that is older than its mesh.
 #[test]
 fn missing_barriers_and_stale_top_levels_are_reported() {
     let Some(device) = ray_query_device() else {

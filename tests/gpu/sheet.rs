@@ -1,4 +1,4 @@
-//! Wavy sheets, and rays that meet them.
+//! Wavy surfaces, and rays that meet them.
 
 use std::sync::{Arc, Weak};
 
@@ -8,13 +8,13 @@ use insonify::scene::triangle;
 
 use super::words;
 
-/// Rays of a trace.
+/// Number of rays of a trace.
 pub const RAYS: usize = 400;
 
 /// Positions, mm.
 pub type Vertices = Vec<[f32; 3]>;
 
-/// A wavy sheet of `2 n^2` triangles over the square of 20 mm about the z axis.
+/// A wavy surface of `2 n^2` triangles over the square of 20 mm about the z axis.
 pub fn sheet(n: u32, phase: f32) -> Vertices {
     let along = |i: u32| 20.0 * i as f32 / n as f32 - 10.0;
     let all = (0..=n).flat_map(|i| (0..=n).map(move |j| (along(i), along(j))));
@@ -33,7 +33,7 @@ pub fn grid(n: u32, base: u32) -> Vec<[u32; 3]> {
     .collect()
 }
 
-/// Rays along z, spread evenly below the sheet.
+/// Rays along z, spread evenly below the wavy surface.
 pub struct Rays {
     pub device: Weak<Device>,
     kernel: Kernel,
@@ -45,7 +45,7 @@ impl Rays {
     pub fn new(device: &Arc<Device>) -> Self {
         let spirv = words(include_bytes!("nearest.spv"));
         let place = |i: usize| {
-            // The golden ratio's multiples and those of the root of two spread evenly.
+            // Multiples of the golden ratio and of the root of two spread evenly.
             let (u, v) = (i as f32 * 0.618_034, i as f32 * 0.414_213_56);
             [18.0 * u.fract() - 9.0, 18.0 * v.fract() - 9.0]
         };
@@ -76,8 +76,8 @@ impl Rays {
         commands.dispatch(&self.kernel, [count, 1, 1], bytemuck::bytes_of(&count), &bindings)
     }
 
-    /// Rays whose hit is not brute force's: distance to 1e-4 mm (50 mm round at 4e-6, over the
-    /// cosine of slopes up to 3), on that triangle or one that shares the edge at that place.
+    /// Rays whose hit differs from brute force's: distance to 1e-4 mm (50 mm round at 4e-6, over the cosine of
+    /// slopes up to 3), on that triangle or one that shares the edge at that place.
     pub fn wrong(
         &self,
         found: &[[f32; 4]],
@@ -99,7 +99,7 @@ impl Rays {
     }
 }
 
-/// A storage buffer with this content.
+/// A storage buffer with the given content.
 pub fn storage(device: &Arc<Device>, name: &str, bytes: &[u8]) -> Buffer {
     let size = bytes.len() as u64;
     let buffer = device.buffer(name, size, BufferKind::Storage).unwrap();

@@ -1,4 +1,4 @@
-//! A client that does what a test wants, and the server that it talks to.
+//! A client controlled by a test, and its server.
 
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, SocketAddr, TcpStream};
@@ -9,7 +9,7 @@ use insonify::igtl::{Picture, Server, Settings};
 use insonify::scene::Tracker;
 use insonify::sim::layout;
 
-/// Nothing here takes longer on an idle machine by far.
+/// Longest wait: on an idle machine everything here is much faster.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Short limits, so that a test can wait for them; but a pose never grows old, however busy the
@@ -74,7 +74,7 @@ impl Client {
         Self { stream }
     }
 
-    /// What the other side may have ended already is no matter.
+    /// Sends bytes; the other side may have ended the connection already.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         let _ = self.stream.write_all(bytes);
     }
@@ -115,7 +115,7 @@ impl Client {
         }
     }
 
-    /// Whether the server ends the connection, whatever it sends before.
+    /// Returns whether the server ends the connection, whatever it sends before.
     pub fn is_ended(&mut self) -> bool {
         let mut scratch = [0; 1 << 16];
         loop {
@@ -139,7 +139,7 @@ pub fn query(kind: &str, device: &str) -> Message {
     Message::new(device, Content::Other { kind, bytes: Vec::new() })
 }
 
-/// A shift in mm as messages hold it.
+/// A shift in mm in the form of messages.
 pub fn shift(x: f32, y: f32, z: f32) -> [f32; 12] {
     [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, x, y, z]
 }

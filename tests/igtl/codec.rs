@@ -1,4 +1,4 @@
-//! Properties of the codec: nothing that arrives makes it panic, and what it writes it reads.
+//! Properties of the codec: no input makes it panic, and it reads what it writes.
 
 use insonify::igtl::image::{Image, Scalar};
 use insonify::igtl::message::{Content, Entry, Extension, HEADER, Header, Message, Tool};
@@ -111,12 +111,12 @@ proptest! {
         }
     }
 
-    /// Past the checksum nothing may be trusted either: anybody can compute it.
+    /// Even with a right checksum nothing may be trusted: anybody can compute it.
     #[test]
     fn any_body_is_read_or_refused(
         kind in proptest::sample::select(&KINDS[..]),
         version in 1_u16..4,
-        // Lengths that lie near those of the types, and small numbers where sizes stand.
+        // Lengths near those of the types, and small numbers at the places of sizes.
         body in prop_oneof![
             vec(any::<u8>(), 0..200),
             vec(prop_oneof![Just(0_u8), 0_u8..16], 0..200),

@@ -24,14 +24,14 @@ fn last_error(server: &Server) -> String {
     server.status().last_error.unwrap_or_default()
 }
 
-/// A message of which header and body are changed after it was made, the checksum not.
+/// A message whose header and body were changed after it was made, but not its checksum.
 fn changed(change: impl FnOnce(&mut Vec<u8>)) -> Vec<u8> {
     let mut wire = Message::new("Probe", Content::Transform(shift(7.0, 7.0, 7.0))).encode();
     change(&mut wire);
     wire
 }
 
-/// The same with the size of the body as stated.
+/// A changed message with the stated size of the body.
 fn sized(kind: &[u8], size: u64) -> Vec<u8> {
     changed(|wire| {
         wire[2..14].fill(0);
@@ -143,11 +143,11 @@ fn a_hundred_connections_are_told_that_there_is_no_room() {
     let mut all: Vec<_> = (0..100).map(|_| Client::connect(&server)).collect();
     until("all are counted", || server.status().accepted + server.status().refused == 100);
     assert_eq!((server.status().clients, server.status().refused), (4, 96));
-    // Those that are in receive the image, the others the refusal and the end.
+    // Clients that got in receive the image, the others the refusal and the end.
     server.publish(grey(4, 4), &DAffine3::IDENTITY);
     let (mut served, mut refused) = (Vec::new(), 0);
     for mut client in all.drain(..) {
-        // One that was dropped before it looked has been reset at worst.
+        // At worst, one that was dropped before it looked has been reset.
         match client.receive().map(|message| message.content) {
             Some(Content::Transform(_)) => served.push(client),
             Some(Content::Status { code, message, .. }) => {
@@ -160,7 +160,7 @@ fn a_hundred_connections_are_told_that_there_is_no_room() {
         }
     }
     assert_eq!((served.len(), refused), (4, 96));
-    // Who leaves makes room.
+    // A client that leaves makes room.
     drop(served);
     until("they have gone", || server.status().clients == 0);
     assert_serves(&server);

@@ -1,4 +1,4 @@
-//! OpenIGTLink: the codec against messages of others, the server against good and bad clients, and
+//! OpenIGTLink: the codec against messages of other programs, the server against good and bad clients, and
 //! the program. All traffic stays on this machine.
 
 mod client;

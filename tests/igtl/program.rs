@@ -75,7 +75,7 @@ fn run(scene: &str, more: &[&str]) -> Output {
     command(scene, more).output().expect("the program starts")
 }
 
-/// The first image that is taken where the probe was put.
+/// The first image from the place where the probe was put.
 fn image_at(client: &mut Client, matrix: [f32; 12]) -> Image {
     client.transform("Probe", matrix);
     loop {
@@ -148,7 +148,7 @@ fn an_address_that_cannot_be_had_is_told_with_what_to_do() {
     ] {
         let out = run("scenes/phantom.toml", more);
         let said = String::from_utf8_lossy(&out.stderr).into_owned();
-        // The message may be broken into lines.
+        // The message may be wrapped into several text lines.
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert_eq!(out.status.code(), Some(1), "{said}");
         assert!(words.iter().all(|w| said.contains(w)), "{said}");

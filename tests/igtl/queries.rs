@@ -1,4 +1,4 @@
-//! Queries and what is answered.
+//! Queries and their answers.
 
 use std::time::{Duration, Instant};
 
@@ -35,7 +35,7 @@ fn what_there_is_not_is_answered_so() {
         client.ask(asked, "");
         assert_eq!(status(&mut client, answered), 1, "{asked}");
     }
-    // Not a query, and nothing that anybody here understands.
+    // Not a query, and of a type unknown here.
     client.ask("RTS_IMAGE", "");
     client.ask("POLYDATA", "");
     until("they are skipped", || server.status().ignored == 2);

@@ -12,13 +12,13 @@ use insonify::scene::tracker::Axes;
 
 use crate::client::{Client, grey, picture, serve, settings, shift, until};
 
-/// Where the probe was last.
+/// Last place of the probe.
 fn place(server: &Server) -> DVec3 {
     let pose = *server.pose().pose().expect("a pose");
     pose.world_from_probe.translation
 }
 
-/// A world that is the tracker's, one tool, and a timeout to wait for.
+/// Settings whose world is the tracker's, with one tool and a short timeout.
 fn plain() -> Settings {
     Settings {
         tracker: Tracker {
@@ -92,7 +92,7 @@ fn calibration_and_axes_are_applied() {
     let depth = face.transform_vector3(DVec3::Z);
     assert!((depth - DVec3::NEG_Y).length() < 1e-9, "{depth}");
 
-    // What is sent is in RAS over a world in LPS.
+    // Messages are in RAS over a world in LPS.
     server.publish(grey(4, 3), &face);
     let Content::Transform(matrix) = client.receive_kind("TRANSFORM").content else {
         panic!("no transform")
@@ -174,7 +174,7 @@ fn every_client_receives_the_image_and_where_it_was_taken() {
         DVec3::new(5.0, 6.0, 7.0),
     );
     server.publish(grey(6, 4), &pose);
-    // One that comes later receives what it has missed.
+    // A later client receives what it has missed.
     let mut late = Client::connect(&server);
     for client in [&mut early, &mut late] {
         let message = client.receive_kind("TRANSFORM");

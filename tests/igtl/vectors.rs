@@ -1,5 +1,4 @@
-//! Messages that other programs have written: they decode to what was put in and encode to the same
-//! bytes.
+//! Messages written by other programs: they decode to their content and encode to the same bytes.
 
 use glam::{DAffine3, DVec3};
 use insonify::igtl::image::Scalar;
@@ -34,7 +33,7 @@ fn bytes(hex: &str) -> Vec<u8> {
     digits.map(|p| pair(p).expect("a digit")).collect()
 }
 
-/// The message, which has to encode to the same bytes.
+/// The decoded message; asserts that it encodes to the same bytes.
 fn decoded(name: &str, wire: &[u8]) -> Message {
     let message = Message::from_bytes(wire).unwrap_or_else(|why| panic!("{name}: {why}"));
     assert!(message.encode() == wire, "{name}: other bytes");
@@ -153,7 +152,7 @@ fn the_reference_library_s_messages_are_read_and_written() {
     assert_eq!(told.metadata("Second patient age").as_deref(), Some("25"));
     assert_eq!(told.extension.map(|Extension { id, .. }| id), Some(1));
 
-    // The comparison has to see a wrong number.
+    // The comparison has to notice a wrong number.
     let mut planted = MATRIX;
     planted[10] += 1e-3;
     assert!(!near(&planted, &MATRIX));

@@ -10,7 +10,7 @@ use insonify::sim::tracer::Tracer;
 use super::device::Rig;
 use super::rays::{Random, Ray, placement, scene, turned};
 
-/// More than there are mask bits.
+/// Number of keyframes, more than there are mask bits.
 pub const KEYFRAMES: usize = 9;
 
 /// A sphere that beats: keyframe `k` of one topology, shifted and squeezed.
@@ -59,7 +59,7 @@ pub fn beating(strategy: Strategy) -> Scene {
     scene
 }
 
-/// Sets keyframe `k`, and another for the second instance. Between keyframes under `interpolate`.
+/// Sets keyframe `k`, and another for the second instance. Under `interpolate`, a state between keyframes.
 pub fn show(scene: &mut Scene, k: usize) {
     for (instance, shift) in [(0, 0), (2, 4)] {
         let instance = &mut scene.instances[instance];
@@ -83,7 +83,7 @@ pub fn strategies(tracer: Tracer) -> impl Iterator<Item = Strategy> {
     Strategy::ALL.iter().copied().filter(has)
 }
 
-/// Whether a line in double precision meets a box.
+/// Returns whether a line in double precision meets a box.
 fn meets(bounds: [[f32; 3]; 2], line: &Ray) -> bool {
     let [low, high] = bounds.map(|corner| DVec3::from(corner.map(f64::from)));
     let (a, b) =
@@ -96,18 +96,18 @@ fn area(bounds: [[f32; 3]; 2]) -> f64 {
     2.0 * (x * y + y * z + z * x)
 }
 
-/// Lines that meet a union box of two boxes, `spread` mm apart.
+/// Counts of lines that meet a union box of two boxes, `spread` mm apart.
 pub struct UnionBox {
     /// Lines that met it.
     pub met: f64,
-    /// Of those, the share that missed the keyframe: F1.
+    /// Share of them that missed the keyframe: F1.
     pub missed: f64,
-    /// 1 - SA(child)/SA(union).
+    /// Expected share, 1 - SA(child)/SA(union).
     pub expected: f64,
 }
 
-/// Isotropic uniform lines at a keyframe of two that a union box holds, by the rig that is made of
-/// the scene.
+/// Traces isotropic uniform lines at a keyframe of two in a union box, with the rig that is made of the
+/// scene.
 pub fn union_box(spread: f64, rig: impl Fn(&Scene) -> Rig) -> UnionBox {
     let mut scene = scene(vec![(shapes::cuboid([30.0, 12.0, 20.0]), DAffine3::IDENTITY)]);
     let mut moved = scene.meshes[0].clone();
@@ -138,7 +138,7 @@ pub fn union_box(spread: f64, rig: impl Fn(&Scene) -> Rig) -> UnionBox {
         assert_eq!(counts.false_boxes, 0, "a box fills its bounds");
         let entered = counts.instances_reached - counts.false_unions;
         assert_eq!(hit.found.is_some(), entered == 1);
-        // Nodes have coarser boxes: what meets only those is no line of the formula.
+        // Nodes have coarser boxes: a line that meets only those does not count in the formula.
         if meets(outer, line) {
             assert_eq!(counts.instances_reached, 1, "the union box holds all");
             met += 1.0;

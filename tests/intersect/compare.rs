@@ -1,4 +1,4 @@
-//! Whether the device's hit is that of the brute-force reference.
+//! Comparison of the device's hit with that of the brute-force reference.
 
 use glam::DVec3;
 use insonify::reference::intersect::{self, Hit};
@@ -16,9 +16,9 @@ pub struct Found {
     pub triangle: usize,
 }
 
-/// How far apart the device's ray and the exact one may lie, mm: the transform into object space
-/// rounds three products and sums, the shear as many, each by 6e-8 of the largest coordinate that
-/// enters; single-precision matrices add as much.
+/// Largest distance between the device's ray and the exact one, mm: the transform into object space rounds
+/// three products and sums, the shear as many, each by 6e-8 of the largest coordinate involved;
+/// single-precision matrices add as much.
 pub fn displacement(scene: &Scene, ray: &Ray, reach: f64) -> f64 {
     let shifts =
         scene.instances.iter().map(|i| i.world_from_object.translation.abs().max_element());
@@ -39,16 +39,16 @@ fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
 }
 
-/// How far a hit on a triangle may lie from where it belongs, mm: the displacement seen along the
-/// ray, which grows as the ray grazes.
+/// Largest distance of a hit on a triangle from its place, mm: the displacement seen along the ray, which
+/// grows as the ray grazes.
 fn blur(scene: &Scene, ray: &Ray, delta: f64, instance: usize, triangle: usize) -> f64 {
     let [a, b, c] = corners(scene, instance, triangle);
     let cosine = (b - a).cross(c - a).normalize().dot(ray.direction()) / ray.direction().length();
     delta / cosine.abs().max(1e-9)
 }
 
-/// Same surface at the same place: t to 1e-5 relative, or to the blur; the same triangle, or one
-/// that touches the point within the blur.
+/// Returns whether both hits are on the same surface at the same place: t to 1e-5 relative, or to the blur; the same
+/// triangle, or one that touches the point within the blur.
 fn agrees(
     scene: &Scene,
     ray: &Ray,
@@ -79,7 +79,7 @@ fn agrees(
         ) <= slack
 }
 
-/// Whether the triangle found touches the ray where it is said to, with nothing before it.
+/// Returns whether the found triangle touches the ray at the found distance, with nothing before it.
 fn first_touched(
     scene: &Scene,
     ray: &Ray,
@@ -106,8 +106,8 @@ pub fn around(direction: DVec3, count: u32) -> impl Iterator<Item = DVec3> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     Same,
-    /// As the reference says of a ray displaced by no more than the rounding: it passes an outline,
-    /// where the device may also meet just the corner of a triangle.
+    /// As the reference's answer to a ray displaced by no more than the rounding: it passes an outline, where the
+    /// device may also meet just the corner of a triangle.
     Displaced,
     Wrong,
 }
@@ -151,15 +151,15 @@ pub fn wrong(
     (0..rays.len()).into_par_iter().filter(wrong).collect()
 }
 
-/// How many of these rays are aimed at vertices and edges, and how many elsewhere.
+/// Numbers of these rays that are aimed at vertices and edges, and of the others.
 pub fn by_aim(rays: &[usize]) -> [usize; 2] {
     let aimed = rays.iter().filter(|&&i| aimed_at_seams(i)).count();
     [aimed, rays.len() - aimed]
 }
 
-/// Of rays aimed at vertices and edges to the last bit, how many may slip through. Ours none. The
-/// device's own triangle test is not ours to mend: Mesa 25's software driver lets up to 195 in
-/// 10,000 through (a box, of whose few edges each is hit often), and none elsewhere.
+/// Most rays aimed exactly at vertices and edges that may slip through. Ours: none. The device's own triangle
+/// test is not ours to mend: Mesa 25's software driver lets up to 195 in 10,000 through (a box, whose few
+/// edges are each hit often), and none elsewhere.
 pub fn slips(tracer: Tracer, aimed: usize) -> usize {
     match tracer {
         Tracer::Bvh => 0,

@@ -1,4 +1,4 @@
-//! Runs `rays.comp` on the device.
+//! Runs of `rays.comp` on the device.
 
 use std::sync::{Arc, Mutex};
 
@@ -34,7 +34,7 @@ struct RawHit {
     counts: Counts,
 }
 
-/// What the compute tracer did for a ray; zero with the ray query. As in `rays.comp`.
+/// Counts of the compute tracer for a ray; zero with the ray query. As in `rays.comp`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 pub struct Counts {
@@ -46,7 +46,7 @@ pub struct Counts {
     pub false_boxes: u32,
 }
 
-/// What the kernel says of a ray.
+/// Result of the kernel for a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct Traced {
     pub found: Option<Found>,
@@ -62,7 +62,7 @@ pub struct Rig {
     kernel: Kernel,
     pub world: World,
     meshes: Vec<usize>,
-    /// Stand in for buffers of the world, by binding.
+    /// Buffers that replace those of the world, by binding.
     pub replaced: Vec<(usize, Buffer)>,
 }
 
@@ -99,7 +99,7 @@ impl Rig {
         }
     }
 
-    /// The scene with its instances moved or reshaped; whether that took anything.
+    /// Moves or reshapes the scene's instances; returns whether anything had changed.
     pub fn update(&mut self, scene: &Scene) -> bool {
         self.meshes = scene.instances.iter().map(|i| i.mesh).collect();
         let world = &mut self.world;

@@ -1,5 +1,5 @@
-//! Instances that share one structure: the same hits as with one each, whatever is hidden, skipped,
-//! moved together or taken apart.
+//! Instances that share one structure: the same hits as with one each, whichever are hidden, skipped,
+//! moved together or separated.
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Scene, shapes};
@@ -12,10 +12,10 @@ use super::device::Rig;
 use super::rays::{rays, scene, turned};
 use super::{TRACERS, wrong};
 
-/// The binding of the triangles and, behind them, of whose they are.
+/// The binding of the triangles, followed by their owners.
 const TRIANGLES: usize = 3;
 
-/// Organs within each other in one frame, and one beside them that has its own.
+/// A scene of nested organs in one frame, and one beside them that has its own.
 fn nested() -> Scene {
     let mut placed: Vec<_> =
         [20.0, 17.0, 12.0, 5.0].map(|radius| (shapes::sphere(radius, 2), turned())).into();
@@ -24,7 +24,7 @@ fn nested() -> Scene {
     scene(placed)
 }
 
-/// Panics where `rig` does not find in `scene` what brute force finds.
+/// Panics where the results of `rig` in `scene` differ from brute force.
 fn assert_found(scene: &Scene, rig: &Rig, tracer: Tracer, what: &str) {
     let still = scene.still();
     let rays = rays(&still, 4000, 5);
@@ -104,7 +104,7 @@ fn keyframes_of_one_group_share_structures() {
     }
 }
 
-/// A ray enters what is shared once; and the comparison sees triangles that are given to another.
+/// A ray enters a shared structure once; and the comparison notices triangles with a wrong owner.
 #[test]
 fn what_is_shared_is_entered_once_and_a_wrong_owner_is_noticed() {
     let scene = nested();

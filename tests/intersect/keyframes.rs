@@ -18,7 +18,7 @@ fn every_strategy_finds_the_keyframe_that_is_shown() {
         for strategy in strategies(tracer) {
             let mut scene = beating(strategy);
             let mut rig = Rig::new(&scene, tracer);
-            // Back and forth, so that what stays behind from another keyframe would show.
+            // Back and forth, so that traces of another keyframe would show.
             for k in [0, 1, 2, 3, 4, 5, 6, 7, 8, 0, 5, 1] {
                 show(&mut scene, k);
                 scene.instances[2].world_from_object.translation.y = k as f64;
@@ -51,7 +51,7 @@ fn a_stale_keyframe_is_noticed() {
     assert!(elsewhere > 100, "{elsewhere}");
 }
 
-/// What each strategy has to record when the keyframe changes, and that none does when nothing does.
+/// Each strategy records only what it has to when the keyframe changes, and nothing otherwise.
 #[test]
 fn only_what_a_strategy_needs_is_recorded() {
     for strategy in Strategy::ALL.iter().copied() {
@@ -64,14 +64,14 @@ fn only_what_a_strategy_needs_is_recorded() {
     }
 }
 
-/// Cauchy-Crofton: of isotropic uniform lines that meet a convex body, those that meet one within it
-/// are as its surface to the outer one's. So is the paper's price, F1, of a union box.
+/// Cauchy-Crofton: of isotropic uniform lines that meet a convex body, the share that meets one within it is the
+/// ratio of the inner to the outer surface area. That gives the paper's price, F1, of a union box.
 #[test]
 fn false_intersections_of_a_union_box_follow_surface_areas() {
     for spread in [0.0, 10.0, 40.0, 160.0] {
         let found = union_box(spread, |scene| Rig::new(scene, Tracer::Bvh));
         let variance = found.expected * (1.0 - found.expected) / found.met;
-        // 1 % is asked for; without spread there is none but by rounding at the box's edge.
+        // 1 % is required; without spread there is only rounding at the box's edge.
         let bound = 0.01_f64.min(4.0 * variance.sqrt() + 1e-3);
         assert!(
             (found.missed - found.expected).abs() < bound,

@@ -38,7 +38,7 @@ fn shape(index: usize) -> Scene {
             (shapes::cylinder(5.0, 60.0, 16), turned()),
             (shapes::sphere(15.0, 1), mirrored()),
         ]),
-        // Metres and micrometres beside each other, and parts within parts.
+        // Metres and micrometres side by side, and parts within parts.
         _ => scene(vec![
             (
                 shapes::ellipsoid([0.02, 0.03, 0.025], 1),
@@ -53,7 +53,7 @@ fn shape(index: usize) -> Scene {
     }
 }
 
-/// How many rays the device answers wrongly: aimed at vertices and edges, and elsewhere.
+/// Numbers of rays that the device answers wrongly: aimed at vertices and edges, and others.
 fn wrong(
     scene: &Scene,
     rays: &[Ray],
@@ -160,7 +160,7 @@ fn a_ray_leaves_whatever_it_enters() {
     }
 }
 
-/// Nothing that a kernel may compute hangs or hits: directions of zero, infinities, NaN.
+/// No kernel input hangs or hits: directions of zero, infinities, NaN.
 #[test]
 fn input_that_is_no_ray_misses() {
     let scene = shape(1);

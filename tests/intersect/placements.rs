@@ -1,4 +1,4 @@
-//! Placements: transforms, the order of instances, and what moves.
+//! Placements: transforms, the order of instances, and movement.
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::shapes;
@@ -13,7 +13,7 @@ fn away_from_seams(rays: Vec<Ray>) -> Vec<Ray> {
     rays.into_iter().enumerate().filter(|(i, _)| !aimed_at_seams(*i)).map(|(_, ray)| ray).collect()
 }
 
-/// T31: a placed mesh is hit where the same mesh with its placement worked in is hit.
+/// T31: a placed mesh is hit at the same places as the same mesh with its placement applied to its vertices.
 #[test]
 fn placements_are_transforms_of_the_mesh() {
     let mesh = shapes::ellipsoid([10.0, 15.0, 12.0], 3);
@@ -76,7 +76,7 @@ fn the_order_of_instances_changes_no_hit() {
     ];
     let orders = [[0, 1, 2, 3], [3, 2, 1, 0], [2, 0, 3, 1]];
     let base = scene(parts.to_vec());
-    // Seams are the business of the tests above.
+    // Seams are tested above.
     let rays = away_from_seams(rays(&base, 8_000, 32));
     let exact: Vec<_> =
         rays.par_iter().map(|ray| clear_hits(&base, ray, 4.0 * MARGIN, twins)).collect();
@@ -88,7 +88,7 @@ fn the_order_of_instances_changes_no_hit() {
                 let scene = scene(order.iter().map(|&i| parts[i].clone()).collect());
                 let rig = Rig::new(&scene, tracer);
                 let first = walk(&rig, &rays, MARGIN);
-                // What coincides with the first hit shows when that is skipped.
+                // A surface that coincides with the first hit appears when that is skipped.
                 let skipping: Vec<Ray> = rays
                     .iter()
                     .zip(&first)
@@ -135,7 +135,7 @@ fn twins(a: usize, b: usize) -> bool {
     a.max(b) == 1 && a != b
 }
 
-/// What moves is found where it went, and what rests is not uploaded again.
+/// Moved instances are found at their new places, and unmoved ones are not uploaded again.
 #[test]
 fn instances_move() {
     let before = shape(2);

@@ -66,7 +66,7 @@ impl Random {
     }
 }
 
-/// Meshes placed in a world that is otherwise of no interest.
+/// A scene of placed meshes, whose other parts do not matter.
 pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
     let tissue = Tissue::shipped("liver").expect("liver is shipped");
     let surface = tissue.surface;
@@ -90,7 +90,7 @@ pub fn scene(placed: Vec<(Mesh, DAffine3)>) -> Scene {
     Scene { meshes, instances, ..Scene::homogeneous(tissue, Probe::abdominal()) }
 }
 
-/// Rotation, stretch and shift as they occur: organs of 10 to 100 mm, up to 150 mm away.
+/// A realistic rotation, stretch and shift: organs of 10 to 100 mm, up to 150 mm away.
 pub fn placement(scale: DVec3, axis: DVec3, angle: f64, shift: DVec3) -> DAffine3 {
     DAffine3::from_scale_rotation_translation(
         scale,
@@ -99,7 +99,7 @@ pub fn placement(scale: DVec3, axis: DVec3, angle: f64, shift: DVec3) -> DAffine
     )
 }
 
-/// Turned about a slanted axis and stretched, unlike along each of its own.
+/// A placement turned about a slanted axis and stretched differently along each of its own.
 pub fn turned() -> DAffine3 {
     placement(
         DVec3::new(1.0, 0.4, 2.0),
@@ -114,8 +114,8 @@ pub fn mirrored() -> DAffine3 {
     placement(DVec3::new(-1.5, 1.0, 1.0), DVec3::Y, 0.7, DVec3::new(-40.0, 10.0, 50.0))
 }
 
-/// The mesh with its placement worked into the vertices. Normals keep the length that the placement
-/// gives them, so that both interpolate alike.
+/// The mesh with its placement applied to the vertices. Normals keep the length that the placement gives
+/// them, so that both interpolate alike.
 pub fn baked(mesh: &Mesh, world_from_object: &DAffine3) -> Mesh {
     let normal = world_from_object.matrix3.inverse().transpose();
     let mut out = mesh.clone();
@@ -142,13 +142,13 @@ pub fn corners(scene: &Scene, instance: usize, triangle: usize) -> [DVec3; 3] {
     })
 }
 
-/// Whether the i-th ray of [`rays`] aims at a vertex or an edge.
+/// Returns whether the i-th ray of [`rays`] aims at a vertex or an edge.
 pub fn aimed_at_seams(i: usize) -> bool {
     i % 4 < 2
 }
 
-/// Rays from all around and from inside at what is hard: besides arbitrary points, edges and
-/// vertices that triangles share, along axes, and grazing.
+/// Rays from all around and from inside at hard places: besides arbitrary points, shared edges and
+/// vertices, along axes, and grazing.
 pub fn rays(scene: &Scene, count: usize, seed: u64) -> Vec<Ray> {
     let mut random = Random::new(seed);
     let triangles = |i: usize| scene.meshes[scene.instances[i].mesh].triangles.len();

@@ -24,7 +24,7 @@ fn rest() -> Scene {
     ])
 }
 
-/// Bumps and dents, nowhere beyond the box of the mesh at rest: the top level stays as it is.
+/// Adds bumps and dents within the box of the mesh at rest: the top level stays as it is.
 fn deform(scene: &mut Scene) {
     for mesh in &mut scene.meshes {
         for p in &mut mesh.positions {
@@ -34,7 +34,7 @@ fn deform(scene: &mut Scene) {
     }
 }
 
-/// The nodes of `rig`'s world with the boxes that `moved` vertices ask for.
+/// The nodes of `rig`'s world with the boxes for `moved` vertices.
 fn refitted(rig: &Rig, levels: &Levels, moved: &Buffer) -> Buffer {
     let Binding::Buffer(nodes) = rig.world.structure() else { panic!("not this tracer") };
     let nodes = rig.storage("refitted", &rig.device.read_back(nodes).unwrap());
@@ -79,8 +79,8 @@ fn rays_through_a_refitted_hierarchy_are_those_of_brute_force() {
     let wrong = compare::wrong(&moved, &rays, &expected, &found(Some(nodes)));
     assert!(wrong.is_empty(), "{wrong:?}");
 
-    // What the comparison notices: no refit at all, and one node's boxes that did not follow. That a
-    // surface is missed is told without looking for rays beside it, which takes long.
+    // The comparison notices: no refit at all, and one node's boxes that did not follow. A missed surface is
+    // detected without looking for rays beside it, which takes long.
     let missed = |found: &[Option<Found>]| {
         let pairs = expected.iter().zip(found);
         let missed = pairs.filter(|(e, f)| match (e, f) {

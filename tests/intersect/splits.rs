@@ -1,4 +1,4 @@
-//! Cut triangles: rays meet what they meet where none is cut, to the last bit.
+//! Cut triangles: rays have the same hits as without cuts, to the last bit.
 
 use std::path::Path;
 
@@ -10,7 +10,7 @@ use super::compare::{self, Found};
 use super::device::{Rig, Traced};
 use super::rays::{Ray, corners, mirrored, placement, rays, scene, turned};
 
-/// Long thin triangles that lie aslant, within one another and beside: some share a structure.
+/// A scene of long thin slanted triangles, nested and side by side: some share a structure.
 fn aslant() -> Scene {
     let near = placement(DVec3::ONE, DVec3::X, 0.9, DVec3::new(0.0, 0.0, 60.0));
     scene(vec![
@@ -22,8 +22,8 @@ fn aslant() -> Scene {
     ])
 }
 
-/// Rays for which one way says other than the other: the place may differ in no bit, the triangle only
-/// where two that touch each other are met at the same place.
+/// Rays for which the two results differ: the place may differ in no bit, the triangle only where two touching
+/// ones are met at the same place.
 fn different(scene: &Scene, a: &[Traced], b: &[Traced]) -> Vec<usize> {
     let alike = |a: Option<Found>, b: Option<Found>| match (a, b) {
         (Some(a), Some(b)) => {

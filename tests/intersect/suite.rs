@@ -1,4 +1,4 @@
-//! What only this suite does with the device: one for all tests, moving instances, planted errors.
+//! Uses of the device by this suite only: one device for all tests, moving instances, planted errors.
 
 use std::sync::{Arc, OnceLock};
 

@@ -7,8 +7,8 @@ use super::compare::{Found, around, displacement};
 use super::device::Rig;
 use super::rays::Ray;
 
-/// Every surface along the ray, nearest first, as the path tracer walks it: past each hit by a
-/// margin of rounding, and what lies within the margin in other instances by skipping.
+/// Every surface along the ray, nearest first, as the path tracer finds them: past each hit by a margin of
+/// rounding; surfaces of other instances within the margin by skipping.
 pub fn walk(rig: &Rig, rays: &[Ray], margin: f64) -> Vec<Vec<(f64, usize, bool)>> {
     let mut found = vec![Vec::new(); rays.len()];
     let mut active: Vec<(usize, Ray)> = rays.iter().copied().enumerate().collect();
@@ -29,9 +29,9 @@ pub fn walk(rig: &Rig, rays: &[Ray], margin: f64) -> Vec<Vec<(f64, usize, bool)>
     found
 }
 
-/// The surfaces along a ray, an edge shared by triangles once, where single precision cannot change
-/// which they are: rays displaced by the rounding meet the same instances, and surfaces of
-/// different triangles lie at least `gap` apart unless `twins` lets two instances coincide.
+/// The surfaces along a ray, an edge shared by triangles once, where single precision cannot change them: rays
+/// displaced by the rounding meet the same instances, and surfaces of different triangles lie at least `gap`
+/// apart unless `twins` lets two instances coincide.
 pub fn clear_hits(
     scene: &Scene,
     ray: &Ray,

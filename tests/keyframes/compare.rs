@@ -1,19 +1,19 @@
-//! Vertex by vertex: a surface as it was loaded against where its vertices should be.
+//! Comparison of a loaded surface with the places of its vertices, one by one.
 
 use insonify::scene::Mesh;
 
 /// Half a unit in the last place of a single-precision number, relative to it.
 pub const ROUNDING: f64 = 1.0 / (1u64 << 24) as f64;
 
-/// Which corner of the stored surface each corner of a loaded one is, and the largest distance so far.
+/// The stored corner of each loaded corner, and the largest distance so far.
 pub struct Corners {
     /// Stored vertices of the corners of each loaded triangle.
     stored: Vec<[usize; 3]>,
 }
 
 impl Corners {
-    /// Triangles keep their order; the program turns some around, and appends those of caps. Which are
-    /// turned is found in one shape, and must then hold in all.
+    /// Triangles keep their order; the program turns some around, and appends those of caps. The turned ones are found
+    /// in one shape, and must be the same in all.
     pub fn new(mesh: &Mesh, triangles: &[[usize; 3]], expected: &[[f64; 3]]) -> Self {
         assert!(mesh.triangles.len() >= triangles.len());
         let stored = triangles.iter().zip(&mesh.triangles).map(|(&[a, b, c], loaded)| {
@@ -31,7 +31,7 @@ impl Corners {
         Self { stored: stored.collect() }
     }
 
-    /// Largest distance of a vertex from where it should be.
+    /// Largest distance of a vertex from its place.
     pub fn off(&self, mesh: &Mesh, expected: &[[f64; 3]]) -> f64 {
         let pairs = self.stored.iter().zip(&mesh.triangles);
         let corners = pairs.flat_map(|(stored, loaded)| stored.iter().zip(loaded));

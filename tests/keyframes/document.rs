@@ -1,4 +1,4 @@
-//! A glTF file as numbers, read for the tests alone: JSON and bytes, nothing of the program.
+//! A glTF file as numbers, read for the tests only: JSON and bytes, without the program.
 
 use std::path::Path;
 
@@ -84,12 +84,12 @@ impl Document {
     }
 }
 
-/// Number of a thing in its list.
+/// Index of a thing in its list.
 pub fn index_of(value: &Value) -> usize {
     value.as_u64().expect("an index") as usize
 }
 
-/// Bytes of a component and what stands for one when normalised.
+/// Bytes of a component, and the value that stands for one when normalised.
 fn component(kind: u64) -> (usize, f64) {
     match kind {
         5120 => (1, 127.0),

@@ -13,11 +13,11 @@ struct Sample {
     file: &'static str,
     /// Name of the animation.
     animation: &'static str,
-    /// The file's unit, chosen so that the sample has the size of an organ.
+    /// The file's unit, chosen to give the sample the size of an organ.
     units: &'static str,
     /// Most shapes of a skin.
     keyframes: Option<usize>,
-    /// Mistakes that make a difference in this sample.
+    /// Mistakes that matter in this sample.
     planted: &'static [Planted],
 }
 
@@ -31,8 +31,8 @@ const ASSIMP: &str = "gltf-samples/assimp-glTF2/MorphStressTest/glTF/MorphStress
 
 #[rustfmt::skip]
 const SAMPLES: &[Sample] = &[
-    Sample { file: FOX, animation: "Survey", units: "mm", keyframes: None, planted: BETWEEN },
-    Sample { file: FOX, animation: "Survey", units: "mm", keyframes: Some(100), planted: SKIN },
+    Sample { file: FOX, animation: "View3d", units: "mm", keyframes: None, planted: BETWEEN },
+    Sample { file: FOX, animation: "View3d", units: "mm", keyframes: Some(100), planted: SKIN },
     Sample { file: FOX, animation: "Walk", units: "mm", keyframes: None, planted: SKIN },
     Sample { file: FOX, animation: "Run", units: "mm", keyframes: Some(11), planted: BETWEEN },
     Sample { file: STRESS, animation: "Individuals", units: "cm", keyframes: None, planted: MORPH },
@@ -76,9 +76,9 @@ pub fn compare(mesh: &AnimatedMesh, node: usize, pose: &Pose<'_>, mm: f64) -> (f
         off = off.max(corners.off(shape, &expected));
         far = far.max(reach(&expected));
     }
-    // The program rounds a position once, each axis by half a unit: less than twice that in length.
-    // Resting rotations and translations above a joint are single precision, too: each turns what is
-    // below it by no more than four roundings of a quaternion's components.
+    // The program rounds a position once, each axis by half a unit: less than twice that in length. Resting
+    // rotations and translations above a joint are single precision, too: each turns everything below it by no
+    // more than four roundings of a quaternion's components.
     let above = pose.joints(node).map_or(0, |joints| {
         let depth = joints.iter().map(|&j| pose.chain(j).len());
         depth.max().unwrap_or(0)

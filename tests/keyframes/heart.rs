@@ -21,7 +21,7 @@ fn options() -> Options {
     Options { units: Units::named("mm"), cap_openings: true, ..Options::default() }
 }
 
-/// Vertices and triangles of a file of `v` and `f` lines.
+/// Vertices and triangles of a file with `v` and `f` lines of text.
 fn parse(path: &Path) -> (Vec<[f64; 3]>, Vec<[usize; 3]>) {
     let text = std::fs::read_to_string(path).expect("readable");
     let words =
@@ -65,8 +65,8 @@ fn volume(mesh: &Mesh) -> f64 {
     six.sum::<f64>() / 6000.0
 }
 
-/// Directed edges without exactly one partner that runs the other way; corners are the same where their
-/// positions are.
+/// Number of directed edges without exactly one partner in the other direction; corners at equal positions are
+/// the same.
 fn unpaired(mesh: &Mesh) -> usize {
     let mut runs: HashMap<_, [usize; 2]> = HashMap::new();
     let key = |i: u32| mesh.positions[i as usize].map(f32::to_bits);
@@ -90,7 +90,7 @@ fn off_centre(mesh: &Mesh, stored: usize) -> f64 {
             entry.1.push(point(mesh, t[(k + 1) % 3]));
         }
     }
-    // A rim's vertex has two triangles of a cap, its centre all.
+    // A rim's vertex has two triangles of a cap, its centre has all.
     let centres = counts.iter().filter(|(_, (count, _))| *count > 2);
     let off = centres.map(|(centre, (count, ring))| {
         let centre = centre.map(|v| f64::from(f32::from_bits(v)));
@@ -104,8 +104,8 @@ fn off_centre(mesh: &Mesh, stored: usize) -> f64 {
     off.into_iter().fold(0.0, f64::max)
 }
 
-/// Largest angle between the shading normals of `mesh` and those of the shape of `of`, degrees: means of
-/// the faces weighted by their corner angles.
+/// Largest angle between the shading normals of `mesh` and those of the shape of `of`, degrees: means of the
+/// faces weighted by their corner angles.
 fn turned(mesh: &Mesh, of: &Mesh) -> f64 {
     let mut sums = vec![[0.0; 3]; of.positions.len()];
     for t in &of.triangles {
@@ -165,7 +165,7 @@ fn phases_share_one_closed_outward_surface() {
         // Single precision in the corners of triangles of a tenth of a millimetre.
         assert!(shading < 0.01, "{surface}: {shading}");
 
-        // What the comparisons are there to notice: another phase's vertices, its normals, a hole.
+        // Planted errors for the comparisons: another phase's vertices, its normals, a hole.
         let allowed = 2.0 * ROUNDING * reach(&stored[0].0);
         assert!(corners.off(&meshes[0], &stored[1].0) > allowed);
         assert!(turned(&meshes[0], &meshes[9]) > 0.1);

@@ -10,7 +10,7 @@ use crate::document::{Document, to_base64};
 use crate::gltf::compare;
 use crate::pose::{Planted, Pose, apply};
 
-/// Bytes of a file's buffer and what describes them.
+/// Bytes of a file's buffer and their descriptions.
 #[derive(Default)]
 struct Store {
     bytes: Vec<u8>,
@@ -108,7 +108,7 @@ fn turn(axis: usize, degrees: f64) -> [f64; 4] {
     q
 }
 
-/// A mirrored matrix above a spline of translations above turns and steps of scale above a mesh.
+/// A file with a mirrored matrix above a spline of translations above turns and steps of scale above a mesh.
 pub fn tree() -> Value {
     let mut store = Store::default();
     let (_, positions, indices) = bar(&mut store, 1);
@@ -154,8 +154,8 @@ pub fn tree() -> Value {
     }))
 }
 
-/// A bar that bends about two joints while a sparse target widens it, all weights in bytes; the node that
-/// bears it and the one above the joints are placed somewhere.
+/// A file with a bar that bends about two joints while a sparse target widens it, all weights in bytes; its node
+/// and the one above the joints have placements.
 pub fn bending() -> Value {
     let mut store = Store::default();
     let (points, positions, indices) = bar(&mut store, 3);
@@ -324,7 +324,7 @@ fn a_mirroring_skin_stays_outward() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let mut json = bending();
     json["nodes"][1]["scale"] = json!([-2, 2, 2]);
-    // Open, so that the winding alone says what is outside.
+    // Open, so that only the winding shows which side is outside.
     let open = json["accessors"][0]["count"].as_u64().expect("indices") - 6;
     json["accessors"][0]["count"] = json!(open);
     let path = written(folder.path(), &json);

@@ -1,4 +1,4 @@
-//! Mistakes in animated files: each is refused with its cause, its place and what to do.
+//! Mistakes in animated files: each is refused with cause, place and remedy.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use crate::made::{bending, tree, written};
 
-/// One mistake: what is changed, which animation is asked for, and what is said.
+/// One mistake: the change, the requested animation, and the message.
 struct Mistake {
     change: fn(&mut Value),
     animation: Option<&'static str>,
@@ -129,7 +129,7 @@ fn of_moving_nodes() {
             Mistake {
                 change: |json| json["animations"][1]["channels"][0]["sampler"] = json!(7),
                 animation: Some("all"),
-                said: &["is not a valid glTF file"],
+                said: &["/animations/1/channels/0/sampler: names samplers[7]"],
             },
             Mistake {
                 change: |json| {
@@ -276,7 +276,7 @@ fn of_files_that_are_keyframes() {
     assert_eq!(meshes[2].positions.len(), 12);
     assert_eq!(tents(&[]).expect("nothing").0.len(), 0);
 
-    // Flat and turned inside out: said with the name of the file.
+    // Flat and turned inside out: reported with the name of the file.
     let (_, issues) = tents(&["9", "0", "-4"]).expect("readable");
     let said: Vec<String> = issues.iter().map(ToString::to_string).collect();
     let about = |file: &str, what: &str| said.iter().any(|s| s.contains(file) && s.contains(what));

@@ -1,5 +1,5 @@
-//! Where the vertices of an animated glTF file are at a time: appendix C and sections 3.7.2 and 3.7.3 of
-//! the specification of glTF 2.0, written for the tests in double precision, nothing of the program.
+//! Places of the vertices of an animated glTF file at a time: appendix C and sections 3.7.2 and 3.7.3 of the
+//! specification of glTF 2.0, written for the tests in double precision, without the program.
 
 use serde_json::Value;
 
@@ -21,7 +21,7 @@ pub enum Planted {
     Target,
     /// Joints move vertices without their inverse bind matrices.
     Unbound,
-    /// The node that bears a skinned mesh moves it, too.
+    /// The node with a skinned mesh moves it, too.
     Carried,
     /// The translation of nodes is left out.
     Unmoved,
@@ -37,7 +37,7 @@ pub struct Pose<'d> {
 struct Keys<'d> {
     sampler: &'d Value,
     times: Vec<f64>,
-    /// One after the other.
+    /// Values, one after the other.
     values: Vec<f64>,
 }
 
@@ -66,7 +66,7 @@ impl Pose<'_> {
         })
     }
 
-    /// Key times of a property; none where it rests.
+    /// Key times of a property; none where it does not move.
     pub fn times(&self, node: usize, path: &str) -> Vec<f64> {
         self.sampler(node, path).map_or(Vec::new(), |keys| keys.times)
     }
@@ -148,7 +148,7 @@ impl Pose<'_> {
         })
     }
 
-    /// The node and those above it.
+    /// The node and its ancestors.
     pub fn chain(&self, node: usize) -> Vec<usize> {
         std::iter::successors(Some(node), |&n| self.parent(n)).collect()
     }
@@ -159,7 +159,7 @@ impl Pose<'_> {
         up.iter().rev().fold(IDENTITY, |m, &n| product(&m, &self.local(n, time)))
     }
 
-    /// Joints of the skin that a node has.
+    /// Joints of a node's skin.
     pub fn joints(&self, node: usize) -> Option<Vec<usize>> {
         let skin = self.document.json["nodes"][node].get("skin")?;
         let joints = self.document.json["skins"][index_of(skin)]["joints"].as_array()?;
@@ -253,7 +253,7 @@ impl Pose<'_> {
         points.iter().enumerate().map(place).collect()
     }
 
-    /// Corners of a node's mesh as it is stored, lists of triangles only.
+    /// Corners of a node's mesh as stored, for lists of triangles only.
     pub fn triangles(&self, node: usize) -> Vec<[usize; 3]> {
         let json = &self.document.json;
         let mesh = &json["meshes"][index_of(&json["nodes"][node]["mesh"])];
@@ -277,14 +277,14 @@ fn unit(q: &[f64]) -> Vec<f64> {
     q.iter().map(|v| v / length).collect()
 }
 
-/// Appendix C.4: the shorter way, at constant speed. Its quaternions are unit ones; some files store
-/// three digits of them.
+/// Interpolation by appendix C.4: the shorter way, at constant speed. Its quaternions are unit ones; some files
+/// store three digits of them.
 fn slerp(a: &[f64], b: &[f64], t: f64) -> Vec<f64> {
     let (a, b) = (unit(a), unit(b));
     let dot: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
     let angle = dot.abs().min(1.0).acos();
     let sign = if dot < 0.0 { -1.0 } else { 1.0 };
-    // Below this the great circle is a line in double precision.
+    // Below this angle the great circle is a line in double precision.
     let (wa, wb) = match angle < 1e-8 {
         true => (1.0 - t, t),
         false => (((1.0 - t) * angle).sin() / angle.sin(), (t * angle).sin() / angle.sin()),

@@ -1,4 +1,4 @@
-//! Animations in scene files: placements, shapes and loops as the scene's time goes on.
+//! Animations in scene files: placements, shapes and loops over the scene's time.
 
 use std::path::Path;
 
@@ -22,8 +22,8 @@ fn load(folder: &Path, text: &str) -> Scene {
     Scene::load(&path, &[]).expect("sound").0
 }
 
-/// Largest distance of four points of the bar from where the file's nodes and the scene's bring them,
-/// over a few periods.
+/// Largest distance of four points of the bar between their places by the file's nodes and by the scene's, over a
+/// few periods.
 fn off(scene: &mut Scene, pose: &Pose<'_>, file_time: impl Fn(f64) -> f64) -> f64 {
     let outer = DAffine3::from_translation(DVec3::new(0.0, 0.0, 50.0))
         * DAffine3::from_rotation_z(0.5)

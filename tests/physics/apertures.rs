@@ -1,4 +1,4 @@
-//! Beside real apertures: the point-spread widths of `tools/oracle/table.json`, made by PyMUST.
+//! Comparison with real apertures: the point-spread widths of `tools/oracle/table.json`, made by PyMUST.
 
 use std::f64::consts::{LN_2, PI, TAU};
 
@@ -32,7 +32,7 @@ pub fn points_are_as_wide_as_through_real_apertures() -> Check {
     }
 }
 
-/// An array as the outside simulator has it; lengths mm.
+/// An array of the outside simulator; lengths mm.
 struct Array {
     frequency: f64,
     /// Pulse-echo fractional bandwidth.
@@ -40,7 +40,7 @@ struct Array {
     elements: u32,
     pitch: f64,
     element: f64,
-    /// Of the receive aperture; the whole array and a sector scan without.
+    /// F-number of the receive aperture; none: the whole array and a sector scan.
     f_number: Option<f64>,
 }
 
@@ -79,8 +79,8 @@ impl Array {
         sine * (-((f - self.frequency).abs() / half).powf(p)).exp()
     }
 
-    /// Sum over the elements within `aperture` mm of the middle, delayed to focus at `focus`, at a point:
-    /// one way, without the carrier over `focus`.
+    /// Sum over the elements within `aperture` mm of the middle, delayed to focus at `focus`, at a point: one way,
+    /// without the carrier over `focus`.
     fn one_way(&self, f: f64, [x, z]: [f64; 2], focus: f64, aperture: f64) -> [f64; 2] {
         let mut sum = [0.0; 2];
         for e in 0..self.elements {
@@ -137,7 +137,7 @@ impl Array {
         [axial, width(&profile) * step]
     }
 
-    /// Our probe beside it: Gaussian beams of its F-number, a Gaussian pulse of length `axial`.
+    /// Our probe for comparison: Gaussian beams of its F-number, a Gaussian pulse of length `axial`.
     fn scene(&self, depth: f64, focus: f64, axial: f64, f_number: f64) -> Scene {
         let mut scene = points(161, 4.0, &[[0.0, 0.0, depth]]);
         let probe = &mut scene.probe;

@@ -1,14 +1,14 @@
-//! What a proof consists of: figures held against closed forms, with the curves and pictures that
-//! show them. Tests and the report take their verdicts from here.
+//! The parts of a proof: figures compared with closed forms, with curves and pictures that show them. Tests and
+//! the report take their verdicts from here.
 
 use std::sync::Arc;
 
 use insonify::gpu;
-pub use insonify::plot::{Curve, Plot};
+pub use insonify::output::plot::{Curve, Plot};
 
 use crate::render::{Renderer, renderers};
 
-/// Whether the physics is as it should be, or wrong in the way that [`Check::planted`] says.
+/// State of the physics: right, or wrong in the way of [`Check::planted`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Physics {
     Right,
@@ -17,38 +17,51 @@ pub enum Physics {
 
 /// One row of the validation table.
 pub struct Check {
-    /// "T5".
+    /// Row of the table, such as "T5".
     pub row: &'static str,
-    /// What it proves, as its test is called: `attenuation_slope_matches_beer_lambert`.
+    /// The proof's name, equal to its test's: `attenuation_slope_matches_beer_lambert`.
     pub name: &'static str,
     /// The closed form, and its source.
     pub claim: &'static str,
-    /// The error that the comparison must notice.
+    /// The error that every figure must notice, except those that name one of their own ([`Figure::unlike`]).
     pub planted: &'static str,
     pub run: fn(&Bench, Physics) -> Outcome,
 }
 
-/// A number, what it should be, and by how much it may be off; all in the unit that `what` names.
+/// A number, its expected value, and its tolerance; all in the unit that `what` names.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// What is measured and by which renderer: "bvh: slope, dB/cm".
+    /// The quantity and its renderer: "bvh: slope, dB/cm".
     pub what: String,
     pub measured: f64,
     pub expected: f64,
     /// Largest allowed |measured - expected|.
     pub tolerance: f64,
+    /// An error that moves this figure, and the value it would then have.
+    pub other: Option<(&'static str, f64)>,
 }
 
 impl Figure {
-    /// A NaN never holds.
+    /// Returns whether it is within the tolerance; false for NaN.
     pub fn holds(&self) -> bool {
         (self.measured - self.expected).abs() <= self.tolerance
+    }
+
+    /// Names an error that only this figure would notice, and the figure's value with it: for a figure that the check's
+    /// planted error does not move.
+    pub fn unlike(&mut self, error: &'static str, value: f64) {
+        self.other = Some((error, value));
+    }
+
+    /// Returns whether it would fail with the error that it names.
+    fn tells(&self) -> bool {
+        self.other.is_some_and(|(_, value)| (self.measured - value).abs() > self.tolerance)
     }
 }
 
 impl std::fmt::Display for Figure {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { what, measured, expected, tolerance } = self;
+        let Self { what, measured, expected, tolerance, .. } = self;
         write!(f, "{what}: {measured}, expected {expected} within {tolerance}")
     }
 }
@@ -62,7 +75,7 @@ pub struct Picture {
 }
 
 impl Picture {
-    /// It has a name and whole rows.
+    /// Returns whether it has a title and whole rows.
     pub fn is_drawable(&self) -> bool {
         !self.title.is_empty()
             && !self.grey.is_empty()
@@ -71,7 +84,7 @@ impl Picture {
     }
 }
 
-/// What a check found.
+/// Result of a check.
 #[derive(Clone, Debug, Default)]
 pub struct Outcome {
     pub figures: Vec<Figure>,
@@ -87,27 +100,28 @@ impl Outcome {
         measured: f64,
         expected: f64,
         tolerance: f64,
-    ) {
-        self.figures.push(Figure { what: what.into(), measured, expected, tolerance });
+    ) -> &mut Figure {
+        let figure = Figure { what: what.into(), measured, expected, tolerance, other: None };
+        self.figures.push_mut(figure)
     }
 
-    /// Every plot and every picture can be shown.
+    /// Returns whether every plot and every picture can be shown.
     pub fn is_drawable(&self) -> bool {
         self.plots.iter().all(Plot::is_drawable) && self.pictures.iter().all(Picture::is_drawable)
     }
 
-    /// Figures that do not hold.
+    /// Figures outside their tolerance.
     pub fn failures(&self) -> Vec<&Figure> {
         self.figures.iter().filter(|f| !f.holds()).collect()
     }
 
-    /// Something was measured, and all of it holds.
+    /// Returns whether something was measured and every figure is within its tolerance.
     pub fn holds(&self) -> bool {
         !self.figures.is_empty() && self.failures().is_empty()
     }
 }
 
-/// What checks are run on.
+/// The device and the renderers for checks.
 pub struct Bench {
     pub device: Arc<gpu::Device>,
     /// The f64 twins, and the device with either tracer.
@@ -125,27 +139,35 @@ impl Bench {
     }
 }
 
-/// What a check found, and what it found with its error planted: the verdict of tests and report.
+/// Result of a check, and the one with its error planted: the verdict of tests and report.
 pub struct Examined {
     pub right: Outcome,
     planted: Outcome,
-    /// Of the validation layers, in the meantime.
+    /// Messages of the validation layers in the meantime.
     pub messages: Vec<String>,
 }
 
 impl Examined {
-    /// The planted error showed.
-    pub fn noticed(&self) -> bool {
-        !self.planted.holds()
+    /// Figures that hold with the planted error as well, and with the one that they name: they prove nothing.
+    pub fn blind(&self) -> Vec<&Figure> {
+        let moved = |figure: &Figure| {
+            let mut planted = self.planted.figures.iter();
+            planted.any(|other| other.what == figure.what && !other.holds())
+        };
+        self.right.figures.iter().filter(|figure| !moved(figure) && !figure.tells()).collect()
     }
 
-    /// Every figure holds and can be shown, the planted error showed, and the validation layers are
-    /// silent.
+    /// Returns whether every figure noticed the planted error, or its own.
+    pub fn noticed(&self) -> bool {
+        self.blind().is_empty()
+    }
+
+    /// Returns whether every figure holds, can be shown and has noticed an error, and the validation layers are silent.
     pub fn holds(&self) -> bool {
         self.right.holds() && self.right.is_drawable() && self.noticed() && self.messages.is_empty()
     }
 
-    /// Why it does not hold, in lines; empty if it does.
+    /// The reasons for failure, a text line each; empty if it holds.
     pub fn complaints(&self, check: &Check) -> String {
         let mut lines: Vec<String> = self.right.failures().iter().map(|f| f.to_string()).collect();
         if self.right.figures.is_empty() {
@@ -155,7 +177,10 @@ impl Examined {
             lines.push("a plot or picture cannot be drawn".into());
         }
         if !self.noticed() {
-            let figures = self.planted.figures.iter().map(|f| format!("\n        {f}"));
+            let figures = self.blind().into_iter().map(|figure| {
+                let other = figure.other.map(|(error, value)| format!(", nor {error}: {value}"));
+                format!("\n        {figure}{}", other.unwrap_or_default())
+            });
             let figures: String = figures.collect();
             lines.push(format!("not noticed: {}{figures}", check.planted));
         }
@@ -174,10 +199,10 @@ pub fn examine(check: &Check, bench: &Bench) -> Examined {
     }
 }
 
-/// The check holds.
+/// Asserts that the check holds.
 ///
 /// # Panics
-/// With what does not.
+/// It does not hold; with the reasons.
 #[cfg(test)]
 pub fn prove(check: &Check) {
     let found = examine(check, &Bench::new());

@@ -1,4 +1,4 @@
-//! The device beside a convolution-based simulator: exact sums over point scatterers.
+//! Comparison of the device with a convolution-based simulator: exact sums over point scatterers.
 
 use std::f64::consts::{LN_2, PI, SQRT_2, TAU};
 
@@ -9,17 +9,17 @@ use crate::resolution::gaussian_beam;
 use crate::scenes::{add_point, linear, silent};
 use crate::signal::Random;
 
-/// Lines over a width, mm; samples over 100 mm.
+/// Number of scanlines over a width, mm; samples over 100 mm.
 const LINES: u32 = 96;
 const WIDTH: f64 = 12.0;
 const SAMPLES: u32 = 4096;
 const PITCH: f64 = 100.0 / SAMPLES as f64;
-/// Depths compared, in samples: 35 to 65 mm about the focus.
+/// Compared depths, in samples: 35 to 65 mm about the focus.
 const SHOWN: [usize; 2] = [1434, 2662];
 /// Phase of the carrier per mm of depth: out and back at 7 MHz and 1540 m/s.
 const WAVENUMBER: f64 = 2.0 * TAU * 7.0 / 1.540;
 
-/// T35.
+/// Check T35.
 pub fn points_and_scatterers_are_those_of_a_convolution_simulator() -> Check {
     Check {
         row: "T35",
@@ -40,7 +40,7 @@ type Point = ([f64; 3], f64);
 fn targets() -> Vec<Point> {
     let place = |i: u32| {
         let (column, row) = (f64::from(i % 6), f64::from(i / 6));
-        // Off lines and samples, by different amounts.
+        // Off scanlines and samples, by different amounts.
         [2.0 * column - 5.0 + 0.037 * row, 0.0, 36.5 + 3.0 * row + 0.0173 * column]
     };
     (0..60).map(|i| (place(i), 0.1)).collect()
@@ -80,7 +80,7 @@ fn axial() -> f64 {
     1.540 / 2.0 * (2.0 * LN_2).sqrt() / (PI * 0.6 * 7.0)
 }
 
-/// Radio-frequency lines of the exact sum, pulses `shift` mm deeper.
+/// Radio-frequency scanlines of the exact sum, pulses `shift` mm deeper.
 fn cole(points: &[Point], shift: f64) -> Vec<Vec<f64>> {
     let axial = axial();
     let [focal_x, focal_y] = beams(50.0);
@@ -104,7 +104,7 @@ fn cole(points: &[Point], shift: f64) -> Vec<Vec<f64>> {
     lines
 }
 
-/// The part compared.
+/// The compared part.
 fn shown(lines: &[Vec<f64>]) -> Vec<f64> {
     lines.iter().flat_map(|l| &l[SHOWN[0]..SHOWN[1]]).copied().collect()
 }
@@ -148,7 +148,7 @@ fn beside_cole(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// Re{IQ exp(i 4 pi f z / c)}.
+/// Radio-frequency signal Re{IQ exp(i 4 pi f z / c)}.
 fn remodulated(line: &[[f64; 2]]) -> Vec<f64> {
     let real = |(k, [re, im]): (usize, &[f64; 2])| {
         let (sin, cos) = (WAVENUMBER * k as f64 * PITCH).sin_cos();

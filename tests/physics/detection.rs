@@ -19,7 +19,7 @@ const ECHOES: [(f64, f64); 9] = [
     (51.22, 0.7),
 ];
 
-/// Envelope by the Hilbert transform of the radio-frequency line that the echoes make: pulses
+/// Envelope by the Hilbert transform of the echoes' radio-frequency scanline: pulses
 /// exp(-t^2 / 2 sigma^2) cos(2 pi f t) sampled every `pitch` mm of depth from `start` on. `n` samples, periodic.
 fn hilbert([start, pitch]: [f64; 2], n: usize, frequency: f64) -> Vec<f64> {
     let sigma = 1.540 / 2.0 * (2.0 * std::f64::consts::LN_2).sqrt() / (PI * 0.6 * 7.0);
@@ -31,7 +31,7 @@ fn hilbert([start, pitch]: [f64; 2], n: usize, frequency: f64) -> Vec<f64> {
     envelope(&line)
 }
 
-/// T26.
+/// Check T26.
 pub fn the_baseband_envelope_is_the_hilbert_envelope() -> Check {
     Check {
         row: "T26",
@@ -71,7 +71,7 @@ fn envelopes(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     for (name, render) in &bench.renderers {
         let got = &render(&scene).envelope(0)[first..first + n];
-        // The level of points is another check's business: one factor for the whole line.
+        // The level of points is tested elsewhere: one factor for the whole scanline.
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let scale = dot(got, &expected) / dot(got, got);
         let got: Vec<f64> = got.iter().map(|g| scale * g).collect();

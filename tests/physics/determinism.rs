@@ -1,4 +1,4 @@
-//! Frames that repeat. The shipped scenes at their own settings are in `tests/frame.rs`.
+//! Repetition of frames. The shipped scenes at their own settings are in `tests/frame.rs`.
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Instance, Keyframes, Scene, Surface, shapes};
@@ -7,7 +7,7 @@ use insonify::sim::{Simulator, Tracer, shaders::Library};
 use crate::check::{Bench, Check, Outcome, Physics, Picture};
 use crate::scenes::{linear, tissue};
 
-/// T34.
+/// Check T34.
 pub fn a_frame_repeats_bit_for_bit_and_both_tracers_show_it() -> Check {
     Check {
         row: "T34",
@@ -64,7 +64,7 @@ fn repeats(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     for tracer in [Tracer::Bvh, Tracer::RayQuery] {
         let (first, picture) = shoot(bench, &scene, tracer);
-        let (second, _) = shoot(bench, &again, tracer);
+        let (second, last) = shoot(bench, &again, tracer);
         for (i, what) in ["surface", "volume"].into_iter().enumerate() {
             assert!(first[i].iter().any(|&v| v != 0), "{what} echoes");
             let pairs = first[i].iter().zip(&second[i]);
@@ -73,7 +73,8 @@ fn repeats(bench: &Bench, physics: Physics) -> Outcome {
             let what = format!("{tracer}: of {of} {what} accumulators, different the second time");
             out.compare(what, differing, 0.0, 0.0);
         }
-        out.pictures.push(picture);
+        // The last run's, so that the planted seed shows in it.
+        out.pictures.push(if tracer == Tracer::Bvh { picture } else { last });
     }
     let pairs = out.pictures[0].grey.iter().zip(&out.pictures[1].grey);
     let far = pairs.filter(|(a, b)| a.abs_diff(**b) > 1).count() as f64;

@@ -1,5 +1,5 @@
-//! Fusion with an acquired volume: the mask of a ball, the volume along oblique scanlines, and how
-//! the two images meet.
+//! Fusion with an acquired volume: the mask of a ball, the volume along oblique scanlines, and the blending of the
+//! two images.
 
 use std::sync::Arc;
 
@@ -17,7 +17,7 @@ use crate::scenes::{add_body, add_box, add_sphere, linear, silent, tissue};
 
 const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
-/// The steps of the frame, its grey levels (transparent is none), and their width.
+/// The steps of the frame, its grey levels (none where transparent), and their width.
 struct Fused {
     steps: Steps,
     levels: Vec<Option<u8>>,
@@ -78,7 +78,7 @@ fn mask(scene: &mut Scene, count: usize, blend: Blend) {
     });
 }
 
-/// T29.
+/// Check T29.
 pub fn the_mask_fades_over_the_box_and_leaves_both_images_alone_beyond_it() -> Check {
     Check {
         row: "T29",
@@ -114,7 +114,7 @@ fn boxed(x: [f64; 2], z: [f64; 2], blend: Blend) -> Scene {
     mask(&mut scene, 1, blend);
     let to_world = DAffine3::from_translation(DVec3::new(-40.0, -4.0, -3.0))
         * DAffine3::from_scale(DVec3::new(0.8, 1.0, 0.7));
-    // Steep, so that no two neighbouring pixels show one level.
+    // Steep, so that no two neighbouring pixels have one level.
     let value = |p: DVec3| 0.5 + 0.3 * (p.x / 3.0).sin() + 0.2 * (p.z / 2.0).cos();
     scene.volume = Some(volume([101, 9, 81], to_world, value));
     scene
@@ -129,7 +129,7 @@ fn ramp(i: u32, edge: u32, n: i64, first: i64) -> f64 {
 
 fn borders(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
-    // What the model says of a box of 32 pixels.
+    // The model's box of 32 pixels.
     let (n, first) = match physics {
         Physics::Right => (32, -16),
         Physics::Planted => (31, -15),
@@ -143,13 +143,15 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
         let at = |i: u32, j: u32| (j * got.width + i) as usize;
         if blend == Blend::Linear {
             let m = &got.steps.mask;
-            let stray = |i: u32, j: u32| {
+            let stray = |right: u32, i: u32, j: u32| {
                 let expected = if i < right && j >= top { 0.0 } else { 1.0 };
                 let near = i.abs_diff(right) <= 1 || j.abs_diff(top) <= 1;
                 !near && m[at(i, j)] != expected
             };
-            let count = pixels(&got).filter(|&(i, j)| stray(i, j)).count();
-            out.compare("pixels away from the border that are not 0 or 1", count as f64, 0.0, 0.0);
+            let [count, wider] = [right, right + 4]
+                .map(|right| pixels(&got).filter(|&(i, j)| stray(right, i, j)).count() as f64);
+            out.compare("pixels away from the border that are not 0 or 1", count, 0.0, 0.0)
+                .unlike("a mask four pixels wider", wider);
             let row = HEIGHT - 40;
             let measured = |i| f64::from(got.steps.blurred[at(i, row)]);
             let expected = |i| ramp(i, right, n, first);
@@ -175,7 +177,7 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                     ),
                 ],
             ));
-            // Inside the mask both ramps are low: 1 - M is the product of what is left of each.
+            // Inside the mask both ramps are low: 1 - M is the product of their rests.
             let corner = |i: u32, j: u32| {
                 let inside = (1.0 - ramp(i, right, n, first)) * ramp(j, top, n, first);
                 1.0 - inside
@@ -190,26 +192,31 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                 1.0 / 255.0,
             );
         }
-        let (mut foreign, mut mixed, mut pure) = (0, 0, [0, 0]);
+        let (mut foreign, mut swapped, mut mixed, mut turned, mut pure) = (0, 0, 0, 0, [0, 0]);
         for (i, j) in pixels(&got) {
             let m = f64::from(got.steps.blurred[at(i, j)]);
             let level = got.levels[at(i, j)].expect("the sector fills the image");
             let simulated = got.steps.simulated[4 * at(i, j)];
             let acquired = f64::from(got.steps.background[at(i, j)]);
+            let [own, other] = [simulated, (acquired * 255.0 + 0.5).floor() as u8];
             if m == 0.0 {
                 pure[0] += 1;
-                foreign += u32::from(level != simulated);
+                foreign += u32::from(level != own);
+                swapped += u32::from(level != other);
             } else if m == 1.0 {
                 pure[1] += 1;
-                foreign += u32::from(level != (acquired * 255.0 + 0.5).floor() as u8);
+                foreign += u32::from(level != other);
+                swapped += u32::from(level != own);
             } else {
                 let m = match blend {
                     Blend::Smooth => m * m * (3.0 - 2.0 * m),
                     _ => m,
                 };
-                let v = m * acquired * 255.0 + (1.0 - m) * f64::from(simulated);
+                let mean = |m: f64| m * acquired * 255.0 + (1.0 - m) * f64::from(simulated);
                 // Half a level by rounding, and single precision.
-                mixed += u32::from((v - f64::from(level)).abs() > 0.501);
+                let is_off = |m| u32::from((mean(m) - f64::from(level)).abs() > 0.501);
+                mixed += is_off(m);
+                turned += is_off(1.0 - m);
             }
         }
         out.compare(
@@ -217,7 +224,8 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
             f64::from(foreign),
             0.0,
             0.0,
-        );
+        )
+        .unlike("the images swapped", f64::from(swapped));
         let expected = f64::from(got.width * HEIGHT) / 5.0;
         for (what, count) in [("simulation", pure[0]), ("volume", pure[1])] {
             let least = f64::from(count).min(expected);
@@ -226,14 +234,16 @@ fn borders(bench: &Bench, physics: Physics) -> Outcome {
                 least,
                 expected,
                 0.0,
-            );
+            )
+            .unlike("the other image everywhere", 0.0);
         }
         out.compare(
             format!("{blend:?}: pixels in the ramp that are not the weighted mean"),
             f64::from(mixed),
             0.0,
             0.0,
-        );
+        )
+        .unlike("weights of the images swapped", f64::from(turned));
         out.pictures.push(picture(format!("Fused, {blend:?} blend"), &got));
     }
     out
@@ -248,7 +258,7 @@ fn picture(title: String, got: &Fused) -> Picture {
     Picture { title, width: got.width, grey: got.levels.iter().map(|l| l.unwrap_or(255)).collect() }
 }
 
-/// T29.
+/// Check T29.
 pub fn bands_fade_over_their_own_widths_and_need_nothing_where_images_agree() -> Check {
     Check {
         row: "T29",
@@ -305,7 +315,8 @@ fn bands(bench: &Bench, physics: Physics) -> Outcome {
             mean,
             middle,
             lost * (2.0 * half).sqrt(),
-        );
+        )
+        .unlike("half a pixel aside, where a level of the pyramid begins", middle + 0.5);
         out.compare(
             format!("box of {blur}: variance of the ramp, pixels^2"),
             variance,
@@ -345,14 +356,19 @@ fn bands(bench: &Bench, physics: Physics) -> Outcome {
             false => got.steps.simulated[4 * at],
         };
         let wrong = (0..got.levels.len()).filter(|&at| got.levels[at] != Some(expected(at)));
-        out.compare(format!("{what}: pixels that are not it"), wrong.count() as f64, 0.0, 0.0);
+        let bright = (0..got.levels.len()).filter(|&at| expected(at) > 0);
+        out.compare(format!("{what}: pixels that are not it"), wrong.count() as f64, 0.0, 0.0)
+            .unlike("the coarsest band left out: black", bright.count() as f64);
         if !steep {
-            let off = (0..got.levels.len()).filter(|&at| {
-                let own = f32::from(got.steps.simulated[4 * at]) / 255.0;
-                (own - got.steps.background[at]).abs() > 1e-4
-            });
-            let off = off.count() as f64;
-            out.compare("pixels at which the volume is not the simulation", off, 0.0, 0.0);
+            let off = |aside: usize| {
+                let off = (aside..got.levels.len()).filter(|&at| {
+                    let own = f32::from(got.steps.simulated[4 * (at - aside)]) / 255.0;
+                    (own - got.steps.background[at]).abs() > 1e-4
+                });
+                off.count() as f64
+            };
+            out.compare("pixels at which the volume is not the simulation", off(0), 0.0, 0.0)
+                .unlike("a volume that lies a pixel aside", off(1));
         }
     };
     alone("mask of everything", everywhere, false, true);
@@ -381,7 +397,7 @@ fn pixels_as_volume(got: &Fused) -> Acquired {
     volume([width, 3, height], place, level)
 }
 
-/// T30.
+/// Check T30.
 pub fn the_mask_of_a_ball_is_its_chord_on_every_scanline() -> Check {
     Check {
         row: "T30",
@@ -460,7 +476,8 @@ fn balls(bench: &Bench, physics: Physics) -> Outcome {
                 f64::from(inside).min(1000.0),
                 1000.0,
                 0.0,
-            );
+            )
+            .unlike("a mask that is nowhere", 0.0);
             if tracer == Tracer::Bvh {
                 let grey = got.steps.blurred.iter().map(|m| (m * 255.0) as u8);
                 out.pictures.push(Picture {
@@ -474,7 +491,7 @@ fn balls(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T30.
+/// Check T30.
 pub fn a_linear_volume_is_exact_along_oblique_scanlines() -> Check {
     Check {
         row: "T30",
@@ -552,7 +569,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
         });
         for tracer in TRACERS {
             let got = fused(bench, &scene, tracer);
-            let (mut worst, mut inside, mut spilt) = (0.0_f64, 0, 0);
+            let (mut worst, mut inside, mut outside, mut spilt) = (0.0_f64, 0, 0, 0);
             let voxel_from_world = world_from_voxel.inverse();
             for l in 0..scene.probe.scanlines {
                 let (mut o, d) = scene.probe.ray(l, 0);
@@ -573,6 +590,7 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
                         worst = worst.max((shown - value(p)).abs());
                         inside += 1;
                     } else if least < -0.501 {
+                        outside += 1;
                         spilt += u32::from(shown != 0.0);
                     }
                 }
@@ -583,19 +601,21 @@ fn oblique(bench: &Bench, physics: Physics) -> Outcome {
                 f64::from(spilt),
                 0.0,
                 0.0,
-            );
+            )
+            .unlike("a volume that goes on at its edge", f64::from(outside));
             out.compare(
                 format!("{tracer}, {name}: samples inside, at least a tenth"),
                 f64::from(inside).min(3276.0),
                 3276.0,
                 0.0,
-            );
+            )
+            .unlike("a volume that is nowhere", 0.0);
         }
     }
     out
 }
 
-/// T30.
+/// Check T30.
 pub fn both_borders_of_a_mask_lie_where_its_surface_echoes() -> Check {
     Check {
         row: "T30",
@@ -640,9 +660,13 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
             let inside: Vec<usize> = (0..samples).filter(|k| prescan[2 * k] == 0.0).collect();
             let ends = [inside[0], inside[inside.len() - 1] + 1].map(|k| k as f64);
             let far = top + chord / rate;
-            for (what, found, expected) in [("near", ends[0], top), ("far", ends[1], far)] {
+            let slow = speed / fat;
+            for (what, found, expected, other) in
+                [("near", ends[0], top, top * slow), ("far", ends[1], far, (top + chord) * slow)]
+            {
                 let name = format!("{tracer}, {}: {what} border, sample", said.word());
-                out.compare(name, found, expected / pitch, 1.0);
+                out.compare(name, found, expected / pitch, 1.0)
+                    .unlike("fat's speed from the face on", other / pitch);
             }
             if said == MaskSpeed::Enclosing {
                 let echoes = &surface[2 * line * samples..][..2 * samples];
@@ -666,7 +690,10 @@ fn far_border(bench: &Bench, physics: Physics) -> Outcome {
                 }
             }
             let name = format!("{tracer}, {}: largest error of the volume's level", said.word());
-            out.compare(name, worst, 0.0, 2e-6);
+            out.compare(name, worst, 0.0, 2e-6).unlike(
+                "nearer by fat's speed, and where it should not be",
+                chord * (slow - 1.0) / 200.0,
+            );
         }
     }
     out

@@ -1,4 +1,4 @@
-//! Second-order statistics of speckle: the size of its grains, and what probe motion leaves of them.
+//! Second-order statistics of speckle: the size of its grains, and its correlation under probe motion.
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::Scene;
@@ -10,7 +10,7 @@ use crate::profile::width;
 use crate::render::Frame;
 use crate::speckle::{DEPTHS, homogeneous, intensities, sigma_axial, sigma_lateral};
 
-/// T12.
+/// Check T12.
 pub fn speckle_grains_are_as_large_as_the_point_spread_function() -> Check {
     Check {
         row: "T12",
@@ -25,7 +25,7 @@ pub fn speckle_grains_are_as_large_as_the_point_spread_function() -> Check {
 
 /// Full width at half maximum of an autocovariance, samples.
 fn fwhm(half: &[f64]) -> f64 {
-    // What is left of chance beyond the first fall under 10 % has no logarithm to fit.
+    // The rest of chance beyond the first fall under 10 % has no logarithm to fit.
     let end = half.iter().position(|v| *v < 0.1).unwrap_or(half.len());
     let right = &half[..end];
     let both: Vec<f64> = right[1..].iter().rev().chain(right).copied().collect();
@@ -47,7 +47,7 @@ fn envelope_covariance(x: f64) -> f64 {
     sum(x) / sum(1.0)
 }
 
-/// Where the envelope's covariance is one half, in sigmas: full width.
+/// Full width at half maximum of the envelope's covariance, in sigmas.
 fn envelope_width() -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     for _ in 0..50 {
@@ -61,11 +61,11 @@ fn envelope_width() -> f64 {
     2.0 * (-2.0 * f64::ln(low)).sqrt()
 }
 
-/// The tolerance is the table's; a frame has 3 000 to 40 000 grains, which make 1 %. Beams end at 2.5 sigma, so that two
+/// Tolerance, the table's; a frame has 3 000 to 40 000 grains, which make 1 %. Beams end at 2.5 sigma, so that two
 /// overlap by erf(2.5 - d / 2 sigma) / erf(2.5) less: lateral grains are 1 % smaller.
 const SIZE: f64 = 0.05;
 
-/// Distance between the lines that show lateral grains, mm: a third of the narrower beam's sigma.
+/// Distance between the scanlines that show lateral grains, mm: a third of the narrower beam's sigma.
 const LINE_PITCH: f64 = 0.08;
 
 /// Axial and lateral size of grains with two beams and two pulses.
@@ -122,7 +122,7 @@ fn compare(out: &mut Outcome, name: &str, way: &str, rows: &[Vec<f64>], pitch: f
     ));
 }
 
-/// T13.
+/// Check T13.
 pub fn probe_motion_decorrelates_speckle_as_the_beam_overlaps() -> Check {
     Check {
         row: "T13",
@@ -137,8 +137,8 @@ pub fn probe_motion_decorrelates_speckle_as_the_beam_overlaps() -> Check {
 /// Shifts in sigmas.
 const SHIFTS: [f64; 5] = [0.05, 0.5, 1.0, 1.5, 2.0];
 
-/// The tolerance is the table's; 18 000 grains make 0.01, and beams that end at 2.5 sigma overlap so much less at
-/// 2 sigma that it is 0.126 instead of 0.135.
+/// Decorrelation by motion. The tolerance is the table's; 18 000 grains make 0.01, and beams that end at 2.5 sigma
+/// overlap less at 2 sigma: 0.126 instead of 0.135.
 pub fn motion(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];

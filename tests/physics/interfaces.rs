@@ -24,7 +24,7 @@ const FLUIDS: [[f64; 2]; 6] = [
 const NAMES: [&str; 6] = ["water", "fat", "muscle", "liver", "bone", "air"];
 const PAIRS: [[usize; 2]; 6] = [[0, 1], [1, 2], [2, 3], [1, 4], [4, 0], [3, 5]];
 
-/// One line that meets a wall turned by `tilt` rad at 40 mm.
+/// One scanline that meets a wall turned by `tilt` rad at 40 mm.
 fn wall(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Scene {
     let mut scene = linear(1, 1.0, tissue(before[0], before[1], 0.0));
     // Near total reflection, and into air, little goes through.
@@ -38,32 +38,32 @@ fn wall(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Scene {
     scene
 }
 
-/// What goes through the wall, if anything, along each line.
+/// The transmitted segment behind the wall, if any, along each scanline.
 fn transmitted(lines: &[Vec<Segment>]) -> Vec<Option<Segment>> {
     let through = |l: &Vec<Segment>| l.iter().find(|s| s.instance == 0).copied();
     lines.iter().map(through).collect()
 }
 
-/// What goes through the wall turned by `tilt`, by the twins.
+/// The transmitted segment behind the wall turned by `tilt`, by the twins.
 fn through(before: [f64; 2], behind: [f64; 2], tilt: f64) -> Option<Segment> {
     transmitted(&Inputs::new(&wall(before, behind, tilt)).traced().segments)[0]
 }
 
-/// Lines from a point, one at each whole degree, that meet a wall across the depth axis.
+/// Scanlines from a point, one at each whole degree, that meet a wall across the depth axis.
 fn fan(before: [f64; 2], behind: [f64; 2]) -> Scene {
     let mut scene = linear(179, 1.0, silent(before[0], before[1], 0.0));
     scene.probe.kind = Kind::Phased { field_of_view: 179f64.to_radians() };
     scene.probe.samples = 64;
     // Near total reflection, and into air, little goes through.
     scene.simulation.min_weight = 1e-12;
-    // Near, so that the outermost line meets it within the image's depth.
+    // Near, so that the outermost scanline meets it within the image's depth.
     add_layer(&mut scene, 1.0, silent(behind[0], behind[1], 0.0));
     // Far away: it makes paths leave segments in silence.
     add_point(&mut scene, [0.0, 500.0, 10.0], 1.0);
     scene
 }
 
-/// What the device lets through walls, with the speed and impedance behind them multiplied: tracer,
+/// A segment that the device transmits through a wall, with the speed and impedance behind it multiplied: tracer,
 /// fluids, incidence, segment.
 type Passage = (Tracer, [f64; 2], [f64; 2], f64, Option<Segment>);
 
@@ -92,7 +92,7 @@ fn incidences() -> impl Iterator<Item = (f64, [f64; 2], [f64; 2], f64)> {
     })
 }
 
-/// 4 Z1 Z2 cos i cos t / (Z2 cos i + Z1 cos t)^2, 0 at total reflection.
+/// Transmission 4 Z1 Z2 cos i cos t / (Z2 cos i + Z1 cos t)^2, 0 at total reflection.
 pub fn fresnel([c1, z1]: [f64; 2], [c2, z2]: [f64; 2], incidence: f64) -> f64 {
     let sine = c2 / c1 * incidence.sin();
     if sine >= 1.0 {
@@ -102,7 +102,7 @@ pub fn fresnel([c1, z1]: [f64; 2], [c2, z2]: [f64; 2], incidence: f64) -> f64 {
     4.0 * n1 * n2 / (n1 + n2).powi(2)
 }
 
-/// T1.
+/// Check T1.
 pub fn what_a_wall_lets_through_is_the_fluid_fresnel_law_at_every_angle() -> Check {
     Check {
         row: "T1",
@@ -117,7 +117,7 @@ pub fn what_a_wall_lets_through_is_the_fluid_fresnel_law_at_every_angle() -> Che
     }
 }
 
-/// Deviation of a transmitted weight from the law, of what is allowed.
+/// Deviation of a transmitted weight from the law, as a multiple of the tolerance.
 fn fresnel_error(weight: f64, a: [f64; 2], b: [f64; 2], incidence: f64) -> f64 {
     let slope = fresnel(a, b, incidence + 1e-7) - fresnel(a, b, incidence - 1e-7);
     (weight - fresnel(a, b, incidence)).abs() / (1e-6 + slope.abs())
@@ -167,7 +167,7 @@ fn law_curves(law: fn([f64; 2], [f64; 2], f64) -> Option<f64>) -> Vec<Curve> {
     PAIRS.into_iter().map(one).collect()
 }
 
-/// T2.
+/// Check T2.
 pub fn refraction_is_snells_law_by_speeds_and_total_reflection_switches_there() -> Check {
     Check {
         row: "T2",
@@ -180,7 +180,7 @@ pub fn refraction_is_snells_law_by_speeds_and_total_reflection_switches_there() 
     }
 }
 
-/// Angle of refraction, rad, unless all is reflected.
+/// Angle of refraction, rad; none at total reflection.
 fn snell([c1, _]: [f64; 2], [c2, _]: [f64; 2], incidence: f64) -> Option<f64> {
     let sine = c2 / c1 * incidence.sin();
     (sine < 1.0).then(|| sine.asin())
@@ -232,7 +232,8 @@ fn snells_law(bench: &Bench, physics: Physics) -> Outcome {
             let got = transmitted(&lines).iter().flatten().count();
             let what =
                 format!("{name}: rays from fat into bone {side} degree from the critical angle");
-            out.compare(what, got as f64, passes, 0.0);
+            let figure = out.compare(what, got as f64, passes, 0.0);
+            figure.unlike("a speed a thousandth too small behind the wall", 1.0);
         }
     }
     let mut curves = law_curves(|a, b, i| snell(a, b, i).map(f64::to_degrees));
@@ -257,7 +258,7 @@ fn abdominal_wall() -> Scene {
     scene
 }
 
-/// T4.
+/// Check T4.
 pub fn transmission_is_beer_lambert_times_fresnel() -> Check {
     Check {
         row: "T4",
@@ -284,10 +285,10 @@ fn transmission(bench: &Bench, physics: Physics) -> Outcome {
     let mut curves = vec![Curve::line("attenuation and transmission", line)];
     for (name, lines) in traced(bench, &scene) {
         let got = &lines[0];
-        let count = weights.len() as f64;
-        out.compare(format!("{name}: segments"), got.len() as f64, count, 0.0);
-        for ((_, expected), (segment, tissue)) in weights.iter().zip(got.iter().zip(&truth.tissues))
-        {
+        assert_eq!(got.len(), weights.len(), "{name}: a segment for each tissue");
+        let entered = weights.iter().zip(got.iter().zip(&truth.tissues));
+        // A path begins with a weight of 1.
+        for ((_, expected), (segment, tissue)) in entered.skip(1) {
             let what = format!("{name}: weight on entering {}", tissue.name);
             out.compare(what, segment.weight, *expected, 1e-5 * expected);
         }

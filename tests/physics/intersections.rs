@@ -1,4 +1,4 @@
-//! Where rays meet triangles, by both tracers. The suite of all kinds of rays is `tests/intersect`.
+//! Hits of rays on triangles, by both tracers. The suite of all kinds of rays is `tests/intersect`.
 
 #[path = "../intersect/beating.rs"]
 pub mod beating;
@@ -21,7 +21,7 @@ use rays::{Ray, aimed_at_seams, baked, mirrored, placement, rays, scene, turned}
 
 pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
-/// T31.
+/// Check T31.
 pub fn placements_are_transforms_of_the_mesh() -> Check {
     Check {
         row: "T31",
@@ -35,7 +35,7 @@ pub fn placements_are_transforms_of_the_mesh() -> Check {
     }
 }
 
-/// Turned; stretched; mirrored.
+/// A turned, a stretched and a mirrored placement.
 fn three_placements() -> [(&'static str, DAffine3); 3] {
     let turned =
         placement(DVec3::ONE, DVec3::new(1.0, -2.0, 0.5), 0.9, DVec3::new(20.0, -10.0, 70.0));
@@ -89,7 +89,7 @@ fn placements(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T33.
+/// Check T33.
 pub fn closest_hits_are_those_of_brute_force_in_double_precision() -> Check {
     Check {
         row: "T33",
@@ -104,7 +104,7 @@ pub fn closest_hits_are_those_of_brute_force_in_double_precision() -> Check {
     }
 }
 
-/// Instances that overlap, turned and mirrored.
+/// A scene of overlapping instances, turned and mirrored.
 fn parts() -> Scene {
     scene(vec![
         (shapes::sphere(15.0, 2), mirrored()),
@@ -128,7 +128,8 @@ fn closest_hits(bench: &Bench, physics: Physics) -> Outcome {
         let half = rays.len() / 2;
         let mut figure = |what, count: usize, allowed: usize| {
             let what = format!("{tracer}: of {half} rays {what}, other hits than by brute force");
-            out.compare(what, count as f64, 0.0, allowed as f64);
+            out.compare(what, count as f64, 0.0, allowed as f64)
+                .unlike("every second ray slips through", half as f64 / 2.0);
         };
         figure("at vertices and edges", aimed, slips(tracer, half));
         figure("elsewhere", elsewhere, 0);
@@ -137,7 +138,7 @@ fn closest_hits(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// What a ray costs over the size of the mesh.
+/// Cost of a ray over the size of the mesh.
 fn steps(bench: &Bench) -> Plot {
     let (mut brute, mut nodes, mut triangles) = (vec![], vec![], vec![]);
     for subdivisions in 0..6 {

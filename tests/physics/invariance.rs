@@ -1,4 +1,4 @@
-//! What must not matter: how a frame is sampled, and where in the world it is taken.
+//! Invariances: the sampling of a frame, and its place in the world.
 
 use std::f64::consts::PI;
 
@@ -15,7 +15,7 @@ use crate::speckle::{homogeneous, intensities, sigma_elevation, sigma_lateral};
 /// Level of unattenuated liver, dB re a perfect mirror.
 const LIVER: f64 = -45.0;
 
-/// T24.
+/// Check T24.
 pub fn brightness_depends_on_neither_layers_nor_samples() -> Check {
     Check {
         row: "T24",
@@ -59,7 +59,8 @@ fn sampling_grid(bench: &Bench, physics: Physics) -> Outcome {
         let density = if scatterers > 0.0 { "thinned lattice" } else { "whole lattice" };
         let label = format!("{layers} layers, {density}, {samples} samples");
         for [z, measured] in &dots {
-            out.compare(format!("{name}: {label}, at {z} mm; dB"), *measured, LIVER, 0.2);
+            out.compare(format!("{name}: {label}, at {z} mm; dB"), *measured, LIVER, 0.2)
+                .unlike("one of the two components of an echo lost", LIVER - decibel(2.0));
         }
         curves.push(Curve::dots(label, dots));
     }
@@ -67,7 +68,7 @@ fn sampling_grid(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T24.
+/// Check T24.
 pub fn sampling_schemes_agree() -> Check {
     Check {
         row: "T24",
@@ -85,13 +86,13 @@ const SCHEMES: [(Sampling, &str); 3] = [
     (Sampling::SharedPrimary, "shared primary (S1)"),
 ];
 
-/// R PATHS is whole, so that exactly as many stratified paths are reflected as should be.
+/// Number of paths for which R PATHS is whole, so that the right number of stratified paths is reflected.
 const PATHS: u32 = 25;
 
-/// Speckle turned aside by a wall of pressure reflection `r` that all lines meet above 45 mm.
+/// Speckle turned aside by a wall of pressure reflection `r` that all scanlines meet above 45 mm.
 fn turned_aside(r: f64) -> Scene {
     let mut scene = homogeneous(24, 1.0, 1);
-    // The same scatterers however a scheme shares the power: what is weaker would get fewer.
+    // The same scatterers however a scheme shares the power: weaker parts would get fewer.
     scene.simulation.scatterers_per_resolution_cell = 0.0;
     // Few of them: each is rounded as often as there are paths.
     scene.simulation.cell = 0.3;
@@ -105,8 +106,8 @@ fn turned_aside(r: f64) -> Scene {
     scene
 }
 
-// 0.2 dB is the table's: 24 lines of 50 mm hold 7 000 grains, 0.05 dB. Between the schemes scatterers and paths are the
-// same, and N equal paths round their N-th parts alike: off by 2.6e-4 N of the speckle, 0.7 % for 25.
+// 0.2 dB is the table's: 24 scanlines of 50 mm hold 7 000 grains, 0.05 dB. Between the schemes scatterers and paths
+// are the same, and N equal paths round their N-th parts alike: off by 2.6e-4 N of the speckle, 0.7 % for 25.
 fn schemes(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let r: f64 = 0.6;
@@ -126,7 +127,8 @@ fn schemes(bench: &Bench, physics: Physics) -> Outcome {
                 level,
                 expected,
                 0.2,
-            );
+            )
+            .unlike("amplitudes that add up", LIVER);
         }
         for ((_, frame), (_, scheme)) in frames.iter().zip(SCHEMES).skip(1) {
             let what =
@@ -137,7 +139,7 @@ fn schemes(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T24.
+/// Check T24.
 pub fn tissue_mirrored_by_a_rough_wall_has_the_level_of_many_paths() -> Check {
     Check {
         row: "T24",
@@ -150,8 +152,8 @@ pub fn tissue_mirrored_by_a_rough_wall_has_the_level_of_many_paths() -> Check {
     }
 }
 
-// 0.3 dB: chance makes 0.05 dB of 24 lines and 50 mm, and three times that as what is near the wall, a fifth of the
-// stretch, makes most of the power. Fewer paths show the same, bit for bit but for the rounding.
+// 0.3 dB: chance makes 0.05 dB of 24 scanlines and 50 mm, and three times that because the part near the wall, a
+// fifth of the stretch, makes most of the power. Fewer paths show the same, bit for bit except for the rounding.
 fn mirrored(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];
@@ -160,7 +162,7 @@ fn mirrored(bench: &Bench, physics: Physics) -> Outcome {
     let mut curves = Vec::new();
     for roughness in [1000.0, 100.0, 10.0] {
         let mut scene = turned_aside(r);
-        // What is straight on would outshine it.
+        // Tissue straight on would outshine it.
         scene.tissues[1].echogenicity = f64::NEG_INFINITY;
         scene.simulation.volume_floor = -200.0;
         for side in &mut scene.instances[0].surface {
@@ -217,7 +219,7 @@ fn difference(a: &Frame, b: &Frame) -> f64 {
     (off / all).sqrt()
 }
 
-/// T24.
+/// Check T24.
 pub fn a_frame_moves_with_its_scene() -> Check {
     Check {
         row: "T24",
@@ -238,8 +240,8 @@ fn organ(m: DAffine3) -> Scene {
     let around = m * DAffine3::from_translation(DVec3::new(3.1, 5.3, -7.0));
     add_box(&mut scene, [80.0, 80.0, 80.0], tissue(1.540, 1.630, 0.5), around);
     add_sphere(&mut scene, 5.0, tissue(1.580, 1.720, 0.3), DVec3::new(0.4, 0.3, 20.0));
-    // Of a draw in which no scatterer lies on the ball to the rounding of 200 mm: such a one may count to either side
-    // or to none, and one scatterer is more than all other rounding.
+    // A draw in which no scatterer lies on the ball to the rounding of 200 mm: such a one may count to either side or
+    // to none, and one scatterer is more than all other rounding.
     scene.simulation.seed = 3;
     let ball = &mut scene.instances[1];
     ball.world_from_object = m * ball.world_from_object;

@@ -1,4 +1,4 @@
-// What frames must show whatever computes them: closed forms of acoustics and image formation.
+// Properties of frames whatever computes them: closed forms of acoustics and image formation.
 // Each expectation is worked out in its test and takes nothing from the code under test.
 // tools/validate.rs includes this file: the report shows what the tests prove.
 
@@ -41,6 +41,8 @@ mod selectors;
 mod shadow;
 #[path = "../common/signal.rs"]
 mod signal;
+#[path = "../common/skip.rs"]
+mod skip;
 mod speckle;
 mod squeeze;
 mod stages;

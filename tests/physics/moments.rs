@@ -19,7 +19,7 @@ pub fn signal_to_noise(values: &[f64]) -> f64 {
     mean(values) / deviation(values)
 }
 
-/// E e^4 / (E e^2)^2 of envelopes e whose squares are given.
+/// Kurtosis E e^4 / (E e^2)^2 of envelopes e whose squares are given.
 pub fn kurtosis(intensities: &[f64]) -> f64 {
     let squares: Vec<f64> = intensities.iter().map(|i| i * i).collect();
     mean(&squares) / mean(intensities).powi(2)
@@ -56,8 +56,8 @@ pub fn correlation(a: &[f64], b: &[f64]) -> f64 {
     mean(&products) / (deviation(a) * deviation(b))
 }
 
-/// Covariance of values `lag` apart along the rows, for lags 0 to `most`, over that at lag 0. The mean is
-/// that of all rows.
+/// Covariance of values `lag` apart along the rows, for lags 0 to `most`, over that at lag 0. The mean is that of
+/// all rows.
 pub fn autocovariance(rows: &[Vec<f64>], most: usize) -> Vec<f64> {
     let all = rows.concat();
     let m = mean(&all);
@@ -76,8 +76,8 @@ pub fn transposed(rows: &[Vec<f64>]) -> Vec<Vec<f64>> {
     (0..rows[0].len()).map(|i| rows.iter().map(|r| r[i]).collect()).collect()
 }
 
-/// Generalised contrast-to-noise ratio of two sets of envelopes: one minus what their histograms
-/// have in common (Rodriguez-Molares et al. 2020, IEEE TUFFC 67(4)). 64 bins, even on the logarithm.
+/// Generalised contrast-to-noise ratio of two sets of envelopes: one minus the common part of their histograms
+/// (Rodriguez-Molares et al. 2020, IEEE TUFFC 67(4)). 64 bins, even on the logarithm.
 pub fn gcnr(inside: &[f64], outside: &[f64]) -> f64 {
     let log = |v: f64| v.max(1e-12).ln();
     let all = || inside.iter().chain(outside).map(|&v| log(v));
@@ -111,7 +111,7 @@ pub fn gaussian_fwhm() -> f64 {
 mod tests {
     use super::*;
 
-    /// n intensities whose distribution is as exponential as n numbers can be.
+    /// The n intensities whose distribution is closest to the exponential one.
     fn quantiles(n: u32) -> Vec<f64> {
         let at = |i| -((f64::from(i) + 0.5) / f64::from(n)).ln();
         (0..n).map(at).collect()

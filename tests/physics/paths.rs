@@ -1,4 +1,4 @@
-//! What paths leave behind on the device, before any image is formed.
+//! The traces of paths on the device, before any image is formed.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::check::Bench;
 /// Both tracers.
 pub const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
-/// One frame's paths.
+/// The paths of one frame.
 pub struct Shot {
     /// Surface echoes before the lateral stage, complex, relative to a perfect mirror: [scanline][sample].
     pub surface: Vec<Vec<[f64; 2]>>,
@@ -20,7 +20,7 @@ pub struct Shot {
     pub segments: Vec<Vec<Segment>>,
 }
 
-/// A scene on the device, shot again and again with other settings.
+/// A scene on the device for repeated frames with other settings.
 pub struct Range {
     device: Arc<gpu::Device>,
     simulator: Simulator,
@@ -71,8 +71,8 @@ impl Range {
     }
 }
 
-/// Amplitude of what `line` holds within `reach` samples of one-way time `time`, us, relative to an
-/// echo of amplitude 1 and phase 0 there: complex.
+/// Complex amplitude of a scanline within `reach` samples of one-way time `time`, us, relative to an echo of
+/// amplitude 1 and phase 0 there.
 pub fn echo(scene: &Scene, line: &[[f64; 2]], time: f64, reach: usize) -> [f64; 2] {
     let probe = &scene.probe;
     let k = (probe.speed * time / probe.sample_pitch()).floor() as usize;

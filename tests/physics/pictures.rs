@@ -1,4 +1,4 @@
-//! Pictures as a user sees them: shipped tissues under the linear small-parts array, everything at its default.
+//! Pictures for the user: shipped tissues under the linear small-parts array, with all defaults.
 
 use glam::{DAffine3, DVec3};
 use insonify::probe::Probe;
@@ -20,12 +20,12 @@ fn liver() -> Scene {
     scene
 }
 
-/// What the display shows of `scene`.
+/// The displayed image of `scene`.
 pub fn shown(bench: &Bench, title: &str, scene: &Scene) -> Picture {
     (bench.renderers[1].1)(scene).picture(title, scene)
 }
 
-/// Both sides of the only instance reflect as its tissue's surface does.
+/// The displayed image; both sides of the only instance reflect as its tissue's surface.
 fn seen(bench: &Bench, title: &str, mut scene: Scene) -> Picture {
     if let [instance] = scene.instances.as_mut_slice() {
         instance.surface = [scene.tissues[instance.tissue].surface; 2];
@@ -33,12 +33,12 @@ fn seen(bench: &Bench, title: &str, mut scene: Scene) -> Picture {
     shown(bench, title, &scene)
 }
 
-/// Speckle and nothing else.
+/// Picture of speckle only.
 pub fn homogeneous(bench: &Bench) -> Picture {
     seen(bench, "Liver", liver())
 }
 
-/// A ball of water of 10 mm: a cyst whose walls reflect 5 %, 19 dB above liver's speckle.
+/// Picture of a ball of water of 10 mm: a cyst whose walls reflect 5 %, 19 dB above liver's speckle.
 pub fn cyst(bench: &Bench) -> Picture {
     let mut scene = liver();
     let centre = DVec3::new(0.0, 0.0, 17.0);
@@ -46,8 +46,8 @@ pub fn cyst(bench: &Bench) -> Picture {
     seen(bench, "Cyst in liver", scene)
 }
 
-/// A plate of bone that lies a little askew: as the shadow is measured, and with the reflected paths that mirror the
-/// tissue above it into its shadow, as they do in patients.
+/// Pictures of a slightly tilted plate of bone: as the shadow is measured, and with the reflected paths that mirror
+/// the tissue above it into its shadow, as in patients.
 pub fn bone(bench: &Bench) -> [Picture; 2] {
     let mut scene = liver();
     let at =

@@ -14,7 +14,7 @@ pub fn width(samples: &[f64]) -> f64 {
     crossing(&log, right, level) - crossing(&log, left - 1, level)
 }
 
-/// Where the cubic through samples i - 1 to i + 2 takes `level` between i and i + 1.
+/// Place between i and i + 1 where the cubic through samples i - 1 to i + 2 takes `level`.
 fn crossing(log: &[f64], i: usize, level: f64) -> f64 {
     let at = |x: f64| {
         let node = |j: usize| j as f64 - 1.0;

@@ -13,11 +13,11 @@ use insonify::sim::{Simulator, Tracer, layout, placement, shaders::Library, tabl
 
 use crate::check::Picture;
 
-/// A scene as the kernels read it.
+/// A scene in the form that the kernels read.
 pub struct Inputs(Owned);
 
 impl Inputs {
-    /// Rigidly placed meshes only: their texture rests in object space.
+    /// Inputs for rigidly placed meshes only: their texture rests in object space.
     pub fn new(scene: &Scene) -> Self {
         let mut inputs = Owned {
             frame: tables::frame(scene, 0),
@@ -57,9 +57,9 @@ impl Deref for Inputs {
 
 /// Stages of a frame.
 pub struct Frame {
-    /// Complex baseband after the axial kernel, per line.
+    /// Complex baseband after the axial kernel, per scanline.
     pub iq: Vec<Vec<[f64; 2]>>,
-    /// Displayed level 0..=1, per line.
+    /// Displayed level 0..=1, per scanline.
     pub levels: Vec<Vec<f64>>,
     /// Pixels row by row, 0 outside the sector.
     pub pixels: Vec<u32>,
@@ -71,7 +71,7 @@ impl Frame {
         self.iq[l].iter().map(|v| v[0].hypot(v[1])).collect()
     }
 
-    /// Its pixels, of the height that `scene` asks for; white outside the sector.
+    /// Its pixels, at the image height of `scene`; white outside the sector.
     pub fn picture(&self, title: impl Into<String>, scene: &Scene) -> Picture {
         let grey = |&p: &u32| if p >> 24 == 0 { 255 } else { (p & 0xff) as u8 };
         Picture {
@@ -82,7 +82,7 @@ impl Frame {
     }
 }
 
-/// What the device's 32-bit buffers would hold.
+/// The sums in the device's 32-bit buffers.
 fn narrow(a: &Accumulator) -> Vec<i32> {
     assert_eq!(a.saturated, 0, "echoes fit the fixed point");
     let fit = |&v: &i64| i32::try_from(v).expect("sums fit the fixed point");
@@ -116,7 +116,7 @@ pub fn twin(scene: &Scene) -> Frame {
     }
 }
 
-/// What computes frames, and its name.
+/// A renderer of frames, with its name.
 pub type Renderer = (&'static str, Box<dyn Fn(&Scene) -> Frame>);
 
 /// The twins, and the device with either tracer.

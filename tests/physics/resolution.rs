@@ -1,4 +1,4 @@
-//! The point-spread function as frames show it.
+//! The point-spread function in frames.
 
 use std::f64::consts::{LN_2, PI, SQRT_2};
 
@@ -23,7 +23,7 @@ pub fn points(lines: u32, width: f64, at: &[[f64; 3]]) -> Scene {
     scene
 }
 
-/// T6.
+/// Check T6.
 pub fn a_point_is_as_long_as_its_pulse() -> Check {
     Check {
         row: "T6",
@@ -33,7 +33,7 @@ pub fn a_point_is_as_long_as_its_pulse() -> Check {
             height, 0.162 mm at 7 MHz and 60 %. Points on and between samples; the split over two \
             samples widens by f (1 - f) of a squared sample about the mean that the kernel corrects, \
             hence 3 % at twice the samples and 8 % at the sample pitch of the Table I preset.",
-        planted: "A twelfth more bandwidth.",
+        planted: "A sixth more bandwidth.",
         run: axial_widths,
     }
 }
@@ -56,10 +56,9 @@ fn pulse((_, render): &Renderer, samples: u32, shift: f64, bandwidth: f64) -> Ve
 fn axial_widths(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let sigma = 1.540 / 2.0 * (2.0 * LN_2).sqrt() / (PI * 0.6 * 7.0);
-    out.compare("closed form at 7 MHz and 60 %, mm", FWHM * sigma, 0.162, 5e-4);
     let bandwidth = match physics {
         Physics::Right => 0.6,
-        Physics::Planted => 0.65,
+        Physics::Planted => 0.7,
     };
     for renderer in &bench.renderers {
         for (samples, share) in [(4096, 0.03), (2048, 0.08)] {
@@ -81,7 +80,7 @@ fn axial_widths(bench: &Bench, physics: Physics) -> Outcome {
 
 fn pulse_plot(pulse: Vec<[f64; 2]>, sigma: f64) -> Plot {
     let gaussian = |z: f64| (-z * z / (2.0 * sigma * sigma)).exp();
-    // The level of points is another check's business.
+    // The level of points is tested elsewhere.
     let scale = pulse.iter().map(|p| p[1]).fold(0.0, f64::max);
     let near = |p: &&[f64; 2]| p[0].abs() < 0.4;
     let shown = pulse.iter().filter(near).map(|p| [p[0], p[1] / scale]);
@@ -103,7 +102,7 @@ pub fn gaussian_beam(f_number: f64, focus: f64, z: f64) -> f64 {
     waist * (1.0 + ((z - focus) / rayleigh).powi(2)).sqrt()
 }
 
-/// T7.
+/// Check T7.
 pub fn a_point_is_as_wide_as_the_beam_at_its_depth() -> Check {
     Check {
         row: "T7",
@@ -146,7 +145,8 @@ fn lateral_widths(bench: &Bench, physics: Physics) -> Outcome {
                 Physics::Planted => FWHM * 0.6 * WAVELENGTH * 2.0,
             };
             let what = format!("{name}: width at {z} mm, mm");
-            out.compare(what, got, expected, 0.05 * expected);
+            out.compare(what, got, expected, 0.05 * expected)
+                .unlike("the transmit beam alone", FWHM * gaussian_beam(2.0, 50.0, z));
             dots.push([z, got]);
         }
         curves.push(Curve::dots(*name, dots));
@@ -156,7 +156,7 @@ fn lateral_widths(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T8.
+/// Check T8.
 pub fn a_slice_is_as_thick_as_the_lens_makes_it() -> Check {
     Check {
         row: "T8",
@@ -175,7 +175,7 @@ fn elevation(z: f64) -> f64 {
 }
 
 fn slice_widths(bench: &Bench, physics: Physics) -> Outcome {
-    // Lines ten millimetres apart: each sees its own points only, one at every depth.
+    // Scanlines ten millimetres apart: each sees its own points only, one at every depth.
     let (step, lines) = (0.2, 39);
     let depths = [40.0, 60.0, 80.0];
     let mut scene = points(lines, 10.0 * f64::from(lines), &[]);

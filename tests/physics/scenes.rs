@@ -20,10 +20,11 @@ pub fn tissue(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
         texture_length: 1.0,
         surface: mirror(),
         source: "test".into(),
+        ..Tissue::shipped("liver").expect("shipped")
     }
 }
 
-/// The same without scatterers.
+/// The tissue without scatterers.
 pub fn silent(speed: f64, impedance: f64, attenuation: f64) -> Tissue {
     Tissue { echogenicity: f64::NEG_INFINITY, ..tissue(speed, impedance, attenuation) }
 }
@@ -49,7 +50,7 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
     }
 }
 
-/// Adds a mirror-like body that `at` takes to its place; later bodies win where they overlap.
+/// Adds a mirror-like body at the place given by `at`; later bodies win where they overlap.
 pub fn add_body(scene: &mut Scene, mesh: Mesh, tissue: Tissue, at: DAffine3) {
     scene.instances.push(Instance {
         name: mesh.name.clone(),
@@ -65,7 +66,7 @@ pub fn add_body(scene: &mut Scene, mesh: Mesh, tissue: Tissue, at: DAffine3) {
     scene.tissues.push(tissue);
 }
 
-/// Adds a box of `size` mm whose front face's middle `at` takes to the place and direction wanted.
+/// Adds a box of `size` mm; `at` gives place and direction of its front face's middle.
 pub fn add_box(scene: &mut Scene, size: [f64; 3], tissue: Tissue, at: DAffine3) {
     add_body(scene, shapes::plane([size[0], size[1]], size[2]), tissue, at);
 }

@@ -1,4 +1,4 @@
-//! Shapes that change: what rays meet, and what a union box costs.
+//! Changing shapes: hits of rays, and the cost of a union box.
 
 use insonify::sim::tracer::Tracer;
 use rayon::prelude::*;
@@ -10,7 +10,7 @@ use crate::intersections::compare::{by_aim, expected, slips, wrong};
 use crate::intersections::device::Rig;
 use crate::intersections::rays::rays;
 
-/// T32.
+/// Check T32.
 pub fn every_strategy_shows_the_keyframe() -> Check {
     Check {
         row: "T32",
@@ -37,7 +37,7 @@ fn run(bench: &Bench, physics: Physics) -> Outcome {
                 show(&mut scene, k);
                 match physics {
                     Physics::Right => drop(rig.update(&scene)),
-                    // What is not there has no triangles to compare with.
+                    // Hidden instances have no triangles to compare with.
                     Physics::Planted => scene.instances[3].shown = true,
                 }
                 let still = scene.still();
@@ -67,7 +67,7 @@ fn union_boxes(bench: &Bench, physics: Physics, out: &mut Outcome) {
         let found = union_box(spread, |scene| Rig::on(&bench.device, scene, Tracer::Bvh));
         let expected = match physics {
             Physics::Right => found.expected,
-            // Both boxes are as wide and as deep: their volumes are as their lengths.
+            // Both boxes are equally wide and deep: their volumes are as their lengths.
             Physics::Planted => 1.0 - 30.0 / (30.0 + spread),
         };
         out.compare(
@@ -75,7 +75,8 @@ fn union_boxes(bench: &Bench, physics: Physics, out: &mut Outcome) {
             found.missed,
             expected,
             0.01,
-        );
+        )
+        .unlike("every second line meets the other child alone", 0.5);
         line.push([spread, expected]);
         dots.push([spread, found.missed]);
     }

@@ -1,4 +1,4 @@
-//! What lies behind: enhancement under fluid, shadow under bone.
+//! Brightness behind structures: enhancement under fluid, shadow under bone.
 
 use glam::{DAffine3, DVec3};
 
@@ -9,13 +9,13 @@ use crate::pictures;
 use crate::scenes::{add_box, add_sphere, silent};
 use crate::speckle::homogeneous;
 
-/// Share of intensity that a wall between two impedances turns back at normal incidence, or at any with
-/// equal speeds.
+/// Share of intensity that a wall between two impedances reflects at normal incidence, or at any with equal
+/// speeds.
 fn reflected(z1: f64, z2: f64) -> f64 {
     ((z2 - z1) / (z2 + z1)).powi(2)
 }
 
-/// T16.
+/// Check T16.
 pub fn fluid_enhances_what_lies_behind_it() -> Check {
     Check {
         row: "T16",
@@ -39,9 +39,9 @@ const FREQUENCY: f64 = 7.0;
 const RADIUS: f64 = 5.0;
 const CENTRE: f64 = 40.0;
 
-// 0.5 dB is the table's: behind the middle and beside lie 1 200 and 5 000 grains, 0.14 dB on the difference. Line by line
-// the scatterers are those of the same scene without the cyst, so that chance drops out: 0.02 dB is the rounding of the
-// sums, and a sphere of flat faces 2 um inside a round one.
+// 0.5 dB is the table's: behind the middle and beside lie 1 200 and 5 000 grains, 0.14 dB on the difference. Each
+// scanline has the same scatterers as in the same scene without the cyst, so that chance drops out: 0.02 dB is the
+// rounding of the sums, and a sphere of flat faces 2 um inside a round one.
 fn enhancement(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let [outside, inside] = [1.630, 1.530];
@@ -96,7 +96,7 @@ fn enhancement(bench: &Bench, physics: Physics) -> Outcome {
     out
 }
 
-/// T17.
+/// Check T17.
 pub fn bone_casts_a_shadow() -> Check {
     Check {
         row: "T17",

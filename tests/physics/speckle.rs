@@ -12,7 +12,7 @@ use crate::pictures;
 use crate::render::Frame;
 use crate::scenes::{linear, tissue};
 
-/// Lossless fully developed speckle with the whole slice sampled, seen by lines `pitch` mm apart. The beam is
+/// Lossless fully developed speckle with the whole slice sampled, seen by scanlines `pitch` mm apart. The beam is
 /// equally wide at every depth: received with F# 2 everywhere, transmitted so weakly focused that it hardly counts.
 pub fn homogeneous(lines: u32, pitch: f64, seed: u32) -> Scene {
     let mut scene = linear(lines, f64::from(lines) * pitch, tissue(1.540, 1.630, 0.0));
@@ -54,7 +54,7 @@ pub fn sigma_elevation(scene: &Scene, z: f64) -> f64 {
     one_way(f_number, scene.probe.elevation_focus, z) / std::f64::consts::SQRT_2
 }
 
-/// Intensities per line between two depths in mm, every `step`th sample.
+/// Intensities per scanline between two depths in mm, every `step`th sample.
 pub fn intensities(frame: &Frame, scene: &Scene, depths: [f64; 2], step: usize) -> Vec<Vec<f64>> {
     let [a, b] = depths.map(|z| (z / scene.probe.sample_pitch()).round() as usize);
     let line = |l: &Vec<[f64; 2]>| {
@@ -71,7 +71,7 @@ fn envelopes(intensities: &[f64]) -> Vec<f64> {
     intensities.iter().map(|v| v.sqrt()).collect()
 }
 
-/// T9.
+/// Check T9.
 pub fn speckle_is_fully_developed() -> Check {
     Check {
         row: "T9",
@@ -90,8 +90,8 @@ pub fn speckle_is_fully_developed() -> Check {
     }
 }
 
-/// Tolerances are those of the table. With 78 scatterers per resolution cell the kurtosis is above 2 by 0.02 and
-/// the ratio below 1.913 by 0.01 (T11). 64 lines hold 22 000 cells: standard error 0.004 of the ratio.
+/// Tolerances are those of the table. With 78 scatterers per resolution cell the kurtosis is above 2 by 0.02 and the
+/// ratio below 1.913 by 0.01 (T11). 64 scanlines hold 22 000 cells: standard error 0.004 of the ratio.
 pub fn fully_developed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let mut scene = homogeneous(64, 1.0, seed);
     if physics == Physics::Planted {
@@ -109,7 +109,7 @@ pub fn fully_developed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let what = format!("{name}: mean / deviation of the intensity");
     out.compare(what, signal_to_noise(&all), 1.0, 0.05);
     out.compare(format!("{name}: kurtosis"), kurtosis(&all), 2.0, 0.1);
-    // Lines lie 3.8 sigma apart, every sixth sample 4.3 sigma: intensities correlate by less than 1e-3.
+    // Scanlines are 3.8 sigma apart, every sixth sample 4.3 sigma: intensities correlate by less than 1e-3.
     let apart = intensities(&frame, &scene, DEPTHS, 6).concat();
     out.compare(
         format!("{name}: Kolmogorov-Smirnov distance of {} samples", apart.len()),
@@ -118,7 +118,8 @@ pub fn fully_developed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         critical_distance(apart.len()),
     );
     // Liver is 45 dB under a perfect mirror; 22 000 cells make 0.03 dB, the depth's calibration less than 0.1.
-    out.compare(format!("{name}: RMS level, dB re mirror"), decibel(power), -45.0, 0.2);
+    out.compare(format!("{name}: RMS level, dB re mirror"), decibel(power), -45.0, 0.2)
+        .unlike("one of the two components of an echo lost", -45.0 - decibel(2.0));
     out.plots.push(histogram(&e, power));
     out
 }
@@ -147,7 +148,7 @@ fn histogram(envelopes: &[f64], power: f64) -> Plot {
     )
 }
 
-/// T10.
+/// Check T10.
 pub fn log_compressed_speckle_has_one_deviation() -> Check {
     Check {
         row: "T10",
@@ -159,7 +160,7 @@ pub fn log_compressed_speckle_has_one_deviation() -> Check {
     }
 }
 
-/// The tolerance is the table's; chance makes 0.03 dB.
+/// Deviation of log-compressed speckle. The tolerance is the table's; chance makes 0.03 dB.
 pub fn log_compressed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];
@@ -183,7 +184,7 @@ pub fn log_compressed(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     out
 }
 
-/// T11.
+/// Check T11.
 pub fn sparse_speckle_follows_the_kurtosis_law() -> Check {
     Check {
         row: "T11",
@@ -197,8 +198,8 @@ pub fn sparse_speckle_follows_the_kurtosis_law() -> Check {
     }
 }
 
-/// int_{-h}^{h} (1 - |d| / h) exp(-d^2 / 2 sigma^2) dd / h: what the average over a cell of edge `h` leaves of a
-/// Gaussian's sum of squares.
+/// Reduction of a Gaussian's sum of squares by the average over a cell of edge `h`:
+/// int_{-h}^{h} (1 - |d| / h) exp(-d^2 / 2 sigma^2) dd / h.
 ///
 /// S = sum X_i over independent cells, X_i = a h(p_i) exp(i phi_i), so E|S|^4 = 2 (sum E|X|^2)^2 + sum E|X|^4 -
 /// 2 sum (E|X|^2)^2. A cell adds 3 rho sigma^4 <h^4> and 2 (rho sigma^2 <h^2>)^2, <> over the cell; the
@@ -214,7 +215,7 @@ fn averaged(h: f64, sigma: f64) -> f64 {
     (0..STEPS).map(term).sum::<f64>() * step
 }
 
-/// The law, averaged over depth as the slice's thickness varies. int h^2 = sqrt(pi) sigma and
+/// The kurtosis law, averaged over depth as the slice's thickness varies. int h^2 = sqrt(pi) sigma and
 /// int h^4 = sqrt(pi / 2) sigma per axis: N = (2 pi)^(3/2) sigma_x sigma_y sigma_z / h^3.
 fn kurtosis_law(scene: &Scene, density: f64) -> f64 {
     const STEPS: u32 = 60;
@@ -230,11 +231,12 @@ fn kurtosis_law(scene: &Scene, density: f64) -> f64 {
     2.0 + depths.map(at).sum::<f64>() / f64::from(STEPS)
 }
 
-/// Edge of a cell, mm, and density. The last two tell the law from that with q = 1, which has 2.10 instead of 2.22.
+/// Edges of a cell, mm, and densities. Over many seeds the last two distinguish the law from that with q = 1, which
+/// has 2.10 instead of 2.22.
 const SPARSE: [[f64; 2]; 6] =
     [[0.15, 0.05], [0.15, 0.1], [0.15, 0.2], [0.15, 1.0], [0.3, 0.4], [0.3, 1.0]];
 
-/// The tolerance is the table's; chance makes up to 2 % where scatterers are sparsest.
+/// Kurtosis of sparse speckle. The tolerance is the table's; chance makes up to 2 % where scatterers are sparsest.
 pub fn sparse(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
     let mut out = Outcome::default();
     let (name, render) = &bench.renderers[1];
@@ -249,7 +251,9 @@ pub fn sparse(bench: &Bench, physics: Physics, seed: u32) -> Outcome {
         let measured = kurtosis(&intensities(&frame, &scene, DEPTHS, 1).concat());
         let expected = kurtosis_law(&scene, density);
         let what = format!("{name}: kurtosis, cells of {h} mm, density {density}");
-        out.compare(what, measured, expected, 0.05 * expected);
+        scene.simulation.cell = 2.0 * h;
+        out.compare(what, measured, expected, 0.05 * expected)
+            .unlike("cells twice as large", kurtosis_law(&scene, density));
         dots[usize::from(h > 0.2)].push([density, measured]);
     }
     let curves = [0.15, 0.3].into_iter().zip(dots).flat_map(|(h, points)| {

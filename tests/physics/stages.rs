@@ -18,7 +18,7 @@ pub struct Stages {
     library: Library,
 }
 
-/// What a run left behind.
+/// Result of a run.
 struct Left {
     job: Job,
     outputs: Vec<Vec<u8>>,
@@ -30,7 +30,7 @@ impl Left {
     }
 }
 
-/// What `beam` reads of the contact where every element is coupled.
+/// The contact read by `beam` where every element is coupled.
 fn joined(frame: &Frame) -> Vec<f32> {
     let lines = frame.scanlines as usize;
     [vec![1.0; lines], vec![0.0; lines + 1]].concat()
@@ -41,7 +41,7 @@ impl Stages {
         Self { device: device.clone(), library: Library::embedded() }
     }
 
-    /// Runs a stage on what it reads beside the frame; no validation message may come.
+    /// Runs a stage on the frame and its other inputs; no validation message may come.
     fn run(&self, pass: &Pass, frame: &Frame, mut given: Vec<Input>) -> Left {
         let words = self.library.words(pass.name);
         let kernel = Kernel::new(&self.device, pass.name, words, &[]).expect("it fits the device");
@@ -53,7 +53,7 @@ impl Stages {
         Left { job, outputs: outcome.outputs }
     }
 
-    /// Accumulators to complex samples; also the saturated samples.
+    /// Complex samples from accumulators, and the number of saturated samples.
     pub fn beam(
         &self,
         frame: &Frame,
@@ -71,13 +71,13 @@ impl Stages {
         (left.values("lateral"), left.values::<Counters>("counters")[0].saturated)
     }
 
-    /// Complex samples through the axial kernel.
+    /// Complex samples after the axial kernel.
     pub fn axial(&self, frame: &Frame, lateral: &[f32]) -> Vec<f32> {
         let rows = vec![Row::default(); frame.samples as usize];
         self.detected(frame, &rows, lateral).values("iq")
     }
 
-    /// Log-compressed envelope of samples as they are.
+    /// Log-compressed envelope of unfiltered samples.
     pub fn detect(&self, frame: &Frame, rows: &[Row], iq: &[f32]) -> Vec<f32> {
         let sharp = Frame { axial_sigma: 0.0, ..*frame };
         self.detected(&sharp, rows, iq).values("log_image")
@@ -88,7 +88,7 @@ impl Stages {
         self.run(&AXIAL, frame, given)
     }
 
-    /// Pixels.
+    /// Pixels of a log image.
     pub fn display(&self, frame: &Frame, log: &[f32], grey: &[u32]) -> Vec<u32> {
         let given = vec![Input::words("log_image", log), Input::words("grey", grey)];
         self.run(&DISPLAY, frame, given).values("pixels")
@@ -108,7 +108,7 @@ mod tests {
     use super::*;
     use crate::signal::scene;
 
-    /// The accumulators' end is reported once per sample, whichever of its four numbers reached it.
+    /// An accumulator's end is reported once per sample, whichever of its four numbers reached it.
     #[test]
     fn saturation_is_counted() {
         let scene = scene(Probe { scanlines: 3, samples: 50, ..Probe::linear() });
@@ -122,7 +122,7 @@ mod tests {
         assert_eq!(saturated, 2);
     }
 
-    /// What the log image must be at the ends of the envelope's range.
+    /// The log image at the ends of the envelope's range.
     #[test]
     fn detection_of_nothing_and_of_everything() {
         let scene = scene(Probe { scanlines: 1, samples: 4, ..Probe::linear() });

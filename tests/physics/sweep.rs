@@ -11,8 +11,8 @@ const SEEDS: u32 = 16;
 /// A statistic of one frame by its seed.
 type Statistic = fn(&Bench, Physics, u32) -> Outcome;
 
-// Every figure holds for every seed, but for one of the Kolmogorov-Smirnov distances, whose bound one in a
-// hundred exceeds (two of sixteen: 1 %). Means over the seeds show what a single frame's chance hides: they hold within half the tolerance.
+// Every figure holds for every seed, except one of the Kolmogorov-Smirnov distances, whose bound one in a hundred
+// exceeds (two of sixteen: 1 %). Means over the seeds, which average chance out, hold within half the tolerance.
 #[test]
 #[ignore = "long: ./tools/test.sh --long"]
 fn statistics_hold_for_sixteen_seeds() {

@@ -1,4 +1,4 @@
-//! Where echoes appear.
+//! Places of echoes.
 
 use insonify::scene::Scene;
 
@@ -7,7 +7,7 @@ use crate::profile::centre;
 use crate::render::Renderer;
 use crate::scenes::{add_layer, linear, silent};
 
-/// T3.
+/// Check T3.
 pub fn a_plate_shows_at_its_time_of_flight() -> Check {
     Check {
         row: "T3",
@@ -19,14 +19,14 @@ pub fn a_plate_shows_at_its_time_of_flight() -> Check {
     }
 }
 
-/// Sample at which a plate at `depth` mm shows.
+/// Sample at which a plate at `depth` mm appears.
 fn shown_at((_, render): &Renderer, scene: &Scene, depth: f64) -> f64 {
     let envelope = render(scene).envelope(0);
     let k = (depth / scene.probe.sample_pitch()) as usize;
     centre(&envelope, k - 60..k + 60, 8)
 }
 
-/// A tenth of a sample: the split over two samples has the exact centre; the fixed point rounds it.
+/// Tolerance of a tenth of a sample: the split over two samples has the exact centre; the fixed point rounds it.
 const TOLERANCE: f64 = 0.1;
 
 fn time_of_flight(bench: &Bench, physics: Physics) -> Outcome {

@@ -1,4 +1,4 @@
-//! A model and a volume of which is known how they lie to each other.
+//! A model and a volume with a known relative placement.
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::random::{gaussian, pcg4d, unit};
@@ -7,7 +7,7 @@ use insonify::scene::{Mesh, Scene, shapes};
 
 use crate::program::insonify;
 
-/// A model under a moved parent, and a volume that is turned, shifted and off by what is to be found.
+/// A model under a moved parent, and a volume that is turned, shifted and displaced by the unknown transform.
 pub const SCENE: &str = r#"# A sac.
 [probe]
 preset = "abdominal"
@@ -42,7 +42,7 @@ const VOLUME: &str = "NDims = 3\nDimSize = 40 40 40\nElementType = MET_UCHAR\n\
     ElementSpacing = 7 7 7\nTransformMatrix = 0 1 0 -1 0 0 0 0 1\nOffset = -128 65 -193\n\
     ElementDataFile = LOCAL\n";
 
-/// Where the bump of the model is largest, in its own space.
+/// Place of the model's bump at its largest, in its own space.
 pub fn apex() -> DVec3 {
     let direction = DVec3::new(0.7, 0.5, 0.5).normalize();
     1.25 * direction / (direction / DVec3::new(40.0, 28.0, 22.0)).length()
@@ -71,20 +71,20 @@ pub fn obj(mesh: &Mesh, change: impl Fn(DVec3) -> DVec3) -> String {
     out
 }
 
-/// A folder with the scene, and what is known of it.
+/// A folder with the scene, and the known transforms.
 pub struct Case {
     pub folder: tempfile::TempDir,
     pub mesh: Mesh,
     /// World from the model's own space.
     pub world_from_model: DAffine3,
-    /// World from LPS, as the volume has to lie.
+    /// World from LPS, the right placement of the volume.
     pub truth: DAffine3,
-    /// World from LPS, as it lies.
+    /// World from LPS, the present placement.
     pub present: DAffine3,
 }
 
 impl Case {
-    /// 12 mm and 9 degrees off, and `scale` too small; `shift` more.
+    /// A case 12 mm and 9 degrees off, `scale` times too small, and shifted by `shift` more.
     pub fn new(mesh: Mesh, scale: f64, shift: DVec3) -> Self {
         let folder = tempfile::tempdir().expect("a folder");
         let write = |name: &str, data: &[u8]| {
@@ -124,8 +124,8 @@ impl Case {
         self.truth.inverse() * self.world_from_model
     }
 
-    /// Writes points of the model as they lie in the volume, with noise of `sigma` mm, `share` of them
-    /// anywhere in twice their box. Returns the share that is.
+    /// Writes points of the model at their places in the volume, with noise of `sigma` mm, `share` of them anywhere in
+    /// twice their box. Returns the share that is.
     pub fn points(&self, sigma: f64, share: f64) -> f64 {
         let at = |i: u32| DVec3::from(self.mesh.positions[i as usize].map(f64::from));
         let triangles: Vec<Triangle> = self.mesh.triangles.iter().map(|t| t.map(at)).collect();
@@ -157,7 +157,7 @@ impl Case {
         strays / count
     }
 
-    /// Writes landmarks, those of the volume each 10 mm off and most of it the same way.
+    /// Writes landmarks, those of the volume each 10 mm off, mostly in the same direction.
     pub fn landmarks(&self) {
         let mut text = "name,model_x,model_y,model_z,volume_x,volume_y,volume_z\n".to_owned();
         let step = self.mesh.positions.len() / 6;
@@ -176,7 +176,7 @@ impl Case {
         self.write("landmarks.csv", &text);
     }
 
-    /// Runs the command on scene.toml; what it says.
+    /// Runs the command on scene.toml; returns its output.
     pub fn register(&self, args: &[&str]) -> String {
         let (ok, text) = self.run(args);
         assert!(ok, "{text}");
@@ -188,8 +188,8 @@ impl Case {
         insonify(self.folder.path(), &all)
     }
 
-    /// How far the model's surface lies from where `truth` has it when the volume is placed by `found`:
-    /// largest distance (mm), angle (degrees), and relative error of the scale.
+    /// Error of the model's surface when `found` places the volume instead of `truth`: largest distance (mm), angle
+    /// (degrees), and relative error of the scale.
     pub fn error(&self, found: &DAffine3) -> (f64, f64, f64) {
         let off = self.mesh.positions.iter().map(|p| {
             let p = DVec3::from(p.map(f64::from));

@@ -1,4 +1,4 @@
-//! Volume, model and masks that are changed between two frames, as the window does it.
+//! Volume, model and masks that change between two frames, as in the window.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -85,7 +85,7 @@ fn folder() -> tempfile::TempDir {
     folder
 }
 
-/// What is changed between two frames looks as if it had been loaded so.
+/// A change between two frames looks the same as if loaded.
 #[test]
 fn a_change_between_frames_is_as_if_the_file_had_said_it() {
     let device = test_device();
@@ -116,7 +116,7 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
             let off = |a: &[u8], b: &[u8]| a.iter().zip(b).filter(|(a, b)| a != b).count();
             let differ = off(&live, &fresh(&device, &wanted, tracer));
             assert_eq!(differ, 0, "{tracer} {settings:?} of {}", live.len());
-            // And back.
+            // The change undone.
             scene.place_model(DAffine3::IDENTITY);
             scene.set_time(TIME);
             let display = plain.volume.as_ref().expect("a volume").display();
@@ -128,7 +128,7 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-/// Where everything goes together, the probe sees what it saw; where one stays behind, it does not.
+/// Where everything moves together, the probe's image stays; where one part stays behind, it does not.
 #[test]
 fn what_moves_together_looks_the_same() {
     let device = test_device();

@@ -1,5 +1,5 @@
-//! `insonify register`: known displacements found again through the command and the scene file that it
-//! writes, both ways round, and what is said to mistakes.
+//! `insonify register`: known displacements found again through the command and its scene file, in both
+//! directions, and the messages for mistakes.
 
 use std::path::Path;
 
@@ -32,7 +32,7 @@ fn a_volume_is_laid_onto_the_model_from_landmarks_ten_millimetres_off() {
         assert!(off < most && angle < 0.3 && scale < 1e-9, "{off} {angle} {scale}: {text}");
         assert!(text.contains("landmarks: 6, rms"), "{text}");
     }
-    // Planted: the comparison sees the placement before, the landmarks alone, and the inverse.
+    // Planted: the comparison notices the placement before, the landmarks alone, and the inverse.
     let (off, angle, _) = case.error(&case.present);
     assert!(off > 300.0 && angle > 8.9, "{off} {angle}");
     case.register(&[&landmarks[..], &["-o", "alone.toml"]].concat());
@@ -40,7 +40,7 @@ fn a_volume_is_laid_onto_the_model_from_landmarks_ten_millimetres_off() {
     assert!(off > 5.0, "{off}");
     let inverse = case.placement("new.toml").inverse();
     assert!(case.error(&inverse).0 > 50.0);
-    // And from where the scene has it, hundreds of mm off, nothing is guessed.
+    // From the scene's placement, hundreds of mm off, nothing is guessed.
     let (ok, text) = case.run(&SURFACE);
     assert!(!ok && text.contains("mm off the surface") && text.contains("--landmarks"), "{text}");
     let text = case.register(&[&SURFACE[..], &["--start", "centroids", "-o", "new.toml"]].concat());
@@ -48,8 +48,8 @@ fn a_volume_is_laid_onto_the_model_from_landmarks_ten_millimetres_off() {
     assert!(off < 0.5 && angle < 0.5, "{off} {angle}: {text}");
 }
 
-/// The voxel that shows the bump lies on the bump, by the file's own header and not by any transform
-/// of the registration.
+/// The voxel that shows the bump lies on the bump, by the file's own header and not by any transform of the
+/// registration.
 #[test]
 fn the_voxel_of_the_bump_comes_to_lie_on_the_bump() {
     let case = Case::new(model(), 1.0, DVec3::ZERO);
@@ -66,7 +66,7 @@ fn the_voxel_of_the_bump_comes_to_lie_on_the_bump() {
     assert!(off(&case.load("scene.toml")) > 8.0);
     case.register(&[&SURFACE[..], &["-o", "volume.toml"]].concat());
     assert!(off(&case.load("volume.toml")) < 0.3);
-    // The other way round the volume stays, and the model comes, with its parent.
+    // In the other direction the volume stays, and the model moves, with its parent.
     case.register(&[&SURFACE[..], &["--move", "womb", "-o", "womb.toml"]].concat());
     case.register(&[&SURFACE[..], &["--move", "model", "-o", "model.toml"]].concat());
     for name in ["womb.toml", "model.toml"] {
@@ -83,7 +83,7 @@ fn the_voxel_of_the_bump_comes_to_lie_on_the_bump() {
     let text = case.read("womb.toml");
     let changed = text.lines().zip(SCENE.lines()).filter(|(a, b)| a != b).count();
     assert!(changed > 0 && text.contains("motion = { kind = \"sine\""), "{text}");
-    // At another time the parent has moved on, and the model's own placement makes up for it.
+    // At another time the parent has moved on, and the model's own placement compensates.
     case.register(
         &[&SURFACE[..], &["--move", "model", "--time", "1 s", "-o", "later.toml"]].concat(),
     );
@@ -101,7 +101,7 @@ fn a_scale_is_found_where_it_may_change() {
     let text = case.register(&args);
     let (off, angle, scale) = case.error(&case.placement("new.toml"));
     assert!(off < 0.5 && angle < 0.3 && scale < 0.005, "{off} {angle} {scale}: {text}");
-    // Planted: a rigid fit keeps the scene's scale, and both the comparison and the program see it.
+    // Planted: a rigid fit keeps the scene's scale, and both the comparison and the program notice.
     let text = case.register(&[&SURFACE[..], &["-o", "rigid.toml"]].concat());
     let (off, _, scale) = case.error(&case.placement("rigid.toml"));
     assert!(off > 1.0 && scale > 0.06, "{off} {scale}");
@@ -127,7 +127,7 @@ fn a_segmented_mesh_does_as_well_in_either_frame() {
         let (off, angle, _) = case.error(&case.placement("new.toml"));
         assert!(off < 0.05 && angle < 0.05, "{off} {angle}");
     }
-    // Planted: without the frame it is somewhere else, and the volume's box says so.
+    // Planted: without the frame it is somewhere else, and the message names the volume's box.
     let (ok, text) = case.run(&[&common[..], &["--volume-surface", "ras.obj"]].concat());
     assert!(text.contains("0 % of the points lie in the volume; with x and y turned"), "{text}");
     assert!(!ok || case.error(&case.placement("new.toml")).0 > 10.0);
@@ -167,7 +167,7 @@ fn the_scene_file_keeps_all_else_and_says_how_well_it_fits() {
     assert_eq!(other(&written), other(SCENE));
     assert!(written.contains("# Placed by eye.\n# registered"), "{written}");
     assert!(written.lines().any(|l| l.starts_with("translate = [") && l.ends_with("# later")));
-    // What is read again is what was found, to the digits written.
+    // The file read again gives the result, to the digits written.
     let vector = |key: &str| {
         let all = report[key].as_array().expect("a list").iter();
         DVec3::from_slice(&all.map(|x| x.as_f64().expect("a number")).collect::<Vec<_>>())

@@ -1,4 +1,4 @@
-//! What is said to mistakes.
+//! The messages for mistakes.
 
 use glam::DVec3;
 

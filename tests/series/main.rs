@@ -1,5 +1,5 @@
-//! An acquired volume that changes with time: which of its volumes is shown when, that it is shown to the
-//! last bit as alone, and what is refused.
+//! An acquired volume that changes with time: the volume shown at each time, equality to the last bit with it
+//! alone, and refusals.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -41,7 +41,7 @@ blur = 5
 
 const SIZE: [usize; 3] = [7, 5, 6];
 
-/// Header of volumes of 16 bits, of so many times 0.25 s apart, or of one.
+/// Header of volumes of 16 bits: `times` of them 0.25 s apart, or a single one.
 fn header(times: usize) -> String {
     let (axes, count, pace) = match times {
         1 => (3, String::new(), ""),
@@ -54,7 +54,7 @@ fn header(times: usize) -> String {
     )
 }
 
-/// Values of a time that look like nothing, over a range of its own.
+/// Values of a time without any pattern, over a range of its own.
 fn values(time: usize) -> Vec<i16> {
     let count: usize = SIZE.iter().product();
     let hash = |i: usize| (i + 977 * time).wrapping_mul(2_654_435_761) >> 7;
@@ -98,7 +98,7 @@ fn shoot(simulator: &mut Simulator, scene: &Scene) -> Vec<u8> {
     simulator.pixels().expect("pixels").2
 }
 
-/// Volume shown at a time by the rule: each for 1/rate seconds, one after another.
+/// Index of the volume at a time by the rule: each for 1/rate seconds, one after another.
 fn expected(time: f64, rate: f64, count: usize, mode: Loop, late: f64) -> usize {
     let steps = (time * rate + 1e-6 + late).floor() as i64;
     let count = count as i64;
@@ -116,7 +116,7 @@ fn expected(time: f64, rate: f64, count: usize, mode: Loop, late: f64) -> usize 
 fn each_volume_has_its_time() {
     let folder = folder();
     for (keys, rate, mode, start) in [
-        // 0.25 s as the file has it.
+        // 0.25 s as in the file.
         (ALL.to_owned(), 4.0, Loop::Repeat, 0.0),
         (format!("{ALL}loop = \"once\"\n"), 4.0, Loop::Once, 0.0),
         (format!("{ALL}rate = \"20 Hz\"\n"), 20.0, Loop::Repeat, 0.0),
@@ -131,7 +131,7 @@ fn each_volume_has_its_time() {
         let mut scene = load(folder.path(), &keys).expect("sound");
         assert!(scene.is_animated());
         let mut planted = 0;
-        // To and fro nothing comes before the first, and negative times are a matter of the clock's tests.
+        // To and fro nothing comes before the first, and negative times are tested with the clock.
         let first = if mode == Loop::Repeat { -300 } else { 0 };
         for i in first..900 {
             // Instants at which the next volume is due, and between them.
@@ -155,7 +155,7 @@ fn each_volume_has_its_time() {
     assert_eq!(alone.volume.expect("a volume").now, 0);
 }
 
-/// Levels that all volumes share, as a series has them by default.
+/// Levels common to all volumes, as a series has them by default.
 fn shared(folder: &Path) -> String {
     let acquired = load(folder, ALL).expect("sound").volume.expect("a volume");
     let all: Vec<_> = (0..4).flat_map(values).collect();
@@ -179,7 +179,7 @@ fn a_frame_is_that_of_its_volume_alone_to_the_last_bit() {
         .collect();
     for keys in [ALL.to_owned(), format!("{FILES}rate = 4\n")] {
         let mut scene = load(folder.path(), &keys).expect("sound");
-        // It begins where the scene stands, and goes to and fro as the scene does.
+        // It begins at the scene's time, and goes to and fro with the scene.
         scene.set_time(0.5);
         let mut simulator = simulator(&device, &scene);
         for (time, k) in [(0.5, 2), (0.0, 0), (0.74, 2), (0.75, 3), (1.0, 0), (-0.1, 3)] {
@@ -189,7 +189,7 @@ fn a_frame_is_that_of_its_volume_alone_to_the_last_bit() {
             let other = (k + 1) % 4;
             assert!(found != alone[other], "{k} and {other} look alike");
         }
-        // What a kernel is run with alone, and its twin compared with, is the frame's.
+        // The input of a kernel run alone, and of its twin, is the frame's.
         let dumped = |simulator: &mut Simulator, scene: &Scene| {
             let to = tempfile::tempdir().expect("a folder");
             simulator.frame(scene, 0).expect("a frame");
@@ -236,7 +236,7 @@ fn the_background_switches_at_its_time_and_back() {
         let at = |x: u32, y: u32| pixels[4 * (y * width + x) as usize];
         let corners = [(3, 3), (width - 4, 3), (3, height - 4), (width - 4, height - 4)];
         assert_eq!(corners.map(|(x, y)| at(x, y)), [level; 4], "{time} s");
-        // The ball spans 16 pixels to either side of its middle, which no change reaches.
+        // The ball covers 16 pixels on either side of its middle, which no change reaches.
         let (x, y) = (width / 2, height * 11 / 24);
         let ball: Vec<_> =
             (x - 8..x + 8).flat_map(|x| (y - 8..y + 8).map(move |y| (x, y))).collect();
@@ -247,8 +247,8 @@ fn the_background_switches_at_its_time_and_back() {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-/// Beyond the device's limits all volumes are averaged over the same blocks, and what is shown is the
-/// average of the one.
+/// Beyond the device's limits all volumes are averaged over the same blocks, and the shown one is its own
+/// average.
 #[test]
 fn volumes_beyond_the_devices_limit_are_averaged_alike() {
     let device = test_device();

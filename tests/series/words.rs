@@ -1,4 +1,4 @@
-//! What is said of volumes over time: mistakes, and the report of a scene.
+//! Texts about volumes over time: mistakes, and the report of a scene.
 
 use insonify::scene::check;
 

@@ -1,4 +1,4 @@
-//! `insonify study answers`, on files as a form saves them.
+//! `insonify study answers`, on files in the form's format.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use crate::program::insonify;
 use crate::{desk, files};
 
-/// What an assessor saves who always takes the scene as it is, agrees by 4 and puts the volume first.
+/// Answers of an assessor who always takes the scene itself, agrees by 4 and puts the volume first.
 fn saved(key: &Key, response: &str) -> Value {
     let plain = |case: usize| {
         let place = key.images(case).iter().position(|r| r.parameter == "none");

@@ -9,7 +9,9 @@ use serde_json::{Value, json};
 use tempfile::TempDir;
 use ureq::Agent;
 
-/// Keys as WebDriver names them.
+use crate::skip::{Lacking, skip};
+
+/// Codes of keys in WebDriver.
 pub const ENTER: &str = "\u{e007}";
 pub const SPACE: &str = " ";
 pub const RIGHT: &str = "\u{e014}";
@@ -29,11 +31,11 @@ fn found(names: &[&str]) -> Option<PathBuf> {
 }
 
 impl Browser {
-    /// None where there is no Chromium with its driver, and it is said.
+    /// Starts a browser; none, with a message, where there is no Chromium with its driver.
     pub fn start() -> Option<Self> {
         let chromium = found(&["chromium", "chromium-browser", "google-chrome"]);
         let (Some(chromium), Some(driver)) = (chromium, found(&["chromedriver"])) else {
-            println!("skipped: no chromium with chromedriver (./tools/setup.sh installs both)");
+            skip(Lacking::Tool, "no chromium with chromedriver (./tools/setup.sh installs both)");
             return None;
         };
         let folder = tempfile::tempdir().expect("a folder");
@@ -95,12 +97,12 @@ impl Browser {
         Some(browser)
     }
 
-    /// Where it puts downloads.
+    /// Folder of downloads.
     pub fn saved(&self) -> PathBuf {
         self.folder.path().join("saved")
     }
 
-    /// The value that WebDriver answers.
+    /// Posts a command; returns WebDriver's answer.
     fn post(&self, command: &str, body: &Value) -> Value {
         let url = format!("{}{command}", self.session);
         let mut response = self.agent.post(&url).send_json(body).expect("it answers");
@@ -114,7 +116,7 @@ impl Browser {
         self.post("/url", &json!({ "url": format!("file://{}", page.display()) }));
     }
 
-    /// What a script returns.
+    /// Result of a script.
     pub fn run(&self, script: &str) -> Value {
         self.post("/execute/sync", &json!({ "script": script, "args": [] }))
     }
@@ -135,7 +137,7 @@ impl Browser {
         format!("/element/{id}")
     }
 
-    /// Clicks as a user does: what is hidden or covered cannot be clicked.
+    /// Clicks as a user does: hidden or covered elements cannot be clicked.
     pub fn click(&self, css: &str) {
         self.post(&format!("{}/click", self.element(css)), &json!({}));
     }
@@ -146,14 +148,14 @@ impl Browser {
         self.post(&format!("{element}/value"), &json!({ "text": text }));
     }
 
-    /// Presses a key wherever the focus is.
+    /// Presses a key at the present focus.
     pub fn press(&self, key: &str) {
         let each = ["keyDown", "keyUp"].map(|kind| json!({ "type": kind, "value": key }));
         let source = json!({ "type": "key", "id": "keyboard", "actions": each });
         self.post("/actions", &json!({ "actions": [source] }));
     }
 
-    /// Says yes to a question of the page.
+    /// Accepts a question of the page.
     pub fn accept(&self) {
         self.post("/alert/accept", &json!({}));
     }
@@ -161,7 +163,7 @@ impl Browser {
 
 impl Drop for Browser {
     fn drop(&mut self) {
-        // Closes the browser; a driver that is gone has closed it already.
+        // Closes the browser; a driver that has ended has closed it already.
         let _ = self.agent.delete(&self.session).call();
         let _ = self.driver.kill();
         let _ = self.driver.wait();

@@ -1,4 +1,4 @@
-//! The form in a browser, filled in as an assessor does.
+//! The form in a browser, filled in as by an assessor.
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use crate::browser::{Browser, ENTER, RIGHT, SPACE};
 use crate::{IMAGES, desk, program};
 
-/// The only file that was saved since the folder was emptied last; taken out of it.
+/// The only file saved since the folder was last emptied; moved out of it.
 fn downloaded(browser: &Browser, to: &Path) -> PathBuf {
     let begun = std::time::Instant::now();
     loop {
@@ -58,7 +58,7 @@ fn notice(browser: &Browser) -> String {
     text.as_str().expect("a text").to_owned()
 }
 
-/// Controls without a label and images without a text in their place.
+/// Controls without a label and images without an alternative text.
 fn nameless(browser: &Browser) -> Value {
     browser.run(
         "return [...document.querySelectorAll('main input, select, textarea')]
@@ -89,7 +89,7 @@ fn an_assessor_fills_the_form() {
     );
     assert_eq!(fetched, json!([]), "nothing is fetched");
 
-    // With the keyboard alone: on to the first case, its second image, from the enlarged view.
+    // With the keyboard only: on to the first case, its second image, from the enlarged view.
     browser.type_into("#name", "A. B\u{e4}r");
     browser.run("document.getElementById('next').focus()");
     browser.press(ENTER);
@@ -128,7 +128,7 @@ fn an_assessor_fills_the_form() {
         browser.click(&format!("input[name='image-{case}'][value='{image}']"));
         browser.click(&format!("input[name='agreement-{case}'][value='{degree}']"));
     }
-    // What was answered outlives the page.
+    // The answers outlive the page.
     browser.open(&page);
     browser.wait(LOADED);
     assert!(notice(&browser).contains("here again"), "{}", notice(&browser));
@@ -161,7 +161,7 @@ fn an_assessor_fills_the_form() {
     let (went_well, said) = program::insonify(desk.path("").as_path(), &args);
     assert!(went_well && said.contains("One assessor"), "{said}");
 
-    // A file of answers brings a page back to where it was; one that was changed does not.
+    // A file of answers restores a page; a changed file does not.
     go(&browser, "start");
     browser.click("#anew");
     browser.accept();
@@ -242,7 +242,7 @@ fn a_form_of_full_size_shows_every_image() {
     assert_eq!(ids.iter().collect::<BTreeSet<_>>().len(), ids.len(), "ids are unique");
     let about = browser.run("return document.querySelector('#case-7 .about').textContent");
     assert_eq!(about, json!("Case of a <test> & number 7"));
-    // Last case, last image, by the buttons that an assessor has.
+    // Last case, last image, by the assessor's buttons.
     go(&browser, "case-27");
     browser.click("input[name='image-27'][value='23']");
     let told = browser.run("return document.getElementById('progress-text').textContent");

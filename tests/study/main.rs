@@ -1,4 +1,4 @@
-//! User studies as they are made: same bytes, nothing told, gone on with after a kill; and evaluated.
+//! User studies: made with the same bytes, nothing revealed, resumed after a kill; and evaluated.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,8 @@ mod stopped;
 
 #[path = "../common/program.rs"]
 mod program;
+#[path = "../common/skip.rs"]
+mod skip;
 
 /// Speckle of one tissue down to a plate at 14 mm, in a volume.
 const SCENE: &str = r#"
@@ -87,7 +89,7 @@ rotate = { axis = [0, 0, 1], angle = "30 deg" }
 /// 2 scenes, a slice each, 2 backgrounds, 4 images.
 const IMAGES: usize = 16;
 
-/// A folder with plan and scenes, and what is put into it.
+/// A folder with plan, scenes and results.
 struct Desk(tempfile::TempDir);
 
 impl Desk {
@@ -108,7 +110,7 @@ impl Desk {
         self.0.path().join(name)
     }
 
-    /// Whether `study make` went well, and what it said.
+    /// Runs `study make`; returns whether it succeeded, and its output.
     fn make(&self, args: &[&str]) -> (bool, String) {
         let all = [&["study", "make", "plan.toml", "--tracer", "bvh", "--validate"], args];
         program::insonify(self.0.path(), &all.concat())
@@ -134,7 +136,7 @@ fn desk() -> &'static Desk {
     })
 }
 
-/// All files below a folder, as they are this moment.
+/// All files below a folder at this moment.
 fn paths(folder: &Path) -> Vec<PathBuf> {
     let mut out = Vec::new();
     let mut folders = vec![folder.to_owned()];
@@ -177,7 +179,7 @@ fn the_same_seed_makes_the_same_bytes() {
     assert!(first["form/form.html"] != other["form/form.html"]);
 }
 
-/// The image that a row of the key stands for.
+/// The image of a row of the key.
 fn image(desk: &Desk, study: &str, row: &Row) -> image::GrayImage {
     let name = format!("{study}/form/cases/{:02}/{:02}.png", row.case, row.image);
     image::open(desk.path(&name)).expect("a PNG").into_luma8()
@@ -226,7 +228,7 @@ fn larger_images_are_reduced() {
     }
 }
 
-/// What the form's folder must not hold: names of the plan, of parameters and of backgrounds.
+/// Words in the form's folder that it must not have: names of the plan, of parameters and of backgrounds.
 fn told(folder: &Path) -> Vec<String> {
     let template = ["page.html", "style.css", "script.js"].map(|name| {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/study/form").join(name);
@@ -247,7 +249,7 @@ fn told(folder: &Path) -> Vec<String> {
             continue;
         }
         let text = String::from_utf8(bytes).expect("text").to_lowercase();
-        // The images themselves hold any letters.
+        // The images themselves may contain any letters.
         let mut bare = String::new();
         for (i, part) in text.split("base64,").enumerate() {
             bare.push_str(if i == 0 { part } else { part.split_once('"').expect("an end").1 });
@@ -284,7 +286,7 @@ fn the_form_tells_nothing_of_the_key() {
         chunks.dedup();
         assert_eq!(chunks, ["IHDR", "IDAT", "IEND"], "{name}");
     }
-    // No place is kept for the scene as it is.
+    // No place is reserved for the scene itself.
     let key = desk.key("first");
     let places = (1..=4).map(|c| key.images(c).iter().position(|r| r.parameter == "none"));
     let mut places: Vec<_> = places.collect();

@@ -1,4 +1,4 @@
-//! Plans: those that ship and are shown, and what is said of mistakes.
+//! Plans: the shipped and documented ones, and the messages for mistakes.
 
 use std::path::Path;
 
@@ -55,7 +55,7 @@ fn the_plan_in_the_manual_loads() {
     };
     let plan = load(example).expect("sound");
     assert_eq!(plan.scenarios[0].slices.len(), 3);
-    // What it calls defaults are those.
+    // The values that it calls defaults are the defaults.
     let is_default = |line: &&str| !line.contains("default");
     let bare: Vec<&str> = example.lines().filter(is_default).collect();
     let bare = load(&bare.join("\n")).expect("sound");

@@ -1,4 +1,4 @@
-//! Runs that were stopped, and go on.
+//! Stopped runs that are resumed.
 
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -16,7 +16,7 @@ fn spawned(desk: &Desk, folder: &str) -> Child {
         .expect("the program starts")
 }
 
-/// Whole images, while a run may be writing.
+/// Number of whole images, while a run may be writing.
 fn images_in(folder: &Path) -> usize {
     let is_image = |path: &&PathBuf| path.extension().is_some_and(|e| e == "png");
     paths(folder).iter().filter(is_image).count()
@@ -46,10 +46,10 @@ fn a_killed_run_is_gone_on_with() {
     assert!(!went_well && said.contains("another order: 0, not 3"), "{said}");
     desk.made(&["-o", "killed", "--resume"]);
     assert!(files(&folder) == files(&crate::desk().path("first")));
-    // Once more changes nothing.
+    // Another run changes nothing.
     desk.made(&["-o", "killed", "--resume"]);
     assert!(files(&folder) == files(&crate::desk().path("first")));
-    // What the scene names is another now, and its own text is not.
+    // The file named by the scene differs now, but the scene's own text does not.
     let voxels = [VOLUME.as_bytes(), &[77; 60]].concat();
     std::fs::write(desk.path("volume.mha"), voxels).expect("written");
     let (went_well, said) = desk.make(&["-o", "killed", "--resume"]);

@@ -1,4 +1,4 @@
-//! Each parameter changes its image the way it should.
+//! The direction in which each parameter changes its image.
 
 use image::GrayImage;
 
@@ -55,7 +55,7 @@ fn figures(parameter: &str, figure: impl Fn(&GrayImage) -> f64) -> [f64; 3] {
     [below, of(&rows[0]), above]
 }
 
-/// Each is more than `factor` times the one before.
+/// Returns whether each is more than `factor` times the one before.
 fn rises([a, b, c]: [f64; 3], factor: f64) -> bool {
     b > factor * a && c > factor * b
 }
@@ -89,7 +89,7 @@ fn each_parameter_changes_its_image_the_way_it_should() {
         (squares.sum::<f64>() / count).sqrt() / mean
     });
     assert!(thin > 1.2 * own, "few scatterers make holes: {thin} {own}");
-    // Some eight in a resolution cell are nearly as many as one can see.
+    // With some eight in a resolution cell, more are hardly visible.
     assert!((0.8 * own..own).contains(&dense), "many are many: {dense} {own}");
     let found = figures("psf_lateral", lateral);
     assert!(rises(found, 1.2), "{found:?}");

@@ -1,4 +1,4 @@
-//! Sheets as a user makes them: what is on them, in which order, and whether it is what `render` makes.
+//! Contact sheets as a user makes them: their content, their order, and equality with `render`.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -72,7 +72,7 @@ struct Row {
     white_percent: f64,
 }
 
-/// A folder with the scene, and what is put into it.
+/// A folder with the scene and results.
 struct Folder(tempfile::TempDir);
 
 impl Folder {
@@ -118,7 +118,7 @@ impl Folder {
         std::fs::read(self.path(name)).expect("a file")
     }
 
-    /// What `render` makes of the scene with the entries of a row.
+    /// The image by `render` of the scene with the entries of a row.
     fn render(&self, set: &str) -> GrayImage {
         let entries = set.split_whitespace().flat_map(|entry| ["--set", entry]);
         let args: Vec<_> = ["-o", "single.png"].into_iter().chain(entries).collect();
@@ -128,7 +128,7 @@ impl Folder {
     }
 }
 
-/// The sheet of the scene's parameters with its single images; made once.
+/// The contact sheet of the scene's parameters with its single images; made once.
 fn swept() -> &'static Folder {
     static MADE: OnceLock<Folder> = OnceLock::new();
     MADE.get_or_init(|| {
@@ -152,7 +152,7 @@ const PARAMETERS: [&str; 11] = [
     "thickness_scale",
 ];
 
-/// The part of a sheet at which a row says that its image is.
+/// The part of a contact sheet at the place that a row states.
 fn cell(sheet: &GrayImage, row: &Row) -> GrayImage {
     imageops::crop_imm(sheet, row.x, row.y, row.width, row.height).to_image()
 }
@@ -172,7 +172,7 @@ fn a_sheet_holds_the_scene_and_each_parameter_below_and_above() {
         let [below, above] = [0, 1].map(|i| number(&pair[i].value));
         let own = number(&pair[0].own);
         assert!(below < own && own < above, "{pair:?}");
-        // The two of a parameter stand side by side.
+        // The two images of a parameter stand side by side.
         assert!(pair[0].y == pair[1].y && pair[0].x < pair[1].x, "{pair:?}");
     }
     for row in &rows {
@@ -182,7 +182,7 @@ fn a_sheet_holds_the_scene_and_each_parameter_below_and_above() {
         let mean = single.pixels().map(|p| f64::from(p.0[0])).sum::<f64>() / (240.0 * 800.0);
         assert!((mean - row.mean_grey).abs() < 1e-3, "{row:?}: {mean}");
     }
-    // The comparison sees a pixel's shift.
+    // The comparison notices a pixel's shift.
     let shifted = Row { x: rows[3].x + 1, ..folder.rows("all/sheet.csv").swap_remove(3) };
     assert!(cell(&sheet, &shifted) != cell(&sheet, &rows[3]));
 }
@@ -246,7 +246,7 @@ fn a_seed_shuffles_and_says_nothing_on_the_sheet() {
         rows.iter().map(caption).max().expect("rows")
     };
     assert!(2 * ink(&folder, "first") < ink(plain, "all"));
-    // In rows of four without a gap, where a labelled sheet has its panel second.
+    // In rows of four without a gap, where a labelled contact sheet has its panel second.
     assert_eq!(rows[1].y, rows[0].y);
     let step = rows[1].x - rows[0].x;
     assert_eq!([rows[2].x - rows[1].x, plain_rows[1].x - plain_rows[0].x], [step, 2 * step]);
@@ -268,7 +268,7 @@ fn steps_surroundings_and_blends_are_what_render_makes() {
         let rows = folder.rows(&format!("{show}/sheet.csv"));
         let sheet = folder.image(&format!("{show}/sheet.png"));
         let found: Vec<_> = rows.iter().map(|r| r.value.as_str()).collect();
-        // There may be more ways to blend than those of the paper.
+        // There may be more methods of blending than the paper's.
         assert!(found.starts_with(values), "{found:?}");
         for row in &rows {
             assert_eq!(row.parameter, parameter);
@@ -297,7 +297,7 @@ fn mistakes_are_explained() {
     let folder = Folder::new(&format!("{SCENE}[vary]\ngain = [3, 999]\n"));
     let line = format!("scene.toml:{}:", SCENE.lines().count() + 2);
     let told = |args: &[&str]| {
-        // The name that the command had.
+        // The command's old name.
         let out = folder.run("sweep", args);
         assert!(!out.status.success(), "{args:?}");
         String::from_utf8_lossy(&out.stderr).into_owned()

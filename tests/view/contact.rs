@@ -44,12 +44,12 @@ priority = 1
 translate = [0, 0, "2 cm"]
 "#;
 
-/// Where the default window has the 3D view: left of the console, right of the image, above the bar.
+/// Part of the default window with the 3D view: left of the console, right of the image, above the bar.
 const VIEW: [u16; 4] = [472, 0, 472, 684];
 /// Within the image, beside the texts.
 const IMAGE: [u16; 4] = [120, 120, 230, 230];
 
-/// Where on the display a point of the world is seen, mm, before anybody has moved the eye.
+/// Position on the display of a point of the world, mm, before the camera has been moved.
 fn seen(point: DVec3) -> (u16, u16) {
     let folder = tempfile::tempdir().expect("a folder");
     let file: PathBuf = folder.path().join("scene.toml");
@@ -58,7 +58,7 @@ fn seen(point: DVec3) -> (u16, u16) {
     let file = File::new(file, Vec::new(), &scene);
     let model = Model::new(&scene, file, Tracer::Bvh, 0.0, Instant::now());
     let [left, top, width, height] = VIEW.map(f64::from);
-    let camera = model.survey.camera;
+    let camera = model.view3d.camera;
     let at = camera.project(DVec2::new(width, height), point);
     let at = at.expect("in front of the eye") + DVec2::new(left, top);
     (at.x as u16, at.y as u16)
@@ -95,8 +95,8 @@ fn the_pointer_slides_leans_and_turns_the_probe() {
         desk.settle(IMAGE);
     };
 
-    // By its handle 12 mm to the right, in the image plane: the cyst moves out of the middle, and all of
-    // the face stays in contact.
+    // By its handle 12 mm to the right, in the image plane: the cyst moves out of the middle, and all of the face
+    // stays in contact.
     let (handle, to) = (DVec3::new(0.0, 0.0, -12.0), DVec3::new(12.0, 0.0, -12.0));
     desk.pull(seen(handle), seen(to));
     desk.wait_for("the cyst to move", |d| difference(&d.grab(IMAGE), &still) > 4.0);

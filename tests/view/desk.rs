@@ -1,4 +1,4 @@
-//! A virtual display with the program on it.
+//! A virtual display with the program running on it.
 
 use std::io::{BufRead, BufReader, IoSlice};
 use std::path::Path;
@@ -9,7 +9,9 @@ use x11rb::connection::{Connection, RequestConnection as _};
 use x11rb::protocol::xproto::{self, ConnectionExt as _, ImageFormat, InputFocus};
 use x11rb::rust_connection::RustConnection;
 
-/// Longest wait for anything: a debug build on a busy machine takes its time to upload a scene.
+use super::skip::{Lacking, skip};
+
+/// Longest wait for anything: a debug build on a busy machine takes long to upload a scene.
 const PATIENCE: Duration = Duration::from_secs(240);
 
 /// Keys that the tests press.
@@ -27,10 +29,10 @@ pub enum Key {
     Enter,
     F2,
     F3,
-    /// Also the signs of Latin-1.
+    /// A letter, or another sign of Latin-1.
     Letter(char),
     Control,
-    /// Any other, by its X symbol.
+    /// Any other key, by its X symbol.
     Symbol(u32),
 }
 
@@ -62,12 +64,12 @@ pub struct Display {
 }
 
 impl Display {
-    /// Starts one; where there is none to start nothing, and it is said.
+    /// Starts a display; none, with a message, where there is no X server.
     pub fn open() -> Option<Self> {
         Self::sized([1366, 768])
     }
 
-    /// One of so many pixels.
+    /// Starts a display of so many pixels.
     pub fn sized([width, height]: [u16; 2]) -> Option<Self> {
         let screen = format!("{width}x{height}x24");
         let started = Command::new("Xvfb")
@@ -78,7 +80,7 @@ impl Display {
         let mut server = match started {
             Ok(server) => server,
             Err(error) => {
-                println!("skipped: no X server (Xvfb: {error})");
+                skip(Lacking::Tool, &format!("no X server (Xvfb: {error})"));
                 return None;
             }
         };
@@ -90,7 +92,7 @@ impl Display {
         Some(Self { server, name })
     }
 
-    /// The program on this display.
+    /// The program's command for this display.
     pub fn program(&self, scene: &Path, arguments: &[&str]) -> Command {
         let mut command = program(scene, arguments);
         command.env("DISPLAY", &self.name);
@@ -106,7 +108,7 @@ impl Drop for Display {
     }
 }
 
-/// `insonify view`.
+/// The command `insonify view`.
 pub fn program(scene: &Path, arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
     command.arg("view").arg(scene).args(arguments);
@@ -125,12 +127,12 @@ pub struct Desk {
 }
 
 impl Desk {
-    /// Opens a scene's window at the upper left corner; nothing where there is no X server.
+    /// Opens a scene's window at the upper left corner; none where there is no X server.
     pub fn open(scene: &str, arguments: &[&str]) -> Option<Self> {
         Self::open_scaled(scene, arguments, 1.0)
     }
 
-    /// The same on a display on which a point is `scale` pixels.
+    /// As [`Self::open`], on a display where a point is `scale` pixels.
     pub fn open_scaled(scene: &str, arguments: &[&str], scale: f64) -> Option<Self> {
         let scaled = |_: &Path, command: &mut Command| {
             command.env("WINIT_X11_SCALE_FACTOR", scale.to_string());
@@ -138,8 +140,8 @@ impl Desk {
         Self::open_on(Display::open()?, scene, arguments, scaled)
     }
 
-    /// The same on a display, with other files in the scene's folder, or another environment: what
-    /// `prepare` makes of both.
+    /// As [`Self::open`], on a display, with other files in the scene's folder, or another environment: `prepare`
+    /// changes both.
     pub fn open_on(
         display: Display,
         scene: &str,
@@ -160,7 +162,7 @@ impl Desk {
         Some(desk)
     }
 
-    /// The program's window, once it is shown.
+    /// Finds the program's window, once it is shown.
     fn find(&mut self) -> bool {
         let tree = self.x.query_tree(self.root).unwrap().reply().unwrap();
         let shown = tree.children.into_iter().find(|&child| {
@@ -173,7 +175,7 @@ impl Desk {
         shown.is_some()
     }
 
-    /// Without a window manager nobody else gives the window the keyboard and a place.
+    /// Gives the window a place and the keyboard, which no window manager does here.
     fn focus(&self) {
         let place = xproto::ConfigureWindowAux::new().x(0).y(0);
         self.x.configure_window(self.window, &place).unwrap();
@@ -198,21 +200,21 @@ impl Desk {
         self.quiet(part, Duration::from_millis(500), true)
     }
 
-    /// Waits until a part stays as it is because the program has nothing left to do: on a slow device
-    /// what comes last, as the finest picture of the anatomy, may be seconds away.
+    /// Waits until a part stays unchanged because the program has nothing left to do: on a slow device the last
+    /// change, such as the finest picture of the anatomy, may come after seconds.
     pub fn rest(&mut self, part: [u16; 4]) -> Vec<u8> {
         self.quiet(part, Duration::from_secs(1), true)
     }
 
-    /// Waits until a part has not changed for a while, also where a cursor blinks in a field of text: twice a second
-    /// the part changes then, and the program never rests for long.
+    /// Waits until a part has not changed for a while, also where a cursor blinks in a text field: then the part
+    /// changes twice a second, and the program never rests for long.
     pub fn still(&mut self, part: [u16; 4]) {
         self.quiet(part, Duration::from_millis(250), false);
     }
 
-    /// The image comes back at the scene's own quality once all is at rest: until then the program works.
-    /// `works`: whether that counts for the whole of the time, or only at its end. A program that is kept
-    /// from the processor has work to do although it uses no time: its threads' states tell.
+    /// Waits for the image at the scene's own quality, which comes once everything is at rest: until then the program
+    /// works. `works`: whether that counts for all of the time, or only at its end. A program kept from the processor
+    /// has work to do although it uses no time: its threads' states show that.
     fn quiet(&mut self, part: [u16; 4], time: Duration, works: bool) -> Vec<u8> {
         // Shorter than between two drawings of a blinking cursor, on a busy machine, too.
         const REST: Duration = Duration::from_millis(80);
@@ -233,7 +235,7 @@ impl Desk {
         last
     }
 
-    /// Whether a thread of the program runs or waits for a processor or a disk (proc(5), state).
+    /// Returns whether a thread of the program runs or waits for a processor or a disk (proc(5), state).
     fn at_work(&self) -> bool {
         let tasks = std::fs::read_dir(format!("/proc/{}/task", self.program.id()));
         let mut tasks = tasks.expect("the program runs").flatten();
@@ -245,7 +247,7 @@ impl Desk {
         })
     }
 
-    /// Waits until something is so.
+    /// Waits until a condition holds.
     pub fn wait_for(&mut self, what: &str, mut is_so: impl FnMut(&mut Self) -> bool) {
         let began = Instant::now();
         while !is_so(self) {
@@ -266,8 +268,8 @@ impl Desk {
         first + found.expect("the keyboard has the key") as u8
     }
 
-    /// XTestFakeInput (The X11 Test Extension, version 2.2). Written out, since the feature of x11rb
-    /// that has it would build the whole window system a second time for the tests.
+    /// Sends XTestFakeInput (The X11 Test Extension, version 2.2). Written here, since the feature of x11rb with it
+    /// would build the whole window system a second time for the tests.
     fn fake(&self, kind: u8, detail: u8, (x, y): (i16, i16)) {
         let extension = self.x.extension_information("XTEST").unwrap();
         let mut request = vec![extension.expect("Xvfb has XTEST").major_opcode, 2, 9, 0];
@@ -300,7 +302,7 @@ impl Desk {
         self.fake(xproto::KEY_RELEASE_EVENT, control, (0, 0));
     }
 
-    /// The scene file as it is now.
+    /// The present scene file.
     pub fn scene(&self) -> String {
         std::fs::read_to_string(self.folder.path().join("scene.toml")).expect("a scene")
     }
@@ -322,7 +324,7 @@ impl Desk {
         }
     }
 
-    /// Holds a key down, or lets it go.
+    /// Holds a key down, or releases it.
     pub fn hold(&self, key: Key, down: bool) {
         let kind = match down {
             true => xproto::KEY_PRESS_EVENT,
@@ -388,7 +390,7 @@ impl Desk {
         self.x.flush().unwrap();
     }
 
-    /// Puts it back.
+    /// Shows the window again.
     pub fn show(&self) {
         self.x.map_window(self.window).unwrap();
         self.x.flush().unwrap();
@@ -416,7 +418,7 @@ impl Desk {
         1024 * value.expect("a size")
     }
 
-    /// Ctrl+Q; the program has to end by itself, without an error.
+    /// Presses Ctrl+Q; asserts that the program ends by itself, without an error.
     pub fn quit(self) {
         self.hold_control(Key::Letter('q'));
         let status = self.ended();

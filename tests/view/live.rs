@@ -11,7 +11,7 @@ fn what_moves_is_coarse_and_what_rests_is_the_scenes_own() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (json, scene, rendered) = (path("times.json"), path("scene.toml"), path("rendered.png"));
-    // No device makes an image in a millisecond that shows a whole scene.
+    // No device makes an image of a whole scene in a millisecond.
     let budget = "live.budget=\"1 ms\"";
     let captures = folder.path().to_str().expect("UTF-8").to_owned();
     let arguments = ["--validate", "--set", budget, "--json", &json, "--captures", &captures];

@@ -1,4 +1,4 @@
-//! The M-mode strip: what it draws is where things are, and the window shows it.
+//! The M-mode strip: echoes at the places of their structures, and its display in the window.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! Every section of the console by the pointer: opened, a control dragged, saved, undone.
+//! Every section of the console with the pointer: opened, a control dragged, saved, undone.
 
 use std::path::Path;
 use std::time::Duration;
@@ -63,19 +63,19 @@ fn open() -> Option<Desk> {
     desk.wait_for("an image", |d| brightness(&d.grab([60, 100, 400, 500])) > 10.0);
     // The 3D view has tests of its own.
     desk.press(Key::Letter('v'));
-    // Grey as far as the volume reaches.
+    // Grey up to the end of the volume.
     desk.wait_for("the image alone", |d| brightness(&d.grab([600, 80, 100, 60])) > 80.0);
     Some(desk)
 }
 
-/// The part in which the image is, without the 3D view.
+/// The part with the image, without the 3D view.
 const IMAGE: [u16; 4] = [200, 100, 500, 500];
 
-/// Where the console lies: its left edge, and the row below its buttons.
+/// The console's left edge, and the row below its buttons.
 const LEFT: u16 = 1280 - 336;
 const TOP: u16 = 70;
 
-/// Rows in which a column of the console, below its buttons, has a colour: their middles.
+/// Middles of the rows in which a column of the console, below its buttons, has a colour.
 fn rows(desk: &Desk, x: u16, is_it: impl Fn(&[u8]) -> bool) -> Vec<u16> {
     let column = desk.grab([x, TOP, 1, 690 - TOP]);
     let mut out: Vec<[u16; 2]> = Vec::new();
@@ -95,7 +95,7 @@ fn sections(desk: &Desk) -> Vec<u16> {
     rows(desk, LEFT + 18, |p| p[0] > 100)
 }
 
-/// The rails of sliders in a section, which are filled at the left: where they begin.
+/// Left ends of the rails of a section's sliders, which are filled at the left.
 fn sliders(desk: &Desk) -> Vec<(u16, u16)> {
     let filled = [36_u8, 92, 108];
     let near = |p: &[u8]| p.iter().zip(filled).all(|(a, b)| a.abs_diff(b) < 12);
@@ -115,9 +115,9 @@ fn sliders(desk: &Desk) -> Vec<(u16, u16)> {
     out.iter().map(|(x, y)| (*x, y + 3)).collect()
 }
 
-/// The only section that is open; all others are closed.
+/// Closes all sections.
 fn close_all(desk: &mut Desk) {
-    // Those that are open at the start: the later first, so that the other keeps its place.
+    // Sections that are open at the start: the later one first, so that the other keeps its place.
     let before = sections(desk);
     desk.click((LEFT + 40, before[1]));
     desk.wait_for("the later to close", |d| {
@@ -136,7 +136,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
     let Some(mut desk) = open() else {
         return;
     };
-    // The clock stands: the scene's own movement would change the image.
+    // The clock stands still: the scene's own movement would change the image.
     desk.press(Key::Letter('p'));
     desk.settle(IMAGE);
     close_all(&mut desk);
@@ -171,7 +171,7 @@ fn each_section_sets_what_is_saved_and_undo_takes_it_back() {
         desk.hold_control(Key::Letter('s'));
         desk.wait_for(section, |d| d.scene() != before.0);
         let saved = desk.scene();
-        // A surface has the key twice: its inside would follow, and says what it was.
+        // A surface has the key twice: its inside would follow, and states its old value.
         let lines = |text: &str| -> Vec<String> {
             let lines = text.lines().filter(|l| l.starts_with(key));
             lines.map(str::to_owned).collect()
@@ -244,7 +244,7 @@ fn each_key_does_what_the_list_says_and_its_opposite_takes_it_back() {
         for _ in 0..3 {
             desk.press(back);
         }
-        // But for the rounding of six turns of the pose.
+        // Equal except for the rounding of six turns of the pose.
         desk.wait_for("the way back", |d| difference(&d.grab(IMAGE), &home) < 0.2);
     }
     // Undo takes back settings, redo makes them again; the probe goes home by its key.
@@ -278,7 +278,7 @@ fn with_all_panels_open_a_window_in_which_nothing_happens_costs_nothing() {
     let Some(mut desk) = open() else {
         return;
     };
-    // Sections, strip and timings: all that can be open at once.
+    // Sections, strip and timings: everything that can be open at once.
     desk.press(Key::Letter('p'));
     desk.settle(IMAGE);
     close_all(&mut desk);

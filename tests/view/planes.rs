@@ -1,4 +1,4 @@
-//! An acquired volume laid onto the model by hand, in three planes.
+//! Registration of an acquired volume with the model by hand, in three planes.
 
 use glam::DAffine3;
 use insonify::scene::Scene;
@@ -47,7 +47,7 @@ translate = [-12, 0, 30]
 const VOLUME: &str = "NDims = 3\nDimSize = 60 2 2\nElementSpacing = 1 50 50\n\
     Offset = -30 -25 -5\nElementType = MET_UCHAR\nElementDataFile = LOCAL\n";
 
-/// Where the image is, beside the planes, and the first of these: x to the right, z down.
+/// The part with the image, beside the planes, and the first of these: x to the right, z down.
 const IMAGE: [u16; 4] = [60, 60, 360, 420];
 const PLANES: [u16; 4] = [472, 30, 472, 640];
 
@@ -70,7 +70,7 @@ fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
     desk.press(Key::Letter('g'));
     desk.wait_for("the planes", |d| difference(&d.grab(PLANES), &eye) > 5.0);
     let (home, planes) = (desk.settle(IMAGE), desk.settle(PLANES));
-    // Where the scene file has the volume.
+    // Placement of the volume in the scene file.
     let place = |desk: &Desk| {
         let loaded = Scene::load(&desk.folder().join("scene.toml"), &[]);
         let (scene, _) = loaded.expect("it stays sound");
@@ -96,9 +96,9 @@ fn a_volume_is_moved_turned_and_put_back_by_the_pointer_and_saved() {
         let (scale, turn, shift) = place(&desk).to_scale_rotation_translation();
         let [scaled, turned] = [scale.x != 1.0, turn.to_axis_angle().1 > 0.01];
         assert_eq!([scaled, turned], [name == "scale", name == "turn"], "{name} {scale} {turn}");
-        // Along the plane alone.
+        // Along the plane only.
         assert!(shift.y.abs() < 1e-9, "{name} {shift}");
-        // All of one drag is one step.
+        // A whole drag is one step.
         desk.hold_control(Key::Letter('z'));
         desk.wait_for("the image before", |d| d.grab(IMAGE) == home);
         desk.hold_control(Key::Letter('s'));

@@ -1,9 +1,10 @@
-//! What displays and devices do to a window: many sizes at once, a large scale, a lost device.
+//! Effects of displays and devices on a window: many sizes at once, a large scale, a lost device.
 
 use std::process::Command;
 use std::time::Duration;
 
 use super::desk::{Desk, Display, Key};
+use super::skip::{Lacking, skip};
 use super::{IMAGE, SCENE, brightness, difference};
 
 #[test]
@@ -13,7 +14,7 @@ fn a_window_that_is_torn_about_shows_its_image_at_last() {
     };
     desk.wait_for("an image", |d| brightness(&d.grab(IMAGE)) > 10.0);
     for step in 0..60_u16 {
-        // Sizes that differ from one event to the next, among them the least that a window can have.
+        // Sizes that differ from one event to the next, among them the least size of a window.
         let size = match step % 5 {
             0 => (1, 1),
             n => (300 + 200 * n + 3 * step, 250 + 90 * n + step),
@@ -71,7 +72,7 @@ fn a_zoomed_interface_keeps_its_clicks() {
         return;
     };
     desk.wait_for("an image", |d| brightness(&d.grab([60, 150, 500, 400])) > 10.0);
-    // What moves in the 3D view has tests of its own.
+    // Movement in the 3D view has tests of its own.
     desk.press(Key::Letter('v'));
     let part = [60, 150, 500, 400];
     let before = desk.settle(part);
@@ -96,8 +97,8 @@ fn a_zoomed_interface_keeps_its_clicks() {
     desk.quit();
 }
 
-/// The folder of a Vulkan layer that loses the device, built by the C compiler; nothing where there is
-/// none.
+/// The folder of a Vulkan layer that loses the device, built by the C compiler; none where there is no
+/// compiler.
 fn layer() -> Option<tempfile::TempDir> {
     let folder = tempfile::tempdir().expect("a folder");
     let source = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/view/loss.c");
@@ -107,7 +108,7 @@ fn layer() -> Option<tempfile::TempDir> {
     match built {
         Ok(status) => assert!(status.success(), "the layer does not compile"),
         Err(error) => {
-            println!("skipped: no C compiler (cc: {error})");
+            skip(Lacking::Tool, &format!("no C compiler (cc: {error})"));
             return None;
         }
     }
@@ -157,10 +158,68 @@ fn a_lost_device_is_opened_again_and_a_second_loss_says_what_to_do() {
     let status = desk.ended();
     assert_eq!(status.code(), Some(1));
     let text = std::fs::read_to_string(&told).expect("there");
-    // It is broken into lines with a bar at the left.
+    // It is wrapped into text lines with a bar at the left.
     let words = text.split_whitespace().filter(|word| *word != "│");
     let text = words.collect::<Vec<_>>().join(" ");
     for words in ["lost", "last pass", "--quality draft", "--device"] {
         assert!(text.contains(words), "{text}");
     }
+}
+
+/// The left half of the image, beside the message over it.
+const BESIDE: [u16; 4] = [60, 100, 320, 500];
+/// The message, and its first button.
+const TOLD: [u16; 4] = [420, 70, 440, 60];
+const START: (u16, u16) = (455, 112);
+
+#[test]
+fn a_simulation_that_dies_is_told_and_started_again() {
+    let Some(display) = Display::open() else {
+        return;
+    };
+    let folder = tempfile::tempdir().expect("a folder");
+    let (die, told) = (folder.path().join("die"), folder.path().join("told"));
+    let mortal = |_: &std::path::Path, command: &mut Command| {
+        command.env("INSONIFY_TEST_DEATH", &die);
+        command.stderr(std::fs::File::create(&told).expect("made"));
+    };
+    let Some(mut desk) = Desk::open_on(display, SCENE, &["--validate"], mortal) else {
+        return;
+    };
+    let kill = |desk: &mut Desk| {
+        std::fs::write(&die, "").expect("written");
+        desk.press(Key::Right);
+        desk.wait_for("the death", |_| !die.exists());
+    };
+    desk.wait_for("an image", |d| brightness(&d.grab(BESIDE)) > 10.0);
+    // A setting that has to outlast the simulation.
+    desk.press(Key::Letter('-'));
+    let (before, bare) = (desk.settle(BESIDE), desk.grab(TOLD));
+    kill(&mut desk);
+    desk.wait_for("what is told", |d| difference(&d.grab(TOLD), &bare) > 5.0);
+    desk.press(Key::Home);
+    desk.wait_for("the same image", |d| difference(&d.grab(BESIDE), &before) < 1.5);
+    let moves = |desk: &mut Desk| {
+        (0..6).for_each(|_| desk.press(Key::Right));
+        desk.wait_for("the image to move", |d| {
+            let now = d.grab(BESIDE);
+            difference(&now, &before) > 4.0 && brightness(&now) > 5.0
+        });
+    };
+    moves(&mut desk);
+    // Where the next one dies as well, it stands still.
+    kill(&mut desk);
+    std::fs::write(&die, "").expect("written");
+    let still = desk.settle(BESIDE);
+    // It is still there where the first of the two came too soon after the last.
+    let _ = std::fs::remove_file(&die);
+    desk.press(Key::Right);
+    desk.press(Key::Right);
+    std::thread::sleep(Duration::from_millis(500));
+    assert!(difference(&desk.grab(BESIDE), &still) < 0.5, "there is nothing new");
+    desk.click(START);
+    moves(&mut desk);
+    desk.quit();
+    let text = std::fs::read_to_string(&told).expect("there");
+    assert!(text.contains("a test has asked for it"), "{text}");
 }

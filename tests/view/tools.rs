@@ -10,7 +10,7 @@ use serde_json::Value;
 use super::desk::{Desk, Key};
 use super::{IMAGE, SCENE, brightness, difference};
 
-/// The part of the default window that shows the picture and what is around it.
+/// The part of the default window with the picture and its surroundings.
 const CENTRE: [u16; 4] = [0, 0, 1280 - 336, 680];
 
 /// A folder for captures.
@@ -51,7 +51,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     desk.press(Key::Space);
     assert_eq!(difference(&desk.settle(IMAGE), &shown[3]), 0.0, "the newest");
 
-    // Back through the loop: what came first is there to the last bit, and so is all between.
+    // Back through the loop: the first image is there to the last bit, and so are all between.
     let mut back = vec![desk.grab(IMAGE)];
     while back[back.len() - 1] != shown[0] {
         assert!(back.len() < 20, "the first image does not come back");
@@ -68,7 +68,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     desk.drag((560, 702), (300, 702));
     desk.wait_for("the first by the pointer", |d| d.grab(IMAGE) == shown[0]);
 
-    // What is saved is what is shown: the first picture, which `render` makes as well.
+    // The saved image is the shown one: the first picture, which `render` makes as well.
     desk.press(Key::F2);
     let still = sidecar(&mut desk, &captures, "cyst-and-wires-0001.json");
     let saved = image::open(captures.join("cyst-and-wires-0001.png")).expect("a picture");
@@ -101,7 +101,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     assert_eq!(frames.len(), back.len());
     assert_eq!(clip["frames"].as_array().map(Vec::len), Some(back.len()));
     assert!(frames[0].as_raw() == saved.to_rgba8().as_raw(), "it begins with the first");
-    // The same as single pictures, which the list at the bar's right end offers.
+    // The loop as single pictures, which the list at the bar's right end offers.
     desk.click((907, 702));
     desk.click((900, 679));
     desk.press(Key::F3);
@@ -117,7 +117,7 @@ fn a_frozen_loop_shows_and_saves_what_was_imaged_before() {
     desk.press(Key::Enter);
     desk.settle(IMAGE);
 
-    // Live, the image is the newest but for its noise.
+    // Live, the image is the newest except for its noise.
     desk.press(Key::Space);
     desk.wait_for("the newest", |d| difference(&d.grab(IMAGE), &shown[3]) < 1.5);
     desk.quit();
@@ -134,7 +134,7 @@ fn gif(path: &Path) -> Vec<image::RgbaImage> {
 #[test]
 fn a_folder_that_cannot_be_written_to_is_said_and_another_one_taken() {
     let (_folder, captures) = folder();
-    // A folder in what is a file: not even a superuser can make it.
+    // A folder inside a file: not even a superuser can make it.
     std::fs::write(&captures, "").expect("written");
     let inside = captures.join("in");
     let arguments = ["--captures", inside.to_str().expect("UTF-8")];
@@ -154,15 +154,15 @@ fn a_folder_that_cannot_be_written_to_is_said_and_another_one_taken() {
     desk.quit();
 }
 
-/// A bright spot: the centre of what is brighter than [`WHITE`], pixels.
+/// A bright spot: the centre of connected pixels brighter than [`WHITE`], pixels.
 type Spot = [f64; 2];
 /// Grey level that wires reach and speckle does not.
 const WHITE: u8 = 170;
 
-/// Bright spots of a picture of the display, by what is connected.
+/// Bright spots of a picture of the display, by connected pixels.
 fn spots(pixels: &[u8], width: usize) -> Vec<Spot> {
     let grey: Vec<u8> = (pixels.chunks_exact(3))
-        // What is drawn over the image has a colour; wires have none.
+        // Drawings over the image have a colour; wires have none.
         .map(|p| if p.iter().all(|&c| c == p[0]) { p[0] } else { 0 })
         .collect();
     let mut seen = vec![false; grey.len()];
@@ -196,7 +196,7 @@ fn spots(pixels: &[u8], width: usize) -> Vec<Spot> {
     out
 }
 
-/// The phantom's wires as they are found in the picture.
+/// The phantom's wires as found in the picture.
 struct Wires {
     /// On the axis, at 10, 20, ... mm.
     column: Vec<Spot>,
@@ -231,7 +231,7 @@ fn wires(pixels: &[u8], width: usize, middle: f64) -> Result<Wires, String> {
     Ok(Wires { near: row(column[3], 1.0, 3)?, far: row(column[8], 2.0, 2)?, column })
 }
 
-/// Accuracy of a distance between two wires: what is asked of a scanner's calipers.
+/// Accuracy of a distance between two wires, as required of a scanner's calipers.
 const ACCURACY: f64 = 0.01;
 
 fn is_accurate(measured: f64, expected: f64) -> bool {
@@ -245,7 +245,7 @@ fn measures_the_phantom(scale: f64) {
     let Some(mut desk) = Desk::open_scaled(scene, &arguments, scale) else {
         return;
     };
-    // Console and 3D view would leave little room beside them where everything is larger.
+    // Console and 3D view would leave little room beside them at a larger scale.
     desk.resize(1280, 720);
     desk.press(Key::Letter('c'));
     desk.press(Key::Letter('v'));
@@ -286,7 +286,7 @@ fn measures_the_phantom(scale: f64) {
     desk.press(Key::Letter('o'));
     desk.drag(at(-65.0, 78.0), at(-55.0, 78.0));
     desk.click(at(-60.0, 83.0));
-    // A text; its letters are keys of the console and others, which do nothing meanwhile.
+    // A text; its letters are keys of the console and others, which have no effect meanwhile.
     desk.press(Key::Letter('n'));
     desk.drag(at(-60.0, 78.0), at(-45.0, 110.0));
     desk.still(picture);
@@ -306,7 +306,7 @@ fn measures_the_phantom(scale: f64) {
         let off = 100.0 * (length / expected - 1.0);
         println!("scale {scale}, {name}: {length:.2} mm, {off:+.2} %");
         assert!(is_accurate(length, expected), "{name}: {length} {expected}");
-        // A pixel pitch that is two hundredths off would be noticed.
+        // A pixel pitch off by two hundredths would be noticed.
         assert!(!is_accurate(length * 1.02, expected), "{name}: {length}");
         assert!(!is_accurate(length / 1.02, expected), "{name}: {length}");
     }
@@ -314,7 +314,7 @@ fn measures_the_phantom(scale: f64) {
     let angle = measured[3]["angle_deg"].as_f64().expect("a number");
     let slack = (0.71 / (20.0 * mm)).atan() + (0.71 / (40.0 * mm)).atan();
     assert!((angle - 90.0).abs() < slack.to_degrees(), "{angle}");
-    // As are the ends of both axes, of 10 mm.
+    // The same holds for the ends of both axes, of 10 mm.
     let area = measured[4]["area_mm2"].as_f64().expect("a number");
     let circle = std::f64::consts::PI * 25.0;
     let slack = 4.0 * 0.71 / (10.0 * mm);

@@ -9,10 +9,10 @@ use crate::client::{Client, shift};
 use crate::desk::{Desk, Key};
 use crate::{IMAGE, SCENE, brightness, difference};
 
-/// Where a notice is, over the image and below its texts.
+/// The part with a notice, over the image and below its texts.
 const NOTICE: [u16; 4] = [16, 54, 440, 42];
 
-/// A window that listens; the scene with a tracker that reports in the scene's own frame.
+/// A window that listens; the scene has a tracker that reports in the scene's own frame.
 fn open(timeout: &str, more: &[&str]) -> Option<(Desk, SocketAddr)> {
     // A port that was free a moment ago.
     let free = TcpListener::bind("127.0.0.1:0").expect("a free port");
@@ -26,8 +26,8 @@ fn open(timeout: &str, more: &[&str]) -> Option<(Desk, SocketAddr)> {
     Some((desk, address))
 }
 
-/// The first image at the scene's own quality, 400 pixels high, that arrives with the pose `matrix`:
-/// what is sent while something moves may be smaller.
+/// The first image at the scene's own quality, 400 pixels high, that arrives with the pose `matrix`: images sent
+/// during movement may be smaller.
 fn image_at(client: &mut Client, matrix: [f32; 12]) -> insonify::igtl::image::Image {
     loop {
         let pose = client.receive_kind("TRANSFORM");
@@ -46,7 +46,7 @@ fn a_tracker_moves_the_probe_and_sees_what_the_window_shows() {
         return;
     };
     let still = desk.settle(IMAGE);
-    // Nothing moves, and yet there is an image for who comes now.
+    // Nothing moves, and yet there is an image for a new client.
     let mut client = Client::at(address);
     let home = shift(0.0, 0.0, 0.0);
     let seen = image_at(&mut client, home);
@@ -115,7 +115,7 @@ fn a_lost_tracker_is_shown_with_its_name_and_since_when() {
     let mut client = Client::at(address);
     client.transform("Probe", shift(1.0, 0.0, 0.0));
     desk.wait_for("the notice", |d| amber(&d.grab(NOTICE)) > 0.05);
-    // It counts on: another number within two seconds.
+    // The seconds go on: another number within two seconds.
     let first = desk.grab(NOTICE);
     desk.wait_for("the seconds", |d| d.grab(NOTICE) != first);
     assert!(amber(&desk.grab(NOTICE)) > 0.05);
@@ -166,7 +166,7 @@ fn clients_that_mean_harm_do_none() {
     let memory = desk.memory();
     let mut kept = Vec::new();
     for round in 0..3 {
-        // Wrong checksums, more than are put up with.
+        // Wrong checksums, more than are tolerated.
         let mut client = Client::at(address);
         for _ in 0..40 {
             client.send_bytes(&changed(|wire| wire[HEADER + 40] ^= 1));
@@ -185,7 +185,7 @@ fn clients_that_mean_harm_do_none() {
     }
     // As many connections as there are ports for, none of which reads.
     let crowd: Vec<Client> = (0..100).map(|_| Client::at(address)).collect();
-    // Meanwhile the window does what it is told.
+    // Meanwhile the window obeys its user.
     for _ in 0..6 {
         desk.press(Key::Right);
     }

@@ -1,4 +1,4 @@
-//! Recorded ways of the probe: in the window, and without one.
+//! Recorded trajectories of the probe: in the window, and without one.
 
 use std::path::Path;
 use std::process::Command;
@@ -6,7 +6,7 @@ use std::process::Command;
 use crate::desk::{self, Desk, Key};
 use crate::{IMAGE, SCENE, brightness, difference};
 
-/// Half a second along the image by 12 mm.
+/// A trajectory: half a second along the image by 12 mm.
 const WAY: &str = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n0.25,6,0,0\n0.5,12,0,0\n";
 
 #[test]
@@ -58,7 +58,7 @@ fn a_trajectory_of_a_file_is_gone_along_from_the_start() {
     desk.quit();
 }
 
-/// `insonify render` of a small image, into `output`.
+/// Runs `insonify render` of a small image, into `output`.
 fn render(scene: &Path, output: &Path, more: &[&str]) -> std::process::Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_insonify"));
     command.arg("render").arg(scene).arg("-o").arg(output);
@@ -95,7 +95,7 @@ fn a_trajectory_is_rendered_pose_by_pose_without_a_window() {
     for (a, b) in rows.iter().zip(&again) {
         assert_eq!(a.buffer(), b.buffer());
     }
-    // A row's frame is that of a scene whose probe is there.
+    // A row's frame is that of a scene whose probe is at the row's place.
     let there = "probe.pose={ position = [12, 0, 0] }";
     for (name, more) in [
         ("moved.png", vec!["--set", there]),
@@ -134,7 +134,7 @@ fn a_trajectory_that_cannot_be_read_is_refused_with_its_line_and_what_to_do() {
         let view = desk::program(&scene, &["--trajectory", named]).output();
         for output in [render, view.expect("started")] {
             let said = String::from_utf8_lossy(&output.stderr).into_owned();
-            // The message may be broken into lines.
+            // The message may be wrapped into several text lines.
             let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
             assert_eq!(output.status.code(), Some(1), "{said}");
             assert!(words.iter().all(|w| said.contains(w)), "{words:?}: {said}");

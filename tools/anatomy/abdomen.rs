@@ -10,9 +10,9 @@ use crate::vessels::{Growth, Piece, Random, Region, lumen};
 
 /// Smooth layers of the wall; their tightest curve is the probe's imprint.
 const WALL: (f32, f64) = (7.0, 0.4);
-/// What bounds the view.
+/// The boundaries of the view.
 const FAR: (f32, f64) = (4.5, 0.3);
-/// Mostly in shadow or beside the fan.
+/// Parts mostly in shadow or beside the fan.
 const BACK: (f32, f64) = (5.0, 0.1);
 /// Organs.
 const ORGAN: (f32, f64) = (3.0, 1.0);
@@ -70,8 +70,8 @@ pub fn parts() -> Vec<Part> {
 /// Thickness of the aortic wall, mm.
 const AORTIC_WALL: f32 = 1.6;
 
-/// Thickness of the portal sheath of Glisson, mm: what makes portal veins bright-walled where
-/// hepatic veins are not.
+/// Thickness of the portal sheath of Glisson, mm: it makes the walls of portal veins bright; hepatic
+/// veins have none.
 const PORTAL_WALL: f32 = 0.9;
 
 /// Portal branches wider than this radius, mm, show their sheath.

@@ -15,7 +15,7 @@ use crate::model::Extent;
 use crate::part::Part;
 use crate::{model, output};
 
-/// What one exam consists of.
+/// The parts and the sizes of one exam.
 pub struct Exam {
     /// The scene is called `NAME.toml`, its volume `NAME/pelvis.mha`.
     pub name: &'static str,
@@ -25,9 +25,9 @@ pub struct Exam {
     pub pelvis: String,
     /// The pelvis, in rising priority.
     pub parts: Vec<Part>,
-    /// How much fainter than flat mirrors the surfaces of a part are, dB.
+    /// Returns by how many dB the surfaces of a part are fainter than flat mirrors.
     pub faint: fn(&str) -> i32,
-    /// Where the axes point, for the meshes.
+    /// Directions of the axes, as text for the mesh files.
     pub axes: &'static str,
     /// The block that holds the parts.
     pub extent: Extent,
@@ -47,7 +47,7 @@ impl Exam {
         let folder = keep.map_or_else(|| std::env::temp_dir().join(name), PathBuf::from);
         let made = self.pelvis_scene(budget, &folder).and_then(|scene| self.swept(&scene));
         if keep.is_none() {
-            // What is left behind in a temporary folder harms nobody.
+            // A temporary folder that stays behind does no harm.
             let _ = std::fs::remove_dir_all(&folder);
         }
         let volume = made?;
@@ -61,7 +61,7 @@ impl Exam {
         Ok(())
     }
 
-    /// Makes the pelvis in `folder`; its scene file.
+    /// Writes the pelvis into `folder`; returns the path of its scene file.
     fn pelvis_scene(&self, budget: usize, folder: &Path) -> Result<PathBuf, String> {
         let surfaces = model::surfaces(&self.parts, self.extent, budget)?;
         let mut out = self.pelvis.clone();
@@ -80,7 +80,7 @@ impl Exam {
         Ok(path)
     }
 
-    /// The volume that a sweep over the pelvis gives.
+    /// Returns the volume that a sweep over the pelvis gives.
     fn swept(&self, path: &Path) -> Result<Volume, String> {
         let (mut scene, warnings) = Scene::load(path, &[]).map_err(|e| e.to_string())?;
         for warning in warnings {

@@ -1,5 +1,5 @@
-//! What a scan through the vagina shows around the uterus in a coronal plane: vaginal wall, pelvic side
-//! walls with iliac vessels, broad ligaments with veins, ovaries, bowel. Sizes and places were chosen by
+//! Surroundings of the uterus in a coronal scan through the vagina: vaginal wall, pelvic side walls
+//! with iliac vessels, broad ligaments with veins, ovaries, bowel. Sizes and places were chosen by
 //! this project, no source found.
 //!
 //! Frame, mm: that of the probe, x to the mother's left, y to her back, z into the pelvis, to her head.
@@ -26,14 +26,14 @@ pub fn within(p: &Point, field: Tree) -> Tree {
     intersection(field, block, 3.0)
 }
 
-/// What lies within `depth` of the face.
+/// The block within `depth` mm of the face.
 fn near(p: &Point, depth: f32) -> Tree {
     let q = p.from(Vec3::new(0.0, 0.0, -FACE));
     let radius = (q.0.square() + q.2.square()).sqrt();
     within(p, radius - (FACE + depth) + undulation(p, 0.3, 23.0, 0.9))
 }
 
-/// What lies beyond the pelvic side walls, `inset` mm deeper.
+/// The block beyond the pelvic side walls, `inset` mm deeper.
 fn side(p: &Point, inset: f32) -> Tree {
     let bulge = (p.2.clone() - 52.0).square() * 0.004;
     let wall = (bulge + 64.0 + inset) - p.0.clone().abs();
@@ -99,7 +99,7 @@ fn bowel(p: &Point, wall: f32) -> Tree {
     within(p, tubes(p, &LOOPS, wall))
 }
 
-/// Gas on the side of the loops that is up.
+/// Gas in the upper part of the loops.
 fn gas(p: &Point) -> Tree {
     let level = p.2.clone() + p.0.clone() * 0.1 - 74.0 + undulation(p, 0.7, 13.0, 2.4);
     let beside = Tree::from(33.0) - p.0.clone();
@@ -134,7 +134,7 @@ impl Ovary {
     }
 }
 
-/// A corpus luteum: middle, radius, and how thick its wall is around the fluid, mm.
+/// A corpus luteum: middle, radius, and thickness of its wall around the fluid, mm.
 pub struct Luteum {
     pub middle: Vec3,
     pub radius: f32,
@@ -142,7 +142,7 @@ pub struct Luteum {
 }
 
 impl Luteum {
-    /// What lies `inset` mm within its surface.
+    /// The part that is more than `inset` mm within its surface.
     fn field(&self, p: &Point, inset: f32) -> Tree {
         let radii = Vec3::new(1.05, 1.0, 0.95) * self.radius - inset;
         ellipsoid(&p.from(self.middle), radii) + undulation(p, 0.35, 7.0, 0.8 + inset)
@@ -154,7 +154,7 @@ pub fn uterus(p: &Point, (middle, radii): (Vec3, Vec3)) -> Tree {
     ellipsoid(&p.from(middle), radii) + undulation(p, 1.0, 39.0, 2.2)
 }
 
-/// Ovaries with what they hold, and the uterus with its vessels, in rising priority.
+/// Ovaries with their follicles and the corpus luteum, and the uterus with its vessels, in rising priority.
 pub fn organs(
     p: &Point,
     [one, other]: [&Ovary; 2],
@@ -188,7 +188,7 @@ fn arcuate(p: &Point, (middle, radii): (Vec3, Vec3)) -> Tree {
     pelvis::arcuate(p, middle, radii * Vec3::new(0.86, 1.0, 0.84), &arcs)
 }
 
-/// How much fainter than flat mirrors the surfaces of a part are, dB.
+/// Returns by how many dB the surfaces of a part are fainter than flat mirrors.
 pub fn faint(name: &str) -> i32 {
     match name {
         "decidua" | "ring" | "filling" | "junction" | "endometrium" => -18,
@@ -198,14 +198,14 @@ pub fn faint(name: &str) -> i32 {
     }
 }
 
-/// Cells and weight of large, of middling and of fine parts.
+/// Cell size, mm, and weight of large parts; below, of medium and of fine ones.
 pub const LARGE: (f32, f64) = (3.5, 0.5);
 /// See [`LARGE`].
 pub const ORGAN: (f32, f64) = (2.2, 1.0);
 /// See [`LARGE`].
 pub const FINE: (f32, f64) = (1.0, 1.5);
 
-/// What lies around a uterus whose left and right edges in the image are at `edges`, in rising
+/// The surroundings of a uterus whose left and right edges in the image are at `edges`, in rising
 /// priority.
 pub fn around(p: &Point, edges: [f32; 2]) -> Vec<Part> {
     vec![

@@ -1,4 +1,4 @@
-//! How the heart moves: one beat as an analytic, invertible deformation of the shape at end
+//! The motion of the heart: one beat as an analytic, invertible deformation of the shape at end
 //! diastole, sampled at eight instants.
 //!
 //! In the ventricles a point at radius r from the left ventricle's axis and level z goes to
@@ -24,14 +24,14 @@ pub const PERIOD: f64 = 0.85;
 /// Keyframes, evenly spaced over [`PERIOD`]; the first is end diastole.
 pub const KEYFRAMES: usize = 8;
 
-/// What has happened at a keyframe.
+/// State of the beat at a keyframe.
 #[derive(Clone, Copy, Debug)]
 pub struct Phase {
     /// Share of the stroke volume that has left the ventricles.
     pub ejected: f64,
     /// Share of their reservoir volume that has entered the atria.
     pub filled: f64,
-    /// How far the valves between atria and ventricles are open.
+    /// Opening of the valves between atria and ventricles: 0 closed, 1 open.
     pub open: f64,
 }
 
@@ -81,7 +81,7 @@ fn radius2([r, below, above]: [f64; 3], z: f64) -> f64 {
     0.5 * (square + square.hypot(8.0))
 }
 
-/// Position at a phase of what is at `p` at end diastole, mm.
+/// Position at a phase, mm, of the point that is at `p` at end diastole.
 pub fn deform(p: DVec3, phase: Phase) -> DVec3 {
     let p = swell(p, phase.filled);
     let q = contract(p, phase.ejected);
@@ -129,7 +129,7 @@ fn softplus(x: f64) -> f64 {
     if x > 30.0 { x } else { x.exp().ln_1p() }
 }
 
-/// How far level `z` has moved towards the apex, mm.
+/// Distance that level `z` has moved towards the apex, mm.
 fn descend(z: f64, ejected: f64) -> f64 {
     let ventricles = (z - APEX) / (MITRAL - APEX);
     let atria = (ROOF - z) / (ROOF - MITRAL);

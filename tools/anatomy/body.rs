@@ -123,7 +123,7 @@ pub fn cavity(p: &Point) -> Tree {
     intersection(dome(p) + 2.8, inner, 4.0)
 }
 
-/// The lungs' bases: what the wall leaves free above the diaphragm.
+/// The lungs' bases: the space that the wall leaves free above the diaphragm.
 pub fn lung(p: &Point) -> Tree {
     // 1.4 mm into the diaphragm, which has the higher priority: no two faces coincide.
     difference(layer(p, CAVITY, 0.8, 5.1), dome(p) + 1.4, 2.5)

@@ -1,5 +1,5 @@
-//! What every mesh must be before it is written: closed, manifold, outward, without slivers of
-//! zero area.
+//! Checks of every mesh before it is written: closed, manifold, outward, without triangles of zero
+//! area.
 
 use std::collections::HashMap;
 
@@ -16,7 +16,7 @@ pub struct Surface {
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Why a mesh is not fit to be written.
+/// Reason for which a mesh must not be written.
 #[derive(Debug, PartialEq, thiserror::Error)]
 pub enum Defect {
     /// No surface at all.
@@ -62,7 +62,7 @@ pub fn double_area_vector(surface: &Surface, t: &[u32; 3]) -> Vec3 {
     (b - a).cross(c - a)
 }
 
-/// All of the checks, the first defect found.
+/// Runs all checks; returns the first defect found.
 pub fn check(surface: &Surface) -> Result<(), Defect> {
     if surface.triangles.is_empty() {
         return Err(Defect::Empty);

@@ -200,7 +200,7 @@ impl Mesh {
         [(a, b), (b, a)].into_iter().all(|(v, other)| self.fan_survives(v, other, target))
     }
 
-    /// Whether the triangles of `v` that stay keep their side and shape when it moves.
+    /// Returns whether the triangles of `v` that stay keep their side and shape when it moves.
     fn fan_survives(&self, v: u32, other: u32, target: DVec3) -> bool {
         let stays = |t: &[u32; 3]| !t.contains(&other);
         let fan = self.around[v as usize].iter();
@@ -220,7 +220,7 @@ impl Mesh {
         })
     }
 
-    /// Merges `b` into `a`; returns how many triangles went.
+    /// Merges `b` into `a`; returns the number of triangles removed.
     fn collapse(&mut self, a: u32, b: u32, target: DVec3) -> usize {
         let (i, j) = (a as usize, b as usize);
         self.positions[i] = target;
@@ -247,7 +247,7 @@ impl Mesh {
         gone
     }
 
-    /// The parts again, without the vertices that are gone.
+    /// Returns the parts again, without the removed vertices.
     fn split(&self, surfaces: &[Surface]) -> Vec<Surface> {
         let (mut vertex, mut triangle) = (0, 0);
         let part = |surface: &Surface| {

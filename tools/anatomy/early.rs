@@ -12,7 +12,7 @@ use crate::vaginal::Case;
 /// Middle of the uterus and its half-axes: 63 mm wide, 52 mm deep (chosen, no source found).
 const UTERUS: (Vec3, Vec3) = (Vec3::new(-2.0, 0.0, 39.0), Vec3::new(31.5, 34.0, 26.0));
 
-/// How far the decidua reaches around the sac, mm, and whither it is thicker: there the placenta begins.
+/// Thickness of the decidua around the sac, mm, and the direction in which it is thicker: the placenta's.
 const DECIDUA: (f32, Vec3) = (5.5, Vec3::new(-1.2, 0.0, 1.6));
 
 const RIGHT: Ovary = Ovary {

@@ -16,7 +16,7 @@ const UTERUS: (Vec3, Vec3) = (Vec3::new(-20.0, 0.0, 38.0), Vec3::new(26.0, 34.0,
 /// Half-axes of the lining, and of the fluid in it (pseudosac), about the uterus' middle.
 const LINING: [Vec3; 2] = [Vec3::new(14.5, 22.0, 6.8), Vec3::new(6.5, 9.0, 1.0)];
 
-/// Thickness of the ring, and what the tube adds to it.
+/// Thickness of the ring; below, the additional thickness of the tube. Both in mm.
 const RING: f32 = 4.6;
 /// See [`RING`].
 const TUBE: f32 = 2.2;

@@ -27,13 +27,13 @@ const BUDGET: usize = 6_000;
 const CROWN_RUMP: f32 = 16.0;
 
 /// Half-axes of the chorionic sac: 27 mm in the mean. By the common rule, days =
-/// diameter + 30, that is 8 weeks; where the rule comes from was not traced.
+/// diameter + 30, that is 8 weeks; the source of the rule was not found.
 const SAC: Vec3 = Vec3::new(16.0, 12.5, 12.5);
 
 /// Middle of the amnion in the sac, and its half-axes.
 const AMNION: (Vec3, Vec3) = (Vec3::new(-2.6, 0.0, 1.5), Vec3::new(10.4, 8.2, 8.6));
 
-/// Where the embryo lies in the sac, and the angle about y by which its head is turned back, degrees.
+/// Place of the embryo in the sac, and the angle about y by which its head is turned back, degrees.
 const REST: (Vec3, f32) = (Vec3::new(-2.6, 0.0, 3.2), 10.0);
 
 /// The joint about which the head nods.
@@ -42,7 +42,7 @@ const NECK: Vec3 = Vec3::new(2.6, 0.0, 2.0);
 /// Middle of the heart.
 const HEART: Vec3 = Vec3::new(0.2, 0.0, -1.3);
 
-/// Half-axes of the heart, and of what blood fills of it.
+/// Half-axes of the heart, and of the blood in it.
 const HEART_RADII: [Vec3; 2] = [Vec3::new(2.7, 2.3, 2.2), Vec3::new(1.85, 1.55, 1.5)];
 
 /// An embryo in a scene.
@@ -53,7 +53,7 @@ pub struct Gestation {
     pub scale: f32,
     /// Middle of the yolk sac from that of the sac, and its radius, mm; chosen, no source found.
     pub yolk: (Vec3, f32),
-    /// Whether the amnion is seen: not before it has left the embryo.
+    /// True where the amnion is seen: not before it has left the embryo.
     pub amnion: bool,
     /// Factor on the heart: the younger the embryo, the larger its share of the body.
     pub heart: f32,
@@ -74,7 +74,7 @@ impl Gestation {
         SAC * self.scale
     }
 
-    /// What the sizes come to, for the record.
+    /// Returns the sizes of the embryo as text, for the scene file.
     pub fn biometry(&self) -> String {
         let length = CROWN_RUMP * self.scale;
         let days = 8.052 * (1.037 * length).sqrt() + 23.73;
@@ -204,7 +204,7 @@ echogenicity = "+7 dB"
 source = "chosen by this project, no source found"
 "#;
 
-/// Tissue of the amnion, where it is seen.
+/// Tissue of the amnion, for scenes that show it.
 pub const AMNIOTIC: &str = r#"
 [tissues.membrane]
 based_on = "fetal_soft_tissue"
@@ -213,7 +213,7 @@ echogenicity = "-8 dB"
 source = "chosen by this project, no source found"
 "#;
 
-/// Where a mesh hangs.
+/// Transform node that a mesh belongs to.
 #[derive(Clone, Copy)]
 enum Node {
     Body,

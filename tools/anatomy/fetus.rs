@@ -33,7 +33,7 @@ const SCALP: f32 = 1.1;
 /// Radius of the trunk at the navel.
 const BELLY: f32 = 7.9;
 
-/// What the proportions come to, for the record.
+/// Returns the sizes of the fetus as text, for the scene file.
 pub fn biometry() -> String {
     let days = 8.052 * (1.037 * CROWN_RUMP).sqrt() + 23.73;
     let (bpd, ofd) = (2.0 * SKULL.y, 2.0 * SKULL.z);
@@ -166,7 +166,7 @@ fn ribs(p: &Point) -> Tree {
     both.reduce(|a, b| a.min(b)).expect("ribs")
 }
 
-/// The way of the umbilical cord from the navel around the legs to the placenta.
+/// The centre line of the umbilical cord from the navel around the legs to the placenta.
 const CORD: [Vec3; 6] = [
     Vec3::new(-10.0, 0.0, -6.5),
     Vec3::new(-12.5, -3.5, -10.5),
@@ -212,11 +212,11 @@ fn cord_vessels(p: &Point) -> Tree {
 pub struct Limb {
     /// Shoulder or hip.
     pub joint: Vec3,
-    /// From the joint to elbow or knee.
+    /// Vector from the joint to elbow or knee.
     pub upper: Vec3,
-    /// From there to wrist or ankle.
+    /// Vector from there to wrist or ankle.
     pub lower: Vec3,
-    /// From there to the tips.
+    /// Vector from there to the tips.
     tip: Vec3,
     /// Radii at the joint, elbow or knee, wrist or ankle, tips.
     radii: [f32; 4],
@@ -240,14 +240,14 @@ pub const LEG: Limb = Limb {
     radii: [2.9, 2.2, 1.5, 1.1],
 };
 
-/// How much shorter the ossified shaft is than its segment, mm.
+/// Length of a segment less that of its ossified shaft, mm.
 const BONE_GAP: f32 = 0.9;
 
 /// Names of a limb's meshes: upper segment, its bone, lower segment, its bone.
 type LimbNames = [&'static str; 4];
 
 impl Limb {
-    /// On the left (1) or right (-1) side.
+    /// Returns `v` on the left (1) or right (-1) side.
     pub fn mirrored(v: Vec3, side: f32) -> Vec3 {
         point(v.x, v.y * side, v.z)
     }
@@ -279,7 +279,7 @@ impl Limb {
     }
 }
 
-/// Where the meshes of [`parts`] hang: the transform nodes of the scene.
+/// Transform nodes of the scene that the meshes of [`parts`] belong to.
 #[derive(Clone, Copy, PartialEq)]
 pub enum Node {
     /// The whole fetus.

@@ -12,13 +12,13 @@ use crate::{model, output, womb};
 /// Share of the triangles that the fetus has; the rest is the mother's.
 const FETUS: f64 = 0.62;
 
-/// Where the fetus rests in the sac, mm from its middle: on its back, a little below.
+/// Resting place of the fetus in the sac, mm from its middle: on its back, a little below.
 const REST: Vec3 = Vec3::new(1.0, 0.0, 1.5);
 
 /// The tilt of its long axis, degrees about y: the head higher.
 const TILT: f32 = 9.0;
 
-/// What the axes are, for the files.
+/// Directions of the axes, as text for the mesh files.
 const FETAL_AXES: &str = "x to the crown, y to the left, z to the back";
 /// See [`FETAL_AXES`].
 pub const WORLD_AXES: &str = "x towards the mother's feet, y to her right, z to her back";
@@ -62,10 +62,10 @@ pub fn make(budget: usize, output: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// What the entry of the sac adds.
+/// Additional line in the entry of the sac.
 pub const CHORION: &str = "surface_gain = \"6 dB\" # chorion: a membrane of its own\n";
 
-/// The nodes and meshes of a scene: the fetus, and of its surroundings those for which `around` has
+/// The nodes and meshes of a scene: the fetus, and those of its surroundings for which `around` returns
 /// the last lines of their entry. All of them belong to the node `carrier`, or to the world.
 pub fn contents(carrier: Option<&str>, around: impl Fn(&str) -> Option<String>) -> String {
     let mut out = transforms(carrier);
@@ -95,7 +95,7 @@ pub fn contents(carrier: Option<&str>, around: impl Fn(&str) -> Option<String>) 
     out
 }
 
-/// Where a node's joint is in the fetus' frame, mm.
+/// Position of a node's joint in the fetus' frame, mm.
 fn joint(node: Node) -> Vec3 {
     match node {
         Node::Body => Vec3::ZERO,
@@ -126,7 +126,7 @@ pub fn about(surface: &Surface, joint: Vec3) -> Surface {
     out
 }
 
-/// One `[[transform]]`: rest placement `at` in its parent and how it moves.
+/// One `[[transform]]`: rest placement `at` in its parent, and its motion.
 fn transform(name: &str, parent: Option<&str>, at: Vec3, rest: &str, motion: &str) -> String {
     let parent = parent.map_or(String::new(), |p| format!("parent = \"{p}\"\n"));
     format!(
@@ -171,7 +171,7 @@ fn transforms(carrier: Option<&str>) -> String {
     out
 }
 
-/// What precedes the tissues.
+/// The lines before the tissues.
 const HEAD: &str = r#"# World frame, mm: that of the probe, x towards the mother's feet, y to her right, z to her back;
 # in the fetus' own frame x points to its crown, y to its left, z to its back. Outside the skin is
 # coupling gel. Sizes: Robinson and Fleming, Br J Obstet Gynaecol 1975;82:702-710.
@@ -196,7 +196,7 @@ gel = "5 mm"
 tgc_sliders = [0, 0, 0, -2, -4, -7, -10, -12]
 "#;
 
-/// What lies around the uterus.
+/// Tissue around the uterus.
 pub const PELVIC: &str = r#"# Bowel, omentum and ligaments around the uterus.
 [tissues.pelvis]
 based_on = "fat"

@@ -165,7 +165,7 @@ impl Field {
         })
     }
 
-    /// Evaluates the points of each block with what is left of the field there; results in the
+    /// Evaluates the points of each block with the rest of the field there; results in the
     /// order of `points`.
     fn by_block<T: Copy + Default + Send>(
         &self,
@@ -194,7 +194,7 @@ impl Field {
         out
     }
 
-    /// The field without the branches that cannot matter within the box of `points`.
+    /// The field without the branches that have no effect within the box of `points`.
     fn near(&self, points: &[Vec3]) -> VmShape {
         let low = points.iter().copied().reduce(Vec3::min);
         let high = points.iter().copied().reduce(Vec3::max);

@@ -15,7 +15,7 @@ use crate::field::{
 use crate::model::Extent;
 use crate::part::{Part, part};
 
-/// The box that holds the heart and what is modelled of the chest.
+/// The box that holds the heart and the modelled part of the chest.
 pub const EXTENT: Extent =
     Extent { low: Vec3::new(-125.0, -64.0, -6.0), high: Vec3::new(105.0, 64.0, 206.0), step: 3.0 };
 
@@ -25,8 +25,8 @@ pub const EQUATOR: f64 = 83.0;
 pub const CAVITY: [f64; 3] = [24.0, 52.0, 40.0];
 /// The same of the outer surface: the wall is 10 mm thick, 8 mm at the apex.
 pub const WALL: [f64; 3] = [34.0, 60.0, 46.0];
-/// Level of the mitral valve, and of the tricuspid valve: that one lies nearer to the apex, by which
-/// the right ventricle is told in a four-chamber view.
+/// Level of the mitral valve; below, of the tricuspid valve, which lies nearer to the apex: in a
+/// four-chamber view the right ventricle is recognised by it.
 pub const MITRAL: f64 = 111.0;
 /// See [`MITRAL`].
 pub const TRICUSPID: f64 = 106.0;
@@ -134,7 +134,7 @@ fn outer(p: &Point) -> Tree {
     union(ventricles, atria, 7.0) + undulation(p, 0.4, 31.0, 0.2)
 }
 
-/// What beats, in rising priority. The first is the outer surface, the next four are the chambers
+/// The beating parts, in rising priority. The first is the outer surface, the next four are the chambers
 /// LV, RV, LA, RA.
 pub fn parts() -> Vec<Part> {
     let p = &Point::world();
@@ -156,7 +156,7 @@ pub fn parts() -> Vec<Part> {
     ]
 }
 
-/// What does not beat, in rising priority: the chest wall over the apex, two ribs in front of and
+/// The resting parts, in rising priority: the chest wall over the apex, two ribs in front of and
 /// behind the plane, the lungs that close the view on both sides.
 pub fn chest() -> Vec<Part> {
     let p = &Point::world();

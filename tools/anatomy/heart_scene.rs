@@ -1,4 +1,4 @@
-//! The beating heart as a scene: keyframes, what is checked on each, the file.
+//! The beating heart as a scene: keyframes, the checks of each, the file.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ const VALVES: [&str; 2] = ["mitral-valve", "tricuspid-valve"];
 /// Chambers in [`heart::parts`].
 const CHAMBERS: std::ops::RangeInclusive<usize> = 1..=4;
 
-/// What the axes are, for the files.
+/// Directions of the axes, as text for the mesh files.
 const AXES: &str = "x from right to left ventricle, y posterior, z from apex to base";
 
 /// Makes `heart.toml` and its meshes in `output`: `budget` triangles, the chest included.
@@ -86,7 +86,7 @@ fn apart(moved: &[Surface], parts: &[Part]) -> Result<(), String> {
     Ok(())
 }
 
-/// Volumes and what follows from them.
+/// Prints the volumes and the values that follow from them.
 fn report(volumes: &[Vec<f64>]) {
     println!("volumes, ml:     LV     RV     LA     RA");
     for (k, at) in volumes.iter().enumerate() {
@@ -128,7 +128,7 @@ fn scene(parts: &[Part], count: usize, command: &str, triangles: usize) -> Strin
     out + "\n"
 }
 
-/// How a surface differs from what its tissue gives.
+/// Differences of a surface from its tissue's, as lines of its entry.
 fn surface(name: &str) -> &'static str {
     match name {
         "epicardium" => {
@@ -142,7 +142,7 @@ fn surface(name: &str) -> &'static str {
     }
 }
 
-/// What precedes the meshes.
+/// The lines before the meshes.
 const HEAD: &str = r#"# World frame, mm: x from the right to the left ventricle, y to the back, z from the chest wall at
 # the apex to the heart's base. Apical four-chamber view: left ventricle on the right.
 # Volumes after Lang et al., J Am Soc Echocardiogr 2015;28:1-39.

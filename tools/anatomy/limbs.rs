@@ -96,7 +96,7 @@ pub fn make(budget: usize, spread: f64, output: &Path) -> Result<(), String> {
     Ok(())
 }
 
-/// What precedes the meshes.
+/// The lines before the meshes.
 const HEAD: &str = r#"# World frame, mm: that of the probe, x lateral, y elevation, z depth.
 name = "Limb in erratic motion"
 background = "amniotic_fluid"

@@ -40,7 +40,7 @@ pub fn mesh(field: &Field, low: Vec3, high: Vec3, cell: f32) -> Result<Surface, 
 }
 
 /// Manifold dual contouring on cells of exactly `cell` mm: the octree's cube is made larger than
-/// the box rather than its cells larger than asked.
+/// the box, since larger cells would lose detail.
 fn contour(field: &Field, low: Vec3, high: Vec3, cell: f32) -> Surface {
     let depth = ((high - low).max_element() / cell).log2().ceil().max(2.0) as u8;
     let half = 0.5 * cell * f32::from(depth).exp2();

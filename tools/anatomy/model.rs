@@ -19,11 +19,11 @@ const LEAST_SPARE: f64 = 1.15;
 /// that the count goes with a power of the size between 1 and 2 that the second round tells.
 const ROUNDS: usize = 5;
 
-/// How far the vertices of a thinned mesh may be from the surface, mm; what is farther has lost
-/// its shape, and Newton's steps are not to hide it.
+/// Largest distance of a thinned mesh's vertices from the surface, mm; a farther vertex has lost
+/// the shape, and Newton's steps must not hide it.
 const REACH: f32 = 2.0;
 
-/// Where the parts are looked for.
+/// The box in which the parts are searched.
 #[derive(Clone, Copy)]
 pub struct Extent {
     /// Lower corner, mm.

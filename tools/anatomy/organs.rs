@@ -142,7 +142,7 @@ pub fn vena_cava(p: &Point) -> Tree {
     tubes(p, &[trunk, renal], 0.0, 5.0)
 }
 
-/// Where the hepatic veins end, mm.
+/// The point at which the hepatic veins end, mm.
 pub const CAVAL_CONFLUENCE: Vec3 = Vec3::new(-23.0, 8.0, 74.0);
 
 /// Abdominal aorta (20 mm; normal under 3 cm) with the coeliac trunk's and upper mesenteric
@@ -220,7 +220,7 @@ pub fn colon_wall(p: &Point) -> Tree {
     colon(p, 0.0)
 }
 
-/// What the colon holds: its wall is 2.6 mm thick (normal: under 3 mm).
+/// The content of the colon, whose wall is 2.6 mm thick (normal: under 3 mm).
 pub fn colon_content(p: &Point) -> Tree {
     colon(p, 2.6)
 }

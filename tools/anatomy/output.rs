@@ -9,8 +9,8 @@ use crate::check::Surface;
 use crate::part::Part;
 use crate::pose::{self, Pose};
 
-/// A mesh as Wavefront OBJ with normals; coordinates to 1 um, normals to 1e-3. `axes` says where
-/// they point.
+/// A mesh as Wavefront OBJ with normals; coordinates to 1 um, normals to 1e-3. `axes` is the text on
+/// their directions.
 pub fn obj(name: &str, axes: &str, surface: &Surface) -> String {
     let mut out = format!("# {name}, mm; {axes}\n");
     for p in &surface.positions {
@@ -62,7 +62,7 @@ based_on = "kidney"
 echogenicity = "-12 dB"
 "#;
 
-/// What the probe has to touch.
+/// The entry that names the mesh which the probe has to touch.
 const CONTACT: &str = r#"# Joined over a gap that gel alone would not fill: real skin yields and lies around the curved face,
 # which this one, being rigid, cannot.
 [contact]

@@ -1,4 +1,4 @@
-//! Whether surfaces pass through each other or themselves: edges of one that pierce triangles of
+//! Test for surfaces that pass through each other or themselves: edges of one that pierce triangles of
 //! the other.
 
 use std::collections::HashMap;
@@ -48,7 +48,7 @@ fn corners(surface: &Surface, t: &[u32; 3]) -> [DVec3; 3] {
     t.map(|i| surface.positions[i as usize].as_dvec3())
 }
 
-/// Whether the segment passes through the triangle's inside.
+/// Returns whether the segment passes through the triangle's inside.
 fn pierces([p, q]: [DVec3; 2], [a, b, c]: [DVec3; 3]) -> bool {
     let side = |u: DVec3, v: DVec3, w: DVec3, x: DVec3| (v - u).cross(w - u).dot(x - u);
     if side(a, b, c, p) * side(a, b, c, q) >= 0.0 {

@@ -11,7 +11,7 @@ pub struct Part {
     pub tissue: &'static str,
     /// Coarsest cell that still resolves the part, mm.
     pub cell: f32,
-    /// How much an error of the surface, mm2, counts when triangles are shared out.
+    /// Weight of an error of the surface, mm2, when triangles are shared out.
     pub weight: f64,
     /// The signed distance field.
     pub field: Tree,

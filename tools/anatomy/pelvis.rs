@@ -1,6 +1,6 @@
-//! What a pelvis shows around a pregnancy of eleven weeks, for a scan in the midline from the front:
+//! The pelvis around a pregnancy of eleven weeks, for a scan in the midline from the front:
 //! wall with its fasciae, bowel with and without gas, bladder, uterus with vessels, a fibroid, cervix
-//! and vagina, rectum, the sacrum's promontory. Where the sac would be is lining.
+//! and vagina, rectum, the sacrum's promontory. In the place of the sac is lining.
 //!
 //! Frame as in `womb`: x towards the feet, y to the right, z to the back, mm.
 
@@ -28,11 +28,11 @@ const LAYERS: [(&str, &str, f32, f32); 9] = [
     ("pelvis", "pelvis", 23.2, 5.2),
 ];
 
-/// Wall of small bowel, of the rectum (normal: under 3 mm).
+/// Thickness of the wall of small bowel and of the rectum, mm (normal: under 3 mm).
 pub const BOWEL: (f32, f32) = (1.8, 2.6);
 
-/// How much fainter than flat mirrors the surfaces of a part are, dB: fibres and glands that grow into
-/// each other are no smooth faces.
+/// Returns by how many dB the surfaces of a part are fainter than flat mirrors: fibres and glands that
+/// grow into each other are no smooth faces.
 pub fn faint(name: &str) -> i32 {
     match name {
         "decidua" | "lining" | "junction" => -18,
@@ -91,7 +91,7 @@ fn loops(p: &Point, bowel: &[Bowel], wall: f32) -> Tree {
     intersection(difference(tubes(p, bowel, wall), clear, 3.0), womb::skin(p) + (25.0 + wall), 4.0)
 }
 
-/// Gas has risen to the front of the loops that hold it.
+/// Gas at the front of the loops that hold it.
 fn small_gas(p: &Point) -> Tree {
     let level = p.2.clone() - p.0.clone() * 0.9 - 106.0 + undulation(p, 0.6, 13.0, 2.4);
     let beside = p.0.clone() + 54.5;
@@ -160,7 +160,7 @@ fn cervical(p: &Point, radius: f32) -> Tree {
         + undulation(p, 0.4, 19.0, 2.0)
 }
 
-/// Flat, from the cervix down, of these half-axes: along, across, thick.
+/// Vagina: flat, from the cervix down, of these half-axes: along, across, thick.
 fn vagina(p: &Point, radii: Vec3) -> Tree {
     let q = p.from(Vec3::new(92.0, 0.0, 112.0)).along([
         Vec3::new(0.95, 0.0, 0.31),
@@ -170,7 +170,7 @@ fn vagina(p: &Point, radii: Vec3) -> Tree {
     within(p, ellipsoid(&q, radii))
 }
 
-/// The part of a field that lies in the block that is modelled, clear of its faces.
+/// The part of a field that lies in the modelled block, clear of its faces.
 fn within(p: &Point, field: Tree) -> Tree {
     intersection(field, womb::skin(p) + 4.0, 3.0)
 }

@@ -8,7 +8,7 @@ use glam::Vec3;
 /// A probe on the skin. The face's centre is at `position`.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
-    /// What the view shows, for the scene file.
+    /// Content of the view, for the scene file.
     pub title: &'static str,
     /// Centre of the probe's face, mm.
     pub position: Vec3,
@@ -19,8 +19,8 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// From a point on the undeformed skin at (`x`, front or right side, `z`), a target and the
-    /// wish for the lateral axis; `press` mm deep.
+    /// Pose from a point on the undeformed skin at (`x`, front or right side, `z`), a target and the
+    /// wanted lateral axis; `press` mm deep.
     fn aimed(title: &'static str, skin: Vec3, target: Vec3, lateral: Vec3, press: f32) -> Self {
         let direction = (target - skin).normalize();
         let lateral = (lateral - direction * lateral.dot(direction)).normalize();
@@ -43,7 +43,7 @@ fn front(x: f32, z: f32) -> Vec3 {
     Vec3::new(x, -b * (1.0 - (x / a).powi(2)).sqrt(), z)
 }
 
-/// How far the default probe is pressed in, mm: as deep as the 57 mm long, 50 mm curved face
+/// Depth to which the default probe is pressed in, mm: as deep as the 57 mm long, 50 mm curved face
 /// needs to touch the skin nearly everywhere.
 pub const PRESS: f32 = 9.0;
 

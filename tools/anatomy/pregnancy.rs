@@ -86,8 +86,8 @@ const ABOUT: &str = r#"# The volume is a sweep of this simulator over a pelvis w
 # towards the mother's feet, y to her right, z to her back. The sweep reaches from y = -18 to 18 mm.
 "#;
 
-/// What makes the simulation look like the volume, in which a voxel is a mean over pixels: coarser and
-/// smoother speckle of the same mean grey.
+/// Settings that make the simulation look like the volume, in which a voxel is a mean over pixels: coarser
+/// and smoother speckle of the same mean grey.
 const MATCH: &str =
     "# As coarse, as smooth and as bright as the volume, whose voxels are means over pixels.
 gain = \"11.5 dB\"
@@ -95,7 +95,7 @@ dynamic_range = \"66 dB\"
 psf_scale = [2.2, 1.6, 1]
 ";
 
-/// The volume, the mask, and the medium that stands for what lies in front of it.
+/// The volume, the mask, and the medium that replaces all that lies in front of it.
 const FUSION: &str = r#"[volume]
 file = "pregnancy/pelvis.mha"
 
@@ -112,7 +112,7 @@ source = "mean of fat, muscle and uterus by their thickness in front of the sac"
 
 "#;
 
-/// What moves the mask.
+/// The motion of the mask.
 const BREATHING: &str = r#"
 # The mother breathes: the sac, and the mask with it, is carried along a little.
 [[transform]]

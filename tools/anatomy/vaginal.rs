@@ -11,7 +11,7 @@ use crate::fetus_scene::DECIDUAL;
 use crate::part::Part;
 use crate::{adnexa, model, output};
 
-/// Where the axes of the world point.
+/// Directions of the world's axes, as text for the mesh files.
 const AXES: &str = "x to the mother's left, y to her back, z from the probe into the pelvis";
 
 /// Elevational extent of the sweep, mm, and its frames: one plane of voxels each.
@@ -29,15 +29,15 @@ pub struct Case {
     pub name: &'static str,
     /// Title of the scene.
     pub title: &'static str,
-    /// The first lines of the scene: what it shows.
+    /// The first lines of the scene: a description.
     pub about: &'static str,
-    /// What is simulated in it.
+    /// The gestation that is simulated in it.
     pub gestation: Gestation,
-    /// The pelvis with the mask and, as `filling`, what stands for the sac.
+    /// The pelvis with the mask and, as `filling`, the part in the place of the sac.
     pub pelvis: Vec<Part>,
     /// Name of the part of the pelvis that is the mask.
     pub mask: &'static str,
-    /// Entries of `[imaging]` by which the simulation looks like the volume.
+    /// Entries of `[imaging]` that make the simulation look like the volume.
     pub matched: &'static str,
     /// The entry of `[imaging]` that both files share.
     pub sliders: &'static str,
@@ -138,7 +138,7 @@ const ABOUT: &str = r#"# Heart rate: Robinson and Shaw-Dunn, J Obstet Gynaecol B
 # mother's left, y to her back, z from the probe into the pelvis. The sweep reaches from y = -12 to 12 mm.
 "#;
 
-/// What moves the mask.
+/// The motion of the mask.
 const BREATHING: &str = r#"
 # The mother breathes: the sac, and the mask with it, is carried along a little.
 [[transform]]
@@ -146,7 +146,7 @@ name = "breathing"
 motion = { kind = "sine", period = "4 s", translate = [0.2, 0.2, 0.5] }
 "#;
 
-/// Those of the entries that a part names.
+/// Returns the entries whose tissue a part has, and that of the background.
 fn used(entries: &str, parts: &[Part]) -> String {
     let named = |entry: &&str| {
         let of = |part: &Part| entry.contains(&format!("[tissues.{}]", part.tissue));

@@ -88,7 +88,7 @@ impl Random {
     }
 }
 
-/// What growing vessels must respect.
+/// Limits on growing vessels.
 pub struct Growth<'a> {
     /// The organ.
     pub region: &'a Region,
@@ -165,7 +165,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Of some random ways from `from`, leaving along `heading`, to about `end`, the clearest.
+    /// Returns the clearest of some random paths from `from`, leaving along `heading`, to about `end`.
     fn clearest(
         &self,
         from: Vec3,

@@ -10,7 +10,7 @@ use crate::field::{Point, cone, difference, ellipsoid, intersection, undulation,
 use crate::model::Extent;
 use crate::part::{Part, part};
 
-/// The block that is modelled.
+/// The modelled block.
 pub const EXTENT: Extent =
     Extent { low: Vec3::new(-96.0, -60.0, -14.0), high: Vec3::new(96.0, 60.0, 190.0), step: 3.0 };
 
@@ -27,7 +27,7 @@ pub const DECIDUA: f32 = 4.0;
 /// peritoneum, the pelvis (lean adult).
 const LAYERS: [f32; 4] = [2.0, 11.0, 19.5, 22.0];
 
-/// How far the middle of the face indents the skin, and the gel left between them, mm.
+/// Depth to which the middle of the face indents the skin, and the gel left between them, mm.
 const PRESS: (f32, f32) = (9.0, 1.5);
 
 /// Distance to the skin, negative inside; the probe's curve of radius 50 mm is pressed in and fades
@@ -92,7 +92,7 @@ pub fn outer() -> Vec<Part> {
     ]
 }
 
-/// What grows into the sac, above the cord's end in priority.
+/// The part that grows into the sac, above the cord's end in priority.
 pub fn inner() -> Part {
     let p = &Point::world();
     part("placenta", "placenta", (2.5, 1.0), placenta(p))

@@ -1,4 +1,4 @@
-//! What was measured, and on what.
+//! Device, driver and commit of a measurement.
 
 use std::fmt;
 use std::process::Command;
@@ -6,17 +6,17 @@ use std::process::Command;
 use insonify::gpu::Device;
 use serde::Serialize;
 
-/// Where figures come from.
+/// Origin of a table's figures.
 #[derive(Serialize)]
 pub struct Provenance {
     pub device: String,
     pub driver: String,
-    /// Of this repository, with a mark where the tree differs from it.
+    /// Commit of this repository, with a mark where the tree differs from it.
     pub commit: String,
 }
 
 impl Provenance {
-    /// What is measured now, on `device`.
+    /// Returns the origin of a measurement made now, on `device`.
     pub fn of(device: &Device) -> Self {
         Self {
             device: device.name().to_owned(),
@@ -33,7 +33,7 @@ impl fmt::Display for Provenance {
     }
 }
 
-/// The commit that this was built in, as git tells it.
+/// Returns the commit that this was built in, as git gives it.
 fn commit() -> String {
     let git = |arguments: &[&str]| {
         let output =

@@ -7,7 +7,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use insonify::gpu::{Device, Kernel};
-use insonify::npy;
+use insonify::output::npy;
 use insonify::sim::shaders::Library;
 
 use super::{Case, Check, Element, Job, Role, SUBJECTS, Size, Subject, run};

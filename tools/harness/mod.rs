@@ -38,7 +38,7 @@ mod worlds;
 use bytemuck::Pod;
 
 pub use check::Check;
-pub use insonify::npy::Element;
+pub use insonify::output::npy::Element;
 use insonify::sim::pass::{self, Pass};
 use insonify::sim::rounds::Round;
 use insonify::sim::shaders::Library;

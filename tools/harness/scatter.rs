@@ -8,6 +8,9 @@ use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
 
+/// Samples beyond the first window of one case; no multiple of a bin or a slot.
+const BEYOND: u32 = 211;
+
 /// The kernel for worlds in which tissue deforms.
 pub const DEFORMING: Subject = Subject { name: "scatter_deforming", job, ..RIGID };
 
@@ -73,7 +76,15 @@ fn scene(case: Case, size: Size) -> Job {
         Case::NotFinite => Case::Random,
         case => case,
     };
-    Job { inputs: trace::scene(case, size), push: Vec::new() }
+    let mut job = Job { inputs: trace::scene(case, size), push: Vec::new() };
+    if case == Case::Modes {
+        // As many samples that the work groups of a second window have some.
+        let mut frame: Frame = job.one("frame");
+        frame.samples = layout::SCATTER_WINDOW + BEYOND;
+        frame.sample_pitch = frame.depth / frame.samples as f32;
+        job.inputs[0] = Input::words("frame", &[frame]);
+    }
+    job
 }
 
 /// The same world with no displacement fields.
@@ -155,9 +166,18 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         if frame.flags & FLAG_VOXEL == 0 { (2e-3_f64.powi(2) + at_an_end).sqrt() } else { 3e-2 };
     let fixed: Vec<f64> = twin.fixed.iter().map(|&x| x as f64).collect();
     let counters: Counters = job.after(outputs, "counters")[0];
+    let beyond = |echoes: &[f64]| {
+        let lines = echoes.chunks(2 * frame.samples.max(1) as usize);
+        let late = lines.flat_map(|line| line.iter().skip(2 * layout::SCATTER_WINDOW as usize));
+        late.copied().collect::<Vec<f64>>()
+    };
+    let [late, late_fixed] = [&echoes, &fixed].map(|echoes| beyond(echoes));
+    let heard = late_fixed.is_empty() || late_fixed.iter().any(|&echo| echo != 0.0);
     let echoed = twin.deposits.iter().any(|&n| n > 0) as u32;
     vec![
         Check::one("echo norm", relative_norm(&echoes, &fixed), allowed),
+        Check::one("beyond a window, norm", relative_norm(&late, &late_fixed), allowed),
+        Check::equal("anything beyond it", &[heard], &[true]),
         Check::equal("saturated", &[counters.saturated], &[twin.saturated]),
         Check::equal("echoes at all", &[u32::from(echoes.iter().any(|&e| e != 0.0))], &[echoed]),
     ]

@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::plot::{Curve, Plot};
+use insonify::output::plot::{Curve, Plot};
 use insonify::scene::{Graph, Keyframes, Mesh, Scene, Strategy, shapes};
 use insonify::settings::Words;
 use insonify::sim::Tracer;
@@ -69,7 +69,7 @@ fn limb(subdivisions: u32, distance: f64, strategy: Strategy) -> Result<Scene> {
     Ok(scene)
 }
 
-/// The limb at the k-th corner of a box of this size, 60 mm deep, turned by as many right angles' halves.
+/// The limb at the k-th corner of a box of this size, 60 mm deep, turned by up to 0.4 k rad.
 fn placed(rest: &Mesh, k: usize, distance: f64) -> Mesh {
     let corner = DVec3::from_array([0, 1, 2].map(|bit| f64::from(k as u32 >> bit & 1) - 0.5));
     let turn = DQuat::from_rotation_y(0.4 * k as f64 * (distance / 60.0).min(1.0));
@@ -86,7 +86,7 @@ fn placed(rest: &Mesh, k: usize, distance: f64) -> Mesh {
     }
 }
 
-/// Of one keyframe of the limb.
+/// Returns the number of triangles of one keyframe of the limb.
 fn triangles(scene: &Scene) -> usize {
     scene.meshes.last().expect("the limb").triangles.len()
 }
@@ -162,7 +162,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
     write_json(&machine.output, "crossover", &all)
 }
 
-/// What a change of keyframes costs by its triangles, 20 mm apart.
+/// Measures the cost of a change of keyframe by its triangles, 20 mm apart.
 fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Value> {
     let strategies = strategies(tracer);
     let mut table = Table::new(
@@ -212,7 +212,7 @@ fn swap(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Valu
     Ok(Value::Array(rows))
 }
 
-/// Where rebuilding begins to pay: a whole frame's structures and trace by distance.
+/// Measures from which distance rebuilding pays: a whole frame's structures and trace.
 fn sweep(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Value> {
     let lasting = match tracer {
         Tracer::Bvh => Strategy::Selector,
@@ -282,7 +282,7 @@ fn sweep(machine: &Machine, tracer: Tracer, arguments: &Arguments) -> Result<Val
     Ok(Value::Array(rows))
 }
 
-/// Says from which distance on a rebuild is cheaper than what keeps all keyframes.
+/// Prints the distance from which a rebuild is cheaper than the strategy that keeps all keyframes.
 fn crossing(rows: &[Value], triangles: usize, lasting: &str) {
     let of = |row: &&Value| row["triangles"] == triangles;
     let cheaper = |row: &&Value| row["rebuild"].as_f64() < row[lasting].as_f64();

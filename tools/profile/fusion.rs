@@ -1,5 +1,5 @@
 //! Table I of the paper: the whole scene simulated, against its fusion with an acquired volume, of
-//! which only what the mask encloses is simulated.
+//! which only the part inside the mask is simulated.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::Machine;
 use crate::measure::{Rig, Statistics};
 use crate::table::{Table, ms};
 
-/// The paper's imaging parameters; only it says nothing of the probe's place.
+/// The paper's imaging parameters; it does not give the pose of the probe.
 const PROBE: [(&str, &str); 6] = [
     ("probe.preset", "paper-table1"),
     ("probe.frequency", "7 MHz"),
@@ -27,14 +27,14 @@ fn parts() -> Vec<&'static str> {
     [vec!["update"], stages::names()].concat()
 }
 
-/// The same scene in two ways.
+/// The same scene wholly simulated, and fused.
 pub struct Scenes {
     simulated: Scene,
     pub fused: Scene,
 }
 
 impl Scenes {
-    /// The scene in `file`, which shows an acquired volume, imaged by the paper's probe from where its own is.
+    /// Loads the scene in `file`, which shows an acquired volume, with the paper's probe in the pose of its own.
     pub fn load(file: &Path, overrides: &[(String, String)]) -> Result<Self> {
         let probe = PROBE.map(|(key, value)| (key.to_owned(), value.to_owned()));
         let (fused, _) = Scene::load(file, &[&probe[..], overrides].concat())?;
@@ -52,7 +52,7 @@ impl Scenes {
     }
 }
 
-/// One way to make the image.
+/// One scene under measurement: simulated or fused.
 struct Way {
     rig: Rig,
     stages: Vec<Vec<f64>>,
@@ -100,12 +100,12 @@ pub struct Measured {
     pub details: Value,
 }
 
-/// Measures both in turns and prints what each stage costs.
+/// Measures both scenes in turns and prints the time of each stage.
 pub fn run(machine: &Machine, scenes: &Scenes, tracer: Tracer, frames: u32) -> Result<Measured> {
     let mut ways =
         [Way::new(machine, &scenes.simulated, tracer)?, Way::new(machine, &scenes.fused, tracer)?];
     for round in 0..frames {
-        // Now the one first, now the other.
+        // Each of the two is first in every second round.
         let first = usize::from(round % 2 == 1);
         ways[first].measure()?;
         ways[1 - first].measure()?;
@@ -158,7 +158,7 @@ pub fn run(machine: &Machine, scenes: &Scenes, tracer: Tracer, frames: u32) -> R
     })
 }
 
-/// Where the saving comes from, in what is not done.
+/// Explains the saving by the work that is not done.
 fn explain(counters: &[Counters; 2], [simulated, fused]: [f64; 2]) {
     let of = |count: fn(&Counters) -> u32| {
         let [all, kept] = [&counters[0], &counters[1]].map(|c| f64::from(count(c)));

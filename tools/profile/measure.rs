@@ -1,4 +1,4 @@
-//! One frame at a time, and what many of them come to.
+//! The times of one frame, and their statistics over many.
 
 use insonify::gpu::FrameTimings;
 use insonify::scene::Scene;
@@ -12,12 +12,12 @@ use insonify::sim::Tracer;
 /// Milliseconds of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
-    /// Making the scene what it is: uploads, builds, refits; on the device and before it on the
+    /// Update of the scene: uploads, builds, refits; on the device and before it on the
     /// processor.
     pub structures: f64,
-    /// Following the paths, and finding what encloses their starts.
+    /// Tracing of the paths, with the search for what encloses their starts.
     pub trace: f64,
-    /// All of the above and the rest of the frame.
+    /// The whole frame, both of the above included.
     pub frame: f64,
 }
 
@@ -34,12 +34,12 @@ impl Rig {
         Ok(Self::of(simulator.into_diagnostic()?, scene))
     }
 
-    /// With a simulator made for `scene`.
+    /// Makes a rig with a simulator made for `scene`.
     pub fn of(simulator: Simulator, scene: Scene) -> Self {
         Self { simulator, scene, index: 0 }
     }
 
-    /// Images the scene as it stands, alone on the device: its passes, and what the processor did, ms.
+    /// Images the scene as it stands, alone on the device: times of its passes and of the processor, ms.
     pub fn timings(&mut self) -> Result<(FrameTimings, f64)> {
         self.index += 1;
         let (simulator, scene) = (&mut self.simulator, &self.scene);

@@ -1,5 +1,5 @@
-//! `profile paper`: the paper's tables again. Starkov et al. 2019 measured on a GeForce GTX 970 with
-//! scenes of their own; what compares is the ratio within a table.
+//! `profile paper`: the paper's tables measured again. Starkov et al. 2019 used a GeForce GTX 970 and
+//! scenes of their own; only the ratios within a table can be compared.
 
 use std::path::{Path, PathBuf};
 
@@ -48,10 +48,10 @@ pub struct Arguments {
     json: Option<PathBuf>,
 }
 
-/// What `--quick` images with.
+/// The probe's settings with `--quick`.
 const QUICK: [(&str, &str); 2] = [("probe.scanlines", "96"), ("probe.elevation_layers", "3")];
 
-/// How much is measured.
+/// Number of frames, poses and rounds to measure.
 struct Plan {
     frames: u32,
     poses: u32,
@@ -86,16 +86,16 @@ enum Which {
     Three,
 }
 
-/// Two ways to image the same things, ms per frame.
+/// Mean times of two methods that image the same things, ms per frame.
 struct Pair {
     first: f64,
     second: f64,
-    /// Deviations over the keyframes, where there are some.
+    /// Deviations over the keyframes, if there are any.
     deviations: Option<[f64; 2]>,
     triangles: usize,
 }
 
-/// Two ways, what they are called in JSON, and what the paper says: thousand triangles, ms, and their deviations.
+/// Two methods, their names in JSON, and the paper's figures: thousand triangles, ms, and their deviations.
 struct Entry {
     number: &'static str,
     what: String,
@@ -192,7 +192,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
         }));
     }
     if let Some(file) = &arguments.json {
-        // Of the tracer that a frame takes unless told otherwise: the last.
+        // The tables of the tracer that a frame uses by default: the last.
         let tables = all.last().map_or(Value::Null, |one| one["tables"].clone());
         let text = serde_json::to_string_pretty(&json!({ "tables": tables })).into_diagnostic()?;
         std::fs::write(file, text + "\n")
@@ -251,7 +251,7 @@ fn report(machine: &Machine, tracer: Tracer, entries: &[Entry]) -> Result<()> {
     table.csv(&machine.output, &format!("paper-{tracer}"))
 }
 
-/// Both times, by how much the second is longer, and the frames per second that both are.
+/// Both times, the surplus of the second, and the frames per second of both.
 fn figures(times: [f64; 2], deviations: Option<[f64; 2]>) -> [String; 4] {
     let shown = |i: usize| match deviations.map(|d| d[i]).filter(|d| d.is_finite()) {
         Some(deviation) => format!("{} ± {}", ms(times[i]), ms(deviation)),
@@ -320,7 +320,7 @@ fn keyframed(
     for round in 0..plan.rounds as usize {
         for (k, found) in found.iter_mut().enumerate() {
             let seconds = (k as f64 + 0.5) * step;
-            // Another first each time.
+            // Each time another one is first.
             for way in (0..3).map(|i| (i + round + k) % 3) {
                 // After a frame of its own, which has its data at hand: of the keyframe before, or of the same where
                 // nothing moves.

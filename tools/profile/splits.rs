@@ -17,7 +17,7 @@ use crate::measure::{Rig, Statistics};
 use crate::strategies::{by, period};
 use crate::table::{Table, ms, write_json};
 
-/// How trees come about.
+/// Time and manner in which trees are built.
 #[derive(Clone, Copy, PartialEq)]
 enum Builder {
     /// Before the first frame.

@@ -1,4 +1,4 @@
-//! `profile stages`: what each stage of a frame takes, beside the bytes that it has to move and the
+//! `profile stages`: the time of each stage of a frame, beside the bytes that it has to move and the
 //! operations that it has to do, by scene and number of paths.
 
 use std::path::PathBuf;
@@ -34,7 +34,7 @@ pub struct Arguments {
     name: String,
 }
 
-/// What a frame of one scene took, ms.
+/// Times of a frame of one scene, ms.
 struct Measured {
     /// By stage, in the order of the frame.
     stages: Vec<(String, Statistics)>,
@@ -129,7 +129,7 @@ fn measure(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<Meas
         simulator.pixels().into_diagnostic()?;
         let elapsed = began.elapsed().as_secs_f64() * 1e3;
         let finished = simulator.wait().into_diagnostic()?;
-        // For the first frame the driver may have compiled.
+        // The first frame may include the driver's compilation.
         if index == 0 {
             continue;
         }
@@ -159,9 +159,9 @@ fn measure(simulator: &mut Simulator, scene: &Scene, frames: u32) -> Result<Meas
     })
 }
 
-/// What the work of a frame follows from.
+/// Sizes that determine the work of a frame.
 struct Sizes {
-    /// Scanlines with their layers.
+    /// Number of lines: scanlines times layers.
     lines: f64,
     /// Samples of one of them, and of all scanlines.
     per_line: f64,
@@ -198,9 +198,9 @@ struct Work {
     operations: f64,
 }
 
-/// Counted by hand from the kernels, to be compared with what the device can do; none for stages whose
-/// work depends on the way through a tree. An operation is an addition, a multiplication or a
-/// comparison; a logarithm, exponential, cosine or root counts as ten.
+/// Returns the work of a stage, counted by hand from the kernels, to be compared with the device's limits;
+/// none for stages whose work depends on the path through a tree. An operation is an addition, a
+/// multiplication or a comparison; a logarithm, exponential, cosine or root counts as ten.
 fn work(stage: &str, sizes: &Sizes, counters: &Counters) -> Option<Work> {
     let Sizes { lines, per_line, samples, pixels, taps: [lateral, axial] } = *sizes;
     let (bytes, operations) = match stage {

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use insonify::plot::{Curve, Plot};
+use insonify::output::plot::{Curve, Plot};
 use insonify::scene::graph::NodeKind;
 use insonify::scene::{Scene, Strategy};
 use insonify::settings::Words;
@@ -40,7 +40,7 @@ pub fn possible(scene: &Scene, tracer: Tracer) -> Vec<Strategy> {
     Strategy::ALL.iter().copied().filter(can).collect()
 }
 
-/// The scene with all its keyframes going by `strategy`.
+/// Returns the scene with all its keyframes shown by `strategy`.
 pub fn by(scene: &Scene, strategy: Strategy) -> Scene {
     let mut scene = scene.clone();
     for instance in &mut scene.instances {
@@ -180,7 +180,7 @@ fn report(
     Ok(json!({ "tracer": tracer.to_string(), "strategies": rows }))
 }
 
-/// False intersections of the union and of the box, and nodes visited, per ray: over eight frames.
+/// Returns false intersections of the union and of the box, and nodes visited, per ray: over eight frames.
 fn count(machine: &Machine, run: &mut Run, period: f64) -> Result<[f64; 3]> {
     run.rig.simulator.count(&machine.library, true).into_diagnostic()?;
     let mut sums = [0.0; 4];

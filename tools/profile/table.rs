@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use insonify::output;
-use insonify::plot::{Plot, svg};
+use insonify::output::plot::{Plot, svg};
 use miette::{Context, IntoDiagnostic, Result};
 use serde_json::Value;
 
-/// Rows under headings that carry their units.
+/// Rows under headings that include their units.
 pub struct Table {
     pub title: String,
     pub headings: Vec<&'static str>,
@@ -55,7 +55,7 @@ impl Table {
     }
 }
 
-/// Milliseconds with three digits that mean something.
+/// Milliseconds with three significant digits.
 pub fn ms(value: f64) -> String {
     match value.abs() {
         v if v >= 100.0 => format!("{value:.0}"),

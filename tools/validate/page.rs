@@ -6,7 +6,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 
 use crate::check::{Check, Examined, Figure, Picture};
-use insonify::plot::{escape, svg};
+use insonify::output::plot::{escape, svg};
 
 /// Rows of the validation table.
 pub const ROWS: u32 = 35;
@@ -21,8 +21,8 @@ td.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}\
 figcaption{font-size:.9em;color:#444}img{max-width:560px;max-height:480px;border:1px solid #ccc}\
 svg{max-width:100%;height:auto}p{max-width:52em}";
 
-/// The page. `origin` says by name where the figures come from; `rows` are those of every check there
-/// is, whether among `examined` or not.
+/// Returns the page. `origin` gives by name the origin of the figures; `rows` are those of every existing
+/// check, whether it is among `examined` or not.
 pub fn page(origin: &[(&str, &str)], rows: &[&str], examined: &[(Check, Examined)]) -> String {
     let mut out = String::new();
     let failing = examined.iter().filter(|(_, e)| !e.holds()).count();
@@ -41,7 +41,7 @@ pub fn page(origin: &[(&str, &str)], rows: &[&str], examined: &[(Check, Examined
          <h1>insonify: the picture obeys acoustics</h1>\n\
          <p>Every figure below is measured in a picture or a path that the simulator computed and held \
          against a closed form. The same comparisons are the project's tests. Each is also made with an error \
-         planted and has to notice it. <b>twins</b> are implementations in double precision on the \
+         planted, which every figure has to notice, but for those beside which another error is named. <b>twins</b> are implementations in double precision on the \
          CPU; <b>bvh</b> and <b>query</b> (<b>ray-query</b>) are the device with the compute tracer and with hardware ray queries.</p>\n\
          <table>{origin}<tr><th>Verdict</th><td class='{}'>{verdict}</td></tr></table>\n",
         if failing == 0 { "yes" } else { "no" },
@@ -55,7 +55,7 @@ pub fn page(origin: &[(&str, &str)], rows: &[&str], examined: &[(Check, Examined
     out
 }
 
-/// States which rows of the table have no check, and which have one that was not asked for.
+/// Writes which rows of the table have no check, and which have one that was not requested.
 fn missing(out: &mut String, rows: &[&str], examined: &[(Check, Examined)]) {
     let all = || (1..=ROWS).map(|n| format!("T{n}"));
     let list = |rows: Vec<String>| rows.join(", ");
@@ -151,10 +151,13 @@ fn section(out: &mut String, check: &Check, found: &Examined) {
         "</div>\n<table><tr><th>Figure</th><th>Measured</th><th>Expected</th><th>Tolerance</th><th>Verdict</th></tr>\n",
     );
     for f in &found.right.figures {
+        let other = f.other.map(|(error, value)| format!(" (not {}: {error})", number(value)));
+        let other = other.unwrap_or_default();
         let _ = writeln!(
             out,
-            "<tr><td>{}</td><td class='n'>{}</td><td class='n'>{}</td><td class='n'>{}</td>{}</tr>",
+            "<tr><td>{}{}</td><td class='n'>{}</td><td class='n'>{}</td><td class='n'>{}</td>{}</tr>",
             escape(&f.what),
+            escape(&other),
             number(f.measured),
             number(f.expected),
             number(f.tolerance),
@@ -167,7 +170,7 @@ fn section(out: &mut String, check: &Check, found: &Examined) {
     }
 }
 
-/// Five digits.
+/// Formats a number with five digits.
 fn number(v: f64) -> String {
     let size = v.abs();
     if v == 0.0 || !v.is_finite() {
@@ -193,7 +196,7 @@ fn png(picture: &Picture) -> Vec<u8> {
     bytes
 }
 
-/// RFC 4648.
+/// Encodes bytes in base64 (RFC 4648).
 fn base64(bytes: &[u8]) -> String {
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
     let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
@@ -228,7 +231,7 @@ mod tests {
         Check { row: "T5", name, claim: "Two millimetres.", planted: "Three.", run }
     }
 
-    /// What is right, what is wrong, and what would not notice: the page says of each what its test says.
+    /// A right check, a wrong one, and one that would not notice: the page's verdict is the test's for each.
     #[test]
     fn verdicts_of_the_page_are_those_of_the_tests() {
         let checks = [

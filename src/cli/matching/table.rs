@@ -1,8 +1,8 @@
-//! What matching found, as text.
+//! The result of matching as text.
 
+use insonify::matching::{Matching, Stage, Statistics, Width, depths};
 use insonify::output;
 use insonify::probe::Probe;
-use insonify::sim::matching::{Matching, Stage, Statistics, Width, depths};
 
 /// Prints brightness by depth, spread and size: the acquired volume, the simulation before and after.
 pub fn print(probe: &Probe, made: &Matching) {

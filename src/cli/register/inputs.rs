@@ -1,4 +1,4 @@
-//! What a registration reads: the model's surface, and what is known of the volume.
+//! Inputs of a registration: the model's surface, and points of the volume.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ use miette::{Report, Result, miette};
 
 use super::Register;
 
-/// Points of the surface in the volume, LPS in mm; none where landmarks are all there is.
+/// Points of the surface in the volume, LPS in mm; none where there are only landmarks.
 pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     if let Some(file) = &args.points {
         let points = points::load(file, args.frame())?;
@@ -29,7 +29,7 @@ pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     Ok(Some(samples(&triangles, args.samples as usize)))
 }
 
-/// The landmarks, those of the volume in the world as it lies now.
+/// The landmarks; those of the volume in the world at its present place.
 pub fn landmarks(
     args: &Register,
     world_from_lps: &DAffine3,
@@ -54,7 +54,7 @@ pub fn landmarks(
     Ok(out)
 }
 
-/// What is worth saying of points, LPS, of which most lie outside the volume.
+/// A warning about points, LPS, if most of them lie outside the volume.
 pub fn outside(points: &[DVec3], volume: &Acquired) -> Option<String> {
     let voxel_from_lps = volume.world_from_voxel.inverse() * volume.world_from_lps;
     let most = DVec3::from(volume.size.map(|n| n as f64)) - 0.5;
@@ -74,7 +74,7 @@ pub fn outside(points: &[DVec3], volume: &Acquired) -> Option<String> {
     Some(format!("only {:.0} % of the points lie in the volume; {hint}", 100.0 * here))
 }
 
-/// The model's surface in the world, as the scene stands.
+/// The model's surface in the world, in the scene's present state.
 pub fn surface(args: &Register, scene: &Scene) -> Result<Surface> {
     let still = scene.still();
     let mut triangles = Vec::new();
@@ -98,7 +98,7 @@ pub fn surface(args: &Register, scene: &Scene) -> Result<Surface> {
     Ok(Surface::new(&triangles)?)
 }
 
-/// The node called `name`, which carries all of the surface.
+/// The node called `name`, which carries the whole surface.
 pub fn carrier(args: &Register, scene: &Scene, name: &str) -> Result<Placed> {
     let node = scene.placed(name, args.time).ok_or_else(|| {
         let meshes = scene.origins.instances.iter().map(|o| o.mesh.as_str());
@@ -127,7 +127,7 @@ pub fn carrier(args: &Register, scene: &Scene, name: &str) -> Result<Placed> {
     }
 }
 
-/// What the surface comes from, for a note: names of meshes, and of files without their folders.
+/// The sources of the surface, for a note: names of meshes, and of files without their folders.
 pub fn names(args: &Register) -> Vec<String> {
     let file = |path: &PathBuf| {
         let name = path.file_name().unwrap_or_default();
@@ -141,14 +141,14 @@ pub fn names(args: &Register) -> Vec<String> {
     model.chain(volume.into_iter().flatten().map(file)).collect()
 }
 
-/// The instances of the `[[mesh]]` called `name`, or of that name themselves.
+/// The instances of the `[[mesh]]` called `name`, or those of that name themselves.
 fn instances(scene: &Scene, name: &str) -> Vec<usize> {
     let origins = scene.origins.instances.iter().zip(&scene.instances).enumerate();
     let of = origins.filter(|(_, (origin, instance))| origin.mesh == name || instance.name == name);
     of.map(|(i, _)| i).collect()
 }
 
-/// `name` as a mesh file, since no mesh of the scene is called so.
+/// `name` as a mesh file, since no mesh of the scene has this name.
 fn file(scene: &Scene, name: &str) -> Result<PathBuf> {
     let path = PathBuf::from(name);
     match mesh::is_mesh(&path) {

@@ -1,4 +1,4 @@
-//! What a registration comes to, in words, in a comment and as JSON.
+//! The result of a registration as text, as a comment and as JSON.
 
 use insonify::output;
 use insonify::register::landmarks::{rms, worst};
@@ -7,12 +7,12 @@ use serde_json::{Value, json};
 
 use super::Registered;
 
-/// Share of the surface's size from which on what is left counts as no fit.
+/// Share of the surface's size from which on the remaining distance counts as no fit.
 const APART: f64 = 0.03;
-/// Share of trimmed points that is worth a word.
+/// Share of trimmed points from which on it is mentioned.
 const TRIMMED: f64 = 0.4;
 
-/// Prints how landmarks and surface fit, and how far things have moved.
+/// Prints the fit of landmarks and surface, and the size of the movement.
 pub fn print(made: &Registered) {
     if let Some((landmark, off)) = worst(&made.start, &made.landmarks) {
         let after = match made.fit {
@@ -53,14 +53,14 @@ fn distances(fit: &Fit) -> String {
     )
 }
 
-/// Says the warnings on standard error.
+/// Prints the warnings on standard error.
 pub fn warn(warnings: &[String]) {
     for warning in warnings {
         eprintln!("warning: {warning}");
     }
 }
 
-/// What the result says against itself.
+/// Doubts about the result.
 pub fn doubts(made: &Registered) -> Vec<String> {
     let Some(fit) = &made.fit else {
         return Vec::new();
@@ -85,7 +85,7 @@ pub fn doubts(made: &Registered) -> Vec<String> {
     out
 }
 
-/// That points and surface, which is `size` mm large, are not of one structure.
+/// A warning that points and surface, which is `size` mm large, do not belong to one structure.
 pub fn apart(fit: &Fit, size: f64) -> Option<String> {
     let off = fit.residuals.rms;
     (off > APART * size).then(|| {

@@ -1,12 +1,12 @@
-//! `insonify study answers`: tables of what was answered.
+//! `insonify study answers`: tables of the answers.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use insonify::output::{self, files};
 use insonify::study::answers::read_all;
 use insonify::study::key::Key;
 use insonify::study::results::{Results, csv, markdown, plain, ratings};
-use insonify::{files, output};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
 /// Arguments of `insonify study answers`.

@@ -1,4 +1,4 @@
-//! The cases of a study: what is shown in each, and under which number.
+//! The cases of a study: their images and numbers.
 
 use insonify::scene::file::Plan;
 use insonify::scene::vary::Variant;
@@ -9,7 +9,7 @@ use miette::Result;
 
 use super::super::order::order;
 
-/// A scenario's scene, as it is loaded, with its variants.
+/// A scenario's loaded scene with its variants.
 pub struct Loaded {
     pub scene: Scene,
     pub variants: Vec<Variant>,
@@ -20,11 +20,11 @@ pub struct Case {
     pub scenario: usize,
     pub slice: usize,
     pub background: Surroundings,
-    /// What each image is, in the order shown: 0 the scene as it is, then its variants from 1.
+    /// Image at each place of the order: 0 the scene itself, then its variants from 1.
     pub images: Vec<usize>,
 }
 
-/// All cases in the order that `seed` draws, and in each the images in an order of its own.
+/// All cases in the order drawn by `seed`, each with its images in an order of its own.
 pub fn cases(plan: &Plan, loaded: &[Loaded], seed: u32) -> Vec<Case> {
     let mut all = Vec::new();
     for (scenario, found) in plan.scenarios.iter().enumerate() {
@@ -45,8 +45,8 @@ pub fn cases(plan: &Plan, loaded: &[Loaded], seed: u32) -> Vec<Case> {
 }
 
 impl Case {
-    /// The scene as this case shows it, but for the variants; and the entries of a scene file, path and
-    /// value without blanks, that say so.
+    /// The scene of this case, without variants; and the equivalent entries of a scene file, path and value
+    /// without blanks.
     pub fn scene(&self, plan: &Plan, loaded: &Loaded) -> (Scene, Vec<(String, String)>) {
         let mut scene = loaded.scene.clone();
         let slice = &plan.scenarios[self.scenario].slices[self.slice];

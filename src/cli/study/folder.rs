@@ -1,8 +1,8 @@
-//! The folder of a study: what was begun in it, and the images that are there already.
+//! The folder of a study: its settings, and the images made so far.
 
 use std::path::{Path, PathBuf};
 
-use insonify::files;
+use insonify::output::files;
 use insonify::scene::file::Plan;
 use insonify::study::key::crc32;
 use miette::{Context, IntoDiagnostic, Result, miette};
@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::super::common::Common;
 
-/// Where everything of a study lies. Only [`Folder::form`] is handed to assessors.
+/// Place of all files of a study. Only [`Folder::form`] is handed to assessors.
 pub struct Folder {
     root: PathBuf,
     /// Digits of the numbers of cases and of images.
@@ -18,17 +18,17 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// A folder for so many cases of at most so many images.
+    /// A folder for `cases` cases of at most `images` images.
     pub fn new(root: &Path, cases: usize, images: usize) -> Self {
         Self { root: root.to_owned(), digits: [cases, images].map(|n| n.to_string().len().max(2)) }
     }
 
-    /// What is handed to assessors, with the images one by one.
+    /// The folder for assessors, with the images one by one.
     pub fn form(&self) -> PathBuf {
         self.root.join("form")
     }
 
-    /// Says what each image is.
+    /// The file that identifies each image.
     pub fn key(&self) -> PathBuf {
         self.root.join("key.csv")
     }
@@ -37,13 +37,13 @@ impl Folder {
         self.root.join("settings.json")
     }
 
-    /// File of an image, within [`Folder::form`], slashes between: `cases/03/17.png`.
+    /// Path of an image within [`Folder::form`], with slashes: `cases/03/17.png`.
     pub fn image(&self, case: usize, image: usize) -> String {
         let [cases, images] = self.digits;
         format!("cases/{case:0cases$}/{image:0images$}.png")
     }
 
-    /// The bytes of an image that is there.
+    /// The bytes of an image; none where it is not there.
     pub fn made(&self, case: usize, image: usize) -> Result<Option<Vec<u8>>> {
         let path = self.form().join(self.image(case, image));
         match std::fs::read(&path) {
@@ -55,13 +55,13 @@ impl Folder {
         }
     }
 
-    /// Makes the folder and notes `settings` in it; or, to resume, holds them against those that it was
-    /// begun with and removes what a killed run was writing.
+    /// Makes the folder and notes `settings` in it; or, to resume, compares them with those of its beginning and
+    /// removes unfinished files of a killed run.
     pub fn begin(&self, settings: &Value, resume: bool) -> Result<()> {
         let root = self.root.display();
         let fail = |cause: String, remedy: &str| Err(miette!(help = remedy, "{cause}"));
         let before = std::fs::read_to_string(self.settings()).ok();
-        // A run that was killed at once leaves the settings half written.
+        // A run that was killed at once leaves half-written settings.
         let is_ours = |name: &str| name.starts_with(".settings.json.");
         let is_empty = std::fs::read_dir(&self.root).map_or(true, |all| {
             let mut names = all.flatten().map(|entry| entry.file_name());
@@ -101,7 +101,7 @@ impl Folder {
         self.write(&self.settings(), text.as_bytes())
     }
 
-    /// Writes a file of the study, whole or not at all, and its folder where there is none.
+    /// Writes a file of the study as a whole or not at all, and makes its folder where there is none.
     pub fn write(&self, path: &Path, bytes: &[u8]) -> Result<()> {
         let folder = path.parent().expect("it lies in the study's folder");
         std::fs::create_dir_all(folder)
@@ -110,7 +110,7 @@ impl Folder {
             .wrap_err_with(|| format!("writing {}", path.display()))
     }
 
-    /// Files that were being written when a run was killed begin with a dot.
+    /// Removes files that were being written when a run was killed: they begin with a dot.
     fn remove_unfinished(&self) -> std::io::Result<()> {
         let cases = self.form().join("cases");
         let mut folders = vec![self.root.clone(), self.form()];
@@ -123,7 +123,7 @@ impl Folder {
             };
             for entry in all.flatten() {
                 let name = entry.file_name().to_string_lossy().into_owned();
-                // As `files::replace` calls them: .NAME. and the number of a process.
+                // The names that `files::replace` uses: .NAME. and the number of a process.
                 let number = name.rsplit('.').next().unwrap_or_default();
                 let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
                 let kinds = [".png.", ".json.", ".csv.", ".html."];
@@ -137,8 +137,8 @@ impl Folder {
     }
 }
 
-/// What decides on the images, but for the files that the scenes name: an image of each case is made
-/// again to see whether those are the same.
+/// All settings that determine the images, except the files that the scenes name: to check those, one image
+/// of each case is made again.
 pub fn settings(plan: &Plan, common: &Common, seed: u32, device: &str) -> Result<Value> {
     let mut scenes = Vec::new();
     for scenario in &plan.scenarios {
@@ -161,7 +161,7 @@ pub fn settings(plan: &Plan, common: &Common, seed: u32, device: &str) -> Result
     }))
 }
 
-/// Name of the first setting in which the two differ.
+/// Name of the first setting that differs between the two.
 fn difference<'a>(begun: &Value, now: &'a Value) -> Option<&'a str> {
     let now = now.as_object().expect("a table of settings");
     let other = now.iter().find(|(name, value)| begun.get(name) != Some(value));

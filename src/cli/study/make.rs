@@ -21,7 +21,7 @@ use super::super::vary::pictures::Studio;
 use super::cases::{Case, Loaded, cases, check_backgrounds};
 use super::folder::{Folder, settings};
 
-/// Larger forms are hard to mail and slow to open, bytes.
+/// Size of a form from which on it is hard to mail and slow to open, bytes.
 const LARGE: usize = 60 << 20;
 
 /// Arguments of `insonify study make`.
@@ -73,7 +73,7 @@ pub fn run(args: &Make) -> Result<()> {
     common.validated(&device)
 }
 
-/// Every scene, so that a mistake in the last one is found before the first image.
+/// Loads every scene, so that a mistake in the last one is found before the first image.
 fn load(plan: &Plan, common: &Common) -> Result<Vec<Loaded>> {
     let mut loaded = Vec::new();
     for (i, scenario) in plan.scenarios.iter().enumerate() {
@@ -87,7 +87,7 @@ fn load(plan: &Plan, common: &Common) -> Result<Vec<Loaded>> {
     Ok(loaded)
 }
 
-/// Makes the images that are not there yet.
+/// Makes the missing images.
 struct Maker<'a> {
     plan: &'a Plan,
     loaded: &'a [Loaded],
@@ -100,8 +100,8 @@ struct Maker<'a> {
 }
 
 impl Maker<'_> {
-    /// All cases of a scenario, from one simulator. In the order in which they are shown, as are the
-    /// images of each: the times of the files tell nothing.
+    /// Makes all cases of a scenario with one simulator, in the order in which they and their images are shown:
+    /// the times of the files then reveal nothing.
     fn scenario(&mut self, scenario: usize) -> Result<Vec<Row>> {
         let loaded = &self.loaded[scenario];
         let mut rows = Vec::new();
@@ -112,7 +112,7 @@ impl Maker<'_> {
             }
             let (scene, entries) = case.scene(self.plan, loaded);
             self.warn_of_masks(case, &scene);
-            // Whether an image of an earlier run has been made again.
+            // True once an image of an earlier run has been made again.
             let mut compared = false;
             for image in 1..=case.images.len() {
                 let mut row = case.row(self.plan, loaded, (number, image), &entries);
@@ -187,7 +187,7 @@ impl Maker<'_> {
     }
 }
 
-/// At most `height` rows, by means over as many pixels as become one.
+/// An image of at most `height` rows, by means over the pixels that become one.
 fn reduced(image: GrayImage, height: u32) -> GrayImage {
     if image.height() <= height {
         return image;
@@ -197,7 +197,7 @@ fn reduced(image: GrayImage, height: u32) -> GrayImage {
     imageops::resize(&image, width, height, imageops::FilterType::Triangle)
 }
 
-/// A PNG file with nothing in it but the pixels.
+/// A PNG file with only the pixels.
 fn png(image: &GrayImage) -> Result<Vec<u8>> {
     let mut out = Vec::new();
     let encoder =

@@ -1,4 +1,4 @@
-//! The images of a sheet, all from one simulator.
+//! The images of a contact sheet, all from one simulator.
 
 use image::{GrayImage, Luma};
 use insonify::scene::Scene;
@@ -9,9 +9,9 @@ use miette::{IntoDiagnostic, Result};
 
 use crate::cli::common::{self, Progress};
 
-/// One image and what it is of.
+/// One image and its description.
 pub struct Picture {
-    /// What was changed; `none` in the image of the scene as it is.
+    /// Changed parameter; `none` in the image of the scene itself.
     pub parameter: String,
     /// Its value.
     pub value: String,
@@ -21,17 +21,17 @@ pub struct Picture {
     pub unit: &'static str,
     /// The entries of the scene file, path and value, that make the scene show it.
     pub settings: Vec<(String, String)>,
-    /// What is written under it.
+    /// Caption under it.
     pub caption: String,
     /// Name of its file, without number and extension.
     pub stem: String,
     /// 8-bit grey; 0 beside the sector.
     pub image: GrayImage,
-    /// How bright the sector is.
+    /// Brightness of the sector.
     pub grey: Grey,
 }
 
-/// How bright a sector is.
+/// Brightness of a sector.
 pub struct Grey {
     /// Mean level, 0 to 255.
     pub mean: f64,
@@ -81,7 +81,7 @@ impl Frame {
     }
 }
 
-/// The scene's own values, line by line.
+/// The scene's own values as text, a row each.
 pub fn own_values(scene: &Scene) -> Vec<String> {
     let own = Parameter::suggested();
     let own = own.filter_map(|p| Some(format!("  {}", p.caption(p.value(scene)?))));
@@ -97,12 +97,12 @@ pub struct Studio {
 }
 
 impl Studio {
-    /// With a simulator of the scene.
+    /// A studio with a simulator of the scene.
     pub fn new(simulator: Simulator) -> Self {
         Self { simulator }
     }
 
-    /// The scene, then each of its variants with what `settle` changes of every scene.
+    /// The scene, then each of its variants; `settle` is applied to every scene.
     pub fn parameters(
         &mut self,
         scene: &Scene,
@@ -147,7 +147,7 @@ impl Studio {
         Ok(pictures)
     }
 
-    /// How a fused image comes about, as figures 10 and 12 of the paper show it.
+    /// The steps of a fused image, as in figures 10 and 12 of the paper.
     pub fn steps(&mut self, scene: &Scene) -> Result<Vec<Picture>> {
         let mut scene = scene.clone();
         let fusion = scene.fusion.as_mut().expect("a volume is shown by a fusion");
@@ -163,7 +163,7 @@ impl Studio {
         let fusion = scene.fusion.as_mut().expect("it is still there");
         (fusion.blur, fusion.blend) = (1, Blend::Linear);
         let sharp = self.shoot(&scene, "the sharp border")?;
-        // Levels 0..1 as the kernel that fuses rounds them.
+        // Levels 0..1, rounded as by the kernel that fuses.
         let levels = |plane: &[f32]| frame.image(plane.iter().map(|v| (v * 255.0 + 0.5) as u8));
         let simulated = frame.image(steps.simulated.iter().step_by(4).copied());
         let step = |value: &str, caption: String, (image, grey): (GrayImage, Grey)| Picture {
@@ -193,7 +193,7 @@ impl Studio {
         ])
     }
 
-    /// What may be shown around the mask, as figure 14 of the paper shows it.
+    /// The possible surroundings of the mask, as in figure 14 of the paper.
     pub fn surroundings(&mut self, scene: &Scene) -> Result<Vec<Picture>> {
         let own = fusion(scene).surroundings;
         let shown = |s: Surroundings| match s {
@@ -207,7 +207,7 @@ impl Studio {
         })
     }
 
-    /// The ways in which the two images meet.
+    /// The methods of blending the two images.
     pub fn blends(&mut self, scene: &Scene) -> Result<Vec<Picture>> {
         let own = fusion(scene).blend;
         let each: Vec<_> = Blend::ALL.iter().map(|b| (b.word(), b.word())).collect();
@@ -217,7 +217,7 @@ impl Studio {
         })
     }
 
-    /// One image per value of a choice in the table `fusion`: names in files and on the sheet.
+    /// One image per value of a choice in the table `fusion`: names in files and on the contact sheet.
     fn each(
         &mut self,
         key: &'static str,
@@ -249,12 +249,12 @@ impl Studio {
         Ok(pictures)
     }
 
-    /// One frame, 8-bit grey, 0 beside the sector; what it lost is told with `name`.
+    /// One frame, 8-bit grey, 0 beside the sector; reports its losses with `name`.
     pub fn image(&mut self, scene: &Scene, name: &str) -> Result<GrayImage> {
         Ok(self.shoot(scene, name)?.whole().0)
     }
 
-    /// Simulates one frame; what it lost is told with `name`.
+    /// Simulates one frame; reports its losses with `name`.
     fn shoot(&mut self, scene: &Scene, name: &str) -> Result<Frame> {
         self.simulator.frame(scene, 0).into_diagnostic()?;
         let (width, height, rgba) = self.simulator.pixels().into_diagnostic()?;

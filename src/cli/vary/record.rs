@@ -1,4 +1,4 @@
-//! The table of a sheet: which image is which, and how bright it is.
+//! The table of a contact sheet: identity and brightness of each image.
 
 use std::path::Path;
 
@@ -10,9 +10,9 @@ use super::pictures::Picture;
 /// One row. Columns are named as the fields.
 #[derive(Debug, Serialize)]
 pub struct Record {
-    /// Number on the sheet, from 1.
+    /// Number on the contact sheet, from 1.
     pub image: usize,
-    /// What was changed; `none` in the image of the scene as it is.
+    /// Changed parameter; `none` in the image of the scene itself.
     pub parameter: String,
     /// Its value here.
     pub value: String,
@@ -20,13 +20,13 @@ pub struct Record {
     pub own: String,
     /// Unit of both; empty for factors and names.
     pub unit: &'static str,
-    /// What `--set` makes of it, blanks between: `insonify render SCENE --set ...` is the same image.
+    /// Values for `--set`, blanks between: `insonify render SCENE --set ...` is the same image.
     pub set: String,
     /// The single image, beside the table; empty where none was written.
     pub file: String,
-    /// Left upper corner of the image on the sheet, px.
+    /// Left upper corner of the image on the contact sheet, px.
     pub x: u32,
-    /// Left upper corner of the image on the sheet, px.
+    /// Left upper corner of the image on the contact sheet, px.
     pub y: u32,
     /// Size, px.
     pub width: u32,
@@ -43,7 +43,7 @@ pub struct Record {
 }
 
 impl Record {
-    /// Of one picture.
+    /// The row of one picture.
     pub fn new(image: usize, picture: &Picture, place: [u32; 2], file: Option<String>) -> Self {
         let grey = &picture.grey;
         let entries = picture.settings.iter();

@@ -10,7 +10,7 @@ use super::{FAR, MAX_POINTS, Point, agreed, far, frame_named, too_many, unknown_
 use crate::register::RegisterError;
 use crate::volume::Frame;
 
-/// The part of a markups file that says where points are (schema 1.0 of 3D Slicer).
+/// The part of a markups file with the points (schema 1.0 of 3D Slicer).
 #[derive(Deserialize)]
 struct Markups {
     markups: Vec<Markup>,
@@ -60,7 +60,7 @@ pub(super) fn read(
             ));
         }
         for point in markup.control_points {
-            // Others have been announced and not placed.
+            // The others have been announced but not placed.
             if point.position_status.as_deref().unwrap_or("defined") != "defined" {
                 continue;
             }

@@ -10,19 +10,19 @@ use crate::register::RegisterError;
 use crate::settings::suggest;
 use crate::volume::Frame;
 
-/// A row that has something in it.
+/// A row that is not empty.
 pub(super) struct Row {
     pub line: u64,
     pub cells: StringRecord,
 }
 
-/// A table of which the columns are known.
+/// A table with known columns.
 pub(super) struct Table<'p> {
     path: &'p Path,
     /// Lower case, without the unit.
     columns: Vec<String>,
     pub rows: Vec<Row>,
-    /// What its comments say.
+    /// Frame stated in its comments.
     pub frame: Frame,
 }
 
@@ -86,7 +86,7 @@ impl<'p> Table<'p> {
         names.iter().all(|n| self.column(n).is_some())
     }
 
-    /// That one of these columns is missing.
+    /// An error: one of these columns is missing.
     pub fn lacks(&self, wanted: &[&str]) -> RegisterError {
         let missing = wanted.iter().find(|n| self.column(n).is_none());
         let missing = missing.expect("one is missing");
@@ -100,7 +100,7 @@ impl<'p> Table<'p> {
         )
     }
 
-    /// The vector in these columns, which are there.
+    /// The vector in these columns, which must exist.
     pub fn vector(&self, row: &Row, names: &[String; 3]) -> Result<DVec3, RegisterError> {
         let mut out = DVec3::ZERO;
         for (axis, name) in names.iter().enumerate() {

@@ -1,37 +1,37 @@
-//! From the scene's time to the place in a period.
+//! The clock of a period: place in a period at the scene's time.
 
 use serde::Deserialize;
 
 use super::EDGE;
 
-/// What follows the end of a period.
+/// Behaviour after the end of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loop {
-    /// The same again.
+    /// The same period again.
     #[default]
     Repeat,
-    /// Nothing: the last state stays.
+    /// No change: the last state stays.
     Once,
-    /// The way back, then the same again: a cycle lasts two periods.
+    /// The period backwards, then forwards again: a cycle lasts two periods.
     PingPong,
 }
 
-/// Counts periods.
+/// A clock that counts periods.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     /// Length of a period, s.
     pub period: f64,
     /// Place in the period at time 0, periods.
     pub phase: f64,
-    /// What comes after.
+    /// Behaviour after the end of a period.
     pub mode: Loop,
     /// Updates per second, Hz; time stands still between them. None: always up to date.
     pub rate: Option<f64>,
 }
 
 impl Default for Clock {
-    /// A second, again and again.
+    /// A period of one second, repeated.
     fn default() -> Self {
         Self { period: 1.0, phase: 0.0, mode: Loop::Repeat, rate: None }
     }
@@ -100,7 +100,7 @@ mod tests {
         assert_eq!(held(0.99 / 30.0, rate), 0.0);
         assert_eq!(held(-0.01, rate), -1.0 / 30.0);
         for i in 0..10_000 {
-            // A tenth of a frame later shows the same.
+            // A tenth of a frame later the same is shown.
             let t = f64::from(i) / 30.0;
             let expected = f64::from(i) / 30.0;
             assert_eq!(held(t, rate), expected, "{i}");

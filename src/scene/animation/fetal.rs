@@ -1,4 +1,4 @@
-//! Movement as a fetus makes: bursts of small displacements and rotations between pauses.
+//! Fetal movement: bursts of small displacements and rotations between pauses.
 
 use std::ops::Range;
 
@@ -14,18 +14,18 @@ use super::motion::Turn;
 const STROKE: f64 = 1.0;
 
 /// Random movement without drift: a node goes from one random pose to the next in bursts, and rests
-/// in between. All poses lie within the amplitudes.
+/// between bursts. All poses lie within the amplitudes.
 ///
 /// Bursts come at irregular times, as general movements do (de Vries et al. 1985). Each consists of
 /// several movements, and each of these starts and ends at rest, with least jerk (Flash and Hogan
 /// 1985, "The coordination of arm movements", Journal of Neuroscience 5, 1688-1703), so that
 /// velocity and acceleration are continuous.
 ///
-/// Time is divided into slots of `pause` plus `duration`, with one burst somewhere in each. So any
-/// time is found at once, in any order, also before 0, and depends on the seed alone.
+/// Time is divided into slots of `pause` plus `duration`, with one burst somewhere in each. So the pose at
+/// any time, also before 0, is found at once, in any order, and depends on the seed alone.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fetal {
-    /// Decides all movements.
+    /// Seed that determines all movements.
     pub seed: u32,
     /// Largest shift along each axis, to either side, mm.
     pub translation: DVec3,
@@ -43,7 +43,7 @@ pub struct Fetal {
 type Pose = [f64; 4];
 
 impl Fetal {
-    /// Where the node at rest is moved to at `seconds`.
+    /// Placement of the node at `seconds`, relative to rest.
     pub fn at(&self, seconds: f64) -> DAffine3 {
         let [x, y, z, angle] = self.pose(held(seconds, self.rate));
         let shift = self.translation * DVec3::new(x, y, z);
@@ -86,7 +86,7 @@ impl Fetal {
         std::array::from_fn(|i| 2.0 * self.random(slot, movement + 1, i as u32) - 1.0)
     }
 
-    /// A number from 0 to 1 that depends on all that is given and the seed.
+    /// A number from 0 to 1 that depends on all arguments and the seed.
     fn random(&self, slot: i64, movement: u32, number: u32) -> f64 {
         let parts = [u64::from(self.seed), slot as u64, u64::from(movement), u64::from(number)];
         let bits = parts.into_iter().fold(0, |state, part| mix(state ^ part));
@@ -103,7 +103,7 @@ fn mix(state: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Share of the way after share `t` of the time, with least jerk between two rests.
+/// Share of the distance after share `t` of the time, with least jerk between two rests.
 fn least_jerk(t: f64) -> f64 {
     t * t * t * (10.0 + t * (6.0 * t - 15.0))
 }
@@ -177,7 +177,7 @@ mod tests {
             }
             last = now;
         }
-        // It does move: 1.875 times the way over the time at the fastest.
+        // It does move: at the fastest 1.875 times distance over time.
         assert!(fastest > 1.0, "{fastest}");
     }
 

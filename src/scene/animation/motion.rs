@@ -20,7 +20,7 @@ pub struct Turn {
 }
 
 impl Default for Turn {
-    /// None.
+    /// No rotation.
     fn default() -> Self {
         Self { centre: DVec3::ZERO, axis: DVec3::Z, angle: 0.0 }
     }
@@ -35,10 +35,10 @@ impl Turn {
     }
 }
 
-/// How a transform node moves; lengths and axes are those of the node at rest.
+/// Motion of a transform node; lengths and axes are those of the node at rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Motion {
-    /// Not at all.
+    /// No motion.
     #[default]
     Still,
     /// To and fro: shift and angle follow the sine of the phase, and factors are to its power.
@@ -52,22 +52,22 @@ pub enum Motion {
         /// Largest factors along the axes, about the centre of the rotation; where the sine is -1, it is 1 over them.
         scale: DVec3,
     },
-    /// About an axis at constant speed, and whatever lies off the axis on a circle around it.
+    /// Rotation at constant speed: points off the axis go on circles around it.
     Orbit {
-        /// The whole angle in one period.
+        /// Clock; a period is the whole angle.
         clock: Clock,
-        /// What is covered in a period.
+        /// Rotation in one period.
         turn: Turn,
     },
-    /// As a fetus moves.
+    /// Fetal movement.
     Fetal(Fetal),
-    /// Along samples.
+    /// A track of samples.
     Track {
         /// Its period is the time from the first sample to the last.
         clock: Clock,
         /// Time of the samples at the begin of the period, s.
         start: f64,
-        /// What has no samples.
+        /// Placement for quantities without samples.
         rest: Trs,
         /// The samples.
         track: Box<Track>,
@@ -75,7 +75,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// The placement that counts as rest: tissue is as squeezed as it is there where nothing squeezes it.
+    /// The placement at rest, at which nothing squeezes the tissue.
     pub fn rest(&self) -> DAffine3 {
         match self {
             Self::Track { rest, .. } => rest.matrix(),
@@ -85,7 +85,7 @@ impl Motion {
         }
     }
 
-    /// Whether what it moves changes its size or proportions.
+    /// Returns whether size or proportions of the moved tissue change.
     pub fn scales(&self) -> bool {
         match self {
             Self::Sine { scale, .. } => *scale != DVec3::ONE,
@@ -94,7 +94,7 @@ impl Motion {
         }
     }
 
-    /// Where the node at rest is moved to at `seconds`.
+    /// Placement of the node at `seconds`, relative to rest.
     pub fn at(&self, seconds: f64) -> DAffine3 {
         match self {
             Self::Still => DAffine3::IDENTITY,
@@ -113,7 +113,7 @@ impl Motion {
     }
 }
 
-/// Factors along the axes, about a point.
+/// A scaling by factors along the axes, about a point.
 fn scaled(factors: DVec3, centre: DVec3) -> DAffine3 {
     DAffine3 { matrix3: DMat3::from_diagonal(factors), translation: centre - factors * centre }
 }

@@ -1,11 +1,11 @@
-//! Which keyframe is shown when, and what lies between two.
+//! The sequence of keyframes over time, and the shapes between them.
 
 use serde::Deserialize;
 
 use super::EDGE;
 use super::clock::{Clock, Loop};
 
-/// Shapes between keyframes.
+/// Interpolation of shapes between keyframes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Interpolation {
@@ -83,8 +83,8 @@ impl Sequence {
         self.count
     }
 
-    /// Station `i`, which may lie before the first or behind the last one where these follow each
-    /// other: its instant and keyframe.
+    /// Instant and keyframe of station `i`, which may lie before the first or behind the last one where
+    /// these follow each other.
     fn station(&self, i: isize) -> Option<(f64, usize)> {
         let n = self.stations.len() as isize;
         let (time, keyframe) = self.stations[i.rem_euclid(n) as usize];
@@ -100,13 +100,13 @@ impl Sequence {
         passed as isize - 1
     }
 
-    /// The keyframe whose time it is at `seconds`.
+    /// The present keyframe at `seconds`.
     pub fn step(&self, seconds: f64) -> usize {
         let reached = self.reached(self.clock.position(seconds));
         self.station(reached).map_or(self.stations[0].1, |s| s.1)
     }
 
-    /// The shape at `seconds` between keyframes.
+    /// The blend of keyframes at `seconds`.
     pub fn blend(&self, seconds: f64) -> Blend {
         let position = self.clock.position(seconds);
         let reached = self.reached(position);
@@ -166,7 +166,7 @@ mod tests {
         times.iter().map(|&t| sequence.step(t)).collect()
     }
 
-    /// The blend of keyframes whose shapes are these numbers.
+    /// The value of a blend of keyframes whose shapes are these numbers.
     fn value(sequence: &Sequence, shapes: &[f64], t: f64) -> f64 {
         let blend = sequence.blend(t);
         let sum: f64 = blend.iter().map(|b| b.1).sum();
@@ -181,7 +181,7 @@ mod tests {
         let of = |mode| steps(&even(mode), &times);
         assert_eq!(of(Loop::Repeat), [0, 0, 1, 2, 3, 3, 0, 1, 2, 3]);
         assert_eq!(of(Loop::Once), [0, 0, 1, 2, 3, 3, 3, 3, 3, 3]);
-        // Thirds: 0, 1, 2 on the way out; 3 at the end, for a third; 2, 1 on the way back.
+        // In thirds: 0, 1, 2 forwards; 3 at the end, for a third; 2, 1 backwards.
         assert_eq!(of(Loop::PingPong), [0, 0, 0, 1, 2, 2, 3, 3, 1, 1]);
         assert_eq!(steps(&even(Loop::Once), &[-5.0]), [0]);
     }
@@ -263,14 +263,14 @@ mod tests {
         let linear = own(Loop::Repeat, Interpolation::Linear);
         let all = [0.0, 0.4, 0.9, 1.0, 2.9, 3.2, 3.9, 4.2];
         assert_eq!(steps(&linear, &all), [0, 0, 0, 1, 1, 2, 3, 0]);
-        // Shapes that are their times: held before the first and after the last.
+        // Shapes equal to their times: held before the first and after the last.
         let cubic = own(Loop::Once, Interpolation::Cubic);
         for t in [0.0, 0.5, 0.7, 1.0, 1.9, 3.1, 3.5, 3.8] {
             let expected = f64::clamp(t, 0.5, 3.5);
             assert!((value(&linear, &times, t) - expected).abs() < 1e-12, "{t}");
             assert!((value(&cubic, &times, t) - expected).abs() < 1e-12, "{t}");
         }
-        // The way back mirrors the way out, and both turning points hold.
+        // The way back mirrors the way forward, and both turning points hold.
         let fro = own(Loop::PingPong, Interpolation::Linear);
         for t in [0.2, 0.7, 2.2, 3.4, 3.9] {
             let (out, back) = (value(&fro, &times, t), value(&fro, &times, 8.0 - t));

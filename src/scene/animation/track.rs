@@ -28,7 +28,7 @@ impl Trs {
     }
 }
 
-/// How a channel goes from one value to the next: the samplers of glTF 2.0.
+/// Interpolation from one value of a channel to the next: the samplers of glTF 2.0.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Curve {
     /// The earlier value, until the next one's time.
@@ -40,13 +40,13 @@ pub enum Curve {
     CubicSpline,
 }
 
-/// Why samples are no channel.
+/// The reason why samples are no channel.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TrackError {
-    /// No time at all.
+    /// There is no time.
     #[error("there are no keyframes")]
     Empty,
-    /// Values do not go with the times.
+    /// The number of values does not fit the number of times.
     #[error("{values} values for {times} times")]
     Count {
         /// Number of times.
@@ -68,13 +68,13 @@ pub enum TrackError {
     ZeroScale(usize),
 }
 
-/// What a channel can hold.
+/// A value that a channel can hold.
 pub trait Sample: Copy {
-    /// Straight on from `self` to `other`, `t` from 0 to 1.
+    /// Straight interpolation from `self` to `other`, `t` from 0 to 1.
     fn between(self, other: Self, t: f64) -> Self;
     /// Sum of products with the weights of a spline, as a value of this kind.
     fn weighted(parts: [(Self, f64); 4]) -> Self;
-    /// Whether all components are numbers.
+    /// Returns whether all components are finite.
     fn finite(self) -> bool;
 }
 
@@ -107,7 +107,7 @@ impl Sample for DVec3 {
 }
 
 impl Sample for DQuat {
-    /// Spherical interpolation as glTF 2.0, appendix C.4, has it: the short way round.
+    /// Spherical interpolation as in glTF 2.0, appendix C.4: the short way round.
     fn between(self, other: Self, t: f64) -> Self {
         self.slerp(other, t).normalize()
     }
@@ -243,7 +243,7 @@ impl Channel<DQuat> {
     }
 }
 
-/// Placement of a node over time; what has no channel keeps its rest value.
+/// Placement of a node over time; a quantity without a channel keeps its rest value.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Track {
     /// Shift, mm.
@@ -255,7 +255,7 @@ pub struct Track {
 }
 
 impl Track {
-    /// The placement at `time`, s, over what the node has at rest.
+    /// The placement at `time`, s; quantities without a channel come from `rest`.
     pub fn at(&self, rest: Trs, time: f64) -> Trs {
         let translation = self.translation.as_ref().map(|c| c.at(time));
         let rotation = self.rotation.as_ref().map(|c| c.at(time));
@@ -267,7 +267,7 @@ impl Track {
         }
     }
 
-    /// Whether the factors are anything but `rest` at some time.
+    /// Returns whether the factors differ from `rest` at some time.
     pub fn scales(&self, rest: DVec3) -> bool {
         let differs = |c: &Channel<DVec3>| {
             c.curve == Curve::CubicSpline || c.keys().any(|factors| factors != rest)
@@ -300,7 +300,7 @@ impl Track {
             return Ok(());
         };
         let first = scale.key(0).signum();
-        // Between keys of one sign a line keeps it; what tangents do is the author's care.
+        // Between keys of one sign a line keeps it; tangents are left to the author.
         let same = |v: DVec3| v.cmpne(DVec3::ZERO).all() && v.signum() == first;
         match scale.keys().position(|v| !same(v)) {
             Some(i) => Err(TrackError::ZeroScale(i)),

@@ -11,7 +11,7 @@ use crate::scene::{Issue, Mesh, Scene};
 /// and no two anatomical surfaces are drawn this close on purpose.
 const SAME: f64 = 1e-4;
 
-/// A shape that an instance takes, and what it takes for that.
+/// A shape of an instance, and the conditions for it.
 struct Pose<'s> {
     instance: usize,
     mesh: &'s Mesh,
@@ -20,7 +20,7 @@ struct Pose<'s> {
 }
 
 impl Pose<'_> {
-    /// Whether both are shown at one time.
+    /// Returns whether both can be shown at one time.
     fn meets(&self, other: &Self) -> bool {
         let apart = |a: &(usize, usize)| {
             let b = other.conditions.iter().find(|b| b.0 == a.0);
@@ -60,7 +60,7 @@ impl Scene {
             .collect()
     }
 
-    /// Every shape of every instance.
+    /// All shapes of all instances.
     fn poses(&self) -> Vec<Pose<'_>> {
         let mut out = Vec::new();
         for (i, instance) in self.instances.iter().enumerate() {
@@ -83,8 +83,8 @@ impl Scene {
 
     fn coincident_pairs(&self) -> HashMap<[usize; 2], usize> {
         let poses = self.poses();
-        // By the triangle's corners, the last pose that has it, as an index into `seen`; from there
-        // on to the pose before.
+        // By the triangle's corners, the last pose that has it, as an index into `seen`; each entry there leads
+        // to the pose before.
         let mut last: HashMap<[[i64; 3]; 3], usize> = HashMap::new();
         let mut seen: Vec<(usize, Option<usize>)> = Vec::new();
         let mut pairs = HashMap::new();

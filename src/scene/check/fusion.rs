@@ -11,8 +11,8 @@ use crate::scene::{Issue, Scene, file};
 use crate::settings::{Surroundings, Words};
 use crate::volume::Volume;
 
-/// What the scene file at `path` shows around what is simulated, line by line, and masks that do
-/// nothing. `facts` measures an instance by its number.
+/// A description of the scene's surroundings, as rows of text, for the scene file at `path`, and masks
+/// without effect. `facts` measures an instance by its number.
 pub fn describe(
     path: &Path,
     scene: &Scene,
@@ -60,18 +60,18 @@ pub fn describe(
     (lines, issues)
 }
 
-/// What the files of the scene at `path` hold, as `insonify check` says of one alone.
+/// The content of the files of the scene at `path`, as `insonify check` describes a file alone.
 fn stored(path: &Path, named: &[PathBuf]) -> Vec<String> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let files: Vec<_> = named.iter().map(|file| folder.join(file)).collect();
     match Volume::load_series(&files) {
         Ok((volume, _)) => volume.to_string().lines().map(str::to_owned).collect(),
-        // The scene was loaded with it; it can only have been changed since.
+        // The scene was loaded with it, so it must have changed since.
         Err((_, error)) => vec![format!("  {error}")],
     }
 }
 
-/// Where it lies in the world, what is black and white, what the device holds of it.
+/// Place in the world, black and white, and size on the device.
 fn placed(acquired: &Acquired) -> Vec<String> {
     let vector = |v: DVec3| {
         // Turns -0 into 0.

@@ -4,7 +4,7 @@ use crate::scene::animation::{Clock, Loop, Motion, Sequence};
 use crate::scene::graph::{Node, NodeKind};
 use crate::scene::{Instance, Scene, Strategy};
 
-/// One line for each node, indented by its depth; none for a scene without nodes.
+/// A row for each node, indented by its depth; none for a scene without nodes.
 pub fn describe(scene: &Scene) -> Vec<String> {
     let nodes = &scene.graph.nodes;
     let mut children = vec![Vec::new(); nodes.len()];
@@ -55,7 +55,7 @@ fn moved(motion: &Motion) -> String {
     }
 }
 
-/// Period of a clock, what follows it, and how often it is updated.
+/// Period of a clock, behaviour after it, and updates per second, as text.
 pub fn periods(clock: &Clock) -> String {
     let mode = match clock.mode {
         Loop::Repeat => "",

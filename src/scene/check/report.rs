@@ -1,4 +1,4 @@
-//! The report of `insonify check`: a scene or a mesh, with everything that is wrong with it.
+//! The report of `insonify check`: a scene or a mesh, with all its faults.
 
 use std::fmt;
 use std::path::Path;
@@ -13,10 +13,10 @@ use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
 /// that coincide with it, inside the thinnest wall.
 const OUTSIDE: f64 = 0.05;
 
-/// What a file holds and what is wrong with it.
+/// Content of a file and its faults.
 #[derive(Debug, Default)]
 pub struct Report {
-    /// Description, line by line.
+    /// Description, a row each.
     pub lines: Vec<String>,
     /// Findings.
     pub issues: Vec<Issue>,
@@ -25,7 +25,7 @@ pub struct Report {
 }
 
 impl Report {
-    /// Whether the file can be used.
+    /// Returns whether the file can be used.
     pub fn passed(&self) -> bool {
         self.error.is_none() && !self.issues.iter().any(Issue::is_error)
     }
@@ -36,7 +36,7 @@ impl Report {
 }
 
 impl fmt::Display for Report {
-    /// Description, findings, and a last line that counts them. The scene error is left to the
+    /// Writes description, findings, and a last row that counts them. The scene error is left to the
     /// caller, who may want it with its source text.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for line in &self.lines {
@@ -84,11 +84,11 @@ fn mesh_file(path: &Path) -> Report {
     report
 }
 
-/// Animations that are tried; a file may have any number.
+/// Number of animations that are tried; a file may have any number.
 const ANIMATIONS: usize = 16;
 
-/// Describes the animations of a mesh file. What keeps one from being played does not keep the mesh from
-/// being used: it is a warning.
+/// Describes the animations of a mesh file. A fault that keeps one from being played is a warning, since the
+/// mesh can still be used.
 fn animations(path: &Path, report: &mut Report) {
     let names = mesh::animations(path);
     for (k, name) in names.iter().take(ANIMATIONS).enumerate() {
@@ -197,8 +197,8 @@ fn world_facts(scene: &Scene, instance: &Instance) -> (Facts, DVec3) {
     (super::measure(&soup), outside)
 }
 
-/// Tissue at a point beside an instance without that instance: of the enclosing mesh of highest
-/// priority, or the background. Elsewhere on the surface it may be another.
+/// Tissue at a point beside an instance, without that instance: of the enclosing mesh of highest
+/// priority, or the background. At other places of the surface it may be another.
 fn tissue_around<'s>(scene: &'s Scene, instance: &Instance, point: DVec3) -> &'s str {
     let around = scene
         .instances
@@ -210,8 +210,8 @@ fn tissue_around<'s>(scene: &'s Scene, instance: &Instance, point: DVec3) -> &'s
     &scene.tissues[tissue].name
 }
 
-/// Winding number by the solid angles of all triangles (van Oosterom and Strackee 1983); one
-/// inside a closed outward mesh and zero outside, so half decides.
+/// Returns whether an instance encloses a point: winding number by the solid angles of all triangles (van Oosterom
+/// and Strackee 1983), one inside a closed outward mesh and zero outside, with one half as the limit.
 fn encloses(scene: &Scene, instance: &Instance, point: DVec3) -> bool {
     let local = instance.world_from_object.inverse().transform_point3(point);
     let mesh = &scene.meshes[instance.mesh];
@@ -250,7 +250,7 @@ mod tests {
         assert!(report.passed(), "{text}");
         assert!(text.contains("encloses bile, priority 2; outside it liver"), "{text}");
         assert!(text.contains("encloses liver, priority 1; outside it water"), "{text}");
-        // 4/3 pi r^3 is 523.599 ml; the polyhedron of 1280 triangles falls 0.9 % short.
+        // 4/3 pi r^3 is 523.599 ml; the polyhedron of 1280 triangles is 0.9 % smaller.
         assert!(text.contains("519.093 ml"), "{text}");
     }
 

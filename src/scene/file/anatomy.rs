@@ -106,6 +106,21 @@ pub(super) fn meshes(
     Ok(out)
 }
 
+/// The placed wires have no more points than a frame affords.
+pub(super) fn countable(document: &Document<'_>, wires: &[Wire]) -> Result<(), SceneError> {
+    let counts = wires.iter().map(Wire::asks_for);
+    let (sum, most) = (counts.clone().sum::<f64>(), f64::from(Wire::MOST));
+    let longest = (0..).zip(counts).max_by(|(_, a), (_, b)| a.total_cmp(b));
+    match longest {
+        Some((i, count)) if sum > most => Err(document.fail(
+            &format!("wire.{i}"),
+            format!("wires have {sum} points, this one {count}; all of them may have {most}"),
+            "widen its `spacing`, or bring its ends together; `[model]` scales wires, too",
+        )),
+        _ => Ok(()),
+    }
+}
+
 pub(super) fn wires(
     document: &Document<'_>,
     tables: &[WireTable],

@@ -74,8 +74,12 @@ impl SceneError {
     }
 }
 
-/// Advice for the deserializer's "unknown field `x`, expected one of `a`, `b`".
+/// Advice for the deserializer's "unknown field `x`, expected one of `a`, `b`" and "missing field `x`".
 pub(super) fn advice(message: &str) -> Option<String> {
+    if let Some(missing) = message.strip_prefix("missing field `") {
+        let key = missing.split('`').next()?;
+        return Some(format!("give `{key}`; docs/scenes.md says what it takes"));
+    }
     if !message.starts_with("unknown field") && !message.starts_with("unknown variant") {
         return None;
     }
@@ -101,5 +105,11 @@ mod tests {
     fn advice_names_the_nearest_key() {
         let advice = advice("unknown field `pathz`, expected one of `paths`, `seed`");
         assert_eq!(advice.as_deref(), Some("did you mean `paths`?"));
+    }
+
+    #[test]
+    fn advice_names_the_missing_key() {
+        let advice = advice("missing field `axis`");
+        assert_eq!(advice.as_deref(), Some("give `axis`; docs/scenes.md says what it takes"));
     }
 }

@@ -43,7 +43,7 @@ pub fn paper(path: &Path, selectors: bool) -> Vec<(String, String)> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::graph_tests::{BEAT, beating, case, mesh};
+    use super::super::tests::graph::{BEAT, beating, case, mesh};
     use super::*;
     use crate::scene::{Scene, Strategy};
     use crate::settings::{Coherence, Sampling, ScatterMode, TextureSpace};

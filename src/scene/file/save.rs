@@ -12,7 +12,7 @@ use super::placing::placement;
 use super::schema::even;
 use super::tissues::Tissues;
 use super::{parameters, probe};
-use crate::files;
+use crate::output::files;
 use crate::settings::suggest;
 
 /// What is wrong with a setting, and what to do about it.
@@ -328,5 +328,4 @@ impl Moved {
 }
 
 #[cfg(test)]
-#[path = "save_tests.rs"]
 mod tests;

@@ -331,5 +331,4 @@ fn slice_of(source: &Source, path: &str, table: &SliceTable) -> Result<Slice, Sc
 }
 
 #[cfg(test)]
-#[path = "study_tests.rs"]
 mod tests;

@@ -1,3 +1,7 @@
+pub(super) mod graph;
+mod mistakes;
+mod vary;
+
 use std::path::PathBuf;
 
 use super::*;
@@ -133,6 +137,17 @@ fn a_picture_too_wide_for_any_device_is_refused() {
     case.fails(text, (6, 16), "100000 pixels wide", "at most 65535");
     let wide = [("probe.depth", "1.6 mm")];
     assert!(case.load(text, &wide).is_ok(), "62500 wide");
+}
+
+#[test]
+fn wires_of_more_points_than_a_frame_affords_are_refused() {
+    let case = Case::new();
+    let text = "[[wire]]\nfrom = [0, 0, 9]\n[[wire]]\nfrom = [0, 0, 9]\nto = [0, 0, 1009]\nspacing = 0.001\n";
+    case.fails(text, (3, 1), "wires have 1000002 points, this one 1000001", "widen its `spacing`");
+    assert!(case.load(text, &[("wire.1.spacing", "0.0011")]).is_ok());
+    // Placing the model makes them longer.
+    let long = case.load(text, &[("wire.1.spacing", "0.1"), ("model.scale", "1000")]);
+    assert!(long.expect_err("10 km").message.contains("10000001"));
 }
 
 #[test]

@@ -189,7 +189,7 @@ fn only_what_time_squeezes_has_a_shape_at_rest() {
         let expected = squeezes.then_some(rest * inner);
         assert_eq!(graph.rests(3), [None, expected, None], "{case}");
     }
-    // What turns above an uneven shape keeps its form.
+    // A rotation above an uneven shape keeps its form.
     let graph = Graph {
         nodes: vec![
             node(None, None, transform(even, sine(DVec3::ONE, 0.5))),

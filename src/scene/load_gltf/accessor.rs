@@ -1,18 +1,16 @@
-//! Typed views of glTF buffers, every access checked against the bytes that are there.
+//! Typed views of glTF buffers; every access is checked against the existing bytes.
 
 use std::path::Path;
 
 use gltf::accessor::{DataType, Dimensions, sparse};
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
-/// Where the bytes are.
+/// Access to the bytes.
 pub(super) struct Reader<'a> {
     pub path: &'a Path,
-    /// Bytes by buffer index; those that no geometry needs are absent.
+    /// Bytes by buffer index; buffers that no geometry needs are absent.
     pub buffers: &'a [Option<Vec<u8>>],
-    /// The file's number of each accessor.
-    pub accessors: &'a [usize],
 }
 
 /// A run of elements inside a buffer.
@@ -32,8 +30,7 @@ impl<'a> Run<'a> {
 
 impl<'a> Reader<'a> {
     fn fault(&self, accessor: &gltf::Accessor<'_>, message: &str) -> Issue {
-        let number = self.accessors.get(accessor.index());
-        let place = format!("/accessors/{}", number.unwrap_or(&accessor.index()));
+        let place = format!("/accessors/{}", accessor.index());
         Issue::error(self.path, 1, message, "export it again").of(&place)
     }
 
@@ -70,8 +67,8 @@ impl<'a> Reader<'a> {
         self.vectors(accessor, Dimensions::Vec3, "positions must be of type VEC3")
     }
 
-    /// Elements of N components, normalised integers as the numbers that they stand for; `otherwise`
-    /// is what is said where the accessor is not of type `kind`.
+    /// Elements of N components, normalised integers as the numbers that they represent; `otherwise`
+    /// is the message where the accessor is not of type `kind`.
     pub fn vectors<const N: usize>(
         &self,
         accessor: &gltf::Accessor<'_>,

@@ -1,4 +1,4 @@
-//! Nodes that move and meshes that change their shape, of one animation.
+//! One animation of a glTF file: moving nodes, and meshes that change their shape.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -10,10 +10,10 @@ use super::skin::Skin;
 use super::surface::Surfaces;
 use super::tree::Tree;
 use super::{File, open};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::{AnimatedNode, Choice, Placement, Soup, bounded};
 
-/// What a file holds for one of its animations.
+/// Content of a file for one of its animations.
 pub struct AnimatedParts {
     /// Name of the animation.
     pub animation: String,
@@ -24,14 +24,14 @@ pub struct AnimatedParts {
     pub issues: Vec<Issue>,
 }
 
-/// A mesh in all its shapes as it is stored, mm.
+/// A mesh in all its shapes as stored, mm.
 pub struct Part {
     pub name: String,
     /// Index into the nodes; none for a skinned mesh, which lies in the space of the root.
     pub node: Option<usize>,
     /// The first shape.
     pub soup: Soup,
-    /// Positions of the further ones.
+    /// Positions of the further shapes.
     pub others: Vec<Vec<[f32; 3]>>,
     /// Times of the shapes, s; none where there is one.
     pub times: Vec<f64>,
@@ -92,14 +92,14 @@ struct Meshes<'a> {
     most: usize,
     /// Vertices and triangles of all shapes so far.
     elements: usize,
-    /// Nodes are those of the file until the end.
+    /// The parts; until the end they name nodes by the file's numbers.
     parts: Vec<Part>,
     visited: Vec<bool>,
 }
 
 impl<'a> Meshes<'a> {
-    /// Reads the meshes below a node; with `only`, those of that node and below it. Without recursion,
-    /// because a file may nest nodes as deep as it likes.
+    /// Reads the meshes below a node; with `only`, those of that node and below it. Without recursion, because
+    /// a file may nest nodes to any depth.
     fn walk(&mut self, root: &gltf::Node<'_>, only: Option<usize>) -> Result<(), Issue> {
         let mut todo = vec![(root.clone(), only.is_none())];
         while let Some((node, kept)) = todo.pop() {
@@ -185,7 +185,7 @@ impl<'a> Meshes<'a> {
         Ok(())
     }
 
-    /// When a mesh is sampled, s: at the keyframes of its morph weights, and of its joints as long as
+    /// Times at which a mesh is sampled, s: the keyframes of its morph weights, and those of its joints while
     /// these are not too many. None where it keeps its shape.
     fn times(&self, motion: Option<&Motion>, skin: Option<&Skin>) -> Vec<f64> {
         let weights = motion.map_or(&[][..], Motion::weight_times);
@@ -230,7 +230,7 @@ impl<'a> Meshes<'a> {
     }
 }
 
-/// Times as they are, or `most` of them evenly spaced from the first to the last.
+/// Unchanged times, or `most` of them evenly spaced from the first to the last.
 fn thinned(times: Vec<f64>, most: usize) -> Vec<f64> {
     let (Some(&first), Some(&last)) = (times.first(), times.last()) else {
         return times;

@@ -1,11 +1,11 @@
-//! Do the stored values of accessors agree with what the file says about them?
+//! Checks of the stored values of accessors against the file's statements about them.
 
 use serde_json::{Map, Value};
 
 use super::validate::{EXPORT_AGAIN, Finding};
-use crate::scene::issue::Severity;
+use crate::issue::Severity;
 
-/// Accessors are compared component by component up to this many values in all.
+/// Most values that are compared in all, component by component.
 const MOST_VALUES: usize = 50_000_000;
 
 /// Components of an element, 0 for an unknown type.
@@ -31,8 +31,8 @@ fn width(component: u64) -> usize {
     }
 }
 
-/// Checks alignment and extent of all accessors, and their values against `min` and `max`.
-/// `buffers` may lack those that nothing needed.
+/// Checks alignment and extent of all accessors, and their values against `min` and `max`. `buffers` may
+/// lack those that were not needed.
 pub(super) fn check(root: &Map<String, Value>, buffers: &[Option<Vec<u8>>]) -> Vec<Finding> {
     let list = |name| root.get(name).and_then(Value::as_array).map_or(&[][..], Vec::as_slice);
     let mut out = Vec::new();

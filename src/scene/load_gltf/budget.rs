@@ -1,8 +1,8 @@
-//! Limits on what a small file can ask for: its parts may be named any number of times.
+//! Limits on the work for a small file: its parts may be named any number of times.
 
 use std::path::Path;
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// Most numbers held at a time, 128 MB.
 const HELD: usize = 16_000_000;
@@ -10,7 +10,7 @@ const HELD: usize = 16_000_000;
 /// Most numbers read, and vertices and matrices computed; some seconds.
 const STEPS: usize = 200_000_000;
 
-/// What is left of them.
+/// The remaining budget.
 pub(super) struct Budget<'p> {
     path: &'p Path,
     held: usize,
@@ -22,7 +22,7 @@ impl<'p> Budget<'p> {
         Self { path, held: HELD, steps: STEPS }
     }
 
-    /// Takes room for `count` numbers, and the time to read them: they may be read for many nodes.
+    /// Takes room for `count` numbers, and time to read them: they may be read for many nodes.
     pub fn hold(&mut self, count: usize) -> Result<(), Issue> {
         self.held = self.held.checked_sub(count).ok_or_else(|| {
             let cause = format!("its animation has more than {HELD} numbers");
@@ -36,12 +36,12 @@ impl<'p> Budget<'p> {
         self.work(count)
     }
 
-    /// What can still be held, for [`Budget::give_back`].
+    /// Numbers that can still be held, for [`Budget::give_back`].
     pub fn mark(&self) -> usize {
         self.held
     }
 
-    /// Gives back what was taken since the mark.
+    /// Gives back the room taken since the mark.
     pub fn give_back(&mut self, mark: usize) {
         self.held = mark;
     }

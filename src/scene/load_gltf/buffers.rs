@@ -2,18 +2,21 @@
 
 use std::path::Path;
 
-use gltf::buffer::{Data, Source};
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
+use gltf::buffer::Source;
+use percent_encoding::percent_decode_str;
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::MAX_FILE;
 
-/// Buffers by index, absent where they cannot be loaded, and why not.
+/// Buffers by index; for those that cannot be loaded, the reason.
 pub(super) struct Buffers {
     pub bytes: Vec<Option<Vec<u8>>>,
     pub issues: Vec<Issue>,
 }
 
-/// Loads all buffers; only failing to load a `needed` one is an error. Files are looked for
+/// Loads all buffers; only failing to load a `needed` one is an error. Files are searched
 /// beside `path`, never at absolute addresses.
 pub(super) fn load(
     path: &Path,
@@ -58,15 +61,10 @@ fn one(
                 (message.to_owned(), "export it again")
             })?
             .to_vec(),
-        Source::Uri(uri) => {
-            local(path, uri).map_err(|message| (message, "keep the file beside the .gltf"))?;
-            let data = Data::from_source(buffer.source(), path.parent());
-            data.map_err(|e| {
-                let message = format!("cannot be read: {e}");
-                (message, "restore the file that it names")
-            })?
-            .0
-        }
+        Source::Uri(uri) => match uri.strip_prefix("data:") {
+            Some(data) => embedded(data)?,
+            None => beside(path, uri)?,
+        },
     };
     if bytes.len() < buffer.length() {
         return Err((
@@ -77,19 +75,30 @@ fn one(
     Ok(bytes)
 }
 
-/// Refuses addresses that leave this machine or name something huge.
-fn local(path: &Path, uri: &str) -> Result<(), String> {
-    if uri.starts_with("data:") {
-        return Ok(());
+/// Bytes of a data URI, from behind its scheme (RFC 2397).
+fn embedded(data: &str) -> Result<Vec<u8>, (String, &'static str)> {
+    let unread = |cause: String| (format!("cannot be read: {cause}"), "export it again");
+    let text = data.split_once(";base64,").map(|(_, text)| text);
+    let text = text.ok_or_else(|| unread("its data URI is not in base64".to_owned()))?;
+    STANDARD.decode(text).map_err(|e| unread(format!("its data URI is not in base64: {e}")))
+}
+
+/// Bytes of a file beside the glTF file. Refuses addresses that leave this machine or name something huge.
+fn beside(path: &Path, uri: &str) -> Result<Vec<u8>, (String, &'static str)> {
+    let elsewhere = "keep the file beside the .gltf";
+    let unread =
+        |cause: String| (format!("cannot be read: {cause}"), "restore the file that it names");
+    let name = percent_decode_str(uri).decode_utf8().map_err(|e| unread(e.to_string()))?;
+    if uri.contains(':') || name.starts_with('/') {
+        return Err((format!("is at `{uri}`, which is not beside the file"), elsewhere));
     }
-    if uri.contains("://") || uri.starts_with('/') {
-        return Err(format!("is at `{uri}`, which is not beside the file"));
+    let file = path.parent().unwrap_or(Path::new("")).join(&*name);
+    let info = std::fs::metadata(&file).map_err(|e| unread(e.to_string()))?;
+    if !info.is_file() {
+        return Err((format!("`{uri}` is not a file"), elsewhere));
     }
-    let beside = path.parent().unwrap_or(Path::new("")).join(uri);
-    match std::fs::metadata(beside) {
-        Ok(info) if info.len() > MAX_FILE => Err(format!("`{uri}` is too large")),
-        Ok(info) if !info.is_file() => Err(format!("`{uri}` is not a file")),
-        // A missing or oddly encoded name is the reader's to report.
-        _ => Ok(()),
+    if info.len() > MAX_FILE {
+        return Err((format!("`{uri}` is too large"), elsewhere));
     }
+    std::fs::read(&file).map_err(|e| unread(e.to_string()))
 }

@@ -1,10 +1,10 @@
-//! Which animation of a file is played.
+//! The choice of an animation of a file.
 
 use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::Choice;
 use crate::settings::suggest;
 
@@ -27,7 +27,7 @@ pub(super) fn names(root: &Map<String, Value>) -> Vec<String> {
 }
 
 impl Chosen {
-    /// Those without a name are called `animation N`, counted from 0.
+    /// The chosen animation. Those without a name are called `animation N`, counted from 0.
     pub fn of(path: &Path, root: &Map<String, Value>, choice: Choice<'_>) -> Result<Self, Issue> {
         let mut names = names(root);
         if names.is_empty() {
@@ -54,7 +54,7 @@ impl Chosen {
         Ok(Self { number, name: names.remove(number), others: names })
     }
 
-    /// Message for an animation that moves nothing of what was chosen.
+    /// Message for an animation that moves no chosen part.
     pub fn moves_nothing(&self, path: &Path, node: Option<&str>) -> Issue {
         let what = match node {
             Some(node) => format!("no mesh of node `{node}`"),

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 const MAGIC: &[u8] = b"glTF";
 const JSON: u32 = 0x4E4F_534A;
@@ -15,7 +15,7 @@ pub(super) struct Container<'a> {
     pub issues: Vec<Issue>,
 }
 
-/// Takes a file apart. Whatever could mean that bytes were lost is an error.
+/// Splits a file into its chunks. Any sign of lost bytes is an error.
 pub(super) fn open<'a>(path: &Path, bytes: &'a [u8]) -> Result<Container<'a>, Issue> {
     let is_glb = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("glb"));
     if !bytes.starts_with(MAGIC) {

@@ -5,19 +5,19 @@ use gltf::accessor::Dimensions;
 use super::accessor::Reader;
 use super::budget::Budget;
 use super::sampler::Motion;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
-/// A surface that morphs; without targets it has one shape.
+/// A surface with morph targets; without targets it has one shape.
 pub(super) struct Morph {
     base: Vec<[f64; 3]>,
     targets: Vec<Target>,
-    /// Weights where no channel sets them.
+    /// Weights that no channel sets.
     rest: Vec<f64>,
 }
 
 /// Displacements of the vertices of one primitive.
 struct Target {
-    /// Which weight.
+    /// Index of its weight.
     weight: usize,
     /// First vertex in the surface.
     first: usize,
@@ -25,7 +25,7 @@ struct Target {
 }
 
 impl Morph {
-    /// Starts with the resting weights of a node: its own, those of its mesh, or zero.
+    /// A surface with the resting weights of a node: its own, those of its mesh, or zero.
     pub fn new(reader: &Reader<'_>, node: &gltf::Node<'_>) -> Result<Self, Issue> {
         let mesh = node.mesh();
         let stored = node.weights().or(mesh.as_ref().and_then(gltf::Mesh::weights));

@@ -1,4 +1,4 @@
-//! Channels of an animation: what moves each node and weighs its morph targets, over time in seconds.
+//! Channels of an animation: placement of each node and weights of its morph targets, over time in seconds.
 
 use std::collections::HashMap;
 
@@ -8,10 +8,10 @@ use gltf::animation::{Interpolation, Property};
 
 use super::accessor::Reader;
 use super::budget::Budget;
+use crate::issue::Issue;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
-use crate::scene::issue::Issue;
 
-/// What an animation does to one node.
+/// The animation of one node.
 #[derive(Debug, Default)]
 pub(super) struct Motion {
     /// Placement, lengths in mm.

@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use Kind::{Bool, Id, Int, IntIn, List, Map, Num, Object, Text, TextIn, Uri};
 
-/// What a property may be.
+/// Kind of a property.
 pub(super) enum Kind {
     Bool,
     Text,
@@ -16,13 +16,13 @@ pub(super) enum Kind {
     /// Index into a top-level list.
     Id(&'static str),
     Object(&'static Table),
-    /// Elements, least and most of them, whether all differ.
+    /// Elements: least and largest number, and whether all differ.
     List(&'static Kind, usize, usize, bool),
-    /// Keys at will.
+    /// Any keys.
     Map(&'static Kind),
 }
 
-/// Properties of an object: name, whether it must be there, kind.
+/// Properties of an object: name, whether required, kind.
 pub(super) type Table = [(&'static str, bool, Kind)];
 
 const MANY: usize = usize::MAX;

@@ -6,18 +6,18 @@ use gltf::accessor::Dimensions;
 
 use super::accessor::Reader;
 use super::budget::Budget;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 
 /// A row of zeros and a one, up to the exporter's rounding.
 const AFFINE_TOLERANCE: f64 = 1e-4;
 
-/// Joints of a skinned node and what they do to each vertex.
+/// Joints of a skinned node and their influence on each vertex.
 pub(super) struct Skin {
-    /// Nodes.
+    /// Node of each joint.
     pub joints: Vec<usize>,
     /// Joint space from the space of the vertices.
     inverse_bind: Vec<DAffine3>,
-    /// Where the influences of each vertex end.
+    /// End of each vertex' influences.
     ends: Vec<usize>,
     /// Joint and weight; a vertex' weights sum to 1.
     influences: Vec<(u32, f64)>,
@@ -113,7 +113,7 @@ impl Skin {
             let own = &mut self.influences[begin..];
             missing += usize::from(own.iter().any(|&(j, _)| j as usize >= self.joints.len()));
             let sum: f64 = own.iter().map(|&(_, weight)| weight).sum();
-            // Written so that a weight that is not a number counts as unbound.
+            // In this form a weight that is not a number counts as unbound.
             let bound = sum > 0.0 && sum.is_finite() && own.iter().all(|&(_, weight)| weight > 0.0);
             unbound += usize::from(!bound);
             // The division of homogeneous coordinates; stored weights sum to 1 up to rounding.

@@ -1,19 +1,19 @@
-//! Triangles of primitives, as they are stored.
+//! Triangles of primitives, as stored.
 
 use gltf::mesh::Mode;
 
 use super::File;
 use super::accessor::Reader;
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::MAX_ELEMENTS;
 
-/// Triangles of a primitive as they are stored, metres.
+/// Triangles of a primitive as stored, metres.
 pub(super) struct Surface {
     pub positions: Vec<[f64; 3]>,
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Reads primitives, and counts what it reads.
+/// A reader of primitives that counts its elements.
 pub(super) struct Surfaces<'a> {
     pub reader: Reader<'a>,
     pub issues: Vec<Issue>,
@@ -23,7 +23,7 @@ pub(super) struct Surfaces<'a> {
 impl<'a> Surfaces<'a> {
     pub fn new(file: &'a File<'_>) -> Self {
         Self {
-            reader: Reader { path: file.path, buffers: &file.buffers, accessors: &file.accessors },
+            reader: Reader { path: file.path, buffers: &file.buffers },
             issues: Vec::new(),
             elements: 0,
         }
@@ -34,7 +34,7 @@ impl<'a> Surfaces<'a> {
         self.issues.push(Issue::warning(self.reader.path, count, message, ""));
     }
 
-    /// Nothing for points and lines.
+    /// Triangles of a primitive; none for points and lines.
     pub fn primitive(
         &mut self,
         name: &str,

@@ -71,6 +71,7 @@ fn planted_faults_are_errors() {
         ("\"count\":3", "\"count\":4000000000", "too many"),
         ("data:", "http://somewhere/", "not beside"),
         ("data:application", "missing", "cannot be read"),
+        ("data:application/octet-stream;base64,", "%2Fdev/zero", "not beside"),
     ] {
         let broken = sound.replace(from, to);
         assert_ne!(broken, sound);

@@ -1,4 +1,4 @@
-//! Where the nodes of a file are, over time.
+//! Places of the nodes of a file over time.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -8,8 +8,8 @@ use gltf::scene::Transform;
 
 use super::budget::Budget;
 use super::sampler::Motion;
+use crate::issue::Issue;
 use crate::scene::animation::{Track, Trs};
-use crate::scene::issue::Issue;
 use crate::scene::mesh::{AnimatedNode, Placement};
 
 /// All nodes of a file; lengths in mm.
@@ -17,12 +17,12 @@ pub(super) struct Tree {
     parents: Vec<Option<usize>>,
     placements: Vec<Placement>,
     names: Vec<String>,
-    /// What moves each node, apart from its placement.
+    /// Motion of each node, apart from its placement.
     pub motions: HashMap<usize, Motion>,
 }
 
 impl Tree {
-    /// `mm` is the length of the file's unit.
+    /// The nodes of a file; `mm` is the length of its unit.
     pub fn new(gltf: &gltf::Document, mut motions: HashMap<usize, Motion>, mm: f64) -> Self {
         let mut parents = vec![None; gltf.nodes().len()];
         let mut placements = Vec::new();
@@ -38,7 +38,7 @@ impl Tree {
         Self { parents, placements, names, motions }
     }
 
-    /// A node and those above it, upwards.
+    /// A node and its ancestors, upwards.
     pub fn chain(&self, node: usize) -> impl Iterator<Item = usize> {
         std::iter::successors(Some(node), |&n| self.parents[n])
     }
@@ -52,7 +52,7 @@ impl Tree {
         track.into_iter().flat_map(Track::times)
     }
 
-    /// Root from node space at a time, s. `known` are those at that time already.
+    /// Root from node space at a time, s. `known` holds results for that time.
     pub fn global(
         &self,
         node: usize,
@@ -69,8 +69,8 @@ impl Tree {
         Ok(known[&node])
     }
 
-    /// The nodes above some others, these included, parents first; and the place of each in that list.
-    /// Refuses those that flatten what is below them.
+    /// Given nodes and all their ancestors, parents first; and the place of each in that list. Refuses nodes
+    /// that flatten their descendants.
     pub fn above(
         &self,
         path: &Path,

@@ -7,7 +7,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::schema::{Kind, ROOT, Table};
-use crate::scene::issue::{Issue, Severity};
+use crate::issue::{Issue, Severity};
 use crate::settings::suggest;
 
 mod rules;
@@ -30,13 +30,13 @@ pub(super) struct Finding {
     pub remedy: &'static str,
 }
 
-/// What helps against files that break the rules.
+/// Remedy for files that break the rules.
 pub(super) const EXPORT_AGAIN: &str = "export it again";
 
 /// All findings on a file.
 pub(super) struct Findings<'a> {
     root: &'a Map<String, Value>,
-    /// Whether animations are read, too.
+    /// True if animations are read, too.
     animated: bool,
     list: Vec<Finding>,
 }
@@ -235,7 +235,7 @@ impl<'a> Findings<'a> {
 }
 
 /// Integers may be written as `1.0` (specification 2.7, JSON encoding).
-fn integer(value: &Value) -> Option<i64> {
+pub(super) fn integer(value: &Value) -> Option<i64> {
     value.as_i64().or_else(|| {
         let v = value.as_f64()?;
         // 2^53: past it a double no longer tells integers apart.

@@ -6,23 +6,23 @@ use glam::DAffine3;
 
 use super::keyframes::shapes;
 use super::{Kind, Options, Units, read_bounded};
+use crate::issue::Issue;
 use crate::scene::Mesh;
 use crate::scene::animation::{Track, Trs};
-use crate::scene::issue::Issue;
 use crate::scene::load_gltf::{self, AnimatedParts, Part};
 
-/// Times at which a skin is sampled unless [`Options::keyframes`] says otherwise.
+/// Number of times at which a skin is sampled unless [`Options::keyframes`] is set.
 const KEYFRAMES: usize = 24;
 
-/// Which animation of a file.
+/// Choice of an animation of a file.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Choice<'a> {
-    /// The first.
+    /// The first animation.
     #[default]
     First,
-    /// The first of this name. Those without a name are called `animation N`, counted from 0.
+    /// The first animation of this name. Those without a name are called `animation N`, counted from 0.
     Named(&'a str),
-    /// That of this number, counted from 0.
+    /// The animation of this number, counted from 0.
     Number(usize),
 }
 
@@ -31,10 +31,10 @@ pub enum Choice<'a> {
 pub struct Animated {
     /// Name of the animation; `animation N` if the file gives it none.
     pub animation: String,
-    /// Earliest and latest keyframe of whatever moves a mesh, s. Outside it all keeps its first or last
-    /// state; to play it in a loop is the caller's choice.
+    /// Earliest and latest keyframe of any motion of a mesh, s. Outside it everything keeps its first or last
+    /// state; the caller may play it in a loop.
     pub span: (f64, f64),
-    /// The nodes above the meshes and those that bear them; a parent comes before its children.
+    /// The ancestors of the nodes with meshes, and those nodes; a parent comes before its children.
     pub nodes: Vec<AnimatedNode>,
     /// The meshes of the chosen nodes, in the file's order.
     pub meshes: Vec<AnimatedMesh>,
@@ -43,7 +43,7 @@ pub struct Animated {
 /// A node of the file's tree.
 #[derive(Clone, Debug)]
 pub struct AnimatedNode {
-    /// Name in the file; may be empty, and need not be the only one of its name.
+    /// Name in the file; may be empty, and need not be unique.
     pub name: String,
     /// Index of the parent in [`Animated::nodes`]; none for a root.
     pub parent: Option<usize>,
@@ -51,14 +51,14 @@ pub struct AnimatedNode {
     pub placement: Placement,
 }
 
-/// Where a node is inside its parent; has an inverse at every keyframe.
+/// Placement of a node in its parent; has an inverse at every keyframe.
 #[derive(Clone, Debug)]
 pub enum Placement {
-    /// Always here; lengths in mm.
+    /// Constant placement; lengths in mm.
     Fixed(DAffine3),
-    /// Where its track says; what the track does not set keeps its value at rest.
+    /// Placement by a track; quantities that it does not set keep their value at rest.
     Moving {
-        /// At rest.
+        /// Placement at rest.
         rest: Trs,
         /// Sets at least one of translation, rotation and scale.
         track: Track,
@@ -74,7 +74,7 @@ impl Placement {
         }
     }
 
-    /// Whether it can be inverted; if not, why.
+    /// Checks that it has an inverse; returns the reason where not.
     pub(in crate::scene) fn invertible(&self) -> Result<(), String> {
         let flat = |m: DAffine3| m.matrix3.determinant() == 0.0 || !m.is_finite();
         match self {
@@ -90,17 +90,17 @@ impl Placement {
     }
 }
 
-/// A mesh that a node bears.
+/// A mesh of a node.
 #[derive(Clone, Debug)]
 pub struct AnimatedMesh {
-    /// Name of the node, else of the mesh, else `node N`; need not be the only one of its name.
+    /// Name of the node, else of the mesh, else `node N`; need not be unique.
     pub name: String,
-    /// Index into [`Animated::nodes`] of the node in whose space the shapes are; none for a skinned mesh,
-    /// whose shapes are in the space of the file's scene, whatever bears it.
+    /// Index into [`Animated::nodes`] of the node in whose space the shapes are; none for a skinned mesh, whose
+    /// shapes are in the space of the file's scene, whichever node has it.
     pub node: Option<usize>,
     /// The shapes, mm, at least one. They share their topology ([`Mesh::shares_topology`]).
     pub shapes: Vec<Mesh>,
-    /// When the mesh has each of them, s, increasing; empty where it has a single shape at all times.
+    /// Times of the shapes, s, increasing; empty where it has a single shape at all times.
     pub times: Vec<f64>,
 }
 
@@ -119,13 +119,13 @@ pub fn animations(path: &Path) -> Vec<String> {
 /// Animated nodes become [`AnimatedNode`]s. Animated morph weights become one shape for each of their
 /// keyframes, animated joints of a skin one for each time at which one of them has a keyframe, or
 /// [`Options::keyframes`] of them evenly spaced where that is fewer. Every shape is repaired and checked
-/// like the keyframes of [`super::load_keyframes`]. [`Options::node`] leaves only that node and those
+/// like the keyframes of [`super::load_keyframes`]. [`Options::node`] keeps only that node and those
 /// under it.
 ///
 /// # Errors
 /// Returns every finding when at least one of them stops loading. Besides those of [`super::load`]: no
-/// animation, or none of that name, or one that moves nothing; keyframes out of order, rotations of
-/// length zero, scales of zero on the way to a mesh; weights that do not go with the morph targets;
+/// animation, or none of that name, or one without effect; keyframes out of order, rotations of
+/// length zero, scales of zero above a mesh; weights that do not fit the morph targets;
 /// joints that a skin does not have, inverse bind matrices without inverse; too much data.
 pub fn load_animated(
     path: &Path,

@@ -4,15 +4,15 @@ use std::path::Path;
 
 use super::recipe::Recipe;
 use super::{Inspected, Options, Soup, Units, load, read_raw};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::{Mesh, check};
 
-/// Most vertices and triangles of all shapes of a surface together. Some 0.5 GB while they are read.
+/// Most vertices and triangles of all shapes of a surface together. Some 0.5 GB during reading.
 pub const MAX_SHAPES: usize = 16_000_000;
 
 impl Mesh {
-    /// Whether `self` and `other` can be shapes of one surface: equal triangles and as many vertices, so
-    /// that the same vertex is the same point of the tissue.
+    /// Returns whether `self` and `other` can be shapes of one surface: equal triangles and equally many vertices,
+    /// so that the same vertex is the same point of the tissue.
     pub fn shares_topology(&self, other: &Self) -> bool {
         self.positions.len() == other.positions.len() && self.triangles == other.triangles
     }
@@ -67,7 +67,7 @@ pub fn load_keyframes<P: AsRef<Path>>(
     Ok((meshes, issues))
 }
 
-/// Refuses `count` shapes of `elements` vertices and triangles that together are too many.
+/// Refuses `count` shapes of `elements` vertices and triangles if they are too many together.
 pub fn bounded(path: &Path, elements: usize, count: usize) -> Result<(), Issue> {
     let total = elements.saturating_mul(count);
     if total <= MAX_SHAPES {
@@ -100,8 +100,8 @@ fn separately<P: AsRef<Path>>(
 }
 
 /// Meshes of shared topology from a surface in mm and further positions of its vertices. Findings on
-/// shape `k` are named by `name(k)`: a file and a place inside it; `enlarged` is the factor between the
-/// positions and the size at which the surface will be placed. The meshes are of use only if no
+/// shape `k` are named by `name(k)`: a file and a place inside it; `enlarged` is the factor from the
+/// positions to the size at which the surface will be placed. The meshes can be used only if no
 /// finding is an error.
 pub fn shapes<'p>(
     raw: &Soup,

@@ -1,16 +1,16 @@
-//! How a file's vertices become those of a mesh: made on one shape of a surface, followed for all.
+//! The recipe that turns a file's vertices into a mesh: made from one shape of a surface, applied to all.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use super::{CREASE, Soup};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::normals::{self, Split};
 use crate::scene::{Mesh, topology};
 
-/// The vertices of a file's surface after repair, each by the file's vertices that it is made of.
+/// The vertices of a file's surface after repair, each with the file's vertices that it comes from.
 pub struct Recipe {
-    /// The vertex of the file that each welded vertex lies on.
+    /// The file's vertex at the place of each welded vertex.
     welded: Vec<u32>,
     /// Welded vertices around each opening; their centres are the vertices after the welded ones.
     rings: Vec<Vec<u32>>,
@@ -18,9 +18,9 @@ pub struct Recipe {
 }
 
 impl Recipe {
-    /// Welds, cleans, orients, caps and splits `raw`. `others` are further positions of its vertices:
-    /// what comes apart or has an area in one of them is neither welded nor dropped. Also returns the
-    /// repaired surface before the split, and what was repaired.
+    /// Welds, cleans, orients, caps and splits `raw`. `others` are further positions of its vertices: vertices
+    /// that separate, and triangles that have an area, in one of them are kept. Also returns the repaired surface
+    /// before the split, and the repairs.
     pub fn new(
         path: &Path,
         raw: &Soup,
@@ -62,19 +62,19 @@ fn pick(positions: &[[f32; 3]], which: &[u32]) -> Vec<[f32; 3]> {
     which.iter().map(|&i| positions[i as usize]).collect()
 }
 
-/// Unites vertices of exactly equal position, so that topology can be seen; drops unused ones.
+/// Unites vertices of exactly equal position, for topology; drops unused ones.
 pub fn weld(soup: &Soup) -> Soup {
     weld_shapes(soup, &[]).0
 }
 
-/// Adding zero makes -0 and +0 the same place.
+/// Position as bits; adding zero makes -0 and +0 equal.
 fn place(position: [f32; 3]) -> [u32; 3] {
     position.map(|v| (v + 0.0).to_bits())
 }
 
 /// Unites vertices that coincide in every shape; also returns the original of each.
 fn weld_shapes(soup: &Soup, others: &[Vec<[f32; 3]>]) -> (Soup, Vec<u32>) {
-    // Vertices of one class coincide in all shapes looked at so far.
+    // Vertices of one class coincide in all shapes seen so far.
     let mut class = vec![0u32; soup.positions.len()];
     for positions in others {
         let mut seen: HashMap<(u32, [u32; 3]), u32> = HashMap::new();

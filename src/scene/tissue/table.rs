@@ -6,25 +6,25 @@
 
 use super::{Surface, Tissue};
 
-/// Diagnostics 13:855 (2023), table 4: attenuation at 1 MHz.
+/// Attenuation at 1 MHz: Diagnostics 13:855 (2023), table 4.
 const A: &str = "Diagnostics 13:855 (2023) table 4";
-/// Bioengineering 12:946 (2025), appendix A: density and speed measured ex vivo.
+/// Density and speed measured ex vivo: Bioengineering 12:946 (2025), appendix A.
 const B: &str = "Bioengineering 12:946 (2025) appendix A";
-/// Burger et al. 2013 as published with its implementation.
+/// Values of Burger et al. 2013 as published with its implementation.
 const BURGER: &str = "Burger et al. 2013, parameter table";
-/// The NVIDIA ray-traced ultrasound simulator, v0.6.0.
+/// Values of the NVIDIA ray-traced ultrasound simulator, v0.6.0.
 const I4H: &str = "Isaac for Healthcare sensor simulation 0.6.0";
-/// IT'IS tissue database, checked against a stored copy.
+/// Values of the IT'IS tissue database, checked against a stored copy.
 const ITIS: &str = "IT'IS tissue database";
-/// IT'IS tissue database, quoted from memory.
+/// Values of the IT'IS tissue database, quoted from memory.
 const ITIS_UNVERIFIED: &str = "IT'IS tissue database, unverified";
-/// Textbook value that nobody here traced to its measurement.
+/// Textbook values that nobody here traced to a measurement.
 const UNVERIFIED: &str = "unverified";
-/// Obstetrics: Zana and Lang 1974.
+/// Obstetric values: Zana and Lang 1974.
 const ZANA: &str = "Zana and Lang 1974, unverified";
 /// Attenuation of uterine tissues at 5 MHz, divided by 5.
 const UTERUS: &str = "PMC3056396 (at 5 MHz, per MHz)";
-/// Chosen by this project because no source was found.
+/// Values chosen by this project because no source was found.
 const CHOICE: &str = "chosen by this project, no source found";
 
 /// Speed mm/us, density g/cm3, attenuation dB/(cm MHz), each with its source.
@@ -39,7 +39,7 @@ type Skin = (f64, f64, f64);
 const SOFT: Skin = (1000.0, 0.1, 1.0);
 const FLUID: Skin = (1000.0, 0.05, 1.0);
 const BONE: Skin = (100.0, 0.3, 8.0);
-/// No scatterers at all.
+/// No scatterers.
 const ANECHOIC: Speckle = (f64::NEG_INFINITY, 1.0, 0.0, 4.0);
 
 const TABLE: &[(&str, Bulk, Speckle, Skin)] = &[
@@ -195,6 +195,8 @@ fn tissue(row: &(&str, Bulk, Speckle, Skin)) -> Tissue {
         speed: speed.0,
         density: density.0,
         attenuation: attenuation.0,
+        // Single numbers per MHz are what most sources give.
+        attenuation_exponent: 1.0,
         echogenicity,
         density_of_scatterers,
         mean_over_sigma: 0.0,

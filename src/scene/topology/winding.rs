@@ -1,15 +1,15 @@
-//! Which way triangles face: neighbours must agree, and closed meshes face outward.
+//! Orientation of triangles: neighbours must agree, and closed meshes face outward.
 
 use std::path::Path;
 
 use glam::DVec3;
 
 use super::{Edges, six_volumes, volume};
-use crate::scene::issue::Issue;
+use crate::issue::Issue;
 use crate::scene::mesh::Soup;
 
-/// Turns triangles so that neighbours agree, the majority of each connected piece deciding; then
-/// turns a closed mesh whose volume is negative.
+/// Turns triangles so that neighbours agree, by the majority of each connected piece; then turns a
+/// closed mesh of negative volume.
 pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
     let mut issues = Vec::new();
     let Agreement { turned, contradictions, bodies, inward } = agree(soup);
@@ -52,14 +52,14 @@ pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
     issues
 }
 
-/// What a flood fill over all pieces has found.
+/// Result of a flood fill over all pieces.
 #[derive(Default)]
 struct Agreement {
     /// Triangles turned to agree with the majority of their piece.
     turned: usize,
     /// Edges whose triangles cannot agree.
     contradictions: usize,
-    /// Closed pieces, and how many of them have a negative volume.
+    /// Number of closed pieces, and of those with a negative volume.
     bodies: usize,
     inward: usize,
 }

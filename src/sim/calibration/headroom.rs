@@ -6,7 +6,7 @@ use super::{Calibration, amplitude};
 use crate::scene::Tissue;
 use crate::settings::ScatterMode;
 use crate::sim::layout::{ECHO_LIMIT, LEVELS_PER_OCTAVE};
-use crate::sim::tables::{wire_points, wire_spacing};
+use crate::sim::tables::wire_spacing;
 
 /// Largest fixed-point scale: one unit is -120 dB re a perfect mirror.
 const LARGEST_SCALE: f64 = (1u32 << 20) as f64;
@@ -85,7 +85,7 @@ impl Calibration<'_> {
             .wires
             .iter()
             .map(|wire| {
-                let count = wire_points(wire).len() as f64;
+                let count = f64::from(wire.steps()) + 1.0;
                 let spacing = wire_spacing(wire);
                 let weights = 1.0 + TAU.sqrt() * widest / spacing.max(1e-9);
                 wire.amplitude.abs() * weights.min(count)

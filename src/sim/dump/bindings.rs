@@ -7,7 +7,7 @@ use super::super::fields::Fields;
 use super::super::world::Arrays;
 use super::super::{SimError, Simulator, Tracer, layout, stages};
 use super::DumpError;
-use crate::npy::{self, Element};
+use crate::output::npy::{self, Element};
 use crate::scene::Scene;
 
 /// Writes `NAME.npy` for everything that a kernel reads, of the last frame: constants and geometry

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::super::Simulator;
 use super::{DumpError, png, rf};
-use crate::npy::{self, Element};
+use crate::output::npy::{self, Element};
 use crate::scene::Scene;
 
 /// One axis of a dumped array.

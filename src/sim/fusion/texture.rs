@@ -211,5 +211,4 @@ fn floats(voxels: &Voxels, acquired: &Acquired) -> Texels {
 }
 
 #[cfg(test)]
-#[path = "texture_tests.rs"]
 mod tests;

@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
-use super::source::{self, file_error};
-use super::{Error, Library, compiler};
+use super::Library;
+use super::authors::source::{self, file_error};
+use super::authors::{Error, compiler};
 
 /// A folder of sources and what has been seen of it.
 pub(super) struct Watched {

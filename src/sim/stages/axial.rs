@@ -2,7 +2,7 @@
 
 use super::super::layout::AXIAL_SAMPLES;
 use super::super::pass::{Array, Extent, Pass, Sizes};
-use crate::npy::Element::Float;
+use crate::output::npy::Element::Float;
 
 /// The stage.
 pub const AXIAL: Pass = Pass {

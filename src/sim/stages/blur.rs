@@ -4,7 +4,7 @@ use super::super::layout::BLUR_SUMS;
 use super::super::pass::{Array, Extent, Pass, Sizes};
 use super::super::passes::Passes;
 use crate::gpu::{Commands, GpuError};
-use crate::npy::Element::Float;
+use crate::output::npy::Element::Float;
 use crate::scene::Scene;
 
 /// The stage, once for each direction.

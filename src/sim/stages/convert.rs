@@ -1,7 +1,7 @@
 //! `convert`: mask and acquired volume from the scanlines to the pixels.
 
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
-use crate::npy::Element::Float;
+use crate::output::npy::Element::Float;
 use crate::scene::Scene;
 
 /// The stage.

@@ -2,7 +2,7 @@
 
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use crate::gpu::Stage;
-use crate::npy::Element::Word;
+use crate::output::npy::Element::Word;
 
 /// The stage.
 pub const DISPLAY: Pass = Pass {

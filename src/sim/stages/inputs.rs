@@ -4,7 +4,7 @@ use super::super::layout::{
     Counters, Frame, Instance, POINT_GROUP, Row, Scanline, Surface, Tissue,
 };
 use super::super::pass::Array;
-use crate::npy::Element::{Float, Word};
+use crate::output::npy::Element::{Float, Word};
 
 /// The frame's constants, the scene's tables, what the probe touches; and the counters, which every
 /// kernel may add to.

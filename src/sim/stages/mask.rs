@@ -2,7 +2,7 @@
 
 use super::super::layout::{Frame, Fusion};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
-use crate::npy::Element::{Float, Word};
+use crate::output::npy::Element::{Float, Word};
 use crate::scene::Scene;
 
 /// The stage.

@@ -2,7 +2,7 @@
 
 use super::super::layout::START_WORDS;
 use super::super::pass::{Array, Pass, Sizes, Variants, per_line};
-use crate::npy::Element::Word;
+use crate::output::npy::Element::Word;
 
 /// The stage.
 pub const ORIGIN: Pass = Pass {

@@ -3,7 +3,7 @@
 use super::super::batches::per_path;
 use super::super::layout::{Frame, SCATTER_WINDOW};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
-use crate::npy::Element::Integer;
+use crate::output::npy::Element::Integer;
 
 /// The stage.
 pub const SCATTER: Pass = Pass {

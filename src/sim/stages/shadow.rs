@@ -2,7 +2,7 @@
 
 use super::super::layout::MAX_PIECES;
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants, per_line};
-use crate::npy::Element::Float;
+use crate::output::npy::Element::Float;
 use crate::scene::Scene;
 
 /// What is transmitted along each line.

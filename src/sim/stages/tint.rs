@@ -4,7 +4,7 @@ use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
 use super::super::{SimError, Simulator};
 use crate::gpu::{Buffer, Commands, GpuError, Image, Stage};
-use crate::npy::Element::Word;
+use crate::output::npy::Element::Word;
 
 /// The stage.
 pub const TINT: Pass = Pass {

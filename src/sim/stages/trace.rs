@@ -5,7 +5,7 @@ use super::super::layout::{Interaction, ROLE_BRANCHES, ROLE_MAIN, ROLE_WHOLE, Se
 use super::super::pass::{Array, Pass, Sizes, Variants};
 #[cfg(doc)]
 use super::super::rounds::Round;
-use crate::npy::Element::{Integer, Word};
+use crate::output::npy::Element::{Integer, Word};
 use crate::scene::Scene;
 use crate::settings::Sampling;
 

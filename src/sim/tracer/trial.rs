@@ -179,5 +179,4 @@ fn next_rays(rays: &[Ray], hits: &[RayHit]) -> Vec<Ray> {
 }
 
 #[cfg(test)]
-#[path = "trial_tests.rs"]
 mod tests;

@@ -1,11 +1,11 @@
-//! Every rating with what was rated, for other programs.
+//! Every rating with its image, for other programs.
 
 use serde::Serialize;
 
 use crate::study::answers::Answers;
 use crate::study::key::Key;
 
-/// What one assessor said of one case. Columns are named as the fields.
+/// One assessor's rating of one case. Columns are named as the fields.
 #[derive(Debug, Serialize)]
 struct Rating<'a> {
     response: &'a str,
@@ -25,7 +25,7 @@ struct Rating<'a> {
     remark: &'a str,
 }
 
-/// CSV, one row per filled form and case; empty where nothing was answered.
+/// The ratings as CSV, one row per filled form and case; empty where nothing was answered.
 pub fn ratings(key: &Key, all: &[Answers]) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     for answers in all {

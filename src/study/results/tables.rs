@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use super::{Part, Results};
 
-/// What stands in a table.
+/// Content of a table's cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Cell {
-    /// How often.
+    /// A count.
     Count(usize),
     /// A mean, a median or a statistic; NaN where there is none.
     Number(f64),
@@ -16,7 +16,7 @@ pub enum Cell {
 }
 
 impl Cell {
-    /// Rounded, for readers.
+    /// Rounded text, for readers.
     fn shown(self) -> String {
         match self {
             Self::Count(n) => n.to_string(),
@@ -27,7 +27,7 @@ impl Cell {
         }
     }
 
-    /// All digits, for programs; empty where there is no number.
+    /// Text with all digits, for programs; empty where there is no number.
     fn exact(self) -> String {
         match self {
             Self::Count(n) => n.to_string(),
@@ -40,20 +40,20 @@ impl Cell {
 /// One table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// What it shows.
+    /// Title.
     pub title: String,
     /// Headings of the values.
     pub head: Vec<String>,
-    /// Rows: scenario, what of it, values.
+    /// Rows: scenario, item, values.
     pub rows: Vec<([String; 2], Vec<Cell>)>,
-    /// What to know about it.
+    /// Note for the reader.
     pub note: String,
 }
 
 const ALL: &str = "all scenarios";
 
 impl Results {
-    /// The tables, in the order in which they are read.
+    /// The tables in reading order.
     pub fn tables(&self) -> Vec<Table> {
         let mut tables = vec![self.agreement(), self.chosen_images()];
         if self.parts.iter().any(|p| p.rated.len() > 1) {
@@ -185,7 +185,7 @@ impl Results {
         }
     }
 
-    /// What stands above the tables.
+    /// Text above the tables.
     fn heading(&self) -> String {
         let mut out = format!("Study {}. Filled forms: {}.", self.study, self.assessors);
         for (file, [cases, degrees, rankings]) in &self.missing {
@@ -203,7 +203,7 @@ impl Results {
     }
 }
 
-/// For a terminal: columns in line.
+/// The tables for a terminal, with aligned columns.
 pub fn plain(results: &Results) -> String {
     let mut out = format!("{}\n", results.heading());
     for table in results.tables() {
@@ -226,7 +226,7 @@ pub fn plain(results: &Results) -> String {
     out
 }
 
-/// As Markdown.
+/// The tables as Markdown.
 pub fn markdown(results: &Results) -> String {
     let escape = |text: &str| text.replace('\\', "\\\\").replace('|', "\\|").replace('\n', " ");
     let mut out = format!("# Results of a study\n{}\n", escape(&results.heading()));
@@ -247,7 +247,7 @@ pub fn markdown(results: &Results) -> String {
     out
 }
 
-/// As CSV: one row per value, with all its digits.
+/// The tables as CSV: one row per value, with all its digits.
 pub fn csv(results: &Results) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     let mut write = |record: [&str; 5]| {

@@ -1,4 +1,4 @@
-//! Names that are not taken yet, and PNG files that say what they show.
+//! Free file names, and PNG files that carry their settings.
 
 use std::fs::{File, OpenOptions};
 use std::io::{Cursor, ErrorKind, Write as _};
@@ -9,8 +9,8 @@ use serde_json::Value;
 
 use super::{CaptureError, Sidecar};
 
-/// A number that no other capture of a folder has, held by its sidecar. What is written under it is
-/// removed again unless all of it is kept.
+/// A number that no other capture of a folder has, reserved by its sidecar. The files written under
+/// it are removed unless all are kept.
 pub(super) struct Claim {
     /// Folder, stem and number.
     base: String,
@@ -21,7 +21,7 @@ pub(super) struct Claim {
 }
 
 impl Claim {
-    /// The lowest number that is free in `folder`, which is made where it does not exist.
+    /// Takes the lowest free number in `folder`, which is made where it does not exist.
     pub(super) fn new(folder: &Path, stem: &str) -> Result<Self, CaptureError> {
         std::fs::create_dir_all(folder).map_err(|e| CaptureError::file(folder, e))?;
         for number in 1.. {
@@ -48,14 +48,14 @@ impl Claim {
         unreachable!("there is a number behind each")
     }
 
-    /// A file under the number.
+    /// Returns the path of a file under the number.
     pub(super) fn add(&mut self, end: &str) -> PathBuf {
         let path = self.folder.join(format!("{}{end}", self.base));
         self.written.push(path.clone());
         path
     }
 
-    /// A folder under the number.
+    /// Makes a folder under the number.
     pub(super) fn add_folder(&mut self) -> Result<PathBuf, CaptureError> {
         let path = self.folder.join(&self.base);
         std::fs::create_dir(&path).map_err(|e| CaptureError::file(&path, e))?;
@@ -63,7 +63,7 @@ impl Claim {
         Ok(path)
     }
 
-    /// Writes the sidecar; all stays.
+    /// Writes the sidecar and keeps all files.
     pub(super) fn keep(mut self, sidecar: &Sidecar) -> Result<(), CaptureError> {
         let text = serde_json::to_string_pretty(sidecar).expect("plain values") + "\n";
         let written = self.sidecar.write_all(text.as_bytes());
@@ -79,7 +79,7 @@ impl Drop for Claim {
             return;
         }
         for path in &self.written {
-            // What was never written needs no removing, and there is no one to tell of the rest.
+            // A file that was never written needs no removal, and no one can be told of the rest.
             let _ = match path.is_dir() {
                 true => std::fs::remove_dir_all(path),
                 false => std::fs::remove_file(path),
@@ -100,7 +100,7 @@ pub(super) fn write_new(path: &Path, bytes: &[u8]) -> Result<(), CaptureError> {
     opened.and_then(|mut file| file.write_all(bytes)).map_err(|e| CaptureError::file(path, e))
 }
 
-/// 8-bit grey, the red channel of `rgba`, with its scale: pixels of `pitch` mm; and a text under the
+/// A PNG file in 8-bit grey, the red channel of `rgba`: pixels of `pitch` mm, and a text under the
 /// keyword `insonify`.
 pub(super) fn grey_png(
     [width, height]: [u32; 2],
@@ -130,7 +130,7 @@ pub(super) fn grey_png(
     out
 }
 
-/// As it is.
+/// A PNG file in colour, without scale or text.
 pub(super) fn colour_png([width, height]: [u32; 2], rgba: &[u8]) -> Vec<u8> {
     let picture = RgbaImage::from_raw(width, height, rgba.to_vec()).expect("four bytes per pixel");
     let mut out = Cursor::new(Vec::new());
@@ -139,7 +139,7 @@ pub(super) fn colour_png([width, height]: [u32; 2], rgba: &[u8]) -> Vec<u8> {
     out.into_inner()
 }
 
-/// RGBA pixels of one size in another: all pictures of a clip have that of its finest.
+/// Resizes RGBA pixels: all pictures of a clip have the size of its finest.
 pub(super) fn scaled(rgba: Vec<u8>, [width, height]: [u32; 2], to: [u32; 2]) -> Vec<u8> {
     if [width, height] == to {
         return rgba;

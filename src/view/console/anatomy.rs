@@ -6,7 +6,7 @@ use super::controls::group;
 use crate::settings::{Group, Tissue};
 use crate::view::model::{Placed, Settings};
 
-/// One of a list; what was chosen last may be gone with another scene.
+/// A list to choose one name from; the last choice may be gone with another scene.
 fn pick<'n>(ui: &mut Ui, id: &str, names: impl Iterator<Item = &'n str>, chosen: &mut usize) {
     let names: Vec<_> = names.collect();
     *chosen = (*chosen).min(names.len().saturating_sub(1));

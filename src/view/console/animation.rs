@@ -1,4 +1,4 @@
-//! The scene's time.
+//! The section for the scene's time.
 
 use std::time::Instant;
 
@@ -36,7 +36,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
         model.touch(now);
     }
     let tracer = model.settings.tracer;
-    // What one selector switches is followed by one strategy.
+    // Meshes that one selector switches have one strategy.
     let mut shown: Vec<&Option<String>> = Vec::new();
     for (index, strategy) in model.settings.strategies.iter_mut().enumerate() {
         let switch = &model.meshes[index].switch;

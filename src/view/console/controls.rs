@@ -5,7 +5,7 @@ use egui::{ComboBox, DragValue, Response, Slider, SliderClamping, Ui};
 use crate::settings::units::ANGLE;
 use crate::settings::{Facts, Form, Group, Off, Row, Value, Words};
 
-/// Meaning, range and name of a key in a tooltip. `path` is its table.
+/// Adds a tooltip: meaning, range and name of a key. `path` is its table.
 pub(super) fn explained(response: Response, path: &str, facts: &Facts) -> Response {
     let unit = facts.unit();
     let range = match facts.range {
@@ -20,15 +20,15 @@ pub(super) fn explained(response: Response, path: &str, facts: &Facts) -> Respon
     response.on_hover_text(format!("{meaning}{range}\n{path}.{}", facts.key))
 }
 
-/// The two columns that the controls below fill.
+/// Draws a grid with two columns for the controls below.
 pub(super) fn grid(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
     egui::Grid::new(id).num_columns(2).spacing([8.0, 4.0]).min_col_width(96.0).show(ui, add);
 }
 
-/// What draws a setting that needs more than its row; true where it has.
+/// Draws a setting that needs more than its row; returns true where it has drawn it.
 pub(super) type Special<'s, T> = &'s mut dyn FnMut(&mut Ui, &Facts, &mut T) -> bool;
 
-/// Controls of all settings of a group, its sections one below the other. `path` is its table.
+/// Draws the controls of all settings of a group, its sections one below the other. `path` is its table.
 pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T, special: Special<'_, T>) {
     section(ui, path, settings, "", special);
     let mut shown = vec![""];
@@ -41,7 +41,7 @@ pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T, special
     }
 }
 
-/// Controls of one section of a group.
+/// Draws the controls of one section of a group.
 pub(super) fn section<T: Group>(
     ui: &mut Ui,
     path: &str,
@@ -50,7 +50,7 @@ pub(super) fn section<T: Group>(
     special: Special<'_, T>,
 ) {
     grid(ui, &format!("{path} {name}"), |ui| {
-        // Without a label a setting has its control elsewhere.
+        // A setting without a label has its control elsewhere.
         let rows = T::rows().iter().filter(|row| row.facts.under == name);
         for row in rows.filter(|row| !row.facts.label.is_empty()) {
             if !special(ui, &row.facts, settings) {
@@ -60,7 +60,7 @@ pub(super) fn section<T: Group>(
     });
 }
 
-/// Label and control of one setting.
+/// Draws label and control of one setting.
 fn control<T>(ui: &mut Ui, path: &str, row: &Row<T>, settings: &mut T) {
     let facts = &row.facts;
     let before = (row.get)(settings);
@@ -94,7 +94,7 @@ fn control<T>(ui: &mut Ui, path: &str, row: &Row<T>, settings: &mut T) {
     }
 }
 
-/// A slider over the usual values; typing takes all that a scene file may give.
+/// A slider over the usual values; the keyboard takes every value that a scene file may give.
 fn slider(ui: &mut Ui, path: &str, facts: &Facts, value: &mut f64) {
     // A long unit needs the room.
     let beyond = facts.unit().len().saturating_sub(5) as f32;
@@ -155,7 +155,7 @@ fn number_or_off(ui: &mut Ui, path: &str, facts: &Facts, value: &mut Value) {
     }
 }
 
-/// One of the words of a key.
+/// A list of the words that a key takes.
 fn choice(ui: &mut Ui, path: &str, facts: &Facts, chosen: &mut &'static str) {
     let Form::Words(words) = facts.form else { return };
     let id = format!("{path}.{}", facts.key);
@@ -167,7 +167,7 @@ fn choice(ui: &mut Ui, path: &str, facts: &Facts, chosen: &mut &'static str) {
     explained(list.response, path, facts);
 }
 
-/// The list of choices alone, those that are `possible`; `id` tells several apart.
+/// The list of words alone, those that are `possible`; `id` distinguishes several lists.
 pub(super) fn words<W: Words>(
     ui: &mut Ui,
     id: &str,

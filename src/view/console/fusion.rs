@@ -1,4 +1,4 @@
-//! Fusion with an acquired volume, and which pixels are real.
+//! The section for fusion with an acquired volume, and for the marking of acquired pixels.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! Image formation.
+//! The section for image formation.
 
 use egui::{Slider, SliderClamping, Ui};
 

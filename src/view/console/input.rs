@@ -1,4 +1,4 @@
-//! What moves the probe, and the network that it is moved from.
+//! The section for devices that move the probe, and for the network.
 
 use std::time::{Duration, Instant};
 
@@ -35,7 +35,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Ins
     file(ui, model, inputs);
 }
 
-/// A line: a device, marked where it has the probe, and how it is.
+/// Draws a row: a device, marked where it has the probe, and its state.
 fn device(ui: &mut Ui, name: &str, holds: bool, state: impl FnOnce(&mut Ui)) {
     let mark = match holds {
         true => RichText::new(format!("{name} *")).color(style::ACCENT),
@@ -76,7 +76,7 @@ fn tracker(ui: &mut Ui, report: Option<&Report>) {
     };
 }
 
-/// Switch, port and clients of OpenIGTLink.
+/// Draws switch, port and clients of OpenIGTLink.
 fn network(ui: &mut Ui, inputs: &mut Inputs) {
     let mut on = inputs.report.is_some();
     ui.horizontal(|ui| {
@@ -109,7 +109,7 @@ fn network(ui: &mut Ui, inputs: &mut Inputs) {
     }
 }
 
-/// How the trajectory is.
+/// The state of the trajectory as a text.
 fn replay(model: &Model, now: Instant) -> String {
     let ways = &model.ways;
     match (&ways.recorder, &ways.replay, &ways.kept) {
@@ -129,7 +129,7 @@ fn replay(model: &Model, now: Instant) -> String {
     }
 }
 
-/// Recording and replay.
+/// Draws the controls for recording and replay.
 fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.horizontal(|ui| {
         let is_recording = model.ways.recorder.is_some();
@@ -159,7 +159,7 @@ fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.add_enabled(model.animated, choice).on_hover_text(tip);
 }
 
-/// The file of the trajectory.
+/// Draws the controls for the trajectory's file.
 fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs) {
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(&mut inputs.path).desired_width(180.0);

@@ -1,4 +1,4 @@
-//! Transducer and its geometry.
+//! The section for the transducer and its geometry.
 
 use egui::{ComboBox, Ui};
 

@@ -1,4 +1,4 @@
-//! The acquired volume and the model laid onto each other, by numbers.
+//! The section for the registration of the acquired volume with the model, by numbers.
 
 use egui::{DragValue, Ui};
 use glam::{DAffine3, DQuat, DVec3};
@@ -44,7 +44,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
     masks(ui, model);
 }
 
-/// Shift, rotation and scale.
+/// Draws shift, rotation and scale.
 fn placement(ui: &mut Ui, place: &mut DAffine3) {
     let (scale, rotation, mut shift) = place.to_scale_rotation_translation();
     let mut factor = scale.x;
@@ -74,7 +74,7 @@ fn placement(ui: &mut Ui, place: &mut DAffine3) {
     }
 }
 
-/// The window of grey levels.
+/// Draws the window of grey levels.
 fn levels(ui: &mut Ui, display: &mut Display) {
     let step = (display.white - display.black).abs() / 200.0;
     let before = *display;
@@ -90,7 +90,7 @@ fn levels(ui: &mut Ui, display: &mut Display) {
     }
 }
 
-/// The masking meshes.
+/// Draws the list of masking meshes.
 fn masks(ui: &mut Ui, model: &mut Model) {
     let (Some(registration), Some(fusion)) = (&model.registration, &mut model.settings.fusion)
     else {

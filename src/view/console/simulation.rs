@@ -1,4 +1,4 @@
-//! Path tracing and scatterers.
+//! The section for path tracing and scatterers.
 
 use egui::{ComboBox, Ui};
 

@@ -1,4 +1,4 @@
-//! What the simulation's thread does.
+//! The work of the simulation's thread.
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, MutexGuard, PoisonError};
@@ -6,7 +6,9 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::{Frame, Job, News, Pixels, SURVEY_PUT_OFF, Sector, Shared, State, WINDOW_PATIENCE};
+use super::{
+    Frame, Job, News, Pixels, Sector, Shared, State, VIEW3D_PUT_OFF, WINDOW_PATIENCE, Wake,
+};
 use crate::gpu::{Abandon, Device, GpuError};
 use crate::live::{self, Pace};
 use crate::scene::Scene;
@@ -17,35 +19,35 @@ use crate::view::look::Pictured;
 use crate::view::model::{Order, Settings};
 use crate::view::ring::Ring;
 
-/// Part of the budget that is the image's where the anatomy is looked at, too.
+/// Share of the image in the budget while the 3D view is open.
 const IMAGE_SHARE: f64 = 0.8;
 
-/// What is waited for before the first picture.
+/// Text while the scene is uploaded, before the first picture.
 const UPLOADING: &str = "Building structures of the anatomy, compiling kernels";
 const FIRST: &str = "Making the first picture";
 const COMPILING: &str = "Compiling kernels for this device, the first time only";
 
-/// The picture that was made last, and what it left on the device.
+/// The last picture, and the state that it left on the device.
 struct Imaged {
     order: Order,
-    /// How many orders were carried out before.
+    /// Number of orders carried out before.
     index: u32,
     pose: DAffine3,
     seconds: f64,
     level: usize,
 }
 
-/// What an image is to be made of.
+/// The contents of an image to be made.
 struct Taken {
     order: Order,
     index: u32,
     pose: DAffine3,
     seconds: f64,
-    /// Level of the ladder, where it is not left to the pace.
+    /// Level of the ladder; none leaves it to the pace.
     level: Option<usize>,
 }
 
-/// What the thread works with.
+/// The state of the thread.
 pub(super) struct Worker {
     shared: Arc<Shared>,
     ring: Ring,
@@ -54,19 +56,19 @@ pub(super) struct Worker {
     device: Arc<Device>,
     library: Arc<Library>,
     scene: Scene,
-    /// Settings that the simulator's buffers are known to hold.
+    /// Settings that the simulator's buffers hold.
     fitted: Option<Arc<Settings>>,
-    /// When the last picture was begun that something new called for; finer ones of it come at once.
+    /// Start of the last picture made for something new; finer ones of it follow at once.
     imaged: Instant,
-    /// What was carried out last, or failed to be.
+    /// The last order carried out, or tried.
     last: Option<Order>,
-    /// What the last picture left on the device.
+    /// The state that the last picture left on the device.
     left: Option<Imaged>,
-    /// Which counts the next picture has.
+    /// Chooses the counts of the next picture.
     pace: Pace,
-    /// When the last picture of the anatomy was finished, and what it took.
-    surveyed: (Instant, Duration),
-    wake: Box<dyn Fn() + Send>,
+    /// End and duration of the last picture of the anatomy.
+    view3d_made: (Instant, Duration),
+    wake: Wake,
 }
 
 impl Worker {
@@ -76,14 +78,14 @@ impl Worker {
         scene: Scene,
         link: Link,
         shared: Arc<Shared>,
-        wake: Box<dyn Fn() + Send>,
+        wake: Wake,
     ) -> Self {
         let machine = sim::machine(device);
         Self {
             shared,
             ring: Ring::new(device, "B-mode"),
             broadcast: Broadcast::new(link, device),
-            pictures: Ring::new(device, "survey"),
+            pictures: Ring::new(device, "view3d"),
             device: device.clone(),
             library,
             scene,
@@ -92,18 +94,18 @@ impl Worker {
             last: None,
             left: None,
             pace: Pace::new(machine),
-            surveyed: (Instant::now(), Duration::ZERO),
+            view3d_made: (Instant::now(), Duration::ZERO),
             wake,
         }
     }
 
-    /// Carries out what is ordered until it is stopped, or the device is lost.
+    /// Carries out orders until it is stopped or the device is lost.
     pub(super) fn run(mut self) {
         let mut simulator = None;
         let mut index = 0;
         while let Some(job) = self.next() {
             let taken = match job {
-                Job::Survey { moving } => {
+                Job::View3d { moving } => {
                     if !self.look(&mut simulator, moving) {
                         return;
                     }
@@ -139,7 +141,7 @@ impl Worker {
             let frame = self.carry_out(&mut simulator, &taken);
             match (&frame, &mut self.left) {
                 (Err(SimError::Gpu(GpuError::Abandoned)), _) => continue,
-                // What cannot be refined stays as it is.
+                // A picture that cannot be refined stays as it is.
                 (Err(_), Some(left)) => left.level = 0,
                 _ => {}
             }
@@ -153,8 +155,8 @@ impl Worker {
         }
     }
 
-    /// Pictures the anatomy; whether there will be more. What is begun because something moves is finished, or
-    /// there would be no picture at all.
+    /// Pictures the anatomy; returns whether there will be more. A picture begun because something moves is finished,
+    /// or there would be no picture at all.
     fn look(&mut self, simulator: &mut Option<(Simulator, Tracer)>, moving: bool) -> bool {
         self.shared.lock().looks_new = false;
         let Some((simulator, _)) = simulator else {
@@ -163,33 +165,33 @@ impl Worker {
         let began = Instant::now();
         simulator.abandon_when((!moving).then(|| self.newer()));
         let pictured = self.picture(simulator).transpose();
-        self.surveyed = (Instant::now(), began.elapsed());
+        self.view3d_made = (Instant::now(), began.elapsed());
         match pictured {
-            // It is still to be made, after what is newer.
+            // It is still to be made, after the newer job.
             Some(Err(SimError::Gpu(GpuError::Abandoned))) => {
                 let mut state = self.shared.lock();
                 state.looks_new = state.look.is_some();
                 true
             }
             Some(pictured) => {
-                let told = pictured.map(|pictured| News::Survey(Box::new(pictured)));
+                let told = pictured.map(|pictured| News::View3d(Box::new(pictured)));
                 self.report(told, false)
             }
             None => true,
         }
     }
 
-    /// What there is to make of an order now.
+    /// The contents of an order's image at this moment.
     fn taken(&self, order: Order, index: u32) -> Taken {
         let now = Instant::now();
         Taken { pose: order.pose(now), seconds: order.clock.at(now), order, index, level: None }
     }
 
-    /// Hands news over; whether there will be more.
+    /// Hands news over; returns whether there will be more.
     fn report(&self, news: Result<News, SimError>, fatal: bool) -> bool {
         match news {
             Ok(news) => self.tell(news),
-            // Everything on the device is gone with it.
+            // Everything on the device is lost with it.
             Err(error @ SimError::Gpu(GpuError::DeviceLost { .. })) => {
                 self.tell(News::Failed(error));
                 return false;
@@ -213,8 +215,8 @@ impl Worker {
         (self.wake)();
     }
 
-    /// The newest order once there is one, or the last one again while it looks different by itself;
-    /// at rest the last image at a finer level; nothing at the end. Pictures of the anatomy come between.
+    /// The newest order once there is one, or the last one again while its image changes by itself; at rest
+    /// the last image at a finer level; none at the end. Pictures of the anatomy come between.
     fn next(&self) -> Option<Job> {
         let mut state = self.shared.lock();
         loop {
@@ -227,7 +229,7 @@ impl Worker {
             }
             if std::mem::take(&mut state.resend) {
                 drop(state);
-                // What is wrong with the device will be told by the next frame.
+                // An error of the device will be told by the next frame.
                 let _ = self.broadcast.again();
                 state = self.shared.lock();
                 continue;
@@ -247,16 +249,16 @@ impl Worker {
             if let Some(level) = finer.filter(|_| quiet >= live::REST) {
                 return Some(Job::Refined(level));
             }
-            // While something moves the next order is about to come: what is begun before would be in its way.
+            // While something moves the next order is about to come: a job begun before would be in its way.
             let moving = due || touched < live::REST;
-            let (ended, took) = self.surveyed;
+            let (ended, took) = self.view3d_made;
             let looks = state.looks_new && left.is_some();
             let put_off = match moving {
-                true => (SURVEY_PUT_OFF * took).saturating_sub(ended.elapsed()),
+                true => (VIEW3D_PUT_OFF * took).saturating_sub(ended.elapsed()),
                 false => Duration::ZERO,
             };
             if looks && put_off.is_zero() {
-                return Some(Job::Survey { moving });
+                return Some(Job::View3d { moving });
             }
             if due {
                 let again = || running.expect("due without an order").again(Instant::now());
@@ -268,7 +270,7 @@ impl Worker {
         }
     }
 
-    /// Waits until something has changed, for so long at most.
+    /// Waits until something has changed, but no longer than `most`.
     fn wait<'s>(
         &'s self,
         state: MutexGuard<'s, State>,
@@ -295,14 +297,14 @@ impl Worker {
         self.left = None;
         self.pace.forget();
         let mut state = self.shared.lock();
-        // What was ordered of the scene before means nothing here.
+        // Orders for the scene before mean nothing here.
         state.order = None;
         state.frozen = false;
         drop(state);
         Ok((simulator, tracer))
     }
 
-    /// The anatomy of the last image as it is looked at now, if it is.
+    /// Pictures the anatomy of the last image from the wanted view, if there is one.
     fn picture(&mut self, simulator: &mut Simulator) -> Result<Option<Pictured>, SimError> {
         let look = self.shared.lock().look.clone();
         let (Some(look), Some(left)) = (look, &self.left) else {
@@ -313,7 +315,7 @@ impl Worker {
             return Ok(None);
         }
         let image = self.pictures.free(look.sight.size)?;
-        let timings = simulator.survey(&self.library, &look.sight, &image)?;
+        let timings = simulator.view3d(&self.library, &look.sight, &image)?;
         Ok(Some(Pictured {
             image,
             look,
@@ -323,13 +325,13 @@ impl Worker {
         }))
     }
 
-    /// Whether there is something newer to do than what was begun last.
+    /// Returns a check whether something newer is to be done than the last job begun.
     fn newer(&self) -> Abandon {
         let shared = self.shared.clone();
         Arc::new(move || shared.newer.load(Ordering::Acquire))
     }
 
-    /// Uploads the scene where it is not there, and makes room for its own counts.
+    /// Uploads the scene where it is not loaded, and makes room for the scene's own counts.
     fn prepare<'s>(
         &mut self,
         simulator: &'s mut Option<(Simulator, Tracer)>,
@@ -363,6 +365,8 @@ impl Worker {
         simulator: &mut Option<(Simulator, Tracer)>,
         taken: &Taken,
     ) -> Result<(Frame, Option<Pixels>), SimError> {
+        #[cfg(debug_assertions)]
+        die_where_asked();
         let began = Instant::now();
         let (order, pose, seconds) = (&taken.order, taken.pose, taken.seconds);
         order.settings.apply(&mut self.scene);
@@ -372,7 +376,7 @@ impl Worker {
             self.imaged = began;
         }
         self.scene.set_time(seconds);
-        // Tables and buffers of the scene's own are made once; their time is not that of a frame.
+        // Tables and buffers of the scene's own counts are made once; their time is not part of a frame's.
         let (simulator, settings) = self.prepare(simulator, &order.settings)?;
         let prepared = began.elapsed();
         let looked_at = self.shared.lock().look.is_some();
@@ -382,7 +386,7 @@ impl Worker {
             None => self.pace.moving(&self.scene),
         };
         self.pace.apply(level, &mut self.scene);
-        // What was begun because something moves is finished, or there would be no picture at all.
+        // A picture begun because something moves is finished, or there would be no picture at all.
         simulator.abandon_when(at_rest.then(|| self.newer()));
         let scene = &self.scene;
         let image = self.ring.free(image_size(scene))?;
@@ -392,7 +396,7 @@ impl Worker {
             None => None,
         };
         simulator.tint_on(tinted.clone());
-        // The scene's own picture is that of `render`, with the noise of its first frame.
+        // The scene's own picture is the one of `render`, with the noise of its first frame.
         let index = if level == 0 && at_rest { 0 } else { taken.index };
         let submitted = simulator.frame(scene, index);
         simulator.show_on(None);
@@ -400,7 +404,7 @@ impl Worker {
         submitted?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         let wall = began.elapsed();
-        // The first frame at all compiles what the driver has put off.
+        // The very first frame includes kernels that the driver compiles late.
         if self.left.is_some() {
             self.pace.finished(level, (wall - prepared).as_secs_f64() * 1e3);
         }
@@ -444,5 +448,14 @@ impl Worker {
             image_bytes: self.ring.bytes(),
         };
         Ok((frame, pixels))
+    }
+}
+
+/// Panics once the file that a test names is there, and takes it away.
+#[cfg(debug_assertions)]
+fn die_where_asked() {
+    let asked = std::env::var_os("INSONIFY_TEST_DEATH");
+    if asked.is_some_and(|file| std::fs::remove_file(file).is_ok()) {
+        panic!("a test has asked for it");
     }
 }

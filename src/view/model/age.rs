@@ -1,9 +1,9 @@
-//! How long ago something was, in words.
+//! The age of something in words.
 
 use std::time::Duration;
 
-/// An age as one reads it - seconds up to a minute, then minutes, then hours - and how long it will
-/// read so.
+/// An age as text - seconds up to a minute, then minutes, then hours - and the time after which the
+/// text changes.
 pub fn age(age: Duration) -> (String, Duration) {
     let seconds = age.as_secs();
     let (unit, word) = match seconds {

@@ -4,22 +4,22 @@ use std::f64::consts::PI;
 
 use glam::DVec2;
 
-/// What is measured.
+/// Kind of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
-    /// Between two points, mm.
+    /// Distance between two points, mm.
     Distance,
     /// Circumference and area: the ends of one axis, then half the other.
     Ellipse,
-    /// Between two arms: a point on one, the vertex, a point on the other.
+    /// Angle between two arms: a point on one, the vertex, a point on the other.
     Angle,
 }
 
 impl Kind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 3] = [Self::Distance, Self::Ellipse, Self::Angle];
 
-    /// As it is called.
+    /// Name of the kind.
     pub fn name(self) -> &'static str {
         match self {
             Self::Distance => "distance",
@@ -28,7 +28,7 @@ impl Kind {
         }
     }
 
-    /// Points that it takes.
+    /// Number of its points.
     pub fn points(self) -> usize {
         match self {
             Self::Distance => 2,
@@ -47,12 +47,12 @@ impl Kind {
     }
 }
 
-/// What a measurement says.
+/// Result of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reading {
     /// Length, mm.
     Distance(f64),
-    /// Of an ellipse.
+    /// Size of an ellipse.
     Ellipse {
         /// Both axes, mm, in the order in which they were drawn.
         axes: [f64; 2],
@@ -61,23 +61,23 @@ pub enum Reading {
         /// Area, mm^2.
         area: f64,
     },
-    /// 0 to 180 degrees.
+    /// Angle, 0 to 180 degrees.
     Angle(f64),
 }
 
-/// A measurement: its points, as many as [`Kind::points`].
+/// A measurement and its points, as many as [`Kind::points`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Caliper {
-    /// What is measured.
+    /// Kind of the measurement.
     pub kind: Kind,
-    /// Where, mm. The third point of an ellipse lies on its second axis.
+    /// Its points, mm. The third point of an ellipse lies on its second axis.
     pub points: Vec<DVec2>,
-    /// A name, or nothing.
+    /// Its name, or an empty text.
     pub label: String,
 }
 
 impl Caliper {
-    /// One without a name.
+    /// A measurement without a name.
     ///
     /// # Panics
     /// When there are not as many points as `kind` takes.
@@ -105,7 +105,7 @@ impl Caliper {
         }
     }
 
-    /// What it says.
+    /// Result of the measurement.
     pub fn reading(&self) -> Reading {
         let p = &self.points;
         match self.kind {
@@ -138,7 +138,7 @@ impl Caliper {
         (self.points[0] + self.points[1]) / 2.0
     }
 
-    /// Of the first axis; where that has no length yet, downwards.
+    /// Unit normal of the first axis; downwards while that has no length.
     fn normal(&self) -> DVec2 {
         let axis = self.points[1] - self.points[0];
         axis.perp().normalize_or(DVec2::Y)
@@ -220,7 +220,7 @@ mod tests {
             ([[-3.0, 1.0], [0.0, 1.0], [9.0, 1.0]], 180.0),
             ([[3.0, 1.0], [0.0, 1.0], [9.0, 1.0]], 0.0),
             ([[0.0, 1.0], [0.0, 1.0], [9.0, 1.0]], 0.0),
-            // On both sides of the cut of the arc tangent.
+            // On both sides of the arc tangent's branch cut.
             ([[-1.0, 0.1], [0.0, 0.0], [-1.0, -0.1]], 2.0 * 0.1_f64.atan().to_degrees()),
         ] {
             let Reading::Angle(degrees) = made(Kind::Angle, &points).reading() else {
@@ -232,7 +232,7 @@ mod tests {
 
     #[test]
     fn an_ellipse_is_measured_along_its_axes() {
-        // The third point need not lie on the second axis: what counts is how far it is from the first.
+        // The third point need not lie on the second axis: only its distance from the first axis counts.
         let drawn = made(Kind::Ellipse, &[[10.0, 20.0], [10.0, 50.0], [18.0, 24.0]]);
         assert_eq!(drawn.points[2], dvec2(18.0, 35.0));
         let Reading::Ellipse { axes, circumference, area } = drawn.reading() else {
@@ -240,12 +240,12 @@ mod tests {
         };
         assert_eq!(axes, [30.0, 16.0]);
         close(area, PI * 15.0 * 8.0);
-        // By the outline that is drawn: the polygon's error falls with the square of its sides.
+        // Compared with the drawn outline: the polygon's error falls with the square of its sides.
         let sides = 20_000;
         let at = |i| drawn.outline(2.0 * PI * f64::from(i) / f64::from(sides));
         let length: f64 = (0..sides).map(|i| at(i).distance(at(i + 1))).sum();
         assert!((length - circumference).abs() < 1e-6, "{length} {circumference}");
-        // Ends carry the second axis with them, without changing it.
+        // An end moves the second axis with it, unchanged.
         let mut moved = drawn.clone();
         moved.drag(1, dvec2(40.0, 20.0));
         let Reading::Ellipse { axes, .. } = moved.reading() else {

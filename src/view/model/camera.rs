@@ -1,42 +1,42 @@
-//! The eye of the 3D view: a perspective camera that goes around a point of the anatomy.
+//! The camera of the 3D view: a perspective camera that goes around a point of the anatomy.
 //!
 //! A panel is its width and height in any unit of length (points, pixels), and places in it are
 //! counted from its upper left corner in that unit.
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
-/// Angle under which the smaller side of the panel is seen, rad: long enough a lens that organs keep
-/// their proportions.
+/// Angle over the smaller side of the panel, rad: small enough that organs keep their
+/// proportions.
 const FIELD_OF_VIEW: f64 = 30.0 * std::f64::consts::PI / 180.0;
-/// Nearest and farthest that the eye goes, in sizes of what is looked at.
+/// Least and greatest distance of the camera, as multiples of the radius of what it looks at.
 const REACH: [f64; 2] = [0.02, 20.0];
 
 /// A ray of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Where it begins, mm.
+    /// Start, mm.
     pub origin: DVec3,
     /// Unit direction.
     pub direction: DVec3,
 }
 
-/// Where the eye is and where it looks.
+/// Position and direction of the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// What it looks at and goes around, world, mm.
+    /// Point that it looks at and goes around, world, mm.
     pub target: DVec3,
-    /// From the target to the eye, mm.
+    /// Distance from the target to the camera, mm.
     pub distance: f64,
-    /// World from camera: x to the right, y up, z from the target to the eye.
+    /// World from camera: x to the right, y up, z from the target to the camera.
     pub turn: DQuat,
-    /// Unit vector about which it goes around sideways.
+    /// Unit vector of the axis for sideways turns.
     up: DVec3,
-    /// Radius of what is looked at, mm.
+    /// Radius of the ball around the target, mm.
     size: f64,
 }
 
 impl Camera {
-    /// Looks at a ball of `radius` (mm) around `target` so that it fills the panel, in the image
+    /// A camera for which a ball of `radius` (mm) around `target` fills the panel, facing the image
     /// plane of `pose` (world from probe): the image's left on the left, the probe above.
     pub fn front(pose: &DAffine3, target: DVec3, radius: f64) -> Self {
         let up = -pose.transform_vector3(DVec3::Z).normalize();
@@ -69,14 +69,14 @@ impl Camera {
     /// being half a turn.
     pub fn orbit(&mut self, panel: DVec2, by: DVec2) {
         let angle = -by / panel.min_element().max(1.0) * std::f64::consts::PI;
-        // Upside down, what is dragged still follows the hand.
+        // Upside down, the picture still follows the pointer.
         let upright = if self.above().dot(self.up) < 0.0 { -1.0 } else { 1.0 };
         let around = DQuat::from_axis_angle(self.up, angle.x * upright);
         let over = DQuat::from_axis_angle(DVec3::X, angle.y);
         self.turn = (around * self.turn * over).normalize();
     }
 
-    /// Shifts what is looked at by `by`, so that the target's plane follows the hand.
+    /// Shifts the target by `by`, so that the target's plane follows the pointer.
     pub fn pan(&mut self, panel: DVec2, by: DVec2) {
         let step = by * self.pitch(panel) * self.distance;
         self.target -= self.right() * step.x - self.above() * step.y;
@@ -88,7 +88,7 @@ impl Camera {
         self.distance = (self.distance * 0.9f64.powf(steps)).clamp(least, most);
     }
 
-    /// Where the eye is, mm.
+    /// Position of the camera, mm.
     pub fn eye(&self) -> DVec3 {
         self.target + self.turn * DVec3::Z * self.distance
     }
@@ -103,7 +103,7 @@ impl Camera {
         self.turn * DVec3::Y
     }
 
-    /// Unit vector from the eye to the target.
+    /// Unit vector from the camera to the target.
     pub fn forward(&self) -> DVec3 {
         self.turn * DVec3::NEG_Z
     }
@@ -113,15 +113,15 @@ impl Camera {
         2.0 * (FIELD_OF_VIEW / 2.0).tan() / panel.min_element().max(1.0)
     }
 
-    /// What is seen at a place of the panel.
+    /// The ray through a place of the panel.
     pub fn ray(&self, panel: DVec2, place: DVec2) -> Ray {
         let off = (place - panel / 2.0) * self.pitch(panel);
         let direction = self.forward() + off.x * self.right() - off.y * self.above();
         Ray { origin: self.eye(), direction: direction.normalize() }
     }
 
-    /// Where a point of the world (mm) is seen in the panel, or beside it; nothing where it is not in
-    /// front of the eye.
+    /// The place of the panel, or beside it, where a point of the world (mm) appears; none where the point is not
+    /// in front of the camera.
     pub fn project(&self, panel: DVec2, point: DVec3) -> Option<DVec2> {
         let v = point - self.eye();
         let depth = v.dot(self.forward());
@@ -158,7 +158,7 @@ mod tests {
             [[0.0, 0.0, 60.0], [20.0, 0.0, 60.0], [0.0, 0.0, 80.0], [20.0, 15.0, 60.0]]
                 .map(|p| seen(&camera, p));
         assert!((middle - PANEL / 2.0).length() < 1e-9);
-        // 20 mm at the target's distance, by the perspective.
+        // 20 mm at the target's distance, in perspective.
         let length = 20.0 / (camera.distance * camera.pitch(PANEL));
         assert!((right - middle - DVec2::new(length, 0.0)).length() < 1e-9);
         assert!((deeper - middle - DVec2::new(0.0, length)).length() < 1e-9);
@@ -201,7 +201,7 @@ mod tests {
         panned.pan(PANEL, DVec2::new(40.0, 25.0));
         let now = panned.project(PANEL, point).expect("seen");
         assert!((now - at - DVec2::new(40.0, 25.0)).length() < 1e-9);
-        // The side towards the eye follows a drag; the distance stays.
+        // The side towards the camera follows a drag; the distance stays.
         let near = before.target - 30.0 * before.forward();
         for by in [DVec2::new(20.0, 0.0), DVec2::new(0.0, 20.0)] {
             let mut turned = before;

@@ -1,19 +1,19 @@
-//! The cine loop: what was imaged last, to be looked through while the image is frozen.
+//! The cine loop: the last images, to be looked through while the image is frozen.
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-/// Longest time for which one frame is shown while the loop plays: nothing is recorded while
-/// nothing changes, and nobody wants to wait for that.
+/// Longest time for which one frame is shown while the loop plays: nothing is recorded while nothing
+/// changes, and nobody wants to wait through that.
 const LONGEST: Duration = Duration::from_secs(1);
 
-/// How long the last frame is shown, and the only one.
+/// Time for which the last frame is shown, and the only one.
 const LAST: Duration = Duration::from_millis(100);
 
-/// How much a loop may hold.
+/// Size limits of a loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limit {
-    /// Frames; at least one is held.
+    /// Number of frames; at least one is held.
     pub frames: usize,
     /// Bytes of all frames.
     pub bytes: u64,
@@ -25,17 +25,17 @@ struct Taken<T> {
     at: Instant,
 }
 
-/// Frames in the order in which they were taken, one of which is shown. Those that do not fit any
-/// more are dropped from the front.
+/// Frames in the order of imaging, one of which is shown. Where there are too many, the oldest are
+/// dropped.
 pub struct Cine<T> {
     frames: VecDeque<Taken<T>>,
     limit: Limit,
     bytes: u64,
     cursor: usize,
-    /// First and last frame of what plays and is saved.
+    /// First and last frame of the marked part, which is played and saved.
     marks: [usize; 2],
     speed: f64,
-    /// Since when it plays, and the loop's time then.
+    /// Start of playing, and the loop's time at that moment.
     playing: Option<(Instant, Duration)>,
 }
 
@@ -53,8 +53,8 @@ impl<T> Cine<T> {
         }
     }
 
-    /// Adds a frame of so many bytes, taken `at` that instant. Where the last one was shown, this
-    /// one is now; the same for the mark of the last.
+    /// Adds a frame of so many bytes, made at the instant `at`. Where the last frame was shown, the new
+    /// one is shown now; the same for the mark of the last frame.
     pub fn push(&mut self, frame: T, bytes: u64, at: Instant) {
         let last = self.last();
         let follows = self.cursor == last;
@@ -72,7 +72,7 @@ impl<T> Cine<T> {
         }
     }
 
-    /// Puts a frame of so many bytes in the place of the newest: the same once more, but finer.
+    /// Replaces the newest frame by one of so many bytes: the same image at a higher quality.
     pub fn replace_newest(&mut self, frame: T, bytes: u64) {
         if let Some(newest) = self.frames.back_mut() {
             self.bytes = self.bytes - newest.bytes + bytes;
@@ -99,7 +99,7 @@ impl<T> Cine<T> {
         *self = Self { speed: self.speed, ..Self::new(self.limit) };
     }
 
-    /// Shows the newest frame again, and plays and saves all.
+    /// Shows the newest frame again, and marks all frames.
     pub fn go_live(&mut self) {
         self.playing = None;
         self.cursor = self.last();
@@ -111,12 +111,12 @@ impl<T> Cine<T> {
         self.frames.iter().map(|taken| &taken.frame)
     }
 
-    /// How many there are.
+    /// Number of frames.
     pub fn len(&self) -> usize {
         self.frames.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.frames.is_empty()
     }
@@ -126,7 +126,7 @@ impl<T> Cine<T> {
         self.bytes
     }
 
-    /// The newest one.
+    /// The newest frame.
     pub fn newest(&self) -> Option<&T> {
         self.frames.back().map(|taken| &taken.frame)
     }
@@ -136,49 +136,49 @@ impl<T> Cine<T> {
         self.frames.get(self.cursor).map(|taken| &taken.frame)
     }
 
-    /// Its index.
+    /// Index of the frame shown.
     pub fn cursor(&self) -> usize {
         self.cursor
     }
 
-    /// Shows a frame, the last one where there are not as many; it does not play any more.
+    /// Shows a frame, or the last one where there are fewer; stops playing.
     pub fn seek(&mut self, index: usize) {
         self.playing = None;
         self.cursor = index.min(self.last());
     }
 
-    /// Shows the frame so many further on; it stops at the ends.
+    /// Shows the frame so many further on, at most up to the ends.
     pub fn step(&mut self, by: isize) {
         self.seek(self.cursor.saturating_add_signed(by));
     }
 
-    /// First and last frame of what plays and is saved.
+    /// First and last frame of the marked part, which is played and saved.
     pub fn marks(&self) -> [usize; 2] {
         self.marks
     }
 
-    /// Begins the marked part with a frame; a part that ended before it is that frame.
+    /// Begins the marked part with a frame; a part that ended before it becomes that frame.
     pub fn mark_first(&mut self, index: usize) {
         let index = index.min(self.last());
         self.marks = [index, self.marks[1].max(index)];
         self.rewind();
     }
 
-    /// Ends the marked part with a frame; a part that began behind it is that frame.
+    /// Ends the marked part with a frame; a part that began behind it becomes that frame.
     pub fn mark_last(&mut self, index: usize) {
         let index = index.min(self.last());
         self.marks = [self.marks[0].min(index), index];
         self.rewind();
     }
 
-    /// The marked frames, each with the time for which it is shown at the pace of recording.
+    /// The marked frames, each with its time at the pace of recording.
     pub fn marked(&self) -> impl ExactSizeIterator<Item = (&T, Duration)> {
         let [first, last] = self.marks;
         let count = if self.is_empty() { 0 } else { last - first + 1 };
         (first..first + count).map(|index| (&self.frames[index].frame, self.shown_for(index)))
     }
 
-    /// For how long a frame is shown at the pace of recording.
+    /// Time for which a frame is shown at the pace of recording.
     fn shown_for(&self, index: usize) -> Duration {
         match self.frames.get(index + 1) {
             Some(next) if index < self.marks[1] => (next.at - self.frames[index].at).min(LONGEST),
@@ -191,12 +191,12 @@ impl<T> Cine<T> {
         (from..to).map(|index| self.shown_for(index)).sum()
     }
 
-    /// How much faster than recorded it plays.
+    /// Speed of playing; 1 is the pace of recording.
     pub fn speed(&self) -> f64 {
         self.speed
     }
 
-    /// Changes it; the loop goes on from where it is.
+    /// Changes the speed; the loop goes on from where it is.
     pub fn set_speed(&mut self, speed: f64, now: Instant) {
         let plays = self.is_playing();
         self.play(false, now);
@@ -204,7 +204,7 @@ impl<T> Cine<T> {
         self.play(plays, now);
     }
 
-    /// Whether it plays.
+    /// Returns whether it plays.
     pub fn is_playing(&self) -> bool {
         self.playing.is_some()
     }
@@ -228,7 +228,7 @@ impl<T> Cine<T> {
         }
     }
 
-    /// Shows what is to be shown now while it plays; how long until there is something else.
+    /// Shows the frame that is due while it plays; returns the time until the next one.
     pub fn tick(&mut self, now: Instant) -> Option<Duration> {
         let (since, from) = self.playing?;
         let [first, last] = self.marks;

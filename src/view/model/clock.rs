@@ -1,8 +1,8 @@
-//! The scene's time against that of the wall.
+//! The scene's time against wall-clock time.
 
 use std::time::Instant;
 
-/// A clock that plays at a speed, or stands.
+/// A clock that plays at a speed, or stands still.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Clock {
     /// The scene's seconds at `anchor`.
@@ -11,7 +11,7 @@ pub struct Clock {
     /// Scene seconds per second.
     speed: f64,
     playing: bool,
-    /// Stands although it plays.
+    /// True while it stands still although it plays.
     held: bool,
 }
 
@@ -29,12 +29,12 @@ impl Clock {
         }
     }
 
-    /// Whether time passes.
+    /// Returns whether time passes.
     pub fn runs(&self) -> bool {
         self.playing && !self.held
     }
 
-    /// Whether it plays, or would if it were not held.
+    /// Returns whether it plays, or would if it were not held.
     pub fn is_playing(&self) -> bool {
         self.playing
     }
@@ -50,7 +50,7 @@ impl Clock {
         self.playing = playing;
     }
 
-    /// Stands still for as long as it is held.
+    /// Makes it stand still as long as it is held.
     pub fn hold(&mut self, held: bool, now: Instant) {
         self.fix(now);
         self.held = held;

@@ -1,13 +1,13 @@
-//! Who moves the probe: the device that moved last.
+//! The device that moves the probe: the one that moved last.
 
 use glam::{DAffine3, DQuat};
 
-/// How far a tracker that lies still may seem to move: mm, and radians (2 degrees). Four times what
-/// an electromagnetic tracker errs by (NDI Aurora: 0.48 mm and 0.30 degrees, root mean square), and
-/// less than a hand moves that takes the probe up.
+/// Greatest movement that counts as a tracker at rest: mm, and radians (2 degrees). Four times the
+/// error of an electromagnetic tracker (NDI Aurora: 0.48 mm and 0.30 degrees, root mean square), and
+/// less than the movement of a hand that takes the probe up.
 const STILL: [f64; 2] = [2.0, 2.0 * std::f64::consts::PI / 180.0];
 
-/// What can move the probe.
+/// A device that can move the probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Keys.
@@ -35,31 +35,31 @@ impl Source {
     }
 }
 
-/// Which device has the probe. One takes it by moving; a tracker, which reports all the time, only
-/// when its tool is no longer where it was when another device took over.
+/// The device that has the probe. A device takes it by moving; a tracker, which reports all the time,
+/// only when its tool has left the place where it was when another device took over.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Devices {
     holder: Option<Source>,
     /// The tracker's last pose.
     tracked: Option<DAffine3>,
-    /// That at which the probe was taken from it.
+    /// The tracker's pose at which another device took the probe.
     rest: Option<DAffine3>,
 }
 
 impl Devices {
-    /// Who moved the probe last, if anybody has.
+    /// The device that moved the probe last, if any.
     pub fn holder(&self) -> Option<Source> {
         self.holder
     }
 
-    /// Another device than the tracker moves the probe.
+    /// Gives the probe to a device other than the tracker.
     pub fn take(&mut self, source: Source) {
         self.holder = Some(source);
         self.rest = self.tracked;
     }
 
-    /// The tracker reports a pose (world from probe); whether it moves the probe there. The first
-    /// one does: a tool that appears has been taken up.
+    /// Takes the tracker's pose (world from probe); returns whether it moves the probe there. The first
+    /// pose does: a tool that appears has been taken up.
     pub fn track(&mut self, pose: DAffine3) -> bool {
         self.tracked = Some(pose);
         let holds = self.holder == Some(Source::Tracker);
@@ -71,7 +71,7 @@ impl Devices {
     }
 }
 
-/// Whether two poses are farther apart than noise puts them.
+/// Returns whether two poses are farther apart than noise explains.
 fn is_moved(a: &DAffine3, b: &DAffine3) -> bool {
     let rotation = |pose: &DAffine3| DQuat::from_mat3(&pose.matrix3);
     a.translation.distance(b.translation) > STILL[0]

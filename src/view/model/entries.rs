@@ -1,4 +1,4 @@
-//! Settings as the entries of a scene file that say them.
+//! Settings as entries of a scene file.
 
 use glam::{DAffine3, DVec3};
 use toml_edit::Value;
@@ -12,16 +12,16 @@ use crate::settings::{
     Display, Fusion, Group, Imaging, Live, Probe, Simulation, Surface, Tissue, plain,
 };
 
-/// Path of the edge of a lattice cell, which follows from others.
+/// Path of the edge of a lattice cell, which follows from other settings.
 const CELL: &str = "simulation.cell";
 
 /// Relative difference below which two lattices are the same: each has been multiplied by frequencies
 /// and divided by them, some hundred times in a long session.
 const SAME_LATTICE: f64 = 1e-9;
 
-/// What a scene file has to say so that `from`, which it gives now, becomes `to`. `lattice` is
+/// Entries of a scene file that turn `from`, which the file gives now, into `to`. `lattice` is
 /// [`lattice`] of the file's own settings, which a quality chosen for the device may have scaled in
-/// both. The tracer is no matter of the file.
+/// both. The tracer does not belong to the file.
 pub(super) fn changes(
     from: &Settings,
     to: &Settings,
@@ -43,7 +43,7 @@ pub(super) fn changes(
     }
     out.extend(moved("model", &from.model, &to.model));
     out.extend(tissue_changes(&from.tissues, &to.tissues, &origins.bases));
-    // Instances of one table have the same settings: the first speaks for all.
+    // Instances of one table have the same settings: the first stands for all.
     let mut done: Vec<&Origin> = Vec::new();
     for (i, origin) in origins.instances.iter().enumerate() {
         if !done.iter().any(|o| o.mesh == origin.mesh) {
@@ -61,7 +61,7 @@ pub(super) fn changes(
     out
 }
 
-/// Path of the table that says how an instance's keyframes are followed.
+/// Path of the table with the strategy for an instance's keyframes.
 pub(super) fn switch(origin: &Origin) -> String {
     match &origin.selector {
         Some(selector) => format!("selector.{}", quoted(selector)),
@@ -72,7 +72,7 @@ pub(super) fn switch(origin: &Origin) -> String {
 /// The pose of the probe, to a ten thousandth of a millimetre.
 pub(super) fn pose(pose: &DAffine3) -> Vec<Entry> {
     let list = |v: DVec3, unit: f64| {
-        // Minus zero is no place.
+        // Minus zero becomes zero.
         let parts = v.to_array().map(|x| plain((x * unit).round() / unit + 0.0));
         Some(format!("[{}]", parts.join(", ")))
     };
@@ -84,20 +84,20 @@ pub(super) fn pose(pose: &DAffine3) -> Vec<Entry> {
     ]
 }
 
-/// Edge of a lattice cell in wavelengths of 1 mm/us, as the file says it: mm MHz, before scatterers
-/// that do not fit into the cells have divided them.
+/// Edge of a lattice cell in wavelengths at 1 mm/us, as the file gives it: mm MHz, before its division
+/// for scatterers that do not fit into the cells.
 pub(super) fn lattice(settings: &Settings) -> f64 {
     let s = &settings.simulation;
     s.cell * s.crowding() * settings.probe.frequency
 }
 
-/// Whether two lattices, or cells, are the same but for rounding.
+/// Returns whether two lattices, or cells, are equal within rounding.
 pub(super) fn is_same_lattice(a: f64, b: f64) -> bool {
     (a / b - 1.0).abs() < SAME_LATTICE
 }
 
-/// The cell follows frequency and density where the file does not say it, and is divided where there
-/// are more scatterers than cells.
+/// The cell's entry. The cell follows frequency and density where the file does not give it, and is divided
+/// where there are more scatterers than cells.
 fn cell(from: &Settings, to: &Settings, file: f64) -> Option<Entry> {
     let inputs = |s: &Settings| {
         let s = (s.simulation.cell, s.simulation.density_scale, s.probe.frequency);
@@ -106,7 +106,7 @@ fn cell(from: &Settings, to: &Settings, file: f64) -> Option<Entry> {
     if inputs(from) == inputs(to) {
         return None;
     }
-    // What a quality has scaled is not for the file.
+    // The scaling by a quality does not belong to the file.
     let value = match is_same_lattice(lattice(from), lattice(to)) {
         true => file / to.probe.frequency,
         false => lattice(to) / to.probe.frequency,
@@ -129,7 +129,7 @@ fn probe_changes(from: &Probe, to: &Probe) -> Vec<Entry> {
     out
 }
 
-/// Settings of the fusion, and the names of its masks.
+/// Entries of the fusion's settings and the names of its masks.
 fn fusion_changes(from: &Fusion, to: &Fusion, origins: &Origins) -> Vec<Entry> {
     let mut out = file::changes(from, to, Fusion::TABLE);
     if from.masks != to.masks {
@@ -143,14 +143,14 @@ fn fusion_changes(from: &Fusion, to: &Fusion, origins: &Origins) -> Vec<Entry> {
     out
 }
 
-/// Where `table` places something that keeps its proportions.
+/// Entries of the `table` that places something and keeps its proportions.
 fn moved(table: &str, from: &DAffine3, to: &DAffine3) -> Vec<Entry> {
     let entries = |place| Placement::of(place, Transformation::Similarity).entries(table);
     let pairs = entries(from).into_iter().zip(entries(to));
     pairs.filter(|(from, to)| from != to).map(|(_, entry)| entry).collect()
 }
 
-/// Those that are based on another one say themselves what that one no longer says as before.
+/// Entries of changed tissues. A tissue based on another states what the other no longer gives as before.
 fn tissue_changes(from: &[Tissue], to: &[Tissue], bases: &[Vec<String>]) -> Vec<Entry> {
     let differs: Vec<Vec<bool>> = (from.iter().zip(to))
         .map(|(from, to)| {
@@ -169,7 +169,7 @@ fn tissue_changes(from: &[Tissue], to: &[Tissue], bases: &[Vec<String>]) -> Vec<
         }
         let t = (from[i].impedance(), to_tissue.impedance());
         if t.0 != t.1 {
-            // It is derived; a stated one would contradict it.
+            // It is derived; a given one would contradict it.
             let path = format!("tissues.{}.impedance", quoted(&to_tissue.name));
             out.push((path, None));
         }
@@ -181,7 +181,7 @@ fn tissue(t: &Tissue) -> Vec<Entry> {
     file::entries(t, &format!("tissues.{}", quoted(&t.name)))
 }
 
-/// The inside is as the outside where the file does not say it: who changes that one says it.
+/// Entries of a changed surface; a change of the outside also writes an inside that the file does not give.
 fn surface_changes(mesh: &str, from: &[Surface; 2], to: &[Surface; 2]) -> Vec<Entry> {
     let path = format!("mesh.{}", quoted(mesh));
     let [outside, inside] = [(0, path.clone()), (1, format!("{path}.inside"))]

@@ -1,15 +1,15 @@
-//! Undo: settings as they were.
+//! Undo: earlier settings.
 
 use std::time::{Duration, Instant};
 
 use super::Settings;
 
-/// Changes of one thing that follow each other faster are one: the drag of a slider.
+/// Changes of one setting that follow each other faster count as one: the drag of a slider.
 const GESTURE: Duration = Duration::from_millis(700);
-/// Steps that are kept.
+/// Number of steps that are kept.
 const DEPTH: usize = 100;
 
-/// Settings before each change, and those that were undone.
+/// Settings before each change, and those undone.
 #[derive(Default)]
 pub(super) struct History {
     past: Vec<Settings>,
@@ -19,13 +19,13 @@ pub(super) struct History {
 
 /// A change that may go on.
 struct Gesture {
-    /// What it changes.
+    /// Paths of the settings that it changes.
     paths: Vec<String>,
     at: Instant,
 }
 
 impl History {
-    /// Notes what the settings were before a change of what lies at `paths`.
+    /// Notes the settings before a change of those at `paths`.
     pub(super) fn push(&mut self, before: Settings, paths: Vec<String>, now: Instant) {
         let last = self.last.as_ref();
         let goes_on = last.is_some_and(|last| now - last.at < GESTURE && last.paths == paths);
@@ -40,7 +40,7 @@ impl History {
         }
     }
 
-    /// What comes next is a change of its own.
+    /// Makes the next change a step of its own.
     pub(super) fn end_gesture(&mut self) {
         self.last = None;
     }
@@ -59,7 +59,7 @@ impl History {
         Some(after)
     }
 
-    /// Steps back and forward that there are.
+    /// Numbers of steps back and forward.
     pub(super) fn depth(&self) -> [usize; 2] {
         [self.past.len(), self.future.len()]
     }

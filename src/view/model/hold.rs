@@ -1,4 +1,4 @@
-//! The probe on the skin, as mouse and keys slide it.
+//! The probe on the skin, moved by mouse and keys.
 
 use std::time::Instant;
 
@@ -10,38 +10,38 @@ use crate::probe::Probe;
 use crate::scene::Scene;
 use crate::sim::contact::Skin;
 
-/// Least and most that the probe is pressed in, mm; below 0 it is held above the skin.
+/// Least and greatest depth to which the probe is pressed in, mm; below 0 it is held above the skin.
 pub const PRESSES: [f64; 2] = [-10.0, 20.0];
-/// What is seen under smaller a sine than this is seen edge on.
+/// Sine of the angle to a plane below which a ray counts as looking along it.
 const EDGE_ON: f64 = 0.1;
-/// Farthest that the probe goes at once in its image plane, mm.
+/// Farthest that one movement takes the probe in its image plane, mm.
 const FARTHEST: f64 = 25.0;
 
-/// How the probe is held to the skin.
+/// The contact of the probe with the skin.
 pub struct Hold {
     body: Body,
-    /// Every movement keeps the probe on the skin.
+    /// True where every movement keeps the probe on the skin.
     pub stays: bool,
-    /// How deep it is pressed in, mm.
+    /// Depth to which it is pressed in, mm.
     pub press: f64,
-    /// Where the face's centre was when the place was found that it is held to.
+    /// Centre of the face, and the place that the probe was held to for it.
     spot: Option<(DVec3, Spot)>,
 }
 
 impl Hold {
-    /// Free to leave the skin; nothing where the scene names none.
+    /// A probe free to leave the skin; none where the scene names no skin.
     pub fn of(scene: &Scene) -> Option<Self> {
         Some(Self { body: Body::of(scene)?, stays: false, press: PRESS, spot: None })
     }
 
-    /// The skin is where the model is: world from model.
+    /// Moves the skin to the model's place: world from model.
     pub(super) fn place_model(&mut self, model: DAffine3) {
         self.body.place_model(model);
         self.spot = None;
     }
 
-    /// The place that a probe at `pose` is held to. While the face's centre rests it is the same, however
-    /// the probe is turned.
+    /// The place that a probe at `pose` is held to. While the face's centre rests, the place stays the same,
+    /// however the probe is turned.
     fn spot(&self, hand: &Hand<'_>, pose: &DAffine3) -> Spot {
         let known = self.spot.filter(|(centre, _)| *centre == pose.translation);
         known.map_or_else(|| hand.held(pose), |(_, spot)| spot)
@@ -53,8 +53,8 @@ impl Hold {
         put
     }
 
-    /// The pose after a movement that does not leave the skin: shifts are along it, pressing and lifting
-    /// change how deep the probe is, turns are those of the hand.
+    /// The pose after a movement that does not leave the skin: shifts go along it, pressing and lifting change
+    /// the depth, turns are those of the hand.
     fn moved(
         &mut self,
         (skin, probe): (&Skin, &Probe),
@@ -74,7 +74,7 @@ impl Hold {
                     Axis::Lateral => DVec3::X,
                     _ => DVec3::Y,
                 };
-                // Where the skin ends the probe stays.
+                // At the end of the skin the probe stays.
                 along(axis).map_or(*pose, |to| self.put(&hand, pose, &from, to))
             }
             Axis::Depth => {
@@ -90,24 +90,24 @@ impl Hold {
     }
 }
 
-/// What of the skin can be seen and meant.
+/// The part of the skin that can be seen and chosen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// All of it.
+    /// The whole skin.
     Whole,
-    /// What lies behind the image plane.
+    /// The skin behind the image plane.
     BehindPlane,
 }
 
 impl Model {
-    /// The skin now, with what holds the probe to it; none where the scene names none.
+    /// The present skin and the probe's contact; none where the scene names no skin.
     fn skin(&mut self, now: Instant) -> Option<(Skin, &mut Hold)> {
         let seconds = self.clock.at(now);
         let hold = self.hold.as_mut()?;
         Some((hold.body.at(seconds), hold))
     }
 
-    /// The place of the skin that is seen along a ray.
+    /// The place of the skin seen along a ray.
     pub fn spot_seen(&mut self, ray: &Ray, seen: Seen, now: Instant) -> Option<Spot> {
         let pose = self.pose;
         let (skin, _) = self.skin(now)?;
@@ -116,14 +116,14 @@ impl Model {
             Seen::Whole => hand.pick(ray),
             Seen::BehindPlane => {
                 let origin = ray.origin + across(&pose, ray)? * ray.direction;
-                // On the cut through the body there is no skin.
+                // There is no skin on the cut through the body.
                 skin.gap(origin, ray.direction).filter(|gap| *gap > 0.0)?;
                 hand.pick(&Ray { origin, ..*ray })
             }
         }
     }
 
-    /// The place that the probe is held to.
+    /// The place of the skin that the probe is held to.
     pub fn spot_held(&mut self, now: Instant) -> Option<Spot> {
         let pose = self.pose;
         let (skin, _) = self.skin(now)?;
@@ -132,7 +132,7 @@ impl Model {
         Some(hold.spot(&Hand::new(&skin, probe), &pose))
     }
 
-    /// Where the probe would be at a place of the skin.
+    /// The probe's pose at a place of the skin.
     pub fn pose_at(&mut self, to: &Spot, now: Instant) -> Option<DAffine3> {
         let pose = self.pose;
         let (skin, _) = self.skin(now)?;
@@ -149,7 +149,7 @@ impl Model {
         });
     }
 
-    /// Slides the probe along its image plane to where a ray crosses that.
+    /// Slides the probe along its image plane to the point where a ray crosses it.
     pub fn slide_in_plane(&mut self, ray: &Ray, now: Instant) {
         self.slide(now, |hand, hold, pose| {
             let from = hold.spot(hand, pose);
@@ -160,14 +160,14 @@ impl Model {
         });
     }
 
-    /// Turns the probe about its face's centre: rock and tilt, rad. One that is to stay on the skin goes
-    /// on touching it.
+    /// Turns the probe about its face's centre: rock and tilt, rad. A probe that is to stay on the skin
+    /// keeps touching it.
     pub fn lean(&mut self, [rock, tilt]: [f64; 2], now: Instant) {
         self.move_by(Source::Pointer, Axis::Rock, rock, now);
         self.move_by(Source::Pointer, Axis::Tilt, tilt, now);
     }
 
-    /// Whether every movement keeps the probe on the skin; it is put there.
+    /// Sets whether every movement keeps the probe on the skin; if so, puts it there.
     pub fn stay_on_skin(&mut self, stays: bool, now: Instant) {
         if let Some(hold) = &mut self.hold {
             hold.stays = stays;
@@ -208,7 +208,7 @@ impl Model {
     }
 }
 
-/// How far along a ray it crosses the image plane of `pose`, mm.
+/// Distance along a ray to the image plane of `pose`, mm.
 fn across(pose: &DAffine3, ray: &Ray) -> Option<f64> {
     let normal = pose.transform_vector3(DVec3::Y).normalize();
     let sine = normal.dot(ray.direction);
@@ -334,7 +334,7 @@ mod tests {
         let mut moved = scene.clone();
         moved.world_from_probe = model.pose;
         let contact = Coupling::of(&moved, &mut Skins::default()).unwrap();
-        // A flat face pressed into a ball by 1.5 mm and 3 mm of gel: all of 38 mm is coupled.
+        // A flat face pressed into a ball by 1.5 mm, and 3 mm of gel: all of its 38 mm is coupled.
         assert_eq!(contact.touch.share, 1.0);
     }
 

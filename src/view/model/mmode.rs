@@ -1,17 +1,17 @@
-//! M-mode: what lies along one scanline, against time.
+//! M-mode: the image along one scanline, against time.
 //!
-//! Levels are those of the B-mode image, sampled along the line: what is fused or blended is in it as
-//! it is on the screen.
+//! Grey levels are those of the B-mode image, sampled along the scanline: fusion and blending show as
+//! on the screen.
 
 use std::collections::VecDeque;
 
 use crate::probe::Probe;
 use crate::view::engine::{Pixels, Sector};
 
-/// Depths of a column, from the face to the image's depth.
+/// Number of depths of a column, from the face to the image's depth.
 pub const ROWS: usize = 256;
 
-/// Columns that are kept: at 60 images per second those of more than a minute.
+/// Number of columns kept: at 60 images per second, more than a minute.
 const KEPT: usize = 4096;
 
 /// One scanline at one moment.
@@ -20,7 +20,7 @@ struct Column {
     levels: Vec<u8>,
 }
 
-/// The strip of one scanline.
+/// The M-mode strip of one scanline.
 #[derive(Default)]
 pub struct Strip {
     line: u32,
@@ -40,7 +40,7 @@ impl Strip {
         self.line
     }
 
-    /// Takes another scanline; what was drawn of the one before is gone.
+    /// Takes another scanline; clears the strip of the one before.
     pub fn aim(&mut self, line: u32) {
         if line != self.line {
             self.line = line;
@@ -49,13 +49,13 @@ impl Strip {
         }
     }
 
-    /// Grows with every change.
+    /// Number that grows with every change.
     pub fn revision(&self) -> u64 {
         self.revision
     }
 
-    /// Adds what an image shows along the line at `seconds`. A strip of another probe, or of a time
-    /// that was left by going back, is gone; the same moment again replaces its column.
+    /// Adds the image along the scanline at `seconds`. Another probe, or a time before the last, clears
+    /// the strip; the same moment again replaces its column.
     pub fn add(&mut self, seconds: f64, probe: &Probe, sector: Sector, pixels: &Pixels) {
         self.revision += 1;
         if self.probe.as_ref() != Some(probe) {
@@ -88,13 +88,13 @@ impl Strip {
         self.columns.back().map(|c| c.seconds)
     }
 
-    /// Columns of the `window` seconds before `end`.
+    /// Number of columns in the `window` seconds before `end`.
     pub fn columns_in(&self, end: f64, window: f64) -> usize {
         let within = |c: &&Column| c.seconds > end - window;
         self.columns.iter().rev().take_while(within).count()
     }
 
-    /// Depth of the strip, mm; nothing before the first image.
+    /// Depth of the strip, mm; none before the first image.
     pub fn depth(&self) -> Option<f64> {
         self.probe.as_ref().map(|p| p.depth)
     }
@@ -118,32 +118,32 @@ impl Strip {
     }
 }
 
-/// From one point of a strip to another: seconds and mm of depth.
+/// Two points of a strip: seconds and mm of depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Span {
-    /// Where it begins.
+    /// First point.
     pub from: [f64; 2],
-    /// Where it ends.
+    /// Second point.
     pub to: [f64; 2],
 }
 
 impl Span {
-    /// Time between, s, 0 or more.
+    /// Time between them, s, 0 or more.
     pub fn seconds(&self) -> f64 {
         (self.to[0] - self.from[0]).abs()
     }
 
-    /// Depth between, mm, 0 or more.
+    /// Depth between them, mm, 0 or more.
     pub fn millimetres(&self) -> f64 {
         (self.to[1] - self.from[1]).abs()
     }
 
-    /// How often a minute what lasts as long happens; nothing where no time lies between.
+    /// Events per minute, if they repeat after this time; none where no time lies between.
     pub fn per_minute(&self) -> Option<f64> {
         (self.seconds() > 0.0).then(|| 60.0 / self.seconds())
     }
 
-    /// Speed of what moves from one to the other, mm/s, positive away from the probe; nothing where no
+    /// Speed from the first point to the second, mm/s, positive away from the probe; none where no
     /// time lies between.
     pub fn speed(&self) -> Option<f64> {
         let [seconds, depth] = [self.to[0] - self.from[0], self.to[1] - self.from[1]];
@@ -182,7 +182,7 @@ mod tests {
         }
     }
 
-    /// 80 by 100 pixels, black but for the row at a depth of `mm`.
+    /// 80 by 100 pixels, black except for the row at a depth of `mm`.
     fn bright_at(mm: f64) -> Pixels {
         let row = (mm / 0.5) as usize;
         let mut rgba = vec![0; 80 * 100 * 4];
@@ -229,7 +229,7 @@ mod tests {
         let seen: Vec<bool> =
             (0..10).map(|x| (0..ROWS).any(|row| raster[row * 10 + x] > 0)).collect();
         assert_eq!(seen, [false, false, false, false, false, true, true, true, true, true]);
-        // Back in time, another line, another probe: a new strip.
+        // Back in time, another scanline, another probe: a new strip.
         strip.add(0.1, &probe(), SECTOR, &bright_at(25.0));
         assert_eq!((strip.columns.len(), strip.newest()), (1, Some(0.1)));
         strip.add(0.1, &probe(), SECTOR, &bright_at(30.0));

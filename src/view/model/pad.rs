@@ -1,17 +1,17 @@
-//! A game pad as a probe in the hand: sticks and triggers are speeds, buttons do what keys do.
+//! A game pad as a probe in the hand: sticks and triggers are speeds, buttons do the work of keys.
 
 use gilrs::{Axis as Stick, Button, EventType};
 
 use super::Axis;
 
-/// Deflection below which a stick counts as let go: worn ones rest up to a tenth off their middle.
+/// Deflection below which a stick counts as released: worn ones rest up to a tenth off their middle.
 const DEAD: f64 = 0.15;
 /// Speed at full deflection: mm/s, and rad/s (30 degrees).
 const SPEED: [f64; 2] = [30.0, 30.0 * std::f64::consts::PI / 180.0];
 /// Factor while the right shoulder button is held.
 const FINE: f64 = 0.25;
 
-/// What a control of the pad says, without the codes of its driver.
+/// State of one control of the pad, without the codes of its driver.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Control {
     /// A stick along an axis, -1 to 1; right and up are positive.
@@ -21,7 +21,7 @@ pub enum Control {
 }
 
 impl Control {
-    /// What an event says of a control, if it is of one.
+    /// The control's state in an event, if the event is about a control.
     pub fn of(event: &EventType) -> Option<Self> {
         match *event {
             EventType::AxisChanged(stick, value, _) => Some(Self::Stick(stick, value.into())),
@@ -31,14 +31,14 @@ impl Control {
     }
 }
 
-/// What a button does once when it goes down.
+/// Action of a button when it goes down.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Press {
     /// Freezes, or goes live.
     Freeze,
     /// Starts or stops the scene's time.
     Play,
-    /// Puts the probe back.
+    /// Puts the probe back to its pose of the scene file.
     Home,
     /// Starts or ends a recording.
     Record,
@@ -48,22 +48,22 @@ pub enum Press {
     Depth(f64),
 }
 
-/// How the controls of one pad are held.
+/// State of the controls of one pad.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pad {
     left: [f64; 2],
     right: [f64; 2],
     /// Left and right trigger, 0 to 1.
     triggers: [f64; 2],
-    /// The right stick rocks instead of rotating.
+    /// True where the right stick rocks instead of rotating.
     rocks: bool,
     fine: bool,
-    /// Buttons that are down, so that a trembling one acts once.
+    /// Buttons that are down, so that a bouncing one acts once.
     down: Vec<Button>,
 }
 
 impl Pad {
-    /// Takes a control's new state; what it does once.
+    /// Takes a control's new state; returns the action of a button that went down.
     pub fn set(&mut self, control: Control) -> Option<Press> {
         match control {
             Control::Stick(stick, value) => {
@@ -95,7 +95,7 @@ impl Pad {
 
     fn press(&mut self, button: Button, value: f64) -> Option<Press> {
         let was_down = self.down.contains(&button);
-        // Apart, so that a button held half way down acts once.
+        // Two thresholds, so that a button held half way down acts once.
         let is_down = value > if was_down { 0.4 } else { 0.6 };
         match button {
             Button::LeftTrigger => self.rocks = is_down,
@@ -120,7 +120,7 @@ impl Pad {
         (is_down && !was_down).then_some(press)
     }
 
-    /// How fast the probe moves along and about its axes, mm/s and rad/s, in the order of
+    /// Speeds of the probe along and about its axes, mm/s and rad/s, in the order of
     /// [`Axis::ALL`].
     pub fn speeds(&self) -> [f64; 6] {
         let [x, y] = self.right.map(shaped);
@@ -143,14 +143,14 @@ impl Pad {
         })
     }
 
-    /// Whether the probe moves.
+    /// Returns whether the probe moves.
     pub fn moves(&self) -> bool {
         self.speeds().iter().any(|s| *s != 0.0)
     }
 }
 
-/// Speed for a deflection, as a share of the full one: nothing within the dead zone, from there on
-/// without a step by the square, so that small movements are fine.
+/// Speed for a deflection, as a share of the full one: zero within the dead zone, quadratic beyond it
+/// and without a step, so that small movements are fine.
 fn shaped(deflection: f64) -> f64 {
     let beyond = (deflection.abs() - DEAD).max(0.0) / (1.0 - DEAD);
     deflection.signum() * beyond * beyond

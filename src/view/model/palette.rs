@@ -1,21 +1,21 @@
-//! How tissues look from outside.
+//! The look of tissues in the 3D view.
 
-/// How much of what is behind a surface shows.
+/// Visibility of a surface, and of the things behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Show {
-    /// It is not there.
+    /// The surface is left out.
     Hidden,
-    /// As glass; outlines remain.
+    /// As glass: outlines remain.
     SeeThrough,
-    /// It hides what is behind it.
+    /// The surface hides everything behind it.
     Solid,
 }
 
 use Show::{Hidden, SeeThrough, Solid};
 
-/// Colours (sRGB) of tissues as anatomical atlases have them, by a word of their names; the first
-/// that is found counts. Layers and vessels that enclose organs are glass, those around everything
-/// but the skin are left out: one wants to see the organs.
+/// Colours (sRGB) of tissues as in anatomical atlases, by a word of their names; the first word
+/// found counts. Layers and vessels that enclose organs are glass; layers around everything, except
+/// the skin, are left out, so that the organs can be seen.
 const KNOWN: [(&str, [u8; 3], Show); 36] = [
     ("membranous", [236, 226, 200], Solid),
     ("bone", [236, 226, 200], Solid),
@@ -55,7 +55,7 @@ const KNOWN: [(&str, [u8; 3], Show); 36] = [
     ("soft_tissue", [234, 184, 158], Solid),
 ];
 
-/// How a tissue of this name looks; `index` chooses a colour for names that say nothing.
+/// Colour and visibility of a tissue of this name; `index` chooses a colour for unknown names.
 pub fn look(name: &str, index: usize) -> ([u8; 3], Option<Show>) {
     let known = KNOWN.iter().find(|(word, ..)| name.contains(word));
     match known {
@@ -64,8 +64,8 @@ pub fn look(name: &str, index: usize) -> ([u8; 3], Option<Show>) {
     }
 }
 
-/// Colour `index` of a list in which neighbours differ: hues a golden angle apart at one lightness
-/// and chroma of OKLCH (Ottosson 2020).
+/// Colour `index` of a list in which neighbours differ: hues a golden angle apart at one lightness and
+/// chroma of OKLCH (Ottosson 2020).
 fn distinct(index: usize) -> [u8; 3] {
     let hue = (40.0 + 137.508 * index as f64).to_radians();
     let (lightness, chroma) = (0.74, 0.125);
@@ -97,7 +97,7 @@ mod tests {
         assert_eq!(look("plus_15", 3), (distinct(3), None));
     }
 
-    // Hues 52 degrees apart, the nearest of any six that follow each other, are 30 levels.
+    // Hues 52 degrees apart, the least among any six in a row, differ by 30 levels.
     #[test]
     fn neighbours_in_the_list_differ() {
         for i in 0..20 {

@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-/// One way to move a probe, in its own axes; rotations are about the centre of its face.
+/// A movement of a probe in its own axes; rotations are about the centre of its face.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Axis {
     /// Slide along the image's lateral axis, mm.
@@ -20,20 +20,20 @@ pub enum Axis {
 }
 
 impl Axis {
-    /// All of them.
+    /// All movements.
     pub const ALL: [Self; 6] =
         [Self::Lateral, Self::Elevation, Self::Depth, Self::Rotate, Self::Rock, Self::Tilt];
 
-    /// Whether it is a shift, in mm; else a turn, in rad.
+    /// Returns true for a shift, in mm, and false for a turn, in rad.
     pub fn shifts(self) -> bool {
         matches!(self, Self::Lateral | Self::Elevation | Self::Depth)
     }
 }
 
-/// What one press of a key moves: mm, and radians (2 degrees).
+/// Movement of one key press: mm, and radians (2 degrees).
 pub const STEP: [f64; 2] = [2.0, 2.0 * std::f64::consts::PI / 180.0];
 
-/// A pose moved along or about an axis of its own, rigid again to the last digit.
+/// A pose moved along or about one of its own axes, and made exactly rigid again.
 pub fn moved(pose: &DAffine3, axis: Axis, amount: f64) -> DAffine3 {
     let shift = DAffine3::from_translation;
     let turn = |axis| DAffine3::from_axis_angle(axis, amount);
@@ -46,7 +46,7 @@ pub fn moved(pose: &DAffine3, axis: Axis, amount: f64) -> DAffine3 {
         Axis::Tilt => turn(DVec3::X),
     };
     let out = *pose * step;
-    // Thousands of steps would else add up to a shear.
+    // Otherwise the rounding of thousands of steps would add up to a shear.
     let rotation = DQuat::from_mat3(&out.matrix3).normalize();
     DAffine3::from_mat3_translation(DMat3::from_quat(rotation), out.translation)
 }

@@ -1,16 +1,16 @@
-//! Which pixels are real: how those of an acquired volume are marked.
+//! The marking of acquired pixels in the image.
 
 use crate::sim::fusion::Tint;
 
-/// Colour of what is acquired, red, green and blue: none of those of a Doppler scale.
+/// Colour of acquired pixels, red, green and blue: none of a Doppler scale.
 pub const COLOUR: [u8; 3] = [88, 196, 176];
 
 /// The overlay.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Real {
-    /// It is shown.
+    /// True where it is shown.
     pub shown: bool,
-    /// Of the colour over a pixel that is all acquired, 0 to 1.
+    /// Opacity of the colour over a fully acquired pixel, 0 to 1.
     pub opacity: f64,
 }
 
@@ -18,14 +18,14 @@ impl Default for Real {
     fn default() -> Self {
         Self {
             shown: false,
-            // Grey levels are still told apart.
+            // Grey levels remain distinguishable.
             opacity: 0.35,
         }
     }
 }
 
 impl Real {
-    /// What the simulation has to colour.
+    /// The colouring that the simulation is to do; none where it is not shown.
     pub fn tint(&self) -> Option<Tint> {
         self.shown.then_some(Tint { colour: COLOUR, opacity: self.opacity as f32 })
     }

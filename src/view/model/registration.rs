@@ -1,4 +1,4 @@
-//! The acquired volume and the model, laid onto each other by hand.
+//! Registration of the acquired volume with the model by hand.
 
 use std::cell::OnceCell;
 
@@ -8,10 +8,10 @@ use super::Settings;
 use crate::scene::fusion::open_edges;
 use crate::scene::{Acquired, Instance, Scene};
 
-/// Least and most that a plane shows, mm across.
+/// Least and greatest extent of a plane, mm across.
 const EXTENTS: [f64; 2] = [5.0, 2000.0];
 
-/// What is moved; the other one stays, and so does the probe.
+/// The part that is moved; the other one stays, and so does the probe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Moves {
     /// The acquired volume.
@@ -23,27 +23,27 @@ pub enum Moves {
 /// A plane through the volume, along two axes of the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// What it is called.
+    /// Name of the plane.
     pub name: &'static str,
-    /// To the right and down on the screen.
+    /// Axes to the right and down on the screen.
     pub axes: [DVec3; 2],
 }
 
 impl Plane {
-    /// The three through one point, depth downwards where they have it.
+    /// The three planes through one point, depth downwards where they contain it.
     pub const ALL: [Self; 3] = [
         Self { name: "x z", axes: [DVec3::X, DVec3::Z] },
         Self { name: "y z", axes: [DVec3::Y, DVec3::Z] },
         Self { name: "x y", axes: [DVec3::X, DVec3::Y] },
     ];
 
-    /// Away from the eye.
+    /// Unit normal, away from the viewer.
     pub fn normal(&self) -> DVec3 {
         self.axes[0].cross(self.axes[1])
     }
 }
 
-/// A mesh's line in a plane.
+/// The outline of a mesh in a plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
     /// Index into [`Scene::instances`].
@@ -52,23 +52,23 @@ pub struct Outline {
     pub pieces: Vec<[[f64; 2]; 2]>,
 }
 
-/// What of the registration is chosen; settings themselves are [`Settings::volume`], [`Settings::model`] and the
-/// masks of [`Settings::fusion`].
+/// The state of the registration by hand; the settings themselves are [`Settings::volume`], [`Settings::model`] and
+/// the masks of [`Settings::fusion`].
 #[derive(Clone, Debug)]
 pub struct Registration {
-    /// What is moved.
+    /// The part that is moved.
     pub moves: Moves,
-    /// Where the three planes meet, world, mm.
+    /// Point where the three planes meet, world, mm.
     pub middle: DVec3,
-    /// What a plane shows across its smaller side, mm.
+    /// Extent of a plane over its smaller side, mm.
     pub extent: f64,
-    /// See [`Self::is_closed`]; found out when it is first asked.
+    /// Results of [`Self::is_closed`], computed when first asked for.
     closed: OnceCell<Vec<bool>>,
     scene: Scene,
 }
 
 impl Registration {
-    /// Of the scene's volume, if it has one; planes meet in the middle of the masks.
+    /// The registration for a scene with a volume, else none; the planes meet in the middle of the masks.
     pub fn of(scene: &Scene) -> Option<Self> {
         let volume = scene.volume.as_ref()?;
         let [low, high] = corners(volume);
@@ -83,13 +83,13 @@ impl Registration {
         Some(out)
     }
 
-    /// The scene as `settings` have it at `seconds`.
+    /// Sets the scene to `settings` at `seconds`.
     pub fn follow(&mut self, settings: &Settings, seconds: f64) {
         settings.apply(&mut self.scene);
         self.scene.set_time(seconds);
     }
 
-    /// Whether placed mesh `index` is closed in every shape that it takes, so that it can be a mask.
+    /// Returns whether placed mesh `index` is closed in each of its shapes, so that it can be a mask.
     pub fn is_closed(&self, index: usize) -> bool {
         let closed = |i: &Instance| {
             let mut shapes = i.keyframes.meshes.iter().chain([&i.mesh]);
@@ -98,12 +98,12 @@ impl Registration {
         self.closed.get_or_init(|| self.scene.instances.iter().map(closed).collect())[index]
     }
 
-    /// The scene as it was followed last.
+    /// The scene as last set by [`Self::follow`].
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// Lets the planes meet in the middle of the masks.
+    /// Moves the planes' meeting point to the middle of the masks.
     pub fn centre(&mut self) {
         let masks = self.scene.fusion.iter().flat_map(|f| &f.masks);
         let boxes = masks.map(|&i| {
@@ -123,23 +123,23 @@ impl Registration {
         }
     }
 
-    /// Shows more or less of the planes.
+    /// Shows a larger or smaller part of the planes.
     pub fn zoom(&mut self, factor: f64) {
         self.extent = (self.extent * factor).clamp(EXTENTS[0], EXTENTS[1]);
     }
 
-    /// Moves what is moved by a vector of the world, mm.
+    /// Shifts the moved part by a vector of the world, mm.
     pub fn shift(&self, settings: &mut Settings, by: DVec3) {
         self.change(settings, DAffine3::from_translation(by));
     }
 
-    /// Turns it about an axis through the planes' meeting point, by the right-hand rule.
+    /// Turns the moved part about an axis through the planes' meeting point, by the right-hand rule.
     pub fn turn(&self, settings: &mut Settings, axis: DVec3, radians: f64) {
         let turn = DAffine3::from_quat(DQuat::from_axis_angle(axis, radians));
         self.change(settings, self.about_middle(turn));
     }
 
-    /// Scales it about the planes' meeting point.
+    /// Scales the moved part about the planes' meeting point.
     pub fn scale(&self, settings: &mut Settings, factor: f64) {
         let scale = DAffine3::from_scale(DVec3::splat(factor));
         self.change(settings, self.about_middle(scale));
@@ -161,7 +161,7 @@ impl Registration {
         }
     }
 
-    /// Placement of what is moved: world from its own frame.
+    /// Placement of the moved part: world from its own frame.
     pub fn place(&self, settings: &Settings) -> DAffine3 {
         match self.moves {
             Moves::Model => settings.model,
@@ -169,14 +169,14 @@ impl Registration {
         }
     }
 
-    /// Puts what is moved somewhere else.
+    /// Gives the moved part another placement.
     pub fn put(&self, settings: &mut Settings, place: DAffine3) {
         let change = place * self.place(settings).inverse();
         self.change(settings, change);
     }
 
-    /// Grey levels of the volume in a plane, `size` pixels of `pitch` mm around the middle, row by row; nothing where
-    /// the volume does not reach.
+    /// Grey levels of the volume in a plane, `size` pixels of `pitch` mm around the middle, row by row; none outside
+    /// the volume.
     pub fn slice(&self, plane: &Plane, size: [usize; 2], pitch: f64) -> Vec<Option<u8>> {
         let Some(volume) = &self.scene.volume else {
             return Vec::new();
@@ -194,7 +194,7 @@ impl Registration {
         (0..width * height).map(grey).collect()
     }
 
-    /// Lines of all meshes that are shown in a plane, those within `reach` mm of the middle.
+    /// Outlines of all shown meshes in a plane, within `reach` mm of the middle.
     pub fn outlines(&self, plane: &Plane, reach: f64) -> Vec<Outline> {
         let mut out = Vec::new();
         for (index, instance) in self.scene.instances.iter().enumerate() {
@@ -202,7 +202,7 @@ impl Registration {
                 continue;
             }
             let mesh = &self.scene.meshes[instance.mesh];
-            // To the right, down, off the plane.
+            // Coordinates to the right, down, off the plane.
             let normal = plane.normal();
             let place = |p: &[f32; 3]| {
                 let p = DVec3::from(p.map(f64::from));
@@ -224,7 +224,7 @@ impl Registration {
     }
 }
 
-/// Where a triangle crosses z = 0; a corner on it counts as beyond it, so that neighbours agree.
+/// The piece in which a triangle crosses z = 0; a corner on it counts as beyond it, so that neighbours agree.
 fn across(corners: [DVec3; 3]) -> Option<[[f64; 2]; 2]> {
     let mut ends = (0..3).filter_map(|i| {
         let (a, b) = (corners[i], corners[(i + 1) % 3]);
@@ -247,5 +247,4 @@ fn corners(volume: &Acquired) -> [DVec3; 2] {
 }
 
 #[cfg(test)]
-#[path = "registration_tests.rs"]
 mod tests;

@@ -1,4 +1,4 @@
-//! A session's settings in scene files: written back, and taken from others.
+//! A session's settings in scene files: saved, and loaded from others.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -9,20 +9,19 @@ use super::{Model, Settings, entries};
 use crate::scene::file::{Entry, load_preset, save};
 use crate::scene::{Origins, SceneError};
 
-/// The file that a session shows.
+/// The scene file of a session.
 #[derive(Clone, Debug)]
 pub struct File {
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
-    /// What the command line says in its place.
+    /// Settings of the command line, which replace those of the file.
     pub overrides: Vec<(String, String)>,
-    /// Edge of its lattice cell times its frequency, mm MHz: before a quality that suits the device.
+    /// Edge of its lattice cell times its frequency, mm MHz, before the quality for the device is applied.
     pub lattice: f64,
     pub(super) origins: Origins,
 }
 
 #[cfg(test)]
-#[path = "saving_tests.rs"]
 mod tests;
 
 impl File {
@@ -42,19 +41,19 @@ impl File {
 }
 
 impl Model {
-    /// Whether settings differ from those of the file; `with_pose`: or the pose does.
+    /// Returns whether settings differ from those of the file; `with_pose`: or the pose does.
     pub fn is_modified(&self, with_pose: bool) -> bool {
         let as_now = |tracer| Settings { tracer, ..self.loaded.clone() };
         as_now(self.settings.tracer) != self.settings || (with_pose && self.pose != self.home)
     }
 
-    /// What the file has to say to give the settings, `with_pose` also the pose of the probe.
+    /// Entries that make the file give the settings, `with_pose` also the pose of the probe.
     fn changes(&self, with_pose: bool) -> Vec<Entry> {
         self.entries(&self.settings, with_pose.then_some(&self.pose))
     }
 
-    /// What the file has to say to give `settings`, which were this session's once, and a pose of the
-    /// probe: paths and values of its keys; without a value those that it must not have.
+    /// Entries that make the file give `settings`, which this session once had, and a pose of the probe:
+    /// paths and values of its keys; no value where the file must not have the key.
     pub fn entries(&self, settings: &Settings, pose: Option<&DAffine3>) -> Vec<Entry> {
         let file = &self.file;
         let overrides = file.overrides.iter().cloned();
@@ -71,7 +70,7 @@ impl Model {
     /// another one, which becomes the session's.
     ///
     /// # Errors
-    /// A file that cannot be written. It is then as it was, and so is the session.
+    /// The file cannot be written. File and session are then unchanged.
     pub fn save(&mut self, to: Option<&Path>, with_pose: bool) -> Result<(), SceneError> {
         let to = to.unwrap_or(&self.file.path).to_owned();
         let changes = self.changes(with_pose);
@@ -91,11 +90,11 @@ impl Model {
         Ok(())
     }
 
-    /// Takes probe, simulation and image formation from another scene file, as far as it speaks of
+    /// Takes probe, simulation and image formation from another scene file, as far as it gives
     /// them. Anatomy and pose stay; one step back undoes it.
     ///
     /// # Errors
-    /// A file that cannot be used. Nothing has then changed.
+    /// The file cannot be used. Then nothing has changed.
     pub fn load_settings(&mut self, path: &Path, now: Instant) -> Result<(), SceneError> {
         let frequency = self.settings.probe.frequency;
         let preset = load_preset(path, frequency)?;
@@ -117,7 +116,7 @@ impl Model {
         Ok(())
     }
 
-    /// Gives meshes that share a place in the file what one of them has got since `before`.
+    /// Copies a mesh's changes since `before` to all meshes that share its place in the file.
     pub(super) fn unite(&mut self, before: &Settings) {
         let (settings, origins) = (&mut self.settings, &self.file.origins.instances);
         for (i, origin) in origins.iter().enumerate() {

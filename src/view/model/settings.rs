@@ -1,4 +1,4 @@
-//! What the console sets: everything of a scene but its geometry.
+//! The settings of the console: everything of a scene except its geometry.
 
 use glam::DAffine3;
 
@@ -22,17 +22,17 @@ pub struct Settings {
     pub tissues: Vec<Tissue>,
     /// Echo properties of each placed mesh, from outside and from inside.
     pub surfaces: Vec<[Surface; 2]>,
-    /// How the device follows each mesh that changes its shape; none for those that do not.
+    /// Strategy of the device for each mesh that changes its shape; none for the others.
     pub strategies: Vec<Option<Strategy>>,
-    /// How an acquired volume is shown around what is simulated.
+    /// Fusion with an acquired volume.
     pub fusion: Option<Fusion>,
-    /// Where an acquired volume is, and its grey levels.
+    /// Place and grey levels of an acquired volume.
     pub volume: Option<Display>,
-    /// World from model: where the anatomy is.
+    /// World from model: the place of the anatomy.
     pub model: DAffine3,
-    /// How images keep pace while something moves.
+    /// Pace of images while something moves.
     pub live: Live,
-    /// How rays find surfaces.
+    /// Method by which rays find surfaces.
     pub tracer: Tracer,
 }
 
@@ -57,7 +57,7 @@ impl Settings {
         }
     }
 
-    /// The lattice follows the wavelength, as in scene files: else speckle would lose its scatterers.
+    /// Scales the lattice with the wavelength, as in scene files: else speckle would lose its scatterers.
     /// `before` is the frequency that the cell suited, MHz.
     pub fn follow_frequency(&mut self, before: f64) {
         let frequency = self.probe.frequency;
@@ -75,7 +75,7 @@ impl Settings {
         self.simulation.cell /= self.simulation.crowding();
     }
 
-    /// Puts them into the scene that they were taken from.
+    /// Puts the settings into the scene that they came from.
     pub fn apply(&self, scene: &mut Scene) {
         scene.probe.clone_from(&self.probe);
         scene.simulation.clone_from(&self.simulation);

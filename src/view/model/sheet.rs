@@ -1,13 +1,13 @@
-//! Measurements and texts on the image, and how the pointer makes, moves and removes them.
+//! The marks on the image, measurements and texts: the pointer makes, moves and removes them.
 
 use glam::{DAffine3, DVec2};
 
 use super::calipers::{Caliper, Kind};
 
-/// What the pointer does on the image.
+/// The pointer's tool on the image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tool {
-    /// Measures.
+    /// Makes a measurement.
     Measure(Kind),
     /// Places a text.
     Note,
@@ -16,15 +16,15 @@ pub enum Tool {
 /// A text on the image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Note {
-    /// What it says.
+    /// The text.
     pub text: String,
     /// Its left edge at half its height, mm lateral and mm deep.
     pub at: DVec2,
-    /// What it points at, mm.
+    /// Point that its arrow shows, mm.
     pub arrow: Option<DVec2>,
 }
 
-/// The moment that an image shows.
+/// The pose and the time of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     /// World from probe.
@@ -33,7 +33,7 @@ pub struct Moment {
     pub seconds: f64,
 }
 
-/// Something on the image.
+/// Content of a mark.
 #[derive(Clone, Debug, PartialEq)]
 pub enum What {
     /// A measurement.
@@ -42,19 +42,19 @@ pub enum What {
     Note(Note),
 }
 
-/// Something on the image, and on which image it was put.
+/// A measurement or text, with the image on which it was put.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mark {
-    /// What it is called: `A` to `Z`.
+    /// Its letter, `A` to `Z`.
     pub letter: char,
-    /// What it is.
+    /// Its content.
     pub what: What,
-    /// On which image.
+    /// Pose and time of its image.
     pub of: Moment,
 }
 
 impl Mark {
-    /// What can be taken with the pointer, mm.
+    /// Points that the pointer can take, mm.
     pub fn points(&self) -> Vec<DVec2> {
         match &self.what {
             What::Caliper(caliper) => caliper.points.clone(),
@@ -74,61 +74,61 @@ impl Mark {
 /// A point of a mark: both indices.
 pub type Handle = (usize, usize);
 
-/// What is being drawn.
+/// An unfinished mark.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Draft {
-    /// With which tool.
+    /// The tool that makes it.
     pub tool: Tool,
     /// Points so far, mm.
     pub points: Vec<DVec2>,
     of: Moment,
 }
 
-/// All marks, and what the pointer holds.
+/// All marks, and the state of the pointer.
 #[derive(Default)]
 pub struct Sheet {
     marks: Vec<Mark>,
     tool: Option<Tool>,
     draft: Option<Draft>,
-    /// Where the pointer was last, mm.
+    /// Last position of the pointer, mm.
     pointer: DVec2,
     selected: Option<Handle>,
-    /// How far the selected point is from the pointer that it follows, mm.
+    /// Vector from the pointer to the selected point that follows it, mm.
     held: Option<DVec2>,
     editing: Option<usize>,
 }
 
 impl Sheet {
-    /// All marks, in the order in which they were made.
+    /// All marks, in the order of their making.
     pub fn marks(&self) -> &[Mark] {
         &self.marks
     }
 
-    /// What the pointer does.
+    /// The pointer's tool.
     pub fn tool(&self) -> Option<Tool> {
         self.tool
     }
 
-    /// Takes a tool, or none. What was being drawn is dropped.
+    /// Takes a tool, or none. An unfinished mark is dropped.
     pub fn take(&mut self, tool: Option<Tool>) {
         self.tool = tool;
         self.draft = None;
         self.stop_editing();
     }
 
-    /// Takes a tool, or puts it away where it is in the hand.
+    /// Takes a tool, or puts it away where it is the present one.
     pub fn toggle(&mut self, tool: Tool) {
         self.take((self.tool != Some(tool)).then_some(tool));
     }
 
-    /// What is being drawn, where it would be finished now where the pointer is.
+    /// The unfinished mark, as if finished at the pointer's position.
     pub fn draft(&self) -> Option<Draft> {
         let mut draft = self.draft.clone()?;
         draft.points.push(self.pointer);
         Some(draft)
     }
 
-    /// Whether something is being drawn.
+    /// Returns whether a mark is unfinished.
     pub fn is_drawing(&self) -> bool {
         self.draft.is_some()
     }
@@ -155,7 +155,7 @@ impl Sheet {
         (self.selected, self.held) = (None, None);
     }
 
-    /// Takes a point with the pointer at a place, mm: both move alike from here on.
+    /// Takes a point with the pointer at a place, mm: both move together from then on.
     pub fn hold(&mut self, handle: Handle, at: DVec2) {
         let (mark, point) = handle;
         self.stop_editing();
@@ -163,7 +163,7 @@ impl Sheet {
         self.held = Some(self.marks[mark].points()[point] - at);
     }
 
-    /// The button went down at a place, mm; what lies within `reach` mm of it is meant.
+    /// Handles the button going down at a place, mm; a point within `reach` mm of it is meant.
     pub fn press(&mut self, at: DVec2, reach: f64, of: Moment) {
         self.stop_editing();
         self.pointer = at;
@@ -179,7 +179,7 @@ impl Sheet {
         }
     }
 
-    /// The pointer is elsewhere now, mm.
+    /// Handles the pointer moving to a place, mm.
     pub fn motion(&mut self, at: DVec2) {
         self.pointer = at;
         if let (Some(apart), Some((mark, point))) = (self.held, self.selected) {
@@ -187,8 +187,8 @@ impl Sheet {
         }
     }
 
-    /// The button went up: a point where it went down and another one here, if it was moved further
-    /// than `reach` mm.
+    /// Handles the button going up: a point where it went down and another one here, if the pointer moved
+    /// farther than `reach` mm.
     pub fn release(&mut self, at: DVec2, reach: f64) {
         self.motion(at);
         self.held = None;
@@ -208,7 +208,7 @@ impl Sheet {
             Tool::Note => {
                 let tip = draft.points[0];
                 self.editing = Some(self.marks.len());
-                // A click places the text itself, a drag leads it away from what it points at.
+                // A click places the text itself, a drag moves the text away from its arrow's tip.
                 let arrow = (tip != at).then_some(tip);
                 let text = String::new();
                 What::Note(Note { text, at, arrow })
@@ -227,7 +227,7 @@ impl Sheet {
         free.unwrap_or('Z')
     }
 
-    /// The point nearest to a place, no further than `reach` mm.
+    /// The point nearest to a place, within `reach` mm.
     pub fn near(&self, at: DVec2, reach: f64) -> Option<Handle> {
         let points = self.marks.iter().enumerate().flat_map(|(index, mark)| {
             let points = mark.points().into_iter().enumerate();
@@ -238,7 +238,7 @@ impl Sheet {
         nearest.map(|(handle, _)| handle)
     }
 
-    /// Moves the selected point; whether there is one.
+    /// Moves the selected point; returns whether there is one.
     pub fn nudge(&mut self, by: DVec2) -> bool {
         let Some((mark, point)) = self.selected else {
             return false;
@@ -248,7 +248,7 @@ impl Sheet {
         true
     }
 
-    /// Drops what is being drawn, else the selection, else the tool; whether there was any.
+    /// Drops the unfinished mark, else the selection, else the tool; returns whether there was one.
     pub fn cancel(&mut self) -> bool {
         if self.editing.is_some() {
             self.stop_editing();
@@ -262,7 +262,7 @@ impl Sheet {
         true
     }
 
-    /// Removes the mark whose point is selected; whether there is one.
+    /// Removes the mark whose point is selected; returns whether there is one.
     pub fn delete(&mut self) -> bool {
         let Some((mark, _)) = self.selected.take() else {
             return false;
@@ -277,7 +277,7 @@ impl Sheet {
         self.marks.remove(mark);
     }
 
-    /// Removes all.
+    /// Removes all marks.
     pub fn clear(&mut self) {
         let tool = self.tool;
         *self = Self { tool, ..Self::default() };
@@ -291,14 +291,14 @@ impl Sheet {
         }
     }
 
-    /// Types the text of a note.
+    /// Starts editing the text of a note.
     pub fn edit(&mut self, mark: usize) {
         self.stop_editing();
         self.select(mark);
         self.editing = Some(mark);
     }
 
-    /// Keeps what was typed; a note without a text is removed.
+    /// Ends editing and keeps the text; removes a note without one.
     pub fn stop_editing(&mut self) {
         let Some(mark) = self.editing.take() else {
             return;
@@ -386,12 +386,12 @@ mod tests {
         sheet.take(Some(Tool::Measure(Kind::Distance)));
         drag(&mut sheet, [0.0, 10.0], [20.0, 10.0]);
         drag(&mut sheet, [0.0, 30.0], [20.0, 30.0]);
-        // Near an end it is taken, though a tool is in the hand.
+        // Near an end, the end is taken, although a tool is active.
         drag(&mut sheet, [20.3, 10.4], [25.3, 10.4]);
         assert_eq!(sheet.marks().len(), 2);
         assert!((distance(&sheet, 0) - 25.0).abs() < 1e-12);
         assert_eq!(sheet.selected(), Some((0, 1)));
-        // Taken and let go where it is, it stays.
+        // Taken and released at one place, it stays.
         click(&mut sheet, 25.6, 9.8);
         assert!((distance(&sheet, 0) - 25.0).abs() < 1e-12);
         assert!(sheet.nudge(dvec2(-0.5, 0.0)));

@@ -1,5 +1,4 @@
-//! What is written beside a picture that is saved: where and when it was taken, with which settings,
-//! and what was measured on it.
+//! The text beside a saved picture: pose, time, settings and measurements.
 
 use glam::DAffine3;
 use serde_json::{Map, Value, json};
@@ -7,7 +6,7 @@ use serde_json::{Map, Value, json};
 use super::calipers::Reading;
 use super::sheet::{Mark, Moment, What};
 
-/// Where a picture lies in the image plane.
+/// Place of a picture in the image plane.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     /// Width and height in pixels.

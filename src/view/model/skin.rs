@@ -1,4 +1,4 @@
-//! The probe held to the skin: which place a ray of the 3D view means, and the pose that slides there.
+//! The probe on the skin: the place that a ray of the 3D view meets, and the pose that slides there.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
@@ -7,22 +7,22 @@ use crate::probe::Probe;
 use crate::scene::{Mesh, Scene};
 use crate::sim::contact::{Skin, Skins};
 
-/// How deep a probe that is put on the skin is pressed in, mm.
+/// Depth to which a probe put on the skin is pressed in, mm.
 pub const PRESS: f64 = 1.5;
 
-/// Points of the face, across and along, that are held against the skin when the probe is put on it.
+/// Points of the face, across and along, that are compared with the skin when the probe is put on it.
 const FACE: [u32; 2] = [9, 3];
 /// Rings of points around a place, by the radius of the footprint, and points in each.
 const RINGS: [f64; 3] = [0.3, 0.6, 0.9];
 const RING: u32 = 8;
-/// How far the normal goes towards the one that was found, each time; on an edge of 90 degrees half of the
-/// way is exact and the whole of it would swing for ever.
+/// Share by which the normal moves towards the fitted one in each step; on an edge of 90 degrees one half is
+/// exact, and one would swing for ever.
 const STEP: f64 = 0.5;
 const STEPS: usize = 16;
 
 /// The skin of a scene, at any time.
 pub struct Body {
-    /// The scene's meshes but those of the skin are left out.
+    /// The scene with the skin's meshes only.
     scene: Scene,
     skins: Skins,
 }
@@ -51,12 +51,12 @@ impl Body {
         })
     }
 
-    /// Places the model that it belongs to: world from model.
+    /// Places the model to which it belongs: world from model.
     pub fn place_model(&mut self, model: DAffine3) {
         self.scene.place_model(model);
     }
 
-    /// As it is at `seconds` of the scene's time.
+    /// The skin at `seconds` of the scene's time.
     pub fn at(&mut self, seconds: f64) -> Skin {
         self.scene.set_time(seconds);
         self.skins.of(&self.scene)
@@ -66,7 +66,7 @@ impl Body {
 /// A place of the skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spot {
-    /// Where it is, world, mm.
+    /// The place, world, mm.
     pub point: DVec3,
     /// The skin's outward normal, averaged over a footprint.
     pub normal: DVec3,
@@ -84,14 +84,14 @@ impl<'s> Hand<'s> {
         Self { skin, probe }
     }
 
-    /// The place that a ray comes to.
+    /// The place where a ray meets the skin.
     pub fn pick(&self, ray: &Ray) -> Option<Spot> {
         let (point, normal) = self.skin.hit(ray.origin, ray.direction)?;
         Some(self.spot(point, normal))
     }
 
-    /// The place that the face's centre is held to: the foot of the perpendicular from there, where it
-    /// was found from the depth axis; without skin ahead the place at the face itself.
+    /// The place that the face's centre is held to: the foot of the perpendicular from there, found first along
+    /// the depth axis; without skin ahead, the place at the face itself.
     pub fn held(&self, pose: &DAffine3) -> Spot {
         let centre = pose.translation;
         let mut spot =
@@ -105,22 +105,22 @@ impl<'s> Hand<'s> {
         spot
     }
 
-    /// The place `by` mm from a `spot` (world; what of it leaves the tangent plane is left out).
+    /// The place `by` mm from a `spot` (world; only the part within the tangent plane counts).
     pub fn beside(&self, spot: &Spot, by: DVec3) -> Option<Spot> {
         let along = by.reject_from(spot.normal);
-        // From above whatever the skin can rise by over the way.
+        // From above the greatest height to which the skin can rise on the way.
         let above = spot.point + along + spot.normal * (by.length() + self.footprint());
         let (point, normal) = self.skin.hit(above, -spot.normal)?;
         Some(self.spot(point, normal))
     }
 
-    /// The pose slid from where it is held to another place: turned as the skin is, and not about its
-    /// normal, so that tilt, rock and rotation stay as they are; then moved along the normal until the face
-    /// is pressed in by `press` mm where it is deepest.
+    /// The pose slid from one place to another: turned with the skin but not about its normal, so that tilt,
+    /// rock and rotation stay; then moved along the normal until the face is pressed in by `press` mm at its
+    /// deepest point.
     pub fn slid(&self, pose: &DAffine3, from: &Spot, to: &Spot, press: f64) -> DAffine3 {
         let turn = match from.normal.dot(to.normal) > -0.999 {
             true => DQuat::from_rotation_arc(from.normal, to.normal),
-            // Onto the other side of a body any axis would do: keep the image's lateral one.
+            // For the opposite side of a body any axis would do: keep the image's lateral one.
             false => DQuat::from_axis_angle(
                 pose.transform_vector3(DVec3::X).normalize(),
                 std::f64::consts::PI,
@@ -140,14 +140,14 @@ impl<'s> Hand<'s> {
         at(to.point - to.normal * lift)
     }
 
-    /// Radius of a disc as large as the face, mm: over it the skin's normal is averaged.
+    /// Radius of a disc of the face's area, mm: the skin's normal is averaged over it.
     fn footprint(&self) -> f64 {
         0.5 * (self.probe.face_width() * self.probe.elevation_height).sqrt()
     }
 
     /// The place at a point of the skin. Its normal is that of the plane that fits the skin best (least
-    /// squares of the heights over the footprint), which turns smoothly on the way over an edge as the
-    /// triangles' own normals do not. `normal` is where the search begins.
+    /// squares of the heights over the footprint): it turns smoothly over an edge, which the triangles'
+    /// own normals do not. The search begins at `normal`.
     fn spot(&self, point: DVec3, normal: DVec3) -> Spot {
         let radius = self.footprint();
         let mut normal = normal;
@@ -158,7 +158,7 @@ impl<'s> Hand<'s> {
                 for i in 0..RING {
                     let angle = std::f64::consts::TAU * f64::from(i) / f64::from(RING);
                     let off = radius * ring * (angle.cos() * u + angle.sin() * v);
-                    // What is steeper than the footprint is wide counts as just as steep.
+                    // Steeper than the footprint is wide counts as just as steep.
                     let above = point + off + normal * radius;
                     let gap = self.skin.gap(above, -normal).unwrap_or(f64::INFINITY);
                     let height = (radius - gap).clamp(-radius, radius);
@@ -178,5 +178,4 @@ impl<'s> Hand<'s> {
 }
 
 #[cfg(test)]
-#[path = "skin_tests.rs"]
 mod tests;

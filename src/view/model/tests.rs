@@ -101,7 +101,7 @@ fn time_passes_while_it_plays_and_is_neither_held_nor_frozen() {
     assert_eq!(model.clock.at(later(6.0)), 2.0);
 }
 
-/// A volume that changes makes time pass as anatomy does that moves; paused, there is nothing to do.
+/// A volume that changes makes time pass as moving anatomy does; paused, there is nothing to do.
 #[test]
 fn time_passes_for_a_volume_that_changes() {
     let now = Instant::now();
@@ -154,7 +154,7 @@ fn a_gesture_is_undone_at_once_and_can_be_done_again() {
         model.note(&before, later(ms));
     }
     assert_eq!(model.undoable(), [true, false]);
-    // Another setting is another change, however soon.
+    // Another setting is another change, however soon after.
     let before = model.settings.clone();
     model.settings.imaging.dynamic_range += 1.0;
     model.note(&before, later(5100));

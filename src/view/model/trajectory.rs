@@ -1,4 +1,4 @@
-//! Ways of the probe: recorded, kept in files, and gone again.
+//! Trajectories of the probe: recorded, saved, and replayed.
 //!
 //! A file is a trajectory as scene files and `insonify acquire` read them: time, position and
 //! rotation, row by row.
@@ -12,15 +12,15 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::Clock;
 use crate::scene::animation::{Channel, Curve, Track, Trs};
 
-/// A probe that has not moved for so long stood still; it did not creep to where it is found next.
+/// Time without movement after which the probe counts as having stood still, instead of moving slowly.
 const REST: Duration = Duration::from_millis(100);
 /// Most rows, as the reader takes them; a tracker of 50 Hz fills them in an hour.
 const ROWS: usize = 200_000;
 
-/// The probe at a moment.
+/// The probe's pose at a moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Row {
-    /// Since the recording began, s.
+    /// Time since the recording began, s.
     seconds: f64,
     /// World from probe, mm.
     pose: DAffine3,
@@ -32,7 +32,7 @@ pub struct Recorder {
     began: Instant,
     scene_seconds: f64,
     rows: Vec<Row>,
-    /// Which device moved the probe from which row on.
+    /// Devices that moved the probe, each with its first row.
     devices: Vec<(usize, String)>,
 }
 
@@ -47,23 +47,23 @@ impl Recorder {
         }
     }
 
-    /// Rows so far.
+    /// Number of rows so far.
     pub fn rows(&self) -> usize {
         self.rows.len()
     }
 
-    /// How long it goes on, s.
+    /// Length so far, s.
     pub fn seconds(&self, now: Instant) -> f64 {
         now.saturating_duration_since(self.began).as_secs_f64()
     }
 
-    /// Whether there is room for no more.
+    /// Returns whether there is no more room.
     pub fn is_full(&self) -> bool {
-        // A movement takes two rows, the end one.
+        // A movement takes two rows, and the end one.
         self.rows.len() + 3 > ROWS
     }
 
-    /// `device` has moved the probe to `pose`.
+    /// Notes that `device` has moved the probe to `pose`.
     pub fn note(&mut self, device: &str, pose: DAffine3, now: Instant) {
         if self.is_full() {
             return;
@@ -80,7 +80,7 @@ impl Recorder {
             let seconds = seconds - REST.as_secs_f64() / 2.0;
             self.rows.push(Row { seconds, ..last });
         }
-        // Events of one moment: the last one counts.
+        // Of several events at one moment the last one counts.
         if seconds <= last.seconds && self.rows.len() > 1 {
             self.rows.pop();
         }
@@ -88,7 +88,7 @@ impl Recorder {
         self.rows.push(Row { seconds, pose });
     }
 
-    /// Ends it; the probe has stood still since the last row.
+    /// Ends the recording; the probe has stood still since the last row.
     pub fn finish(mut self, now: Instant) -> Recording {
         let last = self.rows[self.rows.len() - 1];
         let seconds = self.seconds(now);
@@ -99,7 +99,7 @@ impl Recorder {
     }
 }
 
-/// A recorded way of the probe.
+/// A recorded trajectory of the probe.
 #[derive(Clone, Debug)]
 pub struct Recording {
     scene_seconds: f64,
@@ -108,8 +108,8 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// The text of a trajectory file. Lines that begin with # say what a reader need not know: the
-    /// scene's time at the first row, and which device moved the probe.
+    /// The text of a trajectory file. Lines that begin with # give what a reader does not need: the
+    /// scene's time at the first row, and the device that moved the probe.
     pub fn text(&self) -> String {
         let mut out = format!(
             "# Probe in the world, recorded by insonify.\n# The scene's time at the first row: {} s.\n\
@@ -119,7 +119,7 @@ impl Recording {
         let mut devices = self.devices.iter().peekable();
         for (index, row) in self.rows.iter().enumerate() {
             while let Some((_, name)) = devices.next_if(|(first, _)| *first <= index) {
-                // A name that a client chose must not end the line.
+                // A name chosen by a client must not end the line.
                 let name: String = name.chars().filter(|c| !c.is_control()).collect();
                 let _ = writeln!(out, "# {name}");
             }
@@ -133,7 +133,7 @@ impl Recording {
         out
     }
 
-    /// What it does between the rows: straight on and along the great circle.
+    /// The curve between the rows: straight lines and great circles.
     pub fn track(&self) -> Track {
         let times: Vec<f64> = self.rows.iter().map(|row| row.seconds).collect();
         let positions: Vec<DVec3> = self.rows.iter().map(|r| r.pose.translation).collect();
@@ -158,24 +158,24 @@ fn rotation(pose: &DAffine3) -> DQuat {
     DQuat::from_mat3(&pose.matrix3).normalize()
 }
 
-/// A trajectory that the probe goes along.
+/// A trajectory that the probe follows.
 #[derive(Clone, Debug)]
 pub struct Replay {
     track: Arc<Track>,
-    /// What the trajectory leaves out: position or rotation of the scene file's pose.
+    /// The scene file's pose, of which position or rotation is used where the trajectory has none.
     rest: Trs,
     /// Its first and last time, s.
     span: [f64; 2],
-    /// Seconds since its first row, where it goes by the wall.
+    /// Seconds since its first row, where it follows wall-clock time.
     clock: Clock,
-    /// The scene's time at its first row, where it goes by that.
+    /// The scene's time at its first row, where it follows the scene's time.
     with_scene: Option<f64>,
     looped: bool,
 }
 
 impl Replay {
-    /// Begins now. With the scene's time at the first row (s) it goes on as that does; else at the
-    /// pace of the file's times. What the trajectory leaves out is that of `home`.
+    /// Begins now. With the scene's time at the first row (s) it follows that time; else the pace of
+    /// the file's times. Position or rotation that the trajectory lacks is that of `home`.
     pub fn new(
         track: Arc<Track>,
         home: &DAffine3,
@@ -196,7 +196,7 @@ impl Replay {
         }
     }
 
-    /// Seconds since the first row, beyond the last one where it has ended.
+    /// Time since the first row, s; more than its length once it has ended.
     fn gone(&self, scene: &Clock, now: Instant) -> f64 {
         match self.with_scene {
             Some(start) => scene.at(now) - start,
@@ -204,12 +204,12 @@ impl Replay {
         }
     }
 
-    /// How long it is, s.
+    /// Length, s.
     pub fn length(&self) -> f64 {
         self.span[1] - self.span[0]
     }
 
-    /// Where on its way it is, s from the first row.
+    /// Present place on the trajectory, s from the first row.
     pub fn position(&self, scene: &Clock, now: Instant) -> f64 {
         let gone = self.gone(scene, now);
         match self.looped && self.length() > 0.0 {
@@ -224,14 +224,14 @@ impl Replay {
         self.track.at(self.rest, time).matrix()
     }
 
-    /// Whether the probe stays where the trajectory ends.
+    /// Returns whether it has ended, and the probe stays at its end.
     pub fn is_over(&self, scene: &Clock, now: Instant) -> bool {
         let length = self.length();
         length == 0.0 || !self.looped && self.gone(scene, now) >= length
     }
 
-    /// Whether the probe moves by itself after `since`: a way that is gone by the scene's time stands
-    /// with it.
+    /// Returns whether the probe moves by itself after `since`: a trajectory that follows the scene's time
+    /// stands still with it.
     pub fn moves(&self, scene: &Clock, since: Instant) -> bool {
         let clock = match self.with_scene {
             Some(_) => scene,
@@ -240,7 +240,7 @@ impl Replay {
         clock.runs() && !self.is_over(scene, since)
     }
 
-    /// Stands still for as long as it is held.
+    /// Makes it stand still as long as it is held.
     pub fn hold(&mut self, held: bool, now: Instant) {
         self.clock.hold(held, now);
     }

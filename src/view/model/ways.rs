@@ -1,4 +1,4 @@
-//! Recording where the probe goes, and letting it go there again.
+//! Recording the probe's trajectory, and replaying it.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -9,31 +9,31 @@ use super::trajectory::{Recorder, Recording, Replay};
 use super::{Model, Source};
 use crate::scene::animation::Track;
 
-/// The trajectory that a session has, and what it does with it.
+/// The trajectory of a session, and its state.
 #[derive(Clone, Debug, Default)]
 pub struct Ways {
     /// A recording under way.
     pub recorder: Option<Recorder>,
-    /// What was recorded or loaded last.
+    /// The last trajectory recorded or loaded.
     pub kept: Option<Kept>,
-    /// The probe goes along it.
+    /// The replay that the probe follows.
     pub replay: Option<Replay>,
-    /// It begins again when it has ended.
+    /// True where the replay begins again after its end.
     pub looped: bool,
-    /// It goes on as the scene's time does, from its first row's time on.
+    /// True where it follows the scene's time, from its first row's time on.
     pub with_scene: bool,
 }
 
 /// A trajectory to replay.
 #[derive(Clone, Debug)]
 pub struct Kept {
-    /// Where the probe is when.
+    /// The probe's pose over time.
     pub track: Arc<Track>,
     /// The recording that is not saved yet.
     pub unsaved: Option<Recording>,
-    /// Where it is from.
+    /// Name of its file, or of the recording.
     pub name: String,
-    /// The scene's time at its first row, s, where that is known.
+    /// The scene's time at its first row, s, where known.
     scene_seconds: Option<f64>,
 }
 
@@ -68,8 +68,8 @@ impl Model {
         }
     }
 
-    /// Lets the probe go along the trajectory from its beginning, or stops it where it is. A replay
-    /// that goes by the scene's time sets it to that at which the recording began.
+    /// Starts the replay from its beginning, or stops it. A replay that follows the scene's time
+    /// sets that to the time at which the recording began.
     pub fn replay(&mut self, now: Instant) {
         if self.ways.replay.is_some() {
             self.stop(now);
@@ -91,7 +91,7 @@ impl Model {
         self.touch(now);
     }
 
-    /// Puts the probe where a trajectory begins; [`Self::begin_replay`] lets it go.
+    /// Puts the probe to the start of a trajectory and waits; [`Self::begin_replay`] starts it.
     pub fn await_replay(&mut self, kept: Kept, now: Instant) {
         self.ways.kept = Some(kept);
         self.replay(now);
@@ -100,7 +100,7 @@ impl Model {
         }
     }
 
-    /// There is a picture to look at: a replay that waits for it goes on.
+    /// Starts a waiting replay: there is a picture to look at.
     pub fn begin_replay(&mut self, now: Instant) {
         if let Some(replay) = &mut self.ways.replay
             && !self.frozen
@@ -110,14 +110,14 @@ impl Model {
         }
     }
 
-    /// Another device has taken the probe: it starts from where the replay has brought it.
-    /// Whether there was a replay.
+    /// Stops the replay for another device, which starts from the place that it has reached.
+    /// Returns whether there was a replay.
     pub(super) fn stop(&mut self, now: Instant) -> bool {
         self.follow(now);
         self.ways.replay.take().is_some()
     }
 
-    /// Takes over where a replay has brought the probe. The simulation knows by itself.
+    /// Moves the model's pose to the replay's. The simulation follows the replay by itself.
     pub fn follow(&mut self, now: Instant) {
         if let Some(replay) = &self.ways.replay {
             self.pose = replay.pose(&self.clock, now);
@@ -129,7 +129,7 @@ impl Model {
         }
     }
 
-    /// Notes in the recording, if there is one, where `device` has moved the probe.
+    /// Notes a movement of the probe by `device` in the recording, if there is one.
     pub(super) fn write(&mut self, device: &str, pose: DAffine3, now: Instant) {
         if let Some(recorder) = &mut self.ways.recorder {
             recorder.note(device, pose, now);

@@ -1,11 +1,11 @@
-//! Input as the interface takes it: no press, way of the pointer and release at once.
+//! Input in steps that the interface understands: press, movement and release apart.
 
 use egui::{Event, RawInput};
 
-/// The input in passes to be given to the interface one after the other, so that in none the pointer moves before
-/// or after a button changes. Where the window is drawn more slowly than a hand drags, all of a drag may lie between
-/// two of its pictures; egui takes what comes at once to have happened at the pointer's last place, and no drag
-/// to have been.
+/// The input in passes, to be given to the interface one after the other: in none does the pointer move before or
+/// after a button changes. Where the window is drawn more slowly than a hand drags, a whole drag may lie between two
+/// drawings. egui takes all events of one input to have happened at the pointer's last place, and would see no
+/// drag.
 pub(super) fn passes(mut input: RawInput) -> Vec<RawInput> {
     let mut groups = vec![Vec::new()];
     for event in std::mem::take(&mut input.events) {
@@ -50,7 +50,7 @@ mod tests {
         }
     }
 
-    /// Way by which a panel from x = 20 on was dragged, and number of clicks on it.
+    /// Distance by which a panel from x = 20 on was dragged, and number of clicks on it.
     fn drawn(context: &Context, inputs: Vec<RawInput>) -> (Vec2, usize) {
         let (mut by, mut clicks) = (Vec2::ZERO, 0);
         for input in inputs {

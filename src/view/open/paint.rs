@@ -1,4 +1,4 @@
-//! A picture of the window.
+//! One drawing of the window.
 
 use std::time::{Duration, Instant};
 
@@ -11,11 +11,11 @@ use crate::view::timing::costs;
 use crate::view::tools::cropped;
 use crate::view::{keys, real};
 
-/// Pictures of an animation after which its window is pictured.
+/// Number of images of an animation after which a screenshot is taken.
 const SETTLED: usize = 24;
 
 impl Open {
-    /// One picture of the window; with its pixels where they are wanted and there is an image.
+    /// Draws the window once; returns its pixels where they are wanted and there is an image.
     pub(in crate::view) fn paint(
         &mut self,
         times: &mut Times,
@@ -45,10 +45,10 @@ impl Open {
         let primitives = context.tessellate(std::mem::take(&mut output.shapes), scale);
         let model = &self.model;
         let image = shown.as_ref().map(|frame| real::image(frame, model));
-        let survey = self.pictured.as_ref().map(|pictured| &pictured.image);
+        let view3d = self.pictured.as_ref().map(|pictured| &pictured.image);
         let rects = [
             (image, places.image.as_ref().map(|place| place.rect)),
-            (survey, places.survey.map(|place| place.rect)),
+            (view3d, places.view3d.map(|place| place.rect)),
         ];
         let placed: Vec<Placed> = (rects.into_iter())
             .filter_map(|(image, rect)| {
@@ -59,7 +59,7 @@ impl Open {
             .collect();
         let size = self.window.inner_size();
         let looked = self.pictured.as_ref().map(|pictured| &pictured.look);
-        // What goes on by itself is never at rest: its first pictures have found their quality.
+        // A running animation is never at rest: by then its quality has settled.
         let settled = |frame: &Frame| match self.model.clock.runs() {
             true => times.samples().len() >= SETTLED,
             false => frame.grade.is_full(),
@@ -96,10 +96,10 @@ impl Open {
         }
     }
 
-    /// Tells the simulation how the anatomy is looked at.
+    /// Sends the view of the anatomy to the simulation.
     fn point(&mut self, places: &Places, scale: f32) {
-        let (model, state) = (&self.model, &self.state.survey);
-        let look = (places.survey).map(|place| place.look(model, state, scale));
+        let (model, state) = (&self.model, &self.state.view3d);
+        let look = (places.view3d).map(|place| place.look(model, state, scale));
         if look != self.look {
             if look.is_none() {
                 self.pictured = None;
@@ -109,12 +109,12 @@ impl Open {
         }
     }
 
-    /// Draws again when the interface wants to move.
+    /// Plans the next drawing that the interface wants.
     fn schedule(&mut self, output: &egui::FullOutput) {
         let root = output.viewport_output.get(&egui::ViewportId::ROOT);
         let delay = root.map_or(Duration::MAX, |root| root.repaint_delay);
         let now = Instant::now();
-        // Beyond what an instant can hold: never.
+        // Later than an instant can hold: never.
         self.again = now.checked_add(delay).filter(|_| !delay.is_zero());
         if delay.is_zero() {
             self.draw_soon(now);
@@ -123,7 +123,7 @@ impl Open {
 
     /// Notes that the picture has been handed to the screen.
     fn seen(&mut self, times: &mut Times) {
-        (self.pictures_ms.drain(..)).for_each(|ms| times.add_survey(ms));
+        (self.pictures_ms.drain(..)).for_each(|ms| times.add_view3d(ms));
         if !std::mem::take(&mut self.fresh) {
             return;
         }

@@ -5,12 +5,19 @@ use std::time::Instant;
 use super::{Open, Plan};
 use crate::view::opening::{Opened, Opening};
 
+/// Reason for which no scene is opened.
+const STOPPED: &str = "The simulation stands still. Start it again first, then open the scene.";
+
 impl Open {
-    /// Begins to open a scene where the user wants it.
+    /// Begins to open the scene that the user wants.
     pub(in crate::view) fn begin(&mut self, plan: &Plan) {
         let files = &mut self.state.files;
         if let Some(path) = files.wanted.take() {
-            // Said of this file; another one speaks for itself.
+            if self.state.stopped {
+                return self.refuse(STOPPED.to_owned());
+            }
+            let files = &mut self.state.files;
+            // Overrides belong to this file, not to another one.
             let of_this = path == self.model.file.path;
             let overrides = self.model.file.overrides.iter().filter(|_| of_this).cloned();
             files.opening = true;
@@ -19,7 +26,7 @@ impl Open {
         }
     }
 
-    /// Hands a scene that has been read to the simulation.
+    /// Hands a loaded scene to the simulation.
     pub(super) fn receive(&mut self, plan: &Plan) {
         let device = &self.session.device;
         let Some(opening) = &self.opening else { return };
@@ -43,7 +50,7 @@ impl Open {
         let Opened { scene, model } = opened.expect("nothing else was handed over");
         self.told = model.revision();
         self.model = model;
-        // It shows the scene before, as does all that was measured in it.
+        // The last frame shows the scene before, as do all measurements on it.
         self.frame = None;
         (self.pictured, self.look) = (None, None);
         (self.state.tissue, self.state.mesh) = (0, 0);

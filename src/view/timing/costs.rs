@@ -1,4 +1,4 @@
-//! What it costs to follow what moves, and what lies in the device's memory.
+//! Costs of following moving meshes, and the use of the device's memory.
 
 use egui::{ScrollArea, Ui};
 
@@ -22,7 +22,7 @@ pub(in crate::view) fn strategies(all: &[Option<Strategy>]) -> String {
     }
 }
 
-/// Costs by strategy, as far as the last frames have seen several, and the meshes that change.
+/// Draws the costs by strategy, as far as the last frames have used several, and the meshes that change.
 pub(super) fn structures(ui: &mut Ui, times: &Times, model: &Model) {
     let scroll = ScrollArea::vertical().max_height(HEIGHT - 48.0);
     scroll.auto_shrink([true, false]).show(ui, |ui| {
@@ -86,7 +86,7 @@ fn meshes(ui: &mut Ui, model: &Model) {
     });
 }
 
-/// Memory by kind; `heap` is that of the device, bytes.
+/// Draws the memory by kind; `heap` is the size of the device's own, bytes.
 pub(super) fn memory(ui: &mut Ui, frame: Option<&Frame>, heap: u64) {
     let Some(frame) = frame else {
         return;

@@ -1,4 +1,4 @@
-//! A bar per frame, stacked by stage.
+//! The graph of frame times: a bar per frame, stacked by stage.
 
 use egui::{Align2, Color32, FontId, Pos2, Rect, Sense, Stroke, Ui, vec2};
 
@@ -10,10 +10,10 @@ use crate::statistics::Statistics;
 /// Usual limit of a live image, ms: 30 frames per second.
 const LIVE: f64 = 1e3 / 30.0;
 
-/// Widths between which the graph takes what there is, points.
+/// Least and greatest width of the graph, points.
 const WIDTHS: [f32; 2] = [200.0, 480.0];
 
-/// Bars from the left, oldest first: stages from below, then what the frame took beside the device;
+/// Draws bars from the left, oldest first: stages from below, then the rest of the frame beside the device;
 /// the line is at 1/30 s.
 pub(super) fn show(ui: &mut Ui, times: &Times) {
     let size = vec2(ui.available_width().clamp(WIDTHS[0], WIDTHS[1]), HEIGHT - 52.0);
@@ -21,7 +21,7 @@ pub(super) fn show(ui: &mut Ui, times: &Times) {
     let painter = ui.painter_at(area);
     painter.rect_filled(area, 2.0, style::BACK);
     let names = times.stages();
-    // The first frame, for which kernels are made, would leave nothing of the others to see.
+    // The first frame, which includes compiling kernels, would leave nothing of the others to see.
     let usual = Statistics::of(times.samples().map(Sample::whole)).p95;
     let most = usual.max(LIVE) * 1.1;
     let height = |ms: f64| area.height() * (ms / most) as f32;
@@ -57,7 +57,7 @@ pub(super) fn show(ui: &mut Ui, times: &Times) {
     }
 }
 
-/// What one frame took.
+/// Draws the times of one frame.
 fn details(ui: &mut Ui, names: &[String], sample: &Sample) {
     egui::Grid::new("frame").num_columns(2).show(ui, |ui| {
         for name in names {

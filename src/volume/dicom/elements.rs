@@ -1,6 +1,6 @@
-//! The elements of a DICOM file (PS3.5, PS3.10). Readers at hand allocate what an element declares
-//! before they look whether the file holds it, four gigabytes for twelve bytes; this one keeps
-//! places in the file instead of values, and only of elements that a volume needs.
+//! The elements of a DICOM file (PS3.5, PS3.10). Other readers allocate the length that an element declares
+//! before they check that the file holds it, four gigabytes for twelve bytes; this one keeps places in
+//! the file instead of values, and only of elements that a volume needs.
 
 use std::borrow::Cow;
 use std::collections::BTreeMap;
@@ -9,7 +9,7 @@ use std::ops::Range;
 /// Group and element.
 pub(super) type Tag = (u16, u16);
 
-/// Sequences that are looked into, also where their type is not written down.
+/// Sequences that are read, also where their type is not written.
 pub(super) const SHARED: Tag = (0x5200, 0x9229);
 pub(super) const PER_FRAME: Tag = (0x5200, 0x9230);
 pub(super) const POSITION_VOLUME: Tag = (0x0020, 0x930e);
@@ -61,19 +61,19 @@ const ITEM: Tag = (0xfffe, 0xe000);
 const ITEM_END: Tag = (0xfffe, 0xe00d);
 const SEQUENCE_END: Tag = (0xfffe, 0xe0dd);
 const UNDEFINED: u32 = u32::MAX;
-/// Sequences within sequences that are followed; the standard needs a handful.
+/// Deepest nesting of sequences that is read; the standard needs a handful.
 const MAX_DEPTH: usize = 32;
 
-/// How elements are written.
+/// Encoding of elements.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Syntax {
-    /// Types are written down.
+    /// True where types are written.
     pub explicit: bool,
-    /// Most significant byte first.
+    /// True where the most significant byte comes first.
     pub big: bool,
 }
 
-/// What an element holds: places in the file.
+/// Value of an element: places in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Value {
     /// Bytes.
@@ -100,7 +100,7 @@ pub(super) struct Parser<'b> {
 struct Element {
     tag: Tag,
     sequence: bool,
-    /// Written without types whatever the rest is.
+    /// True for elements without a written type, whatever the rest has.
     implicit: bool,
     length: u32,
     start: usize,
@@ -160,7 +160,7 @@ impl Parser<'_> {
         })
     }
 
-    /// The byte after the elements of group 2, or where they can no longer be followed.
+    /// The byte after the elements of group 2, or the first that cannot be read.
     pub fn end_of_group_2(&self) -> usize {
         let mut ahead = Self { ..*self };
         loop {

@@ -1,4 +1,4 @@
-//! From a file to its elements: preamble, transfer syntax, and what has to be unpacked.
+//! A file's elements: preamble, transfer syntax, and unpacking.
 
 use std::io::Read;
 use std::path::Path;
@@ -12,10 +12,10 @@ use crate::volume::error::VolumeError;
 
 /// The preamble and the four letters after it.
 const START: usize = 132;
-/// Bytes that a byte of a deflated file may unpack to. Images reach ten, not more.
+/// Most bytes into which a byte of a deflated file may unpack. Images reach ten, not more.
 const MAX_INFLATION: u64 = 64;
 
-/// How elements and pixels are written (PS3.5, annex A).
+/// Transfer syntax: encoding of elements and pixels (PS3.5, annex A).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Transfer {
     /// Little endian without types.
@@ -45,13 +45,13 @@ impl Transfer {
         })
     }
 
-    /// How elements are written.
+    /// Encoding of elements.
     pub fn elements(self) -> Syntax {
         Syntax { explicit: self != Self::Implicit, big: self == Self::Big }
     }
 }
 
-/// What a syntax that cannot be read is called.
+/// Name of a syntax that cannot be read.
 fn name(uid: &str) -> &'static str {
     match uid.strip_prefix("1.2.840.10008.1.2.4.") {
         Some("51") => "JPEG of 12 bits",

@@ -1,4 +1,4 @@
-//! Where the planes of a DICOM file lie.
+//! Places of the planes of a DICOM file.
 
 use glam::DVec3;
 
@@ -7,7 +7,7 @@ use super::image::Image;
 use super::{Dicom, VolumeError};
 use crate::volume::grid::{Frame, Grid};
 
-/// Part of the distance between planes by which one may be off its place.
+/// Largest deviation of a plane from its place, as a part of the distance between planes.
 const UNEVEN: f64 = 0.01;
 /// Planes closer than this are the same, mm: a thousandth of the finest ultrasound voxel.
 const SAME: f64 = 1e-4;
@@ -16,7 +16,7 @@ const SAME: f64 = 1e-4;
 pub(super) struct Planes {
     /// Frames of the file, in the order of the third axis.
     pub frames: Vec<usize>,
-    /// Volumes that the file holds.
+    /// Number of volumes in the file.
     pub volumes: usize,
     pub grid: Grid,
 }
@@ -79,7 +79,7 @@ fn unplaced(dicom: &Dicom, image: &Image) -> VolumeError {
     dicom.error(message, NO_PLACE)
 }
 
-/// The plane that these functional groups place, or the file itself.
+/// The plane placed by these functional groups, or by the file itself.
 fn plane(dicom: &Dicom, groups: &[&Item]) -> Option<Plane> {
     let elements = dicom.elements();
     let find = |tag| groups.iter().find_map(|g| first(g, tag));
@@ -119,7 +119,7 @@ fn measures(
     let mut groups = frame.into_iter().chain(shared);
     let item = groups.find_map(|g| first(g, elements::MEASURES)).unwrap_or(&dicom.root);
     let spacing = elements.decimals::<2>(item, (0x0028, 0x0030));
-    // The first is between rows, that is along a column.
+    // The first number is between rows, that is along a column.
     let [y, x] = spacing.ok_or_else(|| dicom.lacks("PixelSpacing", (0x0028, 0x0030)))?;
     let thickness = elements.decimals::<1>(item, (0x0018, 0x0050)).map_or(1.0, |[t]| t);
     let sound = |v: f64| v.is_finite() && v > 0.0;

@@ -1,9 +1,9 @@
-//! What the pixels of a DICOM file are.
+//! The pixel format of a DICOM file.
 
 use super::elements::{FLOAT_PIXELS, VALUES, first};
 use super::{Dicom, SAVE, VolumeError, VoxelType, bytes_of};
 
-/// How values of a pixel are to be understood.
+/// Meaning of a pixel's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Color {
     /// One brightness.
@@ -16,7 +16,7 @@ pub(super) enum Color {
     Ybr422,
 }
 
-/// The pixels.
+/// The pixel format.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Image {
     pub rows: usize,
@@ -24,13 +24,13 @@ pub(super) struct Image {
     pub frames: usize,
     /// Values per pixel.
     pub samples: usize,
-    /// Values of a pixel are a plane each, and not next to each other.
+    /// True where each value of the pixels has a plane of its own.
     pub planar: bool,
     pub color: Color,
     pub kind: VoxelType,
-    /// Bits of a value that count.
+    /// Number of significant bits of a value.
     pub bits: u32,
-    /// Slope and intercept, where they change something.
+    /// Slope and intercept, where they have an effect.
     pub scale: Option<(f64, f64)>,
 }
 

@@ -12,8 +12,8 @@ use super::{Dicom, SAVE, VolumeError, bytes_of, source};
 use crate::volume::layout::{Axis, Layout};
 use crate::volume::voxels::{VoxelType, Voxels};
 
-/// Bytes of pixels that a compressed byte can stand for at most, generously: a run of 128 is two
-/// bytes, a JPEG block of 64 values two bits.
+/// Most bytes of pixels for a compressed byte, with a margin: a run of 128 is two bytes, a JPEG block of 64
+/// values two bits.
 const MAX_RATIO: usize = source::MAX_RATIO as usize;
 
 /// The voxels of these frames, one after another.
@@ -34,7 +34,7 @@ pub(super) fn decode(
     Ok(trim(voxels, image.bits))
 }
 
-/// Values of fewer bits than are allocated: what lies above them is not theirs.
+/// Values of fewer bits than allocated, without the bits above them, which do not belong to them.
 fn trim(voxels: Voxels, bits: u32) -> Voxels {
     match voxels {
         Voxels::U8(v) if bits < 8 => {
@@ -61,7 +61,7 @@ fn native(
 ) -> Result<Vec<u8>, VolumeError> {
     let samples = if image.color == Color::Ybr422 { 2 } else { image.samples };
     let frame = image.rows * image.columns * samples * image.kind.bytes();
-    // Of 8-bit values in big-endian words two would change places; nobody writes them since 2006.
+    // 8-bit values in big-endian words would be swapped in pairs; nobody has written them since 2006.
     let held = range.len();
     if frame.checked_mul(image.frames).is_none_or(|total| total > held) {
         let message = format!(
@@ -78,7 +78,7 @@ fn native(
     Ok(out)
 }
 
-/// Appends the brightness of every pixel: of red, green and blue as BT.601 weighs them (PS3.3,
+/// Appends the brightness of every pixel; red, green and blue are weighted as in BT.601 (PS3.3,
 /// C.7.6.3.1.2).
 fn grey(image: &Image, frame: &[u8], out: &mut Vec<u8>) {
     let pixels = image.rows * image.columns;
@@ -108,8 +108,8 @@ fn packed(
     fragments: &[Range<usize>],
     frames: &[usize],
 ) -> Result<Vec<u8>, VolumeError> {
-    // The table of offsets comes first. A frame may be cut into several fragments; then the table
-    // says where they begin, which only files of old video recorders need.
+    // The table of offsets comes first. A frame may be cut into several fragments; then the table has
+    // their starts, which only files of old video recorders need.
     let data = fragments.get(1..).unwrap_or_default();
     if data.len() != image.frames {
         let message = format!("{} frames lie in {} fragments", image.frames, data.len());
@@ -137,7 +137,7 @@ fn packed(
     Ok(out)
 }
 
-/// Appends a frame of JPEG. The decoder gives grey or red, green and blue, whatever the file says.
+/// Appends a frame of JPEG. The decoder gives grey or red, green and blue, whatever the file states.
 fn jpeg(image: &Image, bytes: &[u8], out: &mut Vec<u8>) -> Result<(), String> {
     let decoder = JpegDecoder::new(Cursor::new(bytes)).map_err(|e| format!("is no JPEG: {e}"))?;
     let (width, height) = decoder.dimensions();

@@ -1,4 +1,4 @@
-//! Which axes of a NRRD file are of space, and where they lie.
+//! The axes of space of a NRRD file, and their places.
 
 use glam::DVec3;
 
@@ -41,7 +41,7 @@ pub(super) fn directions(
     Ok((Some(vectors), frame))
 }
 
-/// Values like `(1,0,0) none (0, 1, 0)`; of two components the third is zero.
+/// Vectors from text like `(1,0,0) none (0, 1, 0)`; of two components the third is zero.
 fn vectors(fields: &Fields, field: &Field) -> Result<Directions, VolumeError> {
     let wrong = || fields.error(field, "is no list of vectors", "write it like (1,0,0) (0,1,0)");
     let mut out = Vec::new();
@@ -65,7 +65,7 @@ fn vectors(fields: &Fields, field: &Field) -> Result<Directions, VolumeError> {
     Ok(out)
 }
 
-/// What each of `n` axes counts: two or three of them space, the first that do; of the others one time,
+/// Meaning of each of `n` axes: two or three of space, the first that qualify; of the others one of time,
 /// which may stand anywhere.
 pub(super) fn axes(
     fields: &Fields,
@@ -90,7 +90,7 @@ pub(super) fn axes(
         ));
     }
     let others = (0..n).filter(|axis| !space.contains(axis));
-    // What is not named are values of a voxel before the axes of space, volumes behind them.
+    // Axes without a name are values of a voxel before the axes of space, and volumes behind them.
     let time = others.filter_map(|axis| match kind(axis).as_str() {
         "time" => Some((0, axis)),
         "list" => Some((1, axis)),
@@ -106,7 +106,7 @@ pub(super) fn axes(
         .collect())
 }
 
-/// Time from one volume to the next along the axis of time, s, where it is stated.
+/// Time from one volume to the next along the axis of time, s, where stated.
 pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<f64>, VolumeError> {
     let Some(field) = fields.find(&["spacings"]) else {
         return Ok(None);

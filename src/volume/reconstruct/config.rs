@@ -15,7 +15,7 @@ use crate::volume::source;
 /// Longest configuration, bytes.
 const MAX_CONFIG: u64 = 4 << 20;
 
-/// What a configuration says of a reconstruction.
+/// Content of a configuration for a reconstruction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Its `CoordinateDefinitions`.
@@ -28,7 +28,7 @@ pub struct Config {
     pub reference: Option<String>,
 }
 
-/// An element and where it is.
+/// An element and its file.
 struct Element<'d, 'p> {
     node: Node<'d, 'd>,
     path: &'p Path,
@@ -38,7 +38,7 @@ impl Config {
     /// Reads a configuration.
     ///
     /// # Errors
-    /// When it is no XML, lacks `VolumeReconstruction`, or asks for what this program cannot do.
+    /// It is no XML, lacks `VolumeReconstruction`, or asks for a method that this program lacks.
     pub fn load(path: &Path) -> Result<Self, VolumeError> {
         let bytes = source::prefix(path, MAX_CONFIG)?;
         let text = String::from_utf8_lossy(&bytes);
@@ -52,7 +52,7 @@ impl Config {
         };
         let mut transforms = Transforms::default();
         for element in named("Transform") {
-            // Transforms of other parts of a configuration have no matrix.
+            // Transforms in other parts of a configuration have no matrix.
             if let Some(matrix) = element.node.attribute("Matrix") {
                 let matrix = frames::matrix(matrix)
                     .map_err(|cause| element.error("Matrix", cause, "write 16 numbers"))?;
@@ -90,7 +90,7 @@ impl Element<'_, '_> {
         self.node.attribute(name).ok_or_else(missing)
     }
 
-    /// So many numbers, where the attribute is there.
+    /// N numbers, where the attribute is there.
     fn numbers<T: FromStr, const N: usize>(
         &self,
         name: &str,
@@ -106,7 +106,7 @@ impl Element<'_, '_> {
         }
     }
 
-    /// What a word stands for, where the attribute is there.
+    /// The value of a word, where the attribute is there.
     fn choice<T: Copy>(&self, name: &str, known: &[(&str, T)]) -> Result<Option<T>, VolumeError> {
         let Some(word) = self.node.attribute(name) else {
             return Ok(None);
@@ -188,7 +188,7 @@ fn filling(element: &Element) -> Result<Filling, VolumeError> {
     let integer = |name: &str| {
         element.need(name)?;
         let value = element.numbers::<usize, 1>(name)?;
-        // Beyond this a hole is no hole, and filling takes hours.
+        // A larger hole is no hole, and filling it takes hours.
         let value = value.map(|[v]| v).filter(|v| (1..=99).contains(v));
         value.ok_or_else(|| element.error(name, "out of range", "write a number from 1 to 99"))
     };

@@ -1,4 +1,4 @@
-//! The part of a frame that is an image, where it is a sector.
+//! The sector of a frame that holds the image.
 
 use super::ReconstructError;
 use crate::volume::Sequence;
@@ -20,7 +20,7 @@ const ORIGIN: &str = "FanOriginPixel";
 const ANGLES: &str = "FanAnglesDeg";
 const RADII: [&str; 2] = ["FanRadiusStartPixel", "FanRadiusStopPixel"];
 
-/// Keys by which a sequence says which part of its frames is the image.
+/// Keys of a sequence for the part of its frames that is the image.
 pub(in crate::volume) const KEYS: [&str; 4] = [ORIGIN, ANGLES, RADII[0], RADII[1]];
 
 impl Fan {
@@ -36,7 +36,7 @@ impl Fan {
         ]
     }
 
-    /// The fan that the entries of a sequence state; none where none does.
+    /// The fan that the entries of a sequence state; none where there are no entries.
     ///
     /// # Errors
     /// When only some of the entries are there, or they are no numbers.

@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use super::insert::Source;
 use super::{MAX_VOXELS, ReconstructError};
 
-/// Where the voxels are.
+/// Places of the voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     origin: DVec3,
@@ -39,8 +39,8 @@ impl Lattice {
         Ok(Self { origin, spacing, size })
     }
 
-    /// The voxels that hold the part of these frames that is used: from the smallest coordinate of
-    /// its corners on, the last voxel rounded, as PLUS does.
+    /// The voxels that hold the used part of these frames: from the smallest coordinate of its corners
+    /// on, the last voxel rounded, as PLUS does.
     pub(super) fn around(
         source: &Source,
         frames: &[(usize, DAffine3)],
@@ -50,7 +50,7 @@ impl Lattice {
         let points = frames.iter().flat_map(|(_, pose)| corners.map(|c| pose.transform_point3(c)));
         let (low, high) =
             points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(l, h), p| (l.min(p), h.max(p)));
-        // A size beyond all numbers is refused with the others.
+        // A size beyond the number range is refused with the others.
         let size = ((high - low) / spacing).round().to_array();
         Self::new(low, spacing, size.map(|n| (n as usize).saturating_add(1)))
     }
@@ -60,12 +60,12 @@ impl Lattice {
         self.size
     }
 
-    /// Voxel indices to mm in the frame of reference.
+    /// Transform from voxel indices to mm in the frame of reference.
     pub fn reference_from_voxel(&self) -> DAffine3 {
         DAffine3::from_scale_rotation_translation(self.spacing, glam::DQuat::IDENTITY, self.origin)
     }
 
-    /// And back.
+    /// Transform from mm in the frame of reference to voxel indices.
     pub(super) fn voxel_from_reference(&self) -> DAffine3 {
         self.reference_from_voxel().inverse()
     }

@@ -1,4 +1,4 @@
-//! Voxels that no pixel reached.
+//! Filling of voxels that no pixel reached.
 
 use rayon::prelude::*;
 
@@ -22,7 +22,7 @@ const STICKS: [[isize; 3]; 13] = [
     [-1, -1, 1],
 ];
 
-/// Values with holes filled, and how many were. Only voxels that pixels reached are a source.
+/// Values with holes filled, and the number of filled ones. Only voxels that pixels reached are a source.
 pub(super) fn fill(values: Vec<f32>, sums: &Sums, ways: &[Filling]) -> (Vec<f32>, usize) {
     if ways.is_empty() {
         return (values, 0);
@@ -106,7 +106,7 @@ impl Reached<'_> {
             found.push((line, weight * after + (1.0 - weight) * before));
         }
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        // Lines as long as the last of those that are used are used as well.
+        // Lines as long as the last used one are also used.
         let last = found.get(count.max(1).min(found.len()).checked_sub(1)?)?.0;
         let used = found.iter().take_while(|(line, _)| *line <= last);
         let (sum, weights) =

@@ -1,20 +1,20 @@
-//! Pixels into voxels.
+//! Insertion of pixels into voxels.
 
 use glam::{DAffine3, DVec3};
 
 use super::{Compounding, Fan, Interpolation, Lattice, ReconstructError, Settings};
 use crate::volume::Sequence;
 
-/// Weight of trilinear interpolation in the middle between eight voxels: below it the largest and
-/// the latest pixel do not count for a voxel.
+/// Weight of trilinear interpolation in the middle between eight voxels: maximum and latest ignore pixels
+/// of less weight.
 const MIN_WEIGHT: f64 = 0.125;
-/// What PLUS adds before it rounds, so that a coordinate a rounding below a half is not lost.
+/// Offset that PLUS adds before it rounds, so that a coordinate a rounding below a half is not lost.
 const TOLERANCE: f64 = 1.0 / 131_072.0;
 
 /// The pixels to insert.
 pub(super) struct Source<'s> {
     sequence: &'s Sequence,
-    /// First and last pixel along x and y, marked and far.
+    /// First and last pixel along x and y, in the directions marked and far.
     x: [i32; 2],
     y: [i32; 2],
     flip: [bool; 2],
@@ -60,7 +60,7 @@ impl<'s> Source<'s> {
         })
     }
 
-    /// Corners of the part that is used, pixels.
+    /// Corners of the used part, pixels.
     pub fn corners(&self) -> [DVec3; 4] {
         let at = |x: i32, y: i32| DVec3::new(f64::from(x), f64::from(y), 0.0);
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
@@ -87,7 +87,7 @@ impl<'s> Source<'s> {
     }
 }
 
-/// What has gone into each voxel.
+/// Sums of the pixels that went into each voxel.
 pub(super) struct Sums {
     size: [usize; 3],
     interpolation: Interpolation,
@@ -115,12 +115,12 @@ impl Sums {
         self.size
     }
 
-    /// Whether a pixel reached this voxel.
+    /// Returns whether a pixel reached this voxel.
     pub fn is_reached(&self, voxel: usize) -> bool {
         self.weight[voxel] > 0.0
     }
 
-    /// Voxels that pixels reached.
+    /// Number of voxels that pixels reached.
     pub fn reached(&self) -> usize {
         self.weight.iter().filter(|w| **w > 0.0).count()
     }
@@ -172,7 +172,7 @@ impl Sums {
         // A coordinate a rounding below a voxel counts as that voxel.
         let part = (at - low).max(DVec3::ZERO);
         let high = low + DVec3::select(part.cmpgt(DVec3::ZERO), DVec3::ONE, DVec3::ZERO);
-        // As PLUS, a pixel that not all eight voxels surround goes nowhere.
+        // As in PLUS, a pixel that is not surrounded by all eight voxels is dropped.
         if self.index(low).is_none() || self.index(high).is_none() {
             return;
         }

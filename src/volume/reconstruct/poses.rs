@@ -1,4 +1,4 @@
-//! From pixels to the frame of reference, through what the file and the calibration know.
+//! Transforms from pixels to the frame of reference, from the file and the calibration.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -14,7 +14,7 @@ pub struct Transforms {
     fixed: Vec<(String, String, DAffine3)>,
 }
 
-/// A way from a frame to one next to it.
+/// A transform from a frame to a neighbouring one.
 struct Step<'t> {
     to: &'t str,
     transform: DAffine3,
@@ -28,11 +28,11 @@ impl Transforms {
     }
 
     /// Transform of points in `image` (pixels) to points in `reference` (mm) for each frame of a
-    /// sequence, along the fewest steps; none where a pose on the way is not OK or cannot be
-    /// turned around.
+    /// sequence, along the fewest steps; none where a pose on that path is not OK or cannot be
+    /// inverted.
     ///
     /// # Errors
-    /// When no frame of the sequence joins the two at all.
+    /// No frame of the sequence connects the two.
     pub fn of_frames(
         &self,
         sequence: &Sequence,
@@ -59,7 +59,7 @@ impl Transforms {
         ))
     }
 
-    /// None where nothing joins the two, none within where what does is not OK.
+    /// The transform between two frames; none where nothing connects them, none within where a pose is not OK.
     fn way(
         &self,
         poses: &BTreeMap<String, Pose>,
@@ -73,7 +73,7 @@ impl Transforms {
             let (to, ok) = (to, ok && inverse.is_finite());
             steps.entry(to).or_default().push(Step { to: from, transform: inverse, ok });
         };
-        // A pose of the file goes before the calibration of the same name.
+        // A pose of the file takes precedence over the calibration of the same name.
         for (name, pose) in poses {
             if let Some((from, to)) = names(name) {
                 join(from, to, pose.transform, pose.is_ok());
@@ -100,7 +100,7 @@ impl Transforms {
     }
 }
 
-/// The two frames in `ProbeToTracker`, if they can be told apart.
+/// The two frames in a name like `ProbeToTracker`, if they can be told apart.
 pub(super) fn names(name: &str) -> Option<(&str, &str)> {
     let mut at = name.match_indices("To").filter(|&(i, _)| {
         let next = name[i + 2..].chars().next();

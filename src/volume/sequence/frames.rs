@@ -8,42 +8,42 @@ use crate::volume::error::VolumeError;
 use crate::volume::fields::{Field, Fields};
 use crate::volume::write::{Header, number};
 
-/// What entries of frames begin with.
+/// Beginning of the keys of frames.
 pub(in crate::volume) const PREFIX: &str = "Seq_Frame";
 const TRANSFORM: &str = "Transform";
 const STATUS: &str = "TransformStatus";
 const IMAGE_STATUS: &str = "ImageStatus";
 const TIMESTAMP: &str = "Timestamp";
 
-/// A transform that was measured, and whether it can be trusted.
+/// A measured transform, and whether it is valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pose {
     /// From the first frame of the name to the second (`ProbeToTracker`), in their units, mm as a
     /// rule.
     pub transform: DAffine3,
-    /// `OK`, or why it is none (`INVALID`, `OUT_OF_VIEW`, ...); none where the file does not say,
-    /// which counts as `OK`.
+    /// `OK`, or the reason why it is not (`INVALID`, `OUT_OF_VIEW`, ...); none where the file does not state
+    /// it, which counts as `OK`.
     pub status: Option<String>,
 }
 
 impl Pose {
-    /// A pose that holds.
+    /// A valid pose.
     pub fn ok(transform: DAffine3) -> Self {
         Self { transform, status: Some("OK".to_owned()) }
     }
 
-    /// Whether it holds.
+    /// Returns whether it is valid.
     pub fn is_ok(&self) -> bool {
         self.status.as_deref().is_none_or(|s| s == "OK")
     }
 }
 
-/// What belongs to one frame beside its pixels.
+/// Data of one frame beside its pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrackedFrame {
-    /// Seconds since a moment that the sequence shares.
+    /// Time since a moment common to the sequence, s.
     pub timestamp: Option<f64>,
-    /// Whether its pixels are an image: `ImageStatus`, where it is stated.
+    /// `ImageStatus`, whether its pixels are an image, where stated.
     pub image: Option<bool>,
     /// Poses by name without `Transform`, e.g. `ProbeToTracker`.
     pub poses: BTreeMap<String, Pose>,
@@ -52,7 +52,7 @@ pub struct TrackedFrame {
 }
 
 impl TrackedFrame {
-    /// Whether its pixels are an image.
+    /// Returns whether its pixels are an image.
     pub fn has_image(&self) -> bool {
         self.image != Some(false)
     }
@@ -84,19 +84,19 @@ impl TrackedFrame {
     }
 }
 
-/// Whether the third axis is declared to be of space.
+/// Returns whether the third axis is declared to be of space.
 pub(in crate::volume) fn third_axis_is_space(fields: &Fields) -> bool {
     let kinds = fields.find(&["Kinds"]);
     kinds.is_some_and(|f| f.value.split_whitespace().nth(2) == Some("domain"))
 }
 
-/// Whether a header describes frames.
+/// Returns whether a header describes frames.
 pub(in crate::volume) fn in_header(fields: &Fields) -> bool {
     fields.list.iter().any(|f| f.key.starts_with(PREFIX)) && !third_axis_is_space(fields)
 }
 
-/// Frames that have entries, by number, each below `count`. They are no more than the header has
-/// lines, whatever the file claims to hold.
+/// Frames that have entries, by number, each below `count`. They are no more than the text lines of the
+/// header, whatever the file claims to hold.
 pub(super) fn parse(
     fields: &Fields,
     count: usize,
@@ -159,7 +159,7 @@ fn transform(fields: &Fields, field: &Field) -> Result<DAffine3, VolumeError> {
 /// A 4 x 4 matrix in text, row by row, as an affine transform.
 ///
 /// # Errors
-/// What is wrong with the text, to follow its name.
+/// The fault of the text, to follow its name.
 pub fn matrix(text: &str) -> Result<DAffine3, &'static str> {
     let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse).collect();
     let numbers = numbers.map_err(|_| "is no list of numbers")?;

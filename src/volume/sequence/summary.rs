@@ -1,4 +1,4 @@
-//! What `insonify check` says of a sequence.
+//! The text of `insonify check` about a sequence.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -11,9 +11,9 @@ use crate::volume::meta;
 /// Frames, poses and times of a sequence.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Summary {
-    /// Frames that the header describes.
+    /// Number of frames that the header describes.
     pub frames: usize,
-    /// How many poses of each name there are, and how many of them hold.
+    /// Number of poses of each name, and of the valid ones among them.
     pub poses: BTreeMap<String, [usize; 2]>,
     /// First and last timestamp, seconds.
     pub times: Option<[f64; 2]>,

@@ -87,7 +87,7 @@ fn cut_singular_huge_and_bomb_are_refused() {
         ("a.nii", nifti(false, true)),
         ("a.nii.gz", gzip(&nifti(false, true))),
     ] {
-        // Wherever it is cut, the file is refused; nothing panics.
+        // Cut anywhere, the file is refused; nothing panics.
         for len in 0..whole.len() {
             assert!(folder.load(name, &whole[..len]).is_err(), "{name} at {len}");
         }

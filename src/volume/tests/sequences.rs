@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::*;
 
-/// Three frames of 5 x 4 pixels with numbers that decimal fractions cannot hold.
+/// Three frames of 5 x 4 pixels with numbers that decimal fractions cannot represent.
 fn sequence() -> Sequence {
     let pose = |angle: f64, status: Option<&str>| Pose {
         transform: DAffine3::from_mat3_translation(

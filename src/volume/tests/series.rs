@@ -1,4 +1,4 @@
-//! Volumes over time: where their values lie in each format, how fast they follow each other.
+//! Volumes over time: places of their values in each format, and the time between them.
 
 use super::*;
 
@@ -41,7 +41,7 @@ fn series(order: &str, big: bool) -> Vec<u8> {
     out
 }
 
-/// What is wrong with a volume that is to be the three of these tests.
+/// The fault of a volume that should be the three of these tests.
 fn wrong(volume: &Volume, interval: Option<f64>) -> Option<String> {
     let size = (volume.size, volume.volumes().count());
     if size != (SIZE, 3) {
@@ -128,14 +128,14 @@ fn every_format_holds_the_same_volumes_over_time() {
     let packed = zlib(&series("xyzt", false));
     same("z.mha", &meta_4d("0.05", ZLIB, &packed), Some(0.05));
 
-    // Of MetaImage without spacings nothing is known.
+    // Without spacings a MetaImage has no interval.
     let bare = String::from_utf8(meta_4d("1", LOCAL, b"")).expect("text");
     let bare = bare.replacen("ElementSpacing = 0.5 1.25 2 1\n", "", 1);
     let bare = [bare.into_bytes(), series("xyzt", false)].concat();
     same("b.mha", &bare, None);
 }
 
-/// NRRD's axes come in any order; what is not of space is told by its kind, or by where it stands.
+/// NRRD's axes come in any order; axes outside space are known by their kind, or by their place.
 #[test]
 fn the_axis_of_time_may_stand_anywhere() {
     let folder = Folder::new();
@@ -171,7 +171,7 @@ fn the_axis_of_time_may_stand_anywhere() {
             assert!(wrong(&planted, interval).is_some());
         }
     }
-    // Directions say which axes are of space; values of a voxel beside them are none over time.
+    // Directions show the axes of space; values of a voxel beside them are no volumes over time.
     let directions = "none (0.5,0,0) (0,1.25,0) (0,0,2) none";
     let more = format!(
         "endian: little\nkinds: vector domain domain domain list\nspace directions: {directions}\n\
@@ -203,7 +203,7 @@ fn planted_mistakes_in_time_are_refused() {
     ] {
         let error = folder.refused("a.nii", &nifti_4d(false, pace, 10), cause);
         assert_eq!(error.place, Place::Byte(92));
-        // Of a single volume it means nothing.
+        // For a single volume it has no meaning.
         let mut single = nifti(false, true);
         single[92..96].copy_from_slice(&pace.to_le_bytes());
         folder.load("b.nii", &single).expect("one volume");
@@ -220,7 +220,7 @@ fn planted_mistakes_in_time_are_refused() {
             };
         }
     }
-    // Seven axes of all that 16 bits can say.
+    // Seven axes of the largest sizes in 16 bits.
     let mut file = nifti_4d(false, 0.05, 10);
     for axis in 0..8 {
         let size = if axis == 0 { 7 } else { i16::MAX };
@@ -242,7 +242,7 @@ fn planted_mistakes_in_time_are_refused() {
     folder.refused("a.mha", &times("60000"), "is cut off");
     let huge = u64::MAX.to_string();
     folder.refused("a.mha", &times(&huge), "over time are more than 65536");
-    // Volumes of a byte would each take many more: of four billion in a file of some bytes nothing is read.
+    // Volumes of a byte would each take many more: of four billion in a file of some bytes none is read.
     let mut encoder = bzip2::write::BzEncoder::new(Vec::new(), bzip2::Compression::best());
     encoder.write_all(&vec![0; 1 << 20]).expect("memory");
     let tiny = nrrd_4d("1 1 1 4000000000", "", &encoder.finish().expect("memory"));
@@ -264,7 +264,7 @@ fn planted_mistakes_in_time_are_refused() {
     }
     let error = folder.refused("a.nrrd", &nrrd("1", "Hz"), "a unit of time");
     assert_eq!(error.place, Place::Line(10));
-    // Wherever it is cut, the file is refused; with any byte changed it is read or refused.
+    // Cut anywhere, the file is refused; with any byte changed it is read or refused.
     for (name, whole) in [
         ("c.nii", nifti_4d(true, 0.05, 10)),
         ("c.mha", meta_4d("0.05", LOCAL, &data)),
@@ -341,7 +341,7 @@ fn files_of_one_volume_each_make_a_series() {
     // A hundredth of a voxel is the rounding of files.
     let (volume, _) = load(changed("-12.5", "-12.501", &bytes(2))).expect("the same grid");
     assert_eq!(wrong(&volume, None), None);
-    // As many as 4 GB cannot hold are refused by the first: the others are not even looked for.
+    // More than fit into 4 GB are refused by the first: the others are not even looked for.
     let large = nrrd("LPS", DVec3::ONE, RAW, &vec![0; 2 * 64 * 64 * 16]);
     let at = large.windows(5).position(|w| w == b"4 3 2").expect("sizes");
     let large = [&large[..at], b"64 64 16", &large[at + 5..]].concat();

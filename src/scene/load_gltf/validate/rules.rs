@@ -30,6 +30,7 @@ pub(super) fn check(findings: &mut Findings<'_>) {
     nodes(findings);
     tree(findings);
     meshes(findings);
+    channels(findings);
 }
 
 fn list<'a>(findings: &Findings<'a>, name: &str) -> &'a [Value] {
@@ -86,7 +87,7 @@ fn extensions(findings: &mut Findings<'_>) {
     }
 }
 
-/// What cannot change the triangles is not examined beyond its types, and that is said.
+/// Notes the lists that do not affect the triangles: only their types are checked.
 fn unread(findings: &mut Findings<'_>) {
     for name in ["animations", "skins", "cameras", "images"] {
         let count = list(findings, name).len();
@@ -243,7 +244,7 @@ fn tree(findings: &mut Findings<'_>) {
     }
     for start in 0..nodes.len() {
         let mut at = parent[start];
-        // A path longer than all nodes goes round in circles.
+        // A path longer than the number of nodes is a cycle.
         let mut steps = 0;
         while let Some(up) = at.filter(|&up| up != start && steps <= nodes.len()) {
             at = parent[up];
@@ -303,6 +304,23 @@ fn meshes(findings: &mut Findings<'_>) {
                 findings.note(
                     &format!("{at}/targets"),
                     "morph targets are not read unless an animation is asked for",
+                );
+            }
+        }
+    }
+}
+
+/// The only index into a list that is not at the top.
+fn channels(findings: &mut Findings<'_>) {
+    for (a, animation) in list(findings, "animations").iter().enumerate() {
+        let parts = |name| animation.get(name).and_then(Value::as_array).into_iter().flatten();
+        let held = parts("samplers").count();
+        for (c, channel) in parts("channels").enumerate() {
+            let sampler = number(channel, "sampler");
+            if let Some(i) = sampler.filter(|i| !(0..held as i64).contains(i)) {
+                findings.fault(
+                    &format!("/animations/{a}/channels/{c}/sampler"),
+                    format!("names samplers[{i}], which does not exist ({held} do)"),
                 );
             }
         }

@@ -15,7 +15,7 @@ fn at(x: f64, angle: f64) -> DAffine3 {
     DAffine3::from_rotation_translation(DQuat::from_rotation_z(angle), DVec3::X * x)
 }
 
-/// Moves every 40 ms: 1 s along x with a quarter turn about z.
+/// A recording with a movement every 40 ms: 1 s along x with a quarter turn about z.
 fn moved(began: Instant) -> Recording {
     let mut recorder = Recorder::new(at(0.0, 0.0), 3.0, began);
     for i in 1..=25 {
@@ -51,7 +51,7 @@ fn names_of_devices_cannot_break_the_file() {
     recorder.note("a\n1,2\r,x", at(1.0, 0.0), after(began, 50));
     let text = recorder.finish(after(began, 50)).text();
     assert!(text.contains("# a1,2,x\n"), "{text}");
-    // Two rows and the header are all that is no comment.
+    // Only two rows and the header are no comments.
     let rows = text.lines().filter(|line| !line.starts_with('#')).count();
     assert_eq!(rows, 3, "{text}");
 }
@@ -63,7 +63,7 @@ fn between_two_rows_the_probe_goes_straight_and_turns_along_the_great_circle() {
     recorder.note("keyboard", at(6.0, FRAC_PI_2), after(began, 80));
     let replay = replay(&recorder.finish(after(began, 80)), None, false, began);
     let scene = Clock::new(0.0, false, began);
-    // Half way in time: half way, and half the angle; a quarter: a quarter.
+    // Half way in time: half the distance and half the angle; a quarter: a quarter.
     for (ms, x, angle) in [(40, 4.0, FRAC_PI_4), (20, 3.0, FRAC_PI_4 / 2.0)] {
         let pose = replay.pose(&scene, after(began, ms));
         assert!(pose.abs_diff_eq(at(x, angle), 1e-12), "{ms}: {pose}");

@@ -9,7 +9,7 @@ fn after(began: Instant, ms: u64) -> Instant {
     began + Duration::from_millis(ms)
 }
 
-/// A second of sliding by 20 mm, recorded, with the probe home again; the time is then 2 s.
+/// A recorded second of sliding by 20 mm, with the probe home again; the time is then 2 s.
 fn recorded(began: Instant) -> Model {
     let mut model = model(began);
     model.record(began);
@@ -36,7 +36,7 @@ fn a_replay_goes_where_was_recorded_and_leaves_the_probe_at_its_end() {
         assert!((found - x).abs() < 1e-9, "{ms}: {found}");
     }
     assert!(order.runs(after(began, 2999)));
-    // The scene moves on, so that the order does not end with the replay.
+    // The scene's time goes on, so that the order does not end with the replay.
     model.follow(after(began, 2500));
     assert!((slid(&model, &model.pose) - 10.0).abs() < 1e-9);
     assert_eq!(model.devices.holder(), Some(Source::Replay));
@@ -56,7 +56,7 @@ fn a_key_takes_the_probe_where_the_replay_has_brought_it() {
     assert!(model.ways.replay.is_none());
     assert!((slid(&model, &model.pose) - 12.0).abs() < 1e-9);
     assert_eq!(model.devices.holder(), Some(Source::Keyboard));
-    // Put where it is already, the probe stops there all the same.
+    // Put to the place where it already is, the probe stops there too.
     model.replay(after(began, 3000));
     let revision = model.revision();
     model.place_probe(Source::Pointer, model.order().pose(after(began, 3500)), after(began, 3500));
@@ -103,7 +103,7 @@ fn a_replay_by_the_scenes_time_begins_when_the_recording_did() {
     model.ways.with_scene = true;
     model.replay(after(began, 3000));
     assert!((model.clock.at(after(began, 3000)) - 7.0).abs() < 1e-9);
-    // Standing with the scene, it goes on with it.
+    // It stands still with the scene, and goes on with it.
     model.clock.play(false, after(began, 3100));
     model.follow(after(began, 9000));
     assert!(model.ways.replay.is_some());

@@ -1,0 +1,39 @@
+//! OpenIGTLink: a server to which trackers and viewers connect (protocol versions 1 to 3; Tokuda et
+//! al., Int J Med Robotics 5, 2009). A client moves the probe by TRANSFORM or TDATA messages; every
+//! client that has room receives the B-mode image and the probe's pose.
+//!
+//! In messages everything is in RAS and mm: 3D Slicer reads matrices so, whatever axes an image states.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+mod answer;
+mod client;
+pub mod image;
+pub mod message;
+mod metadata;
+mod picture;
+mod receive;
+mod server;
+mod tracking;
+pub mod wire;
+
+pub use picture::Picture;
+pub use server::{IgtlError, Server, Settings, Status};
+pub use tracking::{Pose, Tracked};
+
+/// Device name of the images.
+pub const IMAGE_DEVICE: &str = "BMode";
+/// Device name of the probe's pose.
+pub const POSE_DEVICE: &str = "ProbeToWorld";
+/// The protocol's usual port.
+pub const PORT: u16 = 18944;
+
+/// Warning about a server that other machines can reach.
+pub const OPEN: &str = "whoever reaches this machine can move the probe and see the images; OpenIGTLink \
+    knows no passwords";
+
+/// Locks a mutex. The data behind the locks here are whole between any two statements: a thread that has
+/// panicked holding one leaves nothing half done.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

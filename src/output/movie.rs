@@ -1,0 +1,153 @@
+//! Frames as an animated GIF.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+
+use gif::{Encoder, Frame, Repeat};
+/// Reason for which an animation was not written.
+#[derive(Debug, thiserror::Error)]
+#[error("writing {}: {cause}", path.display())]
+pub struct MovieError {
+    /// The file.
+    pub path: PathBuf,
+    /// Message of the system or of the format.
+    pub cause: String,
+}
+
+/// An animated GIF that is being written: 256 greys, played again and again. All frames share one
+/// palette, because some viewers show frames with a palette of their own in black.
+pub struct Movie {
+    path: PathBuf,
+    state: State,
+    /// Time for which the frames so far are shown, hundredths of a second.
+    shown: f64,
+}
+
+/// State of the file: the format needs the size of the first frame before anything else.
+enum State {
+    Empty(BufWriter<File>),
+    Begun(Encoder<BufWriter<File>>),
+    Failed,
+}
+
+impl Movie {
+    /// Returns whether `path` names an animation, by its extension.
+    pub fn is_meant(path: &Path) -> bool {
+        let extension = path.extension().and_then(|e| e.to_str());
+        extension.is_some_and(|e| e.eq_ignore_ascii_case("gif"))
+    }
+
+    /// Begins a file; replaces an existing one.
+    ///
+    /// # Errors
+    /// Errors of the file system.
+    pub fn new(path: &Path) -> Result<Self, MovieError> {
+        let file = File::create(path).map_err(|e| failed(path, e))?;
+        Ok(Self { path: path.to_owned(), state: State::Empty(BufWriter::new(file)), shown: 0.0 })
+    }
+
+    /// Adds a frame that is shown until `end`, s from the beginning: the red channel of RGBA bytes, row
+    /// by row, of the size of the first one.
+    ///
+    /// # Errors
+    /// Errors of the file system; an image larger than the format allows.
+    pub fn add(
+        &mut self,
+        width: u32,
+        height: u32,
+        rgba: &[u8],
+        end: f64,
+    ) -> Result<(), MovieError> {
+        let delay = centiseconds(self.shown, end);
+        self.shown = 100.0 * end;
+        self.write(width, height, rgba, delay).map_err(|e| failed(&self.path, e))
+    }
+
+    fn write(
+        &mut self,
+        width: u32,
+        height: u32,
+        rgba: &[u8],
+        delay: u16,
+    ) -> Result<(), gif::EncodingError> {
+        let large = |_| std::io::Error::other("a GIF has at most 65535 pixels a side");
+        let width = u16::try_from(width).map_err(large)?;
+        let height = u16::try_from(height).map_err(large)?;
+        let mut encoder = match std::mem::replace(&mut self.state, State::Failed) {
+            State::Empty(file) => {
+                let greys: Vec<u8> = (0..=255).flat_map(|g| [g; 3]).collect();
+                let mut encoder = Encoder::new(file, width, height, &greys)?;
+                encoder.set_repeat(Repeat::Infinite)?;
+                encoder
+            }
+            State::Begun(encoder) => encoder,
+            State::Failed => return Err(std::io::Error::other("it failed before").into()),
+        };
+        encoder.write_frame(&Frame {
+            width,
+            height,
+            delay,
+            buffer: rgba.chunks_exact(4).map(|p| p[0]).collect::<Vec<_>>().into(),
+            ..Frame::default()
+        })?;
+        self.state = State::Begun(encoder);
+        Ok(())
+    }
+}
+
+fn failed(path: &Path, cause: impl ToString) -> MovieError {
+    MovieError { path: path.to_owned(), cause: cause.to_string() }
+}
+
+/// Returns how long a frame that begins at `begin`, hundredths of a second, is shown until `end`, s, in the
+/// format's hundredths: rounded such that the error does not add up.
+fn centiseconds(begin: f64, end: f64) -> u16 {
+    let shown = (100.0 * end).round() - begin.round();
+    // Viewers slow down frames shorter than two hundredths.
+    shown.clamp(2.0, 65_535.0) as u16
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use image::AnimationDecoder;
+    use image::codecs::gif::GifDecoder;
+
+    #[test]
+    fn durations_add_up() {
+        for (rate, frames) in [(10.0, 7), (30.0, 30), (24.0, 100), (15.0, 61), (0.1, 3)] {
+            let at = |i: u32| f64::from(i) / rate;
+            let shown = (0..frames).map(|i| centiseconds(100.0 * at(i), at(i + 1)));
+            let total: u32 = shown.map(u32::from).sum();
+            let exact = 100.0 * at(frames);
+            assert!((f64::from(total) - exact).abs() <= 0.5, "{rate}: {total} {exact}");
+        }
+        assert_eq!(centiseconds(0.0, 0.001), 2);
+    }
+
+    #[test]
+    fn every_grey_comes_back_as_it_was() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.gif");
+        let picture = |offset: u8| -> Vec<u8> {
+            let grey = (0..=255u8).map(|g| g.wrapping_add(offset));
+            grey.flat_map(|g| [g, g, g, if g < 9 { 0 } else { 255 }]).collect()
+        };
+        let mut movie = Movie::new(&path).expect("made");
+        for (offset, end) in [(0, 0.05), (7, 0.1)] {
+            movie.add(16, 16, &picture(offset), end).expect("written");
+        }
+        drop(movie);
+        let file = std::io::BufReader::new(File::open(&path).expect("there"));
+        let frames = GifDecoder::new(file).expect("a GIF").into_frames();
+        let frames = frames.collect_frames().expect("whole");
+        assert_eq!(frames.len(), 2);
+        for (frame, offset) in frames.iter().zip([0, 7]) {
+            assert_eq!(frame.delay().numer_denom_ms(), (50, 1));
+            let found: Vec<u8> = frame.buffer().pixels().map(|p| p.0[0]).collect();
+            let expected: Vec<u8> = picture(offset).chunks(4).map(|p| p[0]).collect();
+            assert_eq!(found, expected);
+        }
+    }
+}

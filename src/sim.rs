@@ -1,0 +1,369 @@
+//! The frame: scene and probe to B-mode image on the device.
+
+mod batches;
+mod buffers;
+pub mod bvh;
+pub mod calibration;
+pub mod contact;
+pub mod dump;
+pub mod facts;
+pub mod fields;
+pub mod fusion;
+pub mod layout;
+pub mod memory;
+pub mod pass;
+mod passes;
+pub mod placement;
+mod read_out;
+mod resize;
+mod results;
+pub mod rounds;
+pub mod shaders;
+pub mod special;
+pub mod stages;
+pub mod tables;
+pub mod tracer;
+pub mod view3d;
+pub mod world;
+
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
+use crate::probe::Probe;
+use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
+use crate::settings::Machine;
+use batches::Room;
+use buffers::Buffers;
+use bvh::Splits;
+use contact::Touch;
+use fusion::{Fused, Tint};
+pub use memory::Memory;
+use passes::{Kernels, Passes, frame_constants};
+use read_out::ReadOut;
+pub use resize::image_size;
+use shaders::Library;
+use stages::{AXIAL, BEAM, DISPLAY, ORIGIN, SCATTER};
+use tables::Tables;
+pub use tracer::Tracer;
+use view3d::Viewer3d;
+use world::World;
+
+/// Why a scene cannot be simulated.
+#[derive(Debug, thiserror::Error)]
+pub enum SimError {
+    /// The Vulkan layer failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The geometry does not fit the tracer.
+    #[error(transparent)]
+    World(#[from] world::WorldError),
+}
+
+/// What does the work on a device.
+pub fn machine(device: &Device) -> Machine {
+    match device.info().kind {
+        AdapterKind::Cpu => Machine::Software,
+        _ => Machine::Gpu,
+    }
+}
+
+/// A scene on the device, ready to be imaged frame by frame.
+pub struct Simulator {
+    device: Arc<Device>,
+    frames: Frames,
+    passes: Passes,
+    coincident: bool,
+    settings: Settings,
+    tables: Tables,
+    shelf: Shelf,
+    counting: bool,
+    /// Whether the last frame was mixed with an acquired volume.
+    fused: bool,
+    /// Where the next frames are copied.
+    shown_on: Option<Image>,
+    /// Once the anatomy was looked at.
+    viewer3d: Option<Viewer3d>,
+    tinted_on: Option<(Image, Tint)>,
+    read_out: ReadOut,
+    update_time: Duration,
+}
+
+/// Tables of settings that were left, for as long as they may come back: levels of quality take turns.
+#[derive(Default)]
+struct Shelf(Vec<(Settings, Tables)>);
+
+impl Shelf {
+    /// More than levels of quality.
+    const MOST: usize = 12;
+
+    fn take(&mut self, settings: &Settings) -> Option<Tables> {
+        let at = self.0.iter().position(|(made_of, _)| made_of == settings)?;
+        Some(self.0.remove(at).1)
+    }
+
+    fn put(&mut self, settings: Settings, tables: Tables) {
+        if self.0.len() == Self::MOST {
+            self.0.remove(0);
+        }
+        self.0.push((settings, tables));
+    }
+}
+
+/// What the tables on the device were made of.
+#[derive(PartialEq)]
+struct Settings {
+    probe: Probe,
+    simulation: Simulation,
+    imaging: Imaging,
+    tissues: Vec<Tissue>,
+    surfaces: Vec<[Surface; 2]>,
+    wires: Vec<Wire>,
+}
+
+impl Settings {
+    fn of(scene: &Scene) -> Self {
+        Self {
+            probe: scene.probe.clone(),
+            simulation: scene.simulation.clone(),
+            imaging: scene.imaging.clone(),
+            tissues: scene.tissues.clone(),
+            surfaces: scene.instances.iter().map(|i| i.surface).collect(),
+            wires: scene.wires.clone(),
+        }
+    }
+}
+
+impl Simulator {
+    /// Uploads `scene` and builds its acceleration structures for `tracer`.
+    ///
+    /// # Errors
+    /// Device out of memory, a binding over the device's limit, geometry too deep for the tracer.
+    pub fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        tracer: Tracer,
+    ) -> Result<Self, SimError> {
+        Self::with_splits(device, library, scene, tracer, Splits::default())
+    }
+
+    /// As [`Self::new`], with trees of the compute tracer built so.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`].
+    pub fn with_splits(
+        device: &Arc<Device>,
+        library: &Library,
+        scene: &Scene,
+        tracer: Tracer,
+        splits: Splits,
+    ) -> Result<Self, SimError> {
+        let shapers = Arc::new(world::Kernels::new(device, library)?);
+        let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
+        let coincident = scene.coincident_triangles() > 0;
+        let room = Room::of(device);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);
+        let tables = Tables::new(scene);
+        let buffers = Buffers::new(device, scene, batches.sizes(&frame, &tables))?;
+        let fusion = Fused::new(device, scene, None)?;
+        let simulator = Self {
+            device: Arc::clone(device),
+            frames: Frames::new(device, "frame")?,
+            coincident,
+            settings: Settings::of(scene),
+            tables,
+            shelf: Shelf::default(),
+            counting: false,
+            fused: false,
+            shown_on: None,
+            viewer3d: None,
+            tinted_on: None,
+            read_out: ReadOut::default(),
+            update_time: Duration::ZERO,
+            passes: Passes {
+                kernels: Kernels::new(device, library, scene, &world, false)?,
+                buffers,
+                fusion,
+                skins: contact::Skins::default(),
+                touch: None,
+                world,
+                frame,
+                shown: frame,
+                batches,
+            },
+        };
+        simulator.upload_tables()?;
+        Ok(simulator)
+    }
+
+    fn upload_tables(&self) -> Result<(), GpuError> {
+        let buffers = &self.passes.buffers;
+        let arrays = self.tables.arrays().map(|(name, bytes)| (&buffers[name], 0, bytes));
+        self.device.upload_many(&arrays)
+    }
+
+    /// Simulates one frame of `scene` as it stands: pose, placements and settings may differ from
+    /// those before, sizes (lines, samples, meshes, tissues, points, image, acquired volume; paths where each has
+    /// segments of its own) may not exceed those at creation. A change of settings waits for the
+    /// frames in flight. `index` selects the noise.
+    /// Returns the timings of the frames that have finished since the last call.
+    ///
+    /// # Errors
+    /// What Vulkan says; a lost device names the last pass.
+    pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
+        let exchanged = self.adopt(scene)?;
+        let passes = &mut self.passes;
+        let mut cmd = self.frames.begin()?;
+        self.update_time = exchanged + passes.update(&mut cmd, scene, self.coincident, index)?;
+        passes.touch(&mut cmd, scene)?;
+        passes.clear(&mut cmd);
+        passes.run(&mut cmd, &ORIGIN)?;
+        let mut turn = 0;
+        for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
+            passes.trace(&mut cmd, begin, &mut turn)?;
+            passes.run(&mut cmd, &SCATTER)?;
+        }
+        passes.run(&mut cmd, &BEAM)?;
+        passes.run(&mut cmd, &AXIAL)?;
+        // The picture before is replaced as a whole.
+        cmd.keep_on();
+        passes.run(&mut cmd, &DISPLAY)?;
+        self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
+        if let Some(image) = &self.shown_on {
+            cmd.copy_to_image(passes.pixels(self.fused), image)?;
+        }
+        if let (Some((image, tint)), true) = (&self.tinted_on, self.fused) {
+            let tinted = passes.tint(&mut cmd, tint)?;
+            cmd.copy_to_image(tinted, image)?;
+        }
+        self.read_out.record(&mut cmd, passes.pixels(self.fused))?;
+        cmd.submit()?;
+        passes.shown = passes.frame;
+        Ok(self.frames.take_timings())
+    }
+
+    /// Frames and 3D views to come are made only as long as nothing newer is wanted: while they are being
+    /// recorded, which where the window shares the queue takes about as long as they do, `wanted_no_longer`
+    /// is asked now and then. They then fail with [`GpuError::Abandoned`], and the picture before stays.
+    pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
+        self.frames.abandon_when(wanted_no_longer);
+    }
+
+    /// Takes over settings, strategies and placements that the device does not have yet, after the
+    /// frames in flight. How long structures took that had to be made anew.
+    fn adopt(&mut self, scene: &Scene) -> Result<Duration, SimError> {
+        let settings = Settings::of(scene);
+        if settings != self.settings {
+            // The tables carry scales and levels that belong to the frame's constants.
+            self.frames.wait()?;
+            let tables = self.shelf.take(&settings);
+            let tables = tables.unwrap_or_else(|| Tables::new(scene));
+            let left = std::mem::replace(&mut self.tables, tables);
+            let before = std::mem::replace(&mut self.settings, settings);
+            self.shelf.put(before, left);
+            self.upload_tables()?;
+        }
+        if self.passes.world.serves(scene) {
+            return Ok(Duration::ZERO);
+        }
+        self.frames.wait()?;
+        let began = Instant::now();
+        self.passes.world.exchange(&self.device, scene)?;
+        Ok(began.elapsed())
+    }
+
+    /// True where the first frame will wait for the driver's compiler: its kernels have never run here.
+    pub fn compiles(&self) -> bool {
+        self.passes.kernels.of(&SCATTER).is_new()
+    }
+
+    /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
+    ///
+    /// # Errors
+    /// A kernel that the device refuses; the simulator keeps the ones that it had.
+    pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
+        self.frames.wait()?;
+        let shapers = world::Kernels::new(&self.device, library)?;
+        let world = &self.passes.world;
+        let kernels = &self.passes.kernels;
+        self.passes.kernels = kernels.again(&self.device, library, world, self.counting)?;
+        self.viewer3d = None;
+        self.passes.world.reload(shapers);
+        Ok(())
+    }
+
+    /// Takes the kernels of the compute tracer that count their steps (`node_visits` and below of
+    /// [`Self::counters`]), which slows rays, or those that do not.
+    ///
+    /// # Errors
+    /// A kernel that the device refuses.
+    ///
+    /// # Panics
+    /// With the ray query, whose steps nobody can count.
+    pub fn count(&mut self, library: &Library, counting: bool) -> Result<(), SimError> {
+        assert_eq!(self.passes.world.tracer(), Tracer::Bvh, "what is counted");
+        self.counting = counting;
+        self.reload(library)
+    }
+
+    /// What the processor took to record the last frame's changes of the scene, trees that it built
+    /// for them included: also those of instances that no longer move with what they shared one with.
+    pub fn update_time(&self) -> Duration {
+        self.update_time
+    }
+
+    /// How the probe touched the skin in the last frame; none where the scene asks for no contact.
+    pub fn contact(&self) -> Option<Touch> {
+        self.passes.touch
+    }
+
+    /// What the scene takes of the device's memory.
+    pub fn memory(&self) -> Memory {
+        let fusion = self.passes.fusion.as_ref();
+        Memory { volume: fusion.map_or(0, Fused::volume_bytes), ..self.passes.world.memory() }
+    }
+
+    /// Waits for the frames in flight; their timings, oldest first.
+    ///
+    /// # Errors
+    /// A lost device, with the last pass that had begun.
+    pub fn wait(&mut self) -> Result<Vec<FrameTimings>, SimError> {
+        self.frames.wait()?;
+        Ok(self.frames.take_timings())
+    }
+
+    /// Constants of the last frame.
+    pub fn constants(&self) -> &layout::Frame {
+        &self.passes.frame
+    }
+
+    /// The tables as they are on the device.
+    pub fn tables(&self) -> &Tables {
+        &self.tables
+    }
+
+    /// The B-mode image of the last frame: width, height, RGBA bytes row by row; transparent outside
+    /// the sector.
+    ///
+    /// # Errors
+    /// What Vulkan says.
+    pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
+        let (width, height) = (self.passes.frame.image_width, self.passes.frame.image_height);
+        let mut bytes = vec![0; 4 * width as usize * height as usize];
+        match self.read_out.take() {
+            Some(copy) => self.frames.read(copy, &mut bytes)?,
+            None => {
+                self.frames.wait()?;
+                let pixels = self.passes.pixels(self.fused);
+                self.device.read_into(pixels, 0, &mut bytes)?;
+            }
+        }
+        Ok((width, height, bytes))
+    }
+
+    /// What the user should know of how the scene was uploaded.
+    pub fn warning(&self) -> Option<&str> {
+        self.passes.fusion.as_ref().and_then(Fused::warning)
+    }
+}

@@ -1,0 +1,54 @@
+//! The trial on the software driver's ray query, and on results that are wrong.
+
+use bytemuck::Zeroable;
+use skip::{Lacking, skip};
+
+use super::{RayHit, Trial, agree, id};
+use crate::gpu::test_device;
+use crate::scene::Scene;
+use crate::sim::layout::NONE;
+use crate::sim::shaders::Library;
+
+#[path = "../../../../tests/common/skip.rs"]
+mod skip;
+
+fn hit(instance: u32, t: f32) -> RayHit {
+    RayHit { instance, t, ..RayHit::zeroed() }
+}
+
+#[test]
+fn the_ray_query_finds_the_surfaces_of_a_scene() {
+    let (device, library) = (test_device(), Library::embedded());
+    if !device.supports_ray_query() {
+        skip(Lacking::Tool, &format!("'{}' has no ray queries", device.name()));
+        return;
+    }
+    let (scene, _) = Scene::load("scenes/phantom.toml".as_ref(), &[]).unwrap();
+    let trial = Trial::run(&device, &library, &scene).unwrap();
+    assert!(trial.rays > 3000, "{trial:?}");
+    assert!(trial.passed(), "{trial:?}");
+    assert_eq!(device.validation_messages(), [""; 0]);
+}
+
+#[test]
+fn a_surface_that_is_missed_or_found_again_counts() {
+    assert!(agree(&hit(NONE, 0.0), &hit(NONE, 7.0)));
+    assert!(agree(&hit(2, 31.0), &hit(2, 31.0005)));
+    assert!(agree(&hit(2, 31.0), &hit(5, 31.0005)), "they lie together");
+    assert!(!agree(&hit(2, 31.0), &hit(NONE, 0.0)), "missed");
+    assert!(!agree(&hit(2, 31.0), &hit(2, 0.0)), "the surface just left");
+    assert!(!agree(&hit(2, 31.0), &hit(2, f32::NAN)));
+    let trial = |different| Trial { rays: 10_000, different };
+    assert!(trial(3).passed());
+    assert!(!trial(4).passed());
+}
+
+#[test]
+fn another_geometry_is_tried_again() {
+    let library = Library::embedded();
+    let (mut scene, _) = Scene::load("scenes/phantom.toml".as_ref(), &[]).unwrap();
+    let before = id(&library, &scene);
+    assert_eq!(id(&library, &scene), before);
+    scene.meshes[0].positions[0][1] += 1.0;
+    assert_ne!(id(&library, &scene), before);
+}

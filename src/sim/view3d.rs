@@ -1,0 +1,208 @@
+//! The anatomy as an eye sees it: a picture through the structures that sound is traced with.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::layout::{self, Frame};
+use super::shaders::Library;
+use super::tracer::Tracer;
+use super::{SimError, Simulator};
+use crate::gpu::{
+    Binding, Buffer, BufferKind, Commands, Device, FrameTimings, GpuError, Image, Kernel, Stage,
+};
+
+/// How far the probe's housing stands out beside the face, mm.
+const RIM: f64 = 3.0;
+/// Half the width of a probe whose face is a point, mm.
+const POINT: f64 = 10.0;
+/// Height of the probe's head above the middle of its face, mm.
+pub const HEAD: f64 = 32.0;
+/// Height of head and handle, mm.
+pub const HANDLE: f64 = 105.0;
+
+/// What is seen, from where.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sight {
+    /// Width and height of the picture, pixels.
+    pub size: [u32; 2],
+    /// The eye, world, mm.
+    pub eye: DVec3,
+    /// Unit vector to the picture's middle, world.
+    pub forward: DVec3,
+    /// One pixel to the right at distance 1.
+    pub right: DVec3,
+    /// One pixel down at distance 1.
+    pub down: DVec3,
+    /// What lies on the eye's side of the image plane is cut away.
+    pub cut: bool,
+    /// The B-mode image is shown where it lies.
+    pub image: bool,
+    /// Colour (0..1) and opacity of each of the scene's instances; opacity 0: it is not there.
+    pub looks: Vec<[f32; 4]>,
+}
+
+impl Sight {
+    /// As the kernel reads it, for a probe.
+    pub fn constants(&self, frame: &Frame) -> layout::View3d {
+        let vector = |v: DVec3| {
+            let [x, y, z] = v.as_vec3().to_array();
+            [x, y, z, 0.0]
+        };
+        let flag = |on: bool, flag: u32| if on { flag } else { 0 };
+        let hidden = self.looks.iter().any(|look| look[3] <= 0.0);
+        layout::View3d {
+            eye: vector(self.eye),
+            right: vector(self.right),
+            down: vector(self.down),
+            forward: vector(self.forward),
+            width: self.size[0],
+            height: self.size[1],
+            flags: flag(self.cut, layout::VIEW3D_CUT)
+                | flag(self.image, layout::VIEW3D_IMAGE)
+                | flag(hidden, layout::VIEW3D_SOME_HIDDEN),
+            unused0: 0,
+            housing: housing(frame),
+        }
+    }
+}
+
+/// The probe's housing, mm: half its width, half its thickness, height of its head, and of head and
+/// handle.
+pub fn housing(frame: &Frame) -> [f32; 4] {
+    let half_width = match frame.kind {
+        layout::KIND_CONVEX => {
+            let half = f64::from(frame.field_of_view) / 2.0;
+            f64::from(frame.radius) * half.min(std::f64::consts::FRAC_PI_2).sin()
+        }
+        layout::KIND_LINEAR => f64::from(frame.width) / 2.0,
+        _ => POINT - RIM,
+    };
+    let half_thickness = f64::from(frame.face_height) / 2.0;
+    [(half_width + RIM) as f32, (half_thickness + RIM) as f32, HEAD as f32, HANDLE as f32]
+}
+
+/// Kernel and buffers of the picture, as large as the largest so far.
+pub(super) struct Viewer3d {
+    kernel: Kernel,
+    constants: Buffer,
+    looks: Buffer,
+    picture: Buffer,
+}
+
+impl Viewer3d {
+    fn new(
+        device: &Arc<Device>,
+        library: &Library,
+        tracer: Tracer,
+        sight: &Sight,
+    ) -> Result<Self, GpuError> {
+        let stem = format!("view3d_{}", tracer.suffix());
+        let size = size_of::<layout::View3d>() as u64;
+        let [looks, picture] = buffers(device, sight)?;
+        Ok(Self {
+            kernel: Kernel::new(device, &stem, library.words(&stem), &[])?,
+            constants: device.buffer("view3d", size, BufferKind::Storage)?,
+            looks,
+            picture,
+        })
+    }
+
+    fn holds(&self, sight: &Sight) -> bool {
+        let [looks, picture] = bytes(sight);
+        self.looks.size() >= looks && self.picture.size() >= picture
+    }
+}
+
+/// Of looks and picture.
+fn bytes(sight: &Sight) -> [u64; 2] {
+    let [width, height] = sight.size.map(u64::from);
+    [16 * sight.looks.len() as u64, 4 * width * height].map(|size| size.max(16))
+}
+
+/// Looks and picture.
+fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError> {
+    let [looks, picture] = bytes(sight);
+    Ok([
+        device.buffer("looks", looks, BufferKind::Storage)?,
+        device.buffer("view3d picture", picture, BufferKind::Storage)?,
+    ])
+}
+
+impl Simulator {
+    /// Pictures the anatomy of the last frame on `image`, RGBA of the sight's size, with that frame's
+    /// probe and B-mode image; waits for it. The time that it took on the device.
+    ///
+    /// # Errors
+    /// Device out of memory; a lost device.
+    ///
+    /// # Panics
+    /// When `looks` are not as many as the scene's instances.
+    pub fn view3d(
+        &mut self,
+        library: &Library,
+        sight: &Sight,
+        image: &Image,
+    ) -> Result<FrameTimings, SimError> {
+        let passes = &self.passes;
+        assert_eq!(sight.looks.len(), passes.world.rows().len(), "looks");
+        let mut viewer3d = match self.viewer3d.take() {
+            Some(made) => made,
+            None => Viewer3d::new(&self.device, library, passes.world.tracer(), sight)?,
+        };
+        if !viewer3d.holds(sight) {
+            // The pipeline stays: a window that is dragged larger asks for many sizes.
+            self.frames.wait()?;
+            [viewer3d.looks, viewer3d.picture] = buffers(&self.device, sight)?;
+        }
+        // It stays where the picture is abandoned.
+        let viewer3d = self.viewer3d.insert(viewer3d);
+        let mut cmd = self.frames.begin()?;
+        cmd.scope("view3d");
+        viewer3d.record(&mut cmd, sight, passes, self.fused)?;
+        cmd.copy_to_image(&viewer3d.picture, image)?;
+        cmd.submit()?;
+        self.frames.wait()?;
+        Ok(self.frames.take_timings().pop().unwrap_or_default())
+    }
+}
+
+impl Viewer3d {
+    fn record(
+        &self,
+        cmd: &mut Commands<'_>,
+        sight: &Sight,
+        passes: &super::Passes,
+        fused: bool,
+    ) -> Result<(), GpuError> {
+        let (frame, world) = (&passes.buffers["frame"], &passes.world);
+        // The last frame may have been abandoned.
+        let constants = sight.constants(&passes.shown);
+        cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;
+        cmd.write(&self.constants, 0, bytemuck::bytes_of(&constants))?;
+        if !sight.looks.is_empty() {
+            cmd.write(&self.looks, 0, bytemuck::cast_slice(&sight.looks))?;
+        }
+        cmd.barrier(Stage::Transfer, Stage::Compute);
+        let [instances, vertices, normals, triangles, structure] = world.bindings();
+        cmd.dispatch(
+            &self.kernel,
+            [sight.size[0], sight.size[1], 1],
+            &[],
+            &[
+                Binding::Buffer(frame),
+                instances,
+                vertices,
+                normals,
+                triangles,
+                structure,
+                Binding::Buffer(&self.constants),
+                Binding::Buffer(&self.looks),
+                Binding::Buffer(passes.pixels(fused)),
+                Binding::Buffer(&self.picture),
+            ],
+        )?;
+        cmd.barrier(Stage::Compute, Stage::Transfer);
+        Ok(())
+    }
+}

@@ -1,0 +1,118 @@
+//! Dependencies between the folders of `src`: the table of ARCHITECTURE.md, held against the paths in the code.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs;
+use std::path::Path;
+
+mod uses;
+
+use uses::Uses;
+
+/// Begins the table in ARCHITECTURE.md.
+const HEADER: &str = "| folder | uses |";
+
+/// Folders or files of `src/`, each with the modules it may use: `scene`, or more narrowly `scene::tracker`.
+type Table = Vec<(String, Vec<String>)>;
+
+fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+fn table() -> Table {
+    let map = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("the map");
+    let (_, rows) = map.split_once(HEADER).expect("ARCHITECTURE.md has the table");
+    let rows = rows.lines().skip(2).take_while(|line| line.starts_with('|'));
+    let row = |line: &str| {
+        // What stands between backticks.
+        let names = |cell: &str| cell.split('`').skip(1).step_by(2).map(str::to_owned).collect();
+        let mut cells = line.split('|').skip(1);
+        let mut folders: Vec<String> = names(cells.next().expect("a folder"));
+        assert_eq!(folders.len(), 1, "one folder a row: {line}");
+        (folders.remove(0), names(cells.next().expect("what it uses")))
+    };
+    rows.map(row).collect()
+}
+
+fn covers(allowed: &str, used: &str) -> bool {
+    used == allowed || used.strip_prefix(allowed).is_some_and(|rest| rest.starts_with("::"))
+}
+
+/// Uses that the table does not allow, and permissions that nothing needs.
+fn differences(table: &Table, found: &BTreeMap<String, Uses>) -> Vec<String> {
+    let mut out = Vec::new();
+    for (folder, uses) in found {
+        let Some((_, allowed)) = table.iter().find(|(name, _)| name == folder) else {
+            out.push(format!("`{folder}` has no row in ARCHITECTURE.md"));
+            continue;
+        };
+        let outside = |used: &&String| !covers(folder, used);
+        for (used, place) in uses.paths.iter().filter(|(used, _)| outside(used)) {
+            if !allowed.iter().any(|a| covers(a, used)) {
+                out.push(format!("{place}: `{folder}` uses `{used}`"));
+            }
+        }
+        for name in allowed.iter().filter(|a| !uses.paths.keys().any(|used| covers(a, used))) {
+            out.push(format!("`{folder}` does not use `{name}`: take it out of ARCHITECTURE.md"));
+        }
+    }
+    let gone = table.iter().filter(|(folder, _)| !found.contains_key(folder));
+    out.extend(gone.map(|(folder, _)| format!("`{folder}` of ARCHITECTURE.md is not in src/")));
+    out
+}
+
+#[test]
+fn folders_use_what_the_map_says_and_nothing_else() {
+    let found = uses::of_library(&root().join("src/lib.rs"));
+    let wrong = differences(&table(), &found);
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn each_row_uses_rows_above_it_so_that_there_is_no_circle() {
+    let mut above = BTreeSet::new();
+    for (folder, uses) in table() {
+        for used in uses {
+            let top = used.split("::").next().expect("a name").to_owned();
+            assert!(above.contains(&top), "`{folder}` uses `{used}`, which is not above it");
+        }
+        assert!(above.insert(folder.clone()), "`{folder}` has two rows");
+    }
+}
+
+#[test]
+fn a_planted_use_is_found_however_it_is_written() {
+    let table = vec![("low".to_owned(), vec!["ground".to_owned(), "high::floor".to_owned()])];
+    let said = |source: &str| {
+        let found = BTreeMap::from([("low".to_owned(), uses::of_source("low::deep", source))]);
+        differences(&table, &found).join("\n")
+    };
+    // Both permissions are needed, or that would be said.
+    let sound =
+        "use crate::ground::A; use crate::high::floor::{self, B}; use crate::low::C; use super::D;";
+    assert_eq!(said(sound), "");
+    for planted in [
+        "use crate::high::E;",
+        "use crate::{ground::F,\n    high::{\n        floor, roof},\n};",
+        "use super::super::high::roof;",
+        "mod inner { use super::super::super::high::roof; }",
+        "fn f() -> u32 { crate::high::g() }",
+        "fn f(h: crate::high::H) {}",
+        "fn f() { println!(\"{}\", crate::high::g()); }",
+        "impl crate::high::H for u32 {}",
+        "pub use crate::high as other;",
+    ] {
+        let wrong = said(&format!("{sound} {planted}"));
+        assert!(wrong.contains("`low` uses `high"), "{planted}: {wrong}");
+    }
+    for harmless in [
+        "// use crate::high::E;",
+        "/// As [`crate::high::E`] does.\nfn f() {}",
+        "const TEXT: &str = \"crate::high::E\";",
+        "#[cfg(test)] mod tests { use crate::high::E; }",
+        "#[cfg(test)] use crate::high::E;",
+        "use super::high::E;",
+    ] {
+        assert_eq!(said(&format!("{sound} {harmless}")), "", "{harmless}");
+    }
+    assert!(said("use crate::ground::A;").contains("does not use `high::floor`"));
+}
