@@ -199,9 +199,11 @@ fn through(sight: &Sight, [i, j]: [u32; 2], centre: DVec3, radius: f64, opacity:
 fn glass_is_seen_through_by_its_opacity() {
     let (scene, mut view3d, centre) = view(9.0, 20.0);
     view3d.cut = false;
+    // From beside the image plane, so that nothing but the background is behind the ball.
+    view3d.camera.face(&scene.world_from_probe);
     view3d.camera.target = centre;
     let opacity = 0.4;
-    let mut sight = view3d.sight(SIZE);
+    let mut sight = Sight { image: false, ..view3d.sight(SIZE) };
     sight.looks[0][3] = opacity;
     for picture in pictures(&scene, &sight) {
         // The middle, and towards the rim on both sides.

@@ -235,8 +235,10 @@ fn fields(job: &Job) -> Vec<[f32; 3]> {
 pub fn size(job: &Job, name: &str) -> usize {
     let instances: Vec<Instance> = job.optional("instances");
     let triangles: Vec<[u32; 3]> = job.optional("triangles");
-    let ends = instances.iter().map(|i| i.first_triangle + i.triangles);
-    let used = &triangles[..ends.max().unwrap_or(0) as usize];
+    let ends = instances.iter().map(|i| (i.first_triangle + i.triangles) as usize);
+    let end = ends.max().unwrap_or(0);
+    // As many as there are: a kernel without them has none, a dump may have lost some.
+    let used = &triangles[..end.min(triangles.len())];
     match name {
         "vertices" | "normals" => {
             12 * used.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize
@@ -244,7 +246,7 @@ pub fn size(job: &Job, name: &str) -> usize {
         "triangles" => {
             let owners = instances.iter().filter(|i| i.owners != 0);
             let words = owners.map(|i| i.owners + i.triangles.div_ceil(2)).max();
-            (12 * used.len()).max(4 * words.unwrap_or(0) as usize)
+            (12 * end).max(4 * words.unwrap_or(0) as usize)
         }
         "nodes" => {
             let roots = instances.iter().map(|i| i.bvh_root).filter(|&r| r != NONE);
