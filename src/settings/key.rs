@@ -305,7 +305,9 @@ impl Facts {
 
     fn outside(&self, number: f64) -> Option<(String, String)> {
         let [least, most] = self.range;
-        if (least..=most).contains(&number) {
+        // What has no ends is checked by whoever knows what fits.
+        let endless = least == f64::NEG_INFINITY && most == f64::INFINITY;
+        if endless || (least..=most).contains(&number) {
             return None;
         }
         let unit = match self.unit() {

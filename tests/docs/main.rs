@@ -168,7 +168,11 @@ fn the_reference_names_every_key_as_the_program_takes_it() {
             row("keyframes").replace("list of texts", "text"),
             "mesh.keyframes: text",
         ),
-        (row("gel"), row("gel").replace("0 to 30", "1 to 30"), "contact.gel: range 1"),
+        (
+            row("timeout"),
+            row("timeout").replace("0.01 to", "0.02 to"),
+            "tracker.timeout: range 0.02",
+        ),
         (row("units"), row("units").replace(", `\"in\"`", ""), "mesh.units: one"),
     ] {
         let faults = of_keys(&real.replace(&from, &to), &schema);

@@ -78,12 +78,11 @@ fn placements(bench: &Bench, physics: Physics) -> Outcome {
                 turned = turned.max(a.shading.distance(b.shading));
             }
             assert!(compared > 1000, "{compared} rays met the mesh head-on");
-            let mut figure = |quantity, value, tolerance| {
-                out.compare(format!("{tracer}: {what}: {quantity}"), value, 0.0, tolerance);
-            };
-            figure("largest distance of the points, mm", apart, 1e-4);
-            figure("largest difference of shading normals", turned, 1e-4);
-            figure("normals that point inward", f64::from(inward), 0.0);
+            let name = |quantity| format!("{tracer}: {what}: {quantity}");
+            out.compare(name("largest distance of the points, mm"), apart, 0.0, 1e-4);
+            out.compare(name("largest difference of shading normals"), turned, 0.0, 1e-4);
+            out.compare(name("normals that point inward"), f64::from(inward), 0.0, 0.0)
+                .unlike("triangles wound the other way", f64::from(compared));
         }
     }
     out
