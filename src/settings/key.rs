@@ -338,7 +338,7 @@ fn angle(radians: f64) -> String {
 }
 
 /// Declares the settings of a table, a field and its row at a time. The fields of `beside` are no keys of their own;
-/// the rows of `first` are those of keys that are no field.
+/// the rows of `last` are those of keys that are no field.
 macro_rules! group {
     ($(#[$meta:meta])* pub struct $name:ident in $table:literal {
         $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr, $facts:expr;)*
@@ -359,7 +359,7 @@ macro_rules! group {
     ($(#[$meta:meta])* pub struct $name:ident in $table:literal, from files {
         $($(#[doc = $doc:literal])+ $field:ident: $type:ty, $facts:expr;)*
     } $(beside { $($(#[doc = $other_doc:literal])+ $other:ident: $other_type:ty;)* })?
-      $(first $first:expr)?
+      $(last $last:expr)?
     ) => {
         $(#[$meta])*
         #[derive(Clone, Debug, PartialEq)]
@@ -384,8 +384,8 @@ macro_rules! group {
                     }),*];
                     #[allow(unused_mut)]
                     let mut all: Vec<Row<$name>> = Vec::new();
-                    $(all.extend($first);)?
                     all.extend(rows);
+                    $(all.extend($last);)?
                     all
                 });
                 &ROWS

@@ -81,7 +81,7 @@ group! {
         /// Arrangement of the scanlines.
         kind: Kind;
     }
-    first shape()
+    last shape()
 }
 
 /// Least radius, angle and width of a face.
