@@ -42,79 +42,16 @@ layout(std430, binding = 11) readonly buffer TissueBuffer { Tissue tissues[]; };
 #include "probe.glsl"
 #include "transform.glsl"
 
-const uint MAX_CROSSINGS = 64u;
+#include "crossings.glsl"
 
-// Distances at which the scanline goes into a masking instance; negative where it comes out.
-shared float crossings[MAX_CROSSINGS];
-shared uint crossed[MAX_CROSSINGS];       // which
 shared float depths[MAX_CROSSINGS];       // mm at the probe's speed at which the sound that is there echoes,
 shared float rates[MAX_CROSSINGS + 1u];   // and mm of distance per mm of that depth: up to there, and behind the last
-shared uint crossing_count;
-// Masking instances around the scanline's start: those that it leaves more often than it enters.
-shared int enclosing;
 
-void note_crossing(Hit hit, vec3 d) {
-    bool entering = dot(d, surface_geometric_normal(hit)) < 0.0;
-    if (crossing_count < MAX_CROSSINGS) {
-        crossings[crossing_count] = entering ? hit.t : -hit.t;
-        crossed[crossing_count] = hit.instance;
-        crossing_count += 1u;
-        enclosing += entering ? -1 : 1;
-    } else {
-        atomicAdd(counters.stack_overflow, 1u);
-    }
-}
-
-void cross_masks(vec3 o, vec3 d) {
-    crossing_count = 0u;
-    enclosing = 0;
-    float t_min = 0.0;
-    for (uint order = 0u; order <= MAX_CROSSINGS; ++order) {
-        Hit hit = closest_hit(o, d, t_min, 1e9, NONE);
-        if (hit.instance == NONE) break;
-        note_crossing(hit, d);
-        vec3 p = o + hit.t * d;
-        float clearance = 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
-        t_min = hit.t + clearance;
-        if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-            Hit twin = closest_hit(o, d, max(hit.t - clearance, 0.0), hit.t + clearance, hit.instance);
-            if (twin.instance != NONE) {
-                note_crossing(twin, d);
-                t_min = max(t_min, twin.t + clearance);
-            }
-        }
-    }
-}
-
-// Whether `instance` is around the scanline behind its first `passed` crossings: it then comes out more often
-// than it goes in. Last: the crossing by which it went in, 1 for the first; 0 where it was around the start.
-bool is_around(uint instance, uint passed, out uint entered) {
-    int net = 0;
-    entered = 0u;
-    for (uint i = 0u; i < crossing_count; ++i) {
-        if (crossed[i] != instance) continue;
-        bool enters = crossings[i] > 0.0;
-        if (i >= passed) net += enters ? -1 : 1;
-        else if (enters) entered = i + 1u;
-    }
-    return net > 0;
-}
-
-// Distance per depth behind the first `passed` crossings: by the speed of the masking instance of the highest
-// priority there, of equals the one entered last.
+// Distance per depth behind the first `passed` crossings: by the speed of the masking instance there.
 float rate_behind(uint passed) {
     if (fusion.mask_speed == MASK_SPEED_PROBE) return 1.0;
-    uint best = NONE, best_entered = 0u;
-    for (uint i = passed; i < crossing_count; ++i) {
-        uint entered;
-        if (!is_around(crossed[i], passed, entered)) continue;
-        int ahead = best == NONE ? 1 : instances[crossed[i]].priority - instances[best].priority;
-        if (ahead > 0 || ahead == 0 && entered > best_entered) {
-            best = crossed[i];
-            best_entered = entered;
-        }
-    }
-    return best == NONE ? 1.0 : tissues[instances[best].tissue].speed / frame.speed;
+    uint around = instance_behind(passed);
+    return around == NONE ? 1.0 : tissues[instances[around].tissue].speed / frame.speed;
 }
 
 void time_crossings() {
@@ -154,7 +91,7 @@ void main() {
     o = world_point(o);
     d = world_vector(d);
     if (gl_LocalInvocationID.x == 0u) {
-        cross_masks(o, d);
+        follow_scanline(o, d);
         time_crossings();
     }
     barrier();

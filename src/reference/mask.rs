@@ -49,7 +49,7 @@ impl Crossings {
 }
 
 /// Start and unit direction of scanline `l` in the middle of the slice, world space.
-fn middle(frame: &Frame, l: u32) -> (DVec3, DVec3) {
+pub(super) fn middle(frame: &Frame, l: u32) -> (DVec3, DVec3) {
     let place = affine(&frame.world_from_probe);
     let mut start = line(frame, l, 0).origin;
     start.y = 0.0;
@@ -76,33 +76,17 @@ pub fn crossings(world: &World, fusion: &Fusion) -> Vec<Crossings> {
             });
             Crossings {
                 along: along.collect(),
-                enclosing: -all.iter().map(sign).sum::<i32>(),
+                enclosing: -all.iter().map(Crossing::sign).sum::<i32>(),
                 rate: rate(0),
             }
         })
         .collect()
 }
 
-fn sign(crossing: &Crossing) -> i32 {
-    if crossing.entry { 1 } else { -1 }
-}
-
-/// Distance per depth behind the first `passed` crossings: the speed of the masking instance around, of the highest
-/// priority, of equals the one entered last; over the probe's.
+/// Distance per depth behind the first `passed` crossings: the speed of the masking instance there over the probe's.
 fn rate_behind(world: &World, all: &[Crossing], passed: usize) -> f64 {
-    let around = all[passed..].iter().filter(|candidate| {
-        let own = all[passed..].iter().filter(|c| c.instance == candidate.instance);
-        own.map(sign).sum::<i32>() < 0
-    });
-    let rank = |c: &&Crossing| {
-        let enters = |other: &Crossing| other.instance == c.instance && other.entry;
-        let entered = all[..passed].iter().rposition(enters).map_or(0, |i| i + 1);
-        (world.instances[c.instance as usize].priority, entered)
-    };
-    // Of several that are alike the first: the one left first.
-    let best = around.reduce(|best, next| if rank(&next) > rank(&best) { next } else { best });
-    best.map_or(1.0, |crossing| {
-        let tissue = world.instances[crossing.instance as usize].tissue;
+    world.behind(all, passed).map_or(1.0, |instance| {
+        let tissue = world.instances[instance as usize].tissue;
         f64::from(world.tissues[tissue as usize].speed) / f64::from(world.frame.speed)
     })
 }

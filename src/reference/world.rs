@@ -72,6 +72,13 @@ pub struct Crossing {
     pub entry: bool,
 }
 
+impl Crossing {
+    /// 1 where the ray goes in, -1 where it comes out.
+    pub fn sign(&self) -> i32 {
+        if self.entry { 1 } else { -1 }
+    }
+}
+
 /// A 3x4 matrix in f64.
 pub fn affine(rows: &Rows) -> DAffine3 {
     let r = rows.map(|r| r.map(f64::from));
@@ -90,6 +97,23 @@ fn widen(v: [f32; 3]) -> DVec3 {
 }
 
 impl World<'_> {
+    /// The instance around a ray behind the first `passed` of its crossings, `all` of which are given: that of the
+    /// highest priority, of equals the one entered last. None: nothing is around.
+    pub fn behind(&self, all: &[Crossing], passed: usize) -> Option<u32> {
+        let around = all[passed..].iter().filter(|candidate| {
+            let own = all[passed..].iter().filter(|c| c.instance == candidate.instance);
+            own.map(Crossing::sign).sum::<i32>() < 0
+        });
+        let rank = |c: &&Crossing| {
+            let enters = |other: &Crossing| other.instance == c.instance && other.entry;
+            let entered = all[..passed].iter().rposition(enters).map_or(0, |i| i + 1);
+            (self.instances[c.instance as usize].priority, entered)
+        };
+        // Of several that are alike the first: the one left first.
+        let best = around.reduce(|best, next| if rank(&next) > rank(&best) { next } else { best });
+        best.map(|crossing| crossing.instance)
+    }
+
     /// All crossings with `t_min` < t < `t_max`, by increasing distance.
     pub fn crossings(&self, o: DVec3, d: DVec3, [t_min, t_max]: [f64; 2]) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
