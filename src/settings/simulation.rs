@@ -157,6 +157,10 @@ group! {
         /// Factor on the `thickness` of every surface.
         thickness_scale: f64 = 1.0,
             Facts::number(0.0, 100.0).label("Thickness").usual(0.0, 5.0);
+        /// Whether frames also say which mesh and which tissue each sample lies in, straight along the scanlines: the
+        /// buffer `labels` of `render --dump`, an instance (4294967295: none) and a tissue for each sample.
+        labels: bool = false,
+            Facts::switch().under("Paths").label("Labels");
         /// Seed of every random number.
         seed: u32 = 1,
             Facts::whole(0, u32::MAX).limits("32 bits").under("Paths").label("Seed").usual(0.0, 1000.0);
