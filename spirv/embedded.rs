@@ -12,6 +12,8 @@
     ("fuse", include_bytes!("fuse.spv")),
     ("geometry", include_bytes!("geometry.spv")),
     ("interpolate", include_bytes!("interpolate.spv")),
+    ("label_bvh", include_bytes!("label_bvh.spv")),
+    ("label_query", include_bytes!("label_query.spv")),
     ("mask_bvh", include_bytes!("mask_bvh.spv")),
     ("mask_query", include_bytes!("mask_query.spv")),
     ("origin_bvh", include_bytes!("origin_bvh.spv")),

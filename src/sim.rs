@@ -43,7 +43,7 @@ use passes::{Kernels, Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
-use stages::{AXIAL, BEAM, DISPLAY, ORIGIN, SCATTER};
+use stages::{AXIAL, BEAM, DISPLAY, LABEL, ORIGIN, SCATTER};
 use tables::Tables;
 pub use tracer::Tracer;
 use view3d::Viewer3d;
@@ -229,6 +229,9 @@ impl Simulator {
         // The picture before is replaced as a whole.
         cmd.keep_on();
         passes.run(&mut cmd, &DISPLAY)?;
+        if scene.simulation.labels {
+            passes.run(&mut cmd, &LABEL)?;
+        }
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
             cmd.copy_to_image(passes.pixels(self.fused), image)?;

@@ -9,6 +9,7 @@ pub use convert::CONVERT;
 pub use display::DISPLAY;
 pub use fuse::FUSE;
 pub use inputs::{ANATOMY, INPUTS};
+pub use label::LABEL;
 pub use mask::MASK;
 pub use origin::ORIGIN;
 pub use pyramid::{COLLAPSE, DIFFERENCE, REDUCE};
@@ -24,6 +25,7 @@ mod convert;
 mod display;
 mod fuse;
 mod inputs;
+mod label;
 mod mask;
 mod origin;
 pub(super) mod pyramid;
@@ -32,9 +34,9 @@ mod shadow;
 pub(super) mod tint;
 mod trace;
 
-/// Those of every frame, in order.
-pub const IMAGE: [&Pass; 8] =
-    [&ORIGIN, &TRACE[0], &TRACE[1], &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY];
+/// Those of every frame, in order, and labels where they are wanted.
+pub const IMAGE: [&Pass; 9] =
+    [&ORIGIN, &TRACE[0], &TRACE[1], &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY, &LABEL];
 
 /// Those of frames that show an acquired volume, in order.
 pub const FUSION: [&Pass; 10] =
