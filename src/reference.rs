@@ -22,6 +22,7 @@ pub mod geometry;
 mod interface;
 pub mod interpolate;
 pub mod intersect;
+pub mod label;
 pub mod lattice;
 pub mod mask;
 pub mod origin;

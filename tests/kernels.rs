@@ -84,6 +84,7 @@ subjects!(
     axial,
     detect,
     display,
+    label,
     mask,
     shadow,
     darken,

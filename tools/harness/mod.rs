@@ -23,6 +23,7 @@ mod fuse;
 mod geometry;
 mod inputs;
 mod interpolate;
+mod label;
 mod mask;
 mod origin;
 mod rays;
@@ -293,7 +294,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 22] = [
+pub const SUBJECTS: [Subject; 23] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -307,6 +308,7 @@ pub const SUBJECTS: [Subject; 22] = [
     axial::SUBJECT,
     detect::SUBJECT,
     display::SUBJECT,
+    label::SUBJECT,
     mask::SUBJECT,
     shadow::SUBJECT,
     darken::SUBJECT,

@@ -1,0 +1,64 @@
+//! `label`: the anatomy along the scanlines.
+
+use super::inputs::{frame, scanlines};
+use super::worlds;
+use super::{Case, Check, Input, Job, Size, Subject};
+use insonify::reference::label::label;
+use insonify::sim::layout::{FLAG_COINCIDENT, NONE};
+use insonify::sim::stages;
+
+/// Distance from a crossing, mm, within which a sample may be on either side.
+const EDGE: f64 = 1e-3;
+
+pub const SUBJECT: Subject = Subject {
+    tolerance: "exact but within 1e-3 mm of a crossing, where the label before it will do, too",
+    job,
+    check,
+    plant: |job, outputs| {
+        job.edit(outputs, "labels", |labels: &mut [u32]| {
+            let at = labels.iter().position(|label| *label != NONE).expect("samples");
+            labels[at] += 1;
+        });
+    },
+    ..Subject::of(&stages::LABEL)
+};
+
+fn job(case: Case, size: Size) -> Job {
+    let mut frame = frame(case, size);
+    if case == Case::NotFinite {
+        frame.world_from_probe[0][2] = f32::NAN;
+    }
+    if case == Case::Modes {
+        frame.flags |= FLAG_COINCIDENT;
+    }
+    let mut inputs = vec![Input::words("frame", &[frame])];
+    inputs.extend(worlds::world(case).inputs());
+    inputs.push(scanlines(&frame));
+    Job::of(&stages::LABEL, inputs, Vec::new())
+}
+
+fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
+    let owned = worlds::owned(job);
+    let (world, frame) = (owned.world(), owned.frame);
+    let got: Vec<[u32; 2]> = job.after(outputs, "labels");
+    let lines = label(&world);
+    let (mut wrong, mut near) = (0, 0);
+    for (i, found) in got.iter().enumerate() {
+        let line = &lines[i / frame.samples as usize];
+        let distance = f64::from(i as u32 % frame.samples) * f64::from(frame.sample_pitch);
+        let label = |distance: f64| match line.at(distance) {
+            Some(instance) => [instance, world.instances[instance as usize].tissue],
+            None => [NONE, frame.background],
+        };
+        let either = line.crossings.iter().any(|c| (c.t - distance).abs() < EDGE);
+        near += usize::from(either);
+        let beside = [distance - EDGE, distance + EDGE].map(label);
+        let right = *found == label(distance) || (either && beside.contains(found));
+        wrong += usize::from(!right);
+    }
+    vec![
+        Check::count("labels", got.len(), wrong, 0),
+        // As many as lie so close by chance; else the comparison excuses everything.
+        Check::count("samples at a crossing", got.len(), near, got.len() / 50),
+    ]
+}
