@@ -43,7 +43,7 @@ use crate::probe::Probe;
 use crate::settings::units;
 use document::{Document, Source};
 
-/// Pixels that a picture has beside each other at most: what files and messages can say.
+/// Largest width of a picture, pixels: the limit of image files and messages.
 const WIDEST: f64 = 65535.0;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
@@ -70,11 +70,11 @@ impl Scene {
         Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
     }
 
-    /// As [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
+    /// Like [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
     /// order of [`Parameter::suggested`](super::vary::Parameter::suggested), others after them.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Scene::load`].
     pub fn load_variants(
         path: &Path,
         overrides: &[(String, String)],
@@ -82,7 +82,7 @@ impl Scene {
         Self::load_with(path, overrides, true)
     }
 
-    /// `suggested`: with the variants of parameters of which the file says nothing.
+    /// Loads a scene with its variants; with `suggested` also those of parameters that the file does not vary.
     fn load_with(
         path: &Path,
         overrides: &[(String, String)],
@@ -221,7 +221,7 @@ fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<()
     Err(document.fail("imaging.image_height", message, remedy))
 }
 
-/// Fails at `path` unless `value` lies in the closed range; NaN lies in none.
+/// Fails at `path` unless `value` is in the closed range; NaN is in no range.
 fn within(
     document: &Document<'_>,
     path: &str,
