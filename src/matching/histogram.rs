@@ -39,8 +39,8 @@ impl Histogram {
         Some(self.middle(&Self::default(), 0.0))
     }
 
-    /// As [`Self::midmean`], of values that are not clipped at the ends: differences. Those of `beyond`
-    /// are only known to be larger than the value they are counted at, by an exponential amount of mean
+    /// Like [`Self::midmean`], for values that are not clipped at the ends: differences. Those of `beyond`
+    /// are only known to be larger than the value at which they are counted, by an exponential amount of mean
     /// `tail`.
     pub fn middle(&self, beyond: &Self, tail: f64) -> f64 {
         let total = (self.total + beyond.total) as f64;

@@ -164,10 +164,10 @@ pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     table.map_or_else(Vec::new, |table| table.other.files())
 }
 
-/// A time as the command line and scene files write it: seconds, or with a unit. Finite.
+/// Parses a time as in scene files and on the command line: seconds, or with a unit. Returns s, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn seconds(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
@@ -179,10 +179,10 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A length as the command line and scene files write it: mm, or with a unit. Finite.
+/// Parses a length as in scene files and on the command line: mm, or with a unit. Returns mm, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn millimetres(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
@@ -194,10 +194,10 @@ pub fn millimetres(text: &str) -> Result<f64, String> {
     }
 }
 
-/// An angle as the command line and scene files write it, with its unit, in radians. Finite.
+/// Parses an angle as in scene files and on the command line, with its unit. Returns radians, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn radians(text: &str) -> Result<f64, String> {
     let value = units::ANGLE.parse(text)?;
     match value.is_finite() {
