@@ -1,4 +1,4 @@
-// Where a ray met a surface. The includer declares instances[], vertices[], normals[], triangles[].
+// Place and normals of a hit. The includer declares instances[], vertices[], normals[], triangles[].
 
 // A vector scaled by a power of two at most once more than needed, so that its square neither
 // overflows nor vanishes for triangles of any size.
@@ -61,7 +61,7 @@ vec3 surface_shading_normal(Hit hit) {
     return surface_to_world(hit.instance, n);
 }
 
-// How fast the interpolated normal turns along the direction `along` (world, any length): radians per
+// Rotation of the interpolated normal along the direction `along` (world, any length): radians per
 // mm, unsigned.
 float surface_curvature(Hit hit, vec3 along) {
     uint i = triangles[3u * hit.primitive];
