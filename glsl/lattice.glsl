@@ -1,4 +1,4 @@
-// Lattices of scatterers, as coarse as speckle allows, and their enumeration along a beam; src/reference/lattice.rs
+// Lattices of scatterers, as coarse as speckle allows, and their enumeration along a beam; tools/reference/lattice.rs
 // says why. The includer declares tissues[], rows[] and frame and includes random.glsl.
 
 // Edges of cells on six successive levels, and volumes on two; the volume doubles every two levels.

@@ -31,6 +31,13 @@ pub fn of_library(root: &Path) -> BTreeMap<String, Uses> {
     out
 }
 
+/// The uses of the module in a file: of this library, and of another crate if the file belongs to one.
+pub fn of_module(file: &Path, name: &str) -> Uses {
+    let mut uses = Uses::default();
+    uses.file(file, &[name.to_owned()]);
+    uses
+}
+
 /// The uses of a source text, read as the module `path`.
 pub fn of_source(path: &str, source: &str) -> Uses {
     let mut uses = Uses::default();
@@ -112,7 +119,8 @@ impl Uses {
                 TokenTree::Group(group) => self.scan(group.stream(), module, file),
                 TokenTree::Ident(name) if !continues(&tokens[..i]) => {
                     let begin = match name.to_string().as_str() {
-                        "crate" => Some(&module[..0]),
+                        // As other crates call it.
+                        "crate" | "insonify" => Some(&module[..0]),
                         "super" => module.len().checked_sub(1).map(|n| &module[..n]),
                         "self" => Some(module),
                         _ => None,

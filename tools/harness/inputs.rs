@@ -3,7 +3,7 @@
 use glam::DAffine3;
 
 use super::{Case, Input, Size};
-use insonify::reference::geometry;
+use crate::reference::geometry;
 use insonify::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row};
 use insonify::sim::placement::matrix_rows;
 use insonify::sim::tables;

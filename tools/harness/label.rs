@@ -3,7 +3,7 @@
 use super::inputs::{frame, scanlines};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::label::label;
+use crate::reference::label::label;
 use insonify::sim::layout::{FLAG_COINCIDENT, NONE};
 use insonify::sim::stages;
 

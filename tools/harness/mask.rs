@@ -5,7 +5,7 @@ use glam::{DAffine3, DVec3};
 use super::inputs::{Random, frame, scanlines};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject, sizes};
-use insonify::reference::mask;
+use crate::reference::mask;
 use insonify::sim::layout::{
     FLAG_COINCIDENT, Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE,
 };
