@@ -34,8 +34,8 @@ bool present(Lattice lattice, uvec3 bits) {
     return (((bits.x & 255u) << 8u) | (bits.y & 255u)) < lattice.presence;
 }
 
-// Lattice level that a piece of tissue needs, not rounded: `wanted` of the axial row, or the level at which there are still
-// eight cells for each of the tissue's scatterers; coarser by `drowned`. All are log2 of volumes, in cells of the finest.
+// Lattice level that a piece of tissue needs, not rounded: the coarser of `wanted`, of the axial row, and the level that still has
+// eight cells for each of the tissue's own scatterers; coarser by `drowned`. All are log2 of volumes, in cells of the finest.
 float wanted_level(uint tissue, float wanted, float drowned) {
     if (wanted <= ALL_LEVELS) return 0.0;
     float own = -log2(8.0 * tissues[tissue].density);

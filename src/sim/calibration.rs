@@ -231,7 +231,7 @@ impl<'a> Calibration<'a> {
         let steps = f64::from(LEVELS_PER_OCTAVE);
         let octaves = match self.lattice_level(z) {
             f64::NEG_INFINITY => 0.0,
-            // Cells are merged only while eight of them hold less than one scatterer of a sparse tissue.
+            // A sparse tissue has coarser cells, as long as there are eight for each of its scatterers.
             thinned => thinned.max(-(8.0 * density).log2()).max(0.0),
         };
         let volume = ((steps * octaves).floor() / steps).exp2();

@@ -14,14 +14,14 @@ use insonify::sim::layout::{
     Tissue, UNHEARD,
 };
 
-/// Points are seen this many lateral sigmas off the axis.
+/// Distance from the axis, in lateral sigmas, within which points are received.
 const POINT_CUT: f64 = 4.0;
 
-/// Layers meet this part of their pitch off the round numbers at which points lie: rounding must not
-/// give one to two layers, or to none.
+/// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
+/// could belong to two layers or to none.
 const POINT_SHIFT: f64 = 0.012_34;
 
-/// A segment seen from one space: world or its texture's.
+/// A segment in one space: the world's or that of its texture.
 struct Tube<'a> {
     world: &'a World<'a>,
     segment: &'a Segment,
@@ -34,7 +34,7 @@ struct Tube<'a> {
     layer_offset: f64,
     /// Distance from the geometric scanline, mm: at the start and per mm.
     off: [f64; 2],
-    /// How the tissue is displaced in the tube's space.
+    /// Displacements of the tissue in the tube's space; none where it does not deform.
     field: Option<Deformed<'a>>,
 }
 
@@ -48,8 +48,8 @@ struct Deformed<'a> {
 }
 
 impl Deformed<'_> {
-    /// A middle and a distance of all points of the reference shape from which tissue can be within
-    /// `radius` of `p`, relative to where it is: v differs by no more than `steepness` times the
+    /// Centre and radius of a ball that holds all points of the reference shape whose tissue can be within
+    /// `radius` of `p`, relative to `p`: v differs by no more than `steepness` times the
     /// distance there, which is no more than radius / (1 - steepness).
     fn back(&self, p: DVec3, radius: f64) -> (DVec3, f64) {
         if self.steepness < 1.0 {
@@ -61,7 +61,7 @@ impl Deformed<'_> {
     }
 }
 
-/// [`Tube::level`] of the loudest stretch that fills each slot of a scanline.
+/// For each slot of a scanline, [`Tube::level`] of the loudest segment that fills it.
 type Loudest = Vec<f64>;
 
 /// Echoes of all segments, in units of 1 / volume_scale.
@@ -108,7 +108,7 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
     out
 }
 
-/// How a lattice is walked under a beam: axis `a` along it, `b` across, `c` through the slab of the layer.
+/// The enumeration of a lattice under a beam: axis `a` along it, `b` across, `c` through the slab of the layer.
 struct Walk {
     a: usize,
     b: usize,
@@ -116,9 +116,9 @@ struct Walk {
     /// Per mm of `a` and `b`, within the slab's middle plane: distance along the beam, and across.
     along: DVec2,
     across: DVec2,
-    /// What `c` falls by per mm of `a` and `b` within that plane.
+    /// Decrease of `c` per mm of `a` and `b` within that plane.
     tilt: DVec2,
-    /// How far across lies what is 1 mm above that plane, along `c`.
+    /// Shift across, mm, of a point 1 mm above that plane along `c`.
     slant: f64,
 }
 
@@ -153,12 +153,12 @@ impl Walk {
     }
 }
 
-/// 1 / sigma^2 of the beam across and up.
+/// 1 / sigma^2 of the beam laterally and in elevation.
 fn falling(row: &Row) -> [f64; 2] {
     [row.sigma_lateral, row.sigma_elevation].map(|sigma| f64::from(sigma).powi(-2))
 }
 
-/// Indices whose cells, of edge `h`, have their middles in `low <= x < high`.
+/// Indices of the cells, of edge `h`, whose centres lie in `low <= x < high`.
 fn cells([low, high]: [f64; 2], h: f64) -> std::ops::Range<i64> {
     let first = |x: f64| (x / h - 0.5).ceil() as i64;
     first(low)..first(high)
@@ -219,7 +219,7 @@ impl<'a> Tube<'a> {
         &self.world.rows[out.sample(self.time(x))]
     }
 
-    /// Weight at distance `x` but for absorption: less off the scanline, and averaged down where a rough
+    /// Weight at distance `x` without absorption: smaller off the scanline, and averaged where a rough
     /// reflection has spread the path over many resolution cells.
     fn weight(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.spread;
@@ -236,7 +236,7 @@ impl<'a> Tube<'a> {
         (-f64::from(self.tissue.absorption) * x).exp()
     }
 
-    /// How loud its speckle is at distance `x`: one-way weight times echogenicity, log2.
+    /// Level of its speckle at distance `x`: one-way weight times echogenicity, log2.
     fn level(&self, x: f64, out: &Accumulator) -> f64 {
         (self.weight(x, self.row(x, out)) * self.absorbed(x)).log2() + f64::from(self.tissue.level)
     }
@@ -256,7 +256,7 @@ impl<'a> Tube<'a> {
         first..last
     }
 
-    /// The slots that it fills, but for half a sample at either end.
+    /// The slots that it fills, up to half a sample at either end.
     fn filled(&self, out: &Accumulator) -> std::ops::Range<u32> {
         let samples = f64::from(self.world.frame.samples);
         let at = |x: f64| out.kappa(self.time(x)).clamp(0.0, samples) / f64::from(SCATTER_SLOT);
@@ -264,15 +264,15 @@ impl<'a> Tube<'a> {
         (at(0.0) - margin).ceil() as u32..(at(self.segment.length) + margin).floor() as u32
     }
 
-    /// The place in a bin at which it is held against the others there.
+    /// The place in a bin at which its level is compared with the others there.
     fn within(&self, bin: u32, out: &Accumulator) -> f64 {
         debug_assert!(self.bins(out).contains(&bin));
         let middle = f64::from(bin * SCATTER_BIN + SCATTER_BIN / 2);
         self.distance(middle).clamp(0.0, self.segment.length)
     }
 
-    /// By how much power, log2, something drowns it all along `bin`, as far as it reaches; nothing where
-    /// nobody would hear it.
+    /// The power, log2, by which something louder masks it all along `bin`, as far as it reaches; none where
+    /// it would not be heard.
     fn drowned(&self, bin: u32, loudest: &Loudest, out: &Accumulator) -> Option<f64> {
         let level = self.level(self.within(bin, out), out);
         let middle = (bin * SCATTER_BIN + SCATTER_BIN / 2).min(self.world.frame.samples - 1);
@@ -286,15 +286,15 @@ impl<'a> Tube<'a> {
         (level >= black - f64::from(UNHEARD)).then(|| 2.0 * above.max(0.0))
     }
 
-    /// The slab of a layer about its middle, mm: layers meet off the round numbers at which cells have their
-    /// middles.
+    /// The slab of a layer about its middle, mm. Borders of layers avoid the round numbers at which cells have their
+    /// centres.
     fn slab(&self) -> [f64; 2] {
         let reach = f64::from(self.world.frame.elevation_reach);
         [-1.0, 1.0].map(|side| (side + 2.0 * POINT_SHIFT) * reach)
     }
 
-    /// Half the beam's width at `row`, mm: an ellipse in the plane of width and height, of which the
-    /// layer's edge nearest to the middle counts.
+    /// Half the beam's width at `row`, mm: the beam's section is an ellipse, of which the
+    /// edge of the layer nearest to the middle is taken.
     fn half_width(&self, row: &Row) -> f64 {
         let frame = self.world.frame;
         let cut = f64::from(frame.lateral_cut);
@@ -303,7 +303,7 @@ impl<'a> Tube<'a> {
         cut * f64::from(row.sigma_lateral) * (1.0 - height * height).max(0.0).sqrt()
     }
 
-    /// Echo of something of `amplitude`, all but absorption and `beam`, at `from` the tube's origin.
+    /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`.
     fn echo(&self, from: DVec3, amplitude: f64, beam: f64, out: &mut Accumulator) {
         let x = from.dot(self.direction);
         let scale = f64::from(self.world.frame.volume_scale);
@@ -313,19 +313,19 @@ impl<'a> Tube<'a> {
         });
     }
 
-    /// The beam's two-way amplitude off its axis, as wide as a row says.
+    /// The beam's two-way amplitude off its axis, with the widths of a row.
     fn beam(&self, from: DVec3, row: &Row) -> f64 {
         self.beam_of(from, falling(row))
     }
 
-    /// The same by 1 / sigma^2 across and up.
+    /// The same from 1 / sigma^2 laterally and in elevation.
     fn beam_of(&self, from: DVec3, [lateral, elevation]: [f64; 2]) -> f64 {
         let across = from.dot(self.lateral);
         let up = self.layer_offset + from.dot(self.elevation);
         (-0.5 * (across * across * lateral + up * up * elevation)).exp()
     }
 
-    /// 1 / sigma^2 at distance `x`: a row's is that of its sample's middle, and between them lies the parabola
+    /// 1 / sigma^2 at distance `x`: the value of a row is that of its sample's middle, and between them lies the parabola
     /// through the nearest three.
     fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
         let last = self.world.rows.len() - 1;
@@ -342,7 +342,7 @@ impl<'a> Tube<'a> {
         })
     }
 
-    /// All lattices that sound somewhere along the tube.
+    /// Echoes of all lattices in use somewhere along the tube.
     fn lattices(&self, loudest: &Loudest, out: &mut Accumulator) {
         for number in 0..=LATTICE_LEVELS {
             let level = Level::new(self.tissue, self.world.frame.cell, number);
@@ -360,8 +360,8 @@ impl<'a> Tube<'a> {
         drowned.map_or(0.0, |d| level_power(wanted_level(self.tissue, wanted, d), number))
     }
 
-    /// Plane by plane. A cell counts when its middle lies within the beam's width, taken where the axis
-    /// crosses the plane's middle, and within the layer's slab; its scatterer, when it lies within the
+    /// Echoes of one lattice, plane by plane. A cell counts if its centre lies within the beam's width, taken where
+    /// the axis crosses the plane's middle, and within the layer's slab; its scatterer, if it lies within the
     /// segment's ends.
     fn planes(&self, number: u32, level: &Level, loudest: &Loudest, out: &mut Accumulator) {
         if self.bins(out).is_empty() {
@@ -374,7 +374,7 @@ impl<'a> Tube<'a> {
         let o = self.origin;
         let drift = walk.across.x / walk.across.y;
         let step = walk.along.x - walk.along.y * drift;
-        // More than any cell's scatterer can be ahead of or behind the crossing of its plane.
+        // Larger than the distance of any cell's scatterer from the crossing of its plane.
         let widest = (self.world.rows.iter()).fold(0.0, |w, r| f64::max(w, self.half_width(r)));
         let margin = 2.0 * h + 2.0 * widest + 2.0 * reach;
         let ends = [-margin, self.segment.length + margin].map(|x| o[a] + x / step);
@@ -421,8 +421,8 @@ impl<'a> Tube<'a> {
         }
     }
 
-    /// Deformed tissue, piece by piece: every scatterer that lies within the beam's width, the layer's slab
-    /// and the piece, from wherever in the reference shape the field can bring it there.
+    /// Echoes of one lattice in deformed tissue, piece by piece: every scatterer that lies within the beam's width, the
+    /// layer's slab and the piece, from wherever in the reference shape the field can bring it there.
     fn pieces(
         &self,
         deformed: Deformed,
@@ -437,7 +437,7 @@ impl<'a> Tube<'a> {
             for piece in 0..SCATTER_BIN / SCATTER_PIECE {
                 let begin = bin * SCATTER_BIN + piece * SCATTER_PIECE;
                 let ends = [begin, begin + SCATTER_PIECE].map(|k| self.distance(f64::from(k)));
-                // Before the first sample and behind the last there is no other piece.
+                // The first and the last piece also have what lies before the first and behind the last sample.
                 let first = if begin == 0 { f64::NEG_INFINITY } else { ends[0] };
                 let last = if begin + SCATTER_PIECE >= self.world.frame.samples {
                     f64::INFINITY
@@ -460,7 +460,7 @@ impl<'a> Tube<'a> {
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
                 let reference = deformed.field.reference(middle);
-                // Squeezed tissue echoes as before, though its scatterers lie closer.
+                // Squeezed tissue keeps its echo level though its scatterers are closer together.
                 let least = f64::from(LEAST_GROWTH);
                 let growth = deformed.field.growth(reference);
                 let texture =
@@ -504,7 +504,7 @@ impl<'a> Tube<'a> {
         (a.min(b) - around, a.max(b) + around)
     }
 
-    /// One sample of the voxel grid per axial sample.
+    /// Echoes in voxel mode: one sample of the voxel grid per axial sample.
     fn voxels(&self, out: &mut Accumulator) {
         let frame = self.world.frame;
         let (h, pitch) = (f64::from(frame.cell), f64::from(frame.sample_pitch));
