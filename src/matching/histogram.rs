@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_to_be_larger_is_spread_beyond() {
+    fn values_of_which_only_a_bound_is_known_are_spread_above_it() {
         let (mut known, mut beyond) = (Histogram::default(), Histogram::default());
         for _ in 0..1000 {
             known.add(0.1);

@@ -101,7 +101,7 @@ mod tests {
     }
 
     #[test]
-    fn of_more_than_fit_the_outermost_are_kept() {
+    fn if_media_do_not_fit_the_outermost_are_kept() {
         let most = MAX_STACK as u32;
         let radii: Vec<f64> = (1..=most + 2).map(|i| 2.0 * f64::from(i)).collect();
         let (stacks, overflow) = origin(&spheres(&radii).world());

@@ -56,7 +56,7 @@ mod tests {
     use crate::scene::file::tests::Case;
 
     #[test]
-    fn only_what_a_file_says_is_taken_and_meshes_are_not_needed() {
+    fn only_stated_tables_are_taken_and_meshes_are_not_needed() {
         let case = Case::new();
         let text =
             "[imaging]\ngain = 5\n[[mesh]]\nname = \"a\"\ntissue = \"fat\"\nfile = \"no.obj\"\n";

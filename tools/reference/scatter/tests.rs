@@ -268,7 +268,7 @@ fn every_level_is_as_bright_as_the_finest() {
 
 // If a second path is 20 dB louder, the first one needs a hundredth of its scatterers; its level stays the same.
 #[test]
-fn what_is_drowned_is_as_bright_with_fewer_scatterers() {
+fn masked_tissue_is_as_bright_with_fewer_scatterers() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0), tissue(1.5, 1.5, 0.0)]);
     for row in &mut fixture.rows {
         row.shape[3] = 0.0;
