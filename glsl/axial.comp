@@ -1,7 +1,7 @@
-// Axial point-spread function, a real Gaussian along each line of the complex baseband, and detection:
+// Axial point-spread function, a real Gaussian along each scanline of the complex baseband, and detection:
 // time-gain compensation, envelope, logarithm.
 //
-// A thread computes AXIAL_SAMPLES neighbouring samples of a line: it reads a sample once for all of them
+// A thread computes AXIAL_SAMPLES neighbouring samples of a scanline: it reads a sample once for all of them
 // that it reaches.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,7 +1,7 @@
 // From accumulators to complex samples: fixed point to float, lateral smoothing, contact, noise.
 //
 // A thread computes one sample of BEAM_LINES neighbouring scanlines: it reads an echo once for all of
-// them that it reaches. Neighbouring threads read neighbouring samples of the same line.
+// them that it reaches. Neighbouring threads read neighbouring samples of the same scanline.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
@@ -14,8 +14,8 @@ layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { ivec2 surfa
 layout(std430, binding = 3) restrict readonly buffer VolumeBuffer { ivec2 volume_echoes[]; };
 layout(std430, binding = 4) restrict buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 5) restrict buffer LateralBuffer { vec2 lateral[]; };
-// For each line the coupled share of the transmit aperture; from frame.scanlines on the number of elements
-// before each one are not coupled.
+// For each scanline the coupled share of the transmit aperture; from frame.scanlines on, for each element, the
+// number of elements before it that are not coupled.
 layout(std430, binding = 6) restrict readonly buffer ContactBuffer { float contact[]; };
 
 const int HEADROOM = int(ECHO_LIMIT);
@@ -29,7 +29,7 @@ float air_before(float at) {
     return here + (at - float(i)) * (contact[frame.scanlines + i + 1u] - here);
 }
 
-// The factor on the echoes of line l if `reach` elements on either side receive: coupled share of the transmit
+// The factor on the echoes of scanline l if `reach` elements on either side receive: coupled share of the transmit
 // aperture times that of the receive aperture.
 float coupling(uint l, float reach) {
     float sends = contact[l];
@@ -58,7 +58,7 @@ void main() {
     vec2 v[BEAM_LINES];
     float weights[BEAM_LINES];
     float energies[BEAM_LINES];
-    // tap[n] is the weight, in output line first + n, of the line that is being read.
+    // tap[n] is the weight, in output scanline first + n, of the scanline that is being read.
     float tap[BEAM_LINES];
     for (int n = 0; n < BEAM_LINES; ++n) {
         s[n] = vec2(0.0);
