@@ -28,7 +28,7 @@ void main() {
     vec3 v = part(push.sources.x, push.weights.x, i) + part(push.sources.y, push.weights.y, i)
         + part(push.sources.z, push.weights.z, i) + part(push.sources.w, push.weights.w, i);
     if (push.unit != 0u) {
-        // Scaled first: the square of a short vector may be too small for a float.
+        // The square of a short vector may be too small for a float.
         float size = max(max(abs(v.x), abs(v.y)), abs(v.z));
         if (size > 0.0) v = normalize(v / size);
     }

@@ -42,7 +42,7 @@ const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the latt
 const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged over the beam
 const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
-const uint FLAG_MASKED = 512u;      // only what a masking instance encloses gives echoes
+const uint FLAG_MASKED = 512u;      // only what a masking instance encloses is heard
 
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
@@ -119,7 +119,7 @@ struct Instance {
     vec4 low; vec4 high;               // object-space bounds of what is shown; w unused
     uint field;                        // offset of its displacement field, in vectors; NONE: none
     uint masks;                        // 1: it is part of the fusion's mask
-    uint owners;                       // offset in triangles[], words, of the list of each triangle's instance; 0: all its own
+    uint owners;                       // word of triangles[] where the list begins of whose they are; 0: all its own
     uint unused0;
 };
 

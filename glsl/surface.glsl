@@ -61,7 +61,7 @@ vec3 surface_shading_normal(Hit hit) {
     return surface_to_world(hit.instance, n);
 }
 
-// Rotation of the interpolated normal along the direction `along` (world, any length): radians per
+// How fast the interpolated normal turns along the direction `along` (world, any length): radians per
 // mm, unsigned.
 float surface_curvature(Hit hit, vec3 along) {
     uint i = triangles[3u * hit.primitive];

@@ -39,12 +39,12 @@ pub enum Form {
 }
 
 impl Form {
-    /// True for counts.
+    /// Whether it takes counts.
     pub fn is_whole(&self) -> bool {
         matches!(self, Self::Whole)
     }
 
-    /// True for quantities of this measure.
+    /// Whether it takes quantities of this measure.
     pub fn measures(&self, measure: &Measure) -> bool {
         matches!(self, Self::Quantity(own) if *own == measure)
     }

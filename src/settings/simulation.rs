@@ -44,7 +44,7 @@ words! {
 }
 
 words! {
-    /// The model of the scatterers.
+    /// Where scatterers come from.
     pub enum ScatterMode {
         /// One point scatterer per cell of a lattice fixed to the tissue.
         Lattice = "lattice",

@@ -247,8 +247,8 @@ shared! {
     }
 }
 
-/// Push constants of `interpolate`: a weighted sum of vectors of keyframes. All places are counted in vectors
-/// from the beginning of the buffer.
+/// Push constants of `interpolate`: how vectors between keyframes are made. All places are counted
+/// in vectors from the beginning of the buffer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Interpolation {
@@ -256,7 +256,7 @@ pub struct Interpolation {
     pub count: u32,
     /// Place of the first result: it overlaps no source that is read, or is exactly one of them.
     pub target: u32,
-    /// 1: the results are normalised to length 1, as normals are.
+    /// 1: they are brought to length 1, as normals are.
     pub unit: u32,
     /// Floats from one vector to the next: 3, or 4 of which the last stays as it is.
     pub stride: u32,

@@ -32,18 +32,18 @@ pub(super) struct Micro {
 pub(super) struct Interface {
     /// Normal of the triangle.
     pub(super) geometric: DVec3,
-    /// Interpolated normal.
+    /// Interpolated.
     pub(super) shading: DVec3,
-    /// The micro-normal; none if no attempt was acceptable: then there is no echo and no reflected path.
+    /// None when no attempt was acceptable: no echo, no reflected path.
     pub(super) micro: Option<Micro>,
     /// Fluids before and behind.
     pub(super) fluids: [Fluid; 2],
-    /// Intensity reflectance R at the shading normal; where the surface is curved, its mean over the
-    /// beam. 1 at total reflection.
+    /// Intensity reflectance R at the shading normal, where the surface curves its mean over the
+    /// beam; 1 at total reflection.
     pub(super) reflectance: f64,
-    /// Standard deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
+    /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
     pub(super) width: f64,
-    /// Standard deviation of the reflected direction over the beam, rad.
+    /// Deviation of the reflected direction over the beam, rad.
     pub(super) turn: f64,
     pub(super) roughness: f64,
     surface: Surface,
@@ -142,7 +142,7 @@ pub(super) fn gain<'a>(world: &'a World, path: &Path) -> impl Fn(usize) -> f64 +
 }
 
 impl Interface {
-    /// Deposits the echo that returns along the path: the part in phase at the surface, the rest displaced
+    /// Deposits what returns along the path: the part in phase at the surface, the rest displaced
     /// by the thickness with a phase that belongs to the surface.
     pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
         let Some(micro) = self.micro else { return };

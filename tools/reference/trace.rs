@@ -307,7 +307,7 @@ impl Tracer<'_> {
         let [before, behind] = interface.fluids;
         let through = |n| acoustics::refract(before, behind, path.direction, n);
         let beyond = through(normal).filter(|d| d.dot(interface.geometric) < 0.0);
-        // If the middle of the beam is totally reflected but the rest is not, the path goes straight on.
+        // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
         let straight = (interface.width > 0.0).then_some(path.direction);
         let Some(direction) = beyond.or_else(|| through(interface.geometric)).or(straight) else {
             self.out.counters.paths_lost += 1;

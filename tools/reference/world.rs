@@ -175,7 +175,7 @@ impl World<'_> {
         ((turn * (b - a).cross(c - a)).normalize(), (turn * shading).normalize())
     }
 
-    /// Rotation of the interpolated normal along the direction `along` (world, any length), rad/mm.
+    /// How fast the interpolated normal turns along the direction `along` (world, any length), rad/mm.
     pub fn curvature(&self, crossing: &Crossing, along: DVec3) -> f64 {
         let instance = &self.instances[crossing.instance as usize];
         let to_world = affine(&instance.world_from_object).matrix3;

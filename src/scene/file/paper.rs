@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// Settings for every scene.
+/// What a scene of any kind is simulated with.
 const SIMULATION: [(&str, &str); 6] = [
     ("simulation.sampling", "plain"),
     ("simulation.coherence", "coherent"),

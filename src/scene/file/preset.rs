@@ -1,4 +1,4 @@
-//! Presets: the tables of a scene file that suit any anatomy, namely probe, simulation and imaging.
+//! The tables of a scene file that suit any anatomy: how one images, not what.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use super::{parameters, probe};
 use crate::probe::Probe;
 use crate::scene::{Imaging, Simulation};
 
-/// The imaging settings that a scene file states; none for each table that it lacks.
+/// What a scene file says of imaging; none of what it does not mention.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Preset {
     /// `[probe]`, without its pose.
@@ -20,11 +20,11 @@ pub struct Preset {
 }
 
 /// Reads the tables `[probe]`, `[simulation]` and `[imaging]` of a scene file and nothing that they do
-/// not need: no mesh, no volume. If it has no `[probe]`, defaults that depend on the frequency are
+/// not need: no mesh, no volume. Where it has no `[probe]`, defaults that follow the frequency are
 /// those of a probe of `frequency` MHz.
 ///
 /// # Errors
-/// Those of [`crate::scene::Scene::load`]; a file without any of the three tables.
+/// As those of [`crate::scene::Scene::load`]; a file without any of the three.
 pub fn load_preset(path: &Path, frequency: f64) -> Result<Preset, SceneError> {
     let source = Source::read(path, &[])?;
     let document = source.document()?;
@@ -56,7 +56,7 @@ mod tests {
     use crate::scene::file::tests::Case;
 
     #[test]
-    fn only_stated_tables_are_taken_and_meshes_are_not_needed() {
+    fn only_what_a_file_says_is_taken_and_meshes_are_not_needed() {
         let case = Case::new();
         let text =
             "[imaging]\ngain = 5\n[[mesh]]\nname = \"a\"\ntissue = \"fat\"\nfile = \"no.obj\"\n";

@@ -26,14 +26,14 @@ pub(super) struct Place {
     /// Index in the mesh of each triangle, in the order of the array; triangles that were cut occur several
     /// times. None where the order is that of the mesh.
     pub(super) order: Option<Vec<u32>>,
-    /// For an instance that changes its shape: how many times the device has computed it.
+    /// Of an instance that changes its shape: how often the device has made it.
     pub(super) version: u64,
     /// For a structure that instances share: the place in the triangles, in words, of the list that names the
     /// instance of each triangle; 0: all triangles belong to one instance.
     pub(super) owners: u32,
 }
 
-/// The part of a mesh that has to stay on the device.
+/// What of a mesh has to stay on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Need {
     /// Nothing: the mesh is uploaded when it is shown.
@@ -68,7 +68,7 @@ pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
     needs
 }
 
-/// True if the instance's structure changes while the program runs.
+/// Whether the instance's structure changes while the program runs.
 pub(super) fn is_dynamic(instance: &Instance) -> bool {
     use Strategy::{Cached, Interpolate, Rebuild, Refit};
     let changing = [Rebuild, Cached, Refit, Interpolate].contains(&instance.keyframes.strategy);
@@ -84,8 +84,8 @@ pub struct Arrays {
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
-    /// Indices into the vertices; after them, two per word, the instances to which the triangles of shared
-    /// structures belong.
+    /// Indices into the vertices; behind them, two to a word, whose the triangles are that instances
+    /// share.
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,

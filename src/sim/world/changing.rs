@@ -190,7 +190,7 @@ fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
     [grown(0, -1.0), grown(1, 1.0)]
 }
 
-/// Records what the strategies `rebuild` and `cached` send to the device.
+/// Records what `rebuild` and `cached` send to the device.
 fn upload(
     commands: &mut Commands<'_>,
     scene: &Scene,
