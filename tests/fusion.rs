@@ -179,7 +179,7 @@ fn compare(scene: &Scene, masked: &[Vec<i32>; 2], whole: &[Vec<i32>; 2]) -> [usi
 }
 
 #[test]
-fn only_what_the_mask_encloses_is_heard_and_it_is_what_it_was() {
+fn only_the_inside_of_the_mask_echoes_and_as_without_a_mask() {
     let device = test_device();
     let plain = load("").expect("sound");
     for tracer in [Tracer::Bvh, Tracer::RayQuery] {

@@ -149,12 +149,12 @@ pub fn scanlines(frame: &Frame) -> Input {
     Input::floats("scanlines", bytemuck::cast_slice(&table))
 }
 
-/// Index l K + k of every sample.
+/// The number of samples of all scanlines.
 pub fn samples(frame: &Frame) -> usize {
     frame.scanlines as usize * frame.samples as usize
 }
 
-/// Lines of a frame.
+/// The number of lines of a frame.
 pub fn lines(frame: &Frame) -> usize {
     frame.scanlines as usize * frame.layers as usize
 }

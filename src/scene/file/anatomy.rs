@@ -15,12 +15,12 @@ use super::tissues::Tissues;
 use super::within;
 use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Surface, Wire};
 
-/// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
+/// Smallest spacing of a wire's points, mm: no scanner resolves less, and no frame has time for more points.
 const MIN_SPACING: f64 = 1e-3;
 
-/// What a mesh table of the file has become.
+/// The instances made from a mesh table of the file.
 pub(super) struct Placed {
-    /// Parent from object, unmoved.
+    /// Parent from object, at rest.
     pub rest: DAffine3,
     /// Its instances; several only with an animation.
     pub instances: Range<usize>,
@@ -28,23 +28,23 @@ pub(super) struct Placed {
     pub playing: Option<Playing>,
 }
 
-/// What all mesh tables hold.
+/// The meshes and instances of all mesh tables.
 #[derive(Default)]
 pub(super) struct Anatomy {
     pub meshes: Vec<Mesh>,
-    /// Where they are in their parents, unmoved.
+    /// Instances, each placed in its parent at rest.
     pub instances: Vec<Instance>,
-    /// By table.
+    /// For each table its instances.
     pub placed: Vec<Placed>,
 }
 
 impl Anatomy {
-    /// Where the file describes each instance.
+    /// For each instance the place of its description in the file.
     pub fn origins(&self, tables: &[Table<Surface, MeshTable>]) -> Vec<Origin> {
         let of = |(Table { other: table, .. }, placed): (&Table<Surface, MeshTable>, &Placed)| {
             let origin = Origin {
                 mesh: table.name.clone(),
-                // What switches an animation is the mesh's own.
+                // An animation is switched by the mesh itself.
                 selector: table.parent.clone().filter(|_| table.keyframes.is_some()),
             };
             std::iter::repeat_n(origin, placed.instances.len())
@@ -106,7 +106,7 @@ pub(super) fn meshes(
     Ok(out)
 }
 
-/// The placed wires have no more points than a frame affords.
+/// Fails if the placed wires have more points than a frame may have.
 pub(super) fn countable(document: &Document<'_>, wires: &[Wire]) -> Result<(), SceneError> {
     let counts = wires.iter().map(Wire::asks_for);
     let (sum, most) = (counts.clone().sum::<f64>(), f64::from(Wire::MOST));

@@ -1,4 +1,4 @@
-//! Meshes whose file brings an animation: nodes that move, and shapes at times of their own.
+//! Meshes whose file contains an animation: moving nodes, and shapes over time.
 
 use std::path::Path;
 
@@ -14,10 +14,10 @@ use crate::scene::animation::{Clock, Interpolation, Motion, Sequence};
 use crate::scene::graph::{Graph, Node, NodeKind};
 use crate::scene::mesh::{self, AnimatedNode, Choice, Placement};
 
-/// The animation of one mesh table, read.
+/// The animation of one mesh table, as read from its file.
 pub(super) struct Playing {
     clock: Clock,
-    /// When the animation begins, in the file's time, s.
+    /// The begin of the animation, in the file's time, s.
     start: f64,
     nodes: Vec<AnimatedNode>,
     /// The meshes that it moves.
@@ -84,7 +84,7 @@ pub(super) fn read(
     })?;
     warnings.extend(issues.into_iter().map(|w| w.of(&table.name)));
     let (start, end) = found.span;
-    // A single keyframe is a state, which any period shows.
+    // A single keyframe is a constant state: any period will do.
     let period = if end > start { end - start } else { 1.0 };
     let settings = (table.phase, table.mode, table.rate);
     let clock = motion::clock(document, path, period, settings)?;
@@ -113,7 +113,7 @@ pub(super) fn read(
 }
 
 impl Played {
-    /// What its instance takes from it.
+    /// The shapes of its instance.
     pub fn shapes(&self) -> Shapes {
         Shapes {
             name: self.name.clone(),

@@ -1,4 +1,4 @@
-//! Shapes of a scene file: mesh files, keyframes, and built-in shapes. What several instances name
+//! Shapes of a scene file: mesh files, keyframes, and built-in shapes. A file that several instances name
 //! is read once.
 
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ const MAX_KEYFRAMES: usize = 1000;
 /// Meshes read so far.
 #[derive(Default)]
 pub(super) struct Shelf {
-    /// All of them.
+    /// All meshes.
     pub meshes: Vec<Mesh>,
     read: Vec<Read>,
 }
@@ -25,11 +25,11 @@ pub(super) struct Shelf {
 struct Read {
     files: Files,
     options: Options,
-    /// Where they lie among the meshes.
+    /// Their indices among the meshes.
     meshes: Vec<usize>,
 }
 
-/// What a mesh is made of.
+/// The files from which a mesh is read.
 #[derive(Clone, PartialEq)]
 enum Files {
     One(PathBuf),
@@ -41,14 +41,14 @@ enum Files {
 pub(super) struct Shapes {
     /// Name of the instance.
     pub name: String,
-    /// The one at first.
+    /// The first shape.
     pub mesh: usize,
-    /// All of them; empty where the shape is constant.
+    /// All shapes; empty if the shape is constant.
     pub keyframes: Vec<usize>,
 }
 
 impl Shelf {
-    /// Reads or builds what `table`, at `path` in the file, names.
+    /// Reads or builds the shapes that `table`, at `path` in the file, names.
     pub fn shapes(
         &mut self,
         document: &Document<'_>,
@@ -121,7 +121,7 @@ impl Shelf {
         })
     }
 
-    /// How the files of `table` are read.
+    /// Options for reading the files of `table`.
     pub fn options(table: &MeshTable) -> Options {
         Options {
             units: table.units.map(length_of),
@@ -153,7 +153,7 @@ impl Shelf {
         )
     }
 
-    /// Keeps a mesh; its number.
+    /// Stores a mesh and returns its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
         self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
         self.meshes.len() - 1
