@@ -36,7 +36,7 @@ pub use placing::SCALES;
 pub use preset::{Preset, load_preset};
 pub use save::{Entry, Note, save, save_with};
 pub use study::{Plan, Question, Scenario, Slice};
-pub use table::{changes, entries};
+pub use table::{changes, differing, entries};
 pub use trajectory::load_trajectory;
 
 use crate::probe::Probe;

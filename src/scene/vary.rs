@@ -4,6 +4,7 @@
 
 use super::{Imaging, Scene, Simulation};
 use crate::probe::Probe;
+use crate::settings::units::ANGLE;
 use crate::settings::{Facts, Form, Group, Value};
 
 /// Distance from the scene's own value, below and above.
@@ -56,21 +57,15 @@ fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
             Form::Numbers(_) => (0..facts.parts.len()).map(Some).collect(),
             _ => Vec::new(),
         };
-        // An angle is left out: the probe may not be a sector.
-        let belongs = facts.limits.is_none() || facts.form.is_whole();
-        let parts = parts.into_iter().filter(move |_| belongs);
+        // The probe may not be a sector.
+        let parts = parts.into_iter().filter(|_| !facts.form.measures(&ANGLE));
         parts.map(|part| Parameter { table: T::TABLE, facts, part })
     })
 }
 
-/// The number of a group's setting; none where it is absent.
-fn number<T: Group>(settings: &T, parameter: &Parameter) -> Option<f64> {
-    match ((T::row(parameter.facts.key)?.get)(settings), parameter.part) {
-        (Value::Number(number), _) => Some(number),
-        (Value::Whole(count), _) => Some(f64::from(count)),
-        (Value::List(list), Some(part)) => list.get(part).copied(),
-        _ => None,
-    }
+/// The value of a group's setting.
+fn current<T: Group>(settings: &T, key: &str) -> Option<Value> {
+    T::row(key).map(|row| (row.get)(settings))
 }
 
 impl Parameter {
@@ -130,12 +125,22 @@ impl Parameter {
         self.facts.unit()
     }
 
+    /// The value of its setting in `scene`.
+    fn current(&self, scene: &Scene) -> Option<Value> {
+        match self.table {
+            Probe::TABLE => current(&scene.probe, self.facts.key),
+            Simulation::TABLE => current(&scene.simulation, self.facts.key),
+            _ => current(&scene.imaging, self.facts.key),
+        }
+    }
+
     /// The scene's own value, in [`Self::unit`]; none where the scene's probe does not have it.
     pub fn value(&self, scene: &Scene) -> Option<f64> {
-        match self.table {
-            Probe::TABLE => number(&scene.probe, self),
-            Simulation::TABLE => number(&scene.simulation, self),
-            _ => number(&scene.imaging, self),
+        match (self.current(scene)?, self.part) {
+            (Value::Number(number), _) => Some(number),
+            (Value::Whole(count), _) => Some(f64::from(count)),
+            (Value::List(list), Some(part)) => list.get(part).copied(),
+            _ => None,
         }
     }
 
@@ -163,15 +168,12 @@ impl Parameter {
 
     /// The entry of the scene file, path and value, for `value` in `scene`.
     pub fn setting(&self, scene: &Scene, value: f64) -> (String, String) {
-        let text = match (self.part, Imaging::row(self.facts.key)) {
-            (Some(part), Some(row)) => match (row.get)(&scene.imaging) {
-                Value::List(mut list) => {
-                    list[part] = value;
-                    let list: Vec<_> = list.iter().map(f64::to_string).collect();
-                    format!("[{}]", list.join(","))
-                }
-                _ => value.to_string(),
-            },
+        let text = match (self.part, self.current(scene)) {
+            (Some(part), Some(Value::List(mut list))) => {
+                list[part] = value;
+                let list: Vec<_> = list.iter().map(f64::to_string).collect();
+                format!("[{}]", list.join(","))
+            }
             _ => value.to_string(),
         };
         (self.path(), text)

@@ -39,11 +39,6 @@ pub enum Form {
 }
 
 impl Form {
-    /// Whether it takes counts.
-    pub fn is_whole(&self) -> bool {
-        matches!(self, Self::Whole)
-    }
-
     /// Whether it takes quantities of this measure.
     pub fn measures(&self, measure: &Measure) -> bool {
         matches!(self, Self::Quantity(own) if *own == measure)
@@ -374,7 +369,7 @@ macro_rules! group {
             fn rows() -> &'static [$crate::settings::Row<Self>] {
                 use $crate::settings::{Facts, Field, Row};
                 static ROWS: std::sync::LazyLock<Vec<Row<$name>>> = std::sync::LazyLock::new(|| {
-                    let rows = [$(Row {
+                    let rows = vec![$(Row {
                         facts: {
                             const FACTS: Facts = $facts;
                             FACTS.named(stringify!($field), concat!($($doc),+))
@@ -382,11 +377,7 @@ macro_rules! group {
                         get: |from: &$name| from.$field.get(),
                         set: |to: &mut $name, value| to.$field.set(value),
                     }),*];
-                    #[allow(unused_mut)]
-                    let mut all: Vec<Row<$name>> = Vec::new();
-                    all.extend(rows);
-                    $(all.extend($last);)?
-                    all
+                    rows.into_iter()$(.chain($last))?.collect()
                 });
                 &ROWS
             }

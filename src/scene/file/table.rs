@@ -191,9 +191,7 @@ impl<T: Group> Visitor<'_> for Known<T> {
             return Ok(Name::Other(name));
         }
         let all = self.fields.iter().copied().chain(rows.iter().map(|row| row.facts.key));
-        let all: Vec<_> = all.map(|name| format!("`{name}`")).collect();
-        let all = all.join(", ");
-        Err(E::custom(format!("unknown field `{text}`, expected one of {all}")))
+        Err(unknown(text, all))
     }
 }
 
@@ -203,6 +201,12 @@ impl<'de, T: Group> DeserializeSeed<'de> for Known<T> {
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Name, D::Error> {
         deserializer.deserialize_identifier(self)
     }
+}
+
+/// The error for a key that is none of `all`, in the words of derived readers.
+pub(super) fn unknown<E: Error>(key: &str, all: impl Iterator<Item = impl fmt::Display>) -> E {
+    let all: Vec<_> = all.map(|name| format!("`{name}`")).collect();
+    E::custom(format!("unknown field `{key}`, expected one of {}", all.join(", ")))
 }
 
 /// Every setting of a group as an entry of the table at `path`.
@@ -215,6 +219,11 @@ pub fn entries<T: Group>(settings: &T, path: &str) -> Vec<Entry> {
 
 /// What the table at `path`, which gives `from` now, has to say so that it gives `to`.
 pub fn changes<T: Group>(from: &T, to: &T, path: &str) -> Vec<Entry> {
-    let pairs = entries(from, path).into_iter().zip(entries(to, path));
+    differing(entries(from, path), entries(to, path))
+}
+
+/// Those of `to` that are not as in `from`, which has the same keys in the same order.
+pub fn differing(from: Vec<Entry>, to: Vec<Entry>) -> Vec<Entry> {
+    let pairs = from.into_iter().zip(to);
     pairs.filter(|(from, to)| from != to).map(|(_, entry)| entry).collect()
 }

@@ -7,6 +7,7 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use super::document::Document;
 use super::error::SceneError;
+use super::table::unknown;
 use super::{parameters, probe};
 use crate::scene::Scene;
 use crate::scene::vary::{Parameter, Variant};
@@ -51,10 +52,7 @@ impl Visitor<'_> for Key {
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<Parameter, E> {
-        Parameter::of(text).ok_or_else(|| {
-            let all: Vec<_> = Parameter::all().map(|p| format!("`{}`", p.key())).collect();
-            E::custom(format!("unknown field `{text}`, expected one of {}", all.join(", ")))
-        })
+        Parameter::of(text).ok_or_else(|| unknown(text, Parameter::all().map(|p| p.key())))
     }
 }
 
