@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::vary::Variant;
-use super::{Origins, Scene, Tissue, Warning};
+use super::{Live, Origins, Scene, Tissue, Warning};
 
 mod anatomy;
 mod contact;
@@ -14,13 +14,12 @@ mod graph;
 mod motion;
 mod nodes;
 mod paper;
-mod parameters;
 mod placing;
 mod playing;
-mod preset;
 mod probe;
 mod save;
 mod schema;
+mod settings;
 mod shelf;
 mod study;
 mod table;
@@ -33,14 +32,13 @@ pub use document::quoted;
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
-pub use preset::{Preset, load_preset};
 pub use save::{Entry, Note, save, save_with};
+pub use settings::load_settings;
 pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{changes, differing, entries};
 pub use trajectory::load_trajectory;
 
-use crate::probe::Probe;
-use crate::settings::units;
+use crate::settings::{Settings, units};
 use document::{Document, Source};
 
 /// Pixels that a picture has beside each other at most: what files and messages can say.
@@ -100,10 +98,9 @@ impl Scene {
         let graph = graph::build(&document, &file, &mut anatomy)?;
         let instances = anatomy.origins(&file.mesh);
         let wires = anatomy::wires(&document, &file.wire)?;
-        let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
-        let simulation = parameters::simulation(&document, &file.simulation, probe.frequency)?;
-        let imaging = parameters::imaging(&document, &file.imaging)?;
-        presentable(&document, &probe, imaging.image_height)?;
+        let settings = settings::settings(&document, &file, None)?;
+        let world_from_probe = probe::pose(&document, &file.probe)?;
+        presentable(&document, &settings)?;
         let volume = match &file.volume {
             Some(table) => Some(fusion::volume(&document, table, &mut warnings)?),
             None => None,
@@ -118,7 +115,7 @@ impl Scene {
         let contact =
             contact::build(&document, file.contact.as_ref(), &anatomy.meshes, &anatomy.instances)?;
         let tracker = tracker::build(&document, file.tracker.as_ref())?;
-        let live = parameters::live(&document, &file.live)?;
+        let live = settings::over(&document, &file.live, Live::default())?;
         warnings.extend(tissues.unused());
         let name = file
             .name
@@ -134,10 +131,8 @@ impl Scene {
             instances: anatomy.instances,
             graph,
             wires,
-            probe,
+            settings,
             world_from_probe,
-            simulation,
-            imaging,
             volume,
             fusion,
             contact,
@@ -207,8 +202,9 @@ pub fn radians(text: &str) -> Result<f64, String> {
 }
 
 /// Fails on a picture wider than can be written or sent.
-fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<(), SceneError> {
-    let [left, top, right, bottom] = probe.bounds();
+fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), SceneError> {
+    let height = settings.imaging.image_height;
+    let [left, top, right, bottom] = settings.probe.bounds();
     let width = (right - left) / (bottom - top) * f64::from(height);
     if width <= WIDEST {
         return Ok(());

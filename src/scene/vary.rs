@@ -2,10 +2,8 @@
 //! of the images, as in the user study of Starkov et al. 2019, section III-B. That tuned eleven major
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
-use super::{Imaging, Scene, Simulation};
-use crate::probe::Probe;
 use crate::settings::units::ANGLE;
-use crate::settings::{Facts, Form, Group, Value};
+use crate::settings::{Facts, Form, Group, Imaging, Probe, Settings, Simulation, Value};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
@@ -125,18 +123,18 @@ impl Parameter {
         self.facts.unit()
     }
 
-    /// The value of its setting in `scene`.
-    fn current(&self, scene: &Scene) -> Option<Value> {
+    /// The value of its setting.
+    fn current(&self, settings: &Settings) -> Option<Value> {
         match self.table {
-            Probe::TABLE => current(&scene.probe, self.facts.key),
-            Simulation::TABLE => current(&scene.simulation, self.facts.key),
-            _ => current(&scene.imaging, self.facts.key),
+            Probe::TABLE => current(&settings.probe, self.facts.key),
+            Simulation::TABLE => current(&settings.simulation, self.facts.key),
+            _ => current(&settings.imaging, self.facts.key),
         }
     }
 
-    /// The scene's own value, in [`Self::unit`]; none where the scene's probe does not have it.
-    pub fn value(&self, scene: &Scene) -> Option<f64> {
-        match (self.current(scene)?, self.part) {
+    /// Its value, in [`Self::unit`]; none where the probe does not have it.
+    pub fn value(&self, settings: &Settings) -> Option<f64> {
+        match (self.current(settings)?, self.part) {
             (Value::Number(number), _) => Some(number),
             (Value::Whole(count), _) => Some(f64::from(count)),
             (Value::List(list), Some(part)) => list.get(part).copied(),
@@ -166,9 +164,9 @@ impl Parameter {
         }
     }
 
-    /// The entry of the scene file, path and value, for `value` in `scene`.
-    pub fn setting(&self, scene: &Scene, value: f64) -> (String, String) {
-        let text = match (self.part, self.current(scene)) {
+    /// The entry of the scene file, path and value, for `value` beside the other `settings`.
+    pub fn setting(&self, settings: &Settings, value: f64) -> (String, String) {
+        let text = match (self.part, self.current(settings)) {
             (Some(part), Some(Value::List(mut list))) => {
                 list[part] = value;
                 let list: Vec<_> = list.iter().map(f64::to_string).collect();
@@ -201,7 +199,7 @@ pub fn short(value: f64) -> String {
     rounded.to_string()
 }
 
-/// A scene's settings with one parameter at another value.
+/// A scene with one parameter at another value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     /// The parameter.
@@ -210,21 +208,8 @@ pub struct Variant {
     pub value: f64,
     /// The equivalent entry of the scene file, path and value.
     pub setting: (String, String),
-    /// The transducer with the value.
-    pub probe: Probe,
-    /// Path tracing and scatterers with the value.
-    pub simulation: Simulation,
-    /// Image formation with the value.
-    pub imaging: Imaging,
-}
-
-impl Variant {
-    /// Puts its settings into the scene that it was made from.
-    pub fn apply(&self, scene: &mut Scene) {
-        scene.probe = self.probe.clone();
-        scene.simulation = self.simulation.clone();
-        scene.imaging = self.imaging.clone();
-    }
+    /// The scene's settings with it.
+    pub settings: Settings,
 }
 
 #[cfg(test)]

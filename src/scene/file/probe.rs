@@ -16,7 +16,7 @@ const PARALLEL: f64 = 1e-3;
 pub(super) fn build(
     document: &Document<'_>,
     table: &Table<Probe, ProbeTable>,
-) -> Result<(Probe, DAffine3), SceneError> {
+) -> Result<Probe, SceneError> {
     let preset = table.other.preset.as_deref().unwrap_or("paper-table1");
     let presets = &Probe::PRESETS;
     let make = presets.iter().find(|p| p.0 == preset).ok_or_else(|| {
@@ -26,11 +26,18 @@ pub(super) fn build(
     let mut out = make.1();
     arrange(document, &table.stated, &mut out)?;
     table.stated.put(document, Probe::TABLE, &mut out)?;
-    let pose = match &table.other.pose {
-        Some(pose) => place(document, "probe.pose", pose)?,
-        None => DAffine3::IDENTITY,
-    };
-    Ok((out, pose))
+    Ok(out)
+}
+
+/// World from probe.
+pub(super) fn pose(
+    document: &Document<'_>,
+    table: &Table<Probe, ProbeTable>,
+) -> Result<DAffine3, SceneError> {
+    match &table.other.pose {
+        Some(pose) => place(document, "probe.pose", pose),
+        None => Ok(DAffine3::IDENTITY),
+    }
 }
 
 /// Gives `out`, which is as the preset has it, the arrangement that is stated. Keys of another arrangement are refused,

@@ -11,8 +11,9 @@ use super::error::SceneError;
 use super::placing::placement;
 use super::schema::even;
 use super::tissues::Tissues;
-use super::{parameters, probe};
+use super::{probe, settings};
 use crate::output::files;
+use crate::scene::Live;
 use crate::settings::suggest;
 
 /// What is wrong with a setting, and what to do about it.
@@ -90,10 +91,9 @@ pub fn save_with(
 fn check(source: &Source) -> Result<(), SceneError> {
     let document = source.document()?;
     let file = document.parse()?;
-    let (probe, _) = probe::build(&document, &file.probe)?;
-    parameters::simulation(&document, &file.simulation, probe.frequency)?;
-    parameters::imaging(&document, &file.imaging)?;
-    parameters::live(&document, &file.live)?;
+    settings::settings(&document, &file, None)?;
+    probe::pose(&document, &file.probe)?;
+    settings::over(&document, &file.live, Live::default())?;
     Tissues::new(&document, &file.tissues)?;
     if let Some(t) = file.volume.as_ref().map(|t| &t.other) {
         let place = (t.translate, t.rotate.as_ref(), even(t.scale));

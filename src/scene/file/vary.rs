@@ -7,8 +7,8 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use super::document::Document;
 use super::error::SceneError;
+use super::settings;
 use super::table::unknown;
-use super::{parameters, probe};
 use crate::scene::Scene;
 use crate::scene::vary::{Parameter, Variant};
 use crate::settings::{Form, Value};
@@ -141,8 +141,6 @@ fn settled(
     let source = document.source.with(std::slice::from_ref(&setting));
     let document = source.document()?;
     let file = document.parse()?;
-    let (probe, _) = probe::build(&document, &file.probe)?;
-    let simulation = parameters::simulation(&document, &file.simulation, probe.frequency)?;
-    let imaging = parameters::imaging(&document, &file.imaging)?;
-    Ok(Variant { parameter, value, setting, probe, simulation, imaging })
+    let settings = settings::settings(&document, &file, None)?;
+    Ok(Variant { parameter, value, setting, settings })
 }

@@ -314,7 +314,7 @@ fn counts_that_a_quality_chose_stay_out_of_the_file() {
     model.settings.simulation.cell = 0.3;
     model.settings.simulation.paths = 5;
     model.save(None, false).expect("saved");
-    let saved = desk.saved().simulation;
+    let saved = desk.saved().imaged.simulation;
     assert!((saved.cell - 0.3).abs() < 1e-15, "{}", saved.cell);
     assert_eq!(saved.paths, 5);
 }
