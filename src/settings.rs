@@ -18,6 +18,7 @@ mod words;
 pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};
 pub use imaging::{Imaging, Live, Machine};
+pub(crate) use key::group;
 pub use key::{Facts, Form, Group, Off, Row, Value, plain};
 pub use probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
 pub use simulation::{

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::vary::Variant;
-use super::{Live, Origins, Scene, Tissue, Warning};
+use super::{Origins, Scene, Tissue, Warning};
 
 mod anatomy;
 mod contact;
@@ -33,13 +33,15 @@ pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
 pub use save::{Entry, Note, save, save_with};
+pub use schema::reference;
 pub use settings::load_settings;
 pub use study::{Plan, Question, Scenario, Slice};
-pub use table::{changes, differing, entries};
+pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
 use crate::settings::{Settings, units};
 use document::{Document, Source};
+use schema::Title;
 
 /// Pixels that a picture has beside each other at most: what files and messages can say.
 const WIDEST: f64 = 65535.0;
@@ -92,17 +94,18 @@ impl Scene {
         let mut warnings = Vec::new();
 
         let mut tissues = tissues::Tissues::new(&document, &file.tissues)?;
+        let Title { background, .. } = Title::default();
         let background =
-            tissues.index("background", file.background.as_deref().unwrap_or("water"))?;
+            tissues.index("background", &file.background.clone().unwrap_or(background))?;
         let mut anatomy = anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
         let graph = graph::build(&document, &file, &mut anatomy)?;
         let instances = anatomy.origins(&file.mesh);
-        let wires = anatomy::wires(&document, &file.wire)?;
+        let wires = anatomy::wires(&file.wire);
         let settings = settings::settings(&document, &file, None)?;
-        let world_from_probe = probe::pose(&document, &file.probe)?;
+        let world_from_probe = probe::pose(&document, "probe", &file.probe.stated)?;
         presentable(&document, &settings)?;
         let volume = match &file.volume {
-            Some(table) => Some(fusion::volume(&document, table, &mut warnings)?),
+            Some(table) => Some(fusion::volume(&document, &table.stated, &mut warnings)?),
             None => None,
         };
         let fusion = fusion::fusion(
@@ -114,8 +117,8 @@ impl Scene {
         )?;
         let contact =
             contact::build(&document, file.contact.as_ref(), &anatomy.meshes, &anatomy.instances)?;
-        let tracker = tracker::build(&document, file.tracker.as_ref())?;
-        let live = settings::over(&document, &file.live, Live::default())?;
+        let tracker = tracker::build(&document, &file.tracker.stated)?;
+        let live = file.live.stated.get("");
         warnings.extend(tissues.unused());
         let name = file
             .name
@@ -140,9 +143,7 @@ impl Scene {
             live,
             origins,
         };
-        let model =
-            (file.model.translate, file.model.rotate.as_ref(), schema::even(file.model.scale));
-        scene.place_model(placing::placement(&document, "model", model)?);
+        scene.place_model(placing::placement(&file.model.stated, ""));
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
@@ -156,7 +157,7 @@ impl Scene {
 pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
     let table = file.ok().and_then(|file| file.volume);
-    table.map_or_else(Vec::new, |table| table.other.files())
+    table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
 }
 
 /// A time as the command line and scene files write it: seconds, or with a unit. Finite.

@@ -6,8 +6,7 @@ use super::document::{Document, Source};
 use super::error::SceneError;
 use super::probe;
 use super::schema::File;
-use super::table::Table;
-use crate::settings::{Group, Settings, Simulation};
+use crate::settings::{Settings, Simulation};
 
 /// What the tables `probe`, `simulation` and `imaging` of `file` say. Defaults of `simulation` that follow the
 /// frequency are those of a probe of `frequency` MHz, or of the file's where it is none.
@@ -16,23 +15,12 @@ pub(super) fn settings(
     file: &File,
     frequency: Option<f64>,
 ) -> Result<Settings, SceneError> {
-    let probe = probe::build(document, &file.probe)?;
+    let probe = probe::build(document, &file.probe.stated)?;
     let cell = Simulation::default_cell(frequency.unwrap_or(probe.frequency));
-    let from = Simulation { cell, ..Simulation::default() };
-    let mut simulation = over(document, &file.simulation, from)?;
+    let mut simulation = Simulation { cell, ..Simulation::default() };
+    file.simulation.stated.put("", &mut simulation);
     simulation.cell /= simulation.crowding();
-    let imaging = over(document, &file.imaging, Default::default())?;
-    Ok(Settings { probe, simulation, imaging })
-}
-
-/// What `table` makes of `settings`.
-pub(super) fn over<T: Group>(
-    document: &Document<'_>,
-    table: &Table<T>,
-    mut settings: T,
-) -> Result<T, SceneError> {
-    table.stated.put(document, T::TABLE, &mut settings)?;
-    Ok(settings)
+    Ok(Settings { probe, simulation, imaging: file.imaging.stated.get("") })
 }
 
 /// Takes those of `settings` over from a scene file of which it has a table - `[probe]`, `[simulation]`, `[imaging]` -

@@ -95,7 +95,7 @@ fn control<T>(ui: &mut Ui, path: &str, row: &Row<T>, settings: &mut T) {
             Value::Whole(number) => count(ui, path, facts, number),
             Value::Switch(on) => drop(explained(ui.checkbox(on, ""), path, facts)),
             Value::Word(word) => choice(ui, path, facts, word),
-            Value::List(_) | Value::Absent => {}
+            Value::List(_) | Value::Text(_) | Value::Texts(_) | Value::Absent => {}
         });
         ui.end_row();
     }

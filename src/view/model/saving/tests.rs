@@ -123,6 +123,7 @@ fn another(facts: &Facts, now: Value, draw: Draw<'_>) -> Value {
             Value::Word(words[(at + 1) % words.len()])
         }
         Value::List(list) => Value::List(list.iter().map(|_| draw(facts.range)).collect()),
+        other => other,
     }
 }
 
