@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn one_word_by_hand() {
+    fn one_word_equals_the_value_worked_out_by_hand() {
         // Worked through with the shader's definition in arbitrary-precision integers.
         let a = 1_013_904_223_u32;
         let step = |x: u32, y: u32, z: u32| x.wrapping_add(y.wrapping_mul(z));

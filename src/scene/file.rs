@@ -43,7 +43,7 @@ use crate::settings::{Settings, units};
 use document::{Document, Source};
 use schema::Title;
 
-/// Pixels that a picture has beside each other at most: what files and messages can say.
+/// Largest width of a picture, pixels: the limit of image files and messages.
 const WIDEST: f64 = 65535.0;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
@@ -70,11 +70,11 @@ impl Scene {
         Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
     }
 
-    /// As [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
+    /// Like [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
     /// order of [`Parameter::suggested`](super::vary::Parameter::suggested), others after them.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Scene::load`].
     pub fn load_variants(
         path: &Path,
         overrides: &[(String, String)],
@@ -82,7 +82,7 @@ impl Scene {
         Self::load_with(path, overrides, true)
     }
 
-    /// `suggested`: with the variants of parameters of which the file says nothing.
+    /// Loads a scene with its variants; with `suggested` also those of parameters that the file does not vary.
     fn load_with(
         path: &Path,
         overrides: &[(String, String)],
@@ -160,10 +160,10 @@ pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
 }
 
-/// A time as the command line and scene files write it: seconds, or with a unit. Finite.
+/// Parses a time as in scene files and on the command line: seconds, or with a unit. Returns s, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn seconds(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
@@ -175,10 +175,10 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A length as the command line and scene files write it: mm, or with a unit. Finite.
+/// Parses a length as in scene files and on the command line: mm, or with a unit. Returns mm, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn millimetres(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
@@ -190,10 +190,10 @@ pub fn millimetres(text: &str) -> Result<f64, String> {
     }
 }
 
-/// An angle as the command line and scene files write it, with its unit, in radians. Finite.
+/// Parses an angle as in scene files and on the command line, with its unit. Returns radians, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn radians(text: &str) -> Result<f64, String> {
     let value = units::ANGLE.parse(text)?;
     match value.is_finite() {
@@ -218,7 +218,7 @@ fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), Scene
     Err(document.fail("imaging.image_height", message, remedy))
 }
 
-/// Fails at `path` unless `value` lies in the closed range; NaN lies in none.
+/// Fails at `path` unless `value` is in the closed range; NaN is in no range.
 fn within(
     document: &Document<'_>,
     path: &str,

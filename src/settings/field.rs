@@ -1,4 +1,4 @@
-//! What fields of settings hold, and how their values are read.
+//! The types that fields of settings may have, and the reading of their values.
 
 use std::fmt;
 
@@ -11,11 +11,11 @@ use serde::de::{
 use super::units::Measure;
 use super::{Form, Value};
 
-/// What a field of settings holds.
+/// A type that a field of settings may have.
 pub trait Field {
-    /// Its value.
+    /// The field's value.
     fn get(&self) -> Value;
-    /// Takes a value of its own kind; no other changes it.
+    /// Stores a value of the field's own kind; a value of another kind changes nothing.
     fn set(&mut self, value: &Value);
 }
 
@@ -174,7 +174,7 @@ impl<'de> DeserializeSeed<'de> for &Form {
     }
 }
 
-/// Takes one of the words.
+/// Reads one of the words.
 struct OneOf(&'static [&'static str]);
 
 impl<'de> Visitor<'de> for OneOf {
@@ -275,7 +275,7 @@ impl<'de> Visitor<'de> for Several {
         };
         while let Some(number) = next()? {
             out.push(number);
-            // One more than fits says enough.
+            // One number too many is enough for the error.
             if out.len() > self.count {
                 break;
             }

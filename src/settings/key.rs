@@ -1,4 +1,4 @@
-//! Rows: what is to be known of a key, and how its value is read from a field and put there.
+//! Rows of settings: the facts about a key, and the functions that get and set the value of its field.
 
 use glam::DVec3;
 
@@ -25,7 +25,7 @@ pub enum Value {
     Absent,
 }
 
-/// What a key takes.
+/// The form of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// A number without a unit.
@@ -40,9 +40,9 @@ pub enum Form {
     Switch,
     /// One of these words.
     Words(&'static [&'static str]),
-    /// So many numbers.
+    /// This many numbers.
     Numbers(usize),
-    /// So many quantities.
+    /// This many quantities.
     Quantities(&'static Measure, usize),
     /// Three numbers, not all zero.
     Direction,
@@ -65,7 +65,7 @@ impl Form {
     }
 }
 
-/// The state of a key in which what it sets is off.
+/// The value of a key that switches off what the key sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Off {
     /// This value.
@@ -74,28 +74,28 @@ pub enum Off {
     Absent,
 }
 
-/// All that is to be known of a key.
+/// The facts about a key.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
     /// The key in its table; with those of tables between them: `rotate.axis`.
     pub key: &'static str,
-    /// What it takes.
+    /// The form of its value.
     pub form: Form,
     /// Least and largest value that a scene file may give, of each number of a list.
     pub range: [f64; 2],
     /// Ends of the console's slider.
     pub usual: [f64; 2],
-    /// What the console calls it.
+    /// Its name in the console.
     pub label: &'static str,
     /// The section of the console in which it stands; empty: the first one.
     pub under: &'static str,
-    /// When it is off, and the console's word for that.
+    /// The value that switches it off, and the console's word for that.
     pub off: Option<(Off, &'static str)>,
-    /// What each number of a list is called.
+    /// The name of each number of a list.
     pub parts: &'static [&'static str],
-    /// What a plain count counts: "pixels".
+    /// The things that a plain count counts: "pixels".
     pub counted: &'static str,
-    /// The default in words, where it is no value.
+    /// The default in words, if it is not a single value.
     pub default: Option<&'static str>,
     /// Whether its table needs it.
     pub required: bool,
@@ -107,7 +107,7 @@ pub struct Facts {
 
 /// A key with the field behind it.
 pub struct Row<T> {
-    /// What is to be known of it.
+    /// The facts about the key.
     pub facts: Facts,
     /// The field's value.
     pub get: fn(&T) -> Value,
@@ -334,7 +334,7 @@ impl Facts {
         })
     }
 
-    /// What is wrong with a value of this key, and what to do: none where it lies in the range. NaN lies in none.
+    /// The fault of a value outside the key's range, and its remedy; none for a value in the range. NaN is in no range.
     pub fn fault(&self, value: &Value) -> Option<(String, String)> {
         let all = match value {
             Value::List(all) if matches!(self.form, Form::Direction) => {
@@ -353,7 +353,7 @@ impl Facts {
 
     fn outside(&self, number: f64) -> Option<(String, String)> {
         let [least, most] = self.range;
-        // What has no ends is checked by whoever knows what fits.
+        // A key without limits is checked by the code that knows its limits.
         let endless = least == f64::NEG_INFINITY && most == f64::INFINITY;
         if endless || (least..=most).contains(&number) {
             return None;
@@ -370,13 +370,13 @@ impl Facts {
     }
 }
 
-/// A number as TOML reads it back, to the last bit.
+/// The text of a number that TOML reads back exactly.
 pub fn plain(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// In degrees where they are the same number: most people would write them.
+/// The text of an angle: in degrees, as most people write them, if they give exactly the same number.
 fn angle(radians: f64) -> String {
     let degrees = (radians.to_degrees() * 1e9).round() / 1e9;
     match degrees * (std::f64::consts::PI / 180.0) == radians {
@@ -385,8 +385,8 @@ fn angle(radians: f64) -> String {
     }
 }
 
-/// Declares the settings of a table, a field and its row at a time. The fields of `beside` are no keys of their own;
-/// the rows of `last` are those of keys that are no field.
+/// Declares the settings of a table, each field with its row. The fields of `beside` are no keys of their own;
+/// the rows of `last` are those of keys that have no field.
 macro_rules! group {
     ($(#[$meta:meta])* pub struct $name:ident in $table:literal {
         $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr, $facts:expr;)*

@@ -4,18 +4,18 @@ use std::fmt;
 
 use serde::de::{DeserializeSeed, Deserializer, Error, Visitor};
 
-/// What is measured, and its units.
+/// A measure: a kind of quantity with its units.
 #[derive(Debug, PartialEq)]
 pub struct Measure {
-    /// What the reference calls it.
+    /// Its name in the reference (docs/scenes.md).
     pub name: &'static str,
     /// Noun for messages, with article.
     what: &'static str,
     /// Units with their factors to the one used inside, which is the first and that of a plain number.
     units: &'static [(&'static str, f64)],
-    /// What the reference says beside the units.
+    /// A remark of the reference beside the units.
     pub note: &'static str,
-    /// Whether a plain number is accepted.
+    /// True if a plain number is accepted.
     plain: bool,
 }
 
@@ -83,7 +83,7 @@ impl Measure {
     /// Parses "60 mm".
     ///
     /// # Errors
-    /// What is wrong with the text, and which units there are.
+    /// A message with the fault of the text and the units that exist.
     pub fn parse(&self, text: &str) -> Result<f64, String> {
         let text = text.trim();
         let end = (0..=text.len())

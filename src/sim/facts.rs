@@ -1,4 +1,4 @@
-//! What reports say of a frame.
+//! Facts about a frame for reports.
 
 use serde_json::{Value, json};
 

@@ -1,4 +1,4 @@
-//! Frames of another size than the simulator was made for, and where they are shown.
+//! Frames larger than the simulator was made for, and the image in which they are shown.
 
 use super::batches::Room;
 use super::buffers::Buffers;
@@ -33,14 +33,14 @@ impl Simulator {
         self.tables = tables;
         self.sources = Sources::of(scene);
         self.read_out = super::ReadOut::default();
-        // No frame is in the new buffers.
+        // The new buffers hold no frame yet.
         self.fused = false;
         self.upload_tables()?;
         Ok(true)
     }
 
-    /// Copies the next frames to an image of their size, [`image_size`] texels of RGBA; with nothing
-    /// they stay in their buffer.
+    /// Copies the next frames into an image of their size, [`image_size`] texels of RGBA; with none they stay in
+    /// their buffer.
     pub fn show_on(&mut self, image: Option<Image>) {
         self.shown_on = image;
     }

@@ -16,7 +16,7 @@ use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Wire};
 use crate::settings::group;
 use crate::settings::units::{LENGTH, LEVEL};
 
-/// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
+/// Smallest spacing of a wire's points, mm: no scanner resolves less, and no frame has time for more points.
 const MIN_SPACING: f64 = 1e-3;
 
 group! {
@@ -35,7 +35,7 @@ group! {
 
 /// What a mesh table of the file has become.
 pub(super) struct Placed {
-    /// Parent from object, unmoved.
+    /// Parent from object, at rest.
     pub rest: DAffine3,
     /// Its instances; several only with an animation.
     pub instances: Range<usize>,
@@ -43,13 +43,13 @@ pub(super) struct Placed {
     pub playing: Option<Playing>,
 }
 
-/// What all mesh tables hold.
+/// The meshes and instances of all mesh tables.
 #[derive(Default)]
 pub(super) struct Anatomy {
     pub meshes: Vec<Mesh>,
-    /// Where they are in their parents, unmoved.
+    /// Instances, each placed in its parent at rest.
     pub instances: Vec<Instance>,
-    /// By table.
+    /// For each table its instances.
     pub placed: Vec<Placed>,
 }
 
@@ -121,7 +121,7 @@ pub(super) fn meshes(
     Ok(out)
 }
 
-/// The placed wires have no more points than a frame affords.
+/// Fails if the placed wires have more points than a frame may have.
 pub(super) fn countable(document: &Document<'_>, wires: &[Wire]) -> Result<(), SceneError> {
     let counts = wires.iter().map(Wire::asks_for);
     let (sum, most) = (counts.clone().sum::<f64>(), f64::from(Wire::MOST));

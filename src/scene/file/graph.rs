@@ -1,4 +1,4 @@
-//! The graph of a scene file: what selectors choose from, and what each node does.
+//! The graph of a scene file: its nodes, their effects, and the choices of its selectors.
 
 use std::collections::HashMap;
 
@@ -17,7 +17,7 @@ use crate::scene::animation::{Motion, Sequence};
 use crate::scene::graph::{Graph, Node, NodeKind};
 use crate::settings::group;
 
-/// Factors and shifts, mm, of a placement with all parents at rest: beyond them single precision
+/// Limits of the factors and shifts, mm, of a placement with all parents at rest: beyond them single precision
 /// resolves nothing, or the placement has no inverse.
 const SCALES: (f64, f64) = (1e-6, 1e6);
 const FAR: f64 = 1e6;
@@ -94,7 +94,7 @@ pub(super) fn build(
                 playing.grow(&mut graph, node, placed.instances.start);
             }
         }
-        // Nobody of the file is below the nodes that have just grown.
+        // No node of the file is below the nodes just added.
         rests.resize(graph.nodes.len(), rest);
     }
     Ok(graph)
@@ -110,7 +110,7 @@ fn switched(anatomy: &Anatomy, table: usize) -> Option<usize> {
     waits.then_some(instance)
 }
 
-/// Numbers the selectors that animations of mesh files are: one for all meshes of one parent that
+/// Numbers the selectors that stand for animations of mesh files: one for all meshes of one parent that
 /// change at the same times.
 fn group_played(file: &File, anatomy: &mut Anatomy) {
     let mut groups: Vec<(Option<&str>, &Sequence)> = Vec::new();
@@ -131,12 +131,12 @@ fn group_played(file: &File, anatomy: &mut Anatomy) {
     }
 }
 
-/// What selectors choose from.
+/// The choices of selectors.
 #[derive(Default)]
 struct Choices {
-    /// By the selector's entry, its order over time.
+    /// For each selector, by its entry, the order of its choices over time.
     sequences: HashMap<usize, Sequence>,
-    /// By the child's entry, its number.
+    /// For each child, by its entry, its number among the choices.
     alternatives: HashMap<usize, usize>,
 }
 

@@ -1,4 +1,4 @@
-//! The nodes of a scene file, and who is whose child.
+//! The nodes of a scene file, and their parents.
 
 use std::collections::HashMap;
 
@@ -108,11 +108,11 @@ pub(super) fn depths(
 ) -> Result<Vec<usize>, SceneError> {
     let mut depths: Vec<Option<usize>> = vec![None; entries.len()];
     for start in 0..entries.len() {
-        // Up to an entry whose depth is known, and down again.
+        // First up to an entry whose depth is known, then down again.
         let mut chain = Vec::new();
         let mut at = Some(start);
         while let Some(e) = at.filter(|&e| depths[e].is_none()) {
-            // After as many steps as there are nodes it goes in circles.
+            // More steps than there are nodes mean a cycle.
             if chain.len() == entries.len() {
                 let by = parents[e].expect("it was come by");
                 let by = match by == e {

@@ -1,4 +1,4 @@
-//! Where things are: shift, rotation and scale of meshes, transforms and motions.
+//! Placements: shift, rotation and scale of meshes, transforms and motions.
 
 use glam::{DAffine3, DQuat, DVec3};
 

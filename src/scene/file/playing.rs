@@ -1,4 +1,4 @@
-//! Meshes whose file brings an animation: nodes that move, and shapes at times of their own.
+//! Meshes whose file contains an animation: moving nodes, and shapes over time.
 
 use std::path::Path;
 
@@ -25,10 +25,10 @@ group! {
     }
 }
 
-/// The animation of one mesh table, read.
+/// The animation of one mesh table, as read from its file.
 pub(super) struct Playing {
     clock: Clock,
-    /// When the animation begins, in the file's time, s.
+    /// The begin of the animation, in the file's time, s.
     start: f64,
     nodes: Vec<AnimatedNode>,
     /// The meshes that it moves.
@@ -115,7 +115,7 @@ pub(super) fn read(
 }
 
 impl Played {
-    /// What its instance takes from it.
+    /// The shapes of its instance.
     pub fn shapes(&self) -> Shapes {
         Shapes {
             name: self.name.clone(),

@@ -1,4 +1,4 @@
-//! Shapes of a scene file: mesh files, keyframes, and built-in shapes. What several instances name
+//! Shapes of a scene file: mesh files, keyframes, and built-in shapes. A file that several instances name
 //! is read once.
 
 use std::path::{Path, PathBuf};
@@ -74,7 +74,7 @@ group! {
 /// Meshes read so far.
 #[derive(Default)]
 pub(super) struct Shelf {
-    /// All of them.
+    /// All meshes.
     pub meshes: Vec<Mesh>,
     read: Vec<Read>,
 }
@@ -83,11 +83,11 @@ pub(super) struct Shelf {
 struct Read {
     files: Files,
     options: Options,
-    /// Where they lie among the meshes.
+    /// Their indices among the meshes.
     meshes: Vec<usize>,
 }
 
-/// What a mesh is made of.
+/// The files from which a mesh is read.
 #[derive(Clone, PartialEq)]
 enum Files {
     One(PathBuf),
@@ -99,9 +99,9 @@ enum Files {
 pub(super) struct Shapes {
     /// Name of the instance.
     pub name: String,
-    /// The one at first.
+    /// The first shape.
     pub mesh: usize,
-    /// All of them; empty where the shape is constant.
+    /// All shapes; empty if the shape is constant.
     pub keyframes: Vec<usize>,
 }
 
@@ -196,7 +196,7 @@ impl Shelf {
         )
     }
 
-    /// Keeps a mesh; its number.
+    /// Stores a mesh and returns its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
         self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
         self.meshes.len() - 1

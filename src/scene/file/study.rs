@@ -1,5 +1,5 @@
-//! Plans of user studies: which scenes are shown from where and before which backgrounds, and what is
-//! asked about the images. `docs/studies.md` describes the file.
+//! Plans of user studies: the scenes, their views and backgrounds, and the questions
+//! about the images. `docs/studies.md` describes the file.
 
 use std::path::{Path, PathBuf};
 
@@ -16,26 +16,26 @@ use super::within;
 use crate::scene::Scene;
 use crate::settings::{Form, Surroundings, Words, group};
 
-/// Most cases of a study: the paper has 27, an assessor a day.
+/// Most cases of a study; the paper has 27, for which an assessor needs a day.
 const MAX_CASES: usize = 999;
 /// Longest text that is shown, bytes.
 const MAX_WORDS: usize = 4000;
-/// Height of an image in pixels where the plan says nothing: the paper's 621 come to some 50 MB.
+/// Default height of an image, pixels; the paper's 621 images take about 50 MB.
 const HEIGHT: u32 = 320;
 
-/// What a study shows and asks.
+/// The plan of a study: its images and questions.
 pub struct Plan {
     /// Headline of the form.
     pub title: String,
-    /// What the assessor is told first: plain text, an empty line between paragraphs.
+    /// Introduction for the assessor: plain text, an empty line between paragraphs.
     pub introduction: String,
-    /// What surrounds the simulated part, in the order of the tables.
+    /// Surroundings of the simulated part, in the order of the tables.
     pub backgrounds: Vec<Surroundings>,
     /// Most rows of pixels of an image; larger ones are reduced.
     pub image_height: u32,
-    /// What is asked.
+    /// The questions.
     pub question: Question,
-    /// The scenes, at least one, of different names.
+    /// The scenes, at least one, with different names.
     pub scenarios: Vec<Scenario>,
     source: Source,
 }
@@ -66,11 +66,11 @@ fn agreement() -> [String; 5] {
 pub struct Scenario {
     /// Name in key and tables; the assessor does not see it.
     pub name: String,
-    /// What the assessor reads above its images; empty: nothing.
+    /// Title above its images for the assessor; empty: none.
     pub title: String,
     /// The scene file, seen from the current folder.
     pub scene: PathBuf,
-    /// Where it is imaged from, at least one place, of different names.
+    /// The positions of the transducer, at least one, with different names.
     pub slices: Vec<Slice>,
 }
 
@@ -79,7 +79,7 @@ pub struct Scenario {
 pub struct Slice {
     /// Name in key and tables; the assessor does not see it.
     pub name: String,
-    /// What the assessor reads where its images are ranked; empty: nothing.
+    /// Title for the assessor where its images are ranked; empty: none.
     pub title: String,
     pose: Pose,
 }
@@ -100,7 +100,7 @@ impl Slice {
             Pose::Absolute(pose) => pose,
             Pose::Relative(pose) => scene.world_from_probe * pose,
         };
-        // Minus zero is no place.
+        // Adding zero turns -0 into 0.
         let rounded = |v: DVec3, unit: f64| (v * unit).round() / unit + DVec3::ZERO;
         let position = rounded(exact.translation, 1e4);
         let direction = rounded(exact.matrix3.z_axis, 1e7);
@@ -167,7 +167,7 @@ impl Keys for SliceKeys {
 }
 
 impl Plan {
-    /// Reads a plan. The scenes that it names are not looked at.
+    /// Reads a plan. The scenes that it names are not read.
     ///
     /// # Errors
     /// The first mistake, with file, line, column and remedy.
@@ -235,7 +235,7 @@ impl Plan {
     }
 }
 
-/// Checks what the types of the tables leave open.
+/// Checks conditions that the types of the tables do not express.
 struct Check<'s> {
     source: &'s Source,
 }
@@ -294,7 +294,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// At least one, none empty, none twice.
+    /// Fails unless there is at least one name, none is empty and none occurs twice.
     fn names<'n>(
         &self,
         path: &str,

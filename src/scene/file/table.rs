@@ -261,7 +261,7 @@ pub fn entries<T: Group>(settings: &T, path: &str) -> Vec<Entry> {
     rows.map(entry).collect()
 }
 
-/// What the table at `path`, which gives `from` now, has to say so that it gives `to`.
+/// The entries by which the table at `path`, which gives `from` now, gives `to`.
 pub fn changes<T: Group>(from: &T, to: &T, path: &str) -> Vec<Entry> {
     differing(entries(from, path), entries(to, path))
 }

@@ -25,8 +25,8 @@ group! {
     }
 }
 
-/// Impedance stated beside speed and density may differ from their product by this fraction:
-/// tables round to two digits. More, and refraction and reflection would contradict each other.
+/// Largest relative difference between a stated impedance and the product of speed and density:
+/// tables round to two digits. With a larger one refraction and reflection would contradict each other.
 const IMPEDANCE_TOLERANCE: f64 = 0.02;
 
 /// Tissues that a scene may name, and those that it has named.
@@ -94,7 +94,7 @@ fn unknown<'n>(
     document.fail(path, format!("unknown tissue `{name}`"), remedy)
 }
 
-/// Names of the tissues from which `name` takes what it does not say, the nearest first.
+/// Names of the tissues from which `name` takes the values that it does not state, the nearest first.
 pub(super) fn bases(tables: &Tables, name: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut at = name;
@@ -155,7 +155,7 @@ fn resolve(
     Ok(tissue)
 }
 
-/// What `table` states over `base`.
+/// The tissue `base` with the values that `table` states.
 fn over(
     document: &Document<'_>,
     table: &Table<Tissue>,

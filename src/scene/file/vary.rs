@@ -41,7 +41,7 @@ impl<'de> Deserialize<'de> for VaryTable {
     }
 }
 
-/// Takes the key of a parameter.
+/// Reads the key of a parameter.
 struct Key;
 
 impl Visitor<'_> for Key {
@@ -64,7 +64,7 @@ impl<'de> DeserializeSeed<'de> for Key {
     }
 }
 
-/// Takes a list of values of this form.
+/// Reads a list of values of this form.
 struct Values(Form);
 
 impl<'de> Visitor<'de> for Values {
@@ -131,7 +131,7 @@ pub(super) fn variants(
     Ok(out)
 }
 
-/// The settings of the document with one more override: what `render` makes of it, checks included.
+/// The settings of the document with one more override, checked as `render` does.
 fn settled(
     document: &Document<'_>,
     parameter: Parameter,

@@ -44,7 +44,7 @@ fn every_parameter_stands_below_and_above_its_own_value_and_nothing_else_differs
             for other in Parameter::suggested().filter(|p| *p != variant.parameter) {
                 assert_eq!(other.value(&changed), other.value(&scene), "{variant:?}");
             }
-            // What --set makes of the entry that is named.
+            // The scene that `--set` gives with the entry of the variant.
             let (path, value) = &variant.setting;
             let set = [set, &[(path.as_str(), value.as_str())]].concat();
             let (loaded, _) = case.load(SCENE, &set).expect("sound");
@@ -96,10 +96,10 @@ fn values_out_of_range_are_refused_with_their_key() {
     ] {
         let text = format!("{SCENE}[vary]\n{entry}\n");
         case.fails(&text, (line, column), cause, remedy);
-        // What the table was called.
+        // The table's former name.
         case.fails(&text.replace("[vary]", "[sweep]"), (line, column), cause, remedy);
     }
-    // An override is at fault where it is one.
+    // A mistake in an override is reported there.
     let error = case.load(SCENE, &[("vary.gain", "[500]")]).map(|_| ()).expect_err("out of range");
     assert!(error.to_string().starts_with("--set:1:"), "{error}");
 }

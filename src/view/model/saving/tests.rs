@@ -268,7 +268,7 @@ fn a_setting_that_is_not_written_is_noticed() {
 }
 
 #[test]
-fn only_what_differs_is_written() {
+fn only_changed_settings_are_written() {
     let desk = Desk::new();
     let mut model = desk.model(&[]);
     model.save(None, false).expect("saved");
@@ -321,7 +321,7 @@ fn counts_that_a_quality_chose_stay_out_of_the_file() {
 }
 
 #[test]
-fn what_the_command_line_said_is_written() {
+fn settings_of_the_command_line_are_written() {
     let desk = Desk::new();
     let mut model = desk.model(&[("mesh.still.tissue", "fat"), ("imaging.gain", "3 dB")]);
     model.settings.imaging.dynamic_range = 70.0;
