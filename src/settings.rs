@@ -29,7 +29,7 @@ pub use tissue::Tissue;
 pub use words::Words;
 pub(crate) use words::words;
 
-/// How anything is imaged: what presets, parameter studies, qualities and the console set alike.
+/// Settings of imaging: those that presets, parameter studies, qualities and the console set alike.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Transducer and its geometry.

@@ -204,7 +204,7 @@ impl<'de> DeserializeSeed<'de> for OneOf {
     }
 }
 
-/// Takes what a form of several kinds takes, and what it says that this is.
+/// Reader of a form of several kinds, with the words for what it expects.
 struct Either(&'static str, Form);
 
 impl<'de> Visitor<'de> for Either {

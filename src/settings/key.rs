@@ -97,7 +97,7 @@ pub struct Facts {
     pub counted: &'static str,
     /// The default in words, if it is not a single value.
     pub default: Option<&'static str>,
-    /// Whether its table needs it.
+    /// True if its table needs it.
     pub required: bool,
     /// The range in words, where two numbers do not say it.
     pub limits: Option<&'static str>,

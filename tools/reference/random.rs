@@ -59,7 +59,7 @@ pub fn draw(frame: &Frame, path: u32, bounce: u32, purpose: u32) -> [u32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::statistics::standard_errors;
+    use insonify::statistics::standard_errors;
 
     // A (0, 2)-sequence: of the first 2^k paths each elementary interval of area 2^-k holds one.
     #[test]

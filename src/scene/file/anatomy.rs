@@ -33,7 +33,7 @@ group! {
     }
 }
 
-/// What a mesh table of the file has become.
+/// The instances made from a mesh table of the file.
 pub(super) struct Placed {
     /// Parent from object, at rest.
     pub rest: DAffine3,
@@ -54,11 +54,11 @@ pub(super) struct Anatomy {
 }
 
 impl Anatomy {
-    /// Where the file describes each instance.
+    /// For each instance the place of its description in the file.
     pub fn origins(&self, tables: &[Table<MeshKeys>]) -> Vec<Origin> {
         let of = |(Table { stated, .. }, placed): (&Table<MeshKeys>, &Placed)| {
             let NodeKeys { name, parent } = stated.get("");
-            // What switches an animation is the mesh's own.
+            // An animation is switched by the mesh itself.
             let selector = parent.filter(|_| stated.has("keyframes"));
             let origin = Origin { mesh: name, selector };
             std::iter::repeat_n(origin, placed.instances.len())

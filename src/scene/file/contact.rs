@@ -16,7 +16,7 @@ const GEL: f64 = 3.0;
 const THICKEST: f64 = 30.0;
 
 group! {
-    /// What the probe has to touch.
+    /// The skin, which the probe has to touch.
     pub struct ContactKeys in "contact" {
         /// Names of the meshes, of which the union is the body that the probe is held to: the skin, or where that is a
         /// thin layer also what lies below it. They must be closed; `cap_openings` closes a mesh file.

@@ -31,7 +31,7 @@ group! {
 }
 
 group! {
-    /// What is simulated of the picture.
+    /// The meshes of the mask.
     pub struct MaskKeys in "fusion" {
         /// Names of the meshes, of which the union is simulated. They must be closed; `cap_openings` closes a mesh
         /// file.
@@ -82,8 +82,8 @@ pub(super) fn volume(
     warnings.extend(found);
     let sequence = sequence(document, stated, volume.later.len() + 1, volume.interval)?;
     let world_from_lps = placement(stated, "");
-    // All that is stored of a byte; of other types only the range in use says what is white.
-    // Of all volumes: what is grey in one is as grey in the next.
+    // Bytes have their full range. Other types have the range that their values use.
+    // It is the range of all volumes, so that equal values have equal grey levels at all times.
     let range = match &volume.voxels {
         Voxels::U8(_) => (0.0, 255.0),
         _ => (volume.statistics.min, volume.statistics.max),
@@ -122,8 +122,8 @@ pub(super) fn volume(
     })
 }
 
-/// When each of `count` volumes is shown, which follow each other every `interval` seconds by their file;
-/// none of one volume.
+/// The sequence that shows `count` volumes, which follow each other every `interval` seconds by their file;
+/// none for a single volume.
 fn sequence(
     document: &Document<'_>,
     stated: &Stated,
@@ -148,7 +148,7 @@ fn sequence(
             format!("leave out some: up to {MAX_VOLUMES} can be shown"),
         ));
     }
-    // To and fro, the last one stands at the end of the period.
+    // Played to and fro, the last volume is shown at the end of the period.
     let VolumeKeys { period, rate, .. } = stated.get("");
     let Cycle { phase, mode } = stated.get("");
     let steps = match mode {

@@ -23,7 +23,7 @@ const SCALES: (f64, f64) = (1e-6, 1e6);
 const FAR: f64 = 1e6;
 
 group! {
-    /// Shows its choices one after the other.
+    /// A selector, which shows its choices one after the other.
     pub struct SelectorKeys in "selector" {
         /// Time in which all choices are shown.
         period: Option<f64> = None, PERIOD.by_default("required");

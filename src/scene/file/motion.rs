@@ -13,8 +13,8 @@ use crate::settings::{Facts, Form, group, words};
 
 /// Shortest and longest period, s: a microsecond, which no frame resolves, to a day.
 pub(super) const PERIODS: (f64, f64) = (1e-6, 86_400.0);
-/// Factors by which tissue is squeezed or stretched: half and twice is more than tissue bears, and as far as its
-/// scatterers are found (`docs/kernels.md`, Deformed tissue).
+/// Factors by which tissue may be squeezed or stretched: half and twice is more than real tissue bears, and the limit
+/// to which its scatterers are found (`docs/kernels.md`, Deformed tissue).
 pub(super) const SQUEEZE: (f64, f64) = (0.4, 2.5);
 /// Updates per second: from one a day to more than any frame rate.
 pub(super) const UPDATES: Facts = Facts::quantity(&RATE, 1e-5, 1e6);
@@ -24,7 +24,7 @@ pub(super) const PERIOD: Facts = Facts::quantity(&DURATION, PERIODS.0, PERIODS.1
 const LONGEST: f64 = 3600.0;
 
 words! {
-    /// What a motion is.
+    /// Kind of a motion.
     pub enum Kind {
         /// To and fro.
         Sine = "sine",
@@ -38,7 +38,7 @@ words! {
 }
 
 words! {
-    /// What is between the rows of a trajectory.
+    /// Interpolation between the rows of a trajectory.
     pub enum Between {
         /// Straight, and rotations along the great circle.
         Linear = "linear",
@@ -48,7 +48,7 @@ words! {
 }
 
 group! {
-    /// Where in its period something is.
+    /// Phase of a period, and its end.
     pub struct Cycle in "" {
         /// Place in the period at time 0.
         phase: f64 = 0.0, Facts::number(0.0, 1.0);
@@ -58,7 +58,7 @@ group! {
 }
 
 group! {
-    /// How often something follows the time.
+    /// Rate of updates.
     pub struct Updates in "" {
         /// Updates per second; nothing changes between them.
         rate: Option<f64> = None, UPDATES.by_default("always");
@@ -66,7 +66,7 @@ group! {
 }
 
 group! {
-    /// How a transform moves.
+    /// Motion of a transform.
     pub struct MotionKeys in "transform.motion" {
         /// What it is.
         kind: Kind = Kind::Sine, Facts::word::<Kind>().required();
@@ -97,7 +97,7 @@ group! {
     }
 }
 
-/// The keys of some kinds of motion only, below `motion.`; `kind` and `rate` belong to all.
+/// Keys of some kinds of motion only, with these kinds; `kind` and `rate` belong to all.
 const OWN: [(&str, &[Kind]); 12] = {
     use Kind::{Fetal, File, Orbit, Sine};
     [
@@ -116,14 +116,14 @@ const OWN: [(&str, &[Kind]); 12] = {
     ]
 };
 
-/// The clock of a motion, a selector or an animation, by the table `below`.
+/// The clock of a motion, a selector or an animation, as the table `below` states it.
 pub(super) fn clock(stated: &Stated, below: &str, period: f64) -> Clock {
     let Cycle { phase, mode } = stated.get(below);
     let Updates { rate } = stated.get(below);
     Clock { period, phase, mode, rate }
 }
 
-/// The time that a file lasts, as a period; a single state shows in any. Fails at `path` where it cannot be one.
+/// The duration of a file, s, as a period; of a single, constant state any will do. Fails at `path` if it is no period.
 pub(super) fn lasting(
     document: &Document<'_>,
     path: &str,
@@ -134,7 +134,7 @@ pub(super) fn lasting(
     Ok(period)
 }
 
-/// What the table `motion` of the transform at `path` describes.
+/// The motion that the table `motion` of the transform at `path` describes.
 pub(super) fn motion(
     document: &Document<'_>,
     stated: &Stated,
@@ -239,7 +239,7 @@ impl Parts<'_> {
         })
     }
 
-    /// Something has to be moved by.
+    /// Fails if a table states nothing that moves the node.
     fn moves(&self) -> Result<(), SceneError> {
         let moves = ["translate", "rotate", "scale"].iter().any(|key| self.has(key));
         let needed = match self.keys.kind {

@@ -9,7 +9,7 @@ use super::table::{Keys, Table};
 use crate::settings::{Form, group, suggest};
 
 group! {
-    /// What every node has.
+    /// Keys of every node.
     pub struct NodeKeys in "group" {
         /// Name in messages, and for `--set`.
         name: String = String::new(), Facts::of(Form::Text).required().limits("unique");

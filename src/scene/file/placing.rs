@@ -16,7 +16,7 @@ pub(super) const TURN: Facts = Facts::quantity(&ANGLE, -1e3, 1e3).key("rotate.an
 pub(super) const PLACE: Facts = Facts::quantities(&LENGTH, 3, -1e5, 1e5);
 
 group! {
-    /// The size of what keeps its proportions.
+    /// Size of something that keeps its proportions.
     pub struct Size in "" {
         /// Size factor. Applied first, about the origin.
         scale: f64 = 1.0, Facts::number(SCALES[0], SCALES[1]);
@@ -24,7 +24,7 @@ group! {
 }
 
 group! {
-    /// The size of what may be stretched.
+    /// Size of something that may be stretched.
     pub struct Stretch in "" {
         /// Factor, or factors along x, y, z. Applied first, about the origin.
         scale: [f64; 3] = [1.0; 3], Facts::factors(SCALES[0], SCALES[1]);

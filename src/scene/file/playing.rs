@@ -16,7 +16,7 @@ use crate::scene::{Issue, Strategy};
 use crate::settings::{Value, group};
 
 group! {
-    /// How shapes that change are followed.
+    /// Strategy and interpolation for shapes that change.
     pub struct Following in "" {
         /// How the device follows.
         strategy: Strategy = Strategy::Exchange, Facts::word::<Strategy>();

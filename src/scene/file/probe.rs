@@ -15,7 +15,7 @@ const PARALLEL: f64 = 1e-3;
 const INF: f64 = f64::INFINITY;
 
 group! {
-    /// The probe that other keys change.
+    /// The preset of a probe, which other keys change.
     pub struct PresetKey in "probe" {
         /// One of the presets in the table below.
         preset: String = "paper-table1".to_owned(), Facts::of(Form::Text);
@@ -23,7 +23,7 @@ group! {
 }
 
 group! {
-    /// Where the probe is, and where it looks.
+    /// Pose of the probe.
     pub struct Pose in "probe.pose" {
         /// Centre of the face in the world.
         position: [f64; 3] = [0.0; 3], Facts::quantities(&LENGTH, 3, -INF, INF).limits("finite");
@@ -47,8 +47,8 @@ pub(super) fn build(document: &Document<'_>, stated: &Stated) -> Result<Probe, S
     Ok(out)
 }
 
-/// Gives `out`, which is as the preset has it, the arrangement that is stated. Keys of another arrangement are refused,
-/// and so is one that lacks a key which the preset has not either.
+/// Sets the arrangement that is stated in `out`, which holds the preset. Keys of another arrangement are refused,
+/// and so is an arrangement of which neither the file nor the preset states a needed key.
 fn arrange(document: &Document<'_>, stated: &Stated, out: &mut Probe) -> Result<(), SceneError> {
     const KEYS: [&str; 3] = ["radius", "field_of_view", "width"];
     let preset = out.clone();
@@ -102,7 +102,7 @@ pub(super) fn pose(
 }
 
 /// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it, of which both have a
-/// length; or which of them is at fault, why, and what to do.
+/// length; or the key that is at fault, the cause and the remedy.
 pub(super) fn look(
     position: DVec3,
     direction: DVec3,

@@ -1,4 +1,4 @@
-//! The tables of a scene file, and which groups of keys stand in each.
+//! The tables of a scene file, with the groups of keys in each.
 
 use std::collections::BTreeMap;
 use std::iter::empty;
@@ -26,7 +26,7 @@ use crate::settings::{
 };
 
 group! {
-    /// What stands in no table.
+    /// Keys at the top of the file.
     pub struct Title in "" {
         /// Title.
         name: Option<String> = None, Facts::of(Form::Text).by_default("the file's name");
@@ -35,7 +35,7 @@ group! {
     }
 }
 
-/// The whole file. What is absent keeps its default.
+/// The whole file. Absent keys have their defaults.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct File {

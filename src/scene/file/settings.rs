@@ -1,4 +1,4 @@
-//! The tables that say how a scene is imaged.
+//! The tables `probe`, `simulation` and `imaging`.
 
 use std::path::Path;
 

@@ -15,7 +15,7 @@ use crate::settings::{Facts, Form, group};
 const MAX_KEYFRAMES: usize = 1000;
 /// A length of a shape.
 const LONG: Facts = Facts::quantity(&LENGTH, 1e-3, 1e4).required();
-/// How often the faces of a round shape are divided.
+/// Number of divisions of the faces of a round shape.
 const FINE: Facts = Facts::whole(0, shapes::MAX_SUBDIVISIONS);
 
 /// Several lengths of a shape.
@@ -106,7 +106,7 @@ pub(super) struct Shapes {
 }
 
 impl Shelf {
-    /// Reads or builds what the table of the mesh `name`, at `path` in the file, names.
+    /// Reads or builds the shapes that the table of the mesh `name`, at `path` in the file, names.
     pub fn shapes(
         &mut self,
         document: &Document<'_>,
@@ -213,7 +213,7 @@ fn load(files: &Files, options: &Options) -> Result<(Vec<Mesh>, Vec<Issue>), Vec
     }
 }
 
-/// How the files of a mesh are read.
+/// Options for reading the files of a mesh.
 pub(super) fn options(keys: &MeshKeys) -> Options {
     Options {
         units: keys.units.and_then(Units::named),

@@ -12,7 +12,7 @@ use super::error::SceneError;
 use super::save::Entry;
 use crate::settings::{Facts, Form, Group, Row, Value};
 
-/// What stands in a table of a scene file.
+/// Contents of a table of scene files.
 pub trait Keys: 'static {
     /// The table, as the reference writes it: `tissues.NAME`.
     const TABLE: &'static str;
@@ -25,7 +25,7 @@ pub trait Keys: 'static {
 pub struct Key {
     /// Its place in the table, with those of the tables in between: `inside.roughness`.
     pub path: String,
-    /// What is to be known of it.
+    /// All facts about it.
     pub facts: &'static Facts,
     /// Its default, as the reference writes it.
     pub default: String,
@@ -66,12 +66,12 @@ pub(super) fn defaults<T: Group + Default>(below: &'static str) -> impl Iterator
 
 /// A table with the keys of `K`.
 pub struct Table<K> {
-    /// What it states.
+    /// The values that it states.
     pub stated: Stated,
     of: PhantomData<K>,
 }
 
-/// Values of the keys of which a table speaks.
+/// Values of the keys that a table states.
 #[derive(Debug, Default)]
 pub struct Stated {
     /// By the key's place in the table.
@@ -106,17 +106,17 @@ impl<K: Keys> Table<K> {
 }
 
 impl Stated {
-    /// The value of a key; none where the table does not say it.
+    /// The value of a key; none if the table does not state it.
     pub fn value(&self, key: &str) -> Option<&Value> {
         self.values.get(key)
     }
 
-    /// Whether the table has the key, or a table of this name.
+    /// Returns whether the table has the key, or a table of this name.
     pub fn has(&self, key: &str) -> bool {
         self.values.contains_key(key) || self.tables.contains(key)
     }
 
-    /// The number at a key; none where the table does not say it.
+    /// The number at a key; none if the table does not state it.
     pub fn number(&self, key: &str) -> Option<f64> {
         match self.value(key) {
             Some(Value::Number(number)) => Some(*number),
@@ -124,7 +124,7 @@ impl Stated {
         }
     }
 
-    /// The text at a key; none where the table does not say it.
+    /// The text at a key; none if the table does not state it.
     pub fn text(&self, key: &str) -> Option<&str> {
         match self.value(key) {
             Some(Value::Text(text)) => Some(text),
@@ -132,7 +132,7 @@ impl Stated {
         }
     }
 
-    /// Puts what the table `below` states into `out`.
+    /// Writes the settings that the table `below` states into `out`.
     pub fn put<T: Group>(&self, below: &str, out: &mut T) {
         for row in T::rows() {
             if let Some(value) = self.values.get(&format!("{below}{}", row.facts.key)) {
@@ -141,7 +141,7 @@ impl Stated {
         }
     }
 
-    /// What the table `below` states, and defaults.
+    /// The settings that the table `below` states, and defaults of the others.
     pub fn get<T: Group + Default>(&self, below: &str) -> T {
         let mut out = T::default();
         self.put(below, &mut out);
@@ -159,7 +159,7 @@ impl<'de, K: Keys> Deserialize<'de> for Table<K> {
     }
 }
 
-/// Reads a table, or the one in it of which the keys begin with `below`.
+/// Reader of a table, or of the table in it whose keys begin with `below`.
 struct Reader<'r> {
     keys: &'r [Key],
     below: String,
@@ -223,7 +223,7 @@ impl<'de> DeserializeSeed<'de> for Reader<'_> {
     }
 }
 
-/// Takes one of these names.
+/// Reader of a key, which must be one of these names.
 struct Name<'n>(&'n [&'n str]);
 
 impl<'n> Visitor<'_> for Name<'n> {

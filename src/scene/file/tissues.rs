@@ -13,7 +13,7 @@ use crate::settings::{Form, Group, group, suggest};
 type Tables = BTreeMap<String, Table<Tissue>>;
 
 group! {
-    /// What is said of a tissue beside its acoustics.
+    /// Keys of a tissue beside its acoustics.
     pub struct TissueKeys in "tissues.NAME" {
         /// Shipped tissue, or another one of this file.
         based_on: Option<String> = None, Facts::of(Form::Text).by_default("itself, if shipped");

@@ -1,6 +1,6 @@
 use super::super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, gaussian, path_random, unit};
 use super::*;
-use crate::statistics::standard_errors;
+use insonify::statistics::standard_errors;
 
 /// (speed mm/us, impedance MRayl).
 const FLUIDS: [Fluid; 6] = [
