@@ -14,7 +14,7 @@ use super::wire::Label;
 use super::{IMAGE_DEVICE, POSE_DEVICE};
 
 /// Types of messages from a client that have an effect.
-const TAKEN: [&str; 12] = [
+const ACCEPTED_TYPES: [&str; 12] = [
     "TRANSFORM",
     "TDATA",
     "GET_CAPABIL",
@@ -31,7 +31,7 @@ const TAKEN: [&str; 12] = [
 const OK: u8 = 0;
 const ERROR: u8 = 1;
 /// Kind of a tool with six degrees of freedom.
-const SIX: u8 = 2;
+const SIX_DEGREES_OF_FREEDOM: u8 = 2;
 /// Codes of STATUS: all is well, and there is no room.
 const STATUS_OK: u16 = 1;
 const STATUS_BUSY: u16 = 6;
@@ -145,7 +145,7 @@ fn rts(of: &str, status: u8) -> Content {
 }
 
 fn capability() -> Content {
-    let mut kinds: Vec<_> = TAKEN.iter().map(|k| Label::new(k)).collect();
+    let mut kinds: Vec<_> = ACCEPTED_TYPES.iter().map(|k| Label::new(k)).collect();
     kinds.push(Label::new("STP_TDATA"));
     Content::Capability(kinds)
 }
@@ -177,7 +177,11 @@ pub(super) fn no_room(most: usize) -> Vec<u8> {
 
 /// The probe's pose as a TDATA message.
 pub(super) fn tracking_message(frame: &Published) -> Vec<u8> {
-    let tool =
-        Tool { name: Label::new(POSE_DEVICE), kind: SIX, reserved: 0, matrix: frame.matrix() };
+    let tool = Tool {
+        name: Label::new(POSE_DEVICE),
+        kind: SIX_DEGREES_OF_FREEDOM,
+        reserved: 0,
+        matrix: frame.matrix(),
+    };
     Message::new(POSE_DEVICE, Content::Tracking(vec![tool])).encode()
 }

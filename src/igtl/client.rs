@@ -12,9 +12,9 @@ use super::picture::Published;
 use super::server::Shared;
 
 /// Most answers that may wait. Nobody asks for so many before reading one.
-const ANSWERS: usize = 64;
+const MOST_ANSWERS: usize = 64;
 /// Time after which a thread that waits for the network checks its own time limit.
-pub(super) const LOOK: Duration = Duration::from_millis(250);
+pub(super) const CHECK_INTERVAL: Duration = Duration::from_millis(250);
 
 /// An answer to a query. Images and poses are looked up when they are sent, so that many queries
 /// hold no more memory than one.
@@ -101,7 +101,7 @@ impl Client {
     /// Queues an answer; returns false when too many wait.
     pub fn answer(&self, answer: Answer) -> bool {
         let mut outbox = lock(&self.outbox);
-        if outbox.answers.len() >= ANSWERS {
+        if outbox.answers.len() >= MOST_ANSWERS {
             return false;
         }
         outbox.answers.push_back(answer);

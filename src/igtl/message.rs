@@ -7,7 +7,7 @@ use super::wire::{DecodeError, Label, Reader, Timestamp, checksum, put_floats};
 /// Bytes of a header.
 pub const HEADER: usize = 58;
 /// Bytes of a tool in a TDATA message.
-const TOOL: usize = 70;
+const TOOL_BYTES: usize = 70;
 
 /// The header of every message.
 #[derive(Clone, Debug, PartialEq)]
@@ -171,10 +171,10 @@ impl Content {
                 Self::Transform(matrix)
             }
             "TDATA" => {
-                if !content.len().is_multiple_of(TOOL) {
+                if !content.len().is_multiple_of(TOOL_BYTES) {
                     return Err(odd("a TDATA"));
                 }
-                let tools = content.chunks_exact(TOOL).map(|tool| {
+                let tools = content.chunks_exact(TOOL_BYTES).map(|tool| {
                     let mut from = Reader::new(tool, "a TDATA");
                     Ok(Tool {
                         name: Label(from.array()?),

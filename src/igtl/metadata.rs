@@ -3,9 +3,9 @@
 use super::wire::{DecodeError, Reader};
 
 /// Least size of an extended header, bytes.
-const EXTENDED: usize = 12;
+const EXTENDED_HEADER_BYTES: usize = 12;
 /// Bytes of an entry in the index of the metadata.
-const INDEX: usize = 8;
+const INDEX_ENTRY_BYTES: usize = 8;
 
 /// Extended header and metadata.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -41,8 +41,8 @@ impl Extension {
             text.extend_from_slice(&entry.key);
             text.extend_from_slice(&entry.value);
         }
-        let mut front = Vec::with_capacity(EXTENDED);
-        front.extend((EXTENDED as u16).to_be_bytes());
+        let mut front = Vec::with_capacity(EXTENDED_HEADER_BYTES);
+        front.extend((EXTENDED_HEADER_BYTES as u16).to_be_bytes());
         front.extend(short(index.len()).to_be_bytes());
         front.extend(long(text.len()).to_be_bytes());
         front.extend(self.id.to_be_bytes());
@@ -57,7 +57,7 @@ impl Extension {
         let (text_size, id) = (from.u32()? as usize, from.u32()?);
         // Bytes that a later version may add to the extended header.
         from.take(
-            size.checked_sub(EXTENDED)
+            size.checked_sub(EXTENDED_HEADER_BYTES)
                 .ok_or(DecodeError::Length { what: "an extended header", bytes: size })?,
         )?;
         let rest = from.rest();
@@ -79,7 +79,7 @@ impl Extension {
 fn entries(index: &[u8], text: &[u8]) -> Result<Vec<Entry>, DecodeError> {
     let mut index_from = Reader::new(index, "an index of metadata");
     let count = usize::from(index_from.u16()?);
-    let mut rows = Reader::new(index_from.take(count * INDEX)?, "an index of metadata");
+    let mut rows = Reader::new(index_from.take(count * INDEX_ENTRY_BYTES)?, "an index of metadata");
     index_from.end()?;
     let mut from = Reader::new(text, "metadata");
     let mut out = Vec::with_capacity(count);

@@ -10,18 +10,18 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::client::{Client, LOOK};
+use super::client::{CHECK_INTERVAL, Client};
 use super::picture::{Picture, Published};
 use super::tracking::{Tracked, Tracking};
 use super::{answer, lock, receive};
 use crate::scene::tracker::Tracker;
 
 /// Time between two looks of the listener for clients.
-const LISTEN: Duration = Duration::from_millis(10);
+const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
 /// Most refused clients whose last bytes are read before they are dropped, and for how long: a
 /// connection that is closed over unread bytes is reset, and the refusal would never arrive.
-const LINGERING: usize = 16;
-const LINGER: Duration = Duration::from_millis(300);
+const MOST_LINGERING: usize = 16;
+const LINGER_TIME: Duration = Duration::from_millis(300);
 
 /// The reason why the server cannot run.
 #[derive(Debug, thiserror::Error)]
@@ -283,7 +283,7 @@ impl Doorman {
                         self.shared.error(format!("accepting a client: {error}"));
                     }
                     self.see_out();
-                    thread::sleep(LISTEN);
+                    thread::sleep(ACCEPT_INTERVAL);
                 }
             }
         }
@@ -306,7 +306,7 @@ impl Doorman {
                 Ok(count) => count > 0,
                 Err(error) => error.kind() == ErrorKind::WouldBlock,
             };
-            open && since.elapsed() < LINGER
+            open && since.elapsed() < LINGER_TIME
         });
         let seated = self.threads.len();
         let mut before = seated;
@@ -326,8 +326,8 @@ impl Doorman {
         }
         stream.set_nonblocking(false)?;
         stream.set_nodelay(true)?;
-        stream.set_read_timeout(Some(LOOK))?;
-        stream.set_write_timeout(Some(LOOK))?;
+        stream.set_read_timeout(Some(CHECK_INTERVAL))?;
+        stream.set_write_timeout(Some(CHECK_INTERVAL))?;
         // Both under one lock: a frame that is published now reaches it one way or the other.
         let client = {
             let mut clients = lock(&self.shared.clients);
@@ -364,7 +364,7 @@ impl Doorman {
         stream.set_nonblocking(true)?;
         stream.write_all(&answer::no_room(most))?;
         stream.shutdown(Shutdown::Write)?;
-        self.refused.truncate(LINGERING - 1);
+        self.refused.truncate(MOST_LINGERING - 1);
         self.refused.push_front((stream, Instant::now()));
         Ok(())
     }

@@ -14,7 +14,7 @@ use super::RegisterError;
 pub type Triangle = [DVec3; 3];
 
 /// Share of the largest coordinate by which boxes are widened, so that single precision cuts nothing off.
-const MARGIN: f32 = 1e-6;
+const BOX_MARGIN: f32 = 1e-6;
 
 /// A surface with a search for the nearest point.
 pub struct Surface {
@@ -60,7 +60,7 @@ impl Surface {
         let (sum, centre) = weighted.fold((0.0, DVec3::ZERO), |(sum, centre), (area, middle)| {
             (sum + area, centre + area * middle)
         });
-        let margin = Vec3A::splat(MARGIN * low.abs().max(high.abs()).max_element() as f32);
+        let margin = Vec3A::splat(BOX_MARGIN * low.abs().max(high.abs()).max_element() as f32);
         let around = |t: &Triangle| {
             let tight = Aabb::from_points(&t.map(|p| p.as_vec3a()));
             Aabb::new(tight.min - margin, tight.max + margin)

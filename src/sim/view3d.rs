@@ -13,9 +13,9 @@ use crate::gpu::{
 };
 
 /// Distance by which the probe's housing is wider than the face on each side, mm.
-const RIM: f64 = 3.0;
+const HOUSING_RIM: f64 = 3.0;
 /// Half the width of a probe whose face is a point, mm.
-const POINT: f64 = 10.0;
+const POINT_FACE_HALF_WIDTH: f64 = 10.0;
 /// Height of the probe's head above the middle of its face, mm.
 pub const HEAD: f64 = 32.0;
 /// Height of head and handle, mm.
@@ -75,10 +75,15 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
             f64::from(frame.radius) * half.min(std::f64::consts::FRAC_PI_2).sin()
         }
         layout::KIND_LINEAR => f64::from(frame.width) / 2.0,
-        _ => POINT - RIM,
+        _ => POINT_FACE_HALF_WIDTH - HOUSING_RIM,
     };
     let half_thickness = f64::from(frame.face_height) / 2.0;
-    [(half_width + RIM) as f32, (half_thickness + RIM) as f32, HEAD as f32, HANDLE as f32]
+    [
+        (half_width + HOUSING_RIM) as f32,
+        (half_thickness + HOUSING_RIM) as f32,
+        HEAD as f32,
+        HANDLE as f32,
+    ]
 }
 
 /// Kernel and buffers of the picture. Buffers grow to the largest picture so far.

@@ -26,7 +26,7 @@ pub(super) struct App {
     plan: Plan,
     open: Option<Open>,
     statistics: Times,
-    /// When device and simulation were made anew last.
+    /// Time at which device and simulation were last made anew.
     lost: Option<Instant>,
     log: Option<ValidationLog>,
     failure: Option<ViewError>,

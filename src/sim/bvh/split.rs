@@ -22,11 +22,11 @@ use bins::{BINS, Bins, Division, NOTHING, cheapest};
 /// (alpha of the paper).
 const LEAST_OVERLAP: f32 = 1e-5;
 /// Most parts beyond one per triangle, relative to the number of triangles (choice).
-const MOST_MORE: f64 = 0.5;
+const MOST_DUPLICATES: f64 = 0.5;
 /// Depth below which nodes are halved by number, so that no geometry makes a deep tree.
-const DEEPEST: usize = 40;
+const MOST_LEVELS: usize = 40;
 /// Nodes with more parts than this are built by several threads.
-const WORTH_A_THREAD: usize = 4096;
+const PARALLEL_PARTS: usize = 4096;
 
 /// A triangle, or the part of it that lies in a box.
 #[derive(Clone, Copy, Debug)]
@@ -61,7 +61,7 @@ pub(super) fn tree(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Bvh2 {
     let parts: Vec<Part> = triangles.iter().enumerate().map(whole).collect();
     let builder =
         Builder { positions, triangles, least_overlap: LEAST_OVERLAP * around(&parts).half_area() };
-    let spare = (MOST_MORE * parts.len() as f64) as usize;
+    let spare = (MOST_DUPLICATES * parts.len() as f64) as usize;
     flat(builder.build(parts, spare, 0))
 }
 
@@ -120,7 +120,7 @@ impl Builder<'_> {
         let share = |parts: &Vec<Part>| (spare as u64 * parts.len() as u64 / all as u64) as usize;
         let shares = [share(&left), share(&right)];
         let build = |parts, spare| self.build(parts, spare, depth + 1);
-        let children = match count > WORTH_A_THREAD {
+        let children = match count > PARALLEL_PARTS {
             true => {
                 let (left, right) =
                     rayon::join(|| build(left, shares[0]), || build(right, shares[1]));
@@ -140,7 +140,7 @@ impl Builder<'_> {
         depth: usize,
     ) -> [Vec<Part>; 2] {
         let count = parts.len();
-        if depth < DEEPEST {
+        if depth < MOST_LEVELS {
             let centres = centres(&parts);
             let whole = by_objects(&parts, &centres);
             let overlap = whole.map_or(*bounds, |whole| {

@@ -15,9 +15,9 @@ use crate::sim::bvh;
 /// an edge meets both its triangles.
 const SAME_CROSSING: f64 = 1e-6;
 /// Layers of a body that are no farther apart than this, mm, touch: meshes are rounded to hundredths.
-const JOINED: f64 = 0.1;
+const TOUCHING: f64 = 0.1;
 /// Boxes are widened by this much of the mesh's extent, so that single precision misses no triangle.
-const MARGIN: f32 = 1e-5;
+const BOX_MARGIN: f32 = 1e-5;
 
 /// Hierarchies over the triangles of meshes, built when a mesh is first used as skin.
 #[derive(Default)]
@@ -82,7 +82,7 @@ struct Tree {
 impl Tree {
     fn new(mesh: &Mesh) -> Self {
         let [low, high] = mesh.bounds().map(Vec3A::from);
-        let margin = Vec3A::splat(MARGIN * (low.abs().max(high.abs())).max_element());
+        let margin = Vec3A::splat(BOX_MARGIN * (low.abs().max(high.abs())).max_element());
         let around = |t: &[u32; 3]| {
             let tight = Aabb::from_points(&t.map(|i| Vec3A::from(mesh.positions[i as usize])));
             Aabb::new(tight.min - margin, tight.max + margin)
@@ -154,7 +154,7 @@ impl Skin {
                 (begin, normal) = (crossing.t, crossing.normal);
             } else if before == 1 && depth == 0 {
                 let end = crossing.t;
-                match stretches.last_mut().filter(|s| begin - s.end < JOINED) {
+                match stretches.last_mut().filter(|s| begin - s.end < TOUCHING) {
                     Some(last) => last.end = end,
                     None => stretches.push(Stretch { begin, end, normal }),
                 }

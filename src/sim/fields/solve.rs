@@ -16,7 +16,7 @@ const STIFFNESS: f64 = 0.01;
 /// remainder that is not affine, a few mm, and the carrier's phase asks for 1e-3 mm.
 const RESIDUAL: f64 = 1e-4;
 /// Steps after which the iteration ends in any case; it needs about a hundred.
-const STEPS: usize = 400;
+const MOST_STEPS: usize = 400;
 
 /// A surface that moves with the tissue.
 pub(super) struct Patch<'a> {
@@ -43,7 +43,7 @@ pub(super) struct Solver<'a> {
     grid: &'a Grid,
     patches: &'a [Patch<'a>],
     samples: Vec<Sample>,
-    /// Per node, weights of the 27 nodes around it, those outside the grid 0.
+    /// Weights of the 27 nodes around each node; 0 for those outside the grid.
     stencil: Vec<[f64; 27]>,
     centre: DVec3,
     /// Inverse of the samples' second moments about `centre`.
@@ -161,7 +161,7 @@ impl<'a> Solver<'a> {
         let mut norm = inner(&residual, &direction);
         let enough = norm * RESIDUAL * RESIDUAL;
         let mut image = vec![DVec3::ZERO; u.len()];
-        for _ in 0..STEPS {
+        for _ in 0..MOST_STEPS {
             if norm.cmple(enough).all() {
                 break;
             }
