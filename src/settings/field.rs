@@ -134,7 +134,7 @@ impl<'de> DeserializeSeed<'de> for OneOf {
     }
 }
 
-/// Reads `count` numbers, or quantities of one measure.
+/// Takes so many numbers, or quantities of one measure.
 struct Several {
     count: usize,
     measure: Option<&'static Measure>,

@@ -22,7 +22,7 @@ pub struct Measure {
 
 /// A kind of quantity as a type.
 pub trait Dimension {
-    /// The measure of the dimension.
+    /// What is measured.
     const MEASURE: &'static Measure;
 }
 
@@ -36,7 +36,7 @@ impl<D> Quantity<D> {
         Self(value, PhantomData)
     }
 
-    /// The value 0.
+    /// Nothing, or 0 dB.
     pub fn zero() -> Self {
         Self::new(0.0)
     }

@@ -1,4 +1,4 @@
-//! The keys of a scene file. Absent keys have their defaults.
+//! The keys of a scene file. What is absent keeps its default.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -94,7 +94,7 @@ pub struct VolumeTable {
     pub scale: Option<f64>,
 }
 
-/// Placement of the whole model.
+/// Where the whole model is.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelTable {
@@ -103,7 +103,7 @@ pub struct ModelTable {
     pub scale: Option<f64>,
 }
 
-/// Three equal factors, for scaling that keeps proportions.
+/// Factors of what keeps its proportions.
 pub fn even(scale: Option<f64>) -> Option<Factors> {
     scale.map(|factor| Factors([factor; 3]))
 }
@@ -303,7 +303,7 @@ impl<'de> Deserialize<'de> for Files {
     }
 }
 
-/// The choice of an animation of a file.
+/// Which animation of a file.
 #[derive(Debug, PartialEq)]
 pub enum AnimationName {
     First,
