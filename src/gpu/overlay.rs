@@ -122,7 +122,7 @@ fn patch(
         textures.insert(id, Arc::unwrap_or_clone(part));
         return;
     };
-    let whole = textures.get_mut(&id).expect("egui sets it whole first");
+    let whole = textures.get_mut(&id).expect("egui sends the whole texture before its parts");
     let ([width, height], stride) = (part.size, whole.size[0]);
     for row in 0..height {
         let to = (top + row) * stride + left;

@@ -30,8 +30,8 @@ pub struct Entry {
 impl Extension {
     /// Bytes before the content, and bytes after it.
     pub(super) fn encode(&self) -> [Vec<u8>; 2] {
-        let short = |n: usize| u16::try_from(n).expect("within the protocol");
-        let long = |n: usize| u32::try_from(n).expect("within the protocol");
+        let short = |n: usize| u16::try_from(n).expect("no longer than the protocol allows");
+        let long = |n: usize| u32::try_from(n).expect("no longer than the protocol allows");
         let mut index = short(self.metadata.len()).to_be_bytes().to_vec();
         let mut text = Vec::new();
         for entry in &self.metadata {

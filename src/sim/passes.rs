@@ -85,7 +85,7 @@ impl Passes {
         given: &[(&str, &Buffer)],
     ) -> Result<(), GpuError> {
         cmd.scope(pass.name);
-        let extent = pass.extent.expect("what runs as it says has an extent");
+        let extent = pass.extent.expect("a pass recorded this way states its extent");
         self.record(cmd, pass, extent(&self.frame), &[], given)
     }
 
