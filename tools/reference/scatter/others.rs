@@ -41,7 +41,7 @@ impl Tube<'_> {
         }
     }
 
-    /// Point targets within the beam and between the ends.
+    /// Echoes of the point targets within the beam and between the ends.
     pub(super) fn points(&self, out: &mut Accumulator) {
         let frame = self.world.frame;
         let pitch = f64::from(frame.slice_thickness) / f64::from(frame.layers);
