@@ -134,7 +134,7 @@ impl<'de> DeserializeSeed<'de> for OneOf {
     }
 }
 
-/// Takes so many numbers, or quantities of one measure.
+/// Reads `count` numbers, or quantities of one measure.
 struct Several {
     count: usize,
     measure: Option<&'static Measure>,

@@ -82,7 +82,7 @@ pub struct Facts {
     pub counted: &'static str,
     /// The default in words, if it is not a single value.
     pub default: Option<&'static str>,
-    /// The range in words, where two numbers do not say it.
+    /// The range in words, if two numbers do not describe it.
     pub limits: Option<&'static str>,
     /// What it is, in Markdown.
     meaning: &'static str,

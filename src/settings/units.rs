@@ -22,7 +22,7 @@ pub struct Measure {
 
 /// A kind of quantity as a type.
 pub trait Dimension {
-    /// What is measured.
+    /// The measure of the dimension.
     const MEASURE: &'static Measure;
 }
 
@@ -36,7 +36,7 @@ impl<D> Quantity<D> {
         Self(value, PhantomData)
     }
 
-    /// Nothing, or 0 dB.
+    /// The value 0.
     pub fn zero() -> Self {
         Self::new(0.0)
     }

@@ -18,7 +18,7 @@ use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Surface, Wire};
 /// Smallest spacing of a wire's points, mm: no scanner resolves less, and no frame has time for more points.
 const MIN_SPACING: f64 = 1e-3;
 
-/// What a mesh table of the file has become.
+/// The instances made from a mesh table of the file.
 pub(super) struct Placed {
     /// Parent from object, at rest.
     pub rest: DAffine3,
@@ -39,12 +39,12 @@ pub(super) struct Anatomy {
 }
 
 impl Anatomy {
-    /// Where the file describes each instance.
+    /// For each instance the place of its description in the file.
     pub fn origins(&self, tables: &[Table<Surface, MeshTable>]) -> Vec<Origin> {
         let of = |(Table { other: table, .. }, placed): (&Table<Surface, MeshTable>, &Placed)| {
             let origin = Origin {
                 mesh: table.name.clone(),
-                // What switches an animation is the mesh's own.
+                // An animation is switched by the mesh itself.
                 selector: table.parent.clone().filter(|_| table.keyframes.is_some()),
             };
             std::iter::repeat_n(origin, placed.instances.len())

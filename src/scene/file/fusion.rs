@@ -27,7 +27,7 @@ impl VolumeTable {
         }
     }
 
-    /// Where the file of this number stands in the table.
+    /// The path of file number `number` in the table.
     fn key(&self, number: usize) -> String {
         match self.file {
             Files::One(_) => "volume.file".to_owned(),
@@ -63,8 +63,8 @@ pub(super) fn volume(
     let sequence = sequence(document, table, volume.later.len() + 1, volume.interval)?;
     let place = (table.translate, table.rotate.as_ref(), even(table.scale));
     let world_from_lps = placement(document, "volume", place)?;
-    // All that is stored of a byte; of other types only the range in use says what is white.
-    // Of all volumes: what is grey in one is as grey in the next.
+    // Bytes have their full range. Other types have the range that their values use.
+    // It is the range of all volumes, so that equal values have equal grey levels at all times.
     let range = match &volume.voxels {
         Voxels::U8(_) => (0.0, 255.0),
         _ => (volume.statistics.min, volume.statistics.max),
@@ -103,7 +103,7 @@ pub(super) fn volume(
     })
 }
 
-/// Checks what the table says of time.
+/// Checks the keys of the table that concern time.
 fn timing(document: &Document<'_>, table: &VolumeTable) -> Result<(), SceneError> {
     let period = table.period.map_or(1.0, |p| p.0);
     motion::clock(document, "volume", period, (table.phase, table.mode, table.rate))?;
@@ -117,8 +117,8 @@ fn timing(document: &Document<'_>, table: &VolumeTable) -> Result<(), SceneError
     }
 }
 
-/// When each of `count` volumes is shown, which follow each other every `interval` seconds by their file;
-/// none of one volume.
+/// The sequence that shows `count` volumes, which follow each other every `interval` seconds by their file;
+/// none for a single volume.
 fn sequence(
     document: &Document<'_>,
     table: &VolumeTable,
@@ -148,7 +148,7 @@ fn sequence(
             format!("leave out some: up to {MAX_VOLUMES} can be shown"),
         ));
     }
-    // To and fro, the last one stands at the end of the period.
+    // Played to and fro, the last volume is shown at the end of the period.
     let steps = match table.mode.unwrap_or_default() {
         Loop::PingPong => count - 1,
         Loop::Repeat | Loop::Once => count,

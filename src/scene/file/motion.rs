@@ -14,7 +14,8 @@ use crate::settings::units::{Duration, Rate};
 pub(super) const PERIODS: (f64, f64) = (1e-6, 86_400.0);
 /// Updates per second: from one a day to more than any frame rate.
 const RATES: (f64, f64) = (1e-5, 1e6);
-/// Factors by which tissue is squeezed or stretched: half and twice is more than tissue bears, and as far as its
+/// Factors by which tissue may be squeezed or stretched: half and twice is more than real tissue bears, and the limit
+/// to which its
 /// scatterers are found (`docs/kernels.md`, Deformed tissue).
 pub(super) const SQUEEZE: (f64, f64) = (0.4, 2.5);
 /// A burst of general movements and the pause after it where the file does not say, s: lively enough
@@ -54,7 +55,7 @@ fn updates(
     Ok(rate.map(|rate| rate.0))
 }
 
-/// What `table`, at `path`, describes.
+/// The motion that `table`, at `path`, describes.
 pub(super) fn motion(
     document: &Document<'_>,
     table: &MotionTable,
@@ -111,7 +112,7 @@ pub(super) fn motion(
             })?;
             let track = trajectory::parse(&full, &text, curve)?;
             let (start, end) = track.span().expect("a trajectory has rows");
-            // One row is a placement, which any period shows.
+            // A single row is a constant placement: any period will do.
             let period = if end > start { end - start } else { 1.0 };
             Motion::Track {
                 clock: clock(document, path, period, settings)?,
@@ -175,7 +176,7 @@ impl Parts<'_> {
         Ok(self.need("period", self.table.period)?.0)
     }
 
-    /// Something has to be moved by.
+    /// Fails if a table states nothing that moves the node.
     fn moves(&self) -> Result<(), SceneError> {
         let table = self.table;
         match table.translate.is_some() || table.rotate.is_some() || table.scale.is_some() {

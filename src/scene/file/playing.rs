@@ -84,7 +84,7 @@ pub(super) fn read(
     })?;
     warnings.extend(issues.into_iter().map(|w| w.of(&table.name)));
     let (start, end) = found.span;
-    // A single keyframe is a state, which any period shows.
+    // A single keyframe is a constant state: any period will do.
     let period = if end > start { end - start } else { 1.0 };
     let settings = (table.phase, table.mode, table.rate);
     let clock = motion::clock(document, path, period, settings)?;

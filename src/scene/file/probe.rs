@@ -33,8 +33,8 @@ pub(super) fn build(
     Ok((out, pose))
 }
 
-/// Gives `out`, which is as the preset has it, the arrangement that is stated. Keys of another arrangement are refused,
-/// and so is one that lacks a key which the preset has not either.
+/// Sets the arrangement that is stated in `out`, which holds the preset. Keys of another arrangement are refused,
+/// and so is an arrangement of which neither the file nor the preset states a needed key.
 fn arrange(
     document: &Document<'_>,
     stated: &Stated<Probe>,
@@ -91,8 +91,8 @@ pub(super) fn place(
     })
 }
 
-/// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it; or which
-/// of them is at fault, why, and what to do.
+/// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it; or the key
+/// that is at fault, the cause and the remedy.
 pub(super) fn look(
     position: DVec3,
     direction: DVec3,

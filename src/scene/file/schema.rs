@@ -1,4 +1,4 @@
-//! The keys of a scene file. What is absent keeps its default.
+//! The keys of a scene file. Absent keys have their defaults.
 
 use std::collections::BTreeMap;
 use std::fmt;
@@ -94,7 +94,7 @@ pub struct VolumeTable {
     pub scale: Option<f64>,
 }
 
-/// Where the whole model is.
+/// Placement of the whole model.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelTable {
@@ -103,7 +103,7 @@ pub struct ModelTable {
     pub scale: Option<f64>,
 }
 
-/// Factors of what keeps its proportions.
+/// Three equal factors, for scaling that keeps proportions.
 pub fn even(scale: Option<f64>) -> Option<Factors> {
     scale.map(|factor| Factors([factor; 3]))
 }
@@ -303,7 +303,7 @@ impl<'de> Deserialize<'de> for Files {
     }
 }
 
-/// Which animation of a file.
+/// The choice of an animation of a file.
 #[derive(Debug, PartialEq)]
 pub enum AnimationName {
     First,

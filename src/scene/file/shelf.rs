@@ -48,7 +48,7 @@ pub(super) struct Shapes {
 }
 
 impl Shelf {
-    /// Reads or builds what `table`, at `path` in the file, names.
+    /// Reads or builds the shapes that `table`, at `path` in the file, names.
     pub fn shapes(
         &mut self,
         document: &Document<'_>,
@@ -121,7 +121,7 @@ impl Shelf {
         })
     }
 
-    /// How the files of `table` are read.
+    /// Options for reading the files of `table`.
     pub fn options(table: &MeshTable) -> Options {
         Options {
             units: table.units.map(length_of),

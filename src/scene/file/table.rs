@@ -12,7 +12,7 @@ use super::error::SceneError;
 use super::save::Entry;
 use crate::settings::{Group, Row, Value};
 
-/// A table of a scene file: settings, and what else stands there.
+/// A table of a scene file: its settings and its other keys.
 #[derive(Debug)]
 pub struct Table<T: Group, X = Nothing> {
     /// The settings that it states.
@@ -25,9 +25,9 @@ pub struct Table<T: Group, X = Nothing> {
 #[derive(Debug, Default, Deserialize)]
 pub struct Nothing {}
 
-/// Values of the settings of which a table speaks.
+/// Values of the settings that a table states.
 pub struct Stated<T: Group> {
-    /// Of each row.
+    /// For each row the value; none if the table does not state it.
     values: Vec<Option<Value>>,
     of: PhantomData<T>,
 }
@@ -66,7 +66,7 @@ impl<T: Group> Stated<T> {
         }
     }
 
-    /// Puts what the table at `path` states into `out`.
+    /// Writes the settings that the table at `path` states into `out`.
     ///
     /// # Errors
     /// The first value out of its range.
@@ -104,11 +104,11 @@ impl<'de, T: Group, X: Deserialize<'de>> Deserialize<'de> for Table<T, X> {
     }
 }
 
-/// A table without its settings: those go where they are stated, when they are met.
+/// Reader of a table's other keys; the settings that it meets on the way are stored in `stated`.
 struct Others<'s, A, T: Group> {
     map: A,
     stated: &'s mut Stated<T>,
-    /// Keys of the rest.
+    /// The other keys.
     fields: &'static [&'static str],
 }
 
@@ -169,7 +169,7 @@ enum Name {
     Other(&'static str),
 }
 
-/// Takes the keys of the rows of `T` and of `fields`.
+/// Reads a key, which must be one of the rows of `T` or of `fields`.
 struct Known<T> {
     fields: &'static [&'static str],
     of: PhantomData<T>,
