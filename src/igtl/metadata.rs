@@ -9,16 +9,16 @@ const INDEX_ENTRY_BYTES: usize = 8;
 
 /// Extended header and metadata.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Extension {
+pub struct ExtendedHeader {
     /// The sender's number of the message.
     pub id: u32,
     /// In the sender's order.
-    pub metadata: Vec<Entry>,
+    pub metadata: Vec<MetadataEntry>,
 }
 
 /// A key and a value of the metadata.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct MetadataEntry {
     /// ASCII.
     pub key: Vec<u8>,
     /// Character set of the value, as IANA numbers them: 3 ASCII, 106 UTF-8.
@@ -27,7 +27,7 @@ pub struct Entry {
     pub value: Vec<u8>,
 }
 
-impl Extension {
+impl ExtendedHeader {
     /// Bytes before the content, and bytes after it.
     pub(super) fn encode(&self) -> [Vec<u8>; 2] {
         let short = |n: usize| u16::try_from(n).expect("no longer than the protocol allows");
@@ -76,7 +76,7 @@ impl Extension {
     }
 }
 
-fn entries(index: &[u8], text: &[u8]) -> Result<Vec<Entry>, DecodeError> {
+fn entries(index: &[u8], text: &[u8]) -> Result<Vec<MetadataEntry>, DecodeError> {
     let mut index_from = Reader::new(index, "an index of metadata");
     let count = usize::from(index_from.u16()?);
     let mut rows = Reader::new(index_from.take(count * INDEX_ENTRY_BYTES)?, "an index of metadata");
@@ -85,7 +85,7 @@ fn entries(index: &[u8], text: &[u8]) -> Result<Vec<Entry>, DecodeError> {
     let mut out = Vec::with_capacity(count);
     for _ in 0..count {
         let (key, encoding, value) = (rows.u16()?, rows.u16()?, rows.u32()?);
-        out.push(Entry {
+        out.push(MetadataEntry {
             key: from.take(key.into())?.to_vec(),
             encoding,
             value: from.take(value as usize)?.to_vec(),

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::answer;
 use super::client::{Client, has_left};
 use super::message::{HEADER, Header, Message};
-use super::server::{Settings, Shared};
+use super::server::{ServerSettings, Shared};
 
 /// Most bytes of a message of a type that is read here: a thousand tools.
 const LONGEST_MESSAGE: u64 = 70_000;
@@ -59,7 +59,7 @@ pub(super) fn receive_all(client: &Client, shared: &Shared) {
 
 /// Reads the next message; returns false where the connection has ended between two messages.
 fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
-    let mut source = Source::new(&client.stream, &shared.settings);
+    let mut source = MessageStream::new(&client.stream, &shared.settings);
     let mut header = [0; HEADER];
     if !source.first(&mut header[..1])? {
         return Ok(false);
@@ -95,15 +95,15 @@ fn too_long(header: &Header) -> Fault {
 }
 
 /// A stream whose reads return now and then, and one message's time.
-struct Source<'s> {
+struct MessageStream<'s> {
     stream: &'s TcpStream,
     limit: Duration,
     /// Time by which the message has to be here.
     end: Instant,
 }
 
-impl<'s> Source<'s> {
-    fn new(stream: &'s TcpStream, settings: &Settings) -> Self {
+impl<'s> MessageStream<'s> {
+    fn new(stream: &'s TcpStream, settings: &ServerSettings) -> Self {
         Self { stream, limit: settings.message_timeout, end: Instant::now() }
     }
 

@@ -2,7 +2,7 @@
 
 use crate::probe::Probe;
 use crate::scene::{Acquired, Scene};
-use crate::sim::fusion::Steps;
+use crate::sim::fusion::FusionSteps;
 use crate::sim::layout::Frame;
 
 /// Least share of samples above black within [`HALF_WINDOW`]; with less the place is fluid, shadow, or
@@ -24,7 +24,7 @@ pub(super) struct Bands {
 
 impl Bands {
     /// Places of the samples of `scene`, whose last frame was `frame` with the intermediate `steps`.
-    pub fn new(scene: &Scene, acquired: &Acquired, frame: &Frame, steps: &Steps) -> Self {
+    pub fn new(scene: &Scene, acquired: &Acquired, frame: &Frame, steps: &FusionSteps) -> Self {
         let probe = &scene.probe;
         let (lines, samples) = (probe.scanlines as usize, probe.samples as usize);
         let (width, height) = (frame.image_width as usize, frame.image_height as usize);

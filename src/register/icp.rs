@@ -9,7 +9,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::symmetric::{Square, eigen};
-use super::{RegisterError, Surface, Transformation, scale_of};
+use super::{RegisterError, Transformation, TriangleSurface, scale_of};
 use crate::statistics::Statistics;
 
 /// Fewest points.
@@ -69,7 +69,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    fn of(matched: &[Matched], cutoff: f64) -> Self {
+    fn of(matched: &[MatchedPoint], cutoff: f64) -> Self {
         let near: Vec<f64> = matched.iter().map(|m| m.off).filter(|d| *d < cutoff).collect();
         let statistics = Statistics::of(near.iter().copied());
         let squares: f64 = near.iter().map(|d| d * d).sum();
@@ -90,7 +90,7 @@ impl Residuals {
 }
 
 /// A point at its present place, and its nearest point of the surface.
-struct Matched {
+struct MatchedPoint {
     at: DVec3,
     /// Unit vector from the surface to the point.
     away: DVec3,
@@ -106,7 +106,7 @@ struct Matched {
 /// the surface is large; a similarity that more than doubles or halves the scale.
 pub fn fit(
     points: &[DVec3],
-    surface: &Surface,
+    surface: &TriangleSurface,
     start: DAffine3,
     transformation: Transformation,
 ) -> Result<Fit, RegisterError> {
@@ -128,7 +128,7 @@ pub fn fit(
     let (mut damping, mut rounds, mut settled) = (1e-3, 0, false);
     while rounds < MOST_STEPS && !settled {
         rounds += 1;
-        let system = System::of(&matched, cutoff, transformation);
+        let system = NormalEquations::of(&matched, cutoff, transformation);
         let cost = cost(&matched, cutoff);
         // Where no step helps, however short, this is the minimum.
         settled = true;
@@ -162,7 +162,7 @@ pub fn fit(
         residuals: Residuals::of(&matched, cutoff),
         rounds,
         settled,
-        loose: System::of(&matched, cutoff, transformation).loose(transformation),
+        loose: NormalEquations::of(&matched, cutoff, transformation).loose(transformation),
     })
 }
 
@@ -188,13 +188,13 @@ fn check(points: &[DVec3]) -> Result<(), RegisterError> {
     Ok(())
 }
 
-fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Matched> {
+fn matches(points: &[DVec3], surface: &TriangleSurface, transform: &DAffine3) -> Vec<MatchedPoint> {
     let matched = |p: &DVec3| {
         let at = transform.transform_point3(*p);
         let nearest = surface.nearest(at);
         let away = at - nearest.point;
         let off = away.length();
-        Matched {
+        MatchedPoint {
             at,
             // On the surface the difference is rounding.
             away: if off > LEAST_CUTOFF { away / off } else { nearest.normal },
@@ -205,14 +205,14 @@ fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Mat
 }
 
 /// Cutoff from the median distance, at most `before`.
-fn cutoff_of(matched: &[Matched], before: f64) -> f64 {
+fn cutoff_of(matched: &[MatchedPoint], before: f64) -> f64 {
     let median = Statistics::of(matched.iter().map(|m| m.off)).median;
     (BIWEIGHT_CUTOFF * DEVIATION_PER_MEDIAN * median).max(LEAST_CUTOFF).min(before)
 }
 
 /// Sum of Tukey's biweight over the distances, mm2.
-fn cost(matched: &[Matched], cutoff: f64) -> f64 {
-    let loss = |m: &Matched| {
+fn cost(matched: &[MatchedPoint], cutoff: f64) -> f64 {
+    let loss = |m: &MatchedPoint| {
         let rest = 1.0 - (m.off / cutoff).powi(2).min(1.0);
         1.0 - rest.powi(3)
     };
@@ -220,7 +220,7 @@ fn cost(matched: &[Matched], cutoff: f64) -> f64 {
 }
 
 /// Normal equations of the distances, linear in a small motion about the points' centre.
-struct System {
+struct NormalEquations {
     /// Eigenvalues of the matrix, and their directions.
     axes: [(f64, Motion); DEGREES_OF_FREEDOM],
     gradient: Motion,
@@ -230,8 +230,8 @@ struct System {
     reach: f64,
 }
 
-impl System {
-    fn of(matched: &[Matched], cutoff: f64, transformation: Transformation) -> Self {
+impl NormalEquations {
+    fn of(matched: &[MatchedPoint], cutoff: f64, transformation: Transformation) -> Self {
         let count = matched.len() as f64;
         let centre = matched.iter().map(|m| m.at).sum::<DVec3>() / count;
         let squares = matched.iter().map(|m| m.at.distance_squared(centre));

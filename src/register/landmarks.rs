@@ -45,8 +45,8 @@ pub fn closed_form(
             "give its position in mm",
         ));
     }
-    let from = Cloud::of(landmarks.iter().map(|l| l.from));
-    let to = Cloud::of(landmarks.iter().map(|l| l.to));
+    let from = CentredPoints::of(landmarks.iter().map(|l| l.from));
+    let to = CentredPoints::of(landmarks.iter().map(|l| l.to));
     let is_flat = from.spread("volume")? | to.spread("model")?;
     let covariance =
         landmarks.iter().map(|l| outer(l.from - from.mean, l.to - to.mean)).sum::<DMat3>();
@@ -111,14 +111,14 @@ fn horn(sum: &DMat3) -> [[f64; 4]; 4] {
 }
 
 /// Points of one frame about their mean.
-struct Cloud {
+struct CentredPoints {
     mean: DVec3,
     /// Sum of squared distances from it.
     squares: f64,
     covariance: DMat3,
 }
 
-impl Cloud {
+impl CentredPoints {
     fn of(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> Self {
         let count = points.len() as f64;
         let mean = points.clone().sum::<DVec3>() / count;

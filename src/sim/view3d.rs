@@ -23,7 +23,7 @@ pub const HANDLE: f64 = 105.0;
 
 /// A view: the camera, and what is visible.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sight {
+pub struct CameraView {
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
     /// The eye, world, mm.
@@ -42,7 +42,7 @@ pub struct Sight {
     pub looks: Vec<[f32; 4]>,
 }
 
-impl Sight {
+impl CameraView {
     /// The constants for the kernel, for the probe of `frame`.
     pub fn constants(&self, frame: &Frame) -> layout::View3d {
         let vector = |v: DVec3| {
@@ -99,7 +99,7 @@ impl Viewer3d {
         device: &Arc<Device>,
         library: &Library,
         tracer: Tracer,
-        sight: &Sight,
+        sight: &CameraView,
     ) -> Result<Self, GpuError> {
         let stem = format!("view3d_{}", tracer.suffix());
         let size = size_of::<layout::View3d>() as u64;
@@ -112,20 +112,20 @@ impl Viewer3d {
         })
     }
 
-    fn holds(&self, sight: &Sight) -> bool {
+    fn holds(&self, sight: &CameraView) -> bool {
         let [looks, picture] = bytes(sight);
         self.looks.size() >= looks && self.picture.size() >= picture
     }
 }
 
 /// Bytes of looks and picture.
-fn bytes(sight: &Sight) -> [u64; 2] {
+fn bytes(sight: &CameraView) -> [u64; 2] {
     let [width, height] = sight.size.map(u64::from);
     [16 * sight.looks.len() as u64, 4 * width * height].map(|size| size.max(16))
 }
 
 /// The buffers of looks and picture.
-fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError> {
+fn buffers(device: &Arc<Device>, sight: &CameraView) -> Result<[Buffer; 2], GpuError> {
     let [looks, picture] = bytes(sight);
     Ok([
         device.buffer("looks", looks, BufferKind::Storage)?,
@@ -145,7 +145,7 @@ impl Simulator {
     pub fn view3d(
         &mut self,
         library: &Library,
-        sight: &Sight,
+        sight: &CameraView,
         image: &Image,
     ) -> Result<FrameTimings, SimError> {
         let passes = &self.passes;
@@ -175,7 +175,7 @@ impl Viewer3d {
     fn record(
         &self,
         cmd: &mut Commands<'_>,
-        sight: &Sight,
+        sight: &CameraView,
         passes: &super::Passes,
         fused: bool,
     ) -> Result<(), GpuError> {

@@ -14,7 +14,7 @@ use super::open::{Open, Plan};
 use super::session::{Wake, waker};
 use super::statistics::Times;
 use super::{Options, ViewError};
-use crate::gpu::{GpuError, Shot, ValidationLog};
+use crate::gpu::{GpuError, Screenshot, ValidationLog};
 use crate::scene::Scene;
 use crate::sim::SimError;
 
@@ -134,7 +134,7 @@ impl App {
         }
     }
 
-    fn save(&self, shot: &Shot) -> Result<(), ViewError> {
+    fn save(&self, shot: &Screenshot) -> Result<(), ViewError> {
         let Some(file) = &self.plan.options.screenshot else {
             return Ok(());
         };

@@ -44,8 +44,8 @@ impl Trial {
     /// # Errors
     /// A device error; a scene that the ray query cannot serve.
     pub fn run(device: &Arc<Device>, library: &Library, scene: &Scene) -> Result<Self, SimError> {
-        let own = Bench::new(device, library, scene, Tracer::Bvh)?;
-        let query = Bench::new(device, library, scene, Tracer::RayQuery)?;
+        let own = TrialWorld::new(device, library, scene, Tracer::Bvh)?;
+        let query = TrialWorld::new(device, library, scene, Tracer::RayQuery)?;
         let mut trial = Self::default();
         let mut rays = first_rays(scene);
         for _ in 0..SURFACES_PER_RAY {
@@ -83,12 +83,12 @@ pub(super) fn id(library: &Library, scene: &Scene) -> u64 {
 }
 
 /// The scene with one of the tracers.
-struct Bench {
+struct TrialWorld {
     kernel: Kernel,
     world: World,
 }
 
-impl Bench {
+impl TrialWorld {
     fn new(
         device: &Arc<Device>,
         library: &Library,

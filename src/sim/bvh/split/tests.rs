@@ -106,8 +106,8 @@ fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     let mesh = straw();
     let whole =
         Builder { positions: &mesh.positions, triangles: &mesh.triangles, least_overlap: 0.0 };
-    let parts: Vec<Part> = (0..mesh.triangles.len())
-        .map(|t| Part {
+    let parts: Vec<TrianglePart> = (0..mesh.triangles.len())
+        .map(|t| TrianglePart {
             bounds: Aabb::from_points(
                 &mesh.triangles[t].map(|v| mesh.positions[v as usize].into()),
             ),
