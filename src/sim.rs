@@ -30,9 +30,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
-use crate::probe::Probe;
-use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
-use crate::settings::Machine;
+use crate::scene::{Scene, Surface, Tissue, Wire};
+use crate::settings::{Machine, Settings};
 use batches::Room;
 use buffers::Buffers;
 use bvh::Splits;
@@ -74,7 +73,7 @@ pub struct Simulator {
     frames: Frames,
     passes: Passes,
     coincident: bool,
-    settings: Settings,
+    sources: Sources,
     tables: Tables,
     shelf: Shelf,
     counting: bool,
@@ -91,42 +90,38 @@ pub struct Simulator {
 
 /// Tables of settings used before, kept because settings come back: live quality changes between levels.
 #[derive(Default)]
-struct Shelf(Vec<(Settings, Tables)>);
+struct Shelf(Vec<(Sources, Tables)>);
 
 impl Shelf {
     /// Most tables kept: more than there are levels of quality.
     const MOST: usize = 12;
 
-    fn take(&mut self, settings: &Settings) -> Option<Tables> {
-        let at = self.0.iter().position(|(made_of, _)| made_of == settings)?;
+    fn take(&mut self, sources: &Sources) -> Option<Tables> {
+        let at = self.0.iter().position(|(made_of, _)| made_of == sources)?;
         Some(self.0.remove(at).1)
     }
 
-    fn put(&mut self, settings: Settings, tables: Tables) {
+    fn put(&mut self, sources: Sources, tables: Tables) {
         if self.0.len() == Self::MOST {
             self.0.remove(0);
         }
-        self.0.push((settings, tables));
+        self.0.push((sources, tables));
     }
 }
 
 /// The settings from which the tables on the device were made.
 #[derive(PartialEq)]
-struct Settings {
-    probe: Probe,
-    simulation: Simulation,
-    imaging: Imaging,
+struct Sources {
+    settings: Settings,
     tissues: Vec<Tissue>,
     surfaces: Vec<[Surface; 2]>,
     wires: Vec<Wire>,
 }
 
-impl Settings {
+impl Sources {
     fn of(scene: &Scene) -> Self {
         Self {
-            probe: scene.probe.clone(),
-            simulation: scene.simulation.clone(),
-            imaging: scene.imaging.clone(),
+            settings: scene.settings.clone(),
             tissues: scene.tissues.clone(),
             surfaces: scene.instances.iter().map(|i| i.surface).collect(),
             wires: scene.wires.clone(),
@@ -171,7 +166,7 @@ impl Simulator {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
             coincident,
-            settings: Settings::of(scene),
+            sources: Sources::of(scene),
             tables,
             shelf: Shelf::default(),
             counting: false,
@@ -257,14 +252,14 @@ impl Simulator {
     /// Takes over settings, strategies and placements that the device does not have yet, after the
     /// frames in flight. Returns the time for structures that had to be built again.
     fn adopt(&mut self, scene: &Scene) -> Result<Duration, SimError> {
-        let settings = Settings::of(scene);
-        if settings != self.settings {
+        let sources = Sources::of(scene);
+        if sources != self.sources {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            let tables = self.shelf.take(&settings);
+            let tables = self.shelf.take(&sources);
             let tables = tables.unwrap_or_else(|| Tables::new(scene));
             let left = std::mem::replace(&mut self.tables, tables);
-            let before = std::mem::replace(&mut self.settings, settings);
+            let before = std::mem::replace(&mut self.sources, sources);
             self.shelf.put(before, left);
             self.upload_tables()?;
         }

@@ -3,7 +3,7 @@
 use super::batches::Room;
 use super::buffers::Buffers;
 use super::passes::frame_constants;
-use super::{Fused, Settings, SimError, Simulator, Tables};
+use super::{Fused, SimError, Simulator, Sources, Tables};
 use crate::gpu::Image;
 use crate::scene::Scene;
 
@@ -31,7 +31,7 @@ impl Simulator {
         (passes.frame, passes.batches) = (frame, batches);
         passes.shown = frame;
         self.tables = tables;
-        self.settings = Settings::of(scene);
+        self.sources = Sources::of(scene);
         self.read_out = super::ReadOut::default();
         // The new buffers hold no frame yet.
         self.fused = false;

@@ -59,14 +59,7 @@ pub fn draw(frame: &Frame, path: u32, bounce: u32, purpose: u32) -> [u32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Sample mean and its distance from `expected` in standard errors.
-    fn standard_errors(samples: &[f64], expected: f64) -> f64 {
-        let n = samples.len() as f64;
-        let mean = samples.iter().sum::<f64>() / n;
-        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        ((mean - expected) / (variance / n).sqrt()).abs()
-    }
+    use insonify::statistics::standard_errors;
 
     // A (0, 2)-sequence: of the first 2^k paths each elementary interval of area 2^-k holds one.
     #[test]

@@ -129,9 +129,11 @@ impl Source {
 }
 
 impl Document<'_> {
-    /// A scene file as the schema understands it.
+    /// A scene file as the schema understands it, all values in their ranges.
     pub fn parse(&self) -> Result<File, SceneError> {
-        self.parse_as()
+        let file: File = self.parse_as()?;
+        file.check(self)?;
+        Ok(file)
     }
 
     /// The file as `T` understands it.

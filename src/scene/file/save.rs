@@ -8,10 +8,8 @@ use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value}
 
 use super::document::{Source, segments};
 use super::error::SceneError;
-use super::placing::placement;
-use super::schema::even;
 use super::tissues::Tissues;
-use super::{parameters, probe};
+use super::{probe, settings};
 use crate::output::files;
 use crate::settings::suggest;
 
@@ -90,27 +88,9 @@ pub fn save_with(
 fn check(source: &Source) -> Result<(), SceneError> {
     let document = source.document()?;
     let file = document.parse()?;
-    let (probe, _) = probe::build(&document, &file.probe)?;
-    parameters::simulation(&document, &file.simulation, probe.frequency)?;
-    parameters::imaging(&document, &file.imaging)?;
-    parameters::live(&document, &file.live)?;
-    Tissues::new(&document, &file.tissues)?;
-    if let Some(t) = file.volume.as_ref().map(|t| &t.other) {
-        let place = (t.translate, t.rotate.as_ref(), even(t.scale));
-        placement(&document, "volume", place)?;
-    }
-    let t = &file.model;
-    let place = (t.translate, t.rotate.as_ref(), even(t.scale));
-    placement(&document, "model", place)?;
-    for (i, t) in file.transform.iter().enumerate() {
-        let path = format!("transform.{i}");
-        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
-    }
-    for (i, t) in file.mesh.iter().map(|t| &t.other).enumerate() {
-        let path = format!("mesh.{i}");
-        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
-    }
-    Ok(())
+    settings::settings(&document, &file, None)?;
+    probe::pose(&document, "probe", &file.probe.stated)?;
+    Tissues::new(&document, &file.tissues).map(|_| ())
 }
 
 /// A value as the command line takes it: text that is not TOML is a string.

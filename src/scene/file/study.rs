@@ -8,14 +8,13 @@ use serde::Deserialize;
 
 use super::document::Source;
 use super::error::SceneError;
-use super::placing::placement;
-use super::probe::{look, place};
-use super::schema::{PoseTable, Rotation};
+use super::placing::{Placed, placement};
+use super::probe::{self, look, pose};
+use super::table::{Key, Keys, Table, defaults};
 use super::trajectory;
 use super::within;
 use crate::scene::Scene;
-use crate::settings::units::Length;
-use crate::settings::{Surroundings, Words};
+use crate::settings::{Form, Surroundings, Words, group};
 
 /// Most cases of a study; the paper has 27, for which an assessor needs a day.
 const MAX_CASES: usize = 999;
@@ -145,18 +144,26 @@ struct ScenarioTable {
     title: String,
     scene: String,
     #[serde(default)]
-    slice: Vec<SliceTable>,
+    slice: Vec<Table<SliceKeys>>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SliceTable {
-    name: String,
-    #[serde(default)]
-    title: String,
-    pose: Option<PoseTable>,
-    translate: Option<[Length; 3]>,
-    rotate: Option<Rotation>,
+group! {
+    /// A position of the transducer.
+    pub struct SliceKeys in "scenario.slice" {
+        /// Name in key and tables.
+        name: String = String::new(), Facts::of(Form::Text).required();
+        /// What the assessor reads where its images are ranked.
+        title: String = String::new(), Facts::of(Form::Text);
+    }
+}
+
+impl Keys for SliceKeys {
+    const TABLE: &'static str = "scenario.slice";
+
+    fn keys() -> Vec<Key> {
+        let own = defaults::<Self>("").chain(defaults::<Placed>(""));
+        own.chain(defaults::<probe::Pose>("pose.")).collect()
+    }
 }
 
 impl Plan {
@@ -181,7 +188,10 @@ impl Plan {
         for (i, scenario) in table.scenario.iter().enumerate() {
             let at = format!("scenario.{i}");
             let slices = scenario.slice.iter();
-            check.names(&format!("{at}.slice"), slices.clone().map(|s| &*s.name))?;
+            check.names(
+                &format!("{at}.slice"),
+                slices.clone().filter_map(|s| s.stated.text("name")),
+            )?;
             let slices = slices
                 .enumerate()
                 .map(|(j, slice)| slice_of(&source, &format!("{at}.slice.{j}"), slice))
@@ -256,8 +266,9 @@ impl Check<'_> {
             all.push(own(&format!("scenario.{i}.title"), &scenario.title));
             all.push(own(&format!("scenario.{i}.name"), &scenario.name));
             for (j, slice) in scenario.slice.iter().enumerate() {
-                all.push(own(&format!("scenario.{i}.slice.{j}.title"), &slice.title));
-                all.push(own(&format!("scenario.{i}.slice.{j}.name"), &slice.name));
+                let SliceKeys { name, title } = slice.stated.get("");
+                all.push(own(&format!("scenario.{i}.slice.{j}.title"), &title));
+                all.push(own(&format!("scenario.{i}.slice.{j}.name"), &name));
             }
         }
         match all.iter().find(|(_, text)| text.len() > MAX_WORDS) {
@@ -310,24 +321,24 @@ impl Check<'_> {
     }
 }
 
-fn slice_of(source: &Source, path: &str, table: &SliceTable) -> Result<Slice, SceneError> {
+fn slice_of(source: &Source, path: &str, table: &Table<SliceKeys>) -> Result<Slice, SceneError> {
     let document = source.document()?;
-    let moved = table.translate.is_some() || table.rotate.is_some();
-    let pose = match &table.pose {
-        Some(_) if moved => {
+    table.check(&document, path)?;
+    let stated = &table.stated;
+    let SliceKeys { name, title } = stated.get("");
+    let moved = stated.has("translate") || stated.has("rotate");
+    let pose = match stated.has("pose") {
+        true if moved => {
             return Err(document.fail(
                 path,
-                format!("`{}` has a pose, and a shift from the scene's own", table.name),
+                format!("`{name}` has a pose, and a shift from the scene's own"),
                 "give either `pose`, or `translate` and `rotate`",
             ));
         }
-        Some(pose) => Pose::Absolute(place(&document, &format!("{path}.pose"), pose)?),
-        None => {
-            let shift = (table.translate, table.rotate.as_ref(), None);
-            Pose::Relative(placement(&document, path, shift)?)
-        }
+        true => Pose::Absolute(pose(&document, path, stated)?),
+        false => Pose::Relative(placement(stated, "")),
     };
-    Ok(Slice { name: table.name.clone(), title: table.title.clone(), pose })
+    Ok(Slice { name, title, pose })
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use super::document::Document;
 use super::error::SceneError;
-use super::{parameters, probe};
+use super::settings;
+use super::table::unknown;
 use crate::scene::Scene;
 use crate::scene::vary::{Parameter, Variant};
 use crate::settings::{Form, Value};
@@ -51,10 +52,7 @@ impl Visitor<'_> for Key {
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<Parameter, E> {
-        Parameter::of(text).ok_or_else(|| {
-            let all: Vec<_> = Parameter::all().map(|p| format!("`{}`", p.key())).collect();
-            E::custom(format!("unknown field `{text}`, expected one of {}", all.join(", ")))
-        })
+        Parameter::of(text).ok_or_else(|| unknown(text, Parameter::all().map(|p| p.key())))
     }
 }
 
@@ -143,8 +141,6 @@ fn settled(
     let source = document.source.with(std::slice::from_ref(&setting));
     let document = source.document()?;
     let file = document.parse()?;
-    let (probe, _) = probe::build(&document, &file.probe)?;
-    let simulation = parameters::simulation(&document, &file.simulation, probe.frequency)?;
-    let imaging = parameters::imaging(&document, &file.imaging)?;
-    Ok(Variant { parameter, value, setting, probe, simulation, imaging })
+    let settings = settings::settings(&document, &file, None)?;
+    Ok(Variant { parameter, value, setting, settings })
 }

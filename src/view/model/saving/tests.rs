@@ -123,6 +123,7 @@ fn another(facts: &Facts, now: Value, draw: Draw<'_>) -> Value {
             Value::Word(words[(at + 1) % words.len()])
         }
         Value::List(list) => Value::List(list.iter().map(|_| draw(facts.range)).collect()),
+        other => other,
     }
 }
 
@@ -314,7 +315,7 @@ fn counts_that_a_quality_chose_stay_out_of_the_file() {
     model.settings.simulation.cell = 0.3;
     model.settings.simulation.paths = 5;
     model.save(None, false).expect("saved");
-    let saved = desk.saved().simulation;
+    let saved = desk.saved().imaged.simulation;
     assert!((saved.cell - 0.3).abs() < 1e-15, "{}", saved.cell);
     assert_eq!(saved.paths, 5);
 }
