@@ -70,7 +70,8 @@ const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
 const uint KIND_PHASED = 2u;
 
-// One per frame. Rows of 3x4 matrices are vec4 (rotation row, translation).
+// One per frame. Rows of 3x4 matrices are vec4 (rotation row, translation). `couplant` is the instance, without
+// surfaces, that fills the gap between the face and the body; NONE: the background does.
 struct Frame {
     vec4 world_from_probe[3];
     vec4 probe_from_world[3];
@@ -89,7 +90,7 @@ struct Frame {
     float emission_lobe;                                                      // exponent of the cosine; 0: none
     uint ray_mask;                                                            // ray query: bits of the entries that are shown
     float branch_floor;                                                       // amplitude below which branches are followed by chance
-    float unused0; float unused1; float unused2;
+    uint couplant; float unused0; float unused1;
 };
 
 // A scanline in probe space: its start (mm, without elevation) and its

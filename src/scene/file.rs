@@ -115,8 +115,13 @@ impl Scene {
             &anatomy.meshes,
             &anatomy.instances,
         )?;
-        let contact =
-            contact::build(&document, file.contact.as_ref(), &anatomy.meshes, &anatomy.instances)?;
+        let contact = contact::build(
+            &document,
+            file.contact.as_ref(),
+            &anatomy.meshes,
+            &anatomy.instances,
+            &mut tissues,
+        )?;
         let tracker = tracker::build(&document, &file.tracker.stated)?;
         let live = file.live.stated.get("");
         warnings.extend(tissues.unused());

@@ -174,7 +174,7 @@ shared! {
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
-        branch_floor: f32, unused0: f32, unused1: f32, unused2: f32,
+        branch_floor: f32, couplant: u32, unused0: f32, unused1: f32,
     }
     /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }

@@ -237,7 +237,7 @@ impl World {
     ) -> Result<bool, WorldError> {
         assert_eq!(
             scene.instances.len(),
-            self.rows.len(),
+            self.instances(),
             "instances were added or removed after the upload"
         );
         let reshaped = self.changing.record(
@@ -331,7 +331,12 @@ impl World {
         (self.mask.bits, self.mask.ambiguous)
     }
 
-    /// The rows as they are on the device.
+    /// The number of the scene's instances.
+    pub fn instances(&self) -> usize {
+        self.made_for.len()
+    }
+
+    /// The rows as they are on the device; behind those of the scene's instances the couplant's, where there is one.
     pub fn rows(&self) -> &[layout::Instance] {
         &self.rows
     }

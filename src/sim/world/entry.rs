@@ -130,7 +130,22 @@ pub(super) fn entries(
     entries
 }
 
-/// Rows of the scene's instances. `slots` has the place of each entry in the top level.
+/// The row that stands for what is between face and body, in front of everything in the background.
+fn couplant(tissue: usize) -> layout::Instance {
+    let identity = matrix_rows(&DAffine3::IDENTITY);
+    layout::Instance {
+        world_from_object: identity,
+        object_from_world: identity,
+        texture_from_world: identity,
+        tissue: tissue as u32,
+        priority: -i32::MAX,
+        slot: NONE,
+        field: NONE,
+        ..layout::Instance::default()
+    }
+}
+
+/// Rows of the scene's instances, and of the couplant where the scene has contact. `slots` has the place of each entry in the top level.
 pub(super) fn rows(
     scene: &Scene,
     places: &[Place],
@@ -179,6 +194,7 @@ pub(super) fn rows(
             rows[entry.instance as usize].slot = slot;
         }
     }
+    rows.extend(scene.contact.as_ref().map(|contact| couplant(contact.couplant)));
     rows
 }
 
