@@ -16,7 +16,7 @@ pub(super) struct Elements {
     mass: Vec<f64>,
     /// Stiffness of each node with itself.
     own: Vec<f64>,
-    /// Where the links of each node begin; one more for the end.
+    /// Start of the links of each node; one more entry for the end.
     first: Vec<u32>,
     /// Neighbour and stiffness.
     links: Vec<(u32, f64)>,
@@ -66,7 +66,7 @@ impl Elements {
         Self { corners, mass, own, first, links }
     }
 
-    /// Means over the area about each node of what each corner of the triangles has.
+    /// Means over the area around each node of the values at the corners of the triangles.
     pub(super) fn means(&self, at_corners: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
         let mut sums = vec![DVec3::ZERO; self.mass.len()];
         for (&(node, share), value) in self.corners.iter().zip(at_corners) {

@@ -28,23 +28,23 @@ pub(super) struct Place {
     /// Index in the mesh of each triangle, in the order of the array; triangles that were cut occur several
     /// times. None where the order is that of the mesh.
     pub(super) order: Option<Vec<u32>>,
-    /// In the mesh's unit: over how much of it the first of its averaged normals is taken, which is
+    /// Standard deviation of the finest of the averaged normals, in the mesh's unit: that of
     /// [`FINEST`] where the mesh is placed first.
     pub(super) finest: f64,
-    /// Of an instance that changes its shape: how often the device has made it.
+    /// For an instance that changes its shape: how many times the device has computed it.
     pub(super) version: u64,
     /// For a structure that instances share: the place in the triangles, in words, of the list that names the
     /// instance of each triangle; 0: all triangles belong to one instance.
     pub(super) owners: u32,
 }
 
-/// Deviation over which the first of the averaged normals is taken, mm of the world.
+/// Standard deviation of the finest average of normals, mm of the world.
 const FINEST: f64 = 1.0;
 
-/// Of one vertex the normals averaged over the surface about it ([`smoothed()`]).
+/// The averaged normals of one vertex, packed ([`smoothed()`]).
 pub(super) type Averages = [u32; smoothed::LEVELS];
 
-/// What of a mesh has to stay on the device.
+/// The part of a mesh that has to stay on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Need {
     /// Nothing: the mesh is uploaded when it is shown.
@@ -91,7 +91,7 @@ fn finest(scene: &Scene) -> Vec<f64> {
     finest.into_iter().map(|f| f.unwrap_or(FINEST)).collect()
 }
 
-/// Whether the instance's structure changes while the program runs.
+/// True if the instance's structure changes while the program runs.
 pub(super) fn is_dynamic(instance: &Instance) -> bool {
     use Strategy::{Cached, Interpolate, Rebuild, Refit};
     let changing = [Rebuild, Cached, Refit, Interpolate].contains(&instance.keyframes.strategy);
@@ -107,12 +107,12 @@ pub struct Arrays {
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
-    /// The same averaged over the surface about each vertex ([`smoothed()`]).
+    /// For each vertex the normals averaged over the surface around it ([`smoothed()`]).
     pub smoothed: Vec<[u32; smoothed::LEVELS]>,
-    /// Those of the meshes that have no vertices here, by mesh.
+    /// Averaged normals of the meshes that have no vertices here, by mesh.
     pub(super) uploaded: Vec<Vec<Averages>>,
-    /// Indices into the vertices; behind them, two to a word, whose the triangles are that instances
-    /// share.
+    /// Indices into the vertices; after them, two per word, the instances to which the triangles of shared
+    /// structures belong.
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,

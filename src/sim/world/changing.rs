@@ -195,7 +195,7 @@ fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
     [grown(0, -1.0), grown(1, 1.0)]
 }
 
-/// Records what `rebuild` and `cached` send to the device.
+/// Records what the strategies `rebuild` and `cached` send to the device.
 #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
 fn upload(
     commands: &mut Commands<'_>,

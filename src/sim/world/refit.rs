@@ -200,7 +200,7 @@ fn keyframe(instance: &Instance) -> usize {
     }
 }
 
-/// How `each` vectors of every vertex are made.
+/// Push constants that interpolate `each` vectors of every vertex.
 fn interpolation(
     scene: &Scene,
     instance: &Instance,
