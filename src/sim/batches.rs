@@ -11,14 +11,14 @@ const SEGMENT_BUDGET: u64 = 96 << 20;
 
 /// The memory and threads of a device that a frame may use.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Room {
+pub(super) struct FrameBudget {
     /// Bytes for segments.
     pub(super) segments: u64,
     /// Threads that the device runs at once, approximately.
     pub(super) at_once: u32,
 }
 
-impl Room {
+impl FrameBudget {
     /// The room on a device where no buffers have been made yet.
     pub(super) fn of(device: &Device) -> Self {
         Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once() }
@@ -38,7 +38,7 @@ pub(super) struct Batches {
 
 impl Batches {
     /// The largest batches for whose segments `room` has memory.
-    pub(super) fn new(frame: &layout::Frame, room: &Room) -> Self {
+    pub(super) fn new(frame: &layout::Frame, room: &FrameBudget) -> Self {
         let per_path = per_path(frame);
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
         let affordable = u32::try_from(room.segments / line_bytes.max(1)).unwrap_or(u32::MAX);
