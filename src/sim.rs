@@ -75,7 +75,7 @@ pub struct Simulator {
     coincident: bool,
     sources: Sources,
     tables: Tables,
-    shelf: TableCache,
+    table_cache: TableCache,
     counting: bool,
     /// True if the last frame was mixed with an acquired volume.
     fused: bool,
@@ -157,8 +157,8 @@ impl Simulator {
         let shapers = Arc::new(world::ShapeKernels::new(device, library)?);
         let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
         let coincident = scene.coincident_triangles() > 0;
-        let room = FrameBudget::of(device);
-        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);
+        let budget = FrameBudget::of(device);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &budget);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, scene, batches.sizes(&frame, &tables))?;
         let fusion = FusionResources::new(device, scene, None)?;
@@ -168,7 +168,7 @@ impl Simulator {
             coincident,
             sources: Sources::of(scene),
             tables,
-            shelf: TableCache::default(),
+            table_cache: TableCache::default(),
             counting: false,
             fused: false,
             shown_on: None,
@@ -256,11 +256,11 @@ impl Simulator {
         if sources != self.sources {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            let tables = self.shelf.take(&sources);
+            let tables = self.table_cache.take(&sources);
             let tables = tables.unwrap_or_else(|| Tables::new(scene));
             let left = std::mem::replace(&mut self.tables, tables);
             let before = std::mem::replace(&mut self.sources, sources);
-            self.shelf.put(before, left);
+            self.table_cache.put(before, left);
             self.upload_tables()?;
         }
         if self.passes.world.serves(scene) {

@@ -45,11 +45,12 @@ impl Passes {
         let began = Instant::now();
         self.world.update(cmd, scene)?;
         // A frame of fewer lines than the buffers were made for must not want more segments.
-        let room = FrameBudget {
+        let budget = FrameBudget {
             segments: self.buffers["segments"].size(),
             at_once: self.batches.rounds.at_once,
         };
-        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, &room);
+        (self.frame, self.batches) =
+            frame_constants(scene, &self.world, coincident, index, &budget);
         self.buffers.add(cmd.device(), stages::needed(scene))?;
         cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
@@ -252,7 +253,7 @@ pub(super) fn frame_constants(
     world: &World,
     coincident: bool,
     index: u32,
-    room: &FrameBudget,
+    budget: &FrameBudget,
 ) -> (layout::Frame, Batches) {
     let mut frame = tables::frame(scene, index);
     if coincident {
@@ -263,7 +264,7 @@ pub(super) fn frame_constants(
     if ambiguous {
         frame.flags |= layout::FLAG_SLOTS;
     }
-    let batches = Batches::new(&frame, room);
+    let batches = Batches::new(&frame, budget);
     frame.segment_capacity = batches.capacity;
     (frame, batches)
 }

@@ -16,8 +16,8 @@ impl Simulator {
     /// Device out of memory, a buffer over the device's limit; the simulator then stays as it was.
     pub fn fit(&mut self, scene: &Scene) -> Result<bool, SimError> {
         let world = &self.passes.world;
-        let room = FrameBudget::of(&self.device);
-        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, &room);
+        let budget = FrameBudget::of(&self.device);
+        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, &budget);
         let tables = Tables::new(scene);
         let sizes = batches.sizes(&frame, &tables);
         if self.passes.buffers.hold(&sizes) {
