@@ -13,7 +13,7 @@ struct Slope {
     float width;        // deviation of the sine of incidence over the beam
 };
 
-// The slope at a surface. `row` is that of the path's time; `spread` is the lateral variance of the path, mm^2.
+// `row` is that of the path's time; `spread` the variance that the path has across, mm^2.
 Slope slope_at(Met here, Path path, uint row, float spread) {
     Hit hit = here.hit;
     Slope slope;
@@ -27,7 +27,7 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
 
     bool wide = (frame.flags & FLAG_WAVEFRONT) != 0u;
     float sigma = rows[row].sigma_wavefront;
-    // Width in units of the finest average; each further average is twice as wide.
+    // In units of the finest average; from there on they are twice as wide each.
     float x = mix(0.0, sqrt(sigma * sigma + spread) / instances[hit.instance].finest, wide);
     uint level = uint(x >= 1.0) + uint(x >= 2.0) + uint(x >= 4.0);
     float below = mix(0.0, float(1u << level) * 0.5, level > 0u);

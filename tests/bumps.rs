@@ -22,7 +22,7 @@ const TOP: f64 = 15.0;
 /// Places (x, z) and radius of the vessels, which run along y, mm.
 const VESSELS: [[f64; 3]; 5] =
     [[-16.0, 36.0, 3.5], [-7.0, 52.0, 4.0], [0.0, 30.0, 3.0], [8.0, 46.0, 4.0], [17.0, 34.0, 3.5]];
-/// Standard deviation of the bumps, mm, and the range of their wavelengths.
+/// Deviation of the bumps, mm, and between which wavelengths they lie.
 const BUMPS: [[f64; 3]; 4] = [[0.3, 2.0, 3.0], [0.6, 3.0, 5.0], [1.2, 5.0, 8.0], [2.0, 7.0, 10.0]];
 /// Poses of each surface.
 const POSES: usize = 5;
@@ -299,7 +299,7 @@ struct Seen {
     scatter: f64,
 }
 
-/// Results by the mean slope, and by the local slope.
+/// By the mean slope, and by the local one.
 fn seen(bumps: [f64; 3], tracer: Tracer) -> [Seen; 2] {
     let mut random = Random(11);
     let rough = phantom(block(bumps, 5));

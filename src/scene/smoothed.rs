@@ -21,8 +21,8 @@ use elements::Elements;
 /// Number of scales per vertex; each is twice the one before.
 pub const LEVELS: usize = 4;
 
-/// Dihedral angle above which the normals of two sides are averaged separately, degrees: the sides of a box; the
-/// steps of a segmentation that was smoothed at all are flatter.
+/// Dihedral angle from which on two sides refract apart, degrees: a box's sides do, the steps of a segmentation that
+/// was smoothed at all are flatter.
 const CREASE: f32 = 80.0;
 
 /// Lengths of a mean of unit normals from which its direction begins to count, and counts in full. If the two sides

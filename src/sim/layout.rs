@@ -131,7 +131,7 @@ constants! {
     pub const FLAG_MASKED: u32 = 512;
     /// Surfaces refract by their mean slope over the wavefront's width.
     pub const FLAG_WAVEFRONT: u32 = 1024;
-    /// Least sine of the angle between a refracted path and the triangle behind it.
+    /// A path goes down below a surface that it has met by this part of its way at least.
     pub const LEAST_DESCENT: f32 = 1e-3;
 
     /// The anatomy in front of the image plane is cut away.

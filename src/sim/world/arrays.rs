@@ -38,10 +38,10 @@ pub(super) struct GeometryRange {
     pub(super) owners: u32,
 }
 
-/// Standard deviation of the finest average of normals, mm of the world.
+/// Deviation over which the first of the averaged normals is taken, mm of the world.
 const FINEST: f64 = 1.0;
 
-/// The averaged normals of one vertex, packed ([`smoothed()`]).
+/// Of one vertex the normals averaged over the surface about it ([`smoothed()`]).
 pub(super) type Averages = [u32; smoothed::LEVELS];
 
 /// The part of a mesh that has to stay on the device.
