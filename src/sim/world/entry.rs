@@ -10,9 +10,9 @@ use crate::sim::layout::{self, NONE};
 use crate::sim::placement::{matrix_rows, rigid, stretch};
 
 /// Mask bit of every entry that is not selected by its mask.
-const ALWAYS: u8 = 1;
+const UNSELECTED_BIT: u8 = 1;
 /// Mask bits left for keyframes that are selected by their mask.
-const MASKS: usize = 7;
+const SELECTING_BITS: usize = 7;
 
 /// The geometry of an entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,7 @@ pub(super) struct TopLevelEntry {
 }
 
 fn by_mask(number: usize) -> u8 {
-    1 << (1 + number % MASKS)
+    1 << (1 + number % SELECTING_BITS)
 }
 
 pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
@@ -91,7 +91,7 @@ pub(super) fn entries(
             if set.members[0] == i && hidden < set.members.len() {
                 let shape = set.shape(scene);
                 let geometry = EntryGeometry::Joined { set: number, shape, partial: hidden > 0 };
-                entries.push(entry(geometry, set.shapes[shape].bounds, ALWAYS));
+                entries.push(entry(geometry, set.shapes[shape].bounds, UNSELECTED_BIT));
             }
             continue;
         }
@@ -102,7 +102,11 @@ pub(super) fn entries(
         match (keyframes.strategy, &regions[i]) {
             (_, Some(region)) if instance.shown && region.triangles > 0 => {
                 let version = region.version;
-                entries.push(entry(EntryGeometry::Changing { version }, region.bounds, ALWAYS));
+                entries.push(entry(
+                    EntryGeometry::Changing { version },
+                    region.bounds,
+                    UNSELECTED_BIT,
+                ));
             }
             (_, Some(_)) => {}
             (Strategy::Mask, None) if keyframes.meshes.is_empty() => {
@@ -121,9 +125,9 @@ pub(super) fn entries(
                 };
                 let solid = all.iter().map(|&m| &places[m]).filter(|p| p.triangles > 0);
                 let bounds = solid.map(|p| p.bounds).reduce(union);
-                entries.extend(bounds.map(|b| entry(EntryGeometry::Union, b, ALWAYS)));
+                entries.extend(bounds.map(|b| entry(EntryGeometry::Union, b, UNSELECTED_BIT)));
             }
-            _ if instance.shown => entries.extend(mesh(instance.mesh, ALWAYS)),
+            _ if instance.shown => entries.extend(mesh(instance.mesh, UNSELECTED_BIT)),
             _ => {}
         }
     }
@@ -205,8 +209,8 @@ pub(super) fn mask(scene: &Scene, entries: &[TopLevelEntry]) -> RayMask {
         let instance = &scene.instances[entry.instance as usize];
         instance.shown && shows(instance, entry)
     };
-    // Shared structures have the bit ALWAYS: rays enter them whichever instance is shown.
-    let bits = entries.iter().filter(seen).fold(ALWAYS, |bits, e| bits | e.mask);
+    // Shared structures have the bit UNSELECTED_BIT: rays enter them whichever instance is shown.
+    let bits = entries.iter().filter(seen).fold(UNSELECTED_BIT, |bits, e| bits | e.mask);
     let hidden = entries.iter().filter(|e| !seen(e));
     RayMask { bits: bits.into(), ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0) }
 }

@@ -17,7 +17,7 @@ use crate::sim::tracer::Tracer;
 
 /// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
 /// ten refits).
-const DEGRADED: f64 = 1.5;
+const REBUILD_COST: f64 = 1.5;
 
 /// A tree built for one keyframe; it also serves keyframes near it.
 struct BaseTree {
@@ -239,7 +239,7 @@ fn body(
     for (k, mesh) in meshes.iter().enumerate() {
         let fits = |(&b, base): (&usize, &BaseTree)| {
             let cost = base.tree.degradation(meshes[b], &mesh.positions);
-            (cost <= DEGRADED).then_some((b, cost))
+            (cost <= REBUILD_COST).then_some((b, cost))
         };
         let best = bases.iter().filter_map(fits).min_by(|a, b| a.1.total_cmp(&b.1));
         serving.push(best.map_or(k, |(b, _)| b));
