@@ -1,5 +1,7 @@
 //! Diffusion on a triangulated surface: linear finite elements, lumped masses.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 
 /// Residual, relative to the first, at which a step is good enough: what is left turns normals by less than a
@@ -93,8 +95,8 @@ impl Elements {
         let mut norm = inner(&residual, &direction);
         let enough = norm * RESIDUAL * RESIDUAL;
         for _ in 0..ITERATIONS {
-            // Also where a triangle is no number.
-            if !(norm > enough) {
+            // Also where a corner is no number: then there is no order.
+            if norm.partial_cmp(&enough).is_none_or(Ordering::is_le) {
                 break;
             }
             self.apply(&direction, time, &mut image);
