@@ -59,7 +59,7 @@ pub enum Form {
 }
 
 impl Form {
-    /// Whether it takes quantities of this measure.
+    /// True for quantities of this measure.
     pub fn measures(&self, measure: &Measure) -> bool {
         matches!(self, Self::Quantity(own) if *own == measure)
     }
@@ -206,7 +206,7 @@ impl Facts {
         Self::new(Form::Quantities(measure, count), least, most)
     }
 
-    /// What takes this form, without limits.
+    /// A value of this form, without limits.
     pub const fn of(form: Form) -> Self {
         Self::new(form, f64::NEG_INFINITY, f64::INFINITY)
     }

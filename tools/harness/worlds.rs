@@ -8,7 +8,7 @@ use super::{Case, Input, Job};
 use crate::reference::Owned;
 use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
-use insonify::sim::bvh::{MeshBvh, Placed, SceneBvh};
+use insonify::sim::bvh::{BvhInstance, MeshBvh, SceneBvh};
 use insonify::sim::fields::{HEADER, padded};
 use insonify::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use insonify::sim::placement;
@@ -110,8 +110,8 @@ impl Builder {
         }
         let (mut nodes, roots) = SceneBvh::of(&trees, &firsts, self.placements.len());
         let places = self.placements.iter().zip(0..);
-        let placed: Vec<Placed> = places
-            .map(|(&(mesh, world_from_object), instance)| Placed {
+        let placed: Vec<BvhInstance> = places
+            .map(|(&(mesh, world_from_object), instance)| BvhInstance {
                 instance,
                 bounds: trees[mesh].bounds,
                 world_from_object,

@@ -2,7 +2,7 @@
 
 use super::geometry::world_line;
 use super::stack::Stack;
-use super::way::Start;
+use super::straight::Start;
 use super::world::{Crossing, World};
 use insonify::sim::layout::{MAX_STACK, NONE, START_WORDS};
 

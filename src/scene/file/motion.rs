@@ -42,7 +42,7 @@ words! {
     pub enum Between {
         /// Straight, and rotations along the great circle.
         Linear = "linear",
-        /// As in the row before.
+        /// The values of the row before.
         Step = "step",
     }
 }

@@ -47,7 +47,7 @@ pub(super) fn keys<T: Group>(
     })
 }
 
-/// As [`keys`], of a group with defaults.
+/// The keys of a group with defaults, like [`keys`].
 pub(super) fn defaults<T: Group + Default>(below: &'static str) -> impl Iterator<Item = Key> {
     let value = |row: &Row<T>| match (row.facts.default, (row.get)(&T::default())) {
         (None, Value::Text(text)) => format!("`{text}`"),
