@@ -11,7 +11,7 @@ use toml_edit::Key;
 
 use super::error::{SceneError, advice};
 use super::schema::File;
-use crate::settings::suggest;
+use crate::settings::{Facts, Value, suggest};
 
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
@@ -198,6 +198,14 @@ impl Document<'_> {
         remedy: impl Into<String>,
     ) -> SceneError {
         self.source.error(self.span_of(path), message.into(), Some(remedy.into()))
+    }
+
+    /// Fails at the value of a dotted path, whose key has these facts, if `value` is out of its range.
+    pub fn within(&self, path: &str, facts: &Facts, value: &Value) -> Result<(), SceneError> {
+        match facts.fault(value) {
+            Some((message, remedy)) => Err(self.fail(path, message, remedy)),
+            None => Ok(()),
+        }
     }
 
     /// True if the top-level `table` has a key other than `but`.
