@@ -18,41 +18,24 @@ pub trait Field {
     fn set(&mut self, value: &Value);
 }
 
-impl Field for f64 {
-    fn get(&self) -> Value {
-        Value::Number(*self)
-    }
+/// Fields that hold what a value of one kind holds.
+macro_rules! fields {
+    ($($type:ty as $kind:ident),+) => {
+        $(impl Field for $type {
+            fn get(&self) -> Value {
+                Value::$kind(self.clone())
+            }
 
-    fn set(&mut self, value: &Value) {
-        if let Value::Number(number) = value {
-            *self = *number;
-        }
-    }
+            fn set(&mut self, value: &Value) {
+                if let Value::$kind(own) = value {
+                    self.clone_from(own);
+                }
+            }
+        })+
+    };
 }
 
-impl Field for u32 {
-    fn get(&self) -> Value {
-        Value::Whole(*self)
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Whole(count) = value {
-            *self = *count;
-        }
-    }
-}
-
-impl Field for bool {
-    fn get(&self) -> Value {
-        Value::Switch(*self)
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Switch(on) = value {
-            *self = *on;
-        }
-    }
-}
+fields!(f64 as Number, u32 as Whole, bool as Switch, &'static str as Word, String as Text);
 
 impl<const N: usize> Field for [f64; N] {
     fn get(&self) -> Value {
@@ -81,30 +64,6 @@ impl Field for i32 {
     fn set(&mut self, value: &Value) {
         if let Value::Number(number) = value {
             *self = *number as i32;
-        }
-    }
-}
-
-impl Field for &'static str {
-    fn get(&self) -> Value {
-        Value::Word(self)
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Word(word) = value {
-            *self = word;
-        }
-    }
-}
-
-impl Field for String {
-    fn get(&self) -> Value {
-        Value::Text(self.clone())
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Text(text) = value {
-            self.clone_from(text);
         }
     }
 }

@@ -275,7 +275,8 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
     Some(value)
 }
 
-type Misfit = (String, String);
+/// The fault of a setting, and the remedy.
+pub(super) type Misfit = (String, String);
 
 /// The parts of a path as the command line and the program itself write it. Names with dots stand in quotes, as in
 /// TOML; others need none, and may hold what a bare key of TOML may not.
@@ -326,16 +327,7 @@ fn into_value<'s>(
             return Err((format!("`{name}` has no parts"), "set it as a whole".to_owned()));
         }
     };
-    let names: Vec<String> = array.iter().filter_map(name_of).collect();
-    let by_name = array.iter().position(|v| name_of(v).as_deref() == Some(rest[0]));
-    let index = by_name.or_else(|| rest[0].parse().ok().filter(|&i: &usize| i < array.len()));
-    let Some(index) = index else {
-        let remedy = match names.is_empty() {
-            true => format!("`{name}` has {} elements, counted from 0", array.len()),
-            false => suggest::among(rest[0], names.iter().map(String::as_str)),
-        };
-        return Err((format!("there is no {name} `{}`", rest[0]), remedy));
-    };
+    let index = element(name, rest[0], &array.iter().map(name_of).collect::<Vec<_>>())?;
     let element = &mut array.as_mut()[index];
     match rest {
         [_] => {
@@ -344,6 +336,19 @@ fn into_value<'s>(
         }
         _ => into_value(element.get_mut(), rest[0], &rest[1..], value, key_span),
     }
+}
+
+/// The index of the element that a part of a path means: by name, or counted from 0.
+pub(super) fn element(list: &str, wanted: &str, names: &[Option<String>]) -> Result<usize, Misfit> {
+    let by_name = names.iter().position(|n| n.as_deref() == Some(wanted));
+    let counted = || wanted.parse().ok().filter(|&i: &usize| i < names.len());
+    by_name.or_else(counted).ok_or_else(|| {
+        let remedy = match names.iter().any(Option::is_some) {
+            true => suggest::among(wanted, names.iter().flatten().map(String::as_str)),
+            false => format!("`{list}` has {} elements, counted from 0", names.len()),
+        };
+        (format!("there is no {list} `{wanted}`"), remedy)
+    })
 }
 
 fn name_of(value: &Spanned<DeValue<'_>>) -> Option<String> {
