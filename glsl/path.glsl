@@ -95,16 +95,6 @@ void reflect_path(inout Path path, vec3 m, float roughness, float turn) {
     path.spread.z += min(turn * turn, 1.0);
 }
 
-bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
-    vec3 d;
-    if (!refraction(path.direction, n, c1, c2, d) || dot(d, n_geometric) >= 0.0) {
-        if (!refraction(path.direction, n_geometric, c1, c2, d)) return false;
-    }
-    path.lateral = normalize(path.lateral - dot(path.lateral, d) * d);
-    path.direction = d;
-    return true;
-}
-
 // Moves the path along its segment: attenuation, time, widening after rough reflections.
 void advance(inout Path path, float t, Medium medium, vec3 position) {
     path.weight *= exp(-medium.absorption * t);

@@ -3,6 +3,7 @@
 // Shadows: the loss of sound in the anatomy inside the mask beyond the loss that the tissue around the mask would
 // cause. The level along the transmitted path of each line is written as pieces of straight lines.
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #ifdef RAY_QUERY
 #extension GL_EXT_ray_query : require
 #endif
@@ -16,16 +17,17 @@ layout(std430, binding = 1) restrict readonly buffer TissueBuffer { Tissue tissu
 layout(std430, binding = 2) restrict readonly buffer InstanceBuffer { Instance instances[]; };
 layout(std430, binding = 3) restrict readonly buffer VertexBuffer { float vertices[]; };
 layout(std430, binding = 4) restrict readonly buffer NormalBuffer { float normals[]; };
-layout(std430, binding = 5) restrict readonly buffer TriangleBuffer { uint triangles[]; };
+layout(std430, binding = 5) restrict readonly buffer SmoothedBuffer { uvec4 smoothed[]; };
+layout(std430, binding = 6) restrict readonly buffer TriangleBuffer { uint triangles[]; };
 #ifdef RAY_QUERY
-layout(binding = 6) uniform accelerationStructureEXT tlas;
+layout(binding = 7) uniform accelerationStructureEXT tlas;
 #else
-layout(std430, binding = 6) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
+layout(std430, binding = 7) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 7) restrict readonly buffer StackBuffer { uint stacks[]; };
-layout(std430, binding = 8) restrict readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 9) restrict buffer PieceBuffer { vec4 pieces[]; };
-layout(std430, binding = 10) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 8) restrict readonly buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 9) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 10) restrict buffer PieceBuffer { vec4 pieces[]; };
+layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -42,6 +44,7 @@ layout(std430, binding = 10) restrict readonly buffer ScanlineBuffer { Scanline 
 #include "footprint.glsl"
 #include "media.glsl"
 #include "path.glsl"
+#include "wavefront.glsl"
 
 // Level, in nepers of amplitude, that stands for no sound at all.
 const float DARK = -200.0;
@@ -64,19 +67,9 @@ void middle(uint line, out Path path, inout Media media) {
 
 // Transmits the path; returns the reflected part of its intensity, 1 if nothing is transmitted.
 float pass(inout Path path, Met here, Medium t1, Medium t2) {
-    vec3 n_geometric = here.normal;
-    vec3 n = surface_shading_normal(here.hit);
-    if (dot(path.direction, n_geometric) >= 0.0) { n_geometric = -n_geometric; n = -n; }
-    if (!(dot(path.direction, n) < 0.0)) n = n_geometric;
-    float cos_i = -dot(path.direction, n);
-    float width = 0.0;
-    if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
-        float kappa = frame.speed * path.time / frame.sample_pitch;
-        vec3 along = path.direction + cos_i * n + 0.01 * path.lateral;
-        width = surface_curvature(here.hit, along) * rows[sample_at(kappa)].sigma_lateral;
-    }
-    float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
-    bool through = transmit_path(path, n, n_geometric, t1.speed, t2.speed) || width > 0.0;
+    Slope slope = slope_at(here, path, sample_at(frame.speed * path.time / frame.sample_pitch), 0.0);
+    float reflected = reflectance_at(slope, path.direction, t1, t2);
+    bool through = transmit_path(path, slope.refracting, slope.geometric, t1.speed, t2.speed) || slope.width > 0.0;
     return through ? reflected : 1.0;
 }
 

@@ -43,6 +43,8 @@ const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged 
 const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
 const uint FLAG_MASKED = 512u;      // only what a masking instance encloses is heard
+const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
+const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
 
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
@@ -120,7 +122,7 @@ struct Instance {
     uint field;                        // offset of its displacement field, in vectors; NONE: none
     uint masks;                        // 1: it is part of the fusion's mask
     uint owners;                       // word of triangles[] where the list begins of whose they are; 0: all its own
-    uint unused0;
+    float finest;                      // mm: over how much of the surface the first of `smoothed` normals is averaged
 };
 
 // Per axial sample k, at depth k * sample_pitch.
@@ -138,7 +140,8 @@ struct Row {
     float incoherent_gain;                        // keeps the energy of incoherent surface echoes through the averages
     float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
     float black;                                  // one-way weight times echogenicity that shows as black, log2
-    float unused0; float unused1; float unused2;
+    float sigma_wavefront;                        // mm: deviation across the wavefront that a surface refracts there
+    float unused0; float unused1;
 };
 
 // A straight part of a path inside one medium.

@@ -23,22 +23,23 @@ layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { Surface sur
 layout(std430, binding = 3) restrict readonly buffer InstanceBuffer { Instance instances[]; };
 layout(std430, binding = 4) restrict readonly buffer VertexBuffer { float vertices[]; };
 layout(std430, binding = 5) restrict readonly buffer NormalBuffer { float normals[]; };
-layout(std430, binding = 6) restrict readonly buffer TriangleBuffer { uint triangles[]; };
+layout(std430, binding = 6) restrict readonly buffer SmoothedBuffer { uvec4 smoothed[]; };
+layout(std430, binding = 7) restrict readonly buffer TriangleBuffer { uint triangles[]; };
 #ifdef RAY_QUERY
-layout(binding = 7) uniform accelerationStructureEXT tlas;
+layout(binding = 8) uniform accelerationStructureEXT tlas;
 #else
-layout(std430, binding = 7) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
+layout(std430, binding = 8) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 8) restrict readonly buffer StackBuffer { uint stacks[]; };
-layout(std430, binding = 9) restrict readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 10) restrict buffer SurfaceEchoBuffer { int surface_echoes[]; };
-layout(std430, binding = 11) restrict buffer SegmentBuffer { Segment segments[]; };
-layout(std430, binding = 12) restrict buffer SegmentCountBuffer { uint segment_count[]; };
-layout(std430, binding = 13) restrict buffer CounterBuffer { Counters counters; };
-layout(std430, binding = 14) restrict readonly buffer FieldBuffer { vec4 fields[]; };
-layout(std430, binding = 15) restrict buffer InteractionBuffer { Interaction interactions[]; };
-layout(std430, binding = 16) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
-layout(std430, binding = 17) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 9) restrict readonly buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 10) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 11) restrict buffer SurfaceEchoBuffer { int surface_echoes[]; };
+layout(std430, binding = 12) restrict buffer SegmentBuffer { Segment segments[]; };
+layout(std430, binding = 13) restrict buffer SegmentCountBuffer { uint segment_count[]; };
+layout(std430, binding = 14) restrict buffer CounterBuffer { Counters counters; };
+layout(std430, binding = 15) restrict readonly buffer FieldBuffer { vec4 fields[]; };
+layout(std430, binding = 16) restrict buffer InteractionBuffer { Interaction interactions[]; };
+layout(std430, binding = 17) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
+layout(std430, binding = 18) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 // The role of the paths. Copied to a variable, as naga knows no operations on specialization constants.
 layout(constant_id = 0) const uint ROLE = ROLE_WHOLE;
@@ -73,6 +74,7 @@ bool masks_only = false;
 #include "media.glsl"
 #include "deposit.glsl"
 #include "path.glsl"
+#include "wavefront.glsl"
 #include "count.glsl"
 
 // The media that enclose the path, and those behind the surface that it has met.
@@ -154,6 +156,7 @@ float off_axis(uint line, vec3 position) {
 // An interface that a path has arrived at; normals are turned against the path.
 struct Interface {
     vec3 geometric; vec3 shading;
+    vec3 refracting;                // averaged over the wavefront
     float reflectance;
     float turn;                     // deviation of the reflected direction over the beam
     bool curved;                    // over the beam: something gets through beside a totally reflected middle
@@ -210,22 +213,13 @@ void meet(out Interface at, Met here, bool entering, inout Path path, uint befor
     at.surface = entering ? instances[hit.instance].surface_outside : instances[hit.instance].surface_inside;
     at.before = before;
     at.behind = behind;
-    at.geometric = here.normal;
-    at.shading = surface_shading_normal(hit);
-    if (!entering) { at.geometric = -at.geometric; at.shading = -at.shading; }
-    if (!(dot(path.direction, at.shading) < 0.0)) at.shading = at.geometric;
-    Medium t1 = medium_of(before), t2 = medium_of(behind);
-    float cos_i = -dot(path.direction, at.shading);
-    float width = 0.0;
-    if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
-        float sigma = rows[row_of(path.time)].sigma_lateral;
-        // In the plane of incidence; along the image where there is none.
-        vec3 along = path.direction + cos_i * at.shading + 0.01 * path.lateral;
-        width = surface_curvature(hit, along) * sqrt(sigma * sigma + path.spread.x);
-    }
-    at.reflectance = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
-    at.turn = 2.0 * width / max(cos_i, 1e-3);
-    at.curved = width > 0.0;
+    Slope slope = slope_at(here, path, row_of(path.time), path.spread.x);
+    at.geometric = slope.geometric;
+    at.shading = slope.shading;
+    at.refracting = slope.refracting;
+    at.reflectance = reflectance_at(slope, path.direction, medium_of(before), medium_of(behind));
+    at.turn = 2.0 * slope.width / max(-dot(path.direction, slope.refracting), 1e-3);
+    at.curved = slope.width > 0.0;
 }
 
 void write_down(uint slot, inout Path path, uint n, inout Interface at) {
@@ -268,6 +262,7 @@ void recall(uint slot, out Path path, out Interface at) {
     at.geometric = interactions[slot].geometric_turn.xyz;
     at.turn = interactions[slot].geometric_turn.w;
     at.shading = interactions[slot].shading.xyz;
+    at.refracting = at.shading; // nothing goes through here
     at.reflectance = interactions[slot].lateral_reflectance.w;
     at.curved = false;
     at.instance = interactions[slot].instance;
@@ -572,6 +567,6 @@ void main() {
             reflect_path(path, m, surfaces[at.surface].roughness, at.turn);
             continue;
         }
-        transmit(path, at, mix(at.shading, m, bvec3(rough && rough_through)));
+        transmit(path, at, mix(at.refracting, m, bvec3(rough && rough_through)));
     }
 }

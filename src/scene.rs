@@ -21,6 +21,7 @@ pub mod mesh;
 pub mod normals;
 mod origin;
 pub mod shapes;
+pub mod smoothed;
 pub mod tissue;
 pub mod topology;
 pub mod tracker;

@@ -22,7 +22,7 @@ pub(crate) use key::group;
 pub use key::{Facts, Form, Group, Off, Row, Value, plain};
 pub use probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
 pub use simulation::{
-    Coherence, Quality, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
+    Coherence, Quality, Refraction, Sampling, ScatterMode, Sequence, Simulation, TextureSpace,
 };
 pub use surface::Surface;
 pub use tissue::Tissue;

@@ -37,6 +37,7 @@ pub mod shadow;
 pub mod stack;
 pub mod texture;
 pub mod trace;
+mod wavefront;
 pub mod way;
 pub mod world;
 

@@ -44,6 +44,16 @@ words! {
 }
 
 words! {
+    /// What turns a path at a surface.
+    pub enum Refraction {
+        /// The mean slope over the width of the wavefront that forms the image behind it.
+        Beam = "beam",
+        /// The slope where the ray meets it, geometric acoustics.
+        Ray = "ray",
+    }
+}
+
+words! {
     /// Where scatterers come from.
     pub enum ScatterMode {
         /// One point scatterer per cell of a lattice fixed to the tissue.
@@ -104,6 +114,11 @@ group! {
         /// acoustics.
         beam_footprint: bool = true,
             Facts::switch().under("Paths").label("Footprint");
+        /// A surface refracts by its mean slope over the width of the wavefront that forms the image behind it, as wide
+        /// as the aperture near the face: bumps smaller than that do not steer. `"ray"`: by its slope where the ray
+        /// meets it, geometric acoustics.
+        refraction: Refraction = Refraction::Beam,
+            Facts::word::<Refraction>().under("Paths").label("Refraction");
         /// Standard deviation of the paths' lateral start about the scanline.
         origin_jitter: f64 = 0.0,
             Facts::quantity(&LENGTH, 0.0, 100.0).under("Paths").label("Origin jitter").usual(0.0, 2.0);

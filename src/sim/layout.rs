@@ -129,6 +129,10 @@ constants! {
     pub const FLAG_SLOTS: u32 = 256;
     /// Only what a masking instance encloses gives echoes.
     pub const FLAG_MASKED: u32 = 512;
+    /// Surfaces refract by their mean slope over the wavefront's width.
+    pub const FLAG_WAVEFRONT: u32 = 1024;
+    /// A path goes down below a surface that it has met by this part of its way at least.
+    pub const LEAST_DESCENT: f32 = 1e-3;
 
     /// The anatomy in front of the image plane is cut away.
     pub const VIEW3D_CUT: u32 = 1;
@@ -193,7 +197,7 @@ shared! {
         tissue: u32, priority: i32, surface_outside: u32, surface_inside: u32,
         first_triangle: u32, triangles: u32, bvh_root: u32, slot: u32,
         low: [f32; 4], high: [f32; 4],
-        field: u32, masks: u32, owners: u32, unused0: u32,
+        field: u32, masks: u32, owners: u32, finest: f32,
     }
     /// Constants of one axial sample.
     struct Row {
@@ -202,7 +206,7 @@ shared! {
         volume_gain: f32, point_gain: f32, surface_gain: f32,
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
-        black: f32, unused0: f32, unused1: f32, unused2: f32,
+        black: f32, sigma_wavefront: f32, unused0: f32, unused1: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {
@@ -247,6 +251,13 @@ shared! {
     }
 }
 
+/// What `interpolate` makes of the weighted sum of vectors: nothing.
+pub const SUM: u32 = 0;
+/// A vector of length 1, as normals are.
+pub const UNIT: u32 = 1;
+/// Vectors are of length 1, each a word ([`crate::scene::smoothed::pack`]).
+pub const PACKED: u32 = 2;
+
 /// Push constants of `interpolate`: how vectors between keyframes are made. All places are counted
 /// in vectors from the beginning of the buffer.
 #[repr(C)]
@@ -256,9 +267,9 @@ pub struct Interpolation {
     pub count: u32,
     /// Place of the first result: it overlaps no source that is read, or is exactly one of them.
     pub target: u32,
-    /// 1: they are brought to length 1, as normals are.
-    pub unit: u32,
-    /// Floats from one vector to the next: 3, or 4 of which the last stays as it is.
+    /// [`SUM`], [`UNIT`] or [`PACKED`].
+    pub kind: u32,
+    /// Words from one vector to the next: 3, or 4 of which the last stays as it is; 1 where they are packed.
     pub stride: u32,
     /// Place of each keyframe's first vector.
     pub sources: [u32; 4],

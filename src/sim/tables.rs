@@ -7,7 +7,9 @@ use super::placement::matrix_rows;
 use super::special::half_normal_coherence;
 use crate::probe::{Kind, Probe};
 use crate::scene::{Scene, Surface, Wire};
-use crate::settings::{Coherence, Imaging, Sampling, ScatterMode, Sequence, TextureSpace};
+use crate::settings::{
+    Coherence, Imaging, Refraction, Sampling, ScatterMode, Sequence, TextureSpace,
+};
 
 /// Lower limit of the weights of paths. The kernel ends a path by setting its weight to 0, which has to be
 /// below every limit.
@@ -70,6 +72,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
             | flag(simulation.scatter_mode == ScatterMode::Voxel, layout::FLAG_VOXEL)
             | flag(scene.is_masked(), layout::FLAG_MASKED)
             | flag(simulation.beam_footprint, layout::FLAG_FOOTPRINT)
+            | flag(simulation.refraction == Refraction::Beam, layout::FLAG_WAVEFRONT)
             | flag(simulation.sequence == Sequence::Sobol, layout::FLAG_SOBOL),
         seed: simulation.seed,
         origin_jitter: simulation.origin_jitter as f32,
@@ -191,6 +194,7 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 incoherent_gain: calibration.incoherent_gain(z) as f32,
                 receive_reach: reach(scene, scene.probe.receive_aperture(z)) as f32,
                 black: calibration.black(z).max(f64::from(layout::ALL_LEVELS)) as f32,
+                sigma_wavefront: scene.probe.sigma_wavefront(z) as f32,
                 ..layout::Row::default()
             }
         })

@@ -83,6 +83,7 @@ struct Geometry {
     vertices: Buffer,
     vertex_count: u32,
     normals: Buffer,
+    smoothed: Buffer,
     triangles: Buffer,
     fields: Buffer,
 }
@@ -149,13 +150,22 @@ impl World {
             vertices: upload(device, "vertices", bytemuck::cast_slice(&arrays.vertices))?,
             vertex_count: arrays.vertices.len() as u32,
             normals: upload(device, "normals", bytemuck::cast_slice(&arrays.normals))?,
+            smoothed: upload(device, "smoothed", bytemuck::cast_slice(&arrays.smoothed))?,
             triangles: upload(device, "triangles", bytemuck::cast_slice(&arrays.triangles))?,
             fields: upload(device, "fields", bytemuck::cast_slice(&arrays.fields.padded()))?,
         };
         let mut world = Self {
             tracer,
             splits,
-            changing: Changing::new(device, kernels, scene, tracer, &geometry, &arrays.regions)?,
+            changing: Changing::new(
+                device,
+                kernels,
+                scene,
+                tracer,
+                &geometry,
+                &arrays.regions,
+                arrays.uploaded,
+            )?,
             top: Top::new(device, scene, &arrays.sets, arrays.bvh)?,
             geometry,
             fields: arrays.fields,
@@ -287,6 +297,7 @@ impl World {
             "instances" => &geometry.instances,
             "vertices" => &geometry.vertices,
             "normals" => &geometry.normals,
+            "smoothed" => &geometry.smoothed,
             "triangles" => &geometry.triangles,
             "fields" => &geometry.fields,
             _ => return None,
@@ -340,7 +351,7 @@ impl World {
     /// Device memory of geometry, structures and fields.
     pub fn memory(&self) -> Memory {
         let g = &self.geometry;
-        let buffers = [&g.instances, &g.vertices, &g.normals, &g.triangles];
+        let buffers = [&g.instances, &g.vertices, &g.normals, &g.smoothed, &g.triangles];
         Memory {
             geometry: buffers.iter().map(|b| b.size()).sum(),
             structures: self.top.bytes() + self.changing.bytes(),

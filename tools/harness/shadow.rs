@@ -6,7 +6,8 @@ use super::{Case, Check, Input, Job, Size, Subject};
 use crate::reference::origin;
 use crate::reference::shadow::{self, Piece};
 use insonify::sim::layout::{
-    FAR_PIECE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED, MAX_PIECES, START_WORDS, Surface,
+    FAR_PIECE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_WAVEFRONT, MAX_PIECES,
+    START_WORDS, Surface,
 };
 use insonify::sim::stages;
 
@@ -37,7 +38,7 @@ pub const SUBJECT: Subject = Subject {
 fn job(case: Case, size: Size) -> Job {
     let mut frame = frame(case, size);
     frame.flags = match case {
-        Case::Random => FLAG_MASKED | FLAG_FOOTPRINT,
+        Case::Random => FLAG_MASKED | FLAG_FOOTPRINT | FLAG_WAVEFRONT,
         Case::Odd => FLAG_MASKED,
         Case::Modes => FLAG_COINCIDENT,
         _ => 0,

@@ -7,7 +7,7 @@ use super::{Case, Check, Extent, Input, Job, Size, Subject};
 use crate::reference::{Segment, origin, trace};
 use insonify::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame,
+    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WAVEFRONT, FLAG_WORLD_TEXTURE, Frame,
     SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, START_WORDS,
 };
 use insonify::sim::rounds::Rounds;
@@ -53,15 +53,17 @@ pub fn rounds(job: &Job, frame: &Frame) -> Rounds {
     Rounds::new(frame, paths, WORKERS)
 }
 
-/// Frame, tissues, surfaces, the world's five bindings, and its fields.
+/// Frame, tissues, surfaces, the world's six bindings, and its fields.
 pub fn scene(case: Case, size: Size) -> Vec<Input> {
     let mut frame = frame(case, size);
     frame.surface_scale = (1 << 20) as f32;
     frame.volume_scale = frame.surface_scale;
     (frame.sampling, frame.flags, frame.paths) = match case {
-        Case::Odd => {
-            (SAMPLING_PLAIN, FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED, 7)
-        }
+        Case::Odd => (
+            SAMPLING_PLAIN,
+            FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED | FLAG_WAVEFRONT,
+            7,
+        ),
         Case::Modes => (
             SAMPLING_SHARED_PRIMARY,
             FLAG_COINCIDENT | FLAG_COHERENT | FLAG_WORLD_TEXTURE | FLAG_FOOTPRINT | FLAG_SOBOL,
@@ -69,7 +71,7 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
         ),
         // Main paths of their own.
         Case::One => (SAMPLING_MAIN_PATH, FLAG_ROUGH_TRANSMISSION, 3),
-        _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL, 8),
+        _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL | FLAG_WAVEFRONT, 8),
     };
     let mut tissues = worlds::tissues();
     if case == Case::NotFinite {

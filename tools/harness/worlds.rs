@@ -6,6 +6,7 @@ use glam::{DAffine3, DQuat, DVec3};
 use super::inputs::Random;
 use super::{Case, Input, Job};
 use crate::reference::Owned;
+use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{MeshBvh, Placed, SceneBvh};
 use insonify::sim::fields::{HEADER, padded};
@@ -76,16 +77,18 @@ impl Builder {
         Input::floats("fields", padded(&self.fields).as_flattened())
     }
 
-    /// The five bindings instances, vertices, normals, triangles, nodes.
+    /// The six bindings instances, vertices, normals, smoothed, triangles, nodes.
     pub fn inputs(mut self) -> Vec<Input> {
         let trees: Vec<MeshBvh> = self.meshes.iter().map(MeshBvh::build).collect();
         let (mut vertices, mut normals) = (Vec::new(), Vec::new());
         let (mut triangles, mut firsts) = (Vec::new(), Vec::new());
+        let mut averages = Vec::new();
         for (mesh, tree) in self.meshes.iter().zip(&trees) {
             let base = vertices.len() as u32;
             firsts.push(triangles.len() as u32);
             vertices.extend_from_slice(&mesh.positions);
             normals.extend_from_slice(&mesh.normals);
+            averages.extend(smoothed(mesh, 1.0));
             let order = tree.triangle_order.iter();
             triangles.extend(order.map(|&t| mesh.triangles[t as usize].map(|v| base + v)));
         }
@@ -106,6 +109,7 @@ impl Builder {
             instance.triangles = self.meshes[mesh].triangles.len() as u32;
             instance.bvh_root = roots[mesh];
             instance.slot = nodes.slots[i];
+            instance.finest = placement::stretch(&self.placements[i].1) as f32;
             let [low, high] = trees[mesh].bounds.map(|[x, y, z]| [x, y, z, 0.0]);
             (instance.low, instance.high) = (low, high);
         }
@@ -113,6 +117,7 @@ impl Builder {
             Input::words("instances", &self.instances),
             Input::floats("vertices", vertices.as_flattened()),
             Input::floats("normals", normals.as_flattened()),
+            Input::words("smoothed", &averages),
             Input::words("triangles", &triangles),
             Input::words("nodes", &nodes.nodes),
         ]
@@ -219,6 +224,7 @@ pub fn owned(job: &Job) -> Owned {
         instances: job.optional("instances"),
         positions: job.optional("vertices"),
         normals: job.optional("normals"),
+        smoothed: job.optional("smoothed"),
         triangles: job.optional("triangles"),
         points,
         fields: fields(job),
@@ -240,8 +246,9 @@ pub fn size(job: &Job, name: &str) -> usize {
     // No more than exist: a job of another kernel has none, and a dump may lack some.
     let used = &triangles[..end.min(triangles.len())];
     match name {
-        "vertices" | "normals" => {
-            12 * used.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize
+        "vertices" | "normals" | "smoothed" => {
+            let each = if name == "smoothed" { 16 } else { 12 };
+            each * used.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize
         }
         "triangles" => {
             let owners = instances.iter().filter(|i| i.owners != 0);

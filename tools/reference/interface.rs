@@ -8,8 +8,9 @@ use super::footprint;
 use super::path::Path;
 use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, draw, gaussian, pcg4d, unit};
 use super::stack::Stack;
+use super::wavefront::{Slope, turned};
 use super::world::{Crossing, World};
-use insonify::sim::layout::{FLAG_COHERENT, FLAG_FOOTPRINT, Row, Surface, Tissue};
+use insonify::sim::layout::{FLAG_COHERENT, Row, Surface, Tissue};
 
 /// Roughness exponent from which on a surface is a perfect mirror.
 pub(super) const MIRROR: f64 = 1e9;
@@ -32,17 +33,17 @@ pub(super) struct Micro {
 pub(super) struct Interface {
     /// Normal of the triangle.
     pub(super) geometric: DVec3,
-    /// Interpolated.
-    pub(super) shading: DVec3,
+    /// Averaged over the wavefront: the one that refracts.
+    pub(super) refracting: DVec3,
     /// None when no attempt was acceptable: no echo, no reflected path.
     pub(super) micro: Option<Micro>,
     /// Fluids before and behind.
     pub(super) fluids: [Fluid; 2],
-    /// Intensity reflectance R at the shading normal, where the surface curves its mean over the
-    /// beam; 1 at total reflection.
+    /// Intensity reflectance R at the refracting normal, where the surface curves or is rough its mean
+    /// over the beam; 1 at total reflection.
     pub(super) reflectance: f64,
-    /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
-    pub(super) width: f64,
+    /// Whether something gets through beside a totally reflected middle of the beam.
+    pub(super) curved: bool,
     /// Deviation of the reflected direction over the beam, rad.
     pub(super) turn: f64,
     pub(super) roughness: f64,
@@ -65,37 +66,22 @@ pub(super) fn meet(
     after: &Stack,
 ) -> Interface {
     let d = path.direction;
-    let (outward, shading) = world.normals(hit);
-    let outside = d.dot(outward) < 0.0;
-    let geometric = if outside { outward } else { -outward };
-    let shading = if (shading.dot(d) < 0.0) == outside {
-        if outside { shading } else { -shading }
-    } else {
-        geometric
-    };
+    let Slope { geometric, shading, refracting, width } = world.slope(row, path, hit);
     let tissue = |stack| &world.tissues[world.medium(stack).0 as usize];
     let (before, behind) = (tissue(&path.stack), tissue(after));
     let fluids = [fluid(before), fluid(behind)];
     let instance = &world.instances[hit.instance as usize];
     let surface = world.surfaces
-        [if outside { instance.surface_outside } else { instance.surface_inside } as usize];
+        [if hit.entry { instance.surface_outside } else { instance.surface_inside } as usize];
     let roughness = f64::from(surface.roughness);
-    let cos_i = -d.dot(shading);
-    let width = if world.frame.flags & FLAG_FOOTPRINT == 0 {
-        0.0
-    } else {
-        let sigma = f64::from(row.sigma_lateral);
-        // In the plane of incidence; along the image where there is none.
-        let along = d + cos_i * shading + 0.01 * path.lateral;
-        world.curvature(hit, along) * sigma.hypot(path.spread[0].sqrt())
-    };
+    let cos_i = -d.dot(refracting);
     Interface {
         geometric,
-        shading,
+        refracting,
         micro: micro_normal(world, path, geometric, shading, roughness),
         fluids,
-        reflectance: footprint::reflectance(fluids[0], fluids[1], cos_i, width),
-        width,
+        reflectance: footprint::reflectance(fluids[0], fluids[1], cos_i.max(0.0), width),
+        curved: width > 0.0,
         turn: 2.0 * width / cos_i.max(1e-3),
         roughness,
         surface,
@@ -142,6 +128,13 @@ pub(super) fn gain<'a>(world: &'a World, path: &Path) -> impl Fn(usize) -> f64 +
 }
 
 impl Interface {
+    /// The direction behind the interface of `path`, refracted at normal `n`; none where all is reflected. The middle
+    /// of a beam may be totally reflected where the rest is not: it goes straight on.
+    pub(super) fn turned(&self, world: &World, path: &Path, n: DVec3) -> Option<DVec3> {
+        let direction = turned(world.frame, self.fluids, path.direction, n, self.geometric);
+        direction.or(self.curved.then_some(path.direction))
+    }
+
     /// Deposits what returns along the path: the part in phase at the surface, the rest displaced
     /// by the thickness with a phase that belongs to the surface.
     pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {

@@ -2,12 +2,16 @@
 
 use glam::DVec3;
 
-use insonify::sim::layout::Interpolation;
+use super::wavefront::unpacked;
+use insonify::sim::layout::{Interpolation, PACKED, SUM};
 
 /// The `count` vectors that the kernel writes from `target` on.
 pub fn interpolate(push: &Interpolation, values: &[f32]) -> Vec<DVec3> {
     let at = |vector: u32| {
         let at = (push.stride * vector) as usize;
+        if push.kind == PACKED {
+            return unpacked(values[at].to_bits());
+        }
         DVec3::new(values[at].into(), values[at + 1].into(), values[at + 2].into())
     };
     let sum = |i| {
@@ -16,12 +20,14 @@ pub fn interpolate(push: &Interpolation, values: &[f32]) -> Vec<DVec3> {
         read.map(|(source, weight)| f64::from(weight) * at(source + i)).sum()
     };
     let made = (0..push.count).map(sum);
-    if push.unit == 0 { made.collect() } else { made.map(DVec3::normalize_or_zero).collect() }
+    if push.kind == SUM { made.collect() } else { made.map(DVec3::normalize_or_zero).collect() }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use insonify::scene::smoothed::pack;
+    use insonify::sim::layout::UNIT;
 
     #[test]
     fn vectors_lie_between_those_of_their_keyframes() {
@@ -38,9 +44,18 @@ mod tests {
             [DVec3::new(2.0, 4.0, 2.0)],
             "and what has no weight is not read"
         );
-        push.unit = 1;
+        push.kind = UNIT;
         assert_eq!(interpolate(&push, &values), [DVec3::new(1.0, 2.0, 1.0).normalize()]);
         push.weights = [0.0; 4];
         assert_eq!(interpolate(&push, &values), [DVec3::ZERO]);
+        let values = [DVec3::X, DVec3::Y, -DVec3::Z].map(|v| f32::from_bits(pack(v)));
+        push = Interpolation {
+            kind: PACKED,
+            stride: 1,
+            sources: [0, 1, 2, 2],
+            weights: [2.0, 0.0, 1.0, 0.0],
+            ..push
+        };
+        assert_eq!(interpolate(&push, &values), [DVec3::new(2.0, 0.0, -1.0).normalize()]);
     }
 }

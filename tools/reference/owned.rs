@@ -1,7 +1,9 @@
 //! A world with arrays of its own, for the twins.
 
-use super::world::{Geometry, World};
+use super::world::{Geometry, World, affine};
 use super::{origin, trace};
+use insonify::scene::Mesh;
+use insonify::scene::smoothed::smoothed;
 use insonify::sim::layout::{Frame, Instance, Row, Surface, Tissue};
 
 /// The arrays that a [`World`] borrows, in the device's layout and units.
@@ -23,6 +25,8 @@ pub struct Owned {
     pub positions: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
+    /// The same averaged over the surface.
+    pub smoothed: Vec<[u32; 4]>,
     /// Vertex indices; an instance owns a range, or shares it ([`Geometry::triangles`]).
     pub triangles: Vec<[u32; 3]>,
     /// Displacement fields, in vectors.
@@ -30,7 +34,7 @@ pub struct Owned {
 }
 
 impl Owned {
-    /// Appends a mesh and `instance`, which gets its range of triangles.
+    /// Appends a mesh and `instance`, which gets its range of triangles, and 1 mm for its finest average.
     pub fn place(
         &mut self,
         positions: &[[f32; 3]],
@@ -42,8 +46,17 @@ impl Owned {
         self.instances.push(Instance {
             first_triangle: self.triangles.len() as u32,
             triangles: triangles.len() as u32,
+            finest: 1.0,
             ..instance
         });
+        let mesh = Mesh {
+            positions: positions.to_vec(),
+            normals: normals.to_vec(),
+            triangles: triangles.to_vec(),
+            ..Mesh::default()
+        };
+        let stretch = affine(&instance.world_from_object).matrix3.determinant().abs().cbrt();
+        self.smoothed.extend(smoothed(&mesh, stretch.recip()));
         self.positions.extend_from_slice(positions);
         self.normals.extend_from_slice(normals);
         let moved = triangles.iter().map(|t| t.map(|v| v + base));
@@ -61,6 +74,7 @@ impl Owned {
             geometry: Geometry {
                 positions: &self.positions,
                 normals: &self.normals,
+                smoothed: &self.smoothed,
                 triangles: &self.triangles,
             },
             points: &self.points,

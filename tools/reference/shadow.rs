@@ -1,7 +1,6 @@
 //! Twin of `shadow`: the loss of sound in the anatomy inside the mask, beyond the loss that the
 //! tissue around the mask would cause.
 
-use super::acoustics;
 use super::geometry::world_line;
 use super::interface::{self, Interface};
 use super::path::{Path, Role, step};
@@ -69,14 +68,8 @@ fn middle(world: &World, line: u32, begin: &Start) -> Path {
 }
 
 /// Refracts the path; false at total reflection of the whole beam.
-fn refract(path: &mut Path, interface: &Interface) -> bool {
-    let [before, behind] = interface.fluids;
-    let through = |n| acoustics::refract(before, behind, path.direction, n);
-    let direction = through(interface.shading)
-        .filter(|d| d.dot(interface.geometric) < 0.0)
-        .or_else(|| through(interface.geometric))
-        .or((interface.width > 0.0).then_some(path.direction));
-    let Some(direction) = direction else {
+fn refract(world: &World, path: &mut Path, interface: &Interface) -> bool {
+    let Some(direction) = interface.turned(world, path, interface.refracting) else {
         return false;
     };
     path.direction = direction;
@@ -138,7 +131,7 @@ fn follow(world: &World, mut path: Path) -> Vec<Piece> {
             let row = &world.rows[row.clamp(0, i64::from(frame.samples) - 1) as usize];
             let interface = interface::meet(world, row, &path, &hit, &after);
             let passes = 1.0 - interface.reflectance;
-            lost = !refract(&mut path, &interface) || passes <= 0.0;
+            lost = !refract(world, &mut path, &interface) || passes <= 0.0;
             level = if lost { DARK } else { level + passes.ln() };
         }
         path.stack = after;

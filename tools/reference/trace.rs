@@ -302,14 +302,9 @@ impl Tracer<'_> {
         let rough = self.world.frame.flags & FLAG_ROUGH_TRANSMISSION != 0;
         let normal = match interface.micro {
             Some(micro) if rough => micro.normal,
-            _ => interface.shading,
+            _ => interface.refracting,
         };
-        let [before, behind] = interface.fluids;
-        let through = |n| acoustics::refract(before, behind, path.direction, n);
-        let beyond = through(normal).filter(|d| d.dot(interface.geometric) < 0.0);
-        // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
-        let straight = (interface.width > 0.0).then_some(path.direction);
-        let Some(direction) = beyond.or_else(|| through(interface.geometric)).or(straight) else {
+        let Some(direction) = interface.turned(self.world, path, normal) else {
             self.out.counters.paths_lost += 1;
             return false;
         };

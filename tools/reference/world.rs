@@ -18,6 +18,8 @@ pub struct Geometry<'a> {
     pub positions: &'a [[f32; 3]],
     /// Unit outward shading normals, one per vertex.
     pub normals: &'a [[f32; 3]],
+    /// The same averaged over the surface, packed ([`insonify::scene::smoothed`]).
+    pub smoothed: &'a [[u32; 4]],
     /// Vertex indices, counter-clockwise seen from outside; an instance owns the range
     /// `first_triangle..first_triangle + triangles`, or shares it. Behind them, lists of the instances to which
     /// the shared ones belong.
@@ -169,21 +171,35 @@ impl World<'_> {
         let turn = affine(&instance.object_from_world).matrix3.transpose();
         let [a, b, c] = self.corners(crossing.triangle);
         let [u, v] = crossing.uv;
-        let [na, nb, nc] = self.geometry.triangles[crossing.triangle]
-            .map(|i| widen(self.geometry.normals[i as usize]));
+        let [na, nb, nc] = self.corner_normals(crossing);
         let shading = (1.0 - u - v) * na + u * nb + v * nc;
         ((turn * (b - a).cross(c - a)).normalize(), (turn * shading).normalize())
     }
 
-    /// How fast the interpolated normal turns along the direction `along` (world, any length), rad/mm.
-    pub fn curvature(&self, crossing: &Crossing, along: DVec3) -> f64 {
+    /// Normals at the corners of the triangle, as the vertices have them.
+    pub fn corner_normals(&self, crossing: &Crossing) -> [DVec3; 3] {
+        let corners = self.geometry.triangles[crossing.triangle];
+        corners.map(|i| widen(self.geometry.normals[i as usize]))
+    }
+
+    /// The unit normal at a crossing that is `normals` at the corners of the triangle (object space); zero where they
+    /// cancel.
+    pub fn between(&self, crossing: &Crossing, normals: [DVec3; 3]) -> DVec3 {
+        let instance = &self.instances[crossing.instance as usize];
+        let [u, v] = crossing.uv;
+        let mean = (1.0 - u - v) * normals[0] + u * normals[1] + v * normals[2];
+        (affine(&instance.object_from_world).matrix3.transpose() * mean).normalize_or_zero()
+    }
+
+    /// How fast a normal turns that is `normals` at the corners of the triangle (object space), along the direction
+    /// `along` (world, any length), rad/mm.
+    pub fn curvature(&self, crossing: &Crossing, normals: [DVec3; 3], along: DVec3) -> f64 {
         let instance = &self.instances[crossing.instance as usize];
         let to_world = affine(&instance.world_from_object).matrix3;
         let turn = affine(&instance.object_from_world).matrix3.transpose();
         let [a, b, c] = self.corners(crossing.triangle);
         let (u, v) = (to_world * (b - a), to_world * (c - a));
-        let [n, n_u, n_v] = self.geometry.triangles[crossing.triangle]
-            .map(|i| (turn * widen(self.geometry.normals[i as usize])).normalize_or_zero());
+        let [n, n_u, n_v] = normals.map(|n| (turn * n).normalize_or_zero());
         let across = u.cross(v);
         let (area2, size) = (across.length_squared(), along.length_squared());
         if area2 == 0.0 || size == 0.0 {

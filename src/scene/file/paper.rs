@@ -3,11 +3,12 @@
 use std::path::Path;
 
 /// What a scene of any kind is simulated with.
-const SIMULATION: [(&str, &str); 6] = [
+const SIMULATION: [(&str, &str); 7] = [
     ("simulation.sampling", "plain"),
     ("simulation.coherence", "coherent"),
     ("simulation.rough_transmission", "true"),
     ("simulation.beam_footprint", "false"),
+    ("simulation.refraction", "ray"),
     ("simulation.scatter_mode", "voxel"),
     ("simulation.texture_space", "world"),
 ];

@@ -47,10 +47,11 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         }
         write(array.name, array.element, array.words, &values)?;
     }
-    let anatomy: [&[u8]; 6] = [
+    let anatomy: [&[u8]; 7] = [
         bytemuck::cast_slice(&instances),
         bytemuck::cast_slice(&arrays.vertices),
         bytemuck::cast_slice(&arrays.normals),
+        bytemuck::cast_slice(&arrays.smoothed),
         bytemuck::cast_slice(&arrays.triangles),
         bytemuck::cast_slice(nodes),
         &fields,

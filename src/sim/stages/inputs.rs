@@ -25,10 +25,11 @@ pub static INPUTS: [Array; 9] = [
 ];
 
 /// The anatomy, which [`super::super::World`] holds.
-pub static ANATOMY: [Array; 6] = [
+pub static ANATOMY: [Array; 7] = [
     Array::anatomy("instances", Word, size_of::<Instance>() / 4),
     Array::anatomy("vertices", Float, 3),
     Array::anatomy("normals", Float, 3),
+    Array::anatomy("smoothed", Word, 4),
     Array::anatomy("triangles", Word, 3),
     Array::anatomy("nodes", Word, 20),
     Array::anatomy("fields", Float, 4),

@@ -15,6 +15,7 @@ pub const SHADOW: Pass = Pass {
         "instances",
         "vertices",
         "normals",
+        "smoothed",
         "triangles",
         "nodes",
         "stacks",

@@ -26,6 +26,7 @@ const ANY: Pass = Pass {
         "instances",
         "vertices",
         "normals",
+        "smoothed",
         "triangles",
         "nodes",
         "stacks",

@@ -4,10 +4,12 @@ use rayon::prelude::*;
 
 use super::entry;
 use super::joined::{Set, Sets};
+use crate::scene::smoothed::{self, smoothed};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh, Splits};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
+use crate::sim::placement::stretch;
 use crate::sim::tracer::Tracer;
 
 /// A box in object space, mm: smallest and largest corner.
@@ -26,12 +28,21 @@ pub(super) struct Place {
     /// Index in the mesh of each triangle, in the order of the array; triangles that were cut occur several
     /// times. None where the order is that of the mesh.
     pub(super) order: Option<Vec<u32>>,
+    /// In the mesh's unit: over how much of it the first of its averaged normals is taken, which is
+    /// [`FINEST`] where the mesh is placed first.
+    pub(super) finest: f64,
     /// Of an instance that changes its shape: how often the device has made it.
     pub(super) version: u64,
     /// For a structure that instances share: the place in the triangles, in words, of the list that names the
     /// instance of each triangle; 0: all triangles belong to one instance.
     pub(super) owners: u32,
 }
+
+/// Deviation over which the first of the averaged normals is taken, mm of the world.
+const FINEST: f64 = 1.0;
+
+/// Of one vertex the normals averaged over the surface about it ([`smoothed()`]).
+pub(super) type Averages = [u32; smoothed::LEVELS];
 
 /// What of a mesh has to stay on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -68,6 +79,18 @@ pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
     needs
 }
 
+/// [`FINEST`] in the unit of each mesh of the scene.
+fn finest(scene: &Scene) -> Vec<f64> {
+    let mut finest = vec![None; scene.meshes.len()];
+    for instance in &scene.instances {
+        let own = FINEST / stretch(&instance.world_from_object);
+        for &mesh in instance.keyframes.meshes.iter().chain([&instance.mesh]) {
+            finest[mesh].get_or_insert(own);
+        }
+    }
+    finest.into_iter().map(|f| f.unwrap_or(FINEST)).collect()
+}
+
 /// Whether the instance's structure changes while the program runs.
 pub(super) fn is_dynamic(instance: &Instance) -> bool {
     use Strategy::{Cached, Interpolate, Rebuild, Refit};
@@ -84,6 +107,10 @@ pub struct Arrays {
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
+    /// The same averaged over the surface about each vertex ([`smoothed()`]).
+    pub smoothed: Vec<[u32; smoothed::LEVELS]>,
+    /// Those of the meshes that have no vertices here, by mesh.
+    pub(super) uploaded: Vec<Vec<Averages>>,
     /// Indices into the vertices; behind them, two to a word, whose the triangles are that instances
     /// share.
     pub triangles: Vec<[u32; 3]>,
@@ -137,6 +164,8 @@ impl Arrays {
             instances: Vec::new(),
             vertices: Vec::new(),
             normals: Vec::new(),
+            smoothed: Vec::new(),
+            uploaded: Vec::new(),
             triangles: Vec::new(),
             bvh: (tracer == Tracer::Bvh).then(|| SceneBvh::new(entry::capacity(scene))),
             fields,
@@ -145,15 +174,25 @@ impl Arrays {
             sets,
         };
         let needs = needs(scene, &arrays.sets);
+        let finest = finest(scene);
+        let averages: Vec<Vec<Averages>> =
+            scene.meshes.par_iter().zip(&finest).map(|(mesh, &f)| smoothed(mesh, f)).collect();
         let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
             .map(|(mesh, need)| {
                 let walked = tracer == Tracer::Bvh && *need == Need::Structure;
                 walked.then(|| MeshBvh::over(&mesh.positions, &mesh.triangles, splits))
             })
             .collect();
-        for ((mesh, tree), need) in scene.meshes.iter().zip(trees).zip(needs) {
+        let made = trees.into_iter().zip(averages).zip(finest);
+        for ((mesh, ((tree, averages), finest)), need) in scene.meshes.iter().zip(made).zip(needs) {
             let place = arrays.add(mesh, tree, need);
-            arrays.places.push(place);
+            arrays.places.push(Place { finest, ..place });
+            if need >= Need::Vertices {
+                arrays.smoothed.extend(averages);
+                arrays.uploaded.push(Vec::new());
+            } else {
+                arrays.uploaded.push(averages);
+            }
         }
         let owners = arrays.join(scene, tracer, splits);
         for instance in &scene.instances {
@@ -326,6 +365,7 @@ impl Arrays {
         let grown = self.vertices.len() + if own_vertices { vertices } else { 0 };
         self.vertices.resize(grown, [0.0; 3]);
         self.normals.resize(grown, [0.0; 3]);
+        self.smoothed.resize(grown, [0; smoothed::LEVELS]);
         self.triangles.resize(self.triangles.len() + triangles, [0; 3]);
         place
     }

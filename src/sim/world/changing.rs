@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::arrays::{Bounds, Place, ordered};
+use super::arrays::{Averages, Bounds, Place, ordered};
 use super::refit::Refit;
 use super::top::Top;
 use super::{Geometry, Kernels, WorldError};
@@ -41,6 +41,8 @@ pub(super) struct Changing {
     bodies: Vec<Option<Body>>,
     structures: Vec<Option<Blas>>,
     refit: Refit,
+    /// Averaged normals of the meshes that are uploaded when they are shown.
+    averages: Vec<Vec<Averages>>,
 }
 
 impl Changing {
@@ -52,6 +54,7 @@ impl Changing {
         tracer: Tracer,
         geometry: &Geometry,
         regions: &[Option<Place>],
+        averages: Vec<Vec<Averages>>,
     ) -> Result<Self, GpuError> {
         let mut bodies = Vec::new();
         let mut structures = Vec::new();
@@ -64,7 +67,8 @@ impl Changing {
             structures.push(blas.map(|blas| blas.blas().clone()));
             bodies.push(body);
         }
-        Ok(Self { refit: Refit::new(device, kernels, scene, tracer, regions)?, bodies, structures })
+        let refit = Refit::new(device, kernels, scene, tracer, regions)?;
+        Ok(Self { refit, bodies, structures, averages })
     }
 
     /// Replaces the kernels.
@@ -112,7 +116,8 @@ impl Changing {
                 true => self.refit.shape(commands, scene, i, geometry, region, top)?,
                 false => {
                     let place = &places[instance.mesh];
-                    upload(commands, scene, instance, place, geometry, region, top)?;
+                    let averages = &self.averages[instance.mesh];
+                    upload(commands, scene, instance, place, averages, geometry, region, top)?;
                     true
                 }
             };
@@ -191,11 +196,13 @@ fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
 }
 
 /// Records what `rebuild` and `cached` send to the device.
+#[allow(clippy::too_many_arguments, reason = "the parts of one world")]
 fn upload(
     commands: &mut Commands<'_>,
     scene: &Scene,
     instance: &Instance,
     place: &Place,
+    averages: &[Averages],
     geometry: &Geometry,
     region: &mut Place,
     top: &mut Top,
@@ -216,6 +223,8 @@ fn upload(
         let at = 12 * u64::from(first_vertex);
         commands.write(&geometry.vertices, at, bytemuck::cast_slice(&mesh.positions))?;
         commands.write(&geometry.normals, at, bytemuck::cast_slice(&mesh.normals))?;
+        let at = size_of::<Averages>() as u64 * u64::from(first_vertex);
+        commands.write(&geometry.smoothed, at, bytemuck::cast_slice(averages))?;
     }
     let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
     put_triangles(commands, geometry, region, &ordered(mesh, order, first_vertex))?;

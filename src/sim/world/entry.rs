@@ -7,7 +7,7 @@ use super::joined::Sets;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
-use crate::sim::placement::{matrix_rows, rigid};
+use crate::sim::placement::{matrix_rows, rigid, stretch};
 
 /// Mask bit of every entry that is not selected by its mask.
 const ALWAYS: u8 = 1;
@@ -163,7 +163,7 @@ pub(super) fn rows(
                 field: fields.offset(scene, i),
                 masks: u32::from(scene.is_mask(i)),
                 owners: place.owners,
-                ..layout::Instance::default()
+                finest: (places[placed.mesh].finest * stretch(&placed.world_from_object)) as f32,
             }
         })
         .collect();

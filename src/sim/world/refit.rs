@@ -8,10 +8,11 @@ use super::changing::{put_tree, put_triangles};
 use super::top::Top;
 use super::{Geometry, Kernels, WorldError};
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage};
+use crate::scene::smoothed::LEVELS;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::bvh::{MeshBvh, levels};
 use crate::sim::fields::Fields;
-use crate::sim::layout::{Interpolation, RefitLevel};
+use crate::sim::layout::{Interpolation, PACKED, RefitLevel, SUM, UNIT};
 use crate::sim::tracer::Tracer;
 
 /// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
@@ -133,8 +134,13 @@ impl Refit {
                 continue;
             };
             let instance = &scene.instances[index];
-            for (values, unit) in [(&geometry.vertices, 0), (&geometry.normals, 1)] {
-                let push = interpolation(scene, instance, places, region, unit);
+            let made = [
+                (&geometry.vertices, SUM, 1),
+                (&geometry.normals, UNIT, 1),
+                (&geometry.smoothed, PACKED, LEVELS as u32),
+            ];
+            for (values, kind, each) in made {
+                let push = interpolation(scene, instance, places, region, kind, each);
                 commands.dispatch(
                     &self.kernels.interpolate,
                     [push.count, 1, 1],
@@ -159,7 +165,7 @@ impl Refit {
                 )?;
             }
             commands.barrier(Stage::Compute, Stage::Compute);
-            ranges.push(&body.bases[&body.held.expect("shape came first")].levels);
+            ranges.push(&body.bases[&body.held.expect("the base was chosen by `shape`")].levels);
         }
         let (Some(refit), Some((_, nodes))) = (&self.boxes, top.bvh()) else {
             return Ok(());
@@ -194,22 +200,24 @@ fn keyframe(instance: &Instance) -> usize {
     }
 }
 
+/// How `each` vectors of every vertex are made.
 fn interpolation(
     scene: &Scene,
     instance: &Instance,
     places: &[Place],
     region: &Place,
-    unit: u32,
+    kind: u32,
+    each: u32,
 ) -> Interpolation {
     let keyframes = &instance.keyframes;
-    let source = |k: usize| places[keyframes.meshes[k]].first_vertex;
+    let source = |k: usize| each * places[keyframes.meshes[k]].first_vertex;
     let mut push = Interpolation {
-        count: scene.meshes[keyframes.meshes[0]].positions.len() as u32,
-        target: region.first_vertex,
-        unit,
+        count: each * scene.meshes[keyframes.meshes[0]].positions.len() as u32,
+        target: each * region.first_vertex,
+        kind,
         sources: [source(keyframe(instance)); 4],
         weights: [1.0, 0.0, 0.0, 0.0],
-        stride: 3,
+        stride: if kind == PACKED { 1 } else { 3 },
     };
     if keyframes.strategy == Strategy::Interpolate {
         push.sources = keyframes.blend.map(|(k, _)| source(k));
