@@ -56,6 +56,8 @@ pub enum Form {
     OneOrSeveral,
     /// A text, or `true`.
     TextOrTrue,
+    /// Any count of values of this form, which are numbers: a [`Value::List`].
+    Several(&'static Form),
 }
 
 impl Form {
