@@ -5,6 +5,7 @@
 
 mod field;
 mod fusion;
+mod group;
 mod imaging;
 mod key;
 mod probe;
@@ -17,8 +18,8 @@ mod words;
 
 pub use field::Field;
 pub use fusion::{Blend, Display, Fusion, MaskSpeed, Surroundings};
+pub(crate) use group::group;
 pub use imaging::{Imaging, Live, Machine};
-pub(crate) use key::group;
 pub use key::{Facts, Form, Group, Off, Row, Value, plain};
 pub use probe::{Kind, MAX_ELEVATION_LAYERS, Probe};
 pub use simulation::{

@@ -2,7 +2,7 @@
 
 use glam::DAffine3;
 
-use super::key::group;
+use super::group;
 use super::words;
 
 const INF: f64 = f64::INFINITY;

@@ -1,6 +1,6 @@
 //! Settings of image formation and of live quality.
 
-use super::key::group;
+use super::group;
 use super::units::{ATTENUATION, DURATION, LEVEL};
 
 const OFF: f64 = f64::NEG_INFINITY;

@@ -2,7 +2,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::key::{Facts, Row, Value, group};
+use super::group;
+use super::key::{Facts, Row, Value};
 use super::units::{ANGLE, FREQUENCY, LENGTH, SPEED};
 
 /// Most elevation layers: `scatter` counts the stretches of each (`MAX_ELEVATION_LAYERS` of glsl/shared.glsl).

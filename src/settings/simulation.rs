@@ -1,7 +1,7 @@
 //! Path tracing and scatterers.
 
+use super::group;
 use super::imaging::Machine;
-use super::key::group;
 use super::units::{LENGTH, LEVEL};
 use super::words;
 

@@ -1,6 +1,6 @@
 //! Settings of reflection at interfaces.
 
-use super::key::group;
+use super::group;
 use super::units::{LENGTH, LEVEL};
 
 const INF: f64 = f64::INFINITY;

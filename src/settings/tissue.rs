@@ -1,7 +1,7 @@
 //! Acoustic properties of a tissue.
 
 use super::Surface;
-use super::key::group;
+use super::group;
 use super::units::{ATTENUATION, DENSITY, LENGTH, LEVEL, SPEED};
 
 const OFF: f64 = f64::NEG_INFINITY;
