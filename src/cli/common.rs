@@ -8,6 +8,7 @@ use std::time::Instant;
 use miette::{IntoDiagnostic, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, cache_folder};
+use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::file::{self, override_of};
 use insonify::settings::{Quality, Simulation};
@@ -118,7 +119,7 @@ impl Common {
         }
         let (tracer, why) = Tracer::choose(wanted, device, &Library::embedded(), scene);
         if let Some(why) = why {
-            eprintln!("{why}");
+            output::note(why);
         }
         Ok(tracer)
     }
@@ -137,7 +138,7 @@ impl Common {
     pub fn scene(&self, path: &Path) -> Result<Scene> {
         let (scene, warnings) = Scene::load(path, &self.overrides(path))?;
         for warning in &warnings {
-            eprintln!("{warning}");
+            output::note(warning);
         }
         Ok(scene)
     }
@@ -185,7 +186,7 @@ pub fn simulator(
 ) -> Result<Simulator> {
     let simulator = Simulator::new(device, library, scene, tracer).into_diagnostic()?;
     if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
+        output::note(format!("warning: {warning}"));
     }
     Ok(simulator)
 }
@@ -275,14 +276,17 @@ impl Progress {
             self.next = gone + 0.1;
             let left = gone / f64::from(count.max(1)) * f64::from(self.count.saturating_sub(count));
             // The end of a longer line before it is erased (ECMA-48, EL).
-            eprint!("\r{count}/{} {}, {left:.0} s left\x1b[K", self.count, self.noun);
+            output::progress(format!(
+                "\r{count}/{} {}, {left:.0} s left\x1b[K",
+                self.count, self.noun
+            ));
         }
     }
 
     /// Ends the display: all items are done.
     pub fn finish(self) {
         if self.next > QUIET {
-            eprint!("\r\x1b[K");
+            output::progress("\r\x1b[K");
         }
     }
 }

@@ -144,7 +144,7 @@ struct Registered {
 pub fn run(args: &Register) -> Result<()> {
     let (mut scene, found) = Scene::load(&args.scene, &[])?;
     for warning in &found {
-        eprintln!("{warning}");
+        output::note(warning);
     }
     scene.set_time(args.time);
     let volume = scene.volume.take().ok_or_else(|| {
@@ -272,7 +272,7 @@ fn write(args: &Register, entries: &[Entry], target: &Target, made: &Registered)
         (None, true) => &args.scene,
         (None, false) => {
             if !args.dry_run {
-                eprintln!("nothing is written: give -o FILE or --in-place");
+                output::note("nothing is written: give -o FILE or --in-place");
             }
             return Ok(());
         }
