@@ -109,6 +109,156 @@ fn a_volume_is_in_memory_once() {
     assert_eq!(outcome.code, Some(0), "{}", outcome.text);
 }
 
+const LINEAR: &str = "[probe]\npreset = \"linear\"\n";
+
+/// `check` and `render` say the same about what would never end, before anything is made.
+#[test]
+fn totals_of_a_scene_are_bounded() {
+    let folder = folder();
+    let spheres = (0..200).map(|i| {
+        format!(
+            "[[mesh]]\nname = \"s{i}\"\ntissue = \"fat\"\nshape = {{ sphere = {{ radius = 3, \
+             subdivisions = 8 }} }}\n"
+        )
+    });
+    let cells =
+        "[simulation]\ncell = 0.01\ndensity_scale = 100\nscatterers_per_resolution_cell = 0\n";
+    let fine = "background = \"liver\"\n".to_owned() + LINEAR + cells;
+    for (text, words) in [
+        (
+            "[[wire]]\nfrom = [0, 0, 1]\nto = [0, 100000, 1]\nspacing = 0.001\n".to_owned(),
+            ["points", "spacing"],
+        ),
+        (spheres.collect(), ["triangles; it may have 16000000", "lower `subdivisions`"]),
+        (fine, ["lattice cells of scatterers", "enlarge simulation.cell"]),
+    ] {
+        refused(&checked(&folder, "totals.toml", &text), &words);
+        // The device has its own memory: only the time is limited for it.
+        let path = folder.path().join("scene.toml");
+        fs::write(&path, &text).expect("written");
+        let mut command = assert_cmd::Command::new(env!("CARGO_BIN_EXE_insonify"));
+        command.arg("render").arg(&path).args(["-o", "/dev/null", "--tracer", "bvh"]);
+        let output = command.timeout(std::time::Duration::from_secs(60)).output().expect("started");
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        refused(&Outcome { code: output.status.code(), text }, &words);
+    }
+}
+
+/// Thousands of meshes and of groups.
+#[test]
+fn check_is_linear_in_meshes_and_deep_nesting_is_refused() {
+    let folder = folder();
+    let many = |count: u32| {
+        (0..count).map(|i| {
+            format!(
+                "[[mesh]]\nname = \"m{i}\"\ntissue = \"fat\"\nshape = {{ box = {{ size = [1, 1, 1] }} }}\n\
+                 translate = [{}, {}, {}]\n",
+                i % 40 * 2, i / 40 % 40 * 2, i / 1600 * 2
+            )
+        })
+    };
+    let text: String = many(8000).collect();
+    let outcome = checked(&folder, "many.toml", text);
+    assert_eq!(outcome.code, Some(0), "{}", outcome.text.lines().last().unwrap_or_default());
+    let mut deep = "[[group]]\nname = \"g0\"\n".to_owned();
+    for i in 1..20_000 {
+        deep += &format!("[[group]]\nname = \"g{i}\"\nparent = \"g{}\"\n", i - 1);
+    }
+    let outcome = checked(&folder, "deep.toml", deep);
+    refused(&outcome, &["has more than 100 nodes above it"]);
+    assert!(outcome.text.len() < 2000, "{}", outcome.text.len());
+}
+
+/// Two cubes with a wall between them, of three triangles at its edges.
+#[test]
+fn an_inner_wall_leaks_and_has_no_volume() {
+    let folder = folder();
+    let corners = "v 0 0 0\nv 10 0 0\nv 20 0 0\nv 0 10 0\nv 10 10 0\nv 20 10 0\nv 0 0 10\nv 10 0 10\n\
+        v 20 0 10\nv 0 10 10\nv 10 10 10\nv 20 10 10\n";
+    let outer = "f 1 4 5 2\nf 2 5 6 3\nf 7 8 11 10\nf 8 9 12 11\nf 1 2 8 7\nf 2 3 9 8\nf 4 10 11 5\n\
+        f 5 11 12 6\nf 1 7 10 4\nf 3 6 12 9\n";
+    let outcome = checked(&folder, "wall.obj", format!("{corners}{outer}f 2 5 11 8\n"));
+    let (told, words) = (&outcome.text, ["open (4 edges)", "4 edges at which an inner wall ends"]);
+    assert!(words.iter().all(|word| told.contains(word)), "{told}");
+    assert!(!told.contains(" ml"), "{told}");
+    let outcome = checked(&folder, "box.obj", format!("{corners}{outer}"));
+    assert!(
+        outcome.text.contains("2.000 ml") && outcome.text.contains("0 warnings"),
+        "{}",
+        outcome.text
+    );
+}
+
+/// Messages once said something else than what is wrong, or not what to do.
+#[test]
+fn messages_say_cause_and_remedy() {
+    let folder = folder();
+    let utf16 = |text: &str| {
+        let bytes = text.encode_utf16().flat_map(u16::to_le_bytes);
+        [&[0xff, 0xfe][..], &bytes.collect::<Vec<_>>()].concat()
+    };
+    let cube = "v 0 0 0\nv 1e35 0 0\nv 0 1e35 0\nf 1 2 3\n";
+    let gltf = |rest: &str| format!("{{\"asset\":{{\"version\":\"2.0\"}}{rest}}}");
+    let old = "{\"asset\":{\"version\":\"1.0\"},\"accessors\":{},\"buffers\":{},\"meshes\":{},\"nodes\":{}}";
+    let shape =
+        "[[mesh]]\nname = \"a\"\ntissue = \"fat\"\nshape = { sphere = { radius = 1e300 } }\n";
+    for (name, content, words) in [
+        (
+            "self.toml",
+            b"[tissues.a]\nbased_on = \"a\"\n".to_vec(),
+            ["`a` is based on itself", "leave `based_on` out"],
+        ),
+        ("utf16.toml", utf16("name = \"a\""), ["is text in UTF-16", "save it as UTF-8"]),
+        (
+            "latin.toml",
+            b"name = 'a'\n# M\xe4r\n".to_vec(),
+            ["not text in UTF-8: line 2", "save it as UTF-8"],
+        ),
+        (
+            "null.toml",
+            b"[probe]\ndepth = null\n".to_vec(),
+            ["null.toml:2:9: `null` is no value", "leave the key out"],
+        ),
+        ("long.toml", shape.into(), ["radius is 1e300 mm", "between 0.001 and 10000"]),
+        ("utf16.obj", utf16("v 0 0 0\n"), ["is text in UTF-16", "save it as UTF-8"]),
+        ("large.obj", cube.into(), ["is 1.000e35 mm large", "scale it"]),
+        (
+            "small.obj",
+            cube.replace("1e35", "0.1").into(),
+            ["is 0.1000 mm large", "units = \"m\" in its [[mesh]]"],
+        ),
+        (
+            "missing.gltf",
+            gltf(",\"buffers\":[{\"byteLength\":4,\"uri\":\"b.bin\"}]").into(),
+            ["`b.bin` cannot be read", "restore the file"],
+        ),
+        ("old.gltf", old.into(), ["is 1.0; glTF 2.0 can be read", "export it as glTF 2.0"]),
+    ] {
+        let outcome = checked(&folder, name, content);
+        refused(&outcome, &words);
+        assert!(outcome.text.matches("error: ").count() == 1, "{}", outcome.text);
+    }
+    for (path, word) in [("/", "is a folder"), ("/dev/zero", "is a pipe or a device")] {
+        let path = Path::new(path);
+        let link = folder.path().join("link.toml");
+        let _ = fs::remove_file(&link);
+        std::os::unix::fs::symlink(path, &link).expect("linked");
+        refused(&check(&link), &[word]);
+    }
+    let large = sparse(&folder, "large.toml", b"", 100 << 20);
+    refused(&check(&large), &["is 100 MB; a scene file may have 4"]);
+}
+
+/// `--set` on a list that the file does not have.
+#[test]
+fn an_element_of_no_list_is_told() {
+    let folder = folder();
+    let path = folder.path().join("empty.toml");
+    fs::write(&path, LINEAR).expect("written");
+    let outcome = limited::limited("exec \"$0\" render \"$1\" --set mesh.5.tissue=fat", &path);
+    refused(&outcome, &["there is no mesh `5`: the file has no [[mesh]]"]);
+}
+
 /// Nobody reads what is said: the exit code is that of the work.
 #[test]
 fn a_closed_standard_error_is_no_panic() {

@@ -25,8 +25,8 @@ mod told;
 pub struct Register {
     /// Scene file (.toml) with [volume].
     scene: PathBuf,
-    /// The model's surface: the name of a mesh of the scene, or a mesh file in its world (.obj, .stl,
-    /// .gltf, .glb). May be given several times.
+    /// The model's surface: the name of a mesh of the scene, or a mesh file in its world. May be given
+    /// several times.
     #[arg(long, value_name = "MESH", requires = "segmented")]
     surface: Vec<String>,
     /// Points of the same surface in the volume's frame, mm: .csv with the columns x, y, z, or the

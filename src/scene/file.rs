@@ -151,6 +151,7 @@ impl Scene {
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
+        warnings.extend(scene.lines_in_gas(path));
         let variants = vary::variants(&document, &file.vary, &scene, suggested)?;
         Ok((scene, variants, warnings))
     }
@@ -221,6 +222,14 @@ fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<()
     Err(document.fail("imaging.image_height", message, remedy))
 }
 
+/// A value in few digits, however large or small it is.
+fn shown(value: f64) -> String {
+    match (1e-6..1e12).contains(&value.abs()) || value == 0.0 {
+        true => value.to_string(),
+        false => format!("{value:e}"),
+    }
+}
+
 /// Fails at `path` unless `value` lies in the closed range; NaN lies in none.
 fn within(
     document: &Document<'_>,
@@ -235,6 +244,7 @@ fn within(
     }
     let key = path.rsplit('.').next().unwrap_or(path);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    let value = shown(value);
     let (message, remedy) = if most.is_infinite() {
         (format!("{key} is {value}{unit}"), format!("it must be at least {least}{unit}"))
     } else {

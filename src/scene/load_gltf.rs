@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DMat4;
 
-use super::mesh::{self, Choice, Parts, Soup};
+use super::mesh::{self, Choice, Parts, Soup, Units};
 use crate::issue::Issue;
 
 mod accessor;
@@ -27,6 +27,9 @@ pub(super) use animated::{AnimatedParts, Part, read_animated};
 use choice::Chosen;
 use surface::{Surface, Surfaces};
 use typed::Typed;
+
+/// The unit of lengths.
+pub(super) const METRES: Units = Units(1000.0);
 
 /// Most commas of the JSON part: each value of the parsed tree takes some 50 bytes of memory.
 const MAX_VALUES: usize = 4_000_000;
@@ -99,7 +102,11 @@ impl File<'_> {
             let message = format!("{message} ({count})");
             (count > 0).then(|| Issue::warning(self.path, count, message, ""))
         };
+        let mut loose = vec![true; self.gltf.meshes().len()];
+        self.gltf.nodes().filter_map(|n| n.mesh()).for_each(|mesh| loose[mesh.index()] = false);
+        let loose = loose.into_iter().filter(|loose| *loose).count();
         let both = [
+            remark(loose, "meshes that no node places are ignored; add nodes that name them"),
             remark(self.without_data, "primitives without stored positions are ignored"),
             remark(unseen, "nodes with meshes outside the default scene are ignored"),
         ];
@@ -132,7 +139,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     }
     let mut issues = walk.surfaces.issues;
     issues.extend(file.remarks(&walk.visited));
-    Ok(Parts { parts: walk.parts, issues })
+    Ok(Parts { parts: walk.parts, issues, units: Some(METRES), ..Parts::default() })
 }
 
 /// Names of a file's animations; none where it cannot be read.

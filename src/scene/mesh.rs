@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{Mesh, check, load_gltf, load_obj, load_stl};
+use super::formats::{self, off, ply, stl, threemf, vtk, vtp};
+use super::{Mesh, check, load_gltf, load_obj};
 use crate::issue::Issue;
 
 mod animated;
@@ -61,9 +62,9 @@ impl Units {
 /// Options for reading a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// Unit; without it mm, and metres for glTF, which defines its unit.
+    /// Unit; without it the one that the format defines (glTF: metres) or the file states (3MF), else mm.
     pub units: Option<Units>,
-    /// Only this glTF node with its children, or this OBJ object or group.
+    /// Only this glTF node with its children, this OBJ object or group, this STL solid or 3MF object.
     pub node: Option<String>,
     /// True where boundary loops are closed by fans to their centres.
     pub cap_openings: bool,
@@ -89,6 +90,10 @@ pub struct Inspected {
 pub(super) struct Parts {
     pub parts: Vec<Soup>,
     pub issues: Vec<Issue>,
+    /// The unit, where format or file say it.
+    pub units: Option<Units>,
+    /// True where the file states, by means of its format, that its frame is RAS.
+    pub ras: bool,
 }
 
 /// Reads and checks a mesh file; positions end in mm.
@@ -121,22 +126,9 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
     found
 }
 
-/// All chosen triangles of a file, mm, as stored. None if it could not be read; the reason is then among
-/// the issues.
+/// All chosen triangles of a file, mm. None if it could not be read; the reason is then among the issues.
 fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(Soup, Units)> {
-    let kind = Kind::of(path);
-    let read = read_bounded(path).and_then(|bytes| match kind {
-        Some(Kind::Obj) => load_obj::read(path, &bytes),
-        Some(Kind::Stl) => load_stl::read(path, &bytes),
-        Some(Kind::Gltf) => load_gltf::read(path, &bytes, options.node.as_deref()),
-        None => Err(vec![Issue::error(
-            path,
-            1,
-            "not a mesh format that can be read",
-            "convert it to .obj, .gltf, .glb or .stl",
-        )]),
-    });
-    let Parts { parts, issues } = match read {
+    let Parts { parts, issues, units, .. } = match read_parts(path, options) {
         Ok(parts) => parts,
         Err(issues) => {
             found.issues = issues;
@@ -146,8 +138,9 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
     found.issues = issues;
     found.parts = parts.iter().map(|p| p.name.clone()).collect();
 
-    let parts = match (&options.node, kind) {
-        (Some(node), Some(Kind::Obj | Kind::Stl)) => {
+    let parts = match &options.node {
+        // A node of a tree was chosen while that was read.
+        Some(node) if Kind::of(path) != Some(Kind::Gltf) => {
             let chosen: Vec<_> = parts.into_iter().filter(|p| p.name == *node).collect();
             if chosen.is_empty() {
                 found.issues.push(no_such_node(path, node, &found.parts));
@@ -157,9 +150,38 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
         }
         _ => parts,
     };
-    let default_units = if kind == Some(Kind::Gltf) { 1000.0 } else { 1.0 };
-    let units = options.units.unwrap_or(Units(default_units));
+    let units = options.units.or(units).unwrap_or(Units(1.0));
     Some((merge(parts, units), units))
+}
+
+/// The parts of a mesh file by its extension, in its unit and in LPS where it states its frame.
+fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
+    let kind = Kind::of(path);
+    let bytes = read_bounded(path)?;
+    if let Some(issue) = formats::utf16(path, &bytes).filter(|_| kind.is_some_and(Kind::is_text)) {
+        return Err(vec![issue]);
+    }
+    let mut out = match kind {
+        Some(Kind::Obj) => load_obj::read(path, &bytes),
+        Some(Kind::Gltf) => load_gltf::read(path, &bytes, options.node.as_deref()),
+        Some(Kind::Stl) => stl::read(path, &bytes),
+        Some(Kind::Ply) => ply::read(path, &bytes),
+        Some(Kind::Vtk) => vtk::read(path, &bytes),
+        Some(Kind::Vtp) => vtp::read(path, &bytes),
+        Some(Kind::Off) => off::read(path, &bytes),
+        Some(Kind::Threemf) => threemf::read(path, &bytes),
+        None => {
+            let remedy = format!("convert it to {EXTENSIONS}");
+            Err(vec![Issue::error(path, 1, "not a mesh format that can be read", remedy)])
+        }
+    }?;
+    if out.ras || kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes) {
+        let positions = out.parts.iter_mut().flat_map(|part| &mut part.positions);
+        positions.for_each(|[x, y, _]| (*x, *y) = (-*x, -*y));
+        let message = "states that its frame is RAS: turned into LPS, in which volumes are";
+        out.issues.push(Issue::warning(path, 1, message, ""));
+    }
+    Ok(out)
 }
 
 /// Message for a node that a file does not have.
@@ -168,11 +190,19 @@ pub(super) fn no_such_node(path: &Path, node: &str, names: &[String]) -> Issue {
     Issue::error(path, 1, format!("no node or object `{node}` with triangles"), remedy)
 }
 
+/// Extensions of readable files, for messages.
+pub(super) const EXTENSIONS: &str = ".obj, .stl, .ply, .vtk, .vtp, .off, .3mf, .gltf or .glb";
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Obj,
     Gltf,
     Stl,
+    Ply,
+    Vtk,
+    Vtp,
+    Off,
+    Threemf,
 }
 
 impl Kind {
@@ -182,7 +212,21 @@ impl Kind {
             "obj" => Some(Self::Obj),
             "gltf" | "glb" => Some(Self::Gltf),
             "stl" => Some(Self::Stl),
+            "ply" => Some(Self::Ply),
+            "vtk" => Some(Self::Vtk),
+            "vtp" => Some(Self::Vtp),
+            "off" => Some(Self::Off),
+            "3mf" => Some(Self::Threemf),
             _ => None,
+        }
+    }
+
+    /// Returns whether its files are text, or begin with text.
+    fn is_text(self) -> bool {
+        match self {
+            Self::Obj | Self::Stl | Self::Ply | Self::Vtk | Self::Off => true,
+            // XML states its encoding; the others are binary, or JSON.
+            Self::Vtp | Self::Gltf | Self::Threemf => false,
         }
     }
 }

@@ -109,10 +109,12 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     out.warnings.extend(unused(path, &ignored));
     if stacked {
         let message = "is a sequence of planes: its frames are stacked, 1 mm apart";
-        out.warn(path, 1, message, "reconstruct a volume from it");
+        let remedy =
+            "save it as .igs.mha (3D Slicer does); `insonify reconstruct` makes a volume of that";
+        out.warn(path, 1, message, remedy);
     } else if count == 2 {
         let message = "is a plane: one slice of 1 mm";
-        out.warn(path, 1, message, "reconstruct a volume from it");
+        out.warn(path, 1, message, "give a volume of several slices");
     }
     if frame == Frame::Unstated {
         let message = "no anatomical frame is stated; LPS is assumed";

@@ -1,15 +1,16 @@
 //! Placed meshes and wires of a scene file.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use glam::DAffine3;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::placing::placement;
+use super::placing::placed;
 use super::playing::{self, Played, Playing};
 use super::schema::{MeshTable, WireTable};
-use super::shelf::Shelf;
+use super::shelf::{self, Shelf};
 use super::table::Table;
 use super::tissues::Tissues;
 use super::within;
@@ -60,11 +61,13 @@ pub(super) fn meshes(
     tissues: &mut Tissues<'_>,
     warnings: &mut Vec<Issue>,
 ) -> Result<Anatomy, SceneError> {
+    shelf::countable(document, tables.iter().map(|table| &table.other))?;
     let mut shelf = Shelf::default();
     let mut out = Anatomy::default();
+    let mut names = HashSet::new();
     for (i, Table { stated, other: table }) in tables.iter().enumerate() {
         let path = format!("mesh.{i}");
-        if out.instances.iter().any(|other| other.name == table.name) {
+        if names.contains(&table.name) {
             return Err(document.fail(
                 &format!("{path}.name"),
                 format!("there are two meshes named `{}`", table.name),
@@ -78,13 +81,15 @@ pub(super) fn meshes(
             Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
             None => vec![shelf.shapes(document, table, &path, warnings)?],
         };
+        shelf.bounded(document, &path)?;
         let place = (table.translate, table.rotate.as_ref(), table.scale);
-        let rest = placement(document, &path, place)?;
+        let rest = placed(document, &path, table.matrix, place)?;
         stated.put(document, &path, &mut outside)?;
         let mut inside = outside;
         table.inside.stated.put(document, &format!("{path}.inside"), &mut inside)?;
         let first = out.instances.len();
         for shapes in shapes {
+            names.insert(shapes.name.clone());
             out.instances.push(Instance {
                 name: shapes.name,
                 mesh: shapes.mesh,

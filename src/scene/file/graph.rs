@@ -256,7 +256,7 @@ impl Family<'_> {
                 let place = (table.translate, table.rotate.as_ref(), table.scale);
                 let moves = |t| motion::motion(self.document, t, &format!("{path}.motion"));
                 NodeKind::Transform {
-                    rest: placing::placement(self.document, path, place)?,
+                    rest: placing::placed(self.document, path, table.matrix, place)?,
                     motion: table.motion.as_ref().map_or(Ok(Motion::Still), moves)?,
                 }
             }

@@ -8,7 +8,7 @@ use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value}
 
 use super::document::{Source, segments};
 use super::error::SceneError;
-use super::placing::placement;
+use super::placing::{placed, placement};
 use super::schema::even;
 use super::tissues::Tissues;
 use super::{parameters, probe};
@@ -104,11 +104,11 @@ fn check(source: &Source) -> Result<(), SceneError> {
     placement(&document, "model", place)?;
     for (i, t) in file.transform.iter().enumerate() {
         let path = format!("transform.{i}");
-        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
+        placed(&document, &path, t.matrix, (t.translate, t.rotate.as_ref(), t.scale))?;
     }
     for (i, t) in file.mesh.iter().map(|t| &t.other).enumerate() {
         let path = format!("mesh.{i}");
-        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
+        placed(&document, &path, t.matrix, (t.translate, t.rotate.as_ref(), t.scale))?;
     }
     Ok(())
 }

@@ -153,6 +153,7 @@ pub struct TransformTable {
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
     pub scale: Option<Factors>,
+    pub matrix: Option<[f64; 16]>,
     pub motion: Option<MotionTable>,
 }
 
@@ -230,6 +231,7 @@ pub struct MeshTable {
     pub translate: Option<[Length; 3]>,
     pub rotate: Option<Rotation>,
     pub scale: Option<Factors>,
+    pub matrix: Option<[f64; 16]>,
     #[serde(default)]
     pub inside: Table<Surface>,
     #[serde(default)]

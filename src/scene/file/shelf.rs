@@ -1,6 +1,7 @@
 //! Shapes of a scene file: mesh files, keyframes, and built-in shapes. What several instances name
 //! is read once.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::document::Document;
@@ -18,19 +19,14 @@ const MAX_KEYFRAMES: usize = 1000;
 pub(super) struct Shelf {
     /// All of them.
     pub meshes: Vec<Mesh>,
-    read: Vec<Read>,
-}
-
-/// Files that have been read.
-struct Read {
-    files: Files,
-    options: Options,
-    /// Where they lie among the meshes.
-    meshes: Vec<usize>,
+    /// Triangles of all of them.
+    triangles: usize,
+    /// For files that have been read: with which options, and where they lie among the meshes.
+    read: HashMap<Files, Vec<(Options, Vec<usize>)>>,
 }
 
 /// What a mesh is made of.
-#[derive(Clone, PartialEq)]
+#[derive(Clone, PartialEq, Eq, Hash)]
 enum Files {
     One(PathBuf),
     /// Keyframes are read together: vertices must keep their numbers.
@@ -98,16 +94,18 @@ impl Shelf {
             }
         };
         let options = Self::options(table);
-        let known = self.read.iter().find(|r| r.files == files && r.options == options);
+        let known = self.read.get(&files).into_iter().flatten();
+        let known = known.clone().find(|(o, _)| *o == options);
         let meshes = match known {
-            Some(read) => read.meshes.clone(),
+            Some((_, meshes)) => meshes.clone(),
             None => {
                 let (found, issues) = load(&files, &options)
                     .map_err(|issues| Self::unread(document, &issues, name, path, given))?;
                 warnings.extend(issues.into_iter().map(|w| w.of(name)));
                 let found = found.into_iter().map(|mesh| self.add(name, mesh));
                 let meshes: Vec<_> = found.collect();
-                self.read.push(Read { files: files.clone(), options, meshes: meshes.clone() });
+                let known = self.read.entry(files.clone()).or_default();
+                known.push((options, meshes.clone()));
                 meshes
             }
         };
@@ -155,9 +153,50 @@ impl Shelf {
 
     /// Keeps a mesh; its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
+        self.triangles += mesh.triangles.len();
         self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
         self.meshes.len() - 1
     }
+
+    /// Fails at the mesh table at `path` where the meshes so far have too many triangles.
+    pub fn bounded(&self, document: &Document<'_>, path: &str) -> Result<(), SceneError> {
+        affordable(document, path, self.triangles)
+    }
+}
+
+/// Most triangles of all meshes of a scene, keyframes included: some 4 GB while structures are made.
+const MAX_TRIANGLES: usize = 16_000_000;
+
+/// Fails at the mesh table at `path`, with which the scene has so many triangles, where they are too many.
+fn affordable(document: &Document<'_>, path: &str, triangles: usize) -> Result<(), SceneError> {
+    if triangles <= MAX_TRIANGLES {
+        return Ok(());
+    }
+    Err(document.fail(
+        path,
+        format!("with this mesh the scene has {triangles} triangles; it may have {MAX_TRIANGLES}"),
+        "lower `subdivisions` of shapes, reduce meshes in the modeller, or name fewer keyframes",
+    ))
+}
+
+/// Fails where built-in shapes alone have too many triangles: before one of them is made.
+pub(super) fn countable<'t>(
+    document: &Document<'_>,
+    tables: impl Iterator<Item = &'t MeshTable>,
+) -> Result<(), SceneError> {
+    let mut sum = 0usize;
+    for (i, table) in tables.enumerate() {
+        sum = sum.saturating_add(table.shape.as_ref().map_or(0, |shape| match shape {
+            // Out of its range it is refused for that.
+            Shape::Sphere { subdivisions, .. } | Shape::Ellipsoid { subdivisions, .. } => {
+                20 << (2 * (*subdivisions).min(shapes::MAX_SUBDIVISIONS))
+            }
+            Shape::Cylinder { segments, .. } => 4 * *segments as usize,
+            Shape::Box { .. } | Shape::Plane { .. } => 12,
+        }));
+        affordable(document, &format!("mesh.{i}"), sum)?;
+    }
+    Ok(())
 }
 
 fn load(files: &Files, options: &Options) -> Result<(Vec<Mesh>, Vec<Issue>), Vec<Issue>> {

@@ -1,10 +1,10 @@
 //! The table `tracker`.
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::DAffine3;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::placing::placement;
+use super::placing::{affine, placement};
 use super::schema::{RigidTable, TrackerTable};
 use super::within;
 use crate::scene::tracker::{Axes, Tracker, rigid};
@@ -58,29 +58,11 @@ fn transform(
     let Some(rows) = table.matrix else {
         return placement(document, path, (table.translate, table.rotate.as_ref(), None));
     };
-    let path = format!("{path}.matrix");
-    let fail = |why: String, remedy| Err(document.fail(&path, why, remedy));
-    if table.translate.is_some() || table.rotate.is_some() {
-        return fail(
-            "both a matrix and a rotation or shift are given".to_owned(),
-            "give one of them",
-        );
-    }
-    if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return fail(
-            "the last row is not 0 0 0 1".to_owned(),
-            "write the matrix row by row; the shift is the fourth column, mm",
-        );
-    }
-    let column = |i: usize| DVec3::new(rows[i], rows[4 + i], rows[8 + i]);
-    let matrix = DAffine3::from_mat3_translation(
-        DMat3::from_cols(column(0), column(1), column(2)),
-        column(3),
-    );
+    let alone = table.translate.is_none() && table.rotate.is_none();
+    let matrix = affine(document, path, rows, alone)?;
     rigid(matrix).or_else(|why| {
-        fail(
-            format!("this is no rigid transform: {why}"),
-            "write rotation and shift in mm, without scale, row by row",
-        )
+        let message = format!("this is no rigid transform: {why}");
+        let remedy = "write rotation and shift in mm, without scale, row by row";
+        Err(document.fail(&format!("{path}.matrix"), message, remedy))
     })
 }

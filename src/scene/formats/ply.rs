@@ -1,0 +1,374 @@
+//! PLY, the Stanford polygon file format, in text and binary of either byte order: positions and faces. All other
+//! elements and properties (normals, colours, texture) are skipped.
+
+use std::path::Path;
+
+use super::scalar::whole;
+use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, Scalar, Words, index};
+use crate::issue::Issue;
+use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
+
+/// Most lines of a header.
+const MAX_LINES: usize = 10_000;
+
+pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
+    let (soup, faces) = parse(bytes).map_err(|fault| fault.issues(path))?;
+    let issues = faces.warning(path).into_iter().collect();
+    let vertices = soup.positions.len();
+    let triangles = faces.over(vertices).map_err(|fault| fault.issues(path))?;
+    Ok(Parts { parts: vec![Soup { triangles, ..soup }], issues, ..Parts::default() })
+}
+
+/// A property of an element: one number, or a list with its length before it.
+struct Property {
+    name: Vec<u8>,
+    /// Type of a list's length.
+    length: Option<Scalar>,
+    kind: Scalar,
+}
+
+/// Some rows of equal properties.
+struct Element {
+    name: Vec<u8>,
+    count: usize,
+    properties: Vec<Property>,
+}
+
+impl Element {
+    /// Bytes of a row in a binary file; none where they differ.
+    fn row(&self) -> Option<usize> {
+        let fixed = self.properties.iter().all(|p| p.length.is_none());
+        fixed.then(|| self.properties.iter().map(|p| p.kind.bytes()).sum())
+    }
+}
+
+/// What follows the header.
+enum Body<'b> {
+    Text(Words<'b>),
+    Binary { words: Words<'b>, big: bool },
+}
+
+impl Body<'_> {
+    fn number(&mut self, kind: Scalar, what: &str) -> Result<f64, Fault> {
+        match self {
+            Self::Text(words) => words.number(what),
+            Self::Binary { words, big } => Ok(kind.value(words.bytes(kind.bytes(), what)?, *big)),
+        }
+    }
+
+    /// Reads one property of a row; gives each of its numbers to `take`.
+    fn property(
+        &mut self,
+        property: &Property,
+        what: &str,
+        mut take: impl FnMut(f64),
+    ) -> Result<(), Fault> {
+        let Some(length) = property.length else {
+            take(self.number(property.kind, what)?);
+            return Ok(());
+        };
+        let stated = self.number(length, what)?;
+        let count = whole(stated).filter(|count| *count >= 0);
+        let wrong = || Fault::new(format!("a list of {stated} values in {what}"), COPY_AGAIN);
+        // More than the file holds ends with the file.
+        for _ in 0..count.ok_or_else(wrong)? {
+            take(self.number(property.kind, what)?);
+        }
+        Ok(())
+    }
+}
+
+fn parse(bytes: &[u8]) -> Result<(Soup, Faces), Fault> {
+    let (elements, mut body) = header(bytes)?;
+    let (mut soup, mut faces) = (Soup::default(), Faces::default());
+    for element in &elements {
+        match element.name.as_slice() {
+            b"vertex" => vertices(element, &mut body, &mut soup.positions)?,
+            b"face" => polygons(element, &mut body, |corners| faces.polygon(&indices(corners)?))?,
+            b"tristrips" => polygons(element, &mut body, |corners| strips(corners, &mut faces))?,
+            _ => skip(element, &mut body)?,
+        }
+    }
+    Ok((soup, faces))
+}
+
+fn indices(corners: &[f64]) -> Result<Vec<u32>, Fault> {
+    corners.iter().map(|&corner| index(whole(corner).unwrap_or(-1))).collect()
+}
+
+/// Strips one after another, with -1 between them.
+fn strips(corners: &[f64], faces: &mut Faces) -> Result<(), Fault> {
+    let strips = corners.split(|corner| *corner == -1.0).filter(|strip| !strip.is_empty());
+    strips.map(indices).try_for_each(|strip| faces.strip(&strip?))
+}
+
+/// The lines of a header; the first one's end tells that of all, so that the first byte of a binary body is none.
+struct Lines<'b> {
+    bytes: &'b [u8],
+    end: &'static [u8],
+    number: usize,
+}
+
+impl<'b> Lines<'b> {
+    fn of(bytes: &'b [u8]) -> Self {
+        let first = bytes.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(0);
+        let end: &[u8] = match bytes.get(first..first + 2) {
+            Some(b"\r\n") => b"\r\n",
+            Some([b'\r', _]) => b"\r",
+            _ => b"\n",
+        };
+        Self { bytes, end, number: 0 }
+    }
+
+    fn next(&mut self) -> Option<&'b [u8]> {
+        let len = self.bytes.windows(self.end.len()).position(|w| w == self.end)?;
+        let line = &self.bytes[..len];
+        self.bytes = &self.bytes[len + self.end.len()..];
+        self.number += 1;
+        (self.number <= MAX_LINES).then(|| line.trim_ascii())
+    }
+}
+
+fn header(bytes: &[u8]) -> Result<(Vec<Element>, Body<'_>), Fault> {
+    let mut lines = Lines::of(bytes);
+    if lines.next() != Some(b"ply") {
+        return Err(Fault::new("is no PLY file: its first line is not `ply`", EXPORT_AGAIN));
+    }
+    let mut elements: Vec<Element> = Vec::new();
+    let mut format = None;
+    loop {
+        let line = lines.next().ok_or_else(|| Fault::cut("the header"))?;
+        let words: Vec<_> = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
+        let wrong = |cause: &str| {
+            let shown: String = String::from_utf8_lossy(line).chars().take(60).collect();
+            Err(Fault::new(format!("`{shown}`: {cause}"), EXPORT_AGAIN).at(lines.number))
+        };
+        match words[..] {
+            [] | [b"comment" | b"obj_info", ..] => {}
+            [b"format", name, _] => format = Some(name),
+            [b"element", name, count] => {
+                let count = str::from_utf8(count).ok().and_then(|c| c.parse().ok());
+                let Some(count) = count else { return wrong("is no number of elements") };
+                elements.push(Element { name: name.to_owned(), count, properties: Vec::new() });
+            }
+            [b"property", b"list", length, kind, name] => {
+                let (length, kind) = (scalar(length), scalar(kind));
+                let (Some(length), Some(kind), Some(element)) = (length, kind, elements.last_mut())
+                else {
+                    return wrong("is of no type of PLY, or before all elements");
+                };
+                let property = Property { name: name.to_owned(), length: Some(length), kind };
+                element.properties.push(property);
+            }
+            [b"property", kind, name] => {
+                let (Some(kind), Some(element)) = (scalar(kind), elements.last_mut()) else {
+                    return wrong("is of no type of PLY, or before all elements");
+                };
+                element.properties.push(Property { name: name.to_owned(), length: None, kind });
+            }
+            [b"end_header"] => break,
+            _ => return wrong("is not understood"),
+        }
+    }
+    let words = Words::new(lines.bytes, lines.number + 1);
+    let body = match format {
+        Some(b"ascii") => Body::Text(words),
+        Some(b"binary_little_endian") => Body::Binary { words, big: false },
+        Some(b"binary_big_endian") => Body::Binary { words, big: true },
+        _ => return Err(Fault::new("states no format that PLY has", EXPORT_AGAIN)),
+    };
+    for element in &elements {
+        let read = [&b"vertex"[..], b"face", b"tristrips"].contains(&element.name.as_slice());
+        if read && element.count > MAX_ELEMENTS {
+            let name = String::from_utf8_lossy(&element.name);
+            return Err(Fault::too_many(element.count, &format!("elements `{name}`")));
+        }
+    }
+    Ok((elements, body))
+}
+
+fn scalar(name: &[u8]) -> Option<Scalar> {
+    Some(match name {
+        b"char" | b"int8" => Scalar::I8,
+        b"uchar" | b"uint8" => Scalar::U8,
+        b"short" | b"int16" => Scalar::I16,
+        b"ushort" | b"uint16" => Scalar::U16,
+        b"int" | b"int32" => Scalar::I32,
+        b"uint" | b"uint32" => Scalar::U32,
+        b"float" | b"float32" => Scalar::F32,
+        b"double" | b"float64" => Scalar::F64,
+        _ => return None,
+    })
+}
+
+fn vertices(
+    element: &Element,
+    body: &mut Body<'_>,
+    positions: &mut Vec<[f32; 3]>,
+) -> Result<(), Fault> {
+    let place = |name: &[u8]| element.properties.iter().position(|p| p.name == name);
+    let (Some(x), Some(y), Some(z)) = (place(b"x"), place(b"y"), place(b"z")) else {
+        return Err(Fault::new("has vertices without x, y and z", EXPORT_AGAIN));
+    };
+    for _ in 0..element.count {
+        let mut position = [0.0; 3];
+        for (p, property) in element.properties.iter().enumerate() {
+            let axis = [x, y, z].iter().position(|&axis| axis == p);
+            body.property(property, "the vertices", |value| {
+                if let Some(axis) = axis {
+                    position[axis] = value as f32;
+                }
+            })?;
+        }
+        positions.push(position);
+    }
+    Ok(())
+}
+
+/// Reads elements with a list of corners; gives each list to `take`.
+fn polygons(
+    element: &Element,
+    body: &mut Body<'_>,
+    mut take: impl FnMut(&[f64]) -> Result<(), Fault>,
+) -> Result<(), Fault> {
+    let names = [&b"vertex_indices"[..], b"vertex_index"];
+    let is_list = |p: &Property| names.contains(&p.name.as_slice()) && p.length.is_some();
+    let Some(list) = element.properties.iter().position(is_list) else {
+        return skip(element, body);
+    };
+    let mut corners = Vec::new();
+    for _ in 0..element.count {
+        corners.clear();
+        for (p, property) in element.properties.iter().enumerate() {
+            body.property(property, "the faces", |value| {
+                if p == list {
+                    corners.push(value);
+                }
+            })?;
+        }
+        take(&corners)?;
+    }
+    Ok(())
+}
+
+fn skip(element: &Element, body: &mut Body<'_>) -> Result<(), Fault> {
+    let what = format!("the elements `{}`", String::from_utf8_lossy(&element.name));
+    if let (Body::Binary { words, .. }, Some(row)) = (&mut *body, element.row()) {
+        let size = row.checked_mul(element.count).ok_or_else(|| Fault::cut(&what))?;
+        words.bytes(size, &what)?;
+        return Ok(());
+    }
+    if element.properties.is_empty() {
+        return Ok(());
+    }
+    for _ in 0..element.count {
+        for property in &element.properties {
+            body.property(property, &what, |_| {})?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn load(bytes: impl AsRef<[u8]>) -> Result<Parts, Vec<Issue>> {
+        read(Path::new("x.ply"), bytes.as_ref())
+    }
+
+    /// A square with an element between vertices and faces, and with properties beside those that are read.
+    fn header(format: &str) -> String {
+        format!(
+            "ply\nformat {format} 1.0\ncomment by hand\nobj_info none\nelement vertex 4\n\
+             property double x\nproperty float y\nproperty uchar red\nproperty short z\n\
+             element camera 2\nproperty list uchar int views\nproperty int id\n\
+             element face 2\nproperty list uchar int vertex_indices\nproperty uchar flags\nend_header\n"
+        )
+    }
+
+    fn text() -> String {
+        header("ascii")
+            + "0 0 9 0\n1 0 9 0\n1 1 9 -2\n0 1 9 0\n2 7 7 1\n0 2\n4 0 1 2 3 1\n3 0 2 1 0\n"
+    }
+
+    fn binary(big: bool) -> Vec<u8> {
+        let mut out =
+            header(if big { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+        macro_rules! put {
+            ($v:expr) => {
+                out.extend(if big { $v.to_be_bytes() } else { $v.to_le_bytes() })
+            };
+        }
+        for [x, y, z] in [[0, 0, 0], [1, 0, 0], [1, 1, -2], [0, 1, 0i16]] {
+            put!(f64::from(x));
+            put!(f32::from(y));
+            put!(9u8);
+            put!(z);
+        }
+        put!(2u8);
+        for v in [7i32, 7, 1] {
+            put!(v);
+        }
+        put!(0u8);
+        put!(2i32);
+        for corners in [&[0i32, 1, 2, 3][..], &[0, 2, 1]] {
+            put!(corners.len() as u8);
+            corners.iter().for_each(|v| put!(v));
+            put!(1u8);
+        }
+        out
+    }
+
+    #[test]
+    fn every_encoding_gives_the_same_square() {
+        let crlf = text().replace('\n', "\r\n").into_bytes();
+        let cr = text().replace('\n', "\r").into_bytes();
+        for bytes in [text().into_bytes(), crlf, cr, binary(false), binary(true)] {
+            let parts = load(&bytes).expect("readable");
+            let soup = &parts.parts[0];
+            assert_eq!(soup.positions[2], [1.0, 1.0, -2.0]);
+            assert_eq!(soup.triangles, [[0, 1, 2], [0, 2, 3], [0, 2, 1]]);
+            assert!(parts.issues.is_empty(), "{:?}", parts.issues);
+        }
+    }
+
+    #[test]
+    fn strips_of_triangles_alternate() {
+        let text = text().replace("element face", "element tristrips");
+        let text = text.replace("4 0 1 2 3 1\n3 0 2 1 0\n", "7 0 1 2 3 -1 0 1 0\n3 0 2 1 0\n");
+        let parts = load(text).expect("readable");
+        assert_eq!(parts.parts[0].triangles, [[0, 1, 2], [2, 1, 3], [0, 2, 1]]);
+        assert_eq!(parts.issues.len(), 1, "a strip of two corners");
+    }
+
+    #[test]
+    fn planted_faults_are_named() {
+        let text = text();
+        for (from, to, cause) in [
+            ("ply\n", "play\n", "is no PLY file"),
+            ("format ascii", "format packed", "no format that PLY has"),
+            ("element vertex 4", "element vertex 400000000", "are too many"),
+            ("element vertex 4", "element vertex x", "line 5: `element vertex x`"),
+            ("element camera 2", "element camera 90000000000", "`vertex_indices`|ends within"),
+            ("double x", "quad x", "no type of PLY"),
+            ("property float y\n", "", "without x, y and z"),
+            ("end_header\n", "", "is not understood"),
+            ("3 0 2 1 0", "3 0 2 4 0", "vertex 4, counted from 0, and there are 4"),
+            ("3 0 2 1 0", "3 0 2 -1 0", "vertex -1"),
+            ("3 0 2 1 0", "3000 0 2 1 0", "ends within the faces"),
+            ("3 0 2 1 0", "-3 0 2 1 0", "a list of -3 values"),
+            ("1 0 9 0\n", "1 x 9 0\n", "line 18: `x` is no number"),
+        ] {
+            let broken = text.replace(from, to);
+            assert_ne!(broken, text);
+            let issues = load(broken).expect_err(cause);
+            let told = issues[0].to_string();
+            assert!(cause.split('|').any(|cause| told.contains(cause)), "{cause}: {told}");
+        }
+        let whole = binary(false);
+        for cut in [whole.len() - 1, whole.len() - 20, header("ascii").len()] {
+            assert!(load(&whole[..cut]).is_err());
+        }
+    }
+}
