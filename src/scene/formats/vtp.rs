@@ -584,6 +584,7 @@ mod tests {
             let told = load(broken).map_or_else(|e| e[0].to_string(), |_| String::new());
             assert!(told.contains(cause), "{cause}: {told}");
         }
+        assert!(load("<a/>").expect_err("none")[0].message.contains("is no VTK file"));
         let packed =
             Writer { way: Way::AppendedRaw, wide: true, packed: true, appended: Vec::new() };
         let packed = packed.file();

@@ -94,7 +94,8 @@ mod tests {
     fn what_is_much_is_told_and_what_does_not_end_is_refused() {
         assert_eq!(Work::of(&scene(0.15, 8.0)), None);
         assert_eq!(Work::of(&scene(0.01, 8.0)), None, "thinned");
-        assert!(!Work::of(&scene(0.05, 0.0)).expect("much").too_much);
-        assert!(Work::of(&scene(0.01, 0.0)).expect("too much").too_much);
+        let most = Calibration::new(&scene(1.0, 0.0)).lattice_cells();
+        let told = |cells: f64| Work::of(&scene((most / cells).cbrt(), 0.0)).map(|w| w.too_much);
+        assert_eq!([4e9, 6e9, 1e11, 3e11].map(told), [None, Some(false), Some(false), Some(true)]);
     }
 }
