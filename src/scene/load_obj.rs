@@ -1,11 +1,18 @@
 //! Wavefront OBJ: positions and faces. Materials, normals and texture coordinates are not read.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
 use crate::issue::Issue;
 
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
+    // Lines may end as on old Macintoshes.
+    let lines: Cow<'_, [u8]> = match bytes.contains(&b'\n') {
+        true => bytes.into(),
+        false => bytes.iter().map(|&b| if b == b'\r' { b'\n' } else { b }).collect(),
+    };
+    let bytes = &*lines;
     let issues = scan(path, bytes);
     if issues.iter().any(Issue::is_error) {
         return Err(issues);

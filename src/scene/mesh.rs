@@ -269,3 +269,54 @@ fn merge(parts: Vec<Soup>, units: Units) -> Soup {
     }
     all
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inspected(name: &str, content: &str, options: &Options) -> Inspected {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).expect("written");
+        inspect(&path, options)
+    }
+
+    const OFF: &str = "OFF\n3 1 3\n0 0 0\n90 0 0\n0 60 7\n3 0 1 2\n";
+
+    #[test]
+    fn a_stated_frame_is_turned_into_lps() {
+        let obj = "v 0 0 0\nv 90 0 0\nv 0 60 7\nf 1 2 3\n";
+        let ras = format!("# 3D Slicer output. SPACE=RAS\n{obj}");
+        let found = inspected("a.obj", &ras, &Options::default());
+        assert_eq!((found.facts.min, found.facts.max), ([-90.0, -60.0, 0.0], [0.0, 0.0, 7.0]));
+        assert!(found.issues.iter().any(|i| i.message.contains("RAS")), "{:?}", found.issues);
+        let found = inspected("a.obj", &ras.replace("RAS", "LPS"), &Options::default());
+        assert_eq!(found.facts.max, [90.0, 60.0, 7.0]);
+        assert!(!found.issues.iter().any(|i| i.message.contains("RAS")), "{:?}", found.issues);
+    }
+
+    #[test]
+    fn units_and_nodes_are_chosen_for_every_format() {
+        let cm = Options { units: Units::named("cm"), ..Options::default() };
+        assert_eq!(inspected("a.OFF", OFF, &cm).facts.max, [900.0, 600.0, 70.0]);
+        let solid = |name: &str, x: u32| {
+            format!(
+                "solid {name}\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex {x} 0 0\n\
+                 vertex 0 9 0\nendloop\nendfacet\nendsolid\n"
+            )
+        };
+        let two = solid("a", 30) + &solid("b c", 50);
+        let node = |node: &str| Options { node: Some(node.to_owned()), ..Options::default() };
+        assert_eq!(inspected("a.stl", &two, &Options::default()).facts.triangles, 2);
+        assert_eq!(inspected("a.stl", &two, &node("a")).facts.max[0], 30.0);
+        assert_eq!(inspected("a.stl", &two, &node("b c")).facts.max[0], 50.0);
+        let missing = inspected("a.stl", &two, &node("b"));
+        assert!(
+            missing.issues[0].message.contains("no node or object `b`"),
+            "{:?}",
+            missing.issues
+        );
+        let unknown = inspected("a.dae", OFF, &cm);
+        assert!(unknown.issues[0].remedy.contains(".3mf"), "{:?}", unknown.issues);
+    }
+}

@@ -18,7 +18,8 @@ pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Iss
 
 /// The lines with content, each with its number, without comments.
 fn lines(bytes: &[u8]) -> impl Iterator<Item = (usize, &[u8])> {
-    let lines = bytes.split(|&b| b == b'\n').zip(1..);
+    let end = if bytes.contains(&b'\n') { b'\n' } else { b'\r' };
+    let lines = bytes.split(move |&b| b == end).zip(1..);
     lines.filter_map(|(line, number)| {
         let end = line.iter().position(|&b| b == b'#').unwrap_or(line.len());
         let line = line[..end].trim_ascii();
@@ -135,6 +136,7 @@ mod tests {
             format!("STCNOFF\n{}", plain.replace(" 0\n", " 0 0 0 1 .5 .5 .5 1 0 1\n")),
             format!("4OFF\n{}", plain.replace(" 0\n", " 0 1\n")),
             format!("OFF\r\n{}", plain.replace('\n', "\r\n")),
+            format!("OFF\r{}", plain.replace('\n', "\r")),
             plain.replace("4 1 4", "4 1").replace("3\n", "3 0.5 0.5 0.5\n"),
         ] {
             let parts = load(&text).unwrap_or_else(|issues| panic!("{text}: {issues:?}"));

@@ -217,6 +217,7 @@ mod tests {
             TEXT.replace("solid a", "solid\ta"),
             TEXT.replace("endsolid a\n", ""),
             TEXT.replace('\n', "\r\n"),
+            TEXT.replace('\n', "\r"),
             TEXT.replace("facet normal 0 0 1\n", "facet\n"),
             TEXT.replace('\n', " ").replacen("a ", "a\n", 1),
             format!("\n \n{TEXT}"),

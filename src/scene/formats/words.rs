@@ -30,7 +30,9 @@ impl<'b> Words<'b> {
 
     fn skip_space(&mut self) {
         while let Some(byte) = self.bytes.get(self.at).filter(|b| b.is_ascii_whitespace()) {
-            self.line += usize::from(*byte == b'\n');
+            let ends =
+                *byte == b'\n' || *byte == b'\r' && self.bytes.get(self.at + 1) != Some(&b'\n');
+            self.line += usize::from(ends);
             self.at += 1;
         }
     }
@@ -49,12 +51,17 @@ impl<'b> Words<'b> {
         self.clone().next()
     }
 
-    /// What is left of the line, without space around it; its end is skipped.
+    /// What is left of the line, without space around it; its end (line feed, carriage return or both) is skipped.
     pub fn line_left(&mut self) -> &'b [u8] {
         let rest = self.rest();
-        let len = rest.iter().position(|&b| b == b'\n').unwrap_or(rest.len());
-        self.at = (self.at + len + 1).min(self.bytes.len());
-        self.line += usize::from(len < rest.len());
+        let len = rest.iter().position(|b| b"\r\n".contains(b)).unwrap_or(rest.len());
+        let end = match rest[len..] {
+            [] => 0,
+            [b'\r', b'\n', ..] => 2,
+            _ => 1,
+        };
+        self.at += len + end;
+        self.line += usize::from(end > 0);
         rest[..len].trim_ascii()
     }
 
