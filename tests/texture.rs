@@ -10,7 +10,6 @@ mod signal;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use insonify::gpu::test_device;
 use insonify::probe::{Kind, Probe};
-use insonify::reference::field::Field;
 use insonify::scene::animation::{Clock, Motion, Turn};
 use insonify::scene::graph::{Node, NodeKind};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, shapes};
@@ -18,6 +17,7 @@ use insonify::settings::{ScatterMode, TextureSpace};
 use insonify::sim::calibration::{Calibration, LATERAL_CUT};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, fields::Fields};
+use insonify_tools::reference::field::Field;
 use shared_data::shared_data;
 
 /// Depths between which speckle is measured, mm: inside the body, off its faces.
@@ -460,9 +460,9 @@ fn tissue_below_a_transform_that_scales_is_squeezed_as_its_keyframes_would_be() 
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-// By the lattice; voxels of the paper's grid are steps under the carrier, and get louder or fainter by up to 1 dB as they
-// are squeezed. Speckle of (20 mm / 0.7) x (28 mm / 0.16) cells: its mean power is good to 4.34 / sqrt(5000) = 0.06 dB in each frame;
-// four deviations of the difference.
+// By the lattice; voxels of the paper's grid are steps under the carrier, and get louder or fainter by up to 1 dB as
+// they are squeezed. Speckle of (20 mm / 0.7) x (28 mm / 0.16) cells: its mean power is good to 4.34 / sqrt(5000) =
+// 0.06 dB in each frame; four deviations of the difference.
 #[test]
 fn squeezed_tissue_is_as_bright_as_at_rest() {
     let power = |scene: &Scene| {

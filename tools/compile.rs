@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::{env, fs};
 
 use insonify::output;
-use insonify::sim::shaders::authors::stamp::{self, Entry};
+use insonify::sim::shaders::authors::stamp::{self, ModuleHashes};
 use insonify::sim::shaders::authors::{Error, bytes_of, compiler, source, validate};
 
 fn main() -> ExitCode {
@@ -20,7 +20,7 @@ fn main() -> ExitCode {
             return ExitCode::FAILURE;
         }
     };
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = insonify_tools::root();
     match run(&root.join("glsl"), &root.join("spirv"), root, check) {
         Ok(stale) if stale.is_empty() => ExitCode::SUCCESS,
         Ok(stale) => {
@@ -49,8 +49,10 @@ fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String
         if !variant.keep_names {
             table += &format!("    (\"{stem}\", include_bytes!(\"{stem}.spv\")),\n");
         }
-        let entry =
-            Entry { source: source::hash(glsl, &variant, &version)?, spirv: source::fnv1a(&bytes) };
+        let entry = ModuleHashes {
+            source: source::hash(glsl, &variant, &version)?,
+            spirv: source::fnv1a(&bytes),
+        };
         outputs.insert(spirv.join(format!("{stem}.spv")), bytes);
         entries.insert(stem, entry);
     }

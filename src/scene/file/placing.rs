@@ -1,34 +1,76 @@
-//! Where things are: shift, rotation and scale of meshes, transforms and motions.
+//! Placements: shift, rotation and scale of meshes, transforms and motions.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::{Factors, Rotation};
+use super::table::Stated;
 use super::within;
-use crate::settings::units::Length;
+use crate::settings::units::{ANGLE, LENGTH};
+use crate::settings::{Facts, Form, group};
 
 /// Least and largest factor by which a placement scales.
 pub const SCALES: [f64; 2] = [1e-6, 1e6];
+/// An axis of rotation.
+pub(super) const AXIS: Facts = Facts::of(Form::Direction).key("rotate.axis").required();
+/// The angle about it.
+pub(super) const TURN: Facts = Facts::quantity(&ANGLE, -1e3, 1e3).key("rotate.angle").required();
+/// Three lengths from a place where anatomy may be.
+pub(super) const PLACE: Facts = Facts::quantities(&LENGTH, 3, -1e5, 1e5);
 
-/// Shift, rotation and scale of a table.
-pub(super) type Place<'t> = (Option<[Length; 3]>, Option<&'t Rotation>, Option<Factors>);
+group! {
+    /// Size of something that keeps its proportions.
+    pub struct Size in "" {
+        /// Size factor. Applied first, about the origin.
+        scale: f64 = 1.0, Facts::number(SCALES[0], SCALES[1]);
+    }
+}
+
+group! {
+    /// Size of something that may be stretched.
+    pub struct Stretch in "" {
+        /// Factor, or factors along x, y, z. Applied first, about the origin.
+        scale: [f64; 3] = [1.0; 3], Facts::factors(SCALES[0], SCALES[1]);
+    }
+}
+
+group! {
+    /// Direction and place.
+    pub struct Placed in "" {
+        /// Axis of the rotation, through the origin.
+        axis: [f64; 3] = [0.0, 0.0, 1.0], AXIS;
+        /// Angle, by the right-hand rule.
+        angle: f64 = 0.0, TURN;
+        /// Shift. Applied last.
+        translate: [f64; 3] = [0.0; 3], PLACE;
+    }
+}
+
+group! {
+    /// A placement as a matrix.
+    pub struct Affine in "" {
+        /// Instead of `scale`, `rotate` and `translate`: 4 x 4, row by row; the shift, in mm, is the fourth column.
+        matrix: Option<[f64; 16]> = None,
+            Facts::of(Form::Numbers(16)).limits("not flat, not mirroring, without the other keys");
+    }
+}
 
 /// Volume of the box that the unit vectors become, over the product of their lengths, at and below which a matrix is
 /// flat for single precision.
 const FLAT: f64 = 1e-6;
 
-/// World from object: the matrix where there is one, else scale, then rotate, then translate.
+/// World from object, as the table at `path` says it: its matrix, or its parts.
+///
+/// # Errors
+/// A matrix beside parts, or one that mirrors, is flat, scales too much or leads too far.
 pub(super) fn placed(
     document: &Document<'_>,
     path: &str,
-    matrix: Option<[f64; 16]>,
-    place: Place<'_>,
+    stated: &Stated,
 ) -> Result<DAffine3, SceneError> {
-    let Some(rows) = matrix else { return placement(document, path, place) };
-    let alone = place.0.is_none() && place.1.is_none() && place.2.is_none();
-    let placement = affine(document, path, rows, alone)?;
+    let Some(rows) = stated.get::<Affine>("").matrix else { return Ok(placement(stated, "")) };
     let path = format!("{path}.matrix");
+    let placement = affine(document, &path, rows, (stated, ""))?;
     for shift in placement.translation.to_array() {
         within(document, &path, shift, -1e5, 1e5, "mm")?;
     }
@@ -36,10 +78,9 @@ pub(super) fn placed(
     let lengths = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
     let volume = m.determinant() / lengths.iter().product::<f64>();
     let [least, most] = SCALES;
-    let wrong = lengths.iter().find(|length| !(least..=most).contains(*length));
-    let (cause, remedy) = match wrong {
-        Some(length) => (
-            format!("a column of this matrix is {length} long, by which it scales"),
+    let (cause, remedy) = match lengths.iter().find(|size| !(least..=most).contains(*size)) {
+        Some(size) => (
+            format!("a column of this matrix is {size} long, by which it scales"),
             format!("it must lie between {least} and {most}"),
         ),
         None if volume < 0.0 => (
@@ -47,7 +88,7 @@ pub(super) fn placed(
             "mirror the mesh in the modeller; from RAS to LPS two axes change sign, not one"
                 .to_owned(),
         ),
-        None if !(volume > FLAT) => (
+        None if volume <= FLAT => (
             "this matrix is flat: it has no inverse".to_owned(),
             "write it row by row; the shift is the fourth column, mm".to_owned(),
         ),
@@ -56,15 +97,15 @@ pub(super) fn placed(
     Err(document.fail(&path, cause, remedy))
 }
 
-/// A matrix of four rows; `alone`: without other keys that place.
+/// The matrix of four rows at `path`; the other keys that place may not stand in the table `below` with it.
 pub(super) fn affine(
     document: &Document<'_>,
     path: &str,
     rows: [f64; 16],
-    alone: bool,
+    (stated, below): (&Stated, &str),
 ) -> Result<DAffine3, SceneError> {
-    let fail = |why: &str, remedy| Err(document.fail(&format!("{path}.matrix"), why, remedy));
-    if !alone {
+    let fail = |why: &str, remedy| Err(document.fail(path, why, remedy));
+    if ["scale", "rotate", "translate"].iter().any(|key| stated.has(&format!("{below}{key}"))) {
         return fail("both a matrix and a shift, rotation or scale are given", "give one of them");
     }
     if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
@@ -78,65 +119,10 @@ pub(super) fn affine(
     Ok(DAffine3::from_mat3_translation(matrix, column(3)))
 }
 
-/// World from object: scale, then rotate, then translate.
-pub(super) fn placement(
-    document: &Document<'_>,
-    path: &str,
-    (translate, rotate, scale): Place<'_>,
-) -> Result<DAffine3, SceneError> {
-    let scale = factors(document, &format!("{path}.scale"), scale, SCALES.into())?;
-    let rotation = match rotate {
-        Some(rotation) => {
-            let (axis, angle) = turn(document, &format!("{path}.rotate"), rotation)?;
-            DQuat::from_axis_angle(axis, angle)
-        }
-        None => DQuat::IDENTITY,
-    };
-    let translation = match translate {
-        Some(translate) => shift(document, &format!("{path}.translate"), translate)?,
-        None => DVec3::ZERO,
-    };
-    Ok(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
-}
-
-/// Unit axis and angle, rad.
-pub(super) fn turn(
-    document: &Document<'_>,
-    path: &str,
-    rotation: &Rotation,
-) -> Result<(DVec3, f64), SceneError> {
-    let axis = DVec3::from(rotation.axis).try_normalize().ok_or_else(|| {
-        let remedy = "give a vector such as [0, 0, 1]";
-        let path = format!("{path}.axis");
-        document.fail(&path, "this axis has no length", remedy)
-    })?;
-    let angle = rotation.angle.0;
-    within(document, &format!("{path}.angle"), angle, -1e3, 1e3, "rad")?;
-    Ok((axis, angle))
-}
-
-/// Factors along the axes, each within `range`; 1 where none are given.
-pub(super) fn factors(
-    document: &Document<'_>,
-    path: &str,
-    given: Option<Factors>,
-    range: (f64, f64),
-) -> Result<DVec3, SceneError> {
-    let Factors(factors) = given.unwrap_or(Factors([1.0; 3]));
-    for factor in factors {
-        within(document, path, factor, range.0, range.1, "")?;
-    }
-    Ok(factors.into())
-}
-
-/// A vector, mm.
-pub(super) fn shift(
-    document: &Document<'_>,
-    path: &str,
-    lengths: [Length; 3],
-) -> Result<DVec3, SceneError> {
-    for length in lengths {
-        within(document, path, length.0, -1e5, 1e5, "mm")?;
-    }
-    Ok(lengths.map(|length| length.0).into())
+/// World from object, as the table `below` says it: scale, then rotate, then translate.
+pub(super) fn placement(stated: &Stated, below: &str) -> DAffine3 {
+    let scale = stated.get::<Stretch>(below).scale;
+    let Placed { axis, angle, translate } = stated.get(below);
+    let rotation = DQuat::from_axis_angle(DVec3::from(axis).normalize(), angle);
+    DAffine3::from_scale_rotation_translation(scale.into(), rotation, translate.into())
 }

@@ -157,7 +157,7 @@ fn a_matrix_places_as_its_parts_do() {
     }
 }
 
-/// As the program writes paths: names with dots in quotes, names that TOML would quote without.
+/// Paths as the program writes them: names with dots in quotes, other names without, even those that TOML would quote.
 #[test]
 fn overrides_name_what_has_dots_in_its_name() {
     let case = Case::new();
