@@ -39,7 +39,7 @@ pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
-use crate::settings::{Settings, units};
+use crate::settings::{Settings, plain, units};
 use document::{Document, Source};
 use schema::Title;
 
@@ -219,14 +219,6 @@ fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), Scene
     Err(document.fail("imaging.image_height", message, remedy))
 }
 
-/// A value in few digits, however large or small it is.
-fn shown(value: f64) -> String {
-    match (1e-6..1e12).contains(&value.abs()) || value == 0.0 {
-        true => value.to_string(),
-        false => format!("{value:e}"),
-    }
-}
-
 /// Fails at `path` unless `value` is in the closed range; NaN is in no range.
 fn within(
     document: &Document<'_>,
@@ -241,7 +233,7 @@ fn within(
     }
     let key = path.rsplit('.').next().unwrap_or(path);
     let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let value = shown(value);
+    let value = plain(value);
     let (message, remedy) = if most.is_infinite() {
         (format!("{key} is {value}{unit}"), format!("it must be at least {least}{unit}"))
     } else {

@@ -46,10 +46,15 @@ struct Solid {
     positions: Vec<[f32; 3]>,
     seen: HashMap<[u32; 3], u32>,
     faces: Faces,
+    /// Vertices of the solids before it.
+    before: usize,
 }
 
 impl Solid {
     fn polygon(&mut self, corners: &[[f32; 3]]) -> Result<(), Fault> {
+        if self.before + self.positions.len() > MAX_ELEMENTS {
+            return Err(Fault::too_many("these", "vertices"));
+        }
         let corners = corners.iter().map(|&corner| {
             // Adding zero makes -0 and +0 equal.
             let key = corner.map(|v| (v + 0.0).to_bits());
@@ -116,7 +121,9 @@ fn text(path: &Path, bytes: &[u8]) -> Result<Parts, Fault> {
         match lower.as_slice() {
             b"solid" => {
                 let name = String::from_utf8_lossy(words.line_left()).into_owned();
-                done.push(std::mem::replace(&mut solid, Solid { name, ..Solid::default() }));
+                let before = solid.before + solid.positions.len();
+                let next = Solid { name, before, ..Solid::default() };
+                done.push(std::mem::replace(&mut solid, next));
             }
             b"endsolid" => {
                 words.line_left();

@@ -251,15 +251,18 @@ impl Numbers<'_> {
             if count == 0 {
                 continue;
             }
+            if count > MAX_ELEMENTS {
+                return Err(Fault::too_many(count, "polygons or strips"));
+            }
             // Each offset is where a cell ends.
             let mut bounds = vec![0.0];
             bounds.extend(self.of(offsets, Some(count))?);
-            let corners = self.of(corners, None)?;
+            let mut corners = self.of(corners, None)?;
             let here = out.positions.len() - before;
             if let Some(corner) = corners.iter().find(|&&v| !(v >= 0.0 && v < here as f64)) {
                 return Err(super::no_vertex(corner, here));
             }
-            let corners: Vec<_> = corners.iter().map(|v| v + before as f64).collect();
+            corners.iter_mut().for_each(|v| *v += before as f64);
             offset_cells(Some(kind), &bounds, &corners, &mut out.faces)?;
         }
         Ok(())
