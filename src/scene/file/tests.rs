@@ -137,7 +137,7 @@ fn a_matrix_places_as_its_parts_do() {
         assert!(found.abs_diff_eq(wanted, 1e-9), "{found} {wanted}");
     }
     let mirror = "matrix = [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
-    let flat = "matrix = [1, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
+    let flat = "matrix = [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
     for (text, cause, remedy) in [
         (format!("{matrix}\ntranslate = [1, 2, 3]"), "both a matrix", "give one"),
         (matrix.replace("0, 1]", "1, 1]"), "the last row is not 0 0 0 1", "row by row"),
