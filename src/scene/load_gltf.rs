@@ -98,17 +98,17 @@ impl File<'_> {
     fn remarks(&self, visited: &[bool]) -> Vec<Issue> {
         let unseen =
             self.gltf.nodes().filter(|n| n.mesh().is_some() && !visited[n.index()]).count();
-        let remark = |count: usize, message: &str| {
+        let remark = |count: usize, message: &str, remedy: &str| {
             let message = format!("{message} ({count})");
-            (count > 0).then(|| Issue::warning(self.path, count, message, ""))
+            (count > 0).then(|| Issue::warning(self.path, count, message, remedy))
         };
         let mut loose = vec![true; self.gltf.meshes().len()];
         self.gltf.nodes().filter_map(|n| n.mesh()).for_each(|mesh| loose[mesh.index()] = false);
         let loose = loose.into_iter().filter(|loose| *loose).count();
         let both = [
-            remark(loose, "meshes that no node places are ignored; add nodes that name them"),
-            remark(self.without_data, "primitives without stored positions are ignored"),
-            remark(unseen, "nodes with meshes outside the default scene are ignored"),
+            remark(loose, "meshes that no node places are ignored", "add nodes that name them"),
+            remark(self.without_data, "primitives without stored positions are ignored", ""),
+            remark(unseen, "nodes with meshes outside the default scene are ignored", ""),
         ];
         both.into_iter().flatten().collect()
     }

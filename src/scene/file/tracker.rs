@@ -72,9 +72,9 @@ fn transform(document: &Document<'_>, stated: &Stated, name: &str) -> Result<DAf
     };
     let path = format!("tracker.{below}matrix");
     let matrix = affine(document, &path, rows, (stated, &below))?;
-    rigid(matrix).or_else(|why| {
+    rigid(matrix).map_err(|why| {
         let message = format!("this is no rigid transform: {why}");
         let remedy = "write rotation and shift in mm, without scale, row by row";
-        Err(document.fail(&path, message, remedy))
+        document.fail(&path, message, remedy)
     })
 }

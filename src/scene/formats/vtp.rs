@@ -362,7 +362,7 @@ impl Numbers<'_> {
     fn spend(&mut self, bytes: usize) -> Result<(), Fault> {
         let left = self.budget.checked_sub(bytes);
         self.budget = left.ok_or_else(|| {
-            let most = 2 * MAX_FILE >> 20;
+            let most = (2 * MAX_FILE) >> 20;
             Fault::new(format!("unpacks to more than {most} MB"), super::REDUCE)
         })?;
         Ok(())
