@@ -109,6 +109,46 @@ fn a_volume_is_in_memory_once() {
     assert_eq!(outcome.code, Some(0), "{}", outcome.text);
 }
 
+/// Files of a few bytes that declare as much as the limits allow, and more.
+#[test]
+fn declared_counts_take_no_memory() {
+    let folder = folder();
+    let ply = |format: &str, count: &str| {
+        format!(
+            "ply\nformat {format} 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+             property float z\nelement face {count}\nproperty list uint int vertex_indices\nend_header\n1 2"
+        )
+    };
+    let vtk = |form: &str, rest: &str| {
+        format!("# vtk DataFile Version 5.1\nt\n{form}\nDATASET POLYDATA\n{rest}")
+    };
+    let vtp = |count: u64| {
+        format!(
+            "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" compressor=\"vtkZLibDataCompressor\">\
+             <PolyData><Piece NumberOfPoints=\"{count}\" NumberOfPolys=\"{count}\"><Points><DataArray \
+             type=\"Float32\" format=\"binary\">/////////////////////w==</DataArray></Points></Piece>"
+        )
+    };
+    let list = "POLYGONS 20000000 20000000\nOFFSETS vtktypeint64\n";
+    for (name, content) in [
+        ("a.ply", ply("ascii", "4000000")),
+        ("b.ply", ply("binary_little_endian", "4000000")),
+        ("c.ply", ply("binary_little_endian", "18446744073709551615")),
+        ("a.off", "OFF\n4000000 4000000 0\n1 2 3\n".to_owned()),
+        ("a.vtk", vtk("ASCII", "POINTS 4000000 double\n1 2")),
+        ("b.vtk", vtk("BINARY", "POINTS 4000000 double\n1 2")),
+        ("c.vtk", vtk("BINARY", list)),
+        ("d.vtk", vtk("ASCII", "FIELD f 9000000000\na 1 9000000000 string\n")),
+        ("a.vtp", vtp(4_000_000)),
+        ("b.vtp", vtp(u64::MAX)),
+        ("a.3mf", "PK\u{3}\u{4}".to_owned()),
+    ] {
+        let outcome = checked(&folder, name, content);
+        refused(&outcome, &["error: ", "; "]);
+        assert!(!outcome.text.contains("holds no triangles"), "{}", outcome.text);
+    }
+}
+
 const LINEAR: &str = "[probe]\npreset = \"linear\"\n";
 
 /// `check` and `render` say the same about what would never end, before anything is made.

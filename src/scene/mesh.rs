@@ -160,10 +160,12 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
     Some((merge(parts, units), units))
 }
 
-/// The parts of a mesh file by its extension, in its unit and in LPS where it states its frame.
+/// The parts of a mesh file, in its unit and in LPS where it states its frame. The extension says its format, unless
+/// the file begins as one of another does.
 fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
-    let kind = Kind::of(path);
     let bytes = read_bounded(path)?;
+    let (named, found) = (Kind::of(path), Kind::by_content(&bytes));
+    let kind = found.or(named);
     if let Some(issue) = formats::utf16(path, &bytes).filter(|_| kind.is_some_and(Kind::is_text)) {
         return Err(vec![issue]);
     }
@@ -181,6 +183,10 @@ fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
             Err(vec![Issue::error(path, 1, "not a mesh format that can be read", remedy)])
         }
     }?;
+    if let Some(found) = found.filter(|_| found != named) {
+        let message = format!("is read as {found:?}, as which it begins, whatever its name says");
+        out.issues.push(Issue::warning(path, 1, message, "give it the extension of its format"));
+    }
     if out.ras || kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes) {
         let positions = out.parts.iter_mut().flat_map(|part| &mut part.positions);
         positions.for_each(|[x, y, _]| (*x, *y) = (-*x, -*y));
@@ -224,6 +230,21 @@ impl Kind {
             "off" => Some(Self::Off),
             "3mf" => Some(Self::Threemf),
             _ => None,
+        }
+    }
+
+    /// The format of a file that begins as no file of another does.
+    fn by_content(bytes: &[u8]) -> Option<Self> {
+        let begins = |word: &[u8]| bytes.starts_with(word);
+        let head = &bytes[..bytes.len().min(512)];
+        match () {
+            () if begins(b"ply\n") || begins(b"ply\r") => Some(Self::Ply),
+            () if begins(b"# vtk DataFile Version") => Some(Self::Vtk),
+            () if begins(b"PK\x03\x04") => Some(Self::Threemf),
+            () if begins(b"<") && head.windows(8).any(|word| word == b"<VTKFile") => {
+                Some(Self::Vtp)
+            }
+            () => None,
         }
     }
 
@@ -322,6 +343,11 @@ mod tests {
             "{:?}",
             missing.issues
         );
+        let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 90 0 0\n\
+                   0 60 7\nPOLYGONS 1 4\n3 0 1 2\n";
+        let misnamed = inspected("a.stl", vtk, &Options::default());
+        assert_eq!(misnamed.facts.triangles, 1);
+        assert!(misnamed.issues[0].message.contains("is read as Vtk"), "{:?}", misnamed.issues);
         let unknown = inspected("a.dae", OFF, &cm);
         assert!(unknown.issues[0].remedy.contains(".3mf"), "{:?}", unknown.issues);
     }
