@@ -77,15 +77,15 @@ pub fn run() -> ExitCode {
         Ok(code) => match output::failure() {
             None => code,
             Some(cause) => {
-                eprintln!(
+                output::note(format!(
                     "standard output could not be written: {cause}\n\
                      Files are complete, lines are missing: run it again where there is room for them."
-                );
+                ));
                 ExitCode::FAILURE
             }
         },
         Err(report) => {
-            eprintln!("{report:?}");
+            output::note(format!("{report:?}"));
             ExitCode::FAILURE
         }
     }

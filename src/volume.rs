@@ -96,6 +96,9 @@ const SHEAR: f64 = 1e-3;
 const EXTENSIONS: [&str; 8] =
     [".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom"];
 
+/// The same in a message.
+pub const KINDS: &str = ".mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz or .dcm";
+
 /// Returns whether a file is a volume by its extension, readable or not.
 pub fn is_volume(path: &Path) -> bool {
     let name = path.to_string_lossy().to_ascii_lowercase();
@@ -124,7 +127,7 @@ impl Volume {
             Err(VolumeError::file(
                 path,
                 "is no volume by its extension",
-                "give a .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz or .dcm file",
+                &format!("give a file of the kinds {KINDS}"),
             ))
         }
     }

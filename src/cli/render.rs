@@ -98,7 +98,7 @@ pub fn run(args: &Render) -> Result<()> {
 
     let counters = simulator.counters().into_diagnostic()?;
     for lost in common::lost(&counters) {
-        eprintln!("warning: {lost}");
+        output::note(format!("warning: {lost}"));
     }
     let contact = simulator.contact();
     let steps = match args.steps {
@@ -201,10 +201,10 @@ fn reload(simulator: &mut Simulator, library: &mut Library) {
     match library.poll() {
         Ok(stems) if stems.is_empty() => {}
         Ok(stems) => match simulator.reload(library) {
-            Ok(()) => eprintln!("reloaded {}", stems.join(", ")),
-            Err(error) => eprintln!("warning: {error}; the last kernels stay"),
+            Ok(()) => output::note(format!("reloaded {}", stems.join(", "))),
+            Err(error) => output::note(format!("warning: {error}; the last kernels stay")),
         },
-        Err(error) => eprintln!("warning: {error}; the last kernels stay"),
+        Err(error) => output::note(format!("warning: {error}; the last kernels stay")),
     }
 }
 
@@ -302,7 +302,7 @@ fn simulate(
         progress.done(index + 1);
     }
     for mask in unseen {
-        eprintln!("warning: {}", common::unseen(scene, mask));
+        output::note(format!("warning: {}", common::unseen(scene, mask)));
     }
     timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();

@@ -47,6 +47,14 @@ impl Sequence {
     /// # Errors
     /// Those of a volume; malformed entries of frames; a frame that is a volume itself.
     pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        if !["mha", "mhd"].contains(&extension.to_ascii_lowercase().as_str()) {
+            return Err(VolumeError::file(
+                path,
+                "is no MetaImage by its extension, in which tracked sequences are read",
+                "save it as .igs.mha (3D Slicer and PLUS do)",
+            ));
+        }
         let (fields, data) = meta::fields(path)?;
         let mut header = meta::of_fields(&fields, data)?;
         let axes: usize = fields.number(fields.need("NDims")?)?;

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
+use insonify::output;
 use insonify::register::landmarks::Landmark;
 use insonify::register::surface::{Triangle, TriangleSurface, samples};
 use insonify::register::{RegisterError, points};
@@ -167,7 +168,7 @@ fn mesh_file(path: &Path) -> Result<Mesh> {
         Report::from(RegisterError { file: Some(path.to_owned()), line: 0, cause: message, remedy })
     })?;
     for issue in issues {
-        eprintln!("{issue}");
+        output::note(issue);
     }
     Ok(mesh)
 }

@@ -63,9 +63,10 @@ impl Scene {
     /// All shapes of all instances.
     fn poses(&self) -> Vec<Pose<'_>> {
         let mut out = Vec::new();
+        let nodes = self.graph.nodes_of(self.instances.len());
         for (i, instance) in self.instances.iter().enumerate() {
-            let conditions = self.graph.conditions(i);
-            let switch = self.graph.switch_of(i);
+            let conditions = self.graph.conditions(nodes[i]);
+            let switch = self.graph.switch_of(nodes[i]);
             let shapes = match instance.keyframes.meshes.as_slice() {
                 [] => std::slice::from_ref(&instance.mesh),
                 all => all,

@@ -31,7 +31,7 @@ pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
             "make the surface enclose a volume",
         ));
     }
-    if volume(soup) < 0.0 && Edges::of(soup).groups().all(|g| g.len() > 1) {
+    if volume(soup) < 0.0 && Edges::of(soup).open().next().is_none() {
         for t in &mut soup.triangles {
             t.swap(1, 2);
         }
