@@ -2,6 +2,7 @@ pub(super) mod graph;
 mod mistakes;
 mod vary;
 
+use crate::settings::units::DURATION;
 use std::path::PathBuf;
 
 use super::*;
@@ -142,7 +143,7 @@ fn a_matrix_places_as_its_parts_do() {
         (format!("{matrix}\ntranslate = [1, 2, 3]"), "both a matrix", "give one"),
         (matrix.replace("0, 1]", "1, 1]"), "the last row is not 0 0 0 1", "row by row"),
         (matrix.replace("-2", "-2e7"), "2e7 long|20000000 long", "between"),
-        (matrix.replace("20", "2e9"), "matrix is 2", "between"),
+        (matrix.replace("20", "2e9"), "matrix shifts by 2000000000 mm", "between"),
         (mirror.to_owned(), "mirrors", "two axes change sign"),
         (flat.to_owned(), "is flat", "row by row"),
         (matrix.replace("-2", "nan"), "NaN", "between"),
@@ -297,10 +298,10 @@ fn coincident_triangles_are_counted_and_named() {
 #[test]
 fn times_may_have_a_unit() {
     for (text, value) in [("0.4", 0.4), ("400 ms", 0.4), ("-1s", -1.0)] {
-        assert_eq!(seconds(text), Ok(value));
+        assert_eq!(DURATION.finite(text), Ok(value));
     }
-    for (text, cause) in [("4 mm", "`s`, `ms`"), ("soon", "1.5 s"), ("inf", "no time")] {
-        let said = seconds(text).expect_err(text);
+    for (text, cause) in [("4 mm", "`s`, `ms`"), ("soon", "1.5 s"), ("inf", "no duration")] {
+        let said = DURATION.finite(text).expect_err(text);
         assert!(said.contains(cause), "{said}");
     }
 }
