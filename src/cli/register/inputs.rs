@@ -10,6 +10,7 @@ use insonify::register::{RegisterError, points};
 use insonify::scene::graph::{Placed, is_even};
 use insonify::scene::{Acquired, Mesh, Scene, mesh};
 use insonify::settings::suggest;
+use insonify::volume::Frame;
 use miette::{Report, Result, miette};
 
 use super::Register;
@@ -25,7 +26,10 @@ pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     };
     let mesh = mesh_file(file)?;
     let said = points::frame_of_mesh(file)?;
-    let signs = points::agreed(file, said, args.frame())?.lps_signs();
+    let frame = points::agreed(file, said, args.frame())?;
+    // A file that states its frame was read into LPS.
+    let read = if said == Frame::Unstated { frame } else { Frame::Lps };
+    let signs = read.lps_signs();
     let triangles = placed(&mesh, &DAffine3::from_scale(signs));
     Ok(Some(samples(&triangles, args.samples as usize)))
 }

@@ -6,7 +6,7 @@ use super::document::Document;
 use super::error::SceneError;
 use super::table::Stated;
 use crate::settings::units::{ANGLE, LENGTH};
-use crate::settings::{Facts, Form, Value, group};
+use crate::settings::{Facts, Form, group};
 
 /// Least and largest factor by which a placement scales.
 pub const SCALES: [f64; 2] = [1e-6, 1e6];
@@ -54,8 +54,8 @@ group! {
     }
 }
 
-/// A shift by a matrix, along one axis.
-const SHIFT: Facts = Facts::quantity(&LENGTH, -1e5, 1e5);
+/// Farthest shift along an axis, mm, as of the keys that say it alone.
+const FAR: f64 = 1e5;
 /// Volume of the box that the unit vectors become, over the product of their lengths, at and below which a matrix is
 /// flat for single precision.
 const FLAT: f64 = 1e-6;
@@ -72,10 +72,7 @@ pub(super) fn placed(
     let Some(rows) = stated.get::<Affine>("").matrix else { return Ok(placement(stated, "")) };
     let path = format!("{path}.matrix");
     let placement = affine(document, &path, rows, (stated, ""))?;
-    for shift in placement.translation.to_array() {
-        document.within(&path, &SHIFT, &Value::Number(shift))?;
-    }
-    let m = placement.matrix3;
+    let (m, shifts) = (placement.matrix3, placement.translation.to_array());
     let lengths = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
     let volume = m.determinant() / lengths.iter().product::<f64>();
     let [least, most] = SCALES;
@@ -93,7 +90,13 @@ pub(super) fn placed(
             "this matrix is flat: it has no inverse".to_owned(),
             "write it row by row; the shift is the fourth column, mm".to_owned(),
         ),
-        None => return Ok(placement),
+        None => match shifts.iter().find(|shift| !(-FAR..=FAR).contains(*shift)) {
+            Some(shift) => (
+                format!("this matrix shifts by {shift} mm"),
+                format!("it must lie between -{FAR} and {FAR} mm"),
+            ),
+            None => return Ok(placement),
+        },
     };
     Err(document.fail(&path, cause, remedy))
 }

@@ -143,7 +143,7 @@ fn a_matrix_places_as_its_parts_do() {
         (format!("{matrix}\ntranslate = [1, 2, 3]"), "both a matrix", "give one"),
         (matrix.replace("0, 1]", "1, 1]"), "the last row is not 0 0 0 1", "row by row"),
         (matrix.replace("-2", "-2e7"), "2e7 long|20000000 long", "between"),
-        (matrix.replace("20", "2e9"), "matrix is 2", "between"),
+        (matrix.replace("20", "2e9"), "matrix shifts by 2000000000 mm", "between"),
         (mirror.to_owned(), "mirrors", "two axes change sign"),
         (flat.to_owned(), "is flat", "row by row"),
         (matrix.replace("-2", "nan"), "NaN", "between"),
