@@ -120,7 +120,7 @@ impl Grid {
         const OUTSIDE: u8 = u8::MAX;
         let [x, y, z] = self.size;
         let mut todo: Vec<u32> = Vec::new();
-        let mut reach = |voxels: &mut [u8], at: usize, todo: &mut Vec<u32>| {
+        let reach = |voxels: &mut [u8], at: usize, todo: &mut Vec<u32>| {
             if voxels[at] == 0 {
                 voxels[at] = OUTSIDE;
                 todo.push(at as u32);

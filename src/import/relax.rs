@@ -21,7 +21,7 @@ pub const REACH: f32 = 0.49;
 /// to a few hundredths, those of twenty kept.
 const SHRINK: f32 = 0.5;
 const SWELL: f32 = -0.53;
-const ROUNDS: usize = 12;
+const ROUNDS: usize = 24;
 /// Pushes towards the volumes of the voxels.
 const PUSHES: usize = 8;
 

@@ -109,11 +109,10 @@ fn random(n: u32) -> f64 {
 fn thirty() -> Grid {
     let size = [64, 56, 40];
     let middle = DVec3::new(31.5, 27.5, 19.5);
-    let points: Vec<DVec3> = (0..26)
-        .map(|n| {
-            DVec3::new(random(3 * n) * 63.0, random(3 * n + 1) * 55.0, random(3 * n + 2) * 39.0)
-        })
-        .collect();
+    let within = |n: u32| {
+        middle + DVec3::new(random(n) - 0.5, random(n + 1) - 0.5, random(n + 2) - 0.5) * 34.0
+    };
+    let points: Vec<DVec3> = (0..26).map(|n| within(3 * n)).collect();
     grid(size, |p| {
         for vessel in 0..4 {
             let f = f64::from(vessel);
@@ -146,9 +145,11 @@ fn thirty_organs_are_closed_share_their_faces_and_keep_their_volumes() {
     let (dice, error) = figures(&grid, &surfaces);
     println!("Dice {dice:.4}, volume {:.2} %", 100.0 * error);
     assert!(dice >= 0.97 && error < 0.02, "Dice {dice}, volume {error}");
-    // Two triangles for each pair of neighbouring voxels, in both surfaces.
+    // But for the voxels that touched along an edge, each label is the same again to the voxel.
     let mut separate = grid.clone();
     composed::separate(&mut separate);
+    assert_eq!(figures(&separate, &surfaces).0, 1.0);
+    // Two triangles for each pair of neighbouring voxels, in both surfaces.
     for ((a, b), pairs) in borders(&separate) {
         if a > 0 {
             let of = |l: u8| &surfaces.iter().find(|s| s.0 == l).expect("a surface").1;
@@ -161,8 +162,10 @@ fn thirty_organs_are_closed_share_their_faces_and_keep_their_volumes() {
 fn planted_errors_are_caught() {
     let grid = thirty();
     // Smoothing by more than half a voxel moves surfaces over centres of voxels.
-    let (dice, _) = figures(&grid, &surfaces(&grid, 3.0));
-    assert!(dice < 0.97, "{dice}");
+    let mut separate = grid.clone();
+    composed::separate(&mut separate);
+    let (dice, _) = figures(&separate, &surfaces(&separate, 1.0));
+    assert!(dice < 1.0, "{dice}");
     // A surface per label, each smoothed by itself, shares next to nothing with its neighbours.
     let alone = |label: u8| {
         let mut one = grid.clone();
@@ -194,7 +197,7 @@ fn a_sphere_is_round_and_as_large_as_its_voxels() {
     let [(_, blocks)] = surfaces(&grid, 0.0).try_into().expect("one label");
     // The steps of the voxels alone: a corner is off by up to half a diagonal, 0.87 voxels.
     println!("{:.3} of {:.3} voxels", rms(&smooth), rms(&blocks));
-    assert!(rms(&blocks) > 0.3 && rms(&smooth) < 0.12);
+    assert!(rms(&blocks) > 0.4 && rms(&smooth) < 0.13);
     let ball = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
     approx::assert_relative_eq!(topology::volume(&smooth), ball, max_relative = 0.01);
     assert_eq!(faults(&smooth), 0);
