@@ -5,7 +5,8 @@
 //! them, `surface` takes one out; `map` is the whole way. A folder of meshes goes through `folder`, compared with each other
 //! by `raster`. `table` says which tissue a structure is made of, `hull`
 //! makes up a skin where there is none, `pose` finds a place on it from which an organ is seen, `draft` writes the
-//! scene. Knows no Vulkan.
+//! scene. Configurations of PLUS (`plus`) become scenes by `device_set`, poses of sequences rows of a `trajectory`. Knows no
+//! Vulkan.
 
 use glam::DVec3;
 
@@ -13,6 +14,7 @@ use crate::scene::mesh::Units;
 use crate::volume::Frame;
 
 pub mod composed;
+pub mod device_set;
 mod draft;
 mod error;
 pub mod folder;
@@ -22,6 +24,7 @@ mod labels;
 pub mod map;
 mod names;
 pub mod nets;
+mod plus;
 mod pose;
 pub mod raster;
 pub mod relax;
@@ -29,6 +32,7 @@ pub mod surface;
 pub mod table;
 #[cfg(test)]
 mod tests;
+pub mod trajectory;
 
 pub use draft::{Draft, Part, way};
 pub use error::ImportError;

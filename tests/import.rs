@@ -5,13 +5,17 @@
 mod limited;
 #[path = "common/program.rs"]
 mod program;
+#[path = "common/shared_data.rs"]
+mod shared_data;
 
 use std::path::Path;
 
 use glam::DVec3;
 use insonify::scene::Scene;
-use limited::limited;
+use insonify::volume::is_volume;
+use limited::{check, files, limited};
 use program::insonify;
+use shared_data::shared_data;
 
 /// A NIfTI-1 file of labels: RAS, voxels of these sizes in mm, its first voxel at `origin` (RAS, mm).
 fn nifti(
@@ -219,4 +223,28 @@ fn the_table_that_ships_can_be_read_and_given_back() {
         ["import", "a.nii", "-o", "o", "--labels", "mine.csv", "--classes", "totalsegmentator"];
     let (done, said) = insonify(folder, &args);
     assert!(done && said.contains("liver: spleen,"), "{said}");
+}
+
+#[test]
+fn volumes_of_others_are_scenes_or_refused_within_bounds() {
+    let Some(data) = shared_data() else { return };
+    let out = tempfile::tempdir().expect("temporary folder");
+    let mut made = 0;
+    let all = ["corpus-nrrd-nifti", "us-plus", "us-dicom-pydicom"].map(|set| files(&data.join(set), is_volume));
+    for (n, file) in all.concat().iter().enumerate() {
+        let scene = out.path().join(n.to_string());
+        let script = format!("exec \"$0\" import \"$1\" -o {}", scene.display());
+        let outcome = limited(&script, file);
+        let (file, said) = (file.display(), &outcome.text);
+        assert!(matches!(outcome.code, Some(0 | 1)), "{file}: {:?} {said}", outcome.code);
+        if outcome.code == Some(0) {
+            made += 1;
+            let checked = check(&scene.join("scene.toml"));
+            assert_eq!(checked.code, Some(0), "{file}: {}", checked.text);
+            assert!(checked.text.contains("0 errors, 0 warnings"), "{file}: {}", checked.text);
+        }
+    }
+    println!("{made} scenes of {} volumes", all.concat().len());
+    // The balls of pynrrd, at the least.
+    assert!(made >= 5, "{made}");
 }

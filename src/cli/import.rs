@@ -1,16 +1,17 @@
 //! `insonify import`: a scene from a segmentation or from meshes.
 
-use std::path::PathBuf;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 use insonify::import::table::{self, Table};
 use insonify::import::{self, Draft, Options};
 use insonify::output;
 use insonify::scene::mesh::Units;
 use insonify::scene::tissue::table as tissues;
 use insonify::settings::suggest;
-use insonify::volume::Frame;
+use insonify::volume::{Frame, Pose, frames_of_pose, transform};
 use miette::{Result, miette};
 
 use super::common::Progress;
@@ -19,10 +20,11 @@ use super::reconstruct::spacing;
 /// Arguments of `insonify import`.
 #[derive(Debug, Args)]
 pub struct Import {
-    /// A label map (.nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd), or a folder of meshes, one per organ, named after them
+    /// A label map (.nii, .nii.gz, .nrrd, .seg.nrrd, .mha, .mhd), a folder of meshes, one per organ, named after
+    /// them, a configuration of PLUS's simulator (.xml), or for a trajectory a tracked sequence (.mha, .mhd, .nrrd)
     #[arg(required_unless_present = "print_table")]
     source: Option<PathBuf>,
-    /// Folder of the scene: scene.toml, and the meshes that it shows
+    /// Folder of the scene: scene.toml, and the meshes that it shows; or a trajectory (.csv)
     #[arg(short, long, value_name = "FOLDER", required_unless_present = "print_table")]
     output: Option<PathBuf>,
     /// Table of structures (.csv): columns value, name, tissue, priority, note, of which it may leave out some. Its
@@ -47,6 +49,21 @@ pub struct Import {
     /// Frame of mesh files that do not state theirs (SPACE=) [default: lps]
     #[arg(long, value_enum)]
     frame: Option<FrameChoice>,
+    /// Tracked sequence whose poses a configuration of PLUS is seen with: the first that are valid
+    #[arg(long, value_name = "FILE")]
+    sequence: Option<PathBuf>,
+    /// Transform beside those of a configuration of PLUS, e.g. ProbeToReference="1 0 0 10 0 1 0 0 0 0 1 0 0 0 0 1"
+    #[arg(long, value_name = "NAME=MATRIX", value_parser = named_transform)]
+    transform: Vec<(String, DAffine3)>,
+    /// For a trajectory: a configuration of PLUS, with the calibration of the probe
+    #[arg(long, value_name = "FILE")]
+    config: Option<PathBuf>,
+    /// For a trajectory: the pose of the probe, as the sequence and --config name its two frames
+    #[arg(long, value_name = "FROMToTO", default_value = "ProbeToReference")]
+    pose: String,
+    /// For a trajectory: turns its frame, RAS, into that of a world in LPS
+    #[arg(long)]
+    to_lps: bool,
     /// Replaces the scene in the folder
     #[arg(long)]
     force: bool,
@@ -71,6 +88,12 @@ enum FrameChoice {
     Ras,
 }
 
+fn named_transform(text: &str) -> Result<(String, DAffine3), String> {
+    let (name, matrix) = text.split_once('=').ok_or("write NAME=MATRIX")?;
+    let matrix = transform(&matrix.replace([',', ';'], " ")).map_err(str::to_owned)?;
+    Ok((name.to_owned(), matrix))
+}
+
 fn units(text: &str) -> Result<Units, String> {
     let names = Units::NAMES.iter().map(|(name, _)| *name);
     Units::named(text).ok_or_else(|| suggest::among(text, names))
@@ -85,6 +108,14 @@ pub fn run(args: &Import) -> Result<()> {
         output::line(table::SHIPPED.trim_end());
         return Ok(());
     };
+    let ends =
+        |path: &Path, with: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(with));
+    if ends(folder, "csv") {
+        return trajectory(source, folder, args);
+    }
+    if ends(source, "xml") {
+        return device_set(source, folder, args);
+    }
     let mut table = match &args.labels {
         Some(path) => Table::load(path)?,
         None => Table::shipped(),
@@ -140,6 +171,54 @@ pub fn run(args: &Import) -> Result<()> {
     let path = draft.finish()?;
     report(&draft);
     output::line(path.display());
+    Ok(())
+}
+
+/// A scene of a configuration of PLUS.
+fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
+    let mut poses = match &args.sequence {
+        Some(sequence) => import::trajectory::first_poses(sequence)?,
+        None => BTreeMap::new(),
+    };
+    poses.extend(args.transform.iter().map(|(name, t)| (name.clone(), Pose::ok(*t))));
+    let scene = import::device_set::import(source, folder, &poses, args.force)?;
+    for issue in &scene.issues {
+        eprintln!("{issue}");
+    }
+    let path = scene.finish()?;
+    for structure in &scene.draft.left_out {
+        output::line(format!("left out: {structure}, which no scene takes"));
+    }
+    for part in &scene.draft.parts {
+        output::line(format!("{}: {} triangles, {:.1} ml", part.name, part.triangles, part.volume));
+    }
+    output::line(path.display());
+    Ok(())
+}
+
+/// A trajectory of tracked poses.
+fn trajectory(source: &Path, file: &Path, args: &Import) -> Result<()> {
+    let wrong =
+        || miette!(help = "write it like ProbeToReference", "--pose {}: no two frames", args.pose);
+    let (tool, reference) = frames_of_pose(&args.pose).ok_or_else(wrong)?;
+    let naming = import::trajectory::Naming {
+        tool: tool.to_owned(),
+        reference: reference.to_owned(),
+        to_lps: args.to_lps,
+    };
+    let made = import::trajectory::import(source, args.config.as_deref(), &naming)?;
+    output::files::replace(file, made.text.as_bytes()).map_err(|e| {
+        miette!(
+            help = "check the folder and the room in it",
+            "{}: cannot be written: {e}",
+            file.display()
+        )
+    })?;
+    output::line(format!(
+        "{} poses over {:.3} s, {} frames left out (no valid pose, or no later than the one before)",
+        made.rows, made.duration, made.left_out
+    ));
+    output::line(file.display());
     Ok(())
 }
 

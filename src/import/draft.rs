@@ -7,6 +7,7 @@ use super::error::ImportError;
 use super::pose::View;
 use crate::output::files;
 use crate::scene::mesh::Soup;
+use crate::scene::check::SENSIBLE_SIZE;
 use crate::scene::topology;
 
 /// Name of the scene file in its folder.
@@ -50,6 +51,8 @@ pub struct Draft {
     pub frame: String,
     /// Structures, then the skin where there is one.
     pub parts: Vec<Part>,
+    /// Structures that are no mesh of the scene, and why.
+    pub left_out: Vec<String>,
     /// What the skin is made of and where it comes from.
     pub skin: Option<String>,
     /// Where the probe is, and the name of the organ that it looks at.
@@ -74,16 +77,23 @@ impl Draft {
             source: source.to_owned(),
             frame: String::new(),
             parts: Vec::new(),
+            left_out: Vec::new(),
             skin: None,
             view: None,
         })
     }
 
-    /// Writes a surface and adds it as a mesh whose name is like this one.
+    /// Writes a surface and adds it as a mesh whose name is like this one. Returns the name; none for one of a size that no
+    /// scene takes, which is left out.
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn add(&mut self, part: Part, surface: &Soup) -> Result<(), ImportError> {
+    pub fn add(&mut self, part: Part, surface: &Soup) -> Result<Option<String>, ImportError> {
+        let size = extent(surface);
+        if !(SENSIBLE_SIZE.0..=SENSIBLE_SIZE.1).contains(&size) {
+            self.left_out.push(format!("{}: {size:.3} mm large", part.name));
+            return Ok(None);
+        }
         let name = self.free(&part.name, |p| &p.name, |name, n| format!("{name} {n}"));
         let plain: String = name
             .chars()
@@ -99,8 +109,8 @@ impl Draft {
         files::replace(&path, obj(surface).as_bytes()).map_err(|e| unwritten(&path, &e))?;
         let volume = topology::volume(surface) / 1000.0;
         let triangles = surface.triangles.len();
-        self.parts.push(Part { name, file, triangles, volume, ..part });
-        Ok(())
+        self.parts.push(Part { name: name.clone(), file, triangles, volume, ..part });
+        Ok(Some(name))
     }
 
     /// `wanted`, or what `next` makes of it and a number, so that no part has it.
@@ -180,6 +190,14 @@ impl Draft {
             }
             writeln!(out)?;
         }
+        self.meshes(out)
+    }
+
+    /// The meshes of the scene file.
+    pub(super) fn meshes(&self, out: &mut String) -> std::fmt::Result {
+        for structure in &self.left_out {
+            writeln!(out, "# Left out: {structure}, which no scene takes.")?;
+        }
         writeln!(
             out,
             "# In rising priority: where two lie on or in each other, the later one wins."
@@ -215,16 +233,21 @@ impl Draft {
             depth.clamp(30.0, most)
         )?;
         writeln!(out, "focus = \"{:.0} mm\"\n", view.distance.clamp(10.0, most))?;
-        let vector = |v: glam::DVec3, digits: usize| {
-            // Turns -0 into 0.
-            let v = v.to_array().map(|x| format!("{:.digits$}", x + 0.0));
-            format!("[{}]", v.join(", "))
-        };
         writeln!(out, "[probe.pose]")?;
         writeln!(out, "position = {}", vector(view.position, 2))?;
         writeln!(out, "direction = {}", vector(view.direction, 5))?;
         writeln!(out, "lateral = {}\n", vector(view.lateral, 5))
     }
+}
+
+/// Largest edge of a surface's box, mm.
+fn extent(surface: &Soup) -> f64 {
+    let edge = |axis: usize| {
+        let values = surface.positions.iter().map(|p| f64::from(p[axis]));
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        high - low
+    };
+    (0..3).map(edge).fold(0.0, f64::max)
 }
 
 /// The way of a view in words.
@@ -242,8 +265,15 @@ pub fn way(view: &View) -> String {
     }
 }
 
+/// A vector as TOML has it.
+pub(super) fn vector(v: glam::DVec3, digits: usize) -> String {
+    // Turns -0 into 0.
+    let v = v.to_array().map(|x| format!("{:.digits$}", x + 0.0));
+    format!("[{}]", v.join(", "))
+}
+
 /// A text as TOML has it.
-fn quoted(text: &str) -> String {
+pub(super) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 

@@ -109,8 +109,9 @@ pub fn import(
         hides[n + 1] = pose::blocks(&tissue);
         let mut part = map::part(&organ.entry, name_of(&organ.file));
         part.priority = n as i32;
-        draft.add(part, &organ.surface)?;
-        names.push((label, draft.parts.last().expect("just added").name.clone()));
+        if let Some(name) = draft.add(part, &organ.surface)? {
+            names.push((label, name));
+        }
     }
     let surface = match skin {
         Some(n) => {

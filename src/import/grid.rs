@@ -119,36 +119,33 @@ impl Grid {
     pub fn fill_holes(&mut self, label: u8) -> u64 {
         const OUTSIDE: u8 = u8::MAX;
         let [x, y, z] = self.size;
-        let mut todo: Vec<u32> = Vec::new();
-        let reach = |voxels: &mut [u8], at: usize, todo: &mut Vec<u32>| {
-            if voxels[at] == 0 {
-                voxels[at] = OUTSIDE;
-                todo.push(at as u32);
-            }
-        };
+        // One voxel of each run along x that is still to be visited: runs are few where voxels are many.
+        let mut todo: Vec<usize> = Vec::new();
         for k in 0..z {
             for j in 0..y {
                 let border = j == 0 || k == 0 || j + 1 == y || k + 1 == z;
                 let step = if border { 1 } else { (x - 1).max(1) };
-                for i in (0..x).step_by(step) {
-                    reach(&mut self.voxels, i + x * (j + y * k), &mut todo);
-                    // Depth first from each: the list stays as short as a way is long.
-                    while let Some(at) = todo.pop() {
-                        let at = at as usize;
-                        let (i, j, k) = (at % x, at / x % y, at / (x * y));
-                        let beside = [
-                            (i > 0, at.wrapping_sub(1)),
-                            (i + 1 < x, at + 1),
-                            (j > 0, at.wrapping_sub(x)),
-                            (j + 1 < y, at + x),
-                            (k > 0, at.wrapping_sub(x * y)),
-                            (k + 1 < z, at + x * y),
-                        ];
-                        for (there, at) in beside {
-                            if there {
-                                reach(&mut self.voxels, at, &mut todo);
-                            }
-                        }
+                todo.extend((0..x).step_by(step).map(|i| i + x * (j + y * k)));
+                while let Some(at) = todo.pop() {
+                    if self.voxels[at] != 0 {
+                        continue;
+                    }
+                    let row = at - at % x;
+                    let before = self.voxels[row..at].iter().rposition(|v| *v != 0);
+                    let after = self.voxels[at..row + x].iter().position(|v| *v != 0);
+                    let run = before.map_or(row, |n| row + n + 1)..after.map_or(row + x, |n| at + n);
+                    self.voxels[run.clone()].fill(OUTSIDE);
+                    let (j, k) = (at / x % y, at / (x * y));
+                    let rows = [
+                        (j > 0).then(|| run.start.wrapping_sub(x)),
+                        (j + 1 < y).then(|| run.start + x),
+                        (k > 0).then(|| run.start.wrapping_sub(x * y)),
+                        (k + 1 < z).then(|| run.start + x * y),
+                    ];
+                    for start in rows.into_iter().flatten() {
+                        let beside = &self.voxels[start..start + run.len()];
+                        let first = |n: &usize| beside[*n] == 0 && (*n == 0 || beside[n - 1] != 0);
+                        todo.extend((0..run.len()).filter(first).map(|n| start + n));
                     }
                 }
             }

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::error::ImportError;
 use super::grid::Grid;
 use super::names::{self, Segment};
-use crate::volume::{Volume, Voxels};
+use crate::volume::{DicomSegment, Segmentation, Volume, Voxels};
 
 /// A label map and what its labels are.
 #[derive(Clone, Debug)]
@@ -27,6 +27,12 @@ impl LabelMap {
     /// # Errors
     /// A file that is no volume; values that are no labels, or too many.
     pub fn load(path: &Path) -> Result<Self, ImportError> {
+        let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+        if (extension == "dcm" || extension == "dicom")
+            && let Some(found) = Segmentation::load(path)?
+        {
+            return of_dicom(path, found);
+        }
         let (volume, _) = Volume::load(path)?;
         let segments = names::of(path)?;
         let layered = segments.iter().any(|s| s.layer > 0);
@@ -61,6 +67,17 @@ impl LabelMap {
         }
         Ok(Self { grid: grid.expect("a volume"), labels })
     }
+}
+
+fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, ImportError> {
+    if found.voxels.iter().all(|v| *v == 0) {
+        let message = "none of its segments has a pixel";
+        return Err(ImportError::file(path, message, "give the segmentation"));
+    }
+    let segment = |s: DicomSegment| Segment { layer: 0, value: s.number.into(), names: s.names };
+    let Segmentation { size, world_from_voxel, voxels, segments } = found;
+    let grid = Grid { size, world_from_voxel, voxels };
+    Ok(LabelMap { grid, labels: segments.into_iter().map(segment).collect() })
 }
 
 /// The segment of a value in a layer; without a name where the file has none.

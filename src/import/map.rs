@@ -17,6 +17,8 @@ use crate::scene::mesh::{MAX_ELEMENTS, Soup};
 
 /// Most faces of all surfaces, each counted once: with the voxels the work then stays below 2 GB.
 const MAX_FACES: u64 = 12_000_000;
+/// Labels from which on a map whose voxels hardly ever agree with their neighbours is taken for an image.
+const MANY: usize = 20;
 /// Distance of voxels in which the place of the probe is sought, mm: a rib is three of them thick.
 const COARSE: f64 = 3.0;
 /// What a skin that is made up stands off, mm: some skin, fat and muscle.
@@ -74,9 +76,9 @@ pub fn import(
         let surface = surfaces.of(&entry.name, |l| l == label);
         let own = format!("label {}", segment.value);
         let origin = if entry.name == own { own } else { format!("{own}, {}", entry.name) };
-        draft.add(part(entry, origin), &surface)?;
-        let name = draft.parts.last().expect("just added").name.clone();
-        target.push((label, name, entry.clone()));
+        if let Some(name) = draft.add(part(entry, origin), &surface)? {
+            target.push((label, name, entry.clone()));
+        }
     }
     let skin = match outline {
         Some(_) => {
@@ -150,7 +152,13 @@ pub fn add_skin(draft: &mut Draft, skin: &Soup, options: &Options) -> Result<(),
             part.name = format!("{SKIN} (structure)");
         }
     }
-    draft.add(part(&entry, "skin".to_owned()), skin)
+    match draft.add(part(&entry, "skin".to_owned()), skin)? {
+        Some(_) => Ok(()),
+        None => {
+            let message = format!("the body is {}", draft.left_out.pop().unwrap_or_default());
+            Err(ImportError::file(&draft.source, message, "check its unit and its voxel size"))
+        }
+    }
 }
 
 fn resampled(path: &Path, grid: &Grid, spacing: DVec3) -> Result<Grid, ImportError> {
@@ -197,6 +205,11 @@ fn bounded(
             now * (1.1 * too_many).sqrt()
         )
     };
+    let labelled = grid.voxels.iter().filter(|v| **v > 0).count() as u64;
+    if entries.len() > MANY && all > labelled {
+        let message = "nearly every voxel differs from its neighbours: an image and no label map";
+        return Err(ImportError::file(path, message, "give the segmentation"));
+    }
     if all > MAX_FACES {
         let needed = nets::bytes(grid, all) >> 20;
         let message = format!(
@@ -221,7 +234,7 @@ fn bounded(
     Ok(all)
 }
 
-/// The organ to look at: the one of that name, else the largest that sound reaches.
+/// The organ to look at: the one of that name, else the largest with a tissue of its own that sound reaches.
 pub fn choose(
     parts: &[(u8, &str, &Entry)],
     volumes: &[u64; 256],
@@ -232,7 +245,8 @@ pub fn choose(
     let size = |label: u8| volumes[usize::from(label)];
     let Some(wanted) = &options.look_at else {
         let organ = |&&(label, _, entry): &&(u8, &str, &Entry)| {
-            (20..40).contains(&entry.priority) && !hides[usize::from(label)] && entry.known
+            let usual = entry.known && !entry.note.starts_with("stand-in");
+            (20..40).contains(&entry.priority) && !hides[usize::from(label)] && usual
         };
         let organs = parts.iter().filter(organ);
         let largest = organs.max_by_key(|p| size(p.0)).or(parts.iter().max_by_key(|p| size(p.0)));
