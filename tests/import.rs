@@ -137,7 +137,7 @@ fn without_an_outline_a_skin_is_made_up_and_unknown_names_are_told() {
     std::fs::write(folder.join("a.nii"), bytes).expect("written");
     let (done, said) = insonify(folder, &["import", "a.nii", "-o", "out", "--look-at", "label 2"]);
     assert!(done, "{said}");
-    assert!(said.contains("5 structures had no tissue and were given muscle: label 2"), "{said}");
+    assert!(said.contains("5 structures had no tissue and were given muscle: label 5"), "{said}");
     assert!(said.contains("looks at label 2"), "{said}");
     let text = std::fs::read_to_string(folder.join("out/scene.toml")).expect("a scene");
     assert!(text.contains("made up: the convex hull"), "{text}");
@@ -230,7 +230,8 @@ fn volumes_of_others_are_scenes_or_refused_within_bounds() {
     let Some(data) = shared_data() else { return };
     let out = tempfile::tempdir().expect("temporary folder");
     let mut made = 0;
-    let all = ["corpus-nrrd-nifti", "us-plus", "us-dicom-pydicom"].map(|set| files(&data.join(set), is_volume));
+    let all = ["corpus-nrrd-nifti", "us-plus", "us-dicom-pydicom"]
+        .map(|set| files(&data.join(set), is_volume));
     for (n, file) in all.concat().iter().enumerate() {
         let scene = out.path().join(n.to_string());
         let script = format!("exec \"$0\" import \"$1\" -o {}", scene.display());

@@ -208,7 +208,12 @@ fn write(
         "# attenuation times share over PLUS's default. Surfaces and texture are those of liver."
     )?;
     for model in &set.models {
-        writeln!(out, "[tissues.{}]", tissue_name(set, model))?;
+        let name = tissue_name(set, model);
+        let around = model.file.is_none() && background == Some(model);
+        if !around && !draft.parts.iter().any(|p| p.tissue == name) {
+            continue;
+        }
+        writeln!(out, "[tissues.{name}]")?;
         writeln!(out, "based_on = \"liver\"")?;
         writeln!(out, "speed = {}\ndensity = {}", model.speed, model.density)?;
         writeln!(out, "attenuation = {}", model.attenuation)?;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use super::error::ImportError;
 use super::pose::View;
 use crate::output::files;
-use crate::scene::mesh::Soup;
 use crate::scene::check::SENSIBLE_SIZE;
+use crate::scene::mesh::Soup;
 use crate::scene::topology;
 
 /// Name of the scene file in its folder.
@@ -244,7 +244,8 @@ impl Draft {
 fn extent(surface: &Soup) -> f64 {
     let edge = |axis: usize| {
         let values = surface.positions.iter().map(|p| f64::from(p[axis]));
-        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
         high - low
     };
     (0..3).map(edge).fold(0.0, f64::max)

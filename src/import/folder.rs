@@ -90,10 +90,20 @@ pub fn import(
     let mut grid = box_of(source, &organs)?;
     raise_inner(&mut organs, &grid);
     let skin = organs.iter().position(|o| o.entry.priority == OUTLINE);
+    let mut hides = [false; 256];
+    for (n, organ) in organs.iter().enumerate() {
+        let tissue = Tissue::shipped(&organ.entry.tissue).expect("tables have shipped tissues");
+        hides[n + 1] = pose::blocks(&tissue);
+    }
+    let candidates: Vec<_> = (1..)
+        .zip(organs.iter().map(|o| &o.entry))
+        .filter(|(label, _)| Some(usize::from(*label) - 1) != skin)
+        .collect();
+    let size = |label: u8| organs[usize::from(label) - 1].volume as u64;
+    let chosen = map::choose(&candidates, size, &hides, options, source)?;
     let mut draft = Draft::begin(folder, source, options.force)?;
     let back = grid.world_from_voxel.inverse();
-    let mut hides = [false; 256];
-    let mut names = Vec::new();
+    let mut target = None;
     for (n, organ) in organs.iter().enumerate() {
         progress("comparisons", n, organs.len());
         let label = n as u8 + 1;
@@ -105,12 +115,11 @@ pub fn import(
             let start = x * (j + y * k);
             grid.voxels[start + row.start..start + row.end].fill(label);
         });
-        let tissue = Tissue::shipped(&organ.entry.tissue).expect("tables have shipped tissues");
-        hides[n + 1] = pose::blocks(&tissue);
         let mut part = map::part(&organ.entry, name_of(&organ.file));
         part.priority = n as i32;
-        if let Some(name) = draft.add(part, &organ.surface)? {
-            names.push((label, name));
+        let name = draft.add(part, &organ.surface)?;
+        if chosen == Some(label) {
+            target = name;
         }
     }
     let surface = match skin {
@@ -130,13 +139,8 @@ pub fn import(
         }
     };
     map::add_skin(&mut draft, &surface, options)?;
-    let volumes = grid.counts();
-    let targets: Vec<_> = names
-        .iter()
-        .map(|(label, name)| (*label, name.as_str(), &organs[usize::from(*label) - 1].entry))
-        .collect();
     progress("poses", 0, 1);
-    if let Some((label, name)) = map::choose(&targets, &volumes, &hides, options, source)? {
+    if let Some((label, name)) = chosen.zip(target) {
         let task = Task {
             grid: &grid,
             blocks: &hides,

@@ -133,7 +133,8 @@ impl Grid {
                     let row = at - at % x;
                     let before = self.voxels[row..at].iter().rposition(|v| *v != 0);
                     let after = self.voxels[at..row + x].iter().position(|v| *v != 0);
-                    let run = before.map_or(row, |n| row + n + 1)..after.map_or(row + x, |n| at + n);
+                    let run =
+                        before.map_or(row, |n| row + n + 1)..after.map_or(row + x, |n| at + n);
                     self.voxels[run.clone()].fill(OUTSIDE);
                     let (j, k) = (at / x % y, at / (x * y));
                     let rows = [

@@ -6,7 +6,7 @@ use std::path::Path;
 use super::error::ImportError;
 use super::grid::Grid;
 use super::names::{self, Segment};
-use crate::volume::{DicomSegment, Segmentation, Volume, Voxels};
+use crate::volume::{DicomSegment, Segmentation, Summary, Volume, Voxels};
 
 /// A label map and what its labels are.
 #[derive(Clone, Debug)]
@@ -32,6 +32,11 @@ impl LabelMap {
             && let Some(found) = Segmentation::load(path)?
         {
             return of_dicom(path, found);
+        }
+        if (extension == "mha" || extension == "mhd") && Summary::read(path)?.is_some() {
+            let message = "is a tracked sequence: images and no label map";
+            let remedy = "for its poses give -o NAME.csv; for its images see `insonify reconstruct`";
+            return Err(ImportError::file(path, message, remedy));
         }
         let (volume, _) = Volume::load(path)?;
         let segments = names::of(path)?;

@@ -14,6 +14,7 @@ use super::table::{Entry, OUTLINE};
 use super::{Options, composed, hull, nets, relax};
 use crate::scene::Tissue;
 use crate::scene::mesh::{MAX_ELEMENTS, Soup};
+use crate::settings::suggest;
 
 /// Most faces of all surfaces, each counted once: with the voxels the work then stays below 2 GB.
 const MAX_FACES: u64 = 12_000_000;
@@ -53,6 +54,14 @@ pub fn import(
     }
     let outline = join_outlines(&mut grid, &entries);
     let volumes = grid.counts();
+    let mut hides = [false; 256];
+    for (n, entry) in entries.iter().enumerate() {
+        let tissue = Tissue::shipped(&entry.tissue).expect("tables have shipped tissues alone");
+        hides[n + 1] = entry.priority != OUTLINE && pose::blocks(&tissue);
+    }
+    let there = |l: &u8, e: &Entry| e.priority != OUTLINE && volumes[usize::from(*l)] > 0;
+    let candidates: Vec<_> = (1..).zip(&entries).filter(|(l, e)| there(l, e)).collect();
+    let chosen = choose(&candidates, |l| volumes[usize::from(l)], &hides, options, path)?;
     let coarse = match grid.spacing().min_element() < COARSE / 2.0 {
         true => grid.resampled(grid.spacing().max(DVec3::splat(COARSE))),
         false => grid.clone(),
@@ -66,7 +75,7 @@ pub fn import(
     });
     let mut surfaces = Surfaces::new(&grid, &net);
     let mut draft = Draft::begin(folder, path, options.force)?;
-    let mut target = Vec::new();
+    let mut target = None;
     for (n, (entry, segment)) in entries.iter().zip(&labels).enumerate() {
         let label = n as u8 + 1;
         progress("surfaces", n, entries.len());
@@ -76,8 +85,9 @@ pub fn import(
         let surface = surfaces.of(&entry.name, |l| l == label);
         let own = format!("label {}", segment.value);
         let origin = if entry.name == own { own } else { format!("{own}, {}", entry.name) };
-        if let Some(name) = draft.add(part(entry, origin), &surface)? {
-            target.push((label, name, entry.clone()));
+        let name = draft.add(part(entry, origin), &surface)?;
+        if chosen == Some(label) {
+            target = name;
         }
     }
     let skin = match outline {
@@ -89,7 +99,9 @@ pub fn import(
             let made_up = "made up: the convex hull of all that is labelled, and";
             draft.skin =
                 Some(format!("{made_up} {MARGIN} mm. The file has no outline of the body."));
-            hull::around(&coarse, MARGIN).expect("there are labels")
+            // Coarse voxels may have lost all that is thin.
+            let around = hull::around(&coarse, MARGIN).or_else(|| hull::around(&grid, MARGIN));
+            around.expect("there are labels")
         }
     };
     drop(net);
@@ -103,16 +115,8 @@ pub fn import(
         grid.spacing().y,
         grid.spacing().z
     );
-    let mut hides = [false; 256];
-    for (n, entry) in entries.iter().enumerate() {
-        let tissue = Tissue::shipped(&entry.tissue).expect("tables have shipped tissues alone");
-        hides[n + 1] = entry.priority != OUTLINE && pose::blocks(&tissue);
-    }
-    let candidates: Vec<_> =
-        target.iter().map(|(label, name, entry)| (*label, name.as_str(), entry)).collect();
-    let chosen = choose(&candidates, &volumes, &hides, options, path)?;
     progress("poses", 0, 1);
-    if let Some((label, name)) = chosen {
+    if let Some((label, name)) = chosen.zip(target) {
         let ends = cut(&grid, outline.is_some());
         let task =
             Task { grid: &coarse, blocks: &hides, target: label, skin: &skin, forbidden: &ends };
@@ -236,34 +240,31 @@ fn bounded(
 
 /// The organ to look at: the one of that name, else the largest with a tissue of its own that sound reaches.
 pub fn choose(
-    parts: &[(u8, &str, &Entry)],
-    volumes: &[u64; 256],
+    parts: &[(u8, &Entry)],
+    size: impl Fn(u8) -> u64,
     hides: &[bool; 256],
     options: &Options,
     path: &Path,
-) -> Result<Option<(u8, String)>, ImportError> {
-    let size = |label: u8| volumes[usize::from(label)];
+) -> Result<Option<u8>, ImportError> {
+    let largest = |accepted: &dyn Fn(u8, &Entry) -> bool| {
+        let parts = parts.iter().filter(|(label, entry)| accepted(*label, entry));
+        parts.map(|(label, _)| *label).max_by_key(|label| size(*label))
+    };
     let Some(wanted) = &options.look_at else {
-        let organ = |&&(label, _, entry): &&(u8, &str, &Entry)| {
+        let organ = |label: u8, entry: &Entry| {
             let usual = entry.known && !entry.note.starts_with("stand-in");
             (20..40).contains(&entry.priority) && !hides[usize::from(label)] && usual
         };
-        let organs = parts.iter().filter(organ);
-        let largest = organs.max_by_key(|p| size(p.0)).or(parts.iter().max_by_key(|p| size(p.0)));
-        return Ok(largest.map(|(label, name, _)| (*label, (*name).to_owned())));
+        return Ok(largest(&organ).or_else(|| largest(&|_, _| true)));
     };
-    let same = |name: &str| name.eq_ignore_ascii_case(wanted);
-    let within = |name: &str| name.to_lowercase().contains(&wanted.to_lowercase());
-    let found = parts.iter().find(|p| same(p.1));
-    let found = found.or(parts.iter().filter(|p| within(p.1)).max_by_key(|p| size(p.0)));
-    match found {
-        Some((label, name, _)) => Ok(Some((*label, (*name).to_owned()))),
-        None => {
-            let names = parts.iter().map(|p| p.1);
-            let remedy = crate::settings::suggest::among(wanted, names);
-            Err(ImportError::file(path, format!("has no structure `{wanted}` to look at"), remedy))
-        }
-    }
+    let same = |_: u8, entry: &Entry| entry.name.eq_ignore_ascii_case(wanted);
+    let part = wanted.to_lowercase();
+    let within = |_: u8, entry: &Entry| entry.name.to_lowercase().contains(&part);
+    let found = largest(&same).or_else(|| largest(&within));
+    found.map(Some).ok_or_else(|| {
+        let remedy = suggest::among(wanted, parts.iter().map(|(_, e)| e.name.as_str()));
+        ImportError::file(path, format!("has no structure `{wanted}` to look at"), remedy)
+    })
 }
 
 /// Whether a place of the skin is where the volume ends and the body goes on.
