@@ -35,7 +35,8 @@ impl LabelMap {
         }
         if (extension == "mha" || extension == "mhd") && Summary::read(path)?.is_some() {
             let message = "is a tracked sequence: images and no label map";
-            let remedy = "for its poses give -o NAME.csv; for its images see `insonify reconstruct`";
+            let remedy =
+                "for its poses give -o NAME.csv; for its images see `insonify reconstruct`";
             return Err(ImportError::file(path, message, remedy));
         }
         let (volume, _) = Volume::load(path)?;

@@ -221,12 +221,14 @@ fn bounded(
         );
         return Err(ImportError::file(path, message, advice(all as f64 / MAX_FACES as f64)));
     }
-    for (n, entry) in entries.iter().enumerate() {
-        let triangles = 2 * each[n + 1];
+    // The outline has the faces towards what is outside; what it shares with organs is theirs.
+    let outline = entries.iter().any(|e| e.priority == OUTLINE).then_some((SKIN, each[0]));
+    let organs = entries.iter().zip(&each[1..]).filter(|(e, _)| e.priority != OUTLINE);
+    for (name, faces) in organs.map(|(e, n)| (e.name.as_str(), *n)).chain(outline) {
+        let triangles = 2 * faces;
         if triangles > MAX_ELEMENTS as u64 {
             let message = format!(
-                "the surface of `{}` would have {triangles} triangles, more than {MAX_ELEMENTS}",
-                entry.name
+                "the surface of `{name}` would have {triangles} triangles, more than {MAX_ELEMENTS}"
             );
             return Err(ImportError::file(
                 path,
