@@ -1,8 +1,9 @@
 // variants: bvh query(RAY_QUERY)
 #version 460
-// What the anatomy inside the mask takes from the sound, more than what is around the mask would
-// have: the transmitted path of each line, written down as pieces of straight lines of its level.
+// Shadows: the loss of sound in the anatomy inside the mask beyond the loss that the tissue around the mask would
+// cause. The level along the transmitted path of each line is written as pieces of straight lines.
 #extension GL_GOOGLE_include_directive : require
+#extension GL_EXT_control_flow_attributes : require
 #ifdef RAY_QUERY
 #extension GL_EXT_ray_query : require
 #endif
@@ -16,16 +17,17 @@ layout(std430, binding = 1) restrict readonly buffer TissueBuffer { Tissue tissu
 layout(std430, binding = 2) restrict readonly buffer InstanceBuffer { Instance instances[]; };
 layout(std430, binding = 3) restrict readonly buffer VertexBuffer { float vertices[]; };
 layout(std430, binding = 4) restrict readonly buffer NormalBuffer { float normals[]; };
-layout(std430, binding = 5) restrict readonly buffer TriangleBuffer { uint triangles[]; };
+layout(std430, binding = 5) restrict readonly buffer SmoothedBuffer { uvec4 smoothed[]; };
+layout(std430, binding = 6) restrict readonly buffer TriangleBuffer { uint triangles[]; };
 #ifdef RAY_QUERY
-layout(binding = 6) uniform accelerationStructureEXT tlas;
+layout(binding = 7) uniform accelerationStructureEXT tlas;
 #else
-layout(std430, binding = 6) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
+layout(std430, binding = 7) restrict readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
-layout(std430, binding = 7) restrict readonly buffer StackBuffer { uint stacks[]; };
-layout(std430, binding = 8) restrict readonly buffer RowBuffer { Row rows[]; };
-layout(std430, binding = 9) restrict buffer PieceBuffer { vec4 pieces[]; };
-layout(std430, binding = 10) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 8) restrict readonly buffer StackBuffer { uint stacks[]; };
+layout(std430, binding = 9) restrict readonly buffer RowBuffer { Row rows[]; };
+layout(std430, binding = 10) restrict buffer PieceBuffer { vec4 pieces[]; };
+layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
 #include "triangle.glsl"
 #ifdef RAY_QUERY
@@ -42,8 +44,9 @@ layout(std430, binding = 10) restrict readonly buffer ScanlineBuffer { Scanline 
 #include "footprint.glsl"
 #include "media.glsl"
 #include "path.glsl"
+#include "wavefront.glsl"
 
-// Nepers of amplitude at which nothing is left.
+// Level, in nepers of amplitude, that stands for no sound at all.
 const float DARK = -200.0;
 const float NOTHING = 1e-30;
 
@@ -62,21 +65,11 @@ void middle(uint line, out Path path, inout Media media) {
     path.spread = vec3(0.0);
 }
 
-// Sends the path through; the part of its intensity that is reflected, 1 where nothing gets through.
+// Transmits the path; returns the reflected part of its intensity, 1 if nothing is transmitted.
 float pass(inout Path path, Met here, Medium t1, Medium t2) {
-    vec3 n_geometric = here.normal;
-    vec3 n = surface_shading_normal(here.hit);
-    if (dot(path.direction, n_geometric) >= 0.0) { n_geometric = -n_geometric; n = -n; }
-    if (!(dot(path.direction, n) < 0.0)) n = n_geometric;
-    float cos_i = -dot(path.direction, n);
-    float width = 0.0;
-    if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
-        float kappa = frame.speed * path.time / frame.sample_pitch;
-        vec3 along = path.direction + cos_i * n + 0.01 * path.lateral;
-        width = surface_curvature(here.hit, along) * rows[sample_at(kappa)].sigma_lateral;
-    }
-    float reflected = footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, width);
-    bool through = transmit_path(path, n, n_geometric, t1.speed, t2.speed) || width > 0.0;
+    Slope slope = slope_at(here, path, sample_at(frame.speed * path.time / frame.sample_pitch), 0.0);
+    float reflected = reflectance_at(slope, path.direction, t1, t2);
+    bool through = transmit_path(path, slope.refracting, slope.geometric, t1.speed, t2.speed) || slope.width > 0.0;
     return through ? reflected : 1.0;
 }
 
@@ -93,9 +86,9 @@ void main() {
     float surrounding = tissues[frame.background].absorption;
     float level = 0.0;
     bool fresh = true;
-    // No mask lies on the line, or nothing gets past a surface.
+    // True if no mask lies on the line, or nothing is transmitted at a surface.
     bool lost = path.weight <= 0.0;
-    // The first of two surfaces that coincide was found; the ray looks for the other.
+    // True while the first of two coincident surfaces has been found and the ray searches for the other.
     bool pairing = false;
     Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
     float close = 0.0;
@@ -103,7 +96,7 @@ void main() {
     while (true) {
         Medium t1 = current_medium(media);
         bool heard = is_heard(media);
-        // Around the mask sound goes on at the speed of the recording.
+        // Around the mask sound travels at the speed assumed by the recording.
         Medium way = t1;
         if (!heard) {
             way.speed = frame.speed;
@@ -119,7 +112,7 @@ void main() {
             fresh = false;
         }
         float t_end = (time_end - path.time) * way.speed;
-        // Nothing is met by a ray without room.
+        // With t_max = -1 the ray meets nothing.
         Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.hit.t - close, 0.0) : path.t_min,
             pairing ? first.hit.t + close : (ends ? -1.0 : t_end), pairing ? first.hit.instance : NONE);
         Met here = surface_met(hit);
@@ -129,7 +122,7 @@ void main() {
             here = first;
             pairing = false;
         } else if (hit.instance == NONE) {
-            // What nothing follows holds to the end of the line.
+            // Marks the end of the list; the last piece extends to the end of the line.
             pieces[next] = vec4(FAR_PIECE, 0.0, 0.0, 0.0);
             break;
         } else {

@@ -1,4 +1,4 @@
-// Where a ray met a surface. The includer declares instances[], vertices[], normals[], triangles[].
+// Place and normals of a hit. The includer declares instances[], vertices[], normals[], triangles[].
 
 // A vector scaled by a power of two at most once more than needed, so that its square neither
 // overflows nor vanishes for triangles of any size.
@@ -61,9 +61,9 @@ vec3 surface_shading_normal(Hit hit) {
     return surface_to_world(hit.instance, n);
 }
 
-// How fast the interpolated normal turns along the direction `along` (world, any length): radians per
-// mm, unsigned.
-float surface_curvature(Hit hit, vec3 along) {
+// How fast the normal turns along the direction `along` (world, any length): radians per mm, unsigned. `corners`: normals
+// of the triangle's corners, object space, any length.
+float surface_curvature(Hit hit, vec3 along, vec3 corners[3]) {
     uint i = triangles[3u * hit.primitive];
     uint j = triangles[3u * hit.primitive + 1u];
     uint k = triangles[3u * hit.primitive + 2u];
@@ -75,9 +75,9 @@ float surface_curvature(Hit hit, vec3 along) {
         u[row] = dot(instances[hit.instance].world_from_object[row], to_j);
         v[row] = dot(instances[hit.instance].world_from_object[row], to_k);
     }
-    vec3 n = surface_to_world(hit.instance, vec3(normals[3u * i], normals[3u * i + 1u], normals[3u * i + 2u]));
-    vec3 n_u = surface_to_world(hit.instance, vec3(normals[3u * j], normals[3u * j + 1u], normals[3u * j + 2u])) - n;
-    vec3 n_v = surface_to_world(hit.instance, vec3(normals[3u * k], normals[3u * k + 1u], normals[3u * k + 2u])) - n;
+    vec3 n = surface_to_world(hit.instance, corners[0]);
+    vec3 n_u = surface_to_world(hit.instance, corners[1]) - n;
+    vec3 n_v = surface_to_world(hit.instance, corners[2]) - n;
     vec3 across = cross(u, v);
     float area2 = dot(across, across);
     float size = dot(along, along);

@@ -1,7 +1,5 @@
 //! Fusion from the scene file to the frame: refusals, echoes, dumps.
 
-#[path = "../tools/harness/mod.rs"]
-mod harness;
 #[path = "common/shared_data.rs"]
 mod shared_data;
 
@@ -181,7 +179,7 @@ fn compare(scene: &Scene, masked: &[Vec<i32>; 2], whole: &[Vec<i32>; 2]) -> [usi
 }
 
 #[test]
-fn only_what_the_mask_encloses_is_heard_and_it_is_what_it_was() {
+fn only_the_inside_of_the_mask_echoes_and_as_without_a_mask() {
     let device = test_device();
     let plain = load("").expect("sound");
     for tracer in [Tracer::Bvh, Tracer::RayQuery] {
@@ -378,7 +376,9 @@ fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
         let folder = tempfile::tempdir().expect("a folder");
         dump::frame(&mut simulator, &scene, folder.path()).expect("dumped");
         for name in names {
-            for check in harness::dump::check(&device, &library, folder.path(), name) {
+            for check in
+                insonify_tools::harness::dump::check(&device, &library, folder.path(), name)
+            {
                 assert!(check.passed(), "{name}: {check}");
             }
         }

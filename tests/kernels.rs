@@ -1,16 +1,13 @@
 //! Every kernel against its f64 twin: random, empty, of size one, of odd sizes, with NaN and
 //! infinity; and an error planted into each kernel's outputs is caught.
 
-#[path = "../tools/harness/mod.rs"]
-mod harness;
-
 use std::path::Path;
 
-use harness::{Case, Element, Job, SUBJECTS, Size, dump};
 use insonify::gpu::{Kernel, test_device};
 use insonify::output::npy;
 use insonify::sim::shaders::Library;
 use insonify::sim::stages;
+use insonify_tools::harness::{self, Case, Element, Job, SUBJECTS, Size, dump};
 
 const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 
@@ -115,7 +112,7 @@ fn declared(kernel: &str) -> Vec<String> {
 }
 
 #[test]
-fn what_stages_and_jobs_bind_has_the_names_of_the_sources() {
+fn bindings_of_stages_and_jobs_have_the_names_of_the_sources() {
     for pass in stages::all() {
         assert_eq!(declared(pass.name), pass.binds, "{}", pass.name);
     }

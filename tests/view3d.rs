@@ -125,7 +125,7 @@ fn a_ball_covers_what_perspective_says() {
 }
 
 #[test]
-fn what_is_before_the_image_plane_is_cut_away_and_only_that() {
+fn the_anatomy_in_front_of_the_image_plane_is_cut_away_and_only_that() {
     for (across, is_cut) in [(20.0, true), (-20.0, false)] {
         let (scene, mut view3d, _) = view(9.0, across);
         let count = |view3d: &View3d| {

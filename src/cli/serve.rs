@@ -97,7 +97,7 @@ fn simulate(
     let pause = Duration::from_secs_f64(1.0 / args.fps);
     let mut told = Told::default();
     let mut pace = Pace::new(sim::machine(device));
-    let own = Level::of(&scene.probe, &scene.simulation, &scene.imaging);
+    let own = Level::of(scene);
     let mut shown: Option<Shown> = None;
     let mut frames = 0;
     let mut due = began;

@@ -94,7 +94,7 @@ impl Blas {
         Self::build_timed(device, inputs, options).map(|(built, _)| built)
     }
 
-    /// As [`Self::build_many`], with its times and sizes.
+    /// Like [`Self::build_many`]; also returns times and sizes.
     pub(crate) fn build_timed(
         device: &Arc<Device>,
         inputs: &[BlasInput<'_>],

@@ -324,7 +324,7 @@ impl<'a> Commands<'a> {
         self.slot.submit(self.frame)
     }
 
-    /// As [`Self::submit`], after `wait` at its stages; signals `done`.
+    /// Like [`Self::submit`], after `wait` at its stages; signals `done`.
     pub(crate) fn submit_between(
         self,
         wait: &[(vk::Semaphore, vk::PipelineStageFlags)],
@@ -350,7 +350,7 @@ impl Device {
         self.once_timed(record).map(|(result, _)| result)
     }
 
-    /// As [`Self::once`], with the times of the scopes that were recorded.
+    /// Like [`Self::once`]; also returns the times of the scopes that were recorded.
     pub fn once_timed<T>(
         self: &Arc<Self>,
         record: impl FnOnce(&mut Commands<'_>) -> Result<T, GpuError>,

@@ -198,7 +198,7 @@ impl Slot {
         self.submit_between(frame, &[], &[])
     }
 
-    /// As [`Self::submit`], after `wait` have been signalled for the stages named with them; signals
+    /// Like [`Self::submit`], after `wait` have been signalled for the stages named with them; signals
     /// `done`.
     pub(crate) fn submit_between(
         &mut self,

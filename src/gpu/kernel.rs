@@ -62,7 +62,7 @@ impl Kernel {
         Ok(kernel)
     }
 
-    /// As [`Self::new`], but the pipeline is not made before the first dispatch or [`Self::prepare`]:
+    /// Like [`Self::new`], but the pipeline is not made before the first dispatch or [`Self::prepare`]:
     /// for kernels that many scenes do not need.
     ///
     /// # Errors

@@ -79,7 +79,7 @@ pub struct Tool {
     pub kind: u8,
     /// Not used by the protocol.
     pub reserved: u8,
-    /// As in [`Content::Transform`].
+    /// Matrix in the form of [`Content::Transform`].
     pub matrix: [f32; 12],
 }
 
@@ -283,7 +283,7 @@ impl Message {
     /// Reads a message and nothing behind it.
     ///
     /// # Errors
-    /// As [`Self::decode`], and bytes that are missing or left over.
+    /// Those of [`Self::decode`], and bytes that are missing or left over.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, DecodeError> {
         let (header, body) = bytes
             .split_first_chunk()

@@ -174,11 +174,11 @@ impl Server {
         Self::bind_and_tell(address, settings, || {})
     }
 
-    /// As [`Server::bind`]; `told` is called, from threads of the server, whenever a pose has arrived and when
+    /// Like [`Server::bind`]; `told` is called, from threads of the server, whenever a pose has arrived and when
     /// clients or errors have changed. It must not wait.
     ///
     /// # Errors
-    /// As [`Server::bind`].
+    /// Those of [`Server::bind`].
     pub fn bind_and_tell(
         address: SocketAddr,
         settings: Settings,

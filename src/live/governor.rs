@@ -322,7 +322,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_whose_cost_beats_does_not_pump() {
+    fn a_scene_with_periodic_cost_stays_at_one_level() {
         for whole in [150.0, 300.0, 420.0, 600.0, 1000.0] {
             let mut governor = Governor::new(66.0, WORKS.to_vec());
             let cost = device(whole);

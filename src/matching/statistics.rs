@@ -1,16 +1,17 @@
 //! Statistics of speckle that the eye compares at a border: brightness by depth, spread, size.
 //!
-//! All come from the log-compressed levels 0..1. Brightness is the mean of the middle half of the
+//! All are computed from the log-compressed levels 0..1. Brightness is the mean of the middle half of the
 //! values of a depth ([`Histogram::midmean`]). Spread and size come from differences of two samples,
-//! less what brightness changes by between their depths; of slow changes of anatomy they hardly have any (the structure function or variogram, Matheron,
+//! less the change of brightness between their depths, so that slow changes of anatomy have little effect (structure
+//! function or variogram, Matheron,
 //! Economic Geology 58, 1963): with m(u) the mean of the middle half of |difference| at distance u,
 //! `1 - (m(u) / m(far))^2` is the correlation, and m(far) the spread. For fully developed speckle it is
 //! a Gaussian within 4 % of its width, if the point-spread function is.
 //!
-//! Of a sample that is black only a bound is known. The intensity of speckle is exponential, so that
-//! below a level which it seldom reaches it lies by an exponential number of dB, of mean 10 / ln 10:
-//! that is added where one of two samples is black. Pairs of which both are black, or both white, say
-//! nothing.
+//! For a black sample only an upper bound is known. The intensity of speckle has an exponential distribution, so that
+//! it is below a rarely undercut level by an exponential number of dB, of mean 10 / ln 10:
+//! this is added if one of two samples is black. Pairs that are both black, or both white, are
+//! left out.
 
 use super::histogram::Histogram;
 use crate::probe::Probe;

@@ -29,6 +29,15 @@ impl Probe {
         (tx.powi(-2) + rx.powi(-2)).sqrt().recip()
     }
 
+    /// Sigma across the wavefront at depth `z` that converges on what the image shows halfway between there and its
+    /// bottom, mm: over this width a surface at `z` refracts. As wide as the receive aperture near the face, as narrow
+    /// as a focus at the bottom. A Gaussian aperture whose focus is as wide as that of [`Self::sigma_lateral`].
+    pub fn sigma_wavefront(&self, z: f64) -> f64 {
+        let target = 0.5 * (z + self.depth.max(z));
+        let f_number = self.f_number_receive.max(target / self.aperture);
+        fixed_focus(self.wavelength(), f_number, target, z)
+    }
+
     /// Elevational two-way sigma at depth `z`, mm: the lens focuses transmit and receive alike.
     pub fn sigma_elevation(&self, z: f64) -> f64 {
         let f_number = self.elevation_focus / self.elevation_height;

@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_a_rotation_open_is_refused_with_a_remedy() {
+    fn landmarks_that_do_not_determine_a_rotation_are_refused_with_a_remedy() {
         let truth = similarity(1.0);
         let on_a_line = |n: usize| {
             let mut all = moved(truth, 4);

@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_triangles_none_is_nearer_and_none_has_a_nearer_point() {
+    fn the_nearest_point_is_that_of_brute_force() {
         let all: Vec<Triangle> = triangles(&shapes::sphere(30.0, 3))
             .into_iter()
             .map(|t| t.map(|p| p * DVec3::new(1.0, 0.4, 2.0) + DVec3::new(900.0, 0.0, -80.0)))
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_surface_is_refused() {
+    fn triangles_without_area_or_numbers_are_refused() {
         let line = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::X];
         for (triangles, cause) in [
             (vec![], "no triangle"),

@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_diagonal_repeated_or_zero_stays() {
+    fn diagonal_repeated_and_zero_eigenvalues_are_exact() {
         assert_eq!(eigen([[1.0, 0.0], [0.0, 3.0]]), [(3.0, [0.0, 1.0]), (1.0, [1.0, 0.0])]);
         assert_eq!(eigen([[0.0; 3]; 3]).map(|(value, _)| value), [0.0; 3]);
         // All ones: 3 along the diagonal, and a plane of zeros.

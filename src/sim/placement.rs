@@ -9,6 +9,11 @@ pub fn matrix_rows(matrix: &DAffine3) -> Rows {
     std::array::from_fn(|i| matrix.matrix3.row(i).extend(matrix.translation[i]).as_vec4().into())
 }
 
+/// Mean stretch of lengths: the cube root of that of volumes.
+pub fn stretch(matrix: &DAffine3) -> f64 {
+    matrix.matrix3.determinant().abs().cbrt()
+}
+
 /// The rigid transform next to `matrix`: the proper rotation of its polar decomposition, and its
 /// translation. A mirrored placement has the rotation of its negative, so that the result depends
 /// continuously on the matrix and keeps distances and handedness.
@@ -63,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_rows() {
+    fn matrix_rows_transform_as_the_matrix_does() {
         let matrix = DAffine3::from_scale_rotation_translation(
             DVec3::new(1.0, 2.0, 3.0),
             glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),

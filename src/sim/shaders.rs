@@ -1,4 +1,4 @@
-//! The compiled kernels: what is embedded, what it was compiled from, and reloading.
+//! The compiled kernels: embedded modules, the stamp of their sources, and reloading.
 //!
 //! `spirv/` is checked in, so that nobody but an author of kernels needs a GLSL compiler.
 //! `tools/compile.rs` writes it; `tests/spirv.rs` fails when it is stale or invalid.

@@ -1,4 +1,4 @@
-//! The anatomy as an eye sees it: a picture through the structures that sound is traced with.
+//! The 3D view: a picture of the anatomy from outside, by rays through the structures in which sound is traced.
 
 use std::sync::Arc;
 
@@ -12,7 +12,7 @@ use crate::gpu::{
     Binding, Buffer, BufferKind, Commands, Device, FrameTimings, GpuError, Image, Kernel, Stage,
 };
 
-/// How far the probe's housing stands out beside the face, mm.
+/// Distance by which the probe's housing is wider than the face on each side, mm.
 const RIM: f64 = 3.0;
 /// Half the width of a probe whose face is a point, mm.
 const POINT: f64 = 10.0;
@@ -21,7 +21,7 @@ pub const HEAD: f64 = 32.0;
 /// Height of head and handle, mm.
 pub const HANDLE: f64 = 105.0;
 
-/// What is seen, from where.
+/// A view: the camera, and what is visible.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sight {
     /// Width and height of the picture, pixels.
@@ -34,16 +34,16 @@ pub struct Sight {
     pub right: DVec3,
     /// One pixel down at distance 1.
     pub down: DVec3,
-    /// What lies on the eye's side of the image plane is cut away.
+    /// True if everything on the eye's side of the image plane is cut away.
     pub cut: bool,
-    /// The B-mode image is shown where it lies.
+    /// True if the B-mode image is shown in its place.
     pub image: bool,
-    /// Colour (0..1) and opacity of each of the scene's instances; opacity 0: it is not there.
+    /// Colour (0..1) and opacity of each of the scene's instances; opacity 0: invisible.
     pub looks: Vec<[f32; 4]>,
 }
 
 impl Sight {
-    /// As the kernel reads it, for a probe.
+    /// The constants for the kernel, for the probe of `frame`.
     pub fn constants(&self, frame: &Frame) -> layout::View3d {
         let vector = |v: DVec3| {
             let [x, y, z] = v.as_vec3().to_array();
@@ -67,8 +67,7 @@ impl Sight {
     }
 }
 
-/// The probe's housing, mm: half its width, half its thickness, height of its head, and of head and
-/// handle.
+/// The probe's housing, mm: half its width, half its thickness, height of its head, height of head and handle.
 pub fn housing(frame: &Frame) -> [f32; 4] {
     let half_width = match frame.kind {
         layout::KIND_CONVEX => {
@@ -82,7 +81,7 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
     [(half_width + RIM) as f32, (half_thickness + RIM) as f32, HEAD as f32, HANDLE as f32]
 }
 
-/// Kernel and buffers of the picture, as large as the largest so far.
+/// Kernel and buffers of the picture. Buffers grow to the largest picture so far.
 pub(super) struct Viewer3d {
     kernel: Kernel,
     constants: Buffer,
@@ -114,13 +113,13 @@ impl Viewer3d {
     }
 }
 
-/// Of looks and picture.
+/// Bytes of looks and picture.
 fn bytes(sight: &Sight) -> [u64; 2] {
     let [width, height] = sight.size.map(u64::from);
     [16 * sight.looks.len() as u64, 4 * width * height].map(|size| size.max(16))
 }
 
-/// Looks and picture.
+/// The buffers of looks and picture.
 fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError> {
     let [looks, picture] = bytes(sight);
     Ok([
@@ -130,8 +129,8 @@ fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError>
 }
 
 impl Simulator {
-    /// Pictures the anatomy of the last frame on `image`, RGBA of the sight's size, with that frame's
-    /// probe and B-mode image; waits for it. The time that it took on the device.
+    /// Draws the anatomy of the last frame into `image`, RGBA of the view's size, with that frame's
+    /// probe and B-mode image, and waits for it. Returns the time that it took on the device.
     ///
     /// # Errors
     /// Device out of memory; a lost device.
@@ -151,11 +150,11 @@ impl Simulator {
             None => Viewer3d::new(&self.device, library, passes.world.tracer(), sight)?,
         };
         if !viewer3d.holds(sight) {
-            // The pipeline stays: a window that is dragged larger asks for many sizes.
+            // Only buffers are made again, not the pipeline: dragging the window asks for many sizes.
             self.frames.wait()?;
             [viewer3d.looks, viewer3d.picture] = buffers(&self.device, sight)?;
         }
-        // It stays where the picture is abandoned.
+        // Stored before recording, so that it is kept if the picture is abandoned.
         let viewer3d = self.viewer3d.insert(viewer3d);
         let mut cmd = self.frames.begin()?;
         cmd.scope("view3d");
@@ -176,7 +175,7 @@ impl Viewer3d {
         fused: bool,
     ) -> Result<(), GpuError> {
         let (frame, world) = (&passes.buffers["frame"], &passes.world);
-        // The last frame may have been abandoned.
+        // The constants of the last complete picture: the last frame may have been abandoned.
         let constants = sight.constants(&passes.shown);
         cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;
         cmd.write(&self.constants, 0, bytemuck::bytes_of(&constants))?;

@@ -194,7 +194,7 @@ impl Answers {
 /// Reads several filled forms of one study, each of which counts once.
 ///
 /// # Errors
-/// As [`Answers::read`]; two files that were saved from one filled form.
+/// Those of [`Answers::read`]; two files that were saved from one filled form.
 pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, StudyError> {
     let mut all: Vec<Answers> = Vec::new();
     for path in paths {

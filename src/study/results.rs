@@ -58,7 +58,7 @@ pub struct Pair {
     pub before: [usize; 2],
     /// Probability of the two-sided exact sign test.
     pub p: f64,
-    /// That probability corrected for the number of pairs, after Holm.
+    /// The probability, corrected for the number of pairs after Holm.
     pub corrected: f64,
 }
 

@@ -250,11 +250,10 @@ impl Tools {
 fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     // The settings of the level that it was made at: they give this very image.
     let mut settings = (*frame.settings).clone();
-    let counts = &frame.grade.counts;
-    counts.set(&mut settings.probe, &mut settings.simulation, &mut settings.imaging);
+    frame.grade.counts.apply(&mut settings);
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
-    let all = facts::settings(&settings.probe, &settings.simulation, &settings.imaging);
+    let all = facts::settings(&settings);
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()

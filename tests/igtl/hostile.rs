@@ -201,7 +201,7 @@ fn noise_and_false_lengths_end_the_connection() {
 }
 
 #[test]
-fn who_leaves_in_the_middle_leaves_nothing_behind() {
+fn clients_that_leave_within_a_message_leave_nothing_behind() {
     let server = serve(settings());
     server.publish(grey(1000, 1000), &DAffine3::IDENTITY);
     for cut in [0, 3, HEADER, HEADER + 5] {
@@ -217,7 +217,7 @@ fn who_leaves_in_the_middle_leaves_nothing_behind() {
 }
 
 #[test]
-fn who_asks_and_never_reads_is_sent_away() {
+fn clients_that_ask_and_never_read_are_disconnected() {
     let server = serve(settings());
     server.publish(grey(1000, 1000), &DAffine3::IDENTITY);
     let mut client = Client::connect(&server);

@@ -18,7 +18,7 @@ fn status(client: &mut Client, kind: &str) -> u8 {
 }
 
 #[test]
-fn what_there_is_not_is_answered_so() {
+fn queries_for_missing_things_are_answered_as_such() {
     let server = serve(settings());
     let mut client = Client::connect(&server);
     for (asked, answered) in [

@@ -145,7 +145,7 @@ fn a_tool_that_plus_does_not_see_is_lost_at_once() {
 }
 
 #[test]
-fn what_is_no_pose_is_told_and_leaves_the_last_one() {
+fn invalid_poses_are_reported_and_leave_the_last_one() {
     let server = serve(plain());
     let mut client = Client::connect(&server);
     client.transform("ProbeToReference", shift(1.0, 0.0, 0.0));

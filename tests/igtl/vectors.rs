@@ -41,7 +41,7 @@ fn decoded(name: &str, wire: &[u8]) -> Message {
 }
 
 #[test]
-fn what_pyigtl_writes_is_read_as_it_was_meant() {
+fn messages_of_pyigtl_are_read_with_their_meaning() {
     let quarter = [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 10.5, -20.25, 30.125];
     for (name, hex) in [("TRANSFORM", TRANSFORM), ("TRANSFORM_2", TRANSFORM_2)] {
         let message = decoded(name, &bytes(hex));

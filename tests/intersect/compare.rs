@@ -1,9 +1,9 @@
 //! Comparison of the device's hit with that of the brute-force reference.
 
 use glam::DVec3;
-use insonify::reference::intersect::{self, Hit};
 use insonify::scene::Scene;
 use insonify::sim::tracer::Tracer;
+use insonify_tools::reference::intersect::{self, Hit};
 use rayon::prelude::*;
 
 use super::rays::{Ray, aimed_at_seams, corners};
@@ -106,7 +106,7 @@ pub fn around(direction: DVec3, count: u32) -> impl Iterator<Item = DVec3> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     Same,
-    /// As the reference's answer to a ray displaced by no more than the rounding: it passes an outline, where the
+    /// Equal to the reference's answer to a ray displaced by no more than the rounding: the ray passes an outline, where the
     /// device may also meet just the corner of a triangle.
     Displaced,
     Wrong,

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
-use insonify::settings::{Imaging, Simulation};
+use insonify::settings::Simulation;
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.
@@ -43,11 +43,10 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
         elevation_layers: 1,
         ..Probe::paper_table1()
     };
-    Scene {
-        simulation: Simulation { paths: 1, max_reflections: 0, ..Simulation::default() },
-        imaging: Imaging { noise: f64::NEG_INFINITY, ..Imaging::default() },
-        ..Scene::homogeneous(background, probe)
-    }
+    let mut scene = Scene::homogeneous(background, probe);
+    scene.simulation = Simulation { paths: 1, max_reflections: 0, ..Simulation::default() };
+    scene.imaging.noise = f64::NEG_INFINITY;
+    scene
 }
 
 /// Adds a mirror-like body at the place given by `at`; later bodies win where they overlap.

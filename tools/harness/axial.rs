@@ -1,8 +1,8 @@
-//! `axial`: the pulse's envelope along each line. What it detects of it is the subject `detect`.
+//! `axial`: the pulse's envelope along each line. Its detection is the subject `detect`.
 
 use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::axial;
+use crate::reference::axial;
 use insonify::sim::layout::Frame;
 use insonify::sim::stages;
 

@@ -3,7 +3,7 @@
 use super::display;
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::blur;
+use crate::reference::blur;
 use insonify::sim::layout::{Frame, Fusion};
 use insonify::sim::stages;
 
@@ -24,7 +24,7 @@ pub const SUBJECT: Subject = Subject {
     ..Subject::of(&stages::BLUR)
 };
 
-/// Whether the source has rows and columns exchanged.
+/// True if the source has rows and columns exchanged.
 fn turned(job: &Job) -> bool {
     job.push.iter().any(|&b| b != 0)
 }

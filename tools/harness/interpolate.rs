@@ -2,15 +2,16 @@
 
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::interpolate;
-use insonify::sim::layout::Interpolation;
+use crate::reference::interpolate;
+use insonify::scene::smoothed::pack;
+use insonify::sim::layout::{Interpolation, PACKED, SUM, UNIT};
 
 pub const SUBJECT: Subject = Subject {
     name: "interpolate",
     pass: None,
     tolerance: "5e-7 of the sum of the magnitudes that are added (four products and three sums, each \
                 rounded by 6e-8), over the length that a unit vector had, and 5e-7 for its root and \
-                quotient",
+                quotient; packed directions within 6e-5, what their words round",
     job,
     size: |job, _| {
         let push = push(job);
@@ -22,7 +23,7 @@ pub const SUBJECT: Subject = Subject {
     extent: Some(|job| Extent::threads(push(job).count, 1)),
     check,
     plant: |job, outputs| {
-        // Of numbers about 1.
+        // Rounding of numbers about 1.
         let target = (push(job).stride * push(job).target) as usize;
         job.edit(outputs, "values", |values: &mut [f32]| {
             values[target + 5] += 1e-4;
@@ -50,20 +51,28 @@ fn job(case: Case, size: Size) -> Job {
         // Catmull-Rom's at a quarter of the interval.
         weights: [-0.070_312_5, 0.867_187_5, 0.226_562_5, -0.023_437_5],
         // Displacements have a float to spare.
-        stride: if matches!(case, Case::Random | Case::One) { 4 } else { 3 },
+        stride: match case {
+            Case::Random | Case::One => 4,
+            Case::Odd => 1,
+            _ => 3,
+        },
         ..Interpolation::default()
     };
     let mut values = Random(31).floats(5 * (push.stride * count) as usize, -1.0, 1.0);
     match case {
-        // Linear and of unit length; the two without weight begin beyond the buffer.
+        // Linear and packed; the two without weight begin beyond the buffer.
         Case::Odd => {
-            push.unit = 1;
+            let mut random = Random(32);
+            values = (0..5 * count)
+                .map(|_| f32::from_bits(pack([(); 3].map(|()| random.within(-1.0, 1.0)).into())))
+                .collect();
+            push.kind = PACKED;
             push.sources = [1, count, 1 << 28, u32::MAX];
             push.weights = [0.3, 0.7, 0.0, 0.0];
         }
         // In place of a keyframe, of which some vectors are zero and one is as short as can be.
         Case::Modes => {
-            push.unit = 1;
+            push.kind = UNIT;
             push.target = count;
             push.weights = [0.0, 1.0, 0.0, 0.0];
             values[3 * count as usize..][..12].fill(0.0);
@@ -87,12 +96,15 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let after: Vec<f32> = job.after(outputs, "values");
     let expected = interpolate::interpolate(&push, &before);
     let expected: Vec<f64> = expected.iter().flat_map(|v| v.to_array()).collect();
+    if push.kind == PACKED {
+        return packed(&push, &before, &after, &expected);
+    }
     let stride = push.stride as usize;
     let first = stride * push.target as usize;
     let written: Vec<usize> =
         (0..3 * push.count as usize).map(|i| first + stride * (i / 3) + i % 3).collect();
     // What is added up, and how long the sum is.
-    let plain = Interpolation { unit: 0, ..push };
+    let plain = Interpolation { kind: SUM, ..push };
     let sums = interpolate::interpolate(&plain, &before);
     let magnitude = |i: usize| {
         let parts = push.sources.iter().zip(push.weights);
@@ -102,7 +114,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
             .sum::<f64>()
     };
     let allowed = |i: usize| {
-        if push.unit == 0 {
+        if push.kind == SUM {
             return 5e-7 * magnitude(i);
         }
         let length = sums[i / 3].length().max(f64::MIN_POSITIVE);
@@ -119,5 +131,22 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     vec![
         Check::close("vectors", &made, &expected, allowed),
         Check::equal("everything else", &rest(&after), &rest(&before)),
+    ]
+}
+
+/// The same of packed vectors: their words round directions to 5e-5 rad.
+fn packed(push: &Interpolation, before: &[f32], after: &[f32], expected: &[f64]) -> Vec<Check> {
+    let target = push.target as usize;
+    let end = target + push.count as usize;
+    // Unpacked by the twin.
+    let alone = Interpolation { sources: [push.target; 4], weights: [1.0, 0.0, 0.0, 0.0], ..*push };
+    let made: Vec<f32> = (interpolate::interpolate(&alone, after).iter())
+        .flat_map(|v| v.as_vec3().to_array())
+        .collect();
+    let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
+    let rest = |values: &[f32]| [bits(&values[..target]), bits(&values[end..])];
+    vec![
+        Check::close("directions", &made, expected, |_| 6e-5),
+        Check::equal("everything else", &rest(after), &rest(before)),
     ]
 }

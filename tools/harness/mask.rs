@@ -2,19 +2,17 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::inputs::{Random, frame, scanlines};
+use super::inputs::{Random, scanlines, straight_frame};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject, sizes};
-use insonify::reference::mask;
-use insonify::sim::layout::{
-    FLAG_COINCIDENT, Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE,
-};
+use crate::reference::mask;
+use insonify::sim::layout::{Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE};
 use insonify::sim::placement;
 use insonify::sim::stages;
 
 /// Distance from a crossing, mm, within which a sample may be on either side.
 const EDGE: f64 = 1e-3;
-/// Grey levels of white noise may differ by this: places are good to 1e-4 of a texel.
+/// Largest difference of grey levels in white noise: positions are exact to 1e-4 of a texel.
 const LEVEL: f64 = 1e-3;
 
 pub const SUBJECT: Subject = Subject {
@@ -44,14 +42,7 @@ pub const SUBJECT: Subject = Subject {
 };
 
 fn job(case: Case, size: Size) -> Job {
-    let mut frame = frame(case, size);
-    if case == Case::NotFinite {
-        // Not what the rays' elevation, a constant 0, is multiplied by: a compiler may leave that out.
-        frame.world_from_probe[0][2] = f32::NAN;
-    }
-    if case == Case::Modes {
-        frame.flags |= FLAG_COINCIDENT;
-    }
+    let frame = straight_frame(case, size);
     let mut world = worlds::world(case).inputs();
     let instances = world.iter_mut().find(|i| i.name == "instances");
     let bytes = &mut instances.expect("a world has instances").bytes;
@@ -127,7 +118,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let allowed = |i: usize| if at_end(places[i]) { 1.0 } else { LEVEL };
     vec![
         Check::count("mask", got.len(), wrong, 0),
-        // As many as lie so close by chance; else the comparison excuses everything.
+        // Not more samples than lie so close by chance are left out; otherwise the comparison would allow any result.
         Check::count("samples at a crossing", got.len(), near, got.len() / 50),
         Check::close("grey level", &shown, &expected, allowed),
     ]

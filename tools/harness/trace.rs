@@ -4,16 +4,16 @@ use super::check::relative_norm;
 use super::inputs::{frame, lines, rows, scanlines};
 use super::worlds;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::{Segment, origin, trace};
+use crate::reference::{Segment, origin, trace};
 use insonify::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
-    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WORLD_TEXTURE, Frame,
+    FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WAVEFRONT, FLAG_WORLD_TEXTURE, Frame,
     SAMPLING_MAIN_PATH, SAMPLING_PLAIN, SAMPLING_SHARED_PRIMARY, START_WORDS,
 };
 use insonify::sim::rounds::Rounds;
 use insonify::sim::stages;
 
-/// So few that each takes several pieces of work, and that there are several groups of lines.
+/// Number of workers: so few that each takes several pieces of work, and that there are several groups of lines.
 const WORKERS: u32 = 64;
 
 pub const SUBJECT: Subject = Subject {
@@ -43,25 +43,27 @@ pub const SUBJECT: Subject = Subject {
     ..Subject::of(&stages::TRACE[0])
 };
 
-/// The dispatches for the paths that a job's push constants ask for.
+/// The dispatches for the paths in a job's push constants.
 pub fn rounds(job: &Job, frame: &Frame) -> Rounds {
     let paths = match job.push.as_slice().try_into() {
         Ok(push) => bytemuck::cast::<[u8; 8], [u32; 2]>(push)[1],
-        // Another kernel's.
+        // The job of another kernel, whose push constants are different.
         Err(_) => frame.paths,
     };
     Rounds::new(frame, paths, WORKERS)
 }
 
-/// Frame, tissues, surfaces, the world's five bindings, and its fields.
+/// Frame, tissues, surfaces, the world's six bindings, and its fields.
 pub fn scene(case: Case, size: Size) -> Vec<Input> {
     let mut frame = frame(case, size);
     frame.surface_scale = (1 << 20) as f32;
     frame.volume_scale = frame.surface_scale;
     (frame.sampling, frame.flags, frame.paths) = match case {
-        Case::Odd => {
-            (SAMPLING_PLAIN, FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED, 7)
-        }
+        Case::Odd => (
+            SAMPLING_PLAIN,
+            FLAG_FACE_REFLECTION | FLAG_ROUGH_TRANSMISSION | FLAG_MASKED | FLAG_WAVEFRONT,
+            7,
+        ),
         Case::Modes => (
             SAMPLING_SHARED_PRIMARY,
             FLAG_COINCIDENT | FLAG_COHERENT | FLAG_WORLD_TEXTURE | FLAG_FOOTPRINT | FLAG_SOBOL,
@@ -69,7 +71,7 @@ pub fn scene(case: Case, size: Size) -> Vec<Input> {
         ),
         // Main paths of their own.
         Case::One => (SAMPLING_MAIN_PATH, FLAG_ROUGH_TRANSMISSION, 3),
-        _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL, 8),
+        _ => (SAMPLING_MAIN_PATH, FLAG_FOOTPRINT | FLAG_SOBOL | FLAG_WAVEFRONT, 8),
     };
     let mut tissues = worlds::tissues();
     if case == Case::NotFinite {
@@ -147,7 +149,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-/// Segments of either list without a partner in the other.
+/// The number of segments of both lists without a partner in the other.
 fn unmatched(mut got: Vec<Segment>, expected: &[Segment]) -> usize {
     let mut missing = 0;
     for segment in expected {

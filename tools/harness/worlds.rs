@@ -1,11 +1,12 @@
-//! Small worlds for the tracing kernels: ellipsoids and boxes, as the device's buffers and as the
-//! twins read them.
+//! Small worlds for the tracing kernels: ellipsoids and boxes, in the form of the device's buffers and of the
+//! twins.
 
 use glam::{DAffine3, DQuat, DVec3};
 
 use super::inputs::Random;
 use super::{Case, Input, Job};
-use insonify::reference::Owned;
+use crate::reference::Owned;
+use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{MeshBvh, Placed, SceneBvh};
 use insonify::sim::fields::{HEADER, padded};
@@ -28,7 +29,7 @@ impl Builder {
         self.again(self.meshes.len() - 1, at, tissue, priority);
     }
 
-    /// Places a mesh that has been placed before.
+    /// Places a mesh again.
     pub fn again(&mut self, mesh: usize, at: DAffine3, tissue: u32, priority: i32) {
         self.placements.push((mesh, at));
         self.instances.push(Instance {
@@ -49,7 +50,7 @@ impl Builder {
         self.instances[index].masks = 1;
     }
 
-    /// Lets the tissue of the instance placed last be somewhere else than in its reference shape: by
+    /// Displaces the tissue of the instance placed last from its reference shape: by
     /// up to 3 mm, strained by up to a quarter.
     fn deform(&mut self) {
         let (origin, spacing, size) = (DVec3::new(-20.0, -16.0, -14.0), 4.0, [11_u8, 9, 8]);
@@ -76,16 +77,18 @@ impl Builder {
         Input::floats("fields", padded(&self.fields).as_flattened())
     }
 
-    /// The five bindings instances, vertices, normals, triangles, nodes.
+    /// The six bindings instances, vertices, normals, smoothed, triangles, nodes.
     pub fn inputs(mut self) -> Vec<Input> {
         let trees: Vec<MeshBvh> = self.meshes.iter().map(MeshBvh::build).collect();
         let (mut vertices, mut normals) = (Vec::new(), Vec::new());
         let (mut triangles, mut firsts) = (Vec::new(), Vec::new());
+        let mut averages = Vec::new();
         for (mesh, tree) in self.meshes.iter().zip(&trees) {
             let base = vertices.len() as u32;
             firsts.push(triangles.len() as u32);
             vertices.extend_from_slice(&mesh.positions);
             normals.extend_from_slice(&mesh.normals);
+            averages.extend(smoothed(mesh, 1.0));
             let order = tree.triangle_order.iter();
             triangles.extend(order.map(|&t| mesh.triangles[t as usize].map(|v| base + v)));
         }
@@ -106,6 +109,7 @@ impl Builder {
             instance.triangles = self.meshes[mesh].triangles.len() as u32;
             instance.bvh_root = roots[mesh];
             instance.slot = nodes.slots[i];
+            instance.finest = placement::stretch(&self.placements[i].1) as f32;
             let [low, high] = trees[mesh].bounds.map(|[x, y, z]| [x, y, z, 0.0]);
             (instance.low, instance.high) = (low, high);
         }
@@ -113,6 +117,7 @@ impl Builder {
             Input::words("instances", &self.instances),
             Input::floats("vertices", vertices.as_flattened()),
             Input::floats("normals", normals.as_flattened()),
+            Input::words("smoothed", &averages),
             Input::words("triangles", &triangles),
             Input::words("nodes", &nodes.nodes),
         ]
@@ -205,7 +210,7 @@ pub fn world(case: Case) -> Builder {
     builder
 }
 
-/// What the twins read, taken from a job's bindings; what the kernel does not bind is empty.
+/// The world of the twins, from a job's bindings; arrays that the kernel does not bind are empty.
 pub fn owned(job: &Job) -> Owned {
     let frame = job.optional::<Frame>("frame").first().copied().unwrap_or_default();
     // Without the spheres around them. `trace` binds none and only asks whether there are any.
@@ -219,6 +224,7 @@ pub fn owned(job: &Job) -> Owned {
         instances: job.optional("instances"),
         positions: job.optional("vertices"),
         normals: job.optional("normals"),
+        smoothed: job.optional("smoothed"),
         triangles: job.optional("triangles"),
         points,
         fields: fields(job),
@@ -230,18 +236,19 @@ fn fields(job: &Job) -> Vec<[f32; 3]> {
     job.optional::<[f32; 4]>("fields").iter().map(|&[x, y, z, _]| [x, y, z]).collect()
 }
 
-/// Bytes of a binding of [`Builder::inputs`], or of the displacement fields, that the instances of `job`
-/// refer to; 0 of others.
+/// Bytes of a binding of [`Builder::inputs`], or of the displacement fields, to which the instances of `job`
+/// refer; 0 for other bindings.
 pub fn size(job: &Job, name: &str) -> usize {
     let instances: Vec<Instance> = job.optional("instances");
     let triangles: Vec<[u32; 3]> = job.optional("triangles");
     let ends = instances.iter().map(|i| (i.first_triangle + i.triangles) as usize);
     let end = ends.max().unwrap_or(0);
-    // As many as there are: a kernel without them has none, a dump may have lost some.
+    // No more than exist: a job of another kernel has none, and a dump may lack some.
     let used = &triangles[..end.min(triangles.len())];
     match name {
-        "vertices" | "normals" => {
-            12 * used.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize
+        "vertices" | "normals" | "smoothed" => {
+            let each = if name == "smoothed" { 16 } else { 12 };
+            each * used.iter().flatten().map(|v| v + 1).max().unwrap_or(0) as usize
         }
         "triangles" => {
             let owners = instances.iter().filter(|i| i.owners != 0);

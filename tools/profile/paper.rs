@@ -1,7 +1,7 @@
 //! `profile paper`: the paper's tables measured again. Starkov et al. 2019 used a GeForce GTX 970 and
 //! scenes of their own; only the ratios within a table can be compared.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use insonify::output;
 use insonify::scene::{Scene, Strategy};
@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Poses of Table II [default: 24; 6 with --quick].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     poses: Option<u32>,
-    /// How often each pose and keyframe is measured [default: 3; 1 with --quick].
+    /// Measurements of each pose and keyframe [default: 3; 1 with --quick].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: Option<u32>,
     /// Overrides an entry of all scene files, e.g. --set probe.scanlines=64.
@@ -121,7 +121,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
     let wanted = |table: Which| arguments.only.is_none_or(|only| only == table);
     let file = |given: &Option<PathBuf>, name: &str| {
         let shipped = || {
-            let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+            let scenes = insonify_tools::root().join("scenes");
             scenes.join(name)
         };
         given.clone().unwrap_or_else(shipped)

@@ -166,7 +166,7 @@ fn a_scale_is_found_where_it_may_change_and_kept_where_not() {
 }
 
 #[test]
-fn what_the_surface_leaves_open_stays_and_is_said() {
+fn motions_that_the_surface_does_not_determine_stay_and_are_reported() {
     let ball = Surface::new(&triangles(&shapes::sphere(30.0, 5), |p| p)).expect("a ball");
     let points: Vec<_> = samples(&triangles(&shapes::sphere(30.0, 5), |p| p), 1000)
         .into_iter()
@@ -190,7 +190,7 @@ fn what_the_surface_leaves_open_stays_and_is_said() {
 }
 
 #[test]
-fn what_cannot_be_laid_onto_a_surface_is_refused() {
+fn points_that_do_not_fit_a_surface_are_refused() {
     let good = cloud(&truth(1.0), 50, 0.0, 0.0);
     let mut broken = good.clone();
     broken[7].z = f64::INFINITY;

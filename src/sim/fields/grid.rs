@@ -41,7 +41,7 @@ impl Grid {
         Self { origin: (low + high - edge) / 2.0, spacing: edge, size: UVec3::splat(2) }
     }
 
-    /// The grid that [`Self::header`] told of, as far as single precision keeps it.
+    /// The grid that [`Self::header`] describes, in single precision.
     pub fn from_header(vectors: &[[f32; 3]]) -> Self {
         let [origin, scale, size] = std::array::from_fn(|i| DVec3::from(vectors[i].map(f64::from)));
         Self { origin, spacing: scale.x.recip(), size: size.as_uvec3() }
@@ -86,7 +86,7 @@ impl Grid {
         Some((cell.as_uvec3(), weights))
     }
 
-    /// What the kernels read before the displacements.
+    /// The header that kernels read before the displacements.
     pub fn header(&self) -> [[f32; 3]; 3] {
         let scale = DVec3::splat(self.spacing.recip());
         [self.origin, scale, self.size.as_dvec3()].map(|v| v.as_vec3().to_array())

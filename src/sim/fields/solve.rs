@@ -9,7 +9,7 @@ use crate::scene::Mesh;
 const SAMPLE_PITCH: f64 = 0.5;
 /// Most parts of a triangle's edge: triangles much larger than the grid are cut coarser.
 const MOST_PARTS: f64 = 128.0;
-/// Weight of the membrane, in units of the spacing: surfaces give way by about this part of the
+/// Weight of the membrane, in units of the spacing: surfaces are missed by about this fraction of the
 /// spacing times the change of strain across them.
 const STIFFNESS: f64 = 0.01;
 /// Residual, relative to the first, at which the displacements are good enough: they are those of the
@@ -62,7 +62,7 @@ impl<'a> Solver<'a> {
         for s in &samples {
             moments += s.area * outer(s.place - centre, s.place - centre);
         }
-        // A flat patch says nothing of what lies across it.
+        // A flat patch has no second moment across it; without this term the matrix would be singular.
         let trace = moments.x_axis.x + moments.y_axis.y + moments.z_axis.z;
         moments += DMat3::from_diagonal(DVec3::splat(1e-9 * trace + f64::MIN_POSITIVE));
         let mut solver = Self {
@@ -224,7 +224,7 @@ impl Patch<'_> {
             let area = (b - a).cross(c - a).length() / 2.0 / (parts * parts);
             let count = parts as u32;
             for (i, j) in (0..count).flat_map(|i| (0..count - i).map(move |j| (i, j))) {
-                // The part that points as the triangle does, and the one beside it that does not.
+                // Centres of the part with the triangle's orientation and of the reversed part beside it.
                 for third in 1..=(if i + j + 1 < count { 2 } else { 1 }) {
                     let inside = f64::from(third) / 3.0;
                     let (u, v) = ((f64::from(i) + inside) / parts, (f64::from(j) + inside) / parts);

@@ -1,4 +1,4 @@
-//! What the last fused frame consisted of, to look at and to run its kernels alone.
+//! The intermediate images of the last fused frame, to look at and to run its kernels alone.
 
 use super::super::{SimError, Simulator};
 use crate::scene::Scene;
@@ -21,8 +21,8 @@ pub struct Steps {
 }
 
 impl Simulator {
-    /// What the fusion has bound beside the frame's buffers, if the last frame, of `scene`, showed an
-    /// acquired volume: names with floats.
+    /// The bindings of the fusion's kernels that are not buffers of the frame, as name and floats; empty unless the
+    /// last frame, of `scene`, showed an acquired volume.
     pub(in crate::sim) fn fusion_dump(
         &mut self,
         scene: &Scene,
@@ -43,7 +43,7 @@ impl Simulator {
     /// The steps of the last frame, if it showed an acquired volume.
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn fusion_steps(&mut self) -> Result<Option<Steps>, SimError> {
         if !self.fused {
             return Ok(None);

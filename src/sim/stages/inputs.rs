@@ -1,4 +1,4 @@
-//! What the processor gives the kernels of a frame.
+//! The arrays that the processor gives to the kernels of a frame.
 
 use super::super::layout::{
     Counters, Frame, Instance, POINT_GROUP, Row, Scanline, Surface, Tissue,
@@ -6,8 +6,8 @@ use super::super::layout::{
 use super::super::pass::Array;
 use crate::output::npy::Element::{Float, Word};
 
-/// The frame's constants, the scene's tables, what the probe touches; and the counters, which every
-/// kernel may add to.
+/// The frame's constants, the scene's tables, the contact of the probe; and the counters, to which every
+/// kernel may add.
 pub static INPUTS: [Array; 9] = [
     Array::of::<Frame>("frame", Word, |_| 1),
     Array::of::<Scanline>("scanlines", Float, |s| u64::from(s.frame.scanlines) + 1),
@@ -25,10 +25,11 @@ pub static INPUTS: [Array; 9] = [
 ];
 
 /// The anatomy, which [`super::super::World`] holds.
-pub static ANATOMY: [Array; 6] = [
+pub static ANATOMY: [Array; 7] = [
     Array::anatomy("instances", Word, size_of::<Instance>() / 4),
     Array::anatomy("vertices", Float, 3),
     Array::anatomy("normals", Float, 3),
+    Array::anatomy("smoothed", Word, 4),
     Array::anatomy("triangles", Word, 3),
     Array::anatomy("nodes", Word, 20),
     Array::anatomy("fields", Float, 4),

@@ -4,49 +4,60 @@ use rayon::prelude::*;
 
 use super::entry;
 use super::joined::{Set, Sets};
+use crate::scene::smoothed::{self, smoothed};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh, Splits};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
+use crate::sim::placement::stretch;
 use crate::sim::tracer::Tracer;
 
 /// A box in object space, mm: smallest and largest corner.
 pub(super) type Bounds = [[f32; 3]; 2];
 
-/// Where the geometry of a mesh, or of an instance that changes, lies in the arrays.
+/// The place in the arrays of the geometry of a mesh, or of an instance that changes its shape.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Place {
     pub(super) first_vertex: u32,
     pub(super) first_triangle: u32,
-    /// As many as the array has of it.
+    /// Number of triangles in the array.
     pub(super) triangles: u32,
-    /// Of the compute tracer's tree; NONE: it has none.
+    /// Root node of the compute tracer's tree; NONE: it has none.
     pub(super) root: u32,
     pub(super) bounds: Bounds,
-    /// Index in the mesh of each triangle, in the order of the array, several times of those that were
-    /// cut; none where it is the mesh's.
+    /// Index in the mesh of each triangle, in the order of the array; triangles that were cut occur several
+    /// times. None where the order is that of the mesh.
     pub(super) order: Option<Vec<u32>>,
+    /// In the mesh's unit: over how much of it the first of its averaged normals is taken, which is
+    /// [`FINEST`] where the mesh is placed first.
+    pub(super) finest: f64,
     /// Of an instance that changes its shape: how often the device has made it.
     pub(super) version: u64,
-    /// Of what instances share: where in the triangles, in words, the list begins of whose each is;
-    /// 0: they are of one.
+    /// For a structure that instances share: the place in the triangles, in words, of the list that names the
+    /// instance of each triangle; 0: all triangles belong to one instance.
     pub(super) owners: u32,
 }
+
+/// Deviation over which the first of the averaged normals is taken, mm of the world.
+const FINEST: f64 = 1.0;
+
+/// Of one vertex the normals averaged over the surface about it ([`smoothed()`]).
+pub(super) type Averages = [u32; smoothed::LEVELS];
 
 /// What of a mesh has to stay on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Need {
-    /// Nothing: it is uploaded when it is shown.
+    /// Nothing: the mesh is uploaded when it is shown.
     Nothing,
     /// Vertices and normals.
     Vertices,
-    /// Triangles as well.
+    /// Vertices, normals and triangles.
     Geometry,
-    /// And a structure that rays walk.
+    /// Geometry and a structure that rays traverse.
     Structure,
 }
 
-/// What each mesh of a scene has to have on the device; the triangles of `sets` lie with these.
+/// The part of each mesh of a scene that must stay on the device; the triangles of `sets` lie with their sets.
 pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
     let mut needs = vec![Need::Nothing; scene.meshes.len()];
     for (i, instance) in scene.instances.iter().enumerate() {
@@ -68,6 +79,18 @@ pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
     needs
 }
 
+/// [`FINEST`] in the unit of each mesh of the scene.
+fn finest(scene: &Scene) -> Vec<f64> {
+    let mut finest = vec![None; scene.meshes.len()];
+    for instance in &scene.instances {
+        let own = FINEST / stretch(&instance.world_from_object);
+        for &mesh in instance.keyframes.meshes.iter().chain([&instance.mesh]) {
+            finest[mesh].get_or_insert(own);
+        }
+    }
+    finest.into_iter().map(|f| f.unwrap_or(FINEST)).collect()
+}
+
 /// Whether the instance's structure changes while the program runs.
 pub(super) fn is_dynamic(instance: &Instance) -> bool {
     use Strategy::{Cached, Interpolate, Rebuild, Refit};
@@ -84,35 +107,39 @@ pub struct Arrays {
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
+    /// The same averaged over the surface about each vertex ([`smoothed()`]).
+    pub smoothed: Vec<[u32; smoothed::LEVELS]>,
+    /// Those of the meshes that have no vertices here, by mesh.
+    pub(super) uploaded: Vec<Vec<Averages>>,
     /// Indices into the vertices; behind them, two to a word, whose the triangles are that instances
     /// share.
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,
-    /// How tissue deforms.
+    /// Displacement fields of deforming tissue.
     pub fields: Fields,
     pub(super) places: Vec<Place>,
-    /// Per instance that changes its shape on the device: room for the largest of its keyframes.
+    /// For each instance that changes its shape on the device, room for the largest of its keyframes.
     pub(super) regions: Vec<Option<Place>>,
-    /// Which instances share a structure.
+    /// The instances that share a structure.
     pub(super) sets: Sets,
 }
 
-/// One structure of a set before it has its place.
+/// A structure of a set before its place in the arrays is known.
 struct Joint {
     /// Indices into the vertices, in the order of the array.
     triangles: Vec<[u32; 3]>,
-    /// Of each the instance, and its index in that one's mesh.
+    /// For each triangle the instance, and the index in that instance's mesh.
     from: Vec<(u16, u32)>,
     tree: Option<MeshBvh>,
 }
 
 impl Arrays {
-    /// What `tracer` needs of `scene`, whose tissue deforms by `fields`, with trees built by `splits`.
-    /// Instances that change their shape on the device have room, but nothing in it.
+    /// The arrays that `tracer` needs for `scene`, whose tissue deforms by `fields`, with trees built as `splits`
+    /// says. Instances that change their shape on the device have room, but nothing in it.
     ///
     /// # Errors
-    /// When the hierarchy is deeper than the compute tracer walks.
+    /// An error when the hierarchy is deeper than the compute tracer can walk.
     ///
     /// # Panics
     /// When a mesh has not one normal per vertex.
@@ -125,7 +152,7 @@ impl Arrays {
         Self::with_sets(scene, tracer, splits, fields, Sets::new(scene, &[]))
     }
 
-    /// As [`Self::new`], with the instances of `sets` sharing structures.
+    /// Like [`Self::new`]; the instances of `sets` share structures.
     fn with_sets(
         scene: &Scene,
         tracer: Tracer,
@@ -137,6 +164,8 @@ impl Arrays {
             instances: Vec::new(),
             vertices: Vec::new(),
             normals: Vec::new(),
+            smoothed: Vec::new(),
+            uploaded: Vec::new(),
             triangles: Vec::new(),
             bvh: (tracer == Tracer::Bvh).then(|| SceneBvh::new(entry::capacity(scene))),
             fields,
@@ -145,15 +174,25 @@ impl Arrays {
             sets,
         };
         let needs = needs(scene, &arrays.sets);
+        let finest = finest(scene);
+        let averages: Vec<Vec<Averages>> =
+            scene.meshes.par_iter().zip(&finest).map(|(mesh, &f)| smoothed(mesh, f)).collect();
         let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
             .map(|(mesh, need)| {
                 let walked = tracer == Tracer::Bvh && *need == Need::Structure;
                 walked.then(|| MeshBvh::over(&mesh.positions, &mesh.triangles, splits))
             })
             .collect();
-        for ((mesh, tree), need) in scene.meshes.iter().zip(trees).zip(needs) {
+        let made = trees.into_iter().zip(averages).zip(finest);
+        for ((mesh, ((tree, averages), finest)), need) in scene.meshes.iter().zip(made).zip(needs) {
             let place = arrays.add(mesh, tree, need);
-            arrays.places.push(place);
+            arrays.places.push(Place { finest, ..place });
+            if need >= Need::Vertices {
+                arrays.smoothed.extend(averages);
+                arrays.uploaded.push(Vec::new());
+            } else {
+                arrays.uploaded.push(averages);
+            }
         }
         let owners = arrays.join(scene, tracer, splits);
         for instance in &scene.instances {
@@ -176,8 +215,8 @@ impl Arrays {
         Ok(arrays)
     }
 
-    /// As [`Self::new`] without those that are `apart` ([`Sets::new`]); no triangle is cut where a buffer
-    /// would have more than `most` bytes for it.
+    /// Like [`Self::new`], without sharing for the instances that are `apart` ([`Sets::new`]). No triangle is cut
+    /// if a buffer would then have more than `most` bytes.
     pub(super) fn within(
         most: u64,
         scene: &Scene,
@@ -194,14 +233,14 @@ impl Arrays {
         }
     }
 
-    /// Bytes of the largest of the buffers that cut triangles make larger.
+    /// Bytes of the largest buffer among those that cut triangles make larger.
     fn largest_buffer(&self) -> u64 {
         let nodes = self.bvh.as_ref().map_or(0, |bvh| size_of_val(&bvh.nodes[..]));
         nodes.max(size_of_val(&self.triangles[..])) as u64
     }
 
-    /// Appends the structures of the sets; whose their triangles are, one list after the other, each
-    /// of an even length.
+    /// Appends the structures of the sets. Returns the lists that name the instance of each of their triangles, one
+    /// after the other, each of an even length.
     fn join(&mut self, scene: &Scene, tracer: Tracer, splits: Splits) -> Vec<u16> {
         let shapes = |set: &Set| {
             let keyframes = scene.instances[set.members[0]].keyframes.meshes.len();
@@ -263,7 +302,7 @@ impl Arrays {
         Joint { triangles, from, tree }
     }
 
-    /// Appends the sets' lists behind all triangles.
+    /// Appends the lists of the sets behind all triangles.
     fn put_owners(&mut self, owners: &[u16]) {
         let first = 3 * self.triangles.len() as u32;
         for set in &mut self.sets.all {
@@ -326,12 +365,13 @@ impl Arrays {
         let grown = self.vertices.len() + if own_vertices { vertices } else { 0 };
         self.vertices.resize(grown, [0.0; 3]);
         self.normals.resize(grown, [0.0; 3]);
+        self.smoothed.resize(grown, [0; smoothed::LEVELS]);
         self.triangles.resize(self.triangles.len() + triangles, [0; 3]);
         place
     }
 }
 
-/// The mesh's triangles in `order`, with indices that count from `first_vertex`.
+/// The triangles of the mesh in `order`, with indices that start at `first_vertex`.
 pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> Vec<[u32; 3]> {
     let moved = |triangle: &[u32; 3]| triangle.map(|v| v + first_vertex);
     match order {
@@ -340,7 +380,7 @@ pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> 
     }
 }
 
-/// Entries as the compute tracer's top level takes them.
+/// Entries in the form that the compute tracer's top level needs.
 pub(super) fn placed(entries: &[entry::Entry]) -> Vec<Placed> {
     let place = |e: &entry::Entry| Placed {
         instance: e.instance,
@@ -357,7 +397,7 @@ mod tests {
 
     use super::*;
 
-    /// A device whose largest buffer has no room for cut triangles gets whole ones.
+    /// Triangles are not cut on a device whose largest buffer has no room for them.
     #[test]
     fn triangles_are_cut_where_they_fit() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/limbs.toml");

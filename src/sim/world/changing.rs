@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::arrays::{Bounds, Place, ordered};
+use super::arrays::{Averages, Bounds, Place, ordered};
 use super::refit::Refit;
 use super::top::Top;
 use super::{Geometry, Kernels, WorldError};
@@ -13,7 +13,7 @@ use crate::sim::bvh::MeshBvh;
 use crate::sim::fields::Fields;
 use crate::sim::tracer::Tracer;
 
-/// What is made of an instance: a mesh of the scene, or keyframes with their weights.
+/// The shape of an instance: a mesh of the scene, or keyframes with their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Mesh(usize),
@@ -36,11 +36,13 @@ struct Body {
     blas: Option<DynamicBlas>,
 }
 
-/// All of them.
+/// All instances that change their shape.
 pub(super) struct Changing {
     bodies: Vec<Option<Body>>,
     structures: Vec<Option<Blas>>,
     refit: Refit,
+    /// Averaged normals of the meshes that are uploaded when they are shown.
+    averages: Vec<Vec<Averages>>,
 }
 
 impl Changing {
@@ -52,6 +54,7 @@ impl Changing {
         tracer: Tracer,
         geometry: &Geometry,
         regions: &[Option<Place>],
+        averages: Vec<Vec<Averages>>,
     ) -> Result<Self, GpuError> {
         let mut bodies = Vec::new();
         let mut structures = Vec::new();
@@ -64,15 +67,16 @@ impl Changing {
             structures.push(blas.map(|blas| blas.blas().clone()));
             bodies.push(body);
         }
-        Ok(Self { refit: Refit::new(device, kernels, scene, tracer, regions)?, bodies, structures })
+        let refit = Refit::new(device, kernels, scene, tracer, regions)?;
+        Ok(Self { refit, bodies, structures, averages })
     }
 
-    /// Takes other kernels.
+    /// Replaces the kernels.
     pub(super) fn reload(&mut self, kernels: &Arc<Kernels>) {
         self.refit.kernels = Arc::clone(kernels);
     }
 
-    /// The ray query's structures, per instance.
+    /// The ray query's structures, one per instance.
     pub(super) fn structures(&self) -> &[Option<Blas>] {
         &self.structures
     }
@@ -83,8 +87,8 @@ impl Changing {
         bodies.map(DynamicBlas::bytes).sum::<u64>() + self.refit.bytes()
     }
 
-    /// Records how every shown instance of `scene` that is not what it was gets its shape; `regions`
-    /// then say what they hold. Returns whether anything was recorded.
+    /// Records the computation of the shape of every shown instance of `scene` that has changed; `regions`
+    /// then describe these shapes. Returns true if anything was recorded.
     #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
     pub(super) fn record(
         &mut self,
@@ -112,7 +116,8 @@ impl Changing {
                 true => self.refit.shape(commands, scene, i, geometry, region, top)?,
                 false => {
                     let place = &places[instance.mesh];
-                    upload(commands, scene, instance, place, geometry, region, top)?;
+                    let averages = &self.averages[instance.mesh];
+                    upload(commands, scene, instance, place, averages, geometry, region, top)?;
                     true
                 }
             };
@@ -167,7 +172,8 @@ fn body(
     Ok(Body { made: None, blas: blas.transpose()? })
 }
 
-/// Box around the present shape. Weighted boxes hold the weighted vertices: interval arithmetic.
+/// Box around the present shape. A weighted sum of boxes contains the weighted sum of vertices (interval
+/// arithmetic).
 fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
     let Shape::Blend(blend) = Shape::of(instance) else {
         return places[instance.mesh].bounds;
@@ -190,11 +196,13 @@ fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
 }
 
 /// Records what `rebuild` and `cached` send to the device.
+#[allow(clippy::too_many_arguments, reason = "the parts of one world")]
 fn upload(
     commands: &mut Commands<'_>,
     scene: &Scene,
     instance: &Instance,
     place: &Place,
+    averages: &[Averages],
     geometry: &Geometry,
     region: &mut Place,
     top: &mut Top,
@@ -215,6 +223,8 @@ fn upload(
         let at = 12 * u64::from(first_vertex);
         commands.write(&geometry.vertices, at, bytemuck::cast_slice(&mesh.positions))?;
         commands.write(&geometry.normals, at, bytemuck::cast_slice(&mesh.normals))?;
+        let at = size_of::<Averages>() as u64 * u64::from(first_vertex);
+        commands.write(&geometry.smoothed, at, bytemuck::cast_slice(averages))?;
     }
     let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
     put_triangles(commands, geometry, region, &ordered(mesh, order, first_vertex))?;
@@ -235,7 +245,7 @@ pub(super) fn put_triangles(
     commands.write(&geometry.triangles, at, bytemuck::cast_slice(triangles))
 }
 
-/// Records a tree into the region's room among the nodes.
+/// Records the copy of a tree into the region's room among the nodes.
 pub(super) fn put_tree(
     commands: &mut Commands<'_>,
     tree: &MeshBvh,

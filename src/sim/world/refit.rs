@@ -1,4 +1,4 @@
-//! Shapes of one topology: vertices moved on the device, and the tree's boxes after them.
+//! Shapes of one topology: the device moves their vertices and updates the boxes of the tree.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -8,33 +8,34 @@ use super::changing::{put_tree, put_triangles};
 use super::top::Top;
 use super::{Geometry, Kernels, WorldError};
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage};
+use crate::scene::smoothed::LEVELS;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::bvh::{MeshBvh, levels};
 use crate::sim::fields::Fields;
-use crate::sim::layout::{Interpolation, RefitLevel};
+use crate::sim::layout::{Interpolation, PACKED, RefitLevel, SUM, UNIT};
 use crate::sim::tracer::Tracer;
 
-/// A refitted tree whose rays would cost this many times what they cost in a new one is built anew
-/// (choice; a build costs some ten refits).
+/// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
+/// ten refits).
 const DEGRADED: f64 = 1.5;
 
-/// A tree made for one keyframe, which serves those near it.
+/// A tree built for one keyframe; it also serves keyframes near it.
 struct Base {
     tree: MeshBvh,
-    /// Ranges in the list of node numbers.
+    /// Ranges in the list of node numbers, one per level.
     levels: Vec<RefitLevel>,
 }
 
 /// An instance whose keyframes share their triangles.
 struct Body {
     bases: BTreeMap<usize, Base>,
-    /// Which base serves each keyframe.
+    /// For each keyframe the base that serves it.
     serving: Vec<usize>,
-    /// The base that the region holds.
+    /// The base whose tree is in the region now.
     held: Option<usize>,
 }
 
-/// What the compute tracer's refit works on.
+/// The buffers for refitting on the compute tracer.
 struct Boxes {
     boxes: Buffer,
     order: Buffer,
@@ -47,7 +48,7 @@ pub(super) struct Refit {
 }
 
 impl Refit {
-    /// Trees of all keyframes that need one of their own, and the kernels; nothing in a scene that
+    /// Trees of all keyframes that need one of their own, and the kernels; empty for a scene that
     /// refits nothing.
     pub(super) fn new(
         device: &Arc<Device>,
@@ -84,7 +85,7 @@ impl Refit {
     }
 
     /// Records the triangles and the tree of the base that serves instance `index` now, unless the
-    /// region holds them. Returns whether it did not, so that a structure has to be built from new.
+    /// region has them already. Returns true if it had not: a structure must then be built, not refitted.
     pub(super) fn shape(
         &mut self,
         commands: &mut Commands<'_>,
@@ -133,8 +134,13 @@ impl Refit {
                 continue;
             };
             let instance = &scene.instances[index];
-            for (values, unit) in [(&geometry.vertices, 0), (&geometry.normals, 1)] {
-                let push = interpolation(scene, instance, places, region, unit);
+            let made = [
+                (&geometry.vertices, SUM, 1),
+                (&geometry.normals, UNIT, 1),
+                (&geometry.smoothed, PACKED, LEVELS as u32),
+            ];
+            for (values, kind, each) in made {
+                let push = interpolation(scene, instance, places, region, kind, each);
                 commands.dispatch(
                     &self.kernels.interpolate,
                     [push.count, 1, 1],
@@ -184,7 +190,7 @@ impl Refit {
     }
 }
 
-/// Number of the keyframe that the instance is, or is nearest to.
+/// Number of the keyframe that the instance shows or is nearest to.
 fn keyframe(instance: &Instance) -> usize {
     let keyframes = &instance.keyframes;
     let is = |mesh: &usize| *mesh == instance.mesh;
@@ -194,22 +200,24 @@ fn keyframe(instance: &Instance) -> usize {
     }
 }
 
+/// How `each` vectors of every vertex are made.
 fn interpolation(
     scene: &Scene,
     instance: &Instance,
     places: &[Place],
     region: &Place,
-    unit: u32,
+    kind: u32,
+    each: u32,
 ) -> Interpolation {
     let keyframes = &instance.keyframes;
-    let source = |k: usize| places[keyframes.meshes[k]].first_vertex;
+    let source = |k: usize| each * places[keyframes.meshes[k]].first_vertex;
     let mut push = Interpolation {
-        count: scene.meshes[keyframes.meshes[0]].positions.len() as u32,
-        target: region.first_vertex,
-        unit,
+        count: each * scene.meshes[keyframes.meshes[0]].positions.len() as u32,
+        target: each * region.first_vertex,
+        kind,
         sources: [source(keyframe(instance)); 4],
         weights: [1.0, 0.0, 0.0, 0.0],
-        stride: 3,
+        stride: if kind == PACKED { 1 } else { 3 },
     };
     if keyframes.strategy == Strategy::Interpolate {
         push.sources = keyframes.blend.map(|(k, _)| source(k));

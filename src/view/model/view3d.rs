@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_around_is_glass_and_hiding_comes_back() {
+    fn enclosing_tissues_are_transparent_and_hiding_is_undone() {
         let mut view3d = View3d::new(&scene());
         let shows: Vec<Show> = view3d.shown.iter().map(|s| s.show).collect();
         assert_eq!(shows, [Show::SeeThrough, Show::Hidden, Show::Solid, Show::Solid]);

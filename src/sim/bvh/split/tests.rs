@@ -1,9 +1,9 @@
-//! What lies in the leaves of trees whose triangles are cut.
+//! Tests of trees whose triangles are cut: the leaves must cover every triangle.
 
 use super::*;
 use crate::scene::{Mesh, shapes};
 
-/// Long thin triangles across each other, which no box fits, over a surface of small ones.
+/// Long thin triangles across each other, which fill little of their boxes, over a surface of small ones.
 fn straw() -> Mesh {
     let mut mesh = shapes::sphere(6.0, 1);
     for i in 0..200 {
@@ -17,7 +17,7 @@ fn straw() -> Mesh {
     mesh
 }
 
-/// Boxes of the leaves that hold each triangle.
+/// For each triangle, the boxes of the leaves that hold it.
 fn leaves(tree: &Bvh2, triangles: usize) -> Vec<Vec<Aabb>> {
     let mut leaves = vec![Vec::new(); triangles];
     for node in tree.nodes.iter().filter(|node| node.is_leaf()) {
@@ -27,7 +27,7 @@ fn leaves(tree: &Bvh2, triangles: usize) -> Vec<Vec<Aabb>> {
     leaves
 }
 
-/// Points of triangles that none of the triangle's leaves holds.
+/// The number of points on triangles that are in none of the triangle's leaves.
 fn uncovered(tree: &Bvh2, mesh: &Mesh) -> usize {
     const STEPS: i32 = 40;
     let leaves = leaves(tree, mesh.triangles.len());
@@ -47,7 +47,7 @@ fn uncovered(tree: &Bvh2, mesh: &Mesh) -> usize {
     missed
 }
 
-/// Levels of a tree all of whose boxes hold those below them.
+/// The depth of a tree; fails unless each box contains those below it.
 fn depth(tree: &Bvh2, node: usize) -> usize {
     let node = &tree.nodes[node];
     if node.is_leaf() {
@@ -95,7 +95,7 @@ fn every_part_of_a_triangle_lies_in_a_leaf_that_holds_it() {
     }
 }
 
-/// Surface of the nodes over that of the root, leaves as often as others.
+/// Surface area of all nodes, leaves included, relative to that of the root.
 fn cost(tree: &Bvh2) -> f32 {
     let areas = tree.nodes.iter().map(|node| node.aabb().half_area());
     areas.sum::<f32>() / tree.nodes[0].aabb().half_area()
@@ -124,7 +124,7 @@ fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     assert!(built.primitive_indices.len() as f64 <= most);
 }
 
-/// Nothing that triangles may be hangs the builder, makes a deep tree, or is lost.
+/// Degenerate triangles do not hang the builder, do not make a deep tree, and none is lost.
 #[test]
 fn odd_triangles_are_built_over() {
     let copies = |corners: [[f32; 3]; 3], count: u32| Mesh {
@@ -167,7 +167,7 @@ fn odd_triangles_are_built_over() {
     assert!(tree(&[], &[]).nodes.is_empty());
 }
 
-/// Threads do not decide what is cut.
+/// The tree does not depend on the number of threads.
 #[test]
 fn the_same_triangles_are_the_same_tree() {
     let mesh = shapes::ellipsoid([3.0, 9.0, 27.0], 5);

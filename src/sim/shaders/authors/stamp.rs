@@ -1,4 +1,4 @@
-//! `spirv/stamp.json`: from what each module was compiled, and which bytes came out.
+//! `spirv/stamp.json`: hashes of the sources of each module, and of the resulting bytes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -20,9 +20,9 @@ const REMEDY: &str =
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Entry {
-    /// Sources, includes, flags and compiler.
+    /// Hash of sources, includes, flags and compiler.
     pub source: String,
-    /// Bytes of the module.
+    /// Hash of the module's bytes.
     pub spirv: String,
 }
 
@@ -48,8 +48,8 @@ pub fn text(entries: &BTreeMap<String, Entry>) -> String {
     format!("{{\n{}\n}}\n", lines.join(",\n"))
 }
 
-/// Everything in which the modules in `spirv` differ from what `glsl` compiled by `compiler` would
-/// give, each with its remedy; empty when all is fresh.
+/// The differences between the modules in `spirv` and what `glsl` compiled by `compiler` would
+/// give, each with its remedy; empty if all modules are current.
 pub fn differences(glsl: &Path, spirv: &Path, compiler: &str) -> Result<Vec<String>, Error> {
     let path = spirv.join(FILE);
     let text = fs::read_to_string(&path).map_err(|e| file_error(&path, e))?;

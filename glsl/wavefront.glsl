@@ -1,0 +1,82 @@
+// How a surface turns the wavefront of a beam: by its mean slope over the wavefront's width.
+//
+// The includer declares frame, rows[], instances[], vertices[], normals[], triangles[] and smoothed[], and includes
+// surface.glsl and path.glsl.
+
+#include "octahedron.glsl"
+
+// A surface where a path meets it. Normals are unit, and turned against the path as far as the triangle's is.
+struct Slope {
+    vec3 geometric;     // of the triangle
+    vec3 shading;       // interpolated from the vertices
+    vec3 refracting;    // averaged over the wavefront; in geometric acoustics that of `shading`
+    float width;        // deviation of the sine of incidence over the beam
+};
+
+// `row` is that of the path's time; `spread` the variance that the path has across, mm^2.
+Slope slope_at(Met here, Path path, uint row, float spread) {
+    Hit hit = here.hit;
+    Slope slope;
+    slope.geometric = here.normal;
+    slope.shading = surface_shading_normal(hit);
+    float side = mix(1.0, -1.0, dot(path.direction, here.normal) >= 0.0);
+    slope.geometric *= side;
+    slope.shading *= side;
+    bool turned = !(dot(path.direction, slope.shading) < 0.0);
+    slope.shading = mix(slope.shading, slope.geometric, bvec3(turned));
+
+    bool wide = (frame.flags & FLAG_WAVEFRONT) != 0u;
+    float sigma = rows[row].sigma_wavefront;
+    // In units of the finest average; from there on they are twice as wide each.
+    float x = mix(0.0, sqrt(sigma * sigma + spread) / instances[hit.instance].finest, wide);
+    uint level = uint(x >= 1.0) + uint(x >= 2.0) + uint(x >= 4.0);
+    float below = mix(0.0, float(1u << level) * 0.5, level > 0u);
+    float share = min((x - below) / max(below, 1.0), 1.0);
+    vec3 n[3];
+    [[dont_unroll]] for (uint i = 0u; i < 3u; ++i) {
+        uint vertex = triangles[3u * hit.primitive + i];
+        uvec4 averages = smoothed[vertex];
+        vec3 own = vec3(normals[3u * vertex], normals[3u * vertex + 1u], normals[3u * vertex + 2u]);
+        vec3 coarse = unpack_direction(averages[level]);
+        vec3 fine = mix(unpack_direction(averages[max(level, 1u) - 1u]), own, bvec3(level == 0u));
+        n[i] = mix(fine, coarse, share);
+    }
+    vec3 mean = side * surface_to_world(hit.instance, (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2]);
+    slope.refracting = mix(slope.shading, mean, bvec3(wide));
+
+    slope.width = 0.0;
+    if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
+        float lateral = rows[row].sigma_lateral;
+        float cos_i = -dot(path.direction, slope.refracting);
+        // In the plane of incidence; along the image where there is none.
+        vec3 along = path.direction + cos_i * slope.refracting + 0.01 * path.lateral;
+        float curved = surface_curvature(hit, along, n) * sqrt(lateral * lateral + spread);
+        // What was averaged away.
+        float rough = dot(normalize(along), slope.shading - slope.refracting);
+        slope.width = sqrt(curved * curved + rough * rough);
+    }
+    return slope;
+}
+
+// Mean reflectance at a slope between two media.
+float reflectance_at(Slope slope, vec3 direction, Medium t1, Medium t2) {
+    float cos_i = max(-dot(direction, slope.refracting), 0.0);
+    return footprint_reflectance(t1.impedance, t1.speed, t2.impedance, t2.speed, cos_i, slope.width);
+}
+
+// Refracts a path at normal n into the next medium. False at total reflection; the path is then as it was.
+bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
+    vec3 d = path.direction;
+    if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
+        // Seen edge on or from behind, as the side of a bump is, the mean surface turns nothing.
+        if (dot(d, n) < 0.0 && !refraction(path.direction, n, c1, c2, d)) return false;
+        // What the triangle would let back out runs along it.
+        float rise = dot(d, n_geometric) + LEAST_DESCENT;
+        d = normalize(d - max(rise, 0.0) * n_geometric);
+    } else if (!refraction(path.direction, n, c1, c2, d) || dot(d, n_geometric) >= 0.0) {
+        if (!refraction(path.direction, n_geometric, c1, c2, d)) return false;
+    }
+    path.lateral = normalize(path.lateral - dot(path.lateral, d) * d);
+    path.direction = d;
+    return true;
+}

@@ -1,0 +1,110 @@
+//! Normals averaged over an area about each vertex: the surface as a wide beam refracts at it.
+//!
+//! What refracts is no ray but a wavefront, and it turns by the mean slope of the surface over its width. The mean of
+//! the unit normals over an area has just that slope, of a plane exactly and wherever normals are weighted by area. Bumps
+//! smaller than the width cancel; a plane, a sphere and a cylinder keep their normals, as they lie alike around every
+//! point. The average is diffusion along the surface (backward Euler steps on linear finite elements, from one scale to
+//! the next), so that it does not depend on the triangulation and never leaves a connected patch: what lies near only
+//! through space, as the other vessel of a bundle, has no part in it. Nor has what lies behind an edge sharper than
+//! [`CREASE`].
+
+use glam::DVec3;
+
+use super::Mesh;
+use super::mesh::{Soup, weld};
+use super::normals::split;
+
+mod elements;
+
+use elements::Elements;
+
+/// Scales per vertex, each twice the one before.
+pub const LEVELS: usize = 4;
+
+/// Dihedral angle from which on two sides refract apart, degrees: a box's sides do, the steps of a segmentation that
+/// was smoothed at all are flatter.
+const CREASE: f32 = 80.0;
+
+/// Lengths of a mean of unit normals at which its direction begins to count, and counts in full. Where the two sides
+/// of a thin sheet are averaged they cancel, and the rest points anywhere.
+const LENGTH: [f64; 2] = [0.15, 0.35];
+
+/// Cosines of the angle to the next finer mean, likewise.
+const AGREEMENT: [f64; 2] = [0.0, 0.5];
+
+/// Of each vertex the normal averaged with standard deviations of 1, 2, 4 and 8 times `finest` (in the mesh's unit) along
+/// the surface: unit, outward, [`pack`]ed. Where a mean has no direction it is the next finer one, in the end the
+/// vertex's own normal.
+pub fn smoothed(mesh: &Mesh, finest: f64) -> Vec<[u32; LEVELS]> {
+    let soup = Soup {
+        positions: mesh.positions.clone(),
+        triangles: mesh.triangles.clone(),
+        ..Soup::default()
+    };
+    let nodes = split(&weld(&soup), CREASE);
+    let corners = || mesh.triangles.iter().flatten().zip(nodes.triangles.iter().flatten());
+    let places: Vec<DVec3> = place_nodes(mesh, &nodes.triangles, nodes.source.len());
+    let elements = Elements::new(&places, &nodes.triangles);
+    let normal = |v: u32| DVec3::from(mesh.normals[v as usize].map(f64::from));
+    let mut means = elements.means(corners().map(|(&v, _)| normal(v)));
+    let mut directions: Vec<DVec3> = means.iter().map(|m| m.normalize_or_zero()).collect();
+    let mut levels = vec![[0; LEVELS]; nodes.source.len()];
+    let mut variance = 0.0;
+    for level in 0..LEVELS {
+        let deviation = finest * f64::from(1 << level);
+        means = elements.diffused(means, (deviation * deviation - variance) / 2.0);
+        variance = deviation * deviation;
+        for ((direction, mean), packed) in directions.iter_mut().zip(&means).zip(&mut levels) {
+            *direction = accepted(*direction, *mean);
+            packed[level] = pack(*direction);
+        }
+    }
+    let mut out: Vec<[u32; LEVELS]> =
+        (0..mesh.normals.len() as u32).map(|v| [pack(normal(v)); LEVELS]).collect();
+    for (&vertex, &node) in corners() {
+        if directions[node as usize] != DVec3::ZERO {
+            out[vertex as usize] = levels[node as usize];
+        }
+    }
+    out
+}
+
+/// Positions of the nodes of `triangles`, which follow each other as those of the mesh do.
+fn place_nodes(mesh: &Mesh, triangles: &[[u32; 3]], count: usize) -> Vec<DVec3> {
+    let mut places = vec![DVec3::ZERO; count];
+    for (&vertex, &node) in mesh.triangles.iter().flatten().zip(triangles.iter().flatten()) {
+        places[node as usize] = DVec3::from(mesh.positions[vertex as usize].map(f64::from));
+    }
+    places
+}
+
+/// The direction of a mean of normals, or that of the next `finer` one where it has none.
+fn accepted(finer: DVec3, mean: DVec3) -> DVec3 {
+    let length = mean.length();
+    if length == 0.0 {
+        return finer;
+    }
+    let direction = mean / length;
+    let share = rise(LENGTH, length) * rise(AGREEMENT, direction.dot(finer));
+    finer.lerp(direction, share).normalize_or(finer)
+}
+
+/// Smooth step from 0 to 1 between the two.
+fn rise([from, to]: [f64; 2], x: f64) -> f64 {
+    let t = ((x - from) / (to - from)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// A unit vector as two signed 16-bit parts of a projection onto an octahedron (Meyer et al. 2010), x in the lower
+/// half; within 5e-5 rad. The zero vector becomes some other.
+pub fn pack(v: DVec3) -> u32 {
+    let size = v.abs().element_sum();
+    let p = if size > 0.0 { v / size } else { DVec3::Z };
+    let fold = |a: f64, b: f64| (1.0 - b.abs()).copysign(a);
+    let [x, y] = if p.z < 0.0 { [fold(p.x, p.y), fold(p.y, p.x)] } else { [p.x, p.y] };
+    let part = |e: f64| u32::from((e * 32_767.0).round() as i16 as u16);
+    part(x) | part(y) << 16
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,365 @@
+//! Vessels behind bumpy surfaces, as segmentations have them: bumps smaller than the beam do not steer it.
+
+#[path = "common/shared_data.rs"]
+#[allow(dead_code, reason = "skips are told there")]
+mod shared;
+
+use std::f64::consts::{FRAC_PI_2, TAU};
+use std::path::Path;
+
+use glam::{DAffine3, DQuat, DVec2, DVec3};
+use insonify::gpu::test_device;
+use insonify::probe::{Kind, Probe};
+use insonify::scene::mesh::Soup;
+use insonify::scene::{Instance, Keyframes, Mesh, Scene, Simulation, Surface, Tissue};
+use insonify::scene::{normals, shapes, topology};
+use insonify::settings::{Imaging, Refraction};
+use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer};
+
+/// Depth of the bumpy surface, mm.
+const TOP: f64 = 15.0;
+/// Places (x, z) and radius of the vessels, which run along y, mm.
+const VESSELS: [[f64; 3]; 5] =
+    [[-16.0, 36.0, 3.5], [-7.0, 52.0, 4.0], [0.0, 30.0, 3.0], [8.0, 46.0, 4.0], [17.0, 34.0, 3.5]];
+/// Deviation of the bumps, mm, and between which wavelengths they lie.
+const BUMPS: [[f64; 3]; 4] = [[0.3, 2.0, 3.0], [0.6, 3.0, 5.0], [1.2, 5.0, 8.0], [2.0, 7.0, 10.0]];
+/// Poses of each.
+const POSES: usize = 5;
+/// Least share of what is dark without refraction.
+const LEAST: f64 = 0.9;
+
+/// Numbers uniform in 0..1.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f64 {
+        // Steele, Lea, Flood 2014.
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = (self.0 ^ self.0 >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ z >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ z >> 31) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.next()
+    }
+}
+
+/// A block whose top, towards the probe, carries bumps: waves of random direction.
+fn block([rms, shortest, longest]: [f64; 3], seed: u64) -> Mesh {
+    let mut random = Random(seed);
+    let waves: Vec<(DVec2, f64)> = (0..32)
+        .map(|_| {
+            let (angle, length) = (random.within(0.0, TAU), random.within(shortest, longest));
+            (DVec2::from_angle(angle) * TAU / length, random.within(0.0, TAU))
+        })
+        .collect();
+    let amplitude = rms * (2.0 / waves.len() as f64).sqrt();
+    let height = |p: DVec2| {
+        let waves = waves.iter().map(|(k, phase)| (k.dot(p) + phase).sin());
+        TOP + amplitude * waves.sum::<f64>()
+    };
+    let (half, edge, bottom) = (DVec2::new(60.0, 36.0), 0.5, 100.0);
+    let [nx, ny] = [half.x, half.y].map(|h| (2.0 * h / edge) as u32);
+    let mut soup = Soup::default();
+    for (i, j) in (0..=nx).flat_map(|i| (0..=ny).map(move |j| (i, j))) {
+        let p = DVec2::new(f64::from(i), f64::from(j)) * edge - half;
+        soup.positions.push(p.extend(height(p)).as_vec3().to_array());
+        if i < nx && j < ny {
+            let (a, b) = (i * (ny + 1) + j, (i + 1) * (ny + 1) + j);
+            soup.triangles.extend([[a, b, b + 1], [a, b + 1, a + 1]]);
+        }
+    }
+    // Once around the top.
+    let at = |i: u32, j: u32| i * (ny + 1) + j;
+    let sides = [
+        (0..nx).map(|i| at(i, 0)).collect::<Vec<_>>(),
+        (0..ny).map(|j| at(nx, j)).collect(),
+        (0..nx).map(|i| at(nx - i, ny)).collect(),
+        (0..ny).map(|j| at(0, ny - j)).collect(),
+    ];
+    let rim = sides.concat();
+    let first = soup.positions.len() as u32;
+    for &v in &rim {
+        let [x, y, _] = soup.positions[v as usize];
+        soup.positions.push([x, y, bottom as f32]);
+    }
+    let hub = soup.positions.len() as u32;
+    soup.positions.push([0.0, 0.0, bottom as f32]);
+    let n = rim.len() as u32;
+    for i in 0..n {
+        let next = (i + 1) % n;
+        let (a, b) = (rim[i as usize], rim[next as usize]);
+        let (c, d) = (first + i, first + next);
+        soup.triangles.extend([[a, b, d], [a, d, c], [c, d, hub]]);
+    }
+    assert!(topology::orient(Path::new("block"), &mut soup).iter().all(|i| !i.is_error()));
+    // Creases as of a file.
+    normals::shade(&soup, 40.0)
+}
+
+fn tissue(speed: f64, impedance: f64, echogenicity: f64) -> Tissue {
+    Tissue {
+        speed,
+        density: impedance / speed,
+        attenuation: 0.0,
+        echogenicity,
+        texture_depth: 0.0,
+        ..Tissue::shipped("liver").expect("shipped")
+    }
+}
+
+/// The block below fat, with vessels.
+fn phantom(block: Mesh) -> Scene {
+    let probe = Probe {
+        kind: Kind::Linear { width: 48.0 },
+        scanlines: 96,
+        elevation_layers: 1,
+        samples: 1024,
+        depth: 64.0,
+        frequency: 5.0,
+        focus: 40.0,
+        aperture: 24.0,
+        ..Probe::paper_table1()
+    };
+    let mut scene = Scene {
+        simulation: Simulation {
+            paths: 1,
+            max_reflections: 0,
+            cell: Simulation::default_cell(5.0),
+            ..Simulation::default()
+        },
+        imaging: Imaging { noise: f64::NEG_INFINITY, tgc_attenuation: 0.0, ..Imaging::default() },
+        ..Scene::homogeneous(tissue(1.49, 1.5, 0.0), probe)
+    };
+    let inside = tissue(1.58, 1.65, 0.0);
+    scene.tissues.extend([inside.clone(), Tissue { echogenicity: f64::NEG_INFINITY, ..inside }]);
+    let mirror = Surface {
+        roughness: f64::INFINITY,
+        thickness: 0.0,
+        specularity: 1.0,
+        gain: f64::NEG_INFINITY,
+    };
+    let mut place = |mesh: Mesh, tissue, at| {
+        scene.instances.push(Instance {
+            name: mesh.name.clone(),
+            mesh: scene.meshes.len(),
+            keyframes: Keyframes::default(),
+            shown: true,
+            tissue,
+            priority: tissue as i32,
+            world_from_object: at,
+            surface: [mirror; 2],
+        });
+        scene.meshes.push(mesh);
+    };
+    place(block, 1, DAffine3::IDENTITY);
+    for [x, z, radius] in VESSELS {
+        let along_y = DQuat::from_rotation_x(FRAC_PI_2);
+        let at = DAffine3::from_rotation_translation(along_y, DVec3::new(x, 0.0, z));
+        place(shapes::cylinder(radius, 66.0, 48), 2, at);
+    }
+    scene
+}
+
+/// Above the block, up to 6 degrees off its normal.
+fn pose(random: &mut Random) -> DAffine3 {
+    let at = DVec3::new(random.within(-5.0, 5.0), random.within(-8.0, 8.0), 0.0);
+    let tilt = random.within(-6.0, 6.0).to_radians();
+    let turn = random.within(-15.0, 15.0).to_radians();
+    DAffine3::from_rotation_translation(
+        DQuat::from_rotation_z(turn) * DQuat::from_rotation_y(tilt),
+        at,
+    )
+}
+
+/// Place of each sample in the image plane, straight along its scanline, probe space.
+fn places(probe: &Probe) -> Vec<DVec3> {
+    let rays = (0..probe.scanlines).map(|l| probe.ray(l, 0));
+    let along = |(o, d): (DVec3, DVec3)| {
+        (0..probe.samples).map(move |k| {
+            let p = o + f64::from(k) * probe.sample_pitch() * d;
+            DVec3::new(p.x, 0.0, p.z)
+        })
+    };
+    rays.flat_map(along).collect()
+}
+
+/// Of each sample the log image, averaged over 3 scanlines and 1.5 mm of depth.
+fn smoothed(levels: &[f32], probe: &Probe) -> Vec<f64> {
+    let samples = probe.samples as usize;
+    let reach = (0.75 / probe.sample_pitch()).round() as usize;
+    let lines: Vec<Vec<f64>> = (levels.chunks(samples))
+        .map(|line| {
+            let mut sums = vec![0.0; samples + 1];
+            for (k, &v) in line.iter().enumerate() {
+                sums[k + 1] = sums[k] + f64::from(v);
+            }
+            let mean = |k: usize| {
+                let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(samples));
+                (sums[to] - sums[from]) / (to - from) as f64
+            };
+            (0..samples).map(mean).collect()
+        })
+        .collect();
+    let mean = |l: usize, k: usize| {
+        let beside = l.saturating_sub(1)..=(l + 1).min(lines.len() - 1);
+        let count = beside.clone().count() as f64;
+        beside.map(|l| lines[l][k]).sum::<f64>() / count
+    };
+    (0..lines.len())
+        .flat_map(|l| (0..samples).map(move |k| (l, k)))
+        .map(|(l, k)| mean(l, k))
+        .collect()
+}
+
+/// Whether each sample is 8 dB or more below the mean of those that are not in a lumen and within 4 mm of its depth.
+fn dark(levels: &[f32], lumen: &[bool], scene: &Scene) -> Vec<bool> {
+    let samples = scene.probe.samples as usize;
+    let means = smoothed(levels, &scene.probe);
+    let reach = (4.0 / scene.probe.sample_pitch()).round() as usize;
+    let mut sums = vec![[0.0, 0.0]; samples + 1];
+    for (i, &level) in means.iter().enumerate().filter(|(i, _)| !lumen[*i]) {
+        let sum = &mut sums[i % samples + 1];
+        *sum = [sum[0] + level, sum[1] + 1.0];
+    }
+    for k in 0..samples {
+        sums[k + 1] = [sums[k + 1][0] + sums[k][0], sums[k + 1][1] + sums[k][1]];
+    }
+    let below = 8.0 / scene.imaging.dynamic_range;
+    let limit = |k: usize| {
+        let (from, to) = (k.saturating_sub(reach), (k + reach + 1).min(samples));
+        (sums[to][0] - sums[from][0]) / (sums[to][1] - sums[from][1]) - below
+    };
+    let limits: Vec<f64> = (0..samples).map(limit).collect();
+    means.iter().enumerate().map(|(i, &level)| level < limits[i % samples]).collect()
+}
+
+/// The scene with all sound at the probe's speed.
+fn unrefracted(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    for tissue in &mut scene.tissues {
+        tissue.density *= tissue.speed / scene.probe.speed;
+        tissue.speed = scene.probe.speed;
+    }
+    scene
+}
+
+fn with(scene: &Scene, refraction: Refraction) -> Scene {
+    let mut scene = scene.clone();
+    scene.simulation.refraction = refraction;
+    scene
+}
+
+/// The log image of `scene` by a simulator that has its meshes.
+fn levels(simulator: &mut Simulator, scene: &Scene) -> Vec<f32> {
+    simulator.frame(scene, 0).expect("a frame");
+    simulator.log_image().expect("an image")
+}
+
+fn share(dark: &[bool], lumen: &[bool]) -> f64 {
+    let inside = lumen.iter().filter(|&&l| l).count();
+    dark.iter().zip(lumen).filter(|&(&d, &l)| d && l).count() as f64 / inside as f64
+}
+
+/// Middles of what is dark about each vessel that lies well within the image, mm in the image plane.
+fn middles(dark: &[bool], places: &[DVec3], scene: &Scene) -> Vec<Option<DVec2>> {
+    let probe_from_world = scene.world_from_probe.inverse();
+    let direction = probe_from_world.transform_vector3(DVec3::Y);
+    let middle = |&[x, z, radius]: &[f64; 3]| {
+        let at = probe_from_world.transform_point3(DVec3::new(x, 0.0, z));
+        let at = at - at.y / direction.y * direction;
+        let near = |p: &DVec3| (*p - at).length() < radius + 2.5;
+        if at.x.abs() > 22.0 - radius {
+            return None;
+        }
+        let held = places.iter().zip(dark).filter(|(p, dark)| **dark && near(p));
+        let (sum, count) =
+            held.fold((DVec2::ZERO, 0.0), |(s, n), (p, _)| (s + DVec2::new(p.x, p.z), n + 1.0));
+        Some(sum / count)
+    };
+    VESSELS.iter().map(middle).collect()
+}
+
+/// Whether each of the `places` lies in a vessel.
+fn in_vessels(places: &[DVec3], scene: &Scene) -> Vec<bool> {
+    let inside = |p: &DVec3| {
+        let p = scene.world_from_probe.transform_point3(*p);
+        VESSELS.iter().any(|[x, z, radius]| (p.x - x).hypot(p.z - z) < *radius)
+    };
+    places.iter().map(inside).collect()
+}
+
+/// What of the vessels is dark over what is without refraction, pose by pose; and how far their middles lie from where
+/// the smooth surface puts them: mean of the shifts, and their root mean square, mm.
+struct Seen {
+    ratios: Vec<f64>,
+    shift: DVec2,
+    scatter: f64,
+}
+
+/// By the mean slope, and by the local one.
+fn seen(bumps: [f64; 3], tracer: Tracer) -> [Seen; 2] {
+    let mut random = Random(11);
+    let rough = phantom(block(bumps, 5));
+    let smooth = with(&phantom(block([0.0, 5.0, 6.0], 5)), Refraction::Ray);
+    let simulator = |scene| Simulator::new(&test_device(), &Library::embedded(), scene, tracer);
+    let [mut on_rough, mut on_smooth] =
+        [&rough, &smooth].map(|scene| simulator(scene).expect("a simulator"));
+    let mut ratios = [Vec::new(), Vec::new()];
+    let mut shifts = [Vec::new(), Vec::new()];
+    for _ in 0..POSES {
+        let world_from_probe = pose(&mut random);
+        let [rough, smooth] =
+            [&rough, &smooth].map(|scene| Scene { world_from_probe, ..scene.clone() });
+        let places = places(&rough.probe);
+        let lumen = in_vessels(&places, &rough);
+        let straight = levels(&mut on_rough, &unrefracted(&rough));
+        let most = share(&dark(&straight, &lumen, &rough), &lumen);
+        let expected = dark(&levels(&mut on_smooth, &smooth), &lumen, &smooth);
+        let expected = middles(&expected, &places, &smooth);
+        for (i, refraction) in [Refraction::Beam, Refraction::Ray].into_iter().enumerate() {
+            let image = levels(&mut on_rough, &with(&rough, refraction));
+            let dark = dark(&image, &lumen, &rough);
+            ratios[i].push(share(&dark, &lumen) / most);
+            let got = middles(&dark, &places, &rough);
+            let pairs = got.iter().zip(&expected);
+            shifts[i].extend(pairs.filter_map(|(a, b)| Some((*a)? - (*b)?)));
+        }
+    }
+    let mut all = ratios.into_iter().zip(shifts).map(|(ratios, shifts)| {
+        let count = shifts.len() as f64;
+        let square: f64 = shifts.iter().map(|s| s.length_squared()).sum();
+        let sum: DVec2 = shifts.iter().sum();
+        Seen { ratios, shift: sum / count, scatter: (square / count).sqrt() }
+    });
+    [(); 2].map(|()| all.next().expect("two"))
+}
+
+/// Share, shift and scatter over all poses: near those of no refraction and of the smooth surface.
+fn is_sound(all: &[&Seen]) -> bool {
+    let ratios = all.iter().flat_map(|seen| &seen.ratios);
+    let mean = ratios.clone().sum::<f64>() / ratios.count() as f64;
+    let shift = all.iter().map(|seen| seen.shift).sum::<DVec2>() / all.len() as f64;
+    let square = all.iter().map(|seen| seen.scatter.powi(2)).sum::<f64>() / all.len() as f64;
+    println!("dark {mean:.3}, shift {shift:.3} mm, scatter {:.3} mm", square.sqrt());
+    // A tenth of the least radius for a single vessel.
+    mean >= LEAST && shift.abs().max_element() < 0.1 && square.sqrt() < 0.3
+}
+
+/// Local normals are the planted error: they cut vessels off along scanlines.
+#[test]
+fn bumps_smaller_than_the_beam_do_not_tear_vessels() {
+    let tracers = [Tracer::Bvh, Tracer::RayQuery].into_iter().cycle();
+    let all: Vec<[Seen; 2]> = BUMPS.into_iter().zip(tracers).map(|(b, t)| seen(b, t)).collect();
+    for ([rms, shortest, longest], [beam, ray]) in BUMPS.into_iter().zip(&all) {
+        println!(
+            "{rms} mm high, {shortest} to {longest} mm long: {:.2?} {:.2?}",
+            beam.ratios, ray.ratios
+        );
+        assert!(is_sound(&[beam]), "bumps of {rms} mm");
+    }
+    assert!(is_sound(&all.iter().map(|[beam, _]| beam).collect::<Vec<_>>()));
+    assert!(!is_sound(&all.iter().map(|[_, ray]| ray).collect::<Vec<_>>()), "local normals pass");
+}
