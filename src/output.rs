@@ -1,6 +1,7 @@
 //! Output of the program: lines to standard output, whose reader may leave at any time, and files. Independent
 //! of their content.
 
+pub mod dicom;
 pub mod files;
 pub mod movie;
 pub mod npy;

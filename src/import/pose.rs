@@ -87,6 +87,9 @@ pub fn find(task: &Task) -> Option<View> {
         if direction.dot(inward) < STEEPEST || (task.forbidden)(place) {
             continue;
         }
+        // A millimetre of bone is worse than everything else; then shadows beside, ways along the body or from its
+        // back, where no probe is held, depth, and a tilted face.
+        let unusual = 40.0 * direction.z.powi(2) + 20.0 * f64::max(0.0, -direction.y);
         for lateral in laterals(direction) {
             let view = View {
                 position: place + PRESSED * direction,
@@ -96,9 +99,9 @@ pub fn find(task: &Task) -> Option<View> {
                 blocked: hidden(task, &back, place, target),
                 shaded: shaded(task, &back, place, direction, lateral, way.length()),
             };
-            // A millimetre of bone is worse than everything else; then shadows beside, depth, and a tilted face.
             let score = 20.0 * view.blocked
                 + 100.0 * view.shaded
+                + unusual
                 + 0.3 * view.distance
                 + 30.0 * (1.0 - direction.dot(inward));
             if best.is_none_or(|(least, _)| score < least) {

@@ -1,21 +1,14 @@
-//! `insonify import` as a user runs it: label maps that this file writes, scenes that `check` finds clean and `render`
-//! shows; and bad input.
-
-#[path = "common/limited.rs"]
-mod limited;
-#[path = "common/program.rs"]
-mod program;
-#[path = "common/shared_data.rs"]
-mod shared_data;
+//! Label maps that this file writes: scenes that `check` finds clean and `render` shows; and bad input.
 
 use std::path::Path;
 
 use glam::DVec3;
 use insonify::scene::Scene;
 use insonify::volume::is_volume;
-use limited::{check, files, limited};
-use program::insonify;
-use shared_data::shared_data;
+
+use crate::limited::{check, files, limited};
+use crate::program::insonify;
+use crate::shared_data::shared_data;
 
 /// A NIfTI-1 file of labels: RAS, voxels of these sizes in mm, its first voxel at `origin` (RAS, mm).
 fn nifti(
