@@ -123,16 +123,15 @@ fn phantom(block: Mesh) -> Scene {
         aperture: 24.0,
         ..Probe::paper_table1()
     };
-    let mut scene = Scene {
-        simulation: Simulation {
-            paths: 1,
-            max_reflections: 0,
-            cell: Simulation::default_cell(5.0),
-            ..Simulation::default()
-        },
-        imaging: Imaging { noise: f64::NEG_INFINITY, tgc_attenuation: 0.0, ..Imaging::default() },
-        ..Scene::homogeneous(tissue(1.49, 1.5, 0.0), probe)
+    let mut scene = Scene::homogeneous(tissue(1.49, 1.5, 0.0), probe);
+    scene.simulation = Simulation {
+        paths: 1,
+        max_reflections: 0,
+        cell: Simulation::default_cell(5.0),
+        ..Simulation::default()
     };
+    scene.imaging =
+        Imaging { noise: f64::NEG_INFINITY, tgc_attenuation: 0.0, ..Imaging::default() };
     let inside = tissue(1.58, 1.65, 0.0);
     scene.tissues.extend([inside.clone(), Tissue { echogenicity: f64::NEG_INFINITY, ..inside }]);
     let mirror = Surface {
@@ -239,9 +238,10 @@ fn dark(levels: &[f32], lumen: &[bool], scene: &Scene) -> Vec<bool> {
 /// The scene with all sound at the probe's speed.
 fn unrefracted(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
+    let speed = scene.probe.speed;
     for tissue in &mut scene.tissues {
-        tissue.density *= tissue.speed / scene.probe.speed;
-        tissue.speed = scene.probe.speed;
+        tissue.density *= tissue.speed / speed;
+        tissue.speed = speed;
     }
     scene
 }

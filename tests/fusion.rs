@@ -409,7 +409,7 @@ fn a_volume_beyond_the_devices_limit_is_averaged_with_a_warning() {
     let library = Library::embedded();
     let mut simulator =
         Simulator::new(&device, &library, &scene, Tracer::Bvh).expect("a simulator");
-    let warning = simulator.warning().expect("it is told").to_owned();
+    let warning = simulator.warning().expect("a warning").to_owned();
     assert!(warning.contains("averaged to"), "{warning}");
     simulator.frame(&scene, 0).expect("a frame");
     let steps = simulator.fusion_steps().expect("read").expect("fused");

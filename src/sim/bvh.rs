@@ -27,9 +27,9 @@ pub use refit::{Levels, levels};
 pub type Node = [u32; 20];
 
 /// Stack entries that the top level leaves while a mesh is traversed, beside one entry per level.
-const ENTRY: usize = 1;
+const TOP_LEVEL_ENTRIES: usize = 1;
 
-const MESH: BvhBuildParams = BvhBuildParams {
+const MESH_BUILD: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ploc_search_distance: PlocSearchDistance::Medium,
     search_depth_threshold: 3,
@@ -41,11 +41,11 @@ const MESH: BvhBuildParams = BvhBuildParams {
 };
 
 /// Parameters of a quick build, for a tree that is used for one keyframe only.
-const FAST: BvhBuildParams = BvhBuildParams {
+const QUICK_BUILD: BvhBuildParams = BvhBuildParams {
     ploc_search_distance: PlocSearchDistance::Minimum,
     search_depth_threshold: 1,
     reinsertion_batch_ratio: 0.0,
-    ..MESH
+    ..MESH_BUILD
 };
 
 /// The error of a scene that the compute tracer cannot trace.
@@ -84,12 +84,12 @@ pub struct MeshBvh {
 impl MeshBvh {
     /// Builds the hierarchy of a mesh with finite coordinates; the hierarchy of an empty mesh is empty.
     pub fn build(mesh: &Mesh) -> Self {
-        Self::with(mesh, MESH)
+        Self::with(mesh, MESH_BUILD)
     }
 
     /// Like [`Self::build`], but faster to build and slower for rays.
     pub fn build_fast(mesh: &Mesh) -> Self {
-        Self::with(mesh, FAST)
+        Self::with(mesh, QUICK_BUILD)
     }
 
     fn with(mesh: &Mesh, params: BvhBuildParams) -> Self {
@@ -100,11 +100,15 @@ impl MeshBvh {
     /// Builds the hierarchy of `triangles`, indices into `positions`; unused positions are allowed.
     pub fn over(positions: &[[f32; 3]], triangles: &[[u32; 3]], splits: Splits) -> Self {
         Self::of(match splits {
-            Splits::Object => wide(&boxes(positions, triangles), MESH),
+            Splits::Object => wide(&boxes(positions, triangles), MESH_BUILD),
             Splits::Spatial => {
                 let mut tree = split::tree(positions, triangles);
-                ReinsertionOptimizer::default().run(&mut tree, MESH.reinsertion_batch_ratio, None);
-                bvh2_to_cwbvh(&tree, MESH.max_prims_per_leaf, true, false)
+                ReinsertionOptimizer::default().run(
+                    &mut tree,
+                    MESH_BUILD.reinsertion_batch_ratio,
+                    None,
+                );
+                bvh2_to_cwbvh(&tree, MESH_BUILD.max_prims_per_leaf, true, false)
             }
         })
     }
@@ -135,7 +139,7 @@ impl MeshBvh {
 pub(super) fn binary(boxes: &[Aabb]) -> Bvh2 {
     match boxes.is_empty() {
         true => Bvh2::default(),
-        false => build_bvh2(boxes, MESH, &mut Duration::default()),
+        false => build_bvh2(boxes, MESH_BUILD, &mut Duration::default()),
     }
 }
 
@@ -266,7 +270,7 @@ impl SceneBvh {
             self.top = top_tree(&boxes);
         }
         let wide = bvh2_to_cwbvh(&self.top, 1, true, false);
-        let needed = depth(&wide.nodes) + ENTRY + self.deepest;
+        let needed = depth(&wide.nodes) + TOP_LEVEL_ENTRIES + self.deepest;
         if needed > BVH_STACK {
             return Err(BvhError::TooDeep(needed));
         }
@@ -296,7 +300,8 @@ fn top_tree(boxes: &[Aabb]) -> Bvh2 {
     if boxes.is_empty() {
         return Bvh2::default();
     }
-    let params = BvhBuildParams { max_prims_per_leaf: 1, reinsertion_batch_ratio: 1.0, ..MESH };
+    let params =
+        BvhBuildParams { max_prims_per_leaf: 1, reinsertion_batch_ratio: 1.0, ..MESH_BUILD };
     let mut tree = build_bvh2(boxes, params, &mut Duration::default());
     tree.update_primitives_to_nodes();
     tree

@@ -12,7 +12,7 @@ use crate::scene::Scene;
 pub use skin::{Skin, Skins};
 
 /// Points of the face in a row, at least; a whole number of them belongs to each scanline.
-const COLUMNS: u32 = 128;
+const LEAST_COLUMNS: u32 = 128;
 /// Rows of points along the elements' height.
 const ROWS: u32 = 7;
 
@@ -41,7 +41,7 @@ impl Coupling {
         let contact = scene.contact.as_ref()?;
         let skin = skins.of(scene);
         let (probe, place) = (&scene.probe, scene.world_from_probe);
-        let per_element = COLUMNS.div_ceil(probe.scanlines.max(1));
+        let per_element = LEAST_COLUMNS.div_ceil(probe.scanlines.max(1));
         let columns = probe.scanlines * per_element;
         let (mut coupled, mut depth) = (vec![0u32; probe.scanlines as usize], 0.0);
         for column in 0..columns {

@@ -41,14 +41,14 @@ pub struct Fields {
     /// All fields in sequence: a header, then a displacement (mm) per node, x running fastest.
     pub values: Vec<[f32; 3]>,
     /// For each instance the places of its fields; none without a field.
-    slots: Vec<Option<Slots>>,
+    slots: Vec<Option<FieldOffsets>>,
     /// For each instance its placement at rest; none where no placement scales it in time.
     rests: Vec<Option<DAffine3>>,
 }
 
 /// The places of one instance's fields in the values; the fields follow each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Slots {
+struct FieldOffsets {
     /// Offset of the field of keyframe 0; equal to `blended` if keyframes have none.
     first: u32,
     stride: u32,
@@ -60,7 +60,7 @@ struct Slots {
 /// A weighted sum of keyframes' fields: `count` vectors from `target` on are the sum of the
 /// weighted ones from `sources` on, all counted in vectors of [`Fields::values`]. Weights sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blend {
+pub struct FieldBlend {
     /// The place of each keyframe's displacements, and its weight.
     pub sources: [(u32, f64); 4],
     /// The place of the sum.
@@ -75,7 +75,7 @@ impl Fields {
     /// must keep their places relative to each other.
     pub fn build(scene: &Scene) -> Self {
         let rests = scene.graph.rests(scene.instances.len());
-        let made: Vec<Option<Made>> =
+        let made: Vec<Option<InstanceFields>> =
             (0..scene.instances.len()).into_par_iter().map(|i| make(scene, i, &rests)).collect();
         let mut fields = Self { rests, ..Self::default() };
         for made in made {
@@ -95,7 +95,7 @@ impl Fields {
         }
     }
 
-    fn append(&mut self, made: &Made) -> Slots {
+    fn append(&mut self, made: &InstanceFields) -> FieldOffsets {
         let first = self.values.len() as u32;
         let header = made.grid.header();
         for displacements in &made.keyframes {
@@ -109,7 +109,7 @@ impl Fields {
             Some(displacements) => self.values.extend_from_slice(displacements),
             None => self.values.resize(self.values.len() + nodes, [0.0; 3]),
         }
-        Slots { first, stride: HEADER + nodes as u32, blended }
+        FieldOffsets { first, stride: HEADER + nodes as u32, blended }
     }
 
     /// The buffer that kernels bind; it is never empty.
@@ -141,12 +141,12 @@ impl Fields {
 
     /// The sum by which the device computes the field of instance `i` before a frame; none where a keyframe is
     /// shown unchanged, and where [`Self::follow`] computes it.
-    pub fn blend(&self, scene: &Scene, i: usize) -> Option<Blend> {
+    pub fn blend(&self, scene: &Scene, i: usize) -> Option<FieldBlend> {
         let keyframes = &scene.instances[i].keyframes;
         let between = keyframes.strategy == Strategy::Interpolate && self.rests[i].is_none();
         let slots = self.slots[i].filter(|_| between)?;
         let at = |keyframe: usize| slots.first + keyframe as u32 * slots.stride + HEADER;
-        Some(Blend {
+        Some(FieldBlend {
             sources: keyframes.blend.map(|(keyframe, weight)| (at(keyframe), weight)),
             target: slots.blended + HEADER,
             count: slots.stride - HEADER,
@@ -176,7 +176,7 @@ impl Fields {
 
     /// Present displacements, at the nodes, of an instance that placements scale: those of its keyframes followed
     /// by the affine map from its texture space at rest to the present one.
-    fn squeezed(&self, instance: &Instance, rest: &DAffine3, slots: Slots) -> Vec<[f32; 3]> {
+    fn squeezed(&self, instance: &Instance, rest: &DAffine3, slots: FieldOffsets) -> Vec<[f32; 3]> {
         let placed = &instance.world_from_object;
         let map = texture_from_object(placed) * texture_from_object(rest).inverse();
         let keyframes = &instance.keyframes;
@@ -212,7 +212,7 @@ pub fn padded(vectors: &[[f32; 3]]) -> Vec<[f32; 4]> {
 }
 
 /// Fields of one instance.
-struct Made {
+struct InstanceFields {
     grid: Grid,
     keyframes: Vec<Vec<[f32; 3]>>,
 }
@@ -228,7 +228,7 @@ fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>>
     (others.iter().all(same) && others.iter().any(moves)).then_some(meshes)
 }
 
-fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made> {
+fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<InstanceFields> {
     let instance = &scene.instances[index];
     let rest = |i: usize| rests[i].unwrap_or(scene.instances[i].world_from_object);
     let texture_from_world = rigid(&rest(index)).inverse();
@@ -242,7 +242,7 @@ fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made>
         rests[index]?;
         let shown = instance.keyframes.meshes.iter().chain([&instance.mesh]);
         let all = shown.flat_map(|&mesh| vertices(&scene.meshes[mesh]));
-        return Some(Made { grid: Grid::one_cell(all), keyframes: Vec::new() });
+        return Some(InstanceFields { grid: Grid::one_cell(all), keyframes: Vec::new() });
     };
     let patch =
         |i: usize, meshes| Patch { meshes, texture_from_object: texture_from_world * rest(i) };
@@ -259,7 +259,7 @@ fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made>
     patches.push(patch(index, own));
     let solver = Solver::new(&grid, &patches);
     let keyframes = (0..count).into_par_iter().map(|k| solver.displacements(k)).collect();
-    Some(Made { grid, keyframes })
+    Some(InstanceFields { grid, keyframes })
 }
 
 #[cfg(test)]

@@ -9,10 +9,10 @@ use super::{layout, placement};
 use crate::gpu::{Commands, Device, GpuError, Image};
 use crate::scene::{Acquired, Fusion, Scene};
 use crate::settings::{Blend, MaskSpeed};
-use texture::Texture;
+use texture::VolumeTexture;
 
 pub use super::stages::tint::Tint;
-pub use steps::Steps;
+pub use steps::FusionSteps;
 
 mod steps;
 mod texture;
@@ -20,7 +20,7 @@ mod texture;
 /// All that only frames with fusion need, except its buffers.
 pub(super) struct Fused {
     /// The volume. It is kept when buffers are made larger.
-    texture: Arc<Texture>,
+    texture: Arc<VolumeTexture>,
     /// The time of the volume that the frame shows.
     now: usize,
     pub(super) pyramid: Pyramid,
@@ -40,7 +40,7 @@ impl Fused {
         };
         let texture = match before {
             Some(before) => Arc::clone(&before.texture),
-            None => Arc::new(Texture::new(device, acquired)?),
+            None => Arc::new(VolumeTexture::new(device, acquired)?),
         };
         Ok(Some(Self { texture, now: acquired.now, pyramid: Pyramid::default(), banded: false }))
     }

@@ -85,7 +85,7 @@ impl Passes {
         given: &[(&str, &Buffer)],
     ) -> Result<(), GpuError> {
         cmd.scope(pass.name);
-        let extent = pass.extent.expect("what runs as it says has an extent");
+        let extent = pass.extent.expect("a pass recorded this way states its extent");
         self.record(cmd, pass, extent(&self.frame), &[], given)
     }
 
@@ -177,9 +177,9 @@ impl Passes {
 }
 
 /// The kernels of the passes that frames of a scene may run.
-pub(super) struct Kernels(Vec<Made>);
+pub(super) struct Kernels(Vec<PassKernel>);
 
-struct Made {
+struct PassKernel {
     pass: &'static Pass,
     kernel: Kernel,
     /// True if the frames that the scene began with run it.
@@ -229,7 +229,7 @@ impl Kernels {
             };
             let stem = suffix.map_or(pass.name.into(), |suffix| format!("{}_{suffix}", pass.name));
             let kernel = Kernel::when_needed(device, &stem, library.words(&stem), pass.constants)?;
-            kernels.push(Made { pass, kernel, needed });
+            kernels.push(PassKernel { pass, kernel, needed });
         }
         // The kernels that take longest to compile begin first.
         let mut due: Vec<_> = kernels.iter().filter(|made| made.needed).collect();
@@ -239,8 +239,9 @@ impl Kernels {
     }
 
     pub(super) fn of(&self, pass: &Pass) -> &Kernel {
-        let is =
-            |made: &&Made| made.pass.name == pass.name && made.pass.constants == pass.constants;
+        let is = |made: &&PassKernel| {
+            made.pass.name == pass.name && made.pass.constants == pass.constants
+        };
         &self.0.iter().find(is).expect("a pass of the scene").kernel
     }
 }

@@ -18,7 +18,7 @@ const EMBEDDED: &[(&str, &[u8])] = include!("../../spirv/embedded.rs");
 pub struct Library {
     words: BTreeMap<String, Vec<u32>>,
     #[cfg(feature = "compile")]
-    watched: Option<reload::Watched>,
+    watched: Option<reload::WatchedSources>,
 }
 
 impl Library {

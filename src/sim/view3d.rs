@@ -13,9 +13,9 @@ use crate::gpu::{
 };
 
 /// Distance by which the probe's housing is wider than the face on each side, mm.
-const RIM: f64 = 3.0;
+const HOUSING_RIM: f64 = 3.0;
 /// Half the width of a probe whose face is a point, mm.
-const POINT: f64 = 10.0;
+const POINT_FACE_HALF_WIDTH: f64 = 10.0;
 /// Height of the probe's head above the middle of its face, mm.
 pub const HEAD: f64 = 32.0;
 /// Height of head and handle, mm.
@@ -23,7 +23,7 @@ pub const HANDLE: f64 = 105.0;
 
 /// A view: the camera, and what is visible.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sight {
+pub struct CameraView {
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
     /// The eye, world, mm.
@@ -42,7 +42,7 @@ pub struct Sight {
     pub looks: Vec<[f32; 4]>,
 }
 
-impl Sight {
+impl CameraView {
     /// The constants for the kernel, for the probe of `frame`.
     pub fn constants(&self, frame: &Frame) -> layout::View3d {
         let vector = |v: DVec3| {
@@ -75,10 +75,15 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
             f64::from(frame.radius) * half.min(std::f64::consts::FRAC_PI_2).sin()
         }
         layout::KIND_LINEAR => f64::from(frame.width) / 2.0,
-        _ => POINT - RIM,
+        _ => POINT_FACE_HALF_WIDTH - HOUSING_RIM,
     };
     let half_thickness = f64::from(frame.face_height) / 2.0;
-    [(half_width + RIM) as f32, (half_thickness + RIM) as f32, HEAD as f32, HANDLE as f32]
+    [
+        (half_width + HOUSING_RIM) as f32,
+        (half_thickness + HOUSING_RIM) as f32,
+        HEAD as f32,
+        HANDLE as f32,
+    ]
 }
 
 /// Kernel and buffers of the picture. Buffers grow to the largest picture so far.
@@ -94,7 +99,7 @@ impl Viewer3d {
         device: &Arc<Device>,
         library: &Library,
         tracer: Tracer,
-        sight: &Sight,
+        sight: &CameraView,
     ) -> Result<Self, GpuError> {
         let stem = format!("view3d_{}", tracer.suffix());
         let size = size_of::<layout::View3d>() as u64;
@@ -107,20 +112,20 @@ impl Viewer3d {
         })
     }
 
-    fn holds(&self, sight: &Sight) -> bool {
+    fn holds(&self, sight: &CameraView) -> bool {
         let [looks, picture] = bytes(sight);
         self.looks.size() >= looks && self.picture.size() >= picture
     }
 }
 
 /// Bytes of looks and picture.
-fn bytes(sight: &Sight) -> [u64; 2] {
+fn bytes(sight: &CameraView) -> [u64; 2] {
     let [width, height] = sight.size.map(u64::from);
     [16 * sight.looks.len() as u64, 4 * width * height].map(|size| size.max(16))
 }
 
 /// The buffers of looks and picture.
-fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError> {
+fn buffers(device: &Arc<Device>, sight: &CameraView) -> Result<[Buffer; 2], GpuError> {
     let [looks, picture] = bytes(sight);
     Ok([
         device.buffer("looks", looks, BufferKind::Storage)?,
@@ -140,7 +145,7 @@ impl Simulator {
     pub fn view3d(
         &mut self,
         library: &Library,
-        sight: &Sight,
+        sight: &CameraView,
         image: &Image,
     ) -> Result<FrameTimings, SimError> {
         let passes = &self.passes;
@@ -170,7 +175,7 @@ impl Viewer3d {
     fn record(
         &self,
         cmd: &mut Commands<'_>,
-        sight: &Sight,
+        sight: &CameraView,
         passes: &super::Passes,
         fused: bool,
     ) -> Result<(), GpuError> {

@@ -83,7 +83,8 @@ pub fn add_point(scene: &mut Scene, at: [f64; 3], amplitude: f64) {
     scene.wires.push(Wire { ends: [at; 2], spacing: 1.0, amplitude });
 }
 
-/// Adds a ball of `radius` mm around `centre`, made of 20 480 triangles: its faces are up to 2.5e-4 of the radius inside.
+/// Adds a ball of `radius` mm around `centre`, made of 20 480 triangles: its faces are up to 2.5e-4 of the radius
+/// inside.
 pub fn add_sphere(scene: &mut Scene, radius: f64, tissue: Tissue, centre: DVec3) {
     let at = DAffine3::from_translation(centre);
     add_body(scene, shapes::sphere(radius, 5), tissue, at);

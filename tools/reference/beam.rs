@@ -42,7 +42,7 @@ pub fn beam(
                         sums.volume += w * f64::from(volume[i]) * f64::from(row.volume_undo);
                     }
                 }
-                let own = at(0).expect("the line itself is inside");
+                let own = at(0).expect("the scanline itself is inside");
                 let scatterers = if frame.flags & FLAG_VOXEL != 0 {
                     sums.volume * (sums.full / sums.here).sqrt()
                 } else {

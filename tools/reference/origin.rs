@@ -96,7 +96,7 @@ mod tests {
         packed.extend([0.0_f32, 1.0].map(f32::to_bits));
         packed.push(0);
         assert_eq!(pack(&stacks), packed);
-        let back: [u32; START_WORDS] = packed.try_into().expect("one line's");
+        let back: [u32; START_WORDS] = packed.try_into().expect("the words of one line");
         assert_eq!(unpack(&back), stacks[0]);
     }
 

@@ -268,8 +268,8 @@ impl<'a> Tube<'a> {
         (-0.5 * (across * across * lateral + up * up * elevation)).exp()
     }
 
-    /// 1 / sigma^2 at distance `x`: the value of a row is that of its sample's middle, and between them lies the parabola
-    /// through the nearest three.
+    /// 1 / sigma^2 at distance `x`: the value of a row is that of its sample's middle, and between them lies the
+    /// parabola through the nearest three.
     fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
         let last = self.world.rows.len() - 1;
         let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, last as f64);

@@ -22,21 +22,21 @@ use bins::{BINS, Bins, Division, NOTHING, cheapest};
 /// (alpha of the paper).
 const LEAST_OVERLAP: f32 = 1e-5;
 /// Most parts beyond one per triangle, relative to the number of triangles (choice).
-const MOST_MORE: f64 = 0.5;
+const MOST_DUPLICATES: f64 = 0.5;
 /// Depth below which nodes are halved by number, so that no geometry makes a deep tree.
-const DEEPEST: usize = 40;
+const MOST_LEVELS: usize = 40;
 /// Nodes with more parts than this are built by several threads.
-const WORTH_A_THREAD: usize = 4096;
+const PARALLEL_PARTS: usize = 4096;
 
 /// A triangle, or the part of it that lies in a box.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct TrianglePart {
     bounds: Aabb,
     triangle: u32,
 }
 
 enum Tree {
-    Leaf(Part),
+    Leaf(TrianglePart),
     Node(Aabb, Box<[Tree; 2]>),
 }
 
@@ -54,18 +54,18 @@ pub(super) fn tree(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Bvh2 {
     if triangles.is_empty() {
         return Bvh2::default();
     }
-    let whole = |(t, corners): (usize, &[u32; 3])| Part {
+    let whole = |(t, corners): (usize, &[u32; 3])| TrianglePart {
         bounds: Aabb::from_points(&corners.map(|v| Vec3A::from(positions[v as usize]))),
         triangle: t as u32,
     };
-    let parts: Vec<Part> = triangles.iter().enumerate().map(whole).collect();
+    let parts: Vec<TrianglePart> = triangles.iter().enumerate().map(whole).collect();
     let builder =
         Builder { positions, triangles, least_overlap: LEAST_OVERLAP * around(&parts).half_area() };
-    let spare = (MOST_MORE * parts.len() as f64) as usize;
+    let spare = (MOST_DUPLICATES * parts.len() as f64) as usize;
     flat(builder.build(parts, spare, 0))
 }
 
-fn around(parts: &[Part]) -> Aabb {
+fn around(parts: &[TrianglePart]) -> Aabb {
     (parts.iter()).fold(Aabb::INVALID, |all, part| all.union(&part.bounds))
 }
 
@@ -107,7 +107,7 @@ struct Builder<'a> {
 
 impl Builder<'_> {
     /// Builds the tree over `parts`, of which there is at least one; cuts may add up to `spare` more.
-    fn build(&self, parts: Vec<Part>, spare: usize, depth: usize) -> Tree {
+    fn build(&self, parts: Vec<TrianglePart>, spare: usize, depth: usize) -> Tree {
         if let [part] = parts[..] {
             return Tree::Leaf(part);
         }
@@ -117,10 +117,11 @@ impl Builder<'_> {
         // visit 3 % more nodes, as large nodes use it for cuts of little benefit.
         let all = left.len() + right.len();
         let spare = spare - (all - count);
-        let share = |parts: &Vec<Part>| (spare as u64 * parts.len() as u64 / all as u64) as usize;
+        let share =
+            |parts: &Vec<TrianglePart>| (spare as u64 * parts.len() as u64 / all as u64) as usize;
         let shares = [share(&left), share(&right)];
         let build = |parts, spare| self.build(parts, spare, depth + 1);
-        let children = match count > WORTH_A_THREAD {
+        let children = match count > PARALLEL_PARTS {
             true => {
                 let (left, right) =
                     rayon::join(|| build(left, shares[0]), || build(right, shares[1]));
@@ -134,13 +135,13 @@ impl Builder<'_> {
     /// Divides the parts between two children, neither of them empty.
     fn divide(
         &self,
-        mut parts: Vec<Part>,
+        mut parts: Vec<TrianglePart>,
         bounds: &Aabb,
         spare: usize,
         depth: usize,
-    ) -> [Vec<Part>; 2] {
+    ) -> [Vec<TrianglePart>; 2] {
         let count = parts.len();
-        if depth < DEEPEST {
+        if depth < MOST_LEVELS {
             let centres = centres(&parts);
             let whole = by_objects(&parts, &centres);
             let overlap = whole.map_or(*bounds, |whole| {
@@ -170,7 +171,7 @@ impl Builder<'_> {
     }
 
     /// The best plane that cuts the parts lying across it.
-    fn by_space(&self, parts: &[Part], bounds: &Aabb, spare: usize) -> Option<Division> {
+    fn by_space(&self, parts: &[TrianglePart], bounds: &Aabb, spare: usize) -> Option<Division> {
         let along = |axis| {
             let bins = Bins::new(bounds, axis, parts.len());
             let mut entering = [NOTHING; BINS];
@@ -194,7 +195,7 @@ impl Builder<'_> {
     }
 
     /// The parts on both sides of a plane. Parts across it are cut, unless one side grows less by taking them whole.
-    fn cut(&self, parts: &[Part], bounds: &Aabb, at: Division) -> [Vec<Part>; 2] {
+    fn cut(&self, parts: &[TrianglePart], bounds: &Aabb, at: Division) -> [Vec<TrianglePart>; 2] {
         let axis = at.axis;
         let plane = Bins::new(bounds, axis, parts.len()).plane(at.bin);
         let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -203,19 +204,19 @@ impl Builder<'_> {
             let [in_left, in_right] = self.clip(&part, axis, plane);
             if !in_right.valid() {
                 let bounds = if in_left.valid() { in_left } else { part.bounds };
-                left.push(Part { bounds, ..part });
+                left.push(TrianglePart { bounds, ..part });
                 continue;
             }
             if !in_left.valid() {
-                right.push(Part { bounds: in_right, ..part });
+                right.push(TrianglePart { bounds: in_right, ..part });
                 continue;
             }
             let cut = low.cost() + high.cost();
             let all_left = low.grown(&part.bounds).cost() + high.without_one().cost();
             let all_right = low.without_one().cost() + high.grown(&part.bounds).cost();
             if cut <= all_left && cut <= all_right {
-                left.push(Part { bounds: in_left, ..part });
-                right.push(Part { bounds: in_right, ..part });
+                left.push(TrianglePart { bounds: in_left, ..part });
+                right.push(TrianglePart { bounds: in_right, ..part });
             } else if all_left <= all_right {
                 (low, high) = (low.grown(&part.bounds), high.without_one());
                 left.push(part);
@@ -229,7 +230,7 @@ impl Builder<'_> {
 
     /// Boxes around the portions of a part on both sides of a plane; [`Aabb::INVALID`] for an empty side. A part
     /// that only touches the plane belongs to the side on which it lies.
-    fn clip(&self, part: &Part, axis: usize, plane: f32) -> [Aabb; 2] {
+    fn clip(&self, part: &TrianglePart, axis: usize, plane: f32) -> [Aabb; 2] {
         let bounds = &part.bounds;
         if bounds.max[axis] <= plane {
             return [*bounds, Aabb::INVALID];
@@ -261,13 +262,13 @@ impl Builder<'_> {
     }
 }
 
-fn centres(parts: &[Part]) -> Aabb {
+fn centres(parts: &[TrianglePart]) -> Aabb {
     let centres = parts.iter().map(|part| part.bounds.center());
     centres.fold(Aabb::INVALID, |all, centre| all.union(&Aabb::from_point(centre)))
 }
 
 /// The best division of parts by the centres of their boxes; none where all centres are equal.
-fn by_objects(parts: &[Part], centres: &Aabb) -> Option<Division> {
+fn by_objects(parts: &[TrianglePart], centres: &Aabb) -> Option<Division> {
     let along = |axis| {
         let bins = Bins::new(centres, axis, parts.len());
         let mut entering = [NOTHING; BINS];

@@ -15,14 +15,14 @@ use crate::sim::bvh;
 /// an edge meets both its triangles.
 const SAME_CROSSING: f64 = 1e-6;
 /// Layers of a body that are no farther apart than this, mm, touch: meshes are rounded to hundredths.
-const JOINED: f64 = 0.1;
+const TOUCHING: f64 = 0.1;
 /// Boxes are widened by this much of the mesh's extent, so that single precision misses no triangle.
-const MARGIN: f32 = 1e-5;
+const BOX_MARGIN: f32 = 1e-5;
 
 /// Hierarchies over the triangles of meshes, built when a mesh is first used as skin.
 #[derive(Default)]
 pub struct Skins {
-    trees: HashMap<usize, Arc<Tree>>,
+    trees: HashMap<usize, Arc<MeshTree>>,
 }
 
 impl Skins {
@@ -31,11 +31,11 @@ impl Skins {
     pub fn of(&mut self, scene: &Scene) -> Skin {
         let named = scene.contact.iter().flat_map(|c| &c.skin);
         let placed = named.map(|&i| &scene.instances[i]).filter(|i| i.shown);
-        let bodies = placed.map(|placed| Body {
+        let bodies = placed.map(|placed| PlacedSkin {
             tree: self
                 .trees
                 .entry(placed.mesh)
-                .or_insert_with(|| Arc::new(Tree::new(&scene.meshes[placed.mesh])))
+                .or_insert_with(|| Arc::new(MeshTree::new(&scene.meshes[placed.mesh])))
                 .clone(),
             object_from_world: placed.world_from_object.inverse(),
         });
@@ -46,12 +46,12 @@ impl Skins {
 /// The surface of the body at one time.
 #[derive(Clone)]
 pub struct Skin {
-    bodies: Vec<Body>,
+    bodies: Vec<PlacedSkin>,
 }
 
 #[derive(Clone)]
-struct Body {
-    tree: Arc<Tree>,
+struct PlacedSkin {
+    tree: Arc<MeshTree>,
     object_from_world: DAffine3,
 }
 
@@ -65,7 +65,7 @@ struct Crossing {
 }
 
 /// A part of a line that lies in the body.
-struct Stretch {
+struct Chord {
     begin: f64,
     end: f64,
     /// Outward normal at `begin`, of any length.
@@ -73,16 +73,16 @@ struct Stretch {
 }
 
 /// A mesh's triangles with boxes around them, object space.
-struct Tree {
+struct MeshTree {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     boxes: Bvh2,
 }
 
-impl Tree {
+impl MeshTree {
     fn new(mesh: &Mesh) -> Self {
         let [low, high] = mesh.bounds().map(Vec3A::from);
-        let margin = Vec3A::splat(MARGIN * (low.abs().max(high.abs())).max_element());
+        let margin = Vec3A::splat(BOX_MARGIN * (low.abs().max(high.abs())).max_element());
         let around = |t: &[u32; 3]| {
             let tight = Aabb::from_points(&t.map(|i| Vec3A::from(mesh.positions[i as usize])));
             Aabb::new(tight.min - margin, tight.max + margin)
@@ -132,7 +132,7 @@ impl Tree {
 impl Skin {
     /// Stretches of the line `origin + t direction` (world, mm) that lie in the body, in order; layers
     /// that touch are one.
-    fn stretches(&self, origin: DVec3, direction: DVec3) -> Vec<Stretch> {
+    fn stretches(&self, origin: DVec3, direction: DVec3) -> Vec<Chord> {
         let mut crossings: Vec<Crossing> = Vec::new();
         for body in &self.bodies {
             let object = &body.object_from_world;
@@ -145,7 +145,7 @@ impl Skin {
             }));
         }
         crossings.sort_by(|a, b| a.t.total_cmp(&b.t));
-        let mut stretches: Vec<Stretch> = Vec::new();
+        let mut stretches: Vec<Chord> = Vec::new();
         let (mut depth, mut begin, mut normal) = (0i32, 0.0, DVec3::ZERO);
         for crossing in crossings {
             let before = depth;
@@ -154,9 +154,9 @@ impl Skin {
                 (begin, normal) = (crossing.t, crossing.normal);
             } else if before == 1 && depth == 0 {
                 let end = crossing.t;
-                match stretches.last_mut().filter(|s| begin - s.end < JOINED) {
+                match stretches.last_mut().filter(|s| begin - s.end < TOUCHING) {
                     Some(last) => last.end = end,
-                    None => stretches.push(Stretch { begin, end, normal }),
+                    None => stretches.push(Chord { begin, end, normal }),
                 }
             }
         }

@@ -3,7 +3,7 @@
 use glam::{DVec3, UVec3};
 
 /// Nodes along the longest axis.
-const LONGEST: f64 = 24.0;
+const LONGEST_AXIS_NODES: f64 = 24.0;
 
 /// Smallest and largest coordinates of some points; the origin twice where there is none.
 fn ends(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
@@ -28,7 +28,7 @@ impl Grid {
     pub fn around(points: impl Iterator<Item = DVec3>) -> Self {
         let (low, high) = ends(points);
         let extent = high - low;
-        let spacing = (extent.max_element() / (LONGEST - 3.0)).max(1e-3);
+        let spacing = (extent.max_element() / (LONGEST_AXIS_NODES - 3.0)).max(1e-3);
         // Rounded up: the centre stays where it is.
         let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
         Self { origin: (low + high - cells * spacing) / 2.0, spacing, size: cells.as_uvec3() + 1 }

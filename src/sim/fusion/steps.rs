@@ -6,7 +6,7 @@ use crate::scene::Scene;
 use crate::settings::Blend;
 
 /// The steps of the last fused frame, row by row where they are images.
-pub struct Steps {
+pub struct FusionSteps {
     /// Mask (1 outside) and grey level 0..1 of the volume: pairs, [L][K].
     pub prescan: Vec<f32>,
     /// Grey level 0..1 of the volume per pixel; 0 outside the sector.
@@ -44,7 +44,7 @@ impl Simulator {
     ///
     /// # Errors
     /// A Vulkan error.
-    pub fn fusion_steps(&mut self) -> Result<Option<Steps>, SimError> {
+    pub fn fusion_steps(&mut self) -> Result<Option<FusionSteps>, SimError> {
         if !self.fused {
             return Ok(None);
         }
@@ -54,7 +54,7 @@ impl Simulator {
         let (masks, _) = mask.as_chunks::<2>();
         let (sums, _) = sums.as_chunks::<2>();
         let mean = |s: &[f32; 2]| if s[1] > 0.0 { s[0] / s[1] } else { 0.0 };
-        Ok(Some(Steps {
+        Ok(Some(FusionSteps {
             prescan: self.floats("prescan")?,
             background: self.floats("background")?,
             mask: masks.iter().map(|m| m[0]).collect(),

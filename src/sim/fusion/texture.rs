@@ -10,7 +10,7 @@ use crate::scene::fusion::TEXTURE_BUDGET as BUDGET;
 use crate::volume::Voxels;
 
 /// The textures and the meaning of their texels, which is the same at all times.
-pub(in crate::sim) struct Texture {
+pub(in crate::sim) struct VolumeTexture {
     /// One texture per time, all on the device, so that changing the time costs nothing.
     pub(in crate::sim) images: Vec<Image>,
     /// Texel indices from voxel indices.
@@ -31,7 +31,7 @@ struct Texels {
     offset: f64,
 }
 
-impl Texture {
+impl VolumeTexture {
     /// Uploads the voxels of all times. Volumes beyond the device's limit or [`BUDGET`] are first averaged
     /// over blocks of whole voxels, in the same way at all times.
     ///
@@ -76,7 +76,7 @@ impl Texture {
     }
 }
 
-impl Texture {
+impl VolumeTexture {
     /// Texels along each axis.
     pub(in crate::sim) fn extent(&self) -> [u32; 3] {
         self.images[0].extent()

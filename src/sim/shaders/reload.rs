@@ -10,7 +10,7 @@ use super::authors::source::{self, file_error};
 use super::authors::{Error, compiler};
 
 /// A folder of sources and its last known state.
-pub(super) struct Watched {
+pub(super) struct WatchedSources {
     dir: PathBuf,
     /// Modification time of every file at the last check; `None` before the first.
     seen: Option<BTreeMap<PathBuf, SystemTime>>,
@@ -23,7 +23,8 @@ impl Library {
     /// Kernels that are missing in `dir` stay the embedded ones.
     pub fn with_sources(dir: impl Into<PathBuf>) -> Result<Self, Error> {
         let mut library = Self::embedded();
-        library.watched = Some(Watched { dir: dir.into(), seen: None, loaded: BTreeMap::new() });
+        library.watched =
+            Some(WatchedSources { dir: dir.into(), seen: None, loaded: BTreeMap::new() });
         library.poll()?;
         Ok(library)
     }

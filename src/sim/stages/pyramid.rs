@@ -36,7 +36,7 @@ pub(in crate::sim) fn is_banded(scene: &Scene) -> bool {
 }
 
 /// A level of the pyramid.
-struct Level {
+struct PyramidLevel {
     /// Difference and weights per pixel, three floats.
     sums: Buffer,
     /// The sum that this level and the coarser ones add to the acquired image.
@@ -45,7 +45,7 @@ struct Level {
 
 /// The levels, finest first; empty until they are needed.
 #[derive(Default)]
-pub(in crate::sim) struct Pyramid(Vec<Level>);
+pub(in crate::sim) struct Pyramid(Vec<PyramidLevel>);
 
 impl Pyramid {
     /// Makes room for `levels` levels above the finest, of images of up to `pixels` pixels, whatever
@@ -62,7 +62,8 @@ impl Pyramid {
             let new = |name: &str, each: u64| {
                 device.buffer(name, (each * pixels).max(16), BufferKind::Storage)
             };
-            self.0.push(Level { sums: new("band sums", 12)?, change: new("band change", 4)? });
+            self.0
+                .push(PyramidLevel { sums: new("band sums", 12)?, change: new("band change", 4)? });
         }
         Ok(())
     }

@@ -20,11 +20,11 @@ use crate::sim::world::{Kernels, World};
 /// Rays followed at the same time: one per line, if there are as many lines.
 const RAYS: u32 = 1344;
 /// Most surfaces that each ray meets, one behind the other.
-const BOUNCES: usize = 8;
+const SURFACES_PER_RAY: usize = 8;
 /// Distance below which two surfaces may be found in either order, mm, as both tracers round.
-const MARGIN: f32 = 1e-3;
+const ORDER_MARGIN: f32 = 1e-3;
 /// Differing rays allowed in ten thousand: a ray that grazes an edge may pass it on either side.
-const DIFFERENT: usize = 3;
+const MOST_DIFFERENT: usize = 3;
 /// Distance from a surface at which the next ray begins, relative to the largest coordinate (glsl/path.glsl).
 const CLEARANCE: f32 = 4e-6;
 
@@ -44,11 +44,11 @@ impl Trial {
     /// # Errors
     /// A device error; a scene that the ray query cannot serve.
     pub fn run(device: &Arc<Device>, library: &Library, scene: &Scene) -> Result<Self, SimError> {
-        let own = Bench::new(device, library, scene, Tracer::Bvh)?;
-        let query = Bench::new(device, library, scene, Tracer::RayQuery)?;
+        let own = TrialWorld::new(device, library, scene, Tracer::Bvh)?;
+        let query = TrialWorld::new(device, library, scene, Tracer::RayQuery)?;
         let mut trial = Self::default();
         let mut rays = first_rays(scene);
-        for _ in 0..BOUNCES {
+        for _ in 0..SURFACES_PER_RAY {
             let (mine, theirs) = (own.trace(device, &rays)?, query.trace(device, &rays)?);
             let different = |(a, b): &(&RayHit, &RayHit)| !agree(a, b);
             trial.different += mine.iter().zip(&theirs).filter(different).count();
@@ -63,7 +63,7 @@ impl Trial {
 
     /// True if the ray query may be used.
     pub fn passed(&self) -> bool {
-        10_000 * self.different <= DIFFERENT * self.rays
+        10_000 * self.different <= MOST_DIFFERENT * self.rays
     }
 }
 
@@ -83,12 +83,12 @@ pub(super) fn id(library: &Library, scene: &Scene) -> u64 {
 }
 
 /// The scene with one of the tracers.
-struct Bench {
+struct TrialWorld {
     kernel: Kernel,
     world: World,
 }
 
-impl Bench {
+impl TrialWorld {
     fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -129,7 +129,7 @@ fn agree(a: &RayHit, b: &RayHit) -> bool {
     match (a.instance, b.instance) {
         (NONE, NONE) => true,
         (NONE, _) | (_, NONE) => false,
-        _ => (a.t - b.t).abs() <= MARGIN,
+        _ => (a.t - b.t).abs() <= ORDER_MARGIN,
     }
 }
 

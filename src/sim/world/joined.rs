@@ -13,7 +13,7 @@ use super::entry::union;
 use crate::scene::{Instance, Scene, Strategy};
 
 /// Most instances that can share: a triangle's owner has 16 bits, so later instances have structures of their own.
-const OWNERS: usize = 1 << 16;
+const MOST_OWNERS: usize = 1 << 16;
 
 /// Instances that share their structures.
 #[derive(Clone, Debug)]
@@ -84,7 +84,7 @@ impl Sets {
         }
         let carriers = scene.graph.carriers(scene.instances.len());
         let mut alike: BTreeMap<Vec<u64>, Vec<usize>> = BTreeMap::new();
-        for (i, instance) in scene.instances.iter().enumerate().take(OWNERS) {
+        for (i, instance) in scene.instances.iter().enumerate().take(MOST_OWNERS) {
             let keyframes = &instance.keyframes;
             let own = shapes(instance)
                 .iter()

@@ -165,7 +165,7 @@ impl Refit {
                 )?;
             }
             commands.barrier(Stage::Compute, Stage::Compute);
-            ranges.push(&body.bases[&body.held.expect("shape came first")].levels);
+            ranges.push(&body.bases[&body.held.expect("the base was chosen by `shape`")].levels);
         }
         let (Some(refit), Some((_, nodes))) = (&self.boxes, top.bvh()) else {
             return Ok(());

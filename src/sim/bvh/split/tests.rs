@@ -106,8 +106,8 @@ fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     let mesh = straw();
     let whole =
         Builder { positions: &mesh.positions, triangles: &mesh.triangles, least_overlap: 0.0 };
-    let parts: Vec<Part> = (0..mesh.triangles.len())
-        .map(|t| Part {
+    let parts: Vec<TrianglePart> = (0..mesh.triangles.len())
+        .map(|t| TrianglePart {
             bounds: Aabb::from_points(
                 &mesh.triangles[t].map(|v| mesh.positions[v as usize].into()),
             ),
@@ -120,7 +120,7 @@ fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     let (with, without) = (cost(&built), cost(&objects));
     println!("surface of all nodes: {with} with cuts, {without} without");
     assert!(with < 0.9 * without, "{with} with cuts, {without} without");
-    let most = mesh.triangles.len() as f64 * (1.0 + MOST_MORE);
+    let most = mesh.triangles.len() as f64 * (1.0 + MOST_DUPLICATES);
     assert!(built.primitive_indices.len() as f64 <= most);
 }
 
@@ -157,8 +157,8 @@ fn odd_triangles_are_built_over() {
         let built = tree_of(&mesh);
         let held = leaves(&built, mesh.triangles.len());
         assert!(held.iter().all(|leaves| !leaves.is_empty()), "{name}");
-        assert!(depth(&built, 0) <= DEEPEST + 14, "{name}: {}", depth(&built, 0));
-        let most = mesh.triangles.len() as f64 * (1.0 + MOST_MORE);
+        assert!(depth(&built, 0) <= MOST_LEVELS + 14, "{name}: {}", depth(&built, 0));
+        let most = mesh.triangles.len() as f64 * (1.0 + MOST_DUPLICATES);
         assert!(built.primitive_indices.len() as f64 <= most, "{name}");
         if !name.starts_with("far") {
             assert_eq!(uncovered(&built, &mesh), 0, "{name}");
@@ -171,7 +171,7 @@ fn odd_triangles_are_built_over() {
 #[test]
 fn the_same_triangles_are_the_same_tree() {
     let mesh = shapes::ellipsoid([3.0, 9.0, 27.0], 5);
-    assert!(mesh.triangles.len() > 2 * WORTH_A_THREAD);
+    assert!(mesh.triangles.len() > 2 * PARALLEL_PARTS);
     let boxes = |tree: &Bvh2| -> Vec<[[f32; 3]; 2]> {
         let nodes = tree.nodes.iter().map(|node| node.aabb());
         nodes.map(|b| [b.min.into(), b.max.into()]).collect()

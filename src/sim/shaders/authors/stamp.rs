@@ -19,7 +19,7 @@ const REMEDY: &str =
 /// Hashes of one module.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry {
+pub struct ModuleHashes {
     /// Hash of sources, includes, flags and compiler.
     pub source: String,
     /// Hash of the module's bytes.
@@ -38,10 +38,10 @@ pub fn compiler(lock: &str) -> String {
 }
 
 /// The stamp's text, one module a line so that git merges it.
-pub fn text(entries: &BTreeMap<String, Entry>) -> String {
+pub fn text(entries: &BTreeMap<String, ModuleHashes>) -> String {
     let lines: Vec<_> = entries
         .iter()
-        .map(|(stem, Entry { source, spirv })| {
+        .map(|(stem, ModuleHashes { source, spirv })| {
             format!("  \"{stem}\": {{ \"source\": \"{source}\", \"spirv\": \"{spirv}\" }}")
         })
         .collect();
@@ -53,7 +53,7 @@ pub fn text(entries: &BTreeMap<String, Entry>) -> String {
 pub fn differences(glsl: &Path, spirv: &Path, compiler: &str) -> Result<Vec<String>, Error> {
     let path = spirv.join(FILE);
     let text = fs::read_to_string(&path).map_err(|e| file_error(&path, e))?;
-    let mut stamped: BTreeMap<String, Entry> = match serde_json::from_str(&text) {
+    let mut stamped: BTreeMap<String, ModuleHashes> = match serde_json::from_str(&text) {
         Ok(stamped) => stamped,
         Err(error) => return Ok(vec![format!("{}: {error}; {REMEDY}", path.display())]),
     };
