@@ -1,4 +1,4 @@
-//! Loops in DICOM, read back by pydicom.
+//! Loops in DICOM, read back by pydicom and held to the standard by dciodvfy.
 
 #[path = "common/program.rs"]
 mod program;
@@ -55,6 +55,17 @@ fn read(python: &Path, file: &Path, pixels: usize) -> Value {
     // Warnings of pydicom are faults of ours.
     assert_eq!(String::from_utf8_lossy(&out.stderr), "");
     serde_json::from_slice(&out.stdout).expect("JSON")
+}
+
+/// The errors that dicom3tools' validator finds; none where there is no validator.
+fn errors(file: &Path) -> Option<Vec<String>> {
+    let Ok(out) = Command::new("dciodvfy").arg(file).output() else {
+        skip(Lacking::Data, "no dciodvfy (Debian's dicom3tools)");
+        return None;
+    };
+    let text = String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned();
+    assert!(text.contains("USMultiFrameImage"), "{text}");
+    Some(text.lines().filter(|l| l.starts_with("Error")).map(str::to_owned).collect())
 }
 
 fn numbers(value: &Value) -> Vec<f64> {
@@ -149,6 +160,9 @@ fn colours_and_odd_sizes_are_read_back() {
         assert_eq!(found["pixels"], serde_json::json!(expected), "{name}");
         assert_eq!(numbers(&found["delta"]), [0.012_345_678_9; 2]);
         assert!((found["time"].as_f64().expect("ms") - 33.333_333).abs() < 1e-5);
+        if let Some(errors) = errors(&path) {
+            assert!(errors.is_empty(), "{name}: {errors:?}");
+        }
         assert_eq!(found["kilohertz"], 3500);
         assert_eq!(found["photometric"], if frames.len() > 1 { "RGB" } else { "MONOCHROME2" });
     }
