@@ -36,7 +36,7 @@ pub fn around(grid: &Grid, margin: f64) -> Option<Soup> {
         let reach = planes
             .filter_map(|(d, h)| {
                 let along = d.dot(*ray);
-                (along > 1e-3).then(|| h / along)
+                (along > 1e-3).then_some(h / along)
             })
             .fold(f64::INFINITY, f64::min);
         (middle + *ray * reach).as_vec3().to_array()

@@ -133,17 +133,17 @@ pub fn build(grid: &Grid, faces: u64, mut done: impl FnMut(usize)) -> Net {
                     beside: [NONE; 6],
                     joints: 0,
                 };
-                for axis in 0..3 {
+                for (axis, beside) in before.into_iter().enumerate() {
                     let square = square(&corners, axis);
                     let crossings = (0..4).filter(|&n| square[n] != square[(n + 1) % 4]).count();
                     if crossings == 0 {
                         continue;
                     }
                     let joint = u8::from(crossings > 2);
-                    let other = &mut net.vertices[before[axis] as usize];
+                    let other = &mut net.vertices[beside as usize];
                     other.beside[2 * axis + 1] = own;
                     other.joints |= joint << (2 * axis + 1);
-                    vertex.beside[2 * axis] = before[axis];
+                    vertex.beside[2 * axis] = beside;
                     vertex.joints |= joint << (2 * axis);
                 }
                 net.vertices.push(vertex);

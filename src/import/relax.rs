@@ -58,9 +58,9 @@ fn smooth(net: &mut Net, motions: &mut [Motion], factor: f32, reach: f32) {
             }
             let other = &net.vertices[other as usize];
             count += 1.0;
-            for a in 0..3 {
+            for (a, motion) in motion.iter_mut().enumerate() {
                 let cells = i32::from(other.cell[a]) - i32::from(vertex.cell[a]);
-                motion[a] += cells as f32 + other.offset[a] - vertex.offset[a];
+                *motion += cells as f32 + other.offset[a] - vertex.offset[a];
             }
         }
         *motion = motion.map(|m| m * factor / f32::max(count, 1.0));
@@ -126,8 +126,8 @@ fn inflate(net: &mut Net, motions: &mut [Motion], volumes: &[u64; 256], reach: f
         for v in face.vertices {
             let (motion, weight) = &mut motions[v as usize];
             *weight += size;
-            for a in 0..3 {
-                motion[a] += along[a] as f32 * (from - to);
+            for (motion, along) in motion.iter_mut().zip(along) {
+                *motion += along as f32 * (from - to);
             }
         }
     }

@@ -316,7 +316,7 @@ mod tests {
         }
         let entry = table.look_up(Some(5), &[]);
         assert_eq!((entry.name.as_str(), entry.tissue.as_str()), ("liver", "liver"));
-        assert_eq!(table.look_up(Some(118), &[]).known, false);
+        assert!(!table.look_up(Some(118), &[]).known);
     }
 
     #[test]

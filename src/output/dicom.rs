@@ -166,6 +166,7 @@ impl Loop {
         put(0x0008, 0x0018, VR::UI, text(instance));
         put(0x0020, 0x0013, VR::IS, text("1"));
         put(0x0020, 0x0020, VR::CS, text(""));
+        put(0x0020, 0x0060, VR::CS, text(""));
         put(0x0018, 0x6031, VR::CS, text(self.about.transducer));
         put(0x0028, 0x2110, VR::CS, text("00"));
         // Cine, multi-frame: the pointer names FrameTime.
