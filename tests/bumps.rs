@@ -24,9 +24,9 @@ const VESSELS: [[f64; 3]; 5] =
     [[-16.0, 36.0, 3.5], [-7.0, 52.0, 4.0], [0.0, 30.0, 3.0], [8.0, 46.0, 4.0], [17.0, 34.0, 3.5]];
 /// Deviation of the bumps, mm, and between which wavelengths they lie.
 const BUMPS: [[f64; 3]; 4] = [[0.3, 2.0, 3.0], [0.6, 3.0, 5.0], [1.2, 5.0, 8.0], [2.0, 7.0, 10.0]];
-/// Poses of each.
+/// Poses of each surface.
 const POSES: usize = 5;
-/// Least share of what is dark without refraction.
+/// Least dark share of a vessel, relative to that without refraction.
 const LEAST: f64 = 0.9;
 
 /// Numbers uniform in 0..1.
@@ -185,7 +185,7 @@ fn places(probe: &Probe) -> Vec<DVec3> {
     rays.flat_map(along).collect()
 }
 
-/// Of each sample the log image, averaged over 3 scanlines and 1.5 mm of depth.
+/// The log image at each sample, averaged over 3 scanlines and 1.5 mm of depth.
 fn smoothed(levels: &[f32], probe: &Probe) -> Vec<f64> {
     let samples = probe.samples as usize;
     let reach = (0.75 / probe.sample_pitch()).round() as usize;
@@ -213,7 +213,7 @@ fn smoothed(levels: &[f32], probe: &Probe) -> Vec<f64> {
         .collect()
 }
 
-/// Whether each sample is 8 dB or more below the mean of those that are not in a lumen and within 4 mm of its depth.
+/// True for each sample that is 8 dB or more below the mean of the samples outside lumina within 4 mm of its depth.
 fn dark(levels: &[f32], lumen: &[bool], scene: &Scene) -> Vec<bool> {
     let samples = scene.probe.samples as usize;
     let means = smoothed(levels, &scene.probe);
@@ -263,7 +263,7 @@ fn share(dark: &[bool], lumen: &[bool]) -> f64 {
     dark.iter().zip(lumen).filter(|&(&d, &l)| d && l).count() as f64 / inside as f64
 }
 
-/// Middles of what is dark about each vessel that lies well within the image, mm in the image plane.
+/// Middle of the dark samples around each vessel that lies well within the image, mm in the image plane.
 fn middles(dark: &[bool], places: &[DVec3], scene: &Scene) -> Vec<Option<DVec2>> {
     let probe_from_world = scene.world_from_probe.inverse();
     let direction = probe_from_world.transform_vector3(DVec3::Y);
@@ -282,7 +282,7 @@ fn middles(dark: &[bool], places: &[DVec3], scene: &Scene) -> Vec<Option<DVec2>>
     VESSELS.iter().map(middle).collect()
 }
 
-/// Whether each of the `places` lies in a vessel.
+/// True for each of the `places` that lies in a vessel.
 fn in_vessels(places: &[DVec3], scene: &Scene) -> Vec<bool> {
     let inside = |p: &DVec3| {
         let p = scene.world_from_probe.transform_point3(*p);
@@ -291,8 +291,8 @@ fn in_vessels(places: &[DVec3], scene: &Scene) -> Vec<bool> {
     places.iter().map(inside).collect()
 }
 
-/// What of the vessels is dark over what is without refraction, pose by pose; and how far their middles lie from where
-/// the smooth surface puts them: mean of the shifts, and their root mean square, mm.
+/// Dark share of the vessels relative to that without refraction, for each pose; and the distances of their middles
+/// from where the smooth surface puts them: mean of the shifts, and their root mean square, mm.
 struct Seen {
     ratios: Vec<f64>,
     shift: DVec2,

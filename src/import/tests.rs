@@ -102,7 +102,7 @@ fn borders(grid: &Grid) -> HashMap<(u8, u8), usize> {
 
 /// A number from 0 to 1 by counter.
 fn random(n: u32) -> f64 {
-    crate::random::unit(crate::random::pcg3d([n, 1, 2])[0])
+    crate::random::unit(crate::random::pcg4d([n, 1, 2, 3])[0])
 }
 
 /// Thirty organs: the cells around thirty points within a body, and vessels through them.
