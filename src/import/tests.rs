@@ -109,10 +109,13 @@ fn random(n: u32) -> f64 {
 fn thirty() -> Grid {
     let size = [64, 56, 40];
     let middle = DVec3::new(31.5, 27.5, 19.5);
-    let within = |n: u32| {
-        middle + DVec3::new(random(n) - 0.5, random(n + 1) - 0.5, random(n + 2) - 0.5) * 34.0
+    // Off a lattice of three by three by three.
+    let near = |n: u32| {
+        let cell = DVec3::new(f64::from(n % 3), f64::from(n / 3 % 3), f64::from(n / 9)) - 1.0;
+        let off = DVec3::new(random(3 * n), random(3 * n + 1), random(3 * n + 2)) - 0.5;
+        middle + cell * DVec3::new(14.0, 12.0, 11.0) + off * 6.0
     };
-    let points: Vec<DVec3> = (0..26).map(|n| within(3 * n)).collect();
+    let points: Vec<DVec3> = (0..26).map(near).collect();
     grid(size, |p| {
         for vessel in 0..4 {
             let f = f64::from(vessel);
