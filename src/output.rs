@@ -1,6 +1,7 @@
 //! Output of the program: lines to standard output and standard error, whose readers may leave at any time, and
 //! files. Independent of their content.
 
+pub mod dicom;
 pub mod files;
 pub mod movie;
 pub mod npy;

@@ -30,14 +30,15 @@ mod tests;
 mod voxels;
 mod write;
 
+pub use dicom::segmentation::{DicomSegment, Segmentation};
 pub use error::{Place, VolumeError};
 pub use grid::Frame;
 pub use reconstruct::{
     Compounding, Config, Fan, Filling, Interpolation, Lattice, ReconstructError, Reconstruction,
-    Settings, Transforms, reconstruct,
+    Settings, Transforms, frames_of_pose, reconstruct,
 };
 pub use sequence::frames::matrix as transform;
-pub use sequence::{Pose, Sequence, Summary, TrackedFrame};
+pub use sequence::{Pose, Sequence, Summary, TrackedFrame, track};
 pub use voxels::{Statistics, VoxelType, Voxels};
 pub use write::write_meta;
 

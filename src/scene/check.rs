@@ -19,7 +19,7 @@ pub use report::{Report, report};
 
 /// A mesh file should measure between these in its largest direction, mm: from a small cyst to
 /// a tall person. Outside them the unit is wrong far more often than not.
-const SENSIBLE_SIZE: (f64, f64) = (1.0, 2000.0);
+pub const SENSIBLE_SIZE: (f64, f64) = (1.0, 2000.0);
 
 /// Measures of a mesh after repair, mm.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -15,7 +15,7 @@ pub use animated::{
 };
 pub(super) use keyframes::bounded;
 pub use keyframes::{MAX_SHAPES, load_keyframes};
-pub(super) use recipe::weld;
+pub use recipe::weld;
 
 use recipe::Recipe;
 

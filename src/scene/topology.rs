@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::mesh::Soup;
 use crate::issue::Issue;
 
+mod cavities;
 mod winding;
 
 pub use winding::orient;
@@ -257,6 +258,12 @@ pub(super) mod tests {
         soup.triangles.extend(second.triangles.iter().map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]));
         let issues = orient(Path::new("x"), &mut soup);
         assert!(issues[0].message.contains("1 of 2 closed bodies"), "{issues:?}");
+        // Within the first it is a cavity, and as it should be.
+        let mut hollow = cube();
+        hollow.positions.extend(second.positions.iter().map(|p| p.map(|v| v * 0.5 + 0.25)));
+        hollow.triangles.extend(second.triangles.iter().map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]));
+        assert!(orient(Path::new("x"), &mut hollow).is_empty());
+        assert_eq!(volume(&hollow), 0.875);
     }
 
     #[test]

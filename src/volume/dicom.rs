@@ -14,6 +14,7 @@ mod file;
 mod geometry;
 mod image;
 mod pixels;
+pub(super) mod segmentation;
 
 const SAVE: &str = "export it again, or convert it to .nrrd, .mha or .nii.gz";
 

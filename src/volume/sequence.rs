@@ -9,9 +9,11 @@ use super::{Voxels, Warning, meta};
 
 pub(super) mod frames;
 mod summary;
+mod track;
 
 pub use frames::{Pose, TrackedFrame};
 pub use summary::Summary;
+pub use track::track;
 
 /// Frames of one size with the tracked poses of each.
 #[derive(Clone, Debug, PartialEq)]
