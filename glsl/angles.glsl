@@ -3,7 +3,7 @@
 // Sine, cosine and arctangent of sums and products alone, so that every device gives the same.
 // Vulkan lets a device's own sin and cos err by 2^-11, and only within [-pi, pi], and its atan by
 // 4096 units in the last place; sums and products it must round correctly, and `precise` keeps them
-// from being fused. src/reference/angles.rs mirrors every operation and measures the errors.
+// from being fused. tools/reference/angles.rs mirrors every operation and measures the errors.
 
 const float TURNS = 0.1591549431;   // in a radian
 

@@ -1,4 +1,4 @@
-// Lattices of scatterers, as coarse as speckle allows, and how a beam walks them; src/reference/lattice.rs
+// Lattices of scatterers, as coarse as speckle allows, and how a beam walks them; tools/reference/lattice.rs
 // says why. The includer declares tissues[], rows[] and frame and includes random.glsl.
 
 // A cell's edge on six levels in a row, and its volume on two: two levels on the volume has doubled.

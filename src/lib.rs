@@ -1,8 +1,7 @@
 //! insonify: real-time ultrasound by Monte-Carlo path tracing on Vulkan.
 //!
 //! `scene` and `probe` describe the anatomy and the instrument; `gpu` knows Vulkan and no ultrasound;
-//! `sim` is the frame, `view` the window; `reference` is the f64 twin of every kernel
-//! of the image. Units: mm, microseconds, MHz.
+//! `sim` is the frame, `view` the window. Units: mm, microseconds, MHz.
 
 // For the library's public items: tools and tests have none.
 #![warn(missing_docs)]
@@ -16,7 +15,6 @@ pub mod matching;
 pub mod output;
 pub mod probe;
 pub mod random;
-pub mod reference;
 pub mod register;
 pub mod scene;
 pub mod settings;

@@ -211,65 +211,12 @@ fn a_closed_pipe_is_no_error() {
         (insonify, &["info"][..], 0),
         (insonify, &["check", "scenes/phantom.toml"], 0),
         (insonify, &["check", "scenes/nowhere.toml"], 1),
-        (env!("CARGO_BIN_EXE_kernels"), &["list"], 0),
     ] {
         let out = unread(program, args);
         let said = text(&out.stderr);
         assert!(!said.contains("panicked"), "{args:?}: {said}");
         assert_eq!(out.status.code(), Some(code), "{args:?}: {said}");
     }
-}
-
-/// Options for which no point of a wire, half a millimetre apart, lies on the border of two layers, where rounding
-/// decides which of them sees it; and one kind of cylinder reflects.
-const REPLAYED: [&str; 12] = [
-    "--set",
-    "probe.scanlines=12",
-    "--set",
-    "probe.samples=512",
-    "--set",
-    "probe.elevation_layers=3",
-    "--set",
-    "probe.slice_thickness=8.7mm",
-    "--set",
-    "simulation.paths=2",
-    "--set",
-    "tissues.plus_6.speed=1600m/s",
-];
-
-#[test]
-fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
-    let dir = tempfile::tempdir().expect("a folder");
-    let (png, dump) = (dir.path().join("a.png"), dir.path().join("stages"));
-    let args = ["-o", path(&png), "--dump", path(&dump), "--tracer", "bvh"];
-    let scene = ["render", "scenes/phantom.toml"];
-    let out = insonify(&[&scene[..], &REPLAYED, &args].concat());
-    assert!(out.status.success(), "{}", text(&out.stderr));
-    let kernels = |name: &str| {
-        Command::new(env!("CARGO_BIN_EXE_kernels"))
-            .args(["run", name, "--size", "small", "--input", path(&dump)])
-            .output()
-            .expect("the program starts")
-    };
-    let names = stages::IMAGE.map(|pass| pass.name).map(|name| match name {
-        "scatter" => "scatter_rigid",
-        name => name,
-    });
-    for name in names.into_iter().chain(["detect"]) {
-        let out = kernels(name);
-        let said = text(&out.stdout) + &text(&out.stderr);
-        assert!(out.status.success(), "{said}");
-        let from = said.lines().find(|l| l.starts_with("from "));
-        assert!(from.is_some_and(|l| l.contains("frame, ")), "{said}");
-    }
-    // A truncated array is refused, and named.
-    let rows = dump.join("kernels/rows.npy");
-    let mut bytes = std::fs::read(&rows).expect("rows");
-    bytes.truncate(bytes.len() / 2);
-    std::fs::write(&rows, bytes).expect("rows");
-    let out = kernels("detect");
-    assert!(!out.status.success());
-    assert!(text(&out.stderr).contains("rows.npy"), "{}", text(&out.stderr));
 }
 
 /// Kernels compiled from the checked-in sources equal the checked-in kernels.

@@ -90,17 +90,6 @@ fn the_abdomen_is_the_same_picture_on_both() {
     same_picture("abdomen");
 }
 
-#[test]
-fn kernels_agree_with_their_twins_on_the_second() {
-    let Some(second) = second_driver() else {
-        return;
-    };
-    let mut command = on(Some(&second), env!("CARGO_BIN_EXE_kernels"));
-    let text = output_of(command.args(["check", "--validate"]));
-    assert!(text.starts_with("SwiftShader"), "{text}");
-    assert!(!text.contains("WRONG"), "{text}");
-}
-
 /// Angles of pixels with the largest error that a device's own sine may have.
 #[cfg(feature = "compile")]
 #[test]

@@ -1,7 +1,5 @@
 //! Fusion from the scene file to the frame: refusals, echoes, dumps.
 
-#[path = "../tools/harness/mod.rs"]
-mod harness;
 #[path = "common/shared_data.rs"]
 mod shared_data;
 
@@ -378,7 +376,9 @@ fn kernels_of_the_fusion_run_alone_on_what_a_frame_dumped() {
         let folder = tempfile::tempdir().expect("a folder");
         dump::frame(&mut simulator, &scene, folder.path()).expect("dumped");
         for name in names {
-            for check in harness::dump::check(&device, &library, folder.path(), name) {
+            for check in
+                insonify_tools::harness::dump::check(&device, &library, folder.path(), name)
+            {
                 assert!(check.passed(), "{name}: {check}");
             }
         }

@@ -1,16 +1,13 @@
 //! Every kernel against its f64 twin: random, empty, of size one, of odd sizes, with NaN and
 //! infinity; and an error planted into each kernel's outputs is caught.
 
-#[path = "../tools/harness/mod.rs"]
-mod harness;
-
 use std::path::Path;
 
-use harness::{Case, Element, Job, SUBJECTS, Size, dump};
 use insonify::gpu::{Kernel, test_device};
 use insonify::output::npy;
 use insonify::sim::shaders::Library;
 use insonify::sim::stages;
+use insonify_tools::harness::{self, Case, Element, Job, SUBJECTS, Size, dump};
 
 const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 

@@ -1,9 +1,6 @@
 //! The work that a fused frame saves: around the masks sound goes straight on, and paths that nobody hears are
 //! not traced.
 
-#[path = "../tools/harness/mod.rs"]
-mod harness;
-
 use std::sync::Arc;
 
 use insonify::gpu::{Device, test_device};
@@ -211,7 +208,7 @@ fn origin_and_trace_of_a_fused_frame_equal_their_twins() {
     let folder = tempfile::tempdir().expect("a folder");
     dump::frame(&mut simulator, &scene, folder.path()).expect("dumped");
     for name in ["origin", "trace"] {
-        for check in harness::dump::check(&device, &library, folder.path(), name) {
+        for check in insonify_tools::harness::dump::check(&device, &library, folder.path(), name) {
             assert!(check.passed(), "{name}: {check}");
         }
     }

@@ -10,7 +10,6 @@ mod signal;
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use insonify::gpu::test_device;
 use insonify::probe::{Kind, Probe};
-use insonify::reference::field::Field;
 use insonify::scene::animation::{Clock, Motion, Turn};
 use insonify::scene::graph::{Node, NodeKind};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, shapes};
@@ -18,6 +17,7 @@ use insonify::settings::{ScatterMode, TextureSpace};
 use insonify::sim::calibration::{Calibration, LATERAL_CUT};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer, fields::Fields};
+use insonify_tools::reference::field::Field;
 use shared_data::shared_data;
 
 /// Depths between which speckle is measured, mm: inside the body, off its faces.

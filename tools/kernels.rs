@@ -1,19 +1,16 @@
 //! Runs single kernels against their f64 twins:
 //! `cargo run --release --bin kernels -- list | run NAME [--input DIR] [--output DIR] | check`.
 
-#[path = "harness/mod.rs"]
-mod harness;
-
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::Arc;
 use std::time::Instant;
 
 use clap::{Parser, Subcommand, ValueEnum};
-use harness::{Case, SUBJECTS, Size, Subject, dump};
 use insonify::gpu::{Device, DeviceOptions, Kernel, prepare_process};
 use insonify::output;
 use insonify::sim::shaders::Library;
+use insonify_tools::harness::{self, Case, SUBJECTS, Size, Subject, dump};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
 /// Runs of which the fastest is reported.

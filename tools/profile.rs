@@ -21,8 +21,8 @@ use insonify::gpu::{Device, DeviceOptions, prepare_process};
 use insonify::output;
 use insonify::sim::Tracer;
 use insonify::sim::shaders::Library;
+use insonify_tools::provenance::Provenance;
 use miette::{IntoDiagnostic, Result, miette};
-use provenance::Provenance;
 
 #[path = "profile/builds.rs"]
 mod builds;
@@ -34,8 +34,6 @@ mod fusion;
 mod measure;
 #[path = "profile/paper.rs"]
 mod paper;
-#[path = "common/provenance.rs"]
-mod provenance;
 #[path = "profile/splits.rs"]
 mod splits;
 #[path = "profile/stages.rs"]

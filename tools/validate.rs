@@ -8,9 +8,6 @@ use clap::Parser;
 use insonify::gpu::{Device, DeviceOptions, prepare_process};
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-#[path = "common/provenance.rs"]
-mod provenance;
-
 // The tests' own modules: the page shows the very checks that they run.
 include!("../tests/physics/main.rs");
 
@@ -56,7 +53,7 @@ fn main() -> Result<ExitCode> {
             device.name()
         ));
     }
-    let provenance = provenance::Provenance::of(&device);
+    let provenance = insonify_tools::provenance::Provenance::of(&device);
     println!("{provenance}");
     let bench = check::Bench::on(device);
     let mut examined = vec![];

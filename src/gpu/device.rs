@@ -1,5 +1,7 @@
 //! The logical device: features, queue, allocator, object names.
 
+mod create;
+
 use std::ffi::CString;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -8,12 +10,12 @@ use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use winit::window::Window;
 
-use super::adapter::{self, Adapter, AdapterKind, DeviceInfo};
-use super::error::{GpuError, during};
+use super::adapter::{self, AdapterKind, DeviceInfo};
+use super::error::GpuError;
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::kept::{self, Kept};
 use super::memory::{MemoryUse, MemoryUseCounter};
-use super::queues::{Place, Plan, Queues};
+use super::queues::Queues;
 use super::surface::Probe;
 
 /// Size of the blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
@@ -133,7 +135,7 @@ impl Device {
         adapter.info.ray_query &= !(options.without_ray_query || without);
         let traces = adapter.info.ray_query || adapter.ray_tracing_pipeline;
         adapter.info.acceleration_structure &= traces && !without;
-        let raw = create_device(&instance, &adapter, &plan, window.is_some())?;
+        let raw = create::device(&instance, &adapter, &plan, window.is_some())?;
         let queues = Queues::new(&raw, plan, window.is_some());
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.raw.clone(),
@@ -177,7 +179,7 @@ impl Device {
         Ok(Arc::new(Self {
             timestamp_period_ns: f64::from(limits.timestamp_period),
             timestamp_bits: bits(plan.work.family).min(bits(plan.window.family)),
-            accel: accel_support(&instance, &raw, &adapter),
+            accel: create::accel_support(&instance, &raw, &adapter),
             physical: adapter.physical,
             memory_use: MemoryUseCounter::default(),
             kept,
@@ -345,92 +347,6 @@ impl Drop for Device {
             self.raw.destroy_device(None);
         }
     }
-}
-
-fn create_device(
-    instance: &Instance,
-    adapter: &Adapter,
-    plan: &Plan,
-    window: bool,
-) -> Result<ash::Device, GpuError> {
-    // The window's picture should not wait for the simulation's.
-    let priority = |family, index| match window && plan.window == (Place { family, index }) {
-        true => 1.0,
-        false => 0.5,
-    };
-    let families = plan.families();
-    let priorities: Vec<Vec<f32>> = (families.iter())
-        .map(|&(family, count)| (0..count).map(|index| priority(family, index)).collect())
-        .collect();
-    let queues: Vec<_> = (families.iter().zip(&priorities))
-        .map(|(&(family, _), priorities)| {
-            vk::DeviceQueueCreateInfo::default()
-                .queue_family_index(family)
-                .queue_priorities(priorities)
-        })
-        .collect();
-    let mut extensions = Vec::new();
-    if adapter.portability_subset {
-        extensions.push(khr::portability_subset::NAME.as_ptr());
-    }
-    if window {
-        extensions.push(khr::swapchain::NAME.as_ptr());
-    }
-    let features = vk::PhysicalDeviceFeatures {
-        // Out-of-bounds accesses then have a defined result instead of a random crash; it costs
-        // time on a GPU, so only while validating.
-        robust_buffer_access: (instance.validating && adapter.robust_buffer_access).into(),
-        shader_storage_image_extended_formats: adapter.extended_storage_formats.into(),
-        ..Default::default()
-    };
-    let mut info =
-        vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_features(&features);
-    let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default()
-        .buffer_device_address(adapter.buffer_device_address);
-    let mut accel =
-        vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
-    let mut query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
-    let mut pipeline =
-        vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
-    if adapter.info.acceleration_structure {
-        extensions.push(khr::acceleration_structure::NAME.as_ptr());
-        extensions.push(khr::deferred_host_operations::NAME.as_ptr());
-        info = info.push_next(&mut address).push_next(&mut accel);
-    }
-    if adapter.info.ray_query {
-        extensions.push(khr::ray_query::NAME.as_ptr());
-        info = info.push_next(&mut query);
-    } else if adapter.info.acceleration_structure {
-        extensions.push(khr::ray_tracing_pipeline::NAME.as_ptr());
-        info = info.push_next(&mut pipeline);
-    }
-    let info = info.enabled_extension_names(&extensions);
-    let _changing = LOADER_LISTS.write();
-    // SAFETY: extensions and features were found on this device; all pointers outlive the call.
-    unsafe { instance.raw.create_device(adapter.physical, &info, None) }
-        .map_err(during(format!("opening the device '{}'", adapter.info.name)))
-}
-
-fn accel_support(
-    instance: &Instance,
-    raw: &ash::Device,
-    adapter: &Adapter,
-) -> Option<AccelSupport> {
-    if !adapter.info.acceleration_structure {
-        return None;
-    }
-    let mut accel = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
-    let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut accel);
-    // SAFETY: the device offers the extension whose properties are asked for.
-    unsafe {
-        instance.raw.get_physical_device_properties2(adapter.physical, &mut properties);
-    }
-    Some(AccelSupport {
-        functions: khr::acceleration_structure::Device::new(&instance.raw, raw),
-        scratch_alignment: accel.min_acceleration_structure_scratch_offset_alignment.max(1).into(),
-        max_primitives: accel.max_primitive_count,
-        max_instances: accel.max_instance_count,
-    })
 }
 
 /// A device for tests: the best one, with validation. Panics with the remedy where the driver or

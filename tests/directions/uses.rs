@@ -31,6 +31,13 @@ pub fn of_library(root: &Path) -> BTreeMap<String, Uses> {
     out
 }
 
+/// What the module of a file uses, of this library and of another crate that it is in.
+pub fn of_module(file: &Path, name: &str) -> Uses {
+    let mut uses = Uses::default();
+    uses.file(file, &[name.to_owned()]);
+    uses
+}
+
 /// What a source uses that stands for the module `path`.
 pub fn of_source(path: &str, source: &str) -> Uses {
     let mut uses = Uses::default();
@@ -112,7 +119,8 @@ impl Uses {
                 TokenTree::Group(group) => self.scan(group.stream(), module, file),
                 TokenTree::Ident(name) if !continues(&tokens[..i]) => {
                     let begin = match name.to_string().as_str() {
-                        "crate" => Some(&module[..0]),
+                        // As other crates call it.
+                        "crate" | "insonify" => Some(&module[..0]),
                         "super" => module.len().checked_sub(1).map(|n| &module[..n]),
                         "self" => Some(module),
                         _ => None,

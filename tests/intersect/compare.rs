@@ -1,9 +1,9 @@
 //! Comparison of the device's hit with that of the brute-force reference.
 
 use glam::DVec3;
-use insonify::reference::intersect::{self, Hit};
 use insonify::scene::Scene;
 use insonify::sim::tracer::Tracer;
+use insonify_tools::reference::intersect::{self, Hit};
 use rayon::prelude::*;
 
 use super::rays::{Ray, aimed_at_seams, corners};

@@ -1,7 +1,7 @@
 //! All surfaces along a ray, one after the other.
 
-use insonify::reference::intersect::{self, Hit};
 use insonify::scene::Scene;
+use insonify_tools::reference::intersect::{self, Hit};
 
 use super::compare::{Found, around, displacement};
 use super::device::Rig;

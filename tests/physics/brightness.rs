@@ -1,7 +1,5 @@
 //! Brightness behind interfaces: it belongs to the anatomy, not to the number of paths.
 
-use std::path::Path;
-
 use insonify::scene::Scene;
 use insonify::settings::Sampling;
 use insonify::sim::Tracer;
@@ -33,7 +31,7 @@ const PATHS: [u32; 3] = [1, 8, 32];
 /// A patient's liver behind a wall or, where the data are absent, the shipped abdomen: one layer of `lines`
 /// scanlines without noise, and a name.
 fn load(lines: u32) -> (&'static str, Scene) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let root = insonify_tools::root();
     let (name, file) = if root.join("../shared/data").exists() {
         ("liver", "tests/scenes/liver.toml")
     } else {
@@ -59,7 +57,7 @@ fn liver(bench: &Bench, scene: &Scene) -> Vec<Vec<bool>> {
     straight.simulation.sampling = Sampling::MainPath;
     let shot = Range::new(bench, &straight, Tracer::Bvh).shoot(&straight);
     let probe = &scene.probe;
-    let within = |k: u32, s: &insonify::reference::Segment| {
+    let within = |k: u32, s: &insonify_tools::reference::Segment| {
         let z = f64::from(k) * probe.sample_pitch();
         let tissue = &scene.tissues[s.tissue as usize];
         let top = probe.speed * s.time;

@@ -2,9 +2,9 @@
 
 use std::f64::consts::LN_10;
 
-use insonify::reference::Segment;
 use insonify::scene::Scene;
 use insonify::settings::Sampling;
+use insonify_tools::reference::Segment;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS};

@@ -1,8 +1,8 @@
 //! Comparison with a full-wave simulator: the numbers of `tools/oracle/table.json`, made by k-Wave.
 
 use glam::DVec3;
-use insonify::reference::Segment;
 use insonify::scene::Scene;
+use insonify_tools::reference::Segment;
 use serde_json::Value;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};

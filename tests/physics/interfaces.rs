@@ -2,9 +2,9 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::probe::Kind;
-use insonify::reference::Segment;
 use insonify::scene::{Scene, Tissue};
 use insonify::sim::Tracer;
+use insonify_tools::reference::Segment;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS};

@@ -17,8 +17,6 @@ mod full_wave;
 mod fusion;
 mod fusion_shadows;
 mod grain;
-#[path = "../../tools/harness/mod.rs"]
-mod harness;
 mod hilbert;
 mod interfaces;
 mod intersections;

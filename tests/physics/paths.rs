@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use insonify::gpu;
-use insonify::reference::Segment;
 use insonify::scene::Scene;
 use insonify::sim::{Simulator, Tracer, layout, shaders::Library, tables};
+use insonify_tools::reference::Segment;
 
 use crate::check::Bench;
 

@@ -3,8 +3,8 @@
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DAffine3, DVec3};
-use insonify::reference::Segment;
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Tissue};
+use insonify_tools::reference::Segment;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
 use crate::paths::{Range, TRACERS};

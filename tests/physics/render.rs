@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use insonify::gpu;
-use insonify::reference::{Accumulator, Owned, Segment};
-use insonify::reference::{axial, beam, detect, display, scatter};
 use insonify::scene::Scene;
 use insonify::sim::contact::{self, Coupling, Skins};
 use insonify::sim::{Simulator, Tracer, layout, placement, shaders::Library, tables};
+use insonify_tools::reference::{Accumulator, Owned, Segment};
+use insonify_tools::reference::{axial, beam, detect, display, scatter};
 
 use crate::check::Picture;
 

@@ -2,10 +2,10 @@
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
-use insonify::reference::acoustics::power_cosine;
-use insonify::reference::random::{PURPOSE_NORMAL, path_random, unit};
 use insonify::scene::Scene;
 use insonify::settings::Sampling;
+use insonify_tools::reference::acoustics::power_cosine;
+use insonify_tools::reference::random::{PURPOSE_NORMAL, path_random, unit};
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Plot};
 use crate::paths::{Range, TRACERS, echo};

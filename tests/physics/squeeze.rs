@@ -1,8 +1,8 @@
 //! Transforms that scale along one axis: planes, their normals, and refraction at them.
 
 use glam::{DAffine3, DVec3};
-use insonify::reference::Segment;
 use insonify::scene::Scene;
+use insonify_tools::reference::Segment;
 
 use crate::check::{Bench, Check, Outcome, Physics};
 use crate::interfaces::fresnel;

@@ -10,7 +10,7 @@ use insonify::sim::pass::Pass;
 use insonify::sim::shaders::Library;
 use insonify::sim::stages::{AXIAL, BEAM, DISPLAY};
 
-use crate::harness::{self, Extent, Input, Job};
+use insonify_tools::harness::{self, Extent, Input, Job};
 
 /// Device and kernels.
 pub struct Stages {

@@ -43,7 +43,7 @@ pub fn parts() -> Vec<Part> {
         part("ribs", "cortical_bone", (2.5, 0.6), body::ribs(p)),
         part("lung", "lung", FAR, body::lung(p)),
         part("diaphragm", "muscle", FAR, body::diaphragm(p)),
-        part("abdominal-fat", "fat", FAR, body::cavity(p)),
+        part("abdominal-fat", "visceral_fat", FAR, body::cavity(p)),
         part("back-muscles", "muscle", BACK, body::back_muscles(p)),
         part("discs", "muscle", BACK, body::discs(p)),
         part("vertebrae", "cortical_bone", (3.0, 0.1), body::vertebrae(p)),

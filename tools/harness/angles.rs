@@ -2,7 +2,7 @@
 
 use super::inputs::Random;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
-use insonify::reference::angles;
+use crate::reference::angles;
 
 pub const SUBJECT: Subject = Subject {
     name: "angles",

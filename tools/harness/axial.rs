@@ -2,7 +2,7 @@
 
 use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::axial;
+use crate::reference::axial;
 use insonify::sim::layout::Frame;
 use insonify::sim::stages;
 

@@ -2,7 +2,7 @@
 
 use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::beam;
+use crate::reference::beam;
 use insonify::sim::layout::{Counters, FLAG_VOXEL, Frame, Row};
 use insonify::sim::stages;
 

@@ -3,7 +3,7 @@
 use super::display;
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::blur;
+use crate::reference::blur;
 use insonify::sim::layout::{Frame, Fusion};
 use insonify::sim::stages;
 

@@ -3,7 +3,7 @@
 use super::inputs::Random;
 use super::reduce::{level, noise, size_of_level};
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
-use insonify::reference::pyramid;
+use crate::reference::pyramid;
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {

@@ -3,7 +3,7 @@
 use super::display;
 use super::inputs::{Random, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::convert;
+use crate::reference::convert;
 use insonify::sim::layout::Frame;
 use insonify::sim::stages;
 

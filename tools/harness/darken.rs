@@ -3,7 +3,7 @@
 use super::inputs::{Random, frame, lines, samples};
 use super::shadow::unpack;
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::darken;
+use crate::reference::darken;
 use insonify::sim::layout::{FAR_PIECE, Frame, MAX_PIECES};
 use insonify::sim::stages;
 

@@ -3,7 +3,7 @@
 use super::axial;
 use super::inputs::{Random, frame, samples};
 use super::{Case, Check, Job, Size, Subject};
-use insonify::reference::detect;
+use crate::reference::detect;
 use insonify::sim::layout::{Frame, Row};
 use insonify::sim::stages;
 

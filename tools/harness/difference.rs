@@ -3,7 +3,7 @@
 use super::display;
 use super::inputs::Random;
 use super::{Case, Check, Element, Input, Job, Size, Subject, sizes};
-use insonify::reference::pyramid;
+use crate::reference::pyramid;
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {

@@ -2,7 +2,7 @@
 
 use super::inputs::{Random, frame, samples};
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::display;
+use crate::reference::display;
 use insonify::sim::layout::Frame;
 use insonify::sim::stages;
 

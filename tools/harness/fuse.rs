@@ -3,7 +3,7 @@
 use super::display;
 use super::inputs::Random;
 use super::{Case, Check, Input, Job, Size, Subject, sizes};
-use insonify::reference::fuse;
+use crate::reference::fuse;
 use insonify::sim::layout::{BLEND_LINEAR, BLEND_MULTIBAND, BLEND_SMOOTH, Fusion};
 use insonify::sim::stages;
 

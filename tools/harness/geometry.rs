@@ -1,7 +1,7 @@
 //! `geometry`: the probe's lines and face.
 
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject, inputs, sizes};
-use insonify::reference::geometry;
+use crate::reference::geometry;
 use insonify::sim::layout::Frame;
 
 pub const SUBJECT: Subject = Subject {

@@ -3,8 +3,8 @@
 use glam::DAffine3;
 
 use super::{Case, Input, Size};
-use insonify::reference::geometry;
-use insonify::sim::layout::{Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row};
+use crate::reference::geometry;
+use insonify::sim::layout::{FLAG_COINCIDENT, Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row};
 use insonify::sim::placement::matrix_rows;
 use insonify::sim::tables;
 
@@ -44,6 +44,19 @@ pub fn dimensions(case: Case, size: Size) -> [u32; 3] {
         (Case::Modes, _) => [31, 4, 260],
         (Case::NotFinite, _) => [12, 2, 130],
     }
+}
+
+/// The frame of a kernel that goes straight along the scanlines: as [`frame`], placed nowhere in the case that
+/// is not finite, with surfaces that coincide in the one of modes.
+pub fn straight_frame(case: Case, size: Size) -> Frame {
+    let mut frame = frame(case, size);
+    match case {
+        // Not what the rays' elevation, a constant 0, is multiplied by: a compiler may leave that out.
+        Case::NotFinite => frame.world_from_probe[0][2] = f32::NAN,
+        Case::Modes => frame.flags |= FLAG_COINCIDENT,
+        _ => {}
+    }
+    frame
 }
 
 /// A convex, linear or phased frame by the case, depth 60 mm; every number that a kernel might read

@@ -2,7 +2,7 @@
 
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::interpolate;
+use crate::reference::interpolate;
 use insonify::scene::smoothed::pack;
 use insonify::sim::layout::{Interpolation, PACKED, SUM, UNIT};
 

@@ -1,10 +1,10 @@
 //! `label`: the anatomy along the scanlines.
 
-use super::inputs::{frame, scanlines};
+use super::inputs::{scanlines, straight_frame};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::label::label;
-use insonify::sim::layout::{FLAG_COINCIDENT, NONE};
+use crate::reference::label::label;
+use insonify::sim::layout::NONE;
 use insonify::sim::stages;
 
 /// Distance from a crossing, mm, within which a sample may be on either side.
@@ -24,13 +24,7 @@ pub const SUBJECT: Subject = Subject {
 };
 
 fn job(case: Case, size: Size) -> Job {
-    let mut frame = frame(case, size);
-    if case == Case::NotFinite {
-        frame.world_from_probe[0][2] = f32::NAN;
-    }
-    if case == Case::Modes {
-        frame.flags |= FLAG_COINCIDENT;
-    }
+    let frame = straight_frame(case, size);
     let mut inputs = vec![Input::words("frame", &[frame])];
     inputs.extend(worlds::world(case).inputs());
     inputs.push(scanlines(&frame));

@@ -2,13 +2,11 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::inputs::{Random, frame, scanlines};
+use super::inputs::{Random, scanlines, straight_frame};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject, sizes};
-use insonify::reference::mask;
-use insonify::sim::layout::{
-    FLAG_COINCIDENT, Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE,
-};
+use crate::reference::mask;
+use insonify::sim::layout::{Fusion, Instance, MASK_SPEED_ENCLOSING, MASK_SPEED_PROBE};
 use insonify::sim::placement;
 use insonify::sim::stages;
 
@@ -44,14 +42,7 @@ pub const SUBJECT: Subject = Subject {
 };
 
 fn job(case: Case, size: Size) -> Job {
-    let mut frame = frame(case, size);
-    if case == Case::NotFinite {
-        // Not what the rays' elevation, a constant 0, is multiplied by: a compiler may leave that out.
-        frame.world_from_probe[0][2] = f32::NAN;
-    }
-    if case == Case::Modes {
-        frame.flags |= FLAG_COINCIDENT;
-    }
+    let frame = straight_frame(case, size);
     let mut world = worlds::world(case).inputs();
     let instances = world.iter_mut().find(|i| i.name == "instances");
     let bytes = &mut instances.expect("a world has instances").bytes;

@@ -3,8 +3,8 @@
 use super::inputs::{frame, scanlines};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::origin;
-use insonify::reference::way::Start;
+use crate::reference::origin;
+use crate::reference::way::Start;
 use insonify::sim::layout::{Counters, FLAG_COINCIDENT, FLAG_MASKED, START_WORDS};
 use insonify::sim::placement;
 use insonify::sim::stages;

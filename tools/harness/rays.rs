@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::inputs::Random;
 use super::worlds;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
-use insonify::reference::Owned;
+use crate::reference::Owned;
 use insonify::sim::layout::{NONE, Ray, RayHit};
 
 /// Crossings closer together than this, mm, may change places in single precision; so may a
@@ -128,7 +128,7 @@ fn compare(owned: &Owned, ray: &Ray, hit: &RayHit, worst: &mut Worst) {
     }
     // The first for sure, or one before it that may count or is as near.
     let candidates = seen.iter().filter(|c| surely.is_none_or(|s| c.t <= s.t + MARGIN));
-    let same = |c: &&&insonify::reference::world::Crossing| {
+    let same = |c: &&&crate::reference::world::Crossing| {
         c.instance == hit.instance && (c.t - t).abs() < MARGIN
     };
     let Some(twin) = candidates.clone().find(same) else {

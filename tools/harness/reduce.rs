@@ -2,7 +2,7 @@
 
 use super::inputs::Random;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
-use insonify::reference::pyramid::{self, Level};
+use crate::reference::pyramid::{self, Level};
 use insonify::sim::stages;
 
 pub const SUBJECT: Subject = Subject {

@@ -2,7 +2,7 @@
 
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::refit::{self, Child, Extent as Box3, Geometry};
+use crate::reference::refit::{self, Child, Extent as Box3, Geometry};
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{MeshBvh, SceneBvh, levels};
 use insonify::sim::layout::RefitLevel;
@@ -106,7 +106,8 @@ fn job(case: Case, size: Size) -> Job {
     let mut boxes: Vec<Box3> = vec![[[0.0; 3]; 2]; nodes.len()];
     for &range in &ranges[..done] {
         let words = nodes.as_flattened_mut();
-        refit::refit(range, words, geometry, &mut boxes, &levels.order);
+        let level = &levels.order[range.first as usize..][..range.count as usize];
+        refit::refit(level, words, geometry, &mut boxes);
     }
     let level = ranges.get(done).copied().unwrap_or_default();
     Job {
@@ -128,7 +129,8 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let geometry = Geometry { vertices: &vertices, triangles: &triangles };
     let (mut nodes, mut boxes): (Vec<u32>, Vec<Box3>) = (job.get("nodes"), job.get("boxes"));
     let order: Vec<u32> = job.get("order");
-    refit::refit(push, &mut nodes, geometry, &mut boxes, &order);
+    let level = &order[push.first as usize..][..push.count as usize];
+    refit::refit(level, &mut nodes, geometry, &mut boxes);
     let mut found: Vec<u32> = job.after(outputs, "nodes");
     let mut found_boxes: Vec<Box3> = job.after(outputs, "boxes");
     for &number in &order[push.first as usize..][..push.count as usize] {

@@ -3,7 +3,7 @@
 use super::check::relative_norm;
 use super::inputs::{Random, lines, rows, scanlines};
 use super::{Case, Check, Input, Job, Size, Subject, trace, worlds};
-use insonify::reference::{Segment, origin, scatter};
+use crate::reference::{Segment, origin, scatter};
 use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
@@ -39,7 +39,7 @@ fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
     let rows = rows(frame);
     world.rows = &rows;
     let (stacks, _) = origin::origin(&world);
-    let traced = insonify::reference::trace::trace(&world, &stacks);
+    let traced = crate::reference::trace::trace(&world, &stacks);
     let capacity = frame.segment_capacity as usize;
     let mut slots = vec![layout::Segment::default(); lines(frame) * capacity];
     let mut counts = Vec::new();

@@ -3,8 +3,8 @@
 use super::inputs::{frame, rows, scanlines};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
-use insonify::reference::origin;
-use insonify::reference::shadow::{self, Piece};
+use crate::reference::origin;
+use crate::reference::shadow::{self, Piece};
 use insonify::sim::layout::{
     FAR_PIECE, FLAG_COINCIDENT, FLAG_FOOTPRINT, FLAG_MASKED, FLAG_WAVEFRONT, MAX_PIECES,
     START_WORDS, Surface,

@@ -4,7 +4,7 @@ use super::check::relative_norm;
 use super::inputs::{frame, lines, rows, scanlines};
 use super::worlds;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
-use insonify::reference::{Segment, origin, trace};
+use crate::reference::{Segment, origin, trace};
 use insonify::sim::layout::{
     self, Counters, FLAG_COHERENT, FLAG_COINCIDENT, FLAG_FACE_REFLECTION, FLAG_FOOTPRINT,
     FLAG_MASKED, FLAG_ROUGH_TRANSMISSION, FLAG_SOBOL, FLAG_WAVEFRONT, FLAG_WORLD_TEXTURE, Frame,

@@ -5,7 +5,7 @@ use glam::{DAffine3, DQuat, DVec3};
 
 use super::inputs::Random;
 use super::{Case, Input, Job};
-use insonify::reference::Owned;
+use crate::reference::Owned;
 use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
 use insonify::sim::bvh::{MeshBvh, Placed, SceneBvh};

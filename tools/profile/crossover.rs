@@ -2,7 +2,7 @@
 //! unlike places; how far, and of how many triangles, decides whether a selector or a rebuild is
 //! cheaper.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use glam::{DAffine3, DQuat, DVec3};
 use insonify::output::plot::{Curve, Plot};
@@ -48,7 +48,7 @@ pub struct Arguments {
 /// The shipped limb's scene with a plain limb of so many triangles, which is elsewhere in every
 /// keyframe; 96 scanlines of 3 layers, so that a frame is not all scatterers.
 fn limb(subdivisions: u32, distance: f64, strategy: Strategy) -> Result<Scene> {
-    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/limbs.toml");
+    let file = insonify_tools::root().join("scenes/limbs.toml");
     let fewer = [("probe.scanlines", "96"), ("probe.elevation_layers", "3")];
     let fewer = fewer.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let (mut scene, _) = Scene::load(&file, &fewer)?;

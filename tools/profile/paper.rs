@@ -1,7 +1,7 @@
 //! `profile paper`: the paper's tables measured again. Starkov et al. 2019 used a GeForce GTX 970 and
 //! scenes of their own; only the ratios within a table can be compared.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use insonify::output;
 use insonify::scene::{Scene, Strategy};
@@ -121,7 +121,7 @@ pub fn run(machine: &Machine, arguments: &Arguments) -> Result<()> {
     let wanted = |table: Which| arguments.only.is_none_or(|only| only == table);
     let file = |given: &Option<PathBuf>, name: &str| {
         let shipped = || {
-            let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes");
+            let scenes = insonify_tools::root().join("scenes");
             scenes.join(name)
         };
         given.clone().unwrap_or_else(shipped)

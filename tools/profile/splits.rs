@@ -1,7 +1,7 @@
 //! `profile crossover --splits`: what spatial splits bring. The paper gives the children of a selector
 //! trees that are slow to build and quick to trace (SBVH), since a rebuild has no time for them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use insonify::scene::{Scene, Strategy};
@@ -49,8 +49,8 @@ impl Builder {
 /// The shipped scenes with keyframes, and the limb of the sweep of triangles at its finest.
 pub fn run(machine: &Machine, files: &[PathBuf], frames: u32) -> Result<()> {
     let mut scenes = Vec::new();
-    let shipped = ["heart", "limbs"]
-        .map(|name| Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("scenes/{name}.toml")));
+    let shipped =
+        ["heart", "limbs"].map(|name| insonify_tools::root().join(format!("scenes/{name}.toml")));
     for file in if files.is_empty() { &shipped[..] } else { files } {
         scenes.push(Scene::load(file, &[])?.0);
     }

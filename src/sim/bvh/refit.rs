@@ -105,9 +105,9 @@ impl MeshBvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::refit::{Child, Geometry, child, refit};
     use crate::scene::shapes;
     use crate::sim::bvh::{Node, SceneBvh};
+    use insonify_tools::reference::refit::{Child, Geometry, child, refit};
 
     /// The heart-like pulse of a mesh: every vertex moves by up to 4 mm, neighbours alike.
     fn pulsed(mesh: &Mesh) -> Vec<[f32; 3]> {
@@ -202,7 +202,8 @@ mod tests {
             let mut boxes = vec![[[0.0; 3]; 2]; nodes.len()];
             for &range in &levels.ranges {
                 let words = nodes.as_flattened_mut();
-                refit(range, words, geometry, &mut boxes, &levels.order);
+                let level = &levels.order[range.first as usize..][..range.count as usize];
+                refit(level, words, geometry, &mut boxes);
             }
             assert_eq!(outside(&nodes, roots[0], geometry), 0);
             // The box of the last node done, the root: one child one quantum too short.

@@ -39,7 +39,7 @@ fn add(scene: &mut Scene, mesh: Mesh, at: DAffine3, displaced: impl Fn(DVec3) ->
 fn displacement(scene: &Scene, fields: &Fields, i: usize, p: DVec3) -> DVec3 {
     let at = fields.offset(scene, i);
     assert_ne!(at, NONE);
-    crate::reference::field::Field::new(&fields.values, at).displacement(p)
+    insonify_tools::reference::field::Field::new(&fields.values, at).displacement(p)
 }
 
 /// Worst difference, mm, from `(map - 1) p` in texture space, inside a box and at its faces.

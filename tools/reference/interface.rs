@@ -1,0 +1,173 @@
+//! One meeting of a path with a surface: normals, reflectance and echo.
+
+use glam::DVec3;
+
+use super::Accumulator;
+use super::acoustics::{Fluid, mirror, power_cosine, reflection};
+use super::footprint;
+use super::path::Path;
+use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, draw, gaussian, pcg4d, unit};
+use super::stack::Stack;
+use super::wavefront::{Slope, turned};
+use super::world::{Crossing, World};
+use insonify::sim::layout::{FLAG_COHERENT, Row, Surface, Tissue};
+
+/// Roughness exponents from here on are perfect mirrors.
+pub(super) const MIRROR: f64 = 1e9;
+/// Edge of the cells that share the random phase of a thick surface's echo, mm.
+const PHASE_CELL: f64 = 0.5;
+/// By how much of a cell the cells are moved off the round numbers at which faces are modelled.
+const PHASE_SHIFT: f64 = 0.381_966;
+/// Micro-normals tried.
+const ATTEMPTS: u32 = 8;
+
+/// A sampled micro-normal and where it mirrors the path to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Micro {
+    pub(super) normal: DVec3,
+    pub(super) reflected: DVec3,
+}
+
+/// What a path meets. Normals are unit and turned against the path.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Interface {
+    /// Of the triangle.
+    pub(super) geometric: DVec3,
+    /// Averaged over the wavefront: the one that refracts.
+    pub(super) refracting: DVec3,
+    /// None when no attempt was acceptable: no echo, no reflected path.
+    pub(super) micro: Option<Micro>,
+    /// Before and behind.
+    pub(super) fluids: [Fluid; 2],
+    /// Intensity reflectance R at the refracting normal, where the surface curves or is rough its mean
+    /// over the beam; 1 at total reflection.
+    pub(super) reflectance: f64,
+    /// Whether something gets through beside a totally reflected middle of the beam.
+    pub(super) curved: bool,
+    /// Deviation of the reflected direction over the beam, rad.
+    pub(super) turn: f64,
+    pub(super) roughness: f64,
+    surface: Surface,
+    absorption: f64,
+    instance: u32,
+}
+
+fn fluid(tissue: &Tissue) -> Fluid {
+    Fluid { speed: tissue.speed.into(), impedance: tissue.impedance.into() }
+}
+
+/// The interface at `hit`, where `path` has arrived, with `after` the media behind it; `row` is that
+/// of the path's time.
+pub(super) fn meet(
+    world: &World,
+    row: &Row,
+    path: &Path,
+    hit: &Crossing,
+    after: &Stack,
+) -> Interface {
+    let d = path.direction;
+    let Slope { geometric, shading, refracting, width } = world.slope(row, path, hit);
+    let tissue = |stack| &world.tissues[world.medium(stack).0 as usize];
+    let (before, behind) = (tissue(&path.stack), tissue(after));
+    let fluids = [fluid(before), fluid(behind)];
+    let instance = &world.instances[hit.instance as usize];
+    let surface = world.surfaces
+        [if hit.entry { instance.surface_outside } else { instance.surface_inside } as usize];
+    let roughness = f64::from(surface.roughness);
+    let cos_i = -d.dot(refracting);
+    Interface {
+        geometric,
+        refracting,
+        micro: micro_normal(world, path, geometric, shading, roughness),
+        fluids,
+        reflectance: footprint::reflectance(fluids[0], fluids[1], cos_i.max(0.0), width),
+        curved: width > 0.0,
+        turn: 2.0 * width / cos_i.max(1e-3),
+        roughness,
+        surface,
+        absorption: before.absorption.into(),
+        instance: hit.instance,
+    }
+}
+
+fn micro_normal(
+    world: &World,
+    path: &Path,
+    geometric: DVec3,
+    shading: DVec3,
+    roughness: f64,
+) -> Option<Micro> {
+    let d = path.direction;
+    let accept = |normal: DVec3| {
+        let reflected = mirror(d, normal);
+        (d.dot(normal) < 0.0 && reflected.dot(geometric) > 0.0)
+            .then_some(Micro { normal, reflected })
+    };
+    if roughness >= MIRROR {
+        return accept(shading);
+    }
+    (0..ATTEMPTS).find_map(|j| {
+        let words = draw(world.frame, path.n, path.key(), PURPOSE_NORMAL + j);
+        let u = [unit(words[0]), unit(words[1])];
+        accept(power_cosine(shading, roughness, u))
+    })
+}
+
+/// Gain per sample of surface echoes in the layer of `path`, with the fixed-point scale.
+pub(super) fn gain<'a>(world: &'a World, path: &Path) -> impl Fn(usize) -> f64 + 'a {
+    let frame = world.frame;
+    let (_, layer) = path.scanline(frame.scanlines);
+    let y = super::geometry::probe(frame).elevation(layer);
+    move |k| {
+        let row = &world.rows[k];
+        let sigma = f64::from(row.sigma_elevation);
+        f64::from(row.surface_gain)
+            * (-y * y / (2.0 * sigma * sigma)).exp()
+            * f64::from(frame.surface_scale)
+    }
+}
+
+impl Interface {
+    /// The direction behind the interface of `path`, refracted at normal `n`; none where all is reflected. The middle
+    /// of a beam may be totally reflected where the rest is not: it goes straight on.
+    pub(super) fn turned(&self, world: &World, path: &Path, n: DVec3) -> Option<DVec3> {
+        let direction = turned(world.frame, self.fluids, path.direction, n, self.geometric);
+        direction.or(self.curved.then_some(path.direction))
+    }
+
+    /// Deposits what returns along the path: the part in phase at the surface, the rest displaced
+    /// by the thickness with a phase that belongs to the surface.
+    pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
+        let Some(micro) = self.micro else { return };
+        let frame = world.frame;
+        let (surface, d) = (&self.surface, path.direction);
+        let r = reflection(self.fluids[0], self.fluids[1], -d.dot(micro.normal));
+        let lobe = (-d.dot(micro.reflected)).max(0.0).powf(surface.specularity.into());
+        let amplitude = path.weight * r * lobe * f64::from(surface.gain) * path.beam_weight(frame);
+        let words = draw(frame, path.n, path.key(), PURPOSE_THICKNESS);
+        let q =
+            f64::from(surface.thickness) * gaussian(words[0] & 0xffff_0000 | words[1] >> 16).abs();
+        let behind = amplitude * (-self.absorption * q).exp();
+        let time = path.time + q / self.fluids[0].speed;
+        let (l, _) = path.scanline(frame.scanlines);
+        let gain = gain(world, path);
+        let dither = path.dither(frame);
+        if frame.flags & FLAG_COHERENT != 0 {
+            out.deposit(l, time, path.share * behind, 0.0, &gain, dither);
+            return;
+        }
+        let coherence = if surface.thickness == 0.0 { 1.0 } else { f64::from(surface.coherence) };
+        out.deposit(l, path.time, coherence * path.share * amplitude, 0.0, &gain, dither);
+        let rest = (1.0 - coherence * coherence).max(0.0).sqrt();
+        if rest > 0.0 {
+            let p = world.tissue_point(self.instance, path.origin);
+            let cell = (p / PHASE_CELL + PHASE_SHIFT).floor().as_i64vec3();
+            let key = path.n.wrapping_mul(0x9e37_79b9).wrapping_add(frame.seed);
+            let words = pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, key]);
+            let phase = std::f64::consts::TAU * unit(words[3]);
+            let scale = rest * (path.share * path.probability).sqrt();
+            let incoherent = |k: usize| gain(k) * f64::from(world.rows[k].incoherent_gain);
+            out.deposit(l, time, scale * behind, phase, incoherent, dither);
+        }
+    }
+}

@@ -1,0 +1,61 @@
+//! Twin of `interpolate`: vectors between keyframes.
+
+use glam::DVec3;
+
+use super::wavefront::unpacked;
+use insonify::sim::layout::{Interpolation, PACKED, SUM};
+
+/// The `count` vectors that the kernel writes from `target` on.
+pub fn interpolate(push: &Interpolation, values: &[f32]) -> Vec<DVec3> {
+    let at = |vector: u32| {
+        let at = (push.stride * vector) as usize;
+        if push.kind == PACKED {
+            return unpacked(values[at].to_bits());
+        }
+        DVec3::new(values[at].into(), values[at + 1].into(), values[at + 2].into())
+    };
+    let sum = |i| {
+        let keyframes = push.sources.into_iter().zip(push.weights);
+        let read = keyframes.filter(|&(_, weight)| weight != 0.0);
+        read.map(|(source, weight)| f64::from(weight) * at(source + i)).sum()
+    };
+    let made = (0..push.count).map(sum);
+    if push.kind == SUM { made.collect() } else { made.map(DVec3::normalize_or_zero).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use insonify::scene::smoothed::pack;
+    use insonify::sim::layout::UNIT;
+
+    #[test]
+    fn vectors_lie_between_those_of_their_keyframes() {
+        let values = [1.0, 2.0, 3.0, f32::NAN, 0.0, 0.0, 5.0, 10.0, -1.0];
+        let mut push = Interpolation {
+            count: 1,
+            sources: [0, 2, 1, 1],
+            weights: [0.75, 0.25, 0.0, 0.0],
+            stride: 3,
+            ..Interpolation::default()
+        };
+        assert_eq!(
+            interpolate(&push, &values),
+            [DVec3::new(2.0, 4.0, 2.0)],
+            "and what has no weight is not read"
+        );
+        push.kind = UNIT;
+        assert_eq!(interpolate(&push, &values), [DVec3::new(1.0, 2.0, 1.0).normalize()]);
+        push.weights = [0.0; 4];
+        assert_eq!(interpolate(&push, &values), [DVec3::ZERO]);
+        let values = [DVec3::X, DVec3::Y, -DVec3::Z].map(|v| f32::from_bits(pack(v)));
+        push = Interpolation {
+            kind: PACKED,
+            stride: 1,
+            sources: [0, 1, 2, 2],
+            weights: [2.0, 0.0, 1.0, 0.0],
+            ..push
+        };
+        assert_eq!(interpolate(&push, &values), [DVec3::new(2.0, 0.0, -1.0).normalize()]);
+    }
+}

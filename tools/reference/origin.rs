@@ -1,0 +1,132 @@
+//! Twin of `origin`: which media enclose the start of each line, and where its paths begin.
+
+use super::geometry::world_line;
+use super::stack::Stack;
+use super::way::Start;
+use super::world::{Crossing, World};
+use insonify::sim::layout::{MAX_STACK, START_WORDS};
+
+/// Most crossings followed.
+const CROSSINGS: usize = 64;
+
+/// One start per line e * scanlines + l, and how often there were more media than a stack holds.
+pub fn origin(world: &World) -> (Vec<Start>, u32) {
+    let mut overflow = 0;
+    let mut starts = Vec::new();
+    for e in 0..world.frame.layers {
+        for l in 0..world.frame.scanlines {
+            let line = world_line(world.frame, l, e);
+            let mut crossings = world.crossings(line.origin, line.direction, [0.0, f64::INFINITY]);
+            crossings.truncate(CROSSINGS);
+            let mut media = enclosing(&crossings);
+            overflow += u32::from(media.len() > MAX_STACK);
+            media.truncate(MAX_STACK);
+            let (start, full) = world.start(Stack(media), &crossings);
+            overflow += full;
+            starts.push(start);
+        }
+    }
+    (starts, overflow)
+}
+
+/// Instances left more often than entered, the one whose last exit is farthest first.
+fn enclosing(crossings: &[Crossing]) -> Vec<u32> {
+    let mut instances: Vec<u32> = Vec::new();
+    for c in crossings.iter().rev().filter(|c| !c.entry) {
+        let own = crossings.iter().filter(|o| o.instance == c.instance);
+        let net: i32 = own.map(|o| if o.entry { -1 } else { 1 }).sum();
+        if net > 0 && !instances.contains(&c.instance) {
+            instances.push(c.instance);
+        }
+    }
+    instances
+}
+
+/// The layout of the device's buffer.
+pub fn pack(starts: &[Start]) -> Vec<u32> {
+    let mut packed = vec![0; starts.len() * START_WORDS];
+    for (slot, start) in packed.chunks_mut(START_WORDS).zip(starts) {
+        let media = &start.media.0;
+        slot[0] = media.len() as u32;
+        slot[1..=media.len()].copy_from_slice(media);
+        slot[MAX_STACK + 1] = (start.travelled as f32).to_bits();
+        slot[MAX_STACK + 2] = (start.weight as f32).to_bits();
+        slot[MAX_STACK + 3] = start.interactions;
+    }
+    packed
+}
+
+/// What one line's words in the device's buffer say.
+pub fn unpack(words: &[u32; START_WORDS]) -> Start {
+    let count = (words[0] as usize).min(MAX_STACK);
+    Start {
+        media: Stack(words[1..=count].to_vec()),
+        travelled: f32::from_bits(words[MAX_STACK + 1]).into(),
+        weight: f32::from_bits(words[MAX_STACK + 2]).into(),
+        interactions: words[MAX_STACK + 3],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::super::fixture::{Fixture, tissue};
+    use super::*;
+
+    fn spheres(radii: &[f64]) -> Fixture {
+        let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+        for &r in radii {
+            fixture.sphere(DVec3::new(0.3, 0.2, 0.1), r, 24, 0, 0);
+        }
+        fixture
+    }
+
+    #[test]
+    fn nested_spheres_enclose_the_start_from_the_outermost_in() {
+        let mut fixture = spheres(&[5.0, 20.0, 10.0]);
+        // Ahead of the probe, behind it and beside it: none encloses the start.
+        fixture.sphere(DVec3::new(0.0, 0.0, 50.0), 8.0, 24, 0, 0);
+        fixture.sphere(DVec3::new(0.0, 0.0, -50.0), 8.0, 24, 0, 0);
+        fixture.sphere(DVec3::new(30.0, 0.0, 0.0), 8.0, 24, 0, 0);
+        let (stacks, overflow) = origin(&fixture.world());
+        assert_eq!((&stacks[0].media.0[..], overflow), (&[1, 2, 0][..], 0));
+        let mut packed = vec![3, 1, 2, 0];
+        packed.resize(MAX_STACK + 1, 0);
+        packed.extend([0.0_f32, 1.0].map(f32::to_bits));
+        packed.push(0);
+        assert_eq!(pack(&stacks), packed);
+        let back: [u32; START_WORDS] = packed.try_into().expect("one line's");
+        assert_eq!(unpack(&back), stacks[0]);
+    }
+
+    #[test]
+    fn of_more_than_fit_the_outermost_are_kept() {
+        let most = MAX_STACK as u32;
+        let radii: Vec<f64> = (1..=most + 2).map(|i| 2.0 * f64::from(i)).collect();
+        let (stacks, overflow) = origin(&spheres(&radii).world());
+        let outermost: Vec<u32> = (2..most + 2).rev().collect();
+        assert_eq!((&stacks[0].media.0, overflow), (&outermost, 1));
+    }
+
+    #[test]
+    fn lines_differ_where_only_some_start_inside() {
+        let mut fixture = spheres(&[]);
+        fixture.block([0.0, -9.0, -9.0], [9.0, 9.0, 9.0], 0, 0);
+        (fixture.frame.scanlines, fixture.frame.layers) = (4, 2);
+        let (stacks, _) = origin(&fixture.world());
+        let counts: Vec<usize> = stacks.iter().map(|s| s.media.0.len()).collect();
+        assert_eq!(counts, [0, 0, 1, 1, 0, 0, 1, 1]);
+    }
+
+    #[test]
+    fn a_ray_through_edges_crosses_once() {
+        let mut fixture = spheres(&[]);
+        // The pole is a fan of triangles, and the ray runs through both poles.
+        let turn = glam::DAffine3::from_rotation_x(std::f64::consts::FRAC_PI_2);
+        fixture.sphere(DVec3::ZERO, 5.0, 12, 0, 0);
+        fixture.instances[0].object_from_world = super::super::fixture::rows_of(&turn);
+        let (stacks, _) = origin(&fixture.world());
+        assert_eq!(stacks[0].media.0, [0]);
+    }
+}

@@ -1,0 +1,90 @@
+//! Arrays of one's own that the twins read.
+
+use super::world::{Geometry, World, affine};
+use super::{origin, trace};
+use insonify::scene::Mesh;
+use insonify::scene::smoothed::smoothed;
+use insonify::sim::layout::{Frame, Instance, Row, Surface, Tissue};
+
+/// Owns what a [`World`] borrows, in the device's layout and units.
+#[derive(Clone, Debug, Default)]
+pub struct Owned {
+    /// Constants of the frame.
+    pub frame: Frame,
+    /// One per axial sample.
+    pub rows: Vec<Row>,
+    /// Acoustic properties.
+    pub tissues: Vec<Tissue>,
+    /// Echo properties.
+    pub surfaces: Vec<Surface>,
+    /// Placed meshes.
+    pub instances: Vec<Instance>,
+    /// World position (mm) and amplitude of point targets.
+    pub points: Vec<[f32; 4]>,
+    /// Vertex positions of all meshes, object space, mm.
+    pub positions: Vec<[f32; 3]>,
+    /// Unit outward shading normals, one per vertex.
+    pub normals: Vec<[f32; 3]>,
+    /// The same averaged over the surface.
+    pub smoothed: Vec<[u32; 4]>,
+    /// Vertex indices; an instance owns a range, or shares it ([`Geometry::triangles`]).
+    pub triangles: Vec<[u32; 3]>,
+    /// Displacement fields, in vectors.
+    pub fields: Vec<[f32; 3]>,
+}
+
+impl Owned {
+    /// Appends a mesh and `instance`, which gets its range of triangles, and 1 mm for its finest average.
+    pub fn place(
+        &mut self,
+        positions: &[[f32; 3]],
+        normals: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        instance: Instance,
+    ) {
+        let base = self.positions.len() as u32;
+        self.instances.push(Instance {
+            first_triangle: self.triangles.len() as u32,
+            triangles: triangles.len() as u32,
+            finest: 1.0,
+            ..instance
+        });
+        let mesh = Mesh {
+            positions: positions.to_vec(),
+            normals: normals.to_vec(),
+            triangles: triangles.to_vec(),
+            ..Mesh::default()
+        };
+        let stretch = affine(&instance.world_from_object).matrix3.determinant().abs().cbrt();
+        self.smoothed.extend(smoothed(&mesh, stretch.recip()));
+        self.positions.extend_from_slice(positions);
+        self.normals.extend_from_slice(normals);
+        let moved = triangles.iter().map(|t| t.map(|v| v + base));
+        self.triangles.extend(moved);
+    }
+
+    /// Borrows it all.
+    pub fn world(&self) -> World<'_> {
+        World {
+            frame: &self.frame,
+            rows: &self.rows,
+            tissues: &self.tissues,
+            surfaces: &self.surfaces,
+            instances: &self.instances,
+            geometry: Geometry {
+                positions: &self.positions,
+                normals: &self.normals,
+                smoothed: &self.smoothed,
+                triangles: &self.triangles,
+            },
+            points: &self.points,
+            fields: &self.fields,
+        }
+    }
+
+    /// Segments per line and surface echoes, every line starting inside what encloses its origin.
+    pub fn traced(&self) -> trace::Traced {
+        let world = self.world();
+        trace::trace(&world, &origin::origin(&world).0)
+    }
+}

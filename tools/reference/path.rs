@@ -1,0 +1,110 @@
+//! A path between two interactions, and how a mirror turns it.
+
+use glam::DVec3;
+
+use super::acoustics::mirror;
+use super::geometry::{beam_weight, world_line};
+use super::interface::MIRROR;
+use super::random::pcg4d;
+use super::stack::Stack;
+use insonify::sim::layout::Frame;
+
+/// Purpose of the numbers that are added to an echo before it is rounded down.
+const PURPOSE_DITHER: u32 = 0x51ed_270b;
+/// Purpose of the number that decides whether a faint branch is followed.
+pub(super) const PURPOSE_SURVIVAL: u32 = 0x2545_f491;
+
+/// Whether a path was split and how it goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Role {
+    /// Transmitted path of main-path sampling; spawns branches.
+    Main,
+    /// Reflected off the main path.
+    Branch,
+    /// One stochastic choice at every interaction.
+    Single,
+}
+
+/// A path between two interactions.
+#[derive(Clone, Debug)]
+pub(super) struct Path {
+    pub(super) role: Role,
+    /// Index n of the path sample.
+    pub(super) n: u32,
+    pub(super) line: u32,
+    /// One-way intensity weight W.
+    pub(super) weight: f64,
+    /// Share p of an echo.
+    pub(super) share: f64,
+    /// Probability Q of the branches taken.
+    pub(super) probability: f64,
+    /// One-way time T, us.
+    pub(super) time: f64,
+    pub(super) origin: DVec3,
+    pub(super) direction: DVec3,
+    pub(super) lateral: DVec3,
+    pub(super) handedness: f64,
+    pub(super) interactions: u32,
+    pub(super) reflections: u32,
+    pub(super) spread: [f64; 3],
+    /// Chance that it had to be followed; its weight is over that.
+    pub(super) survival: f64,
+    pub(super) stack: Stack,
+    pub(super) t_min: f64,
+}
+
+impl Path {
+    /// Key of the random numbers at the interaction just reached.
+    pub(super) fn key(&self) -> u32 {
+        self.interactions + 32 * self.reflections
+    }
+
+    /// Amplitude factor for how far off the geometric scanline the path is.
+    pub(super) fn beam_weight(&self, frame: &Frame) -> f64 {
+        let (l, layer) = self.scanline(frame.scanlines);
+        let line = world_line(frame, l, layer);
+        beam_weight(frame, (self.origin - line.origin).dot(line.lateral))
+    }
+
+    /// What is added before rounding down: per sample of a deposit, real and imaginary part.
+    pub(super) fn dither(&self, frame: &Frame) -> [f64; 8] {
+        let words = self.line_random(frame, PURPOSE_DITHER);
+        std::array::from_fn(|i| {
+            let word = words[i / 2];
+            let half = if i % 2 == 0 { word >> 16 } else { word & 0xffff };
+            f64::from(half) / 65_536.0
+        })
+    }
+
+    /// Numbers that belong to the line's interaction just reached: what neighbouring lines must not do alike.
+    pub(super) fn line_random(&self, frame: &Frame, purpose: u32) -> [u32; 4] {
+        pcg4d([self.line, self.n, self.key(), frame.seed ^ purpose])
+    }
+
+    /// Scanline and layer.
+    pub(super) fn scanline(&self, scanlines: u32) -> (u32, u32) {
+        (self.line % scanlines, self.line / scanlines)
+    }
+}
+
+/// Distance from `p` below which a surface is the one just left.
+pub(super) fn step(p: DVec3) -> f64 {
+    4e-6 * p.abs().max_element().max(1.0)
+}
+
+/// Turns the path back along `direction`, mirrored by the plane of normal `m`.
+pub(super) fn reflect(path: &mut Path, direction: DVec3, m: DVec3) {
+    path.direction = direction;
+    path.lateral = mirror(path.lateral, m);
+    path.handedness = -path.handedness;
+    path.reflections += 1;
+}
+
+/// The lobe of a rough reflection, and the `turn` of a curved one, rad: their variance per axis grows
+/// with the distance.
+pub(super) fn widen(path: &mut Path, roughness: f64, turn: f64) {
+    if roughness < MIRROR {
+        path.spread[2] += 4.0 / (roughness + 2.0);
+    }
+    path.spread[2] += (turn * turn).min(1.0);
+}

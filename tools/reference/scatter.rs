@@ -1,0 +1,290 @@
+//! Twin of `scatter`: echoes of scatterers and point targets along the segments.
+
+mod lattices;
+mod others;
+
+use glam::{DAffine3, DVec3};
+
+use super::field::Field;
+use super::geometry::{beam_weight, probe, world_line};
+use super::world::World;
+use super::{Accumulator, Segment};
+use insonify::sim::layout::{FLAG_VOXEL, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD};
+
+/// Layers meet this part of their pitch off the round numbers at which points lie: rounding must not
+/// give one to two layers, or to none.
+const POINT_SHIFT: f64 = 0.012_34;
+
+/// A segment seen from one space: world or its texture's.
+struct Tube<'a> {
+    world: &'a World<'a>,
+    segment: &'a Segment,
+    tissue: &'a Tissue,
+    origin: DVec3,
+    direction: DVec3,
+    lateral: DVec3,
+    elevation: DVec3,
+    scanline: u32,
+    layer_offset: f64,
+    /// Distance from the geometric scanline, mm: at the start and per mm.
+    off: [f64; 2],
+    /// How the tissue is displaced in the tube's space.
+    field: Option<Deformed<'a>>,
+}
+
+/// A field and its bounds.
+#[derive(Clone, Copy)]
+struct Deformed<'a> {
+    field: Field<'a>,
+    /// mm.
+    reach: f64,
+    steepness: f64,
+}
+
+impl Deformed<'_> {
+    /// A middle and a distance of all points of the reference shape from which tissue can be within
+    /// `radius` of `p`, relative to where it is: v differs by no more than `steepness` times the
+    /// distance there, which is no more than radius / (1 - steepness).
+    fn back(&self, p: DVec3, radius: f64) -> (DVec3, f64) {
+        if self.steepness < 1.0 {
+            let spread = self.steepness / (1.0 - self.steepness) * radius;
+            (self.field.reference(p) - p, spread)
+        } else {
+            (DVec3::ZERO, self.reach)
+        }
+    }
+}
+
+/// [`Tube::level`] of the loudest stretch that fills each slot of a scanline.
+type Loudest = Vec<f64>;
+
+/// Echoes of all segments, in units of 1 / volume_scale.
+pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
+    let mut out = Accumulator::new(world.frame);
+    let deformed = |instance: u32| {
+        world.field(instance).map(|field| Deformed {
+            field,
+            reach: field.reach(),
+            steepness: field.steepness(),
+        })
+    };
+    let fields: Vec<_> = (0..world.instances.len() as u32).map(deformed).collect();
+    let numbers = |s: &Segment| [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread);
+    let finite = |s: &&Segment| {
+        let vectors = [s.origin, s.direction, s.lateral];
+        numbers(s).all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
+    };
+    let slots = world.frame.samples.div_ceil(SCATTER_SLOT) as usize;
+    let mut loudest = vec![vec![f64::NEG_INFINITY; slots]; world.frame.scanlines as usize];
+    for tube in segments
+        .iter()
+        .filter(finite)
+        .map(|s| Tube::textured(world, s, &fields))
+        .filter(Tube::sounds)
+    {
+        for slot in tube.filled(&out) {
+            let here = &mut loudest[tube.scanline as usize][slot as usize];
+            let middle = (f64::from(slot) + 0.5) * f64::from(SCATTER_SLOT);
+            *here = here.max(tube.level(tube.distance(middle), &out));
+        }
+    }
+    for segment in segments.iter().filter(finite) {
+        let tube = Tube::textured(world, segment, &fields);
+        if tube.sounds() {
+            if world.frame.flags & FLAG_VOXEL == 0 {
+                tube.lattices(&loudest[tube.scanline as usize], &mut out);
+            } else {
+                tube.voxels(&mut out);
+            }
+        }
+        Tube::new(world, segment, DAffine3::IDENTITY, None).points(&mut out);
+    }
+    out
+}
+
+/// 1 / sigma^2 of the beam across and up.
+fn falling(row: &Row) -> [f64; 2] {
+    [row.sigma_lateral, row.sigma_elevation].map(|sigma| f64::from(sigma).powi(-2))
+}
+
+impl<'a> Tube<'a> {
+    fn new(
+        world: &'a World,
+        segment: &'a Segment,
+        space: DAffine3,
+        field: Option<Deformed<'a>>,
+    ) -> Self {
+        let elevation = segment.handedness * segment.direction.cross(segment.lateral);
+        let (l, layer) =
+            (segment.line % world.frame.scanlines, segment.line / world.frame.scanlines);
+        let line = world_line(world.frame, l, layer);
+        Self {
+            world,
+            segment,
+            tissue: &world.tissues[segment.tissue as usize],
+            origin: space.transform_point3(segment.origin),
+            direction: space.transform_vector3(segment.direction),
+            lateral: space.transform_vector3(segment.lateral),
+            elevation: space.transform_vector3(elevation),
+            scanline: l,
+            layer_offset: probe(world.frame).elevation(layer),
+            off: [
+                (segment.origin - line.origin).dot(line.lateral),
+                segment.direction.dot(line.lateral),
+            ],
+            field,
+        }
+    }
+
+    /// The segment in the space where its scatterers rest.
+    fn textured(world: &'a World, segment: &'a Segment, fields: &[Option<Deformed<'a>>]) -> Self {
+        let field = fields.get(segment.instance as usize).copied().flatten();
+        Self::new(world, segment, world.texture(segment.instance), field)
+    }
+
+    fn sounds(&self) -> bool {
+        self.tissue.presence > 0.0 && self.segment.weight > 0.0
+    }
+
+    /// One-way time at distance `x`, us.
+    fn time(&self, x: f64) -> f64 {
+        self.segment.time + x / f64::from(self.tissue.speed)
+    }
+
+    /// Distance at which sample `kappa` lies.
+    fn distance(&self, kappa: f64) -> f64 {
+        let frame = self.world.frame;
+        let time = kappa * f64::from(frame.sample_pitch) / f64::from(frame.speed);
+        (time - self.segment.time) * f64::from(self.tissue.speed)
+    }
+
+    fn row(&self, x: f64, out: &Accumulator) -> &'a Row {
+        &self.world.rows[out.sample(self.time(x))]
+    }
+
+    /// Weight at distance `x` but for absorption: less off the scanline, and averaged down where a rough
+    /// reflection has spread the path over many resolution cells.
+    fn weight(&self, x: f64, row: &Row) -> f64 {
+        let [a, b, c] = self.segment.spread;
+        let variance = a + 2.0 * b * x + c * x * x;
+        let wider = |sigma: f32| (1.0 + variance / f64::from(sigma).powi(2)).sqrt();
+        let cells = wider(row.sigma_lateral) * wider(row.sigma_elevation);
+        let averaged = (self.segment.share / cells).sqrt().min(1.0);
+        self.segment.weight
+            * averaged
+            * beam_weight(self.world.frame, self.off[0] + x * self.off[1])
+    }
+
+    fn absorbed(&self, x: f64) -> f64 {
+        (-f64::from(self.tissue.absorption) * x).exp()
+    }
+
+    /// How loud its speckle is at distance `x`: one-way weight times echogenicity, log2.
+    fn level(&self, x: f64, out: &Accumulator) -> f64 {
+        (self.weight(x, self.row(x, out)) * self.absorbed(x)).log2() + f64::from(self.tissue.level)
+    }
+
+    /// Bin of the sample at distance `x`.
+    fn bin(&self, x: f64, out: &Accumulator) -> u32 {
+        out.sample(self.time(x)) as u32 / SCATTER_BIN
+    }
+
+    /// The bins that it passes.
+    fn bins(&self, out: &Accumulator) -> std::ops::Range<u32> {
+        let end = self.segment.length;
+        let passed = out.kappa(self.time(end)) > 0.0
+            && out.kappa(self.segment.time) < f64::from(self.world.frame.samples);
+        let first = self.bin(0.0, out);
+        let last = if passed { self.bin(end, out) + 1 } else { first };
+        first..last
+    }
+
+    /// The slots that it fills, but for half a sample at either end.
+    fn filled(&self, out: &Accumulator) -> std::ops::Range<u32> {
+        let samples = f64::from(self.world.frame.samples);
+        let at = |x: f64| out.kappa(self.time(x)).clamp(0.0, samples) / f64::from(SCATTER_SLOT);
+        let margin = 0.5 / f64::from(SCATTER_SLOT);
+        (at(0.0) - margin).ceil() as u32..(at(self.segment.length) + margin).floor() as u32
+    }
+
+    /// The place in a bin at which it is held against the others there.
+    fn within(&self, bin: u32, out: &Accumulator) -> f64 {
+        debug_assert!(self.bins(out).contains(&bin));
+        let middle = f64::from(bin * SCATTER_BIN + SCATTER_BIN / 2);
+        self.distance(middle).clamp(0.0, self.segment.length)
+    }
+
+    /// By how much power, log2, something drowns it all along `bin`, as far as it reaches; nothing where
+    /// nobody would hear it.
+    fn drowned(&self, bin: u32, loudest: &Loudest, out: &Accumulator) -> Option<f64> {
+        let level = self.level(self.within(bin, out), out);
+        let middle = (bin * SCATTER_BIN + SCATTER_BIN / 2).min(self.world.frame.samples - 1);
+        let black = f64::from(self.world.rows[middle as usize].black);
+        let slot = |x: f64| (out.kappa(self.time(x)).max(0.0) / f64::from(SCATTER_SLOT)) as usize;
+        let per_bin = (SCATTER_BIN / SCATTER_SLOT) as usize;
+        let first = slot(0.0).max(bin as usize * per_bin);
+        let last = slot(self.segment.length).min(bin as usize * per_bin + per_bin - 1);
+        let over = loudest[first..=last.min(loudest.len() - 1)].iter().copied();
+        let above = over.fold(f64::INFINITY, f64::min).max(black) - level;
+        (level >= black - f64::from(UNHEARD)).then(|| 2.0 * above.max(0.0))
+    }
+
+    /// The slab of a layer about its middle, mm: layers meet off the round numbers at which cells have their
+    /// middles.
+    fn slab(&self) -> [f64; 2] {
+        let reach = f64::from(self.world.frame.elevation_reach);
+        [-1.0, 1.0].map(|side| (side + 2.0 * POINT_SHIFT) * reach)
+    }
+
+    /// Half the beam's width at `row`, mm: an ellipse in the plane of width and height, of which the
+    /// layer's edge nearest to the middle counts.
+    fn half_width(&self, row: &Row) -> f64 {
+        let frame = self.world.frame;
+        let cut = f64::from(frame.lateral_cut);
+        let nearest = (self.layer_offset.abs() - f64::from(frame.elevation_reach)).max(0.0);
+        let height = nearest / (cut * f64::from(row.sigma_elevation));
+        cut * f64::from(row.sigma_lateral) * (1.0 - height * height).max(0.0).sqrt()
+    }
+
+    /// Echo of something of `amplitude`, all but absorption and `beam`, at `from` the tube's origin.
+    fn echo(&self, from: DVec3, amplitude: f64, beam: f64, out: &mut Accumulator) {
+        let x = from.dot(self.direction);
+        let scale = f64::from(self.world.frame.volume_scale);
+        let amplitude = amplitude * self.absorbed(x) * beam;
+        out.deposit_nearest(self.scanline, self.time(x), amplitude, |k| {
+            f64::from(self.world.rows[k].volume_gain) * scale
+        });
+    }
+
+    /// The beam's two-way amplitude off its axis, as wide as a row says.
+    fn beam(&self, from: DVec3, row: &Row) -> f64 {
+        self.beam_of(from, falling(row))
+    }
+
+    /// The same by 1 / sigma^2 across and up.
+    fn beam_of(&self, from: DVec3, [lateral, elevation]: [f64; 2]) -> f64 {
+        let across = from.dot(self.lateral);
+        let up = self.layer_offset + from.dot(self.elevation);
+        (-0.5 * (across * across * lateral + up * up * elevation)).exp()
+    }
+
+    /// 1 / sigma^2 at distance `x`: a row's is that of its sample's middle, and between them lies the parabola
+    /// through the nearest three.
+    fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
+        let last = self.world.rows.len() - 1;
+        let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, last as f64);
+        let middle =
+            (at.round() as usize).clamp(1.min(last), last.saturating_sub(1).max(1.min(last)));
+        let off = at - middle as f64;
+        let [before, here, behind] = [middle.saturating_sub(1), middle, (middle + 1).min(last)]
+            .map(|k| falling(&self.world.rows[k]));
+        std::array::from_fn(|i| {
+            let slope = (behind[i] - before[i]) / 2.0;
+            let bend = (behind[i] + before[i]) / 2.0 - here[i];
+            here[i] + off * (slope + off * bend)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,70 @@
+//! A straight stretch of a path, widened to f64.
+
+use glam::DVec3;
+
+use insonify::sim::layout;
+
+/// See [`layout::Segment`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Segment {
+    /// Start, world mm.
+    pub origin: DVec3,
+    /// Length, mm.
+    pub length: f64,
+    /// Unit direction.
+    pub direction: DVec3,
+    /// One-way time at the start, us.
+    pub time: f64,
+    /// Unit lateral axis carried along the path.
+    pub lateral: DVec3,
+    /// One-way intensity weight at the start.
+    pub weight: f64,
+    /// Lateral variance a + 2 b x + c x^2 after rough reflections: a mm^2, b mm, c.
+    pub spread: [f64; 3],
+    /// Share of the path among those that replace it.
+    pub share: f64,
+    /// Index of the tissue.
+    pub tissue: u32,
+    /// Index of the instance, or NONE in the background.
+    pub instance: u32,
+    /// Line e * scanlines + l.
+    pub line: u32,
+    /// Elevation axis = handedness * cross(direction, lateral).
+    pub handedness: f64,
+}
+
+impl From<&layout::Segment> for Segment {
+    fn from(s: &layout::Segment) -> Self {
+        let xyz = |v: [f32; 4]| DVec3::new(v[0].into(), v[1].into(), v[2].into());
+        Self {
+            origin: xyz(s.origin_length),
+            length: s.origin_length[3].into(),
+            direction: xyz(s.direction_time),
+            time: s.direction_time[3].into(),
+            lateral: xyz(s.lateral_weight),
+            weight: s.lateral_weight[3].into(),
+            spread: [s.spread[0].into(), s.spread[1].into(), s.spread[2].into()],
+            share: s.spread[3].into(),
+            tissue: s.tissue,
+            instance: s.instance,
+            line: s.line,
+            handedness: s.handedness.into(),
+        }
+    }
+}
+
+impl From<&Segment> for layout::Segment {
+    fn from(s: &Segment) -> Self {
+        let pack = |v: DVec3, w: f64| [v.x as f32, v.y as f32, v.z as f32, w as f32];
+        Self {
+            origin_length: pack(s.origin, s.length),
+            direction_time: pack(s.direction, s.time),
+            lateral_weight: pack(s.lateral, s.weight),
+            spread: pack(DVec3::from(s.spread), s.share),
+            tissue: s.tissue,
+            instance: s.instance,
+            line: s.line,
+            handedness: s.handedness as f32,
+        }
+    }
+}

@@ -1,0 +1,374 @@
+//! Twin of `trace`: Monte-Carlo paths, their surface echoes and their segments.
+
+use glam::{DAffine3, DVec3};
+
+use super::geometry::{face, world_line};
+use super::interface::{self, Interface};
+use super::path::{PURPOSE_SURVIVAL, Path, Role, reflect, step, widen};
+use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
+use super::stack::Stack;
+use super::way::{Start, Toggled};
+use super::world::{World, affine};
+use super::{Accumulator, Segment, acoustics};
+use insonify::sim::layout::{
+    Counters, FLAG_FACE_REFLECTION, FLAG_ROUGH_TRANSMISSION, LEAST_SURVIVAL, SAMPLING_MAIN_PATH,
+    SAMPLING_SHARED_PRIMARY,
+};
+
+/// What `trace` leaves behind.
+#[derive(Clone, Debug)]
+pub struct Traced {
+    /// Surface echoes, in units of 1 / surface_scale.
+    pub surface: Accumulator,
+    /// Segments per line e * scanlines + l, by path; none is dropped for want of room.
+    pub segments: Vec<Vec<Segment>>,
+    /// Counts; `segments_dropped` is what the frame's capacity would not hold.
+    pub counters: Counters,
+}
+
+struct Tracer<'a> {
+    world: &'a World<'a>,
+    probe_from_world: DAffine3,
+    out: Traced,
+}
+
+/// Follows all paths of all lines from where they begin.
+pub fn trace(world: &World, starts: &[Start]) -> Traced {
+    let frame = world.frame;
+    let lines = frame.layers * frame.scanlines;
+    let mut tracer = Tracer {
+        world,
+        probe_from_world: affine(&frame.probe_from_world),
+        out: Traced {
+            surface: Accumulator::new(frame),
+            segments: vec![Vec::new(); lines as usize],
+            counters: Counters::default(),
+        },
+    };
+    for line in 0..lines {
+        for n in 0..frame.paths {
+            let path = tracer.start(line, n, &starts[line as usize]);
+            tracer.follow(path);
+        }
+    }
+    let mut out = tracer.out;
+    let sizes = out.segments.iter().map(|s| s.len() as u32);
+    out.counters.segments = sizes.clone().sum();
+    out.counters.segments_dropped = sizes.map(|n| n.saturating_sub(frame.segment_capacity)).sum();
+    out.counters.saturated = out.surface.saturated;
+    out
+}
+
+impl Tracer<'_> {
+    fn start(&self, line: u32, n: u32, begin: &Start) -> Path {
+        let frame = self.world.frame;
+        let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
+        let words = draw(frame, n, 0, PURPOSE_JITTER);
+        let (jitter, lobe) = (f64::from(frame.origin_jitter), f64::from(frame.emission_lobe));
+        let (mut direction, mut lateral, mut fan) = (start.direction, start.lateral, 0.0);
+        if lobe > 0.0 {
+            direction = acoustics::power_cosine(direction, lobe, [unit(words[1]), unit(words[2])]);
+            lateral = (lateral - lateral.dot(direction) * direction).normalize();
+            fan = 1.0 / (lobe + 2.0);
+        }
+        let mut origin = start.origin + jitter * gaussian(words[0]) * start.lateral;
+        let mut t_min = 0.0;
+        if begin.travelled > 0.0 {
+            origin += begin.travelled * direction;
+            t_min = step(origin);
+        }
+        Path {
+            role: if frame.sampling == SAMPLING_MAIN_PATH { Role::Main } else { Role::Single },
+            n,
+            line,
+            weight: begin.weight,
+            share: 1.0 / f64::from(frame.paths),
+            probability: 1.0,
+            time: begin.travelled / f64::from(frame.speed),
+            origin,
+            direction,
+            lateral,
+            handedness: 1.0,
+            interactions: begin.interactions,
+            reflections: 0,
+            spread: [jitter * jitter, 0.0, fan],
+            survival: 1.0,
+            stack: begin.media.clone(),
+            t_min,
+        }
+    }
+
+    /// One-way time of the image's bottom.
+    fn end(&self) -> f64 {
+        f64::from(self.world.frame.depth) / f64::from(self.world.frame.speed)
+    }
+
+    fn follow(&mut self, mut path: Path) {
+        let frame = self.world.frame;
+        for _ in 0..64 + frame.max_interactions {
+            if self.ended(&path) {
+                return;
+            }
+            let t_end = (self.end() - path.time) * self.speed(&path.stack);
+            let range = [path.t_min, t_end];
+            let crossings = self.world.crossings(path.origin, path.direction, range);
+            self.out.counters.rays += 1;
+            let nearest = crossings.first().map_or(t_end, |c| c.t);
+            if self.flies_past(&path, t_end, self.world.meets_mask(&crossings)) {
+                return;
+            }
+            if let Some((t, normal)) = self.face(&path, nearest) {
+                self.emit(&path, t);
+                let ends = frame.flags & FLAG_FACE_REFLECTION == 0
+                    || path.reflections >= frame.max_reflections;
+                if ends {
+                    return;
+                }
+                self.interact(&mut path, t);
+                self.face_echo(&path, normal);
+                let back = acoustics::mirror(path.direction, normal);
+                reflect(&mut path, back, normal);
+            } else {
+                if crossings.is_empty() {
+                    self.emit(&path, t_end);
+                    return;
+                }
+                let toggled = self.world.toggled(&path.stack, &crossings);
+                self.out.counters.stack_overflow += toggled.overflow;
+                let Toggled { hit, after, last, .. } = toggled;
+                let heard = [&path.stack, &after].map(|s| self.world.is_heard(s));
+                let same = self.world.medium(&path.stack) == self.world.medium(&after);
+                if same || heard == [false; 2] {
+                    if same && heard[0] == heard[1] {
+                        path.t_min = last + step(path.origin + last * path.direction);
+                    } else {
+                        // The mask begins or ends within a medium: the stretch is cut there. Outside
+                        // another medium begins, and sound goes straight on.
+                        self.emit(&path, hit.t);
+                        self.advance(&mut path, hit.t);
+                        path.t_min += last - hit.t;
+                        if !same {
+                            path.weight *= self.world.passed(&path.stack, &after);
+                            path.interactions += 1;
+                        }
+                    }
+                    path.stack = after;
+                    continue;
+                }
+                self.emit(&path, hit.t);
+                self.interact(&mut path, hit.t);
+                let row = &self.world.rows[self.out.surface.sample(path.time)];
+                let interface = interface::meet(self.world, row, &path, &hit, &after);
+                interface.echo(self.world, &path, &mut self.out.surface);
+                let goes_on = match path.role {
+                    Role::Main => {
+                        self.branch(&path, &interface);
+                        path.weight *= 1.0 - interface.reflectance;
+                        interface.reflectance < 1.0 && self.transmit(&mut path, &interface, after)
+                    }
+                    Role::Branch | Role::Single => self.choose(&mut path, &interface, after),
+                };
+                if !goes_on {
+                    return;
+                }
+            }
+        }
+    }
+
+    /// Whether nothing more is heard of the path: it is outside of all masks, and none is ahead, nor
+    /// the face that would send it back.
+    fn flies_past(&self, path: &Path, t_end: f64, mask_ahead: bool) -> bool {
+        let frame = self.world.frame;
+        let bounces = frame.flags & FLAG_FACE_REFLECTION != 0
+            && path.reflections < frame.max_reflections
+            && self.face(path, t_end).is_some();
+        !self.world.is_heard(&path.stack) && !mask_ahead && !bounces
+    }
+
+    /// Speed at which a path goes on: that of its medium, and of the acquired image around the masks.
+    fn speed(&self, media: &Stack) -> f64 {
+        let (tissue, _) = self.world.medium(media);
+        let heard = self.world.is_heard(media);
+        let speed = self.world.tissues[tissue as usize].speed;
+        f64::from(if heard { speed } else { self.world.frame.speed })
+    }
+
+    fn ended(&self, path: &Path) -> bool {
+        path.interactions >= self.world.frame.max_interactions
+            || path.weight * path.survival < f64::from(self.world.frame.min_weight)
+            || path.time >= self.end()
+    }
+
+    /// The transducer's face, for reflected paths, if it is nearer than `limit`.
+    fn face(&self, path: &Path, limit: f64) -> Option<(f64, DVec3)> {
+        if path.reflections == 0 {
+            return None;
+        }
+        let to_probe = &self.probe_from_world;
+        let (o, d) =
+            (to_probe.transform_point3(path.origin), to_probe.transform_vector3(path.direction));
+        let (t, normal) = face(self.world.frame, o, d, path.t_min)?;
+        let world = affine(&self.world.frame.world_from_probe);
+        (t < limit).then(|| (t, world.transform_vector3(normal).normalize()))
+    }
+
+    /// What the transducer's face, a perfect mirror, sends back along the path.
+    fn face_echo(&mut self, path: &Path, normal: DVec3) {
+        let cos = -path.direction.dot(normal);
+        let lobe = (2.0 * cos * cos - 1.0).max(0.0);
+        if cos > 0.0 && self.world.is_heard(&path.stack) {
+            let amplitude = path.share * path.weight * lobe * path.beam_weight(self.world.frame);
+            let gain = interface::gain(self.world, path);
+            let (l, _) = path.scanline(self.world.frame.scanlines);
+            let dither = path.dither(self.world.frame);
+            let surface = &mut self.out.surface;
+            surface.deposit(l, path.time, amplitude, 0.0, gain, dither);
+        }
+    }
+
+    /// Moves the path by `t` to its next interaction.
+    fn interact(&mut self, path: &mut Path, t: f64) {
+        self.advance(path, t);
+        path.interactions += 1;
+        self.out.counters.interactions += 1;
+    }
+
+    /// Moves the path by `t`.
+    fn advance(&self, path: &mut Path, t: f64) {
+        path.origin += t * path.direction;
+        path.weight *= self.world.unabsorbed(&path.stack, t);
+        path.time += t / self.speed(&path.stack);
+        let [a, b, c] = path.spread;
+        path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
+        path.t_min = step(path.origin);
+    }
+
+    /// The reflected part that main-path sampling splits off, followed to its end.
+    fn branch(&mut self, main: &Path, interface: &Interface) {
+        let frame = self.world.frame;
+        let Some(echo) = interface.micro.filter(|_| main.reflections < frame.max_reflections)
+        else {
+            return;
+        };
+        let (n, big_r) = (f64::from(frame.paths), interface.reflectance);
+        let mut path = Path { role: Role::Branch, ..main.clone() };
+        let branches = (n * big_r).ceil().clamp(1.0, n);
+        if f64::from(main.n) >= branches {
+            return;
+        }
+        // The fainter a branch, the rarer it is followed, and counts for as many.
+        let row = &self.world.rows[self.out.surface.sample(path.time)];
+        let level = path.weight * big_r * f64::from(row.compensation);
+        let floor = f64::from(frame.branch_floor);
+        if level < floor {
+            path.survival = (level / floor).max(f64::from(LEAST_SURVIVAL));
+        }
+        if unit(path.line_random(frame, PURPOSE_SURVIVAL)[0]) >= path.survival {
+            return;
+        }
+        path.weight *= big_r / path.survival;
+        path.probability = path.survival;
+        path.share = 1.0 / branches;
+        reflect(&mut path, echo.reflected, echo.normal);
+        widen(&mut path, interface.roughness, interface.turn);
+        if !self.ended(&path) {
+            self.follow(path);
+        }
+    }
+
+    /// Reflects or transmits by chance; whether the path goes on.
+    fn choose(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
+        let frame = self.world.frame;
+        let mut u = unit(draw(frame, path.n, path.key(), PURPOSE_CHOICE)[0]);
+        if path.role == Role::Single && path.interactions == 1 {
+            u = (f64::from(path.n) + u) / f64::from(frame.paths);
+        }
+        if u >= interface.reflectance {
+            path.probability *= 1.0 - interface.reflectance;
+            return self.transmit(path, interface, after);
+        }
+        path.probability *= interface.reflectance;
+        let Some(micro) = interface.micro.filter(|_| path.reflections < frame.max_reflections)
+        else {
+            return false;
+        };
+        reflect(path, micro.reflected, micro.normal);
+        widen(path, interface.roughness, interface.turn);
+        true
+    }
+
+    /// Refracts into the next medium; false when the path is lost to total reflection.
+    fn transmit(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
+        let rough = self.world.frame.flags & FLAG_ROUGH_TRANSMISSION != 0;
+        let normal = match interface.micro {
+            Some(micro) if rough => micro.normal,
+            _ => interface.refracting,
+        };
+        let Some(direction) = interface.turned(self.world, path, normal) else {
+            self.out.counters.paths_lost += 1;
+            return false;
+        };
+        path.direction = direction;
+        path.lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
+        path.stack = after;
+        true
+    }
+
+    /// Whether the volume echoes of a branch would be drowned.
+    fn is_faint(&self, path: &Path) -> bool {
+        let row = &self.world.rows[self.out.surface.sample(path.time)];
+        path.weight * path.survival * f64::from(row.compensation)
+            < f64::from(self.world.frame.volume_floor)
+    }
+
+    /// Keeps the stretch of `length` ahead of the path, if scatterers or points can lie there.
+    fn emit(&mut self, path: &Path, length: f64) {
+        let (tissue, instance) = self.world.medium(&path.stack);
+        let scatters = self.world.tissues[tissue as usize].presence > 0.0;
+        let holds_echoes = scatters || !self.world.points.is_empty();
+        // A NaN length is no stretch either.
+        if !holds_echoes || length.partial_cmp(&0.0) != Some(std::cmp::Ordering::Greater) {
+            return;
+        }
+        let frame = self.world.frame;
+        let unsplit = frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0;
+        let alike = frame.origin_jitter <= 0.0
+            && frame.emission_lobe <= 0.0
+            && frame.flags & FLAG_ROUGH_TRANSMISSION == 0;
+        if !self.world.is_heard(&path.stack) || path.role == Role::Branch && self.is_faint(path) {
+            return;
+        }
+        let (weight, share) = match path.role {
+            _ if !alike => own_share(path),
+            Role::Single if !unsplit => own_share(path),
+            _ if path.n != 0 => return,
+            // Speckle adds in power.
+            _ => (path.weight * path.survival.sqrt(), 1.0),
+        };
+        self.out.segments[path.line as usize].push(Segment {
+            origin: path.origin,
+            length,
+            direction: path.direction,
+            time: path.time,
+            lateral: path.lateral,
+            weight,
+            spread: path.spread,
+            share,
+            tissue,
+            instance,
+            line: path.line,
+            handedness: path.handedness,
+        });
+    }
+}
+
+/// Weight and share of a path that speaks for itself only.
+fn own_share(path: &Path) -> (f64, f64) {
+    (
+        path.weight * path.survival.sqrt() * path.share,
+        (path.probability / (path.survival * path.share)).max(1.0),
+    )
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,101 @@
+//! The program `kernels` as an author of kernels uses it: on the frame that a simulator dumped, on another driver,
+//! with a reader that leaves.
+
+#[path = "../../tests/common/skip.rs"]
+mod skip;
+
+use std::process::{Command, Output, Stdio};
+
+use insonify::gpu::test_device;
+use insonify::scene::Scene;
+use insonify::sim::dump;
+use insonify::sim::shaders::Library;
+use insonify::sim::{Simulator, Tracer, stages};
+use insonify_tools::root;
+use skip::{Lacking, skip};
+
+/// Returns the program, with its arguments.
+fn kernels(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_kernels"));
+    command.args(arguments);
+    command
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+/// Settings for which no point of a wire, half a millimetre apart, lies on the border of two layers, where rounding
+/// decides which of them sees it; and one kind of cylinder reflects.
+const REPLAYED: [(&str, &str); 6] = [
+    ("probe.scanlines", "12"),
+    ("probe.samples", "512"),
+    ("probe.elevation_layers", "3"),
+    ("probe.slice_thickness", "8.7mm"),
+    ("simulation.paths", "2"),
+    ("tissues.plus_6.speed", "1600m/s"),
+];
+
+#[test]
+fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
+    let scene = root().join("scenes/phantom.toml");
+    let set = REPLAYED.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let (scene, _) = Scene::load(&scene, &set).expect("a shipped scene");
+    let device = test_device();
+    let mut simulator =
+        Simulator::new(&device, &Library::embedded(), &scene, Tracer::Bvh).expect("a simulator");
+    simulator.frame(&scene, 0).expect("a frame");
+    let folder = tempfile::tempdir().expect("a folder");
+    dump::frame(&mut simulator, &scene, folder.path()).expect("dumped");
+    let input = folder.path().to_str().expect("a plain path");
+    let run = |name: &str| -> Output {
+        let command = ["run", name, "--size", "small", "--input", input];
+        kernels(&command).output().expect("the program starts")
+    };
+    let names = stages::IMAGE.map(|pass| pass.name).map(|name| match name {
+        "scatter" => "scatter_rigid",
+        name => name,
+    });
+    for name in names.into_iter().chain(["detect"]) {
+        let out = run(name);
+        let said = text(&out.stdout) + &text(&out.stderr);
+        assert!(out.status.success(), "{said}");
+        let from = said.lines().find(|l| l.starts_with("from "));
+        assert!(from.is_some_and(|l| l.contains("frame, ")), "{said}");
+    }
+    // A truncated array is refused, and named.
+    let rows = folder.path().join("kernels/rows.npy");
+    let mut bytes = std::fs::read(&rows).expect("rows");
+    bytes.truncate(bytes.len() / 2);
+    std::fs::write(&rows, bytes).expect("rows");
+    let out = run("detect");
+    assert!(!out.status.success());
+    assert!(text(&out.stderr).contains("rows.npy"), "{}", text(&out.stderr));
+}
+
+#[test]
+fn a_reader_that_leaves_is_no_error() {
+    let (reader, writer) = std::io::pipe().expect("a pipe");
+    drop(reader);
+    let mut command = kernels(&["list"]);
+    let child = command.stdout(writer).stderr(Stdio::piped()).spawn().expect("the program starts");
+    let out = child.wait_with_output().expect("the program ends");
+    let said = text(&out.stderr);
+    assert!(out.status.success() && !said.contains("panicked"), "{said}");
+}
+
+#[test]
+fn kernels_agree_with_their_twins_on_a_second_driver() {
+    let manifest = root().join("target/second-driver/vk_swiftshader_icd.json");
+    if !manifest.exists() {
+        let why = "no second driver in target/second-driver (./tools/setup.sh unpacks one)";
+        return skip(Lacking::Tool, why);
+    }
+    let mut command = kernels(&["check", "--validate"]);
+    command.env_remove("VK_ICD_FILENAMES").env("VK_DRIVER_FILES", manifest);
+    let out = command.output().expect("the program starts");
+    let said = text(&out.stdout) + &text(&out.stderr);
+    assert!(out.status.success(), "{said}");
+    assert!(said.starts_with("SwiftShader"), "{said}");
+    assert!(!said.contains("WRONG"), "{said}");
+}
