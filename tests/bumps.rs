@@ -11,18 +11,21 @@ use glam::{DAffine3, DQuat, DVec2, DVec3};
 use insonify::gpu::test_device;
 use insonify::probe::{Kind, Probe};
 use insonify::scene::mesh::Soup;
-use insonify::scene::{Instance, Keyframes, Mesh, Scene, Simulation, Surface, Tissue};
+use insonify::scene::{Instance, Keyframes, Mesh, Scene, Simulation, Surface, Tissue, Wire};
 use insonify::scene::{normals, shapes, topology, triangle};
 use insonify::settings::{Imaging, Refraction};
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use rayon::prelude::*;
+use serde_json::Value;
 
 /// Depth of the bumpy surface, mm.
 const TOP: f64 = 15.0;
 /// Places (x, z) and radius of the vessels, which run along y, mm.
 const VESSELS: [[f64; 3]; 5] =
     [[-16.0, 36.0, 3.5], [-7.0, 52.0, 4.0], [0.0, 30.0, 3.0], [8.0, 46.0, 4.0], [17.0, 34.0, 3.5]];
+/// Places of the wires of the full-wave simulation, mm.
+const WIRES: [[f64; 2]; 3] = [[-5.0, 26.0], [0.0, 34.0], [5.0, 40.0]];
 /// Deviation of the bumps, mm, and between which wavelengths they lie.
 const BUMPS: [[f64; 3]; 4] = [[0.3, 2.0, 3.0], [0.6, 3.0, 5.0], [1.2, 5.0, 8.0], [2.0, 7.0, 10.0]];
 /// Poses of each.
@@ -47,8 +50,8 @@ impl Random {
     }
 }
 
-/// A block whose top, towards the probe, carries bumps: waves of random direction.
-fn block([rms, shortest, longest]: [f64; 3], seed: u64) -> Mesh {
+/// Bumps of a deviation between two wavelengths, mm: waves of random direction.
+fn bumps([rms, shortest, longest]: [f64; 3], seed: u64) -> impl Fn(DVec2) -> f64 {
     let mut random = Random(seed);
     let waves: Vec<(DVec2, f64)> = (0..32)
         .map(|_| {
@@ -57,10 +60,14 @@ fn block([rms, shortest, longest]: [f64; 3], seed: u64) -> Mesh {
         })
         .collect();
     let amplitude = rms * (2.0 / waves.len() as f64).sqrt();
-    let height = |p: DVec2| {
+    move |p: DVec2| {
         let waves = waves.iter().map(|(k, phase)| (k.dot(p) + phase).sin());
-        TOP + amplitude * waves.sum::<f64>()
-    };
+        amplitude * waves.sum::<f64>()
+    }
+}
+
+/// A block whose top, towards the probe, lies at a depth by place.
+fn block(height: impl Fn(DVec2) -> f64) -> Mesh {
     let (half, edge, bottom) = (DVec2::new(60.0, 36.0), 0.5, 100.0);
     let [nx, ny] = [half.x, half.y].map(|h| (2.0 * h / edge) as u32);
     let mut soup = Soup::default();
@@ -111,6 +118,44 @@ fn tissue(speed: f64, impedance: f64, echogenicity: f64) -> Tissue {
     }
 }
 
+/// The block inside a background; the same tissue without scatterers is the third.
+fn layers(probe: Probe, around: Tissue, inside: Tissue, block: Mesh) -> Scene {
+    let mut scene = Scene {
+        simulation: Simulation {
+            paths: 1,
+            max_reflections: 0,
+            cell: Simulation::default_cell(probe.frequency),
+            ..Simulation::default()
+        },
+        imaging: Imaging { noise: f64::NEG_INFINITY, tgc_attenuation: 0.0, ..Imaging::default() },
+        ..Scene::homogeneous(around, probe)
+    };
+    scene.tissues.extend([inside.clone(), Tissue { echogenicity: f64::NEG_INFINITY, ..inside }]);
+    place(&mut scene, block, 1, DAffine3::IDENTITY);
+    scene
+}
+
+/// Adds a mesh that echoes nothing; a later tissue wins where two overlap.
+fn place(scene: &mut Scene, mesh: Mesh, tissue: usize, at: DAffine3) {
+    let silent = Surface {
+        roughness: f64::INFINITY,
+        thickness: 0.0,
+        specularity: 1.0,
+        gain: f64::NEG_INFINITY,
+    };
+    scene.instances.push(Instance {
+        name: mesh.name.clone(),
+        mesh: scene.meshes.len(),
+        keyframes: Keyframes::default(),
+        shown: true,
+        tissue,
+        priority: tissue as i32,
+        world_from_object: at,
+        surface: [silent; 2],
+    });
+    scene.meshes.push(mesh);
+}
+
 /// The block below fat, with vessels.
 fn phantom(block: Mesh) -> Scene {
     let probe = Probe {
@@ -124,42 +169,11 @@ fn phantom(block: Mesh) -> Scene {
         aperture: 24.0,
         ..Probe::paper_table1()
     };
-    let mut scene = Scene {
-        simulation: Simulation {
-            paths: 1,
-            max_reflections: 0,
-            cell: Simulation::default_cell(5.0),
-            ..Simulation::default()
-        },
-        imaging: Imaging { noise: f64::NEG_INFINITY, tgc_attenuation: 0.0, ..Imaging::default() },
-        ..Scene::homogeneous(tissue(1.49, 1.5, 0.0), probe)
-    };
-    let inside = tissue(1.58, 1.65, 0.0);
-    scene.tissues.extend([inside.clone(), Tissue { echogenicity: f64::NEG_INFINITY, ..inside }]);
-    let mirror = Surface {
-        roughness: f64::INFINITY,
-        thickness: 0.0,
-        specularity: 1.0,
-        gain: f64::NEG_INFINITY,
-    };
-    let mut place = |mesh: Mesh, tissue, at| {
-        scene.instances.push(Instance {
-            name: mesh.name.clone(),
-            mesh: scene.meshes.len(),
-            keyframes: Keyframes::default(),
-            shown: true,
-            tissue,
-            priority: tissue as i32,
-            world_from_object: at,
-            surface: [mirror; 2],
-        });
-        scene.meshes.push(mesh);
-    };
-    place(block, 1, DAffine3::IDENTITY);
+    let mut scene = layers(probe, tissue(1.49, 1.5, 0.0), tissue(1.58, 1.65, 0.0), block);
     for [x, z, radius] in VESSELS {
         let along_y = DQuat::from_rotation_x(FRAC_PI_2);
         let at = DAffine3::from_rotation_translation(along_y, DVec3::new(x, 0.0, z));
-        place(shapes::cylinder(radius, 66.0, 48), 2, at);
+        place(&mut scene, shapes::cylinder(radius, 66.0, 48), 2, at);
     }
     scene
 }
@@ -301,10 +315,11 @@ struct Seen {
 }
 
 /// By the mean slope, and by the local one.
-fn seen(bumps: [f64; 3], tracer: Tracer) -> [Seen; 2] {
+fn seen(size: [f64; 3], tracer: Tracer) -> [Seen; 2] {
     let mut random = Random(11);
-    let rough = phantom(block(bumps, 5));
-    let smooth = with(&phantom(block([0.0, 5.0, 6.0], 5)), Refraction::Ray);
+    let bumps = bumps(size, 5);
+    let rough = phantom(block(|p| TOP + bumps(p)));
+    let smooth = with(&phantom(block(|_| TOP)), Refraction::Ray);
     let simulator = |scene| Simulator::new(&test_device(), &Library::embedded(), scene, tracer);
     let [mut on_rough, mut on_smooth] =
         [&rough, &smooth].map(|scene| simulator(scene).expect("a simulator"));
@@ -468,4 +483,124 @@ fn vessels_of_a_patient_stay_whole() {
     }
     println!("beam {:.3}, ray {:.3}", sums[0], sums[1]);
     assert!(sums[0] >= LEAST);
+}
+
+/// A wire as it is seen: place and depth, width at half of the envelope, mm; level, dB.
+#[derive(Clone, Copy, Debug)]
+struct Spot {
+    lateral: f64,
+    depth: f64,
+    width: f64,
+    level: f64,
+}
+
+/// The brightest spot about `at` (x, z).
+fn spot(simulator: &mut Simulator, scene: &Scene, [x, z]: [f64; 2]) -> Spot {
+    simulator.frame(scene, 0).expect("a frame");
+    let iq = simulator.iq().expect("baseband");
+    let samples = scene.probe.samples as usize;
+    let pitch = scene.probe.sample_pitch();
+    let near = ((z - 2.0) / pitch) as usize..((z + 2.0) / pitch) as usize;
+    let brightest = |line: &[f32]| {
+        let of = |k: usize| (f64::from(line[2 * k]).hypot(line[2 * k + 1].into()), k);
+        near.clone().map(of).max_by(|a, b| a.0.total_cmp(&b.0)).expect("samples")
+    };
+    let profile: Vec<(f64, f64, usize)> = (iq.chunks(2 * samples).zip(0..))
+        .map(|(line, l)| (scene.probe.ray(l, 0).0.x, brightest(line)))
+        .filter(|(place, _)| (place - x).abs() < 3.0)
+        .map(|(place, (value, k))| (place, value, k))
+        .collect();
+    let top = (1..profile.len() - 1).max_by(|&i, &j| profile[i].1.total_cmp(&profile[j].1));
+    let top = top.expect("scanlines");
+    let half = profile[top].1 / 2.0;
+    let step = profile[1].0 - profile[0].0;
+    let crossing = |ahead: bool| {
+        let next = |i: usize| if ahead { i + 1 } else { i - 1 };
+        let mut i = top;
+        while profile[next(i)].1 > half {
+            i = next(i);
+        }
+        let (a, b) = (profile[i], profile[next(i)]);
+        a.0 + (a.1 - half) / (a.1 - b.1) * (b.0 - a.0)
+    };
+    let [a, b, c] = [top - 1, top, top + 1].map(|i| profile[i].1.ln());
+    Spot {
+        lateral: profile[top].0 + step * 0.5 * (a - c) / (a - 2.0 * b + c),
+        depth: profile[top].2 as f64 * pitch,
+        width: crossing(true) - crossing(false),
+        level: 20.0 * profile[top].1.log10(),
+    }
+}
+
+/// A full-wave simulation of the same wires behind the same bumps: `tests/bumps.json`.
+#[test]
+fn wires_behind_bumps_stand_as_in_a_full_wave_simulation() {
+    let table: Value = serde_json::from_str(include_str!("bumps.json")).expect("JSON");
+    let number = |v: &Value| v.as_f64().expect("a number");
+    let waves: Vec<[f64; 3]> = (table["waves"].as_array().expect("a list").iter())
+        .map(|w| ["length", "phase", "amplitude"].map(|key| number(&w[key])))
+        .collect();
+    let height = |x: f64| {
+        waves.iter().map(|[length, phase, a]| a * (TAU * x / length + phase).sin()).sum::<f64>()
+    };
+    let probe = Probe {
+        kind: Kind::Linear { width: 17.0 },
+        scanlines: 136,
+        elevation_layers: 1,
+        samples: 2048,
+        depth: 48.0,
+        frequency: number(&table["frequency"]),
+        bandwidth: number(&table["bandwidth"]),
+        focus: number(&table["focus"]),
+        f_number_transmit: number(&table["f_number"]),
+        f_number_receive: number(&table["f_number"]),
+        ..Probe::paper_table1()
+    };
+    let [around, inside] = [0, 1].map(|i| {
+        let layer = &table["layers"][i];
+        let speed = number(&layer["speed"]);
+        tissue(speed, speed * number(&layer["density"]), f64::NEG_INFINITY)
+    });
+    let mut smooth: Vec<[Spot; 3]> = Vec::new();
+    let (mut wrong, mut planted) = (Vec::new(), 0);
+    for row in table["wires"].as_array().expect("a list") {
+        let (rms, at) = (number(&row["rms"]), [0, 1].map(|i| number(&row["at"][i])));
+        let block = block(|p| number(&table["top"]) + rms * height(p.x));
+        let mut scene = layers(probe.clone(), around.clone(), inside.clone(), block);
+        let ends = [[at[0], 0.0, at[1]]; 2];
+        scene.wires.push(Wire { ends, spacing: 1.0, amplitude: 1.0 });
+        let simulator = Simulator::new(&test_device(), &Library::embedded(), &scene, Tracer::Bvh);
+        let mut simulator = simulator.expect("a simulator");
+        let full = ["lateral", "depth", "width", "level"].map(|key| number(&row[key]));
+        let full = Spot { lateral: full[0], depth: full[1], width: full[2], level: full[3] };
+        let [beam, ray] = [Refraction::Beam, Refraction::Ray]
+            .map(|refraction| spot(&mut simulator, &with(&scene, refraction), at));
+        if rms == 0.0 {
+            smooth.push([full, beam, ray]);
+        }
+        let first = smooth[WIRES.iter().position(|w| *w == at).expect("a wire")];
+        // Level over that behind the smooth surface.
+        let agree = |own: &Spot, reference: &Spot| {
+            let gain = own.level - reference.level - (full.level - first[0].level);
+            println!(
+                "{rms} mm, {at:?}: lateral {:.3} depth {:.3} width {:.3} of {:.3}, level {:.2} of {:.2} dB",
+                own.lateral - full.lateral,
+                own.depth - full.depth,
+                own.width,
+                full.width,
+                own.level - reference.level,
+                full.level - first[0].level
+            );
+            (own.lateral - full.lateral).abs() < 0.3
+                && (own.depth - full.depth).abs() < 0.3
+                && (own.width / full.width - 1.0).abs() < 0.2
+                && gain.abs() < 2.0
+        };
+        if !agree(&beam, &first[1]) {
+            wrong.push(format!("{rms} mm, {at:?}"));
+        }
+        planted += u32::from(!agree(&ray, &first[2]));
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("; "));
+    assert!(planted > 0, "local normals agree");
 }
