@@ -1,4 +1,4 @@
-// Circle and arcs of a list of arguments; no stage of a frame, it exists so that a test can compare
+// Sines, cosines and arcs of a list of arguments. It is no stage of a frame; a test uses it to compare
 // angles.glsl with its twin: one thread per argument.
 #version 460
 #extension GL_GOOGLE_include_directive : require

@@ -1,6 +1,6 @@
 #ifndef ANGLES_GLSL
 #define ANGLES_GLSL
-// Sine, cosine and arctangent of sums and products alone, so that every device gives the same.
+// Sine, cosine and arctangent computed from sums and products alone, so that every device gives the same.
 // Vulkan lets a device's own sin and cos err by 2^-11, and only within [-pi, pi], and its atan by
 // 4096 units in the last place; sums and products it must round correctly, and `precise` keeps them
 // from being fused. tools/reference/angles.rs mirrors every operation and measures the errors.
@@ -9,7 +9,7 @@ const float TURNS = 0.1591549431;   // in a radian
 
 // Point of the unit circle at an angle in turns: (cosine, sine), within 2.5e-7, for |turns| up to 2^22.
 vec2 phasor(float turns) {
-    // At most half a turn; from a quarter on, the sine is that of what is missing to half a turn.
+    // Reduced to at most half a turn; for more than a quarter, sin(x) = sin(half a turn - x).
     precise float t = turns - floor(turns + 0.5);
     precise float half_turn = mix(0.5, -0.5, t < 0.0);
     precise vec2 z = vec2(0.25 - abs(t), mix(t, half_turn - t, abs(t) > 0.25));

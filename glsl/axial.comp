@@ -1,7 +1,7 @@
-// Axial point-spread function, a real Gaussian along each line of the complex baseband, and detection:
+// Axial point-spread function, a real Gaussian along each scanline of the complex baseband, and detection:
 // time-gain compensation, envelope, logarithm.
 //
-// A thread makes AXIAL_SAMPLES neighbouring samples of a line: a sample that it reads counts in all of them
+// A thread computes AXIAL_SAMPLES neighbouring samples of a scanline: it reads a sample once for all of them
 // that it reaches.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -40,7 +40,7 @@ void main() {
         if (k < 0 || k >= samples) { continue; }
         vec2 heard = lateral[line + k];
         for (int n = 0; n < AXIAL_SAMPLES; ++n) {
-            // Beyond the reach there is no tap at all: what is not finite stays where it is heard.
+            // Beyond the reach there is no tap, not even one of weight 0, so that NaN and infinity do not spread.
             if (abs(j - n) <= radius) { sums[n] += tap[n] * heard; }
         }
     }

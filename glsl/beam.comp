@@ -1,7 +1,7 @@
-// Accumulators to complex samples: fixed point undone, lateral smoothing, contact, noise.
+// From accumulators to complex samples: fixed point to float, lateral smoothing, contact, noise.
 //
-// A thread makes one sample of BEAM_LINES neighbouring scanlines: an echo that it reads counts in all of
-// them that it reaches. Neighbouring threads read neighbouring samples of the same line.
+// A thread computes one sample of BEAM_LINES neighbouring scanlines: it reads an echo once for all of
+// them that it reaches. Neighbouring threads read neighbouring samples of the same scanline.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
@@ -14,23 +14,23 @@ layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { ivec2 surfa
 layout(std430, binding = 3) restrict readonly buffer VolumeBuffer { ivec2 volume_echoes[]; };
 layout(std430, binding = 4) restrict buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 5) restrict buffer LateralBuffer { vec2 lateral[]; };
-// Per line the coupled share of the transmit aperture; from frame.scanlines on how many of the elements
-// before each one are not coupled.
+// For each scanline the coupled share of the transmit aperture; from frame.scanlines on, for each element, the
+// number of elements before it that are not coupled.
 layout(std430, binding = 6) restrict readonly buffer ContactBuffer { float contact[]; };
 
 const int HEADROOM = int(ECHO_LIMIT);
 
 bool saturated(ivec2 v) { return any(greaterThanEqual(v, ivec2(HEADROOM))) || any(lessThanEqual(v, ivec2(-HEADROOM))); }
 
-// Elements before the place `at` (in elements from the face's edge) that are not coupled.
+// Number of elements before the place `at` (in elements from the face's edge) that are not coupled.
 float air_before(float at) {
     uint i = min(uint(at), frame.scanlines - 1u);
     float here = contact[frame.scanlines + i];
     return here + (at - float(i)) * (contact[frame.scanlines + i + 1u] - here);
 }
 
-// What is left of the echoes of line l where `reach` elements on either side receive: coupled shares of
-// what sends and what receives.
+// The factor on the echoes of scanline l if `reach` elements on either side receive: coupled share of the transmit
+// aperture times that of the receive aperture.
 float coupling(uint l, float reach) {
     float sends = contact[l];
     float count = float(frame.scanlines);
@@ -58,7 +58,7 @@ void main() {
     vec2 v[BEAM_LINES];
     float weights[BEAM_LINES];
     float energies[BEAM_LINES];
-    // tap[n] is the weight, in output line first + n, of the line that is being read.
+    // tap[n] is the weight, in output scanline first + n, of the scanline that is being read.
     float tap[BEAM_LINES];
     for (int n = 0; n < BEAM_LINES; ++n) {
         s[n] = vec2(0.0);
@@ -100,7 +100,7 @@ void main() {
         uint own = l * frame.samples + k;
         ivec2 echo = volume_echoes[own];
         if (saturated(echo)) { full |= 1u << uint(n); }
-        // Speckle adds in power, surface echoes in amplitude: each keeps its level at the edges.
+        // Speckle adds in power, surface echoes add in amplitude; each is normalised to keep its level at the edges.
         vec2 scatterers = vec2(echo);
         if (voxel) { scatterers = v[n] * sqrt(energy_full / energies[n]); }
         vec2 iq = (s[n] * (surface_undo / weights[n]) + scatterers * volume_undo) * coupling(l, reach);

@@ -1,8 +1,8 @@
 // Box sums down the columns of the mask, an image of pairs of values, written with rows and columns exchanged:
 // run twice, it sums over squares and the image stands upright again.
 //
-// A thread makes BLUR_SUMS neighbouring sums of a column: what all of them have in common is read and
-// added once. Nothing is subtracted, so that a value that is no number spoils only sums that hold it.
+// A thread computes BLUR_SUMS neighbouring sums of a column: the pixels common to all of them are read and
+// added once. Nothing is subtracted, so that NaN affects only the sums that include it.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
@@ -15,7 +15,7 @@ layout(std430, binding = 3) restrict buffer SumBuffer { vec2 sums[]; };
 
 layout(push_constant) uniform Push { uint turned; };  // 1: the mask has rows and columns exchanged
 
-// Beyond the image's edge its outermost pixels count on.
+// Beyond the image's edge its outermost pixels are repeated.
 vec2 read(int x, int y, int width, int height) { return mask[clamp(y, 0, height - 1) * width + x]; }
 
 void main() {
@@ -25,7 +25,7 @@ void main() {
     int height = int(turned == 0u ? frame.image_height : frame.image_width);
     if (x >= width || first >= height) { return; }
     int taps = int(fusion.blur);
-    // An even box reaches one pixel farther up: half a pixel of shift.
+    // An even box reaches one pixel farther up than down, a shift by half a pixel.
     int top = first - taps / 2;
     vec2 sum[BLUR_SUMS];
     for (int n = 0; n < BLUR_SUMS; ++n) { sum[n] = vec2(0.0); }
@@ -34,8 +34,8 @@ void main() {
             for (int i = n; i < n + taps; ++i) { sum[n] += read(x, top + i, width, height); }
         }
     } else {
-        // Of the first sum, the last pixel is the first that all have; what lies before it is missing in
-        // more and more of them, and what follows its end comes to more and more.
+        // The last pixel of the first sum is the first one common to all. Each later sum lacks one more of the pixels
+        // before it, and has one more of those after the end of the first sum.
         vec2 shared_sum = vec2(0.0);
         for (int i = BLUR_SUMS - 1; i < taps; ++i) { shared_sum += read(x, top + i, width, height); }
         vec2 before = vec2(0.0);

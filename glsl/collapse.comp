@@ -1,4 +1,4 @@
-// One level of the blend's pyramid added to what the coarser ones give: one thread per pixel.
+// Adds one level of the blend's pyramid to the result of the coarser ones: one thread per pixel.
 #version 460
 #extension GL_GOOGLE_include_directive : require
 
@@ -21,13 +21,13 @@ void main() {
     if (i >= width || j >= height) { return; }
     uint at = j * width + i;
     vec3 here = vec3(fine[3u * at], fine[3u * at + 1u], fine[3u * at + 2u]);
-    // What the coarser level says of this pixel: of the difference, where there is some of it, and of
+    // The coarser level, interpolated at this pixel: of the difference, where it has weight, and of
     // its blended value.
     vec2 difference = vec2(0.0);
     vec2 blended = vec2(0.0);
     if (coarsest == 0u) {
         ivec2 size = ivec2((width + 1u) / 2u, (height + 1u) / 2u);
-        // Those to which this pixel has given.
+        // The parents to which this pixel has contributed.
         for (int y = (int(j) + 3) / 2 - 2; y <= int(j) / 2 + 1; ++y) {
             if (y < 0 || y >= size.y) continue;
             for (int x = (int(i) + 3) / 2 - 2; x <= int(i) / 2 + 1; ++x) {

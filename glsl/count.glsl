@@ -1,5 +1,5 @@
-// What the walk down the hierarchy has counted in this invocation, added to the frame's counters;
-// nothing unless built with COUNT.
+// Adds the steps of this invocation's traversals to the frame's counters;
+// does nothing unless built with COUNT.
 void report_counts() {
 #ifdef COUNT
     atomicAdd(counters.node_visits, bvh_node_visits);

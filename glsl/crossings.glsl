@@ -1,16 +1,16 @@
-// What a scanline meets straight ahead, and what is around it behind each crossing. One work group is one scanline;
-// its first thread follows it.
+// The crossings of a straight scanline, and the instances around it behind each. One work group is one scanline;
+// its first thread traces it.
 //
 // The includer declares frame, instances[] and counters, defines what rays meet, and includes closest_hit,
 // surface_geometric_normal.
 
 const uint MAX_CROSSINGS = 64u;
 
-// Distances at which the scanline goes into an instance; negative where it comes out.
+// Distances at which the scanline enters an instance; negative where it leaves one.
 shared float crossings[MAX_CROSSINGS];
 shared uint crossed[MAX_CROSSINGS];       // which
 shared uint crossing_count;
-// Instances around the scanline's start: those that it leaves more often than it enters.
+// Instances that enclose the scanline's start: those that it leaves more often than it enters.
 shared int enclosing;
 
 void note_crossing(Hit hit, vec3 d) {
@@ -46,8 +46,8 @@ void follow_scanline(vec3 o, vec3 d) {
     }
 }
 
-// Whether `instance` is around the scanline behind its first `passed` crossings: it then comes out more often
-// than it goes in. Last: the crossing by which it went in, 1 for the first; 0 where it was around the start.
+// True if `instance` encloses the scanline behind its first `passed` crossings: after them it leaves more often
+// than it enters. `entered`: the crossing at which it entered, counted from 1; 0 if the instance encloses the start.
 bool is_around(uint instance, uint passed, out uint entered) {
     int net = 0;
     entered = 0u;

@@ -1,4 +1,4 @@
-// The acquired volume along the scanlines, darker by what the simulated anatomy takes from the
+// The acquired volume along the scanlines, darkened by what the simulated anatomy absorbs and reflects of the
 // sound: one thread per sample.
 #version 460
 #extension GL_GOOGLE_include_directive : require
@@ -27,7 +27,7 @@ void main() {
     }
     uint at = 2u * (l * frame.samples + k);
     float level = prescan[at + 1u];
-    // 20 / ln 10. Nothing is brightened: in what a recording shows darkest there is more noise than echo.
+    // 20 / ln 10. Nothing is brightened: the darkest parts of a recording have more noise than echo.
     float left = clamp(sum / float(frame.layers), 1e-30, 1.0);
     float change = 8.685889638 * log(left) * frame.inverse_range;
     shaded[at] = prescan[at];

@@ -7,7 +7,7 @@
 
 struct Field { vec3 origin; vec3 scale; vec3 last; uint values; };
 
-// Where the field of an instance begins; NONE where its tissue does not deform.
+// Offset of the field of an instance; NONE where its tissue does not deform.
 uint field_of(uint instance) {
     if (instance == NONE || (frame.flags & FLAG_WORLD_TEXTURE) != 0u) return NONE;
     return instances[instance].field;
@@ -54,7 +54,7 @@ vec3 displaced(Field f, vec3 p) {
     return p + displacement(f, p, gradient);
 }
 
-// The x for which jacobian x = b; b itself where the field folds.
+// Solves jacobian x = b; returns b where the field folds.
 vec3 undeform(mat3 jacobian, vec3 b) {
     vec3 across = cross(jacobian[1], jacobian[2]);
     float volume = dot(jacobian[0], across);
@@ -74,7 +74,7 @@ vec3 reference_point(Field f, vec3 p) {
     return found;
 }
 
-// World to the reference shape of the tissue at p.
+// The map from the world to the reference shape, for the tissue at p.
 vec3 tissue_point(uint instance, vec3 p) {
     vec3 q = texture_point(instance, p);
     uint at = field_of(instance);

@@ -2,12 +2,12 @@
 //
 // A ray stands for a beam. Where a surface curves by `kappa` (1/mm, along the plane of incidence), a
 // ray xi mm beside it meets the surface at sin i' = sin i + kappa xi (exact for a cylinder), and
-// beyond 1 it passes by. With xi normal of deviation sigma, sin i' is normal of deviation kappa sigma.
-// Without this a vessel's edge, where a hundredth of the beam is totally reflected, would turn all of
-// it aside.
+// beyond 1 it misses. If xi is normal with standard deviation sigma, sin i' is normal with kappa sigma.
+// Without this average the edge of a vessel, where a hundredth of the beam is totally reflected, would
+// reflect all of it.
 #include "angles.glsl"
 
-// Mass of the standard normal distribution below x: Abramowitz and Stegun 7.1.26, within 1e-7.
+// Standard normal distribution function at x: Abramowitz and Stegun 7.1.26, within 1e-7.
 float normal_mass(float x) {
     float z = abs(x) * 0.70710678;
     float t = 1.0 / (1.0 + 0.3275911 * z);
@@ -24,7 +24,7 @@ float footprint_reflectance(float z1, float c1, float z2, float c2, float cos_i,
     float critical = min(c1 / c2, 1.0);
     float beyond = normal_mass((1.0 - centre) / width) - normal_mass((critical - centre) / width)
         + normal_mass((-critical - centre) / width) - normal_mass((-1.0 - centre) / width);
-    // Below the critical angle, by s = critical sin(phi): what is steep at the edge becomes smooth.
+    // Below the critical angle, with s = critical sin(phi), which makes the steep integrand at the edge smooth.
     float from = arcsine(clamp((centre - 4.0 * width) / critical, -1.0, 1.0)) * TURNS;
     float to = arcsine(clamp((centre + 4.0 * width) / critical, -1.0, 1.0)) * TURNS;
     float sum = 0.0;

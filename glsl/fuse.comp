@@ -11,7 +11,7 @@ layout(std430, binding = 2) restrict readonly buffer PixelBuffer { uint pixels[]
 layout(std430, binding = 3) restrict readonly buffer BackgroundBuffer { float background[]; };
 layout(std430, binding = 4) restrict readonly buffer SumBuffer { vec2 sums[]; };
 layout(std430, binding = 5) restrict buffer FusedBuffer { uint fused[]; };
-// What blending by bands adds to the acquired image; read by that only.
+// The values that blending by bands adds to the acquired image; read only if blended by bands.
 layout(std430, binding = 6) restrict readonly buffer ChangeBuffer { float change[]; };
 
 void main() {
@@ -25,7 +25,7 @@ void main() {
         if (fusion.blend == BLEND_MULTIBAND) {
             v = background[at] + change[at];
         } else {
-            // Division may round; where the whole box is outside, the weight is 1 to the last bit.
+            // Division may round; if the whole box is outside, the weight must be exactly 1.
             vec2 sum = sums[at];
             float m = sum.x >= sum.y ? 1.0 : sum.x / sum.y;
             if (fusion.blend == BLEND_SMOOTH) { m = m * m * (3.0 - 2.0 * m); }

@@ -1,7 +1,7 @@
 #version 460
 #extension GL_GOOGLE_include_directive : require
-// The rays of every (scanline, layer) and what the face returns on the way back; no stage of a
-// frame, it exists so that a test can compare probe.glsl with `Probe::ray` and the harness can
+// The ray of every (scanline, layer), and its intersection with the face on the way back. It is no stage of a
+// frame; a test uses it to compare probe.glsl with `Probe::ray`, and the harness to
 // show that a kernel runs at all.
 #include "shared.glsl"
 
@@ -9,7 +9,7 @@ layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) readonly buffer FrameBuffer { Frame frame; };
 // Per line = e * scanlines + l: (origin, elevation), (direction, face_distance), (lateral, 0), (face_normal, 0).
-// The face is sought from a point `depth` along the ray, looking back: exactly `depth` away, or a
+// The face is searched from a point `depth` along the ray, backwards: it is exactly `depth` away, or a
 // miss outside the face's height or for a point.
 layout(std430, binding = 1) buffer RayBuffer { vec4 rays[]; };
 layout(std430, binding = 2) readonly buffer ScanlineBuffer { Scanline scanlines[]; };

@@ -1,4 +1,4 @@
-// The transducer as one holds it, in probe space: a head that ends in the face and a handle of
+// The housing of the transducer, in probe space: a head that ends in the face and a handle of
 // elliptic section. The includer declares `frame` and `view3d`.
 
 struct HousingHit {
@@ -7,7 +7,7 @@ struct HousingHit {
     vec3 colour;
 };
 
-// A stretch of a ray inside a convex body, and the normal where it enters.
+// The part of a ray inside a convex body, and the normal where it enters.
 struct Stretch {
     float enter;
     float leave;
@@ -72,7 +72,7 @@ HousingHit housing_hit(vec3 from, vec3 to) {
     head = between(head, from.x, to.x, -half_width, half_width, x);
     head = between(head, from.y, to.y, -half_thickness, half_thickness, y);
     head = between(head, from.z, to.z, -view3d.housing.z, 0.0, z);
-    // The cylinder of a small array would end within the head.
+    // Only for large radii: the cylinder of a small array would end within the head.
     if (frame.kind == KIND_CONVEX && frame.radius > view3d.housing.z) {
         float r = frame.radius;
         head = within(head, vec2(from.x, from.z + r) / r, vec2(to.x, to.z) / r, vec2(1.0), z);

@@ -1,26 +1,26 @@
-// Closest hit by a walk down a two-level, eight-wide bounding volume hierarchy.
+// Closest hit by traversal of a two-level, eight-wide bounding volume hierarchy.
 //
 // The includer includes triangle.glsl and declares `uvec4 nodes[]`, five of them per node, the format
 // of Ylitie, Karras, Laine 2017 with each axis' planes together:
 //   corner p (3 floats), exponents of the quantum e per axis and mask of inner children (4 bytes);
-//   first inner child, first primitive, what each of 8 children is (8 bytes);
+//   first inner child, first primitive, kind of each of 8 children (8 bytes);
 //   per axis x, y, z: lower planes of the 8 children (8 bytes), upper planes (8 bytes): p + e byte.
 // A child is 0 (none), 001 and 24 + its slot (inner), or the unary count of its primitives and their
 // offset. Primitives are triangles, or in the top level places in a table of instances, which
 // begins at the node nodes[0].y; of an instance's places rays enter the one that its row's `slot` names.
-// Where several instances share a structure, the table has one of them, and each triangle is asked
-// whose it is before one that is transparent or not shown can be met.
-// The top level's root is the node nodes[0].x; NONE: nothing is placed. nodes[0].z: of those that share
-// a structure some are not shown.
+// If several instances share a structure, the table has one of them, and for each triangle its instance is
+// looked up, so that rays pass those that are transparent or not shown.
+// The top level's root is the node nodes[0].x; NONE: nothing is placed. nodes[0].z: 1 if some instances that share
+// a structure are not shown.
 
-// Which other instances are transparent, and whether any may be.
+// RAY_SKIPS(i): true if instance i is transparent besides `skip_instance`. RAY_SELECTS: true if any may be.
 #ifndef RAY_SKIPS
 #define RAY_SKIPS(i) false
 #define RAY_SELECTS false
 #endif
 
 #ifdef COUNT
-// As the counters of shared.glsl; nodes are those of meshes and of the top level.
+// The counters of shared.glsl; nodes are those of meshes and of the top level.
 uint bvh_node_visits = 0u;
 uint bvh_top_visits = 0u;
 uint bvh_triangle_tests = 0u;
@@ -71,14 +71,14 @@ uint bvh_children(BvhRay ray, uint meta, uvec3 lo, uvec3 hi, vec3 scale, vec3 ne
     return children.x | children.y | children.z | children.w;
 }
 
-// Whether rays pass by what is found in a structure that instances share.
+// True if rays ignore a triangle found in a structure that instances share.
 bool bvh_passes(uint entered, uint triangle, uint skip_instance) {
-    if (instances[entered].owners == 0u) return false;   // the top level has asked
+    if (instances[entered].owners == 0u) return false;   // checked at the top level
     uint owner = triangle_owner(entered, triangle);
     return owner == skip_instance || instances[owner].slot == NONE || RAY_SKIPS(owner);
 }
 
-// `selects`: whether any instance may be passed by.
+// `selects`: true if rays may ignore some instance.
 void bvh_triangle(BvhRay ray, uint entered, uint triangle, float t_min, bool selects, uint skip_instance, inout Hit hit) {
     TriangleHit h = triangle_hit(ray.sheared, triangle);
     if (min(h.edges.x, min(h.edges.y, h.edges.z)) < 0.0 && max(h.edges.x, max(h.edges.y, h.edges.z)) > 0.0) return;
@@ -91,9 +91,9 @@ void bvh_triangle(BvhRay ray, uint entered, uint triangle, float t_min, bool sel
 }
 
 #ifdef COUNT
-// Whether a ray in object space meets the bounds of what an instance shows before t_max.
+// True if a ray in object space meets the bounds of the shown shape of an instance before t_max.
 bool bvh_bounds_met(uint instance, BvhRay ray, float t_min, float t_max) {
-    if (instances[instance].owners != 0u) return true;   // rows have no bounds of what they share
+    if (instances[instance].owners != 0u) return true;   // rows have no bounds of shared structures
     vec3 a = (instances[instance].low.xyz - ray.origin) * ray.inverse;
     vec3 b = (instances[instance].high.xyz - ray.origin) * ray.inverse;
     vec3 enter = min(a, b), leave = max(a, b);
@@ -103,7 +103,7 @@ bool bvh_bounds_met(uint instance, BvhRay ray, float t_min, float t_max) {
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
-// Miss: instance NONE, t = t_max. A ray that is none (not finite, no direction, t_min < 0) misses.
+// Miss: instance NONE, t = t_max. An invalid ray (not finite, no direction, t_min < 0) misses.
 Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
     Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
     uint root = nodes[0].x;
@@ -170,7 +170,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             uint entered = nodes[5u * nodes[0].y + primitive / 4u][primitive % 4u];
             bool passed_by = entered == skip_instance || instances[entered].slot != primitive || RAY_SKIPS(entered);
             if (passed_by && instances[entered].owners == 0u) continue;
-            // What is left of the top level waits below `base`.
+            // The rest of the top level waits on the stack below `base`.
             if (primitives.y != 0u && depth < BVH_STACK) {
                 stack[depth] = primitives;
                 depth += 1u;
@@ -188,7 +188,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
             bvh_instances_reached += 1u;
             if (!bvh_bounds_met(instance, ray, t_min, hit.t)) {
                 bvh_false_unions += 1u;
-                bvh_false_boxes -= 1u;   // no triangle will be met either; counted when the mesh is left
+                bvh_false_boxes -= 1u;   // F1, not F2: cancels the count made when the mesh is left
             }
             bvh_triangle_hits = 0u;
 #endif

@@ -3,22 +3,22 @@
 // The includer enables GL_EXT_ray_query, includes triangle.glsl, and declares `tlas`, whose
 // instances carry our instance as custom index (one of those that share a structure) and whose meshes
 // hold the triangles in the same order as triangles[]. It defines RAY_MASK, the mask bits of the entries that are shown, and RAY_SLOTS,
-// whether entries that are not shown share them; then an instance's row says which one is. It may
-// define RAY_SKIPS(i), whether instance i is transparent, and RAY_SELECTS, whether any may be.
+// true if entries that are not shown share them; an instance's row then names the one that is shown. It may
+// define RAY_SKIPS(i), true if instance i is transparent, and RAY_SELECTS, true if any may be.
 
 #ifndef RAY_SKIPS
 #define RAY_SKIPS(i) false
 #define RAY_SELECTS false
 #endif
 
-// Whose the triangle is that a structure has at `index`.
+// The instance to which the triangle at `index` of a structure belongs.
 uint query_owner(uint entered, uint index) {
     return triangle_owner(entered, instances[entered].first_triangle + index);
 }
 
 // The first surface with t_min < t < t_max along origin + t direction, world space; direction need
 // not be a unit vector. All of `skip_instance` is transparent; NONE: nothing is.
-// Miss: instance NONE, t = t_max. A ray that is none (not finite, no direction, t_min < 0) misses.
+// Miss: instance NONE, t = t_max. An invalid ray (not finite, no direction, t_min < 0) misses.
 Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip_instance) {
     Hit hit = Hit(t_max, NONE, NONE, 0.0, 0.0);
     float size = max(max(abs(direction.x), abs(direction.y)), abs(direction.z));
@@ -47,7 +47,7 @@ Hit closest_hit(vec3 origin, vec3 direction, float t_min, float t_max, uint skip
         hit.primitive = instances[entered].first_triangle + index;
         hit.u = uv.x;
         hit.v = uv.y;
-        // The device only chooses the triangle; where it is met, both tracers must say alike.
+        // The device only chooses the triangle; the hit is computed here, so that both tracers agree exactly.
         ShearedRay ray = sheared_ray(object_point(hit.instance, origin), object_direction(hit.instance, direction));
         TriangleHit h = triangle_hit(ray, hit.primitive);
         if (h.sum != 0.0 && h.t > t_min && h.t < t_max) {

@@ -1,7 +1,7 @@
 // variants: bvh query(RAY_QUERY)
 #version 460
-// Which mesh and which tissue each sample lies in, straight along the scanline in the middle of the slice: the anatomy
-// as it is, not as sound shows it. One work group is one scanline.
+// Labels: the mesh and the tissue at each sample, straight along the scanline in the middle of the slice; the anatomy
+// without refraction. One work group is one scanline.
 #extension GL_GOOGLE_include_directive : require
 #ifdef RAY_QUERY
 #extension GL_EXT_ray_query : require
@@ -37,7 +37,7 @@ layout(std430, binding = 8) buffer LabelBuffer { uint labels[]; };
 #include "transform.glsl"
 #include "crossings.glsl"
 
-// What is around the scanline up to each crossing, and behind the last.
+// The instance around the scanline up to each crossing, and behind the last.
 shared uint around[MAX_CROSSINGS + 1u];
 
 void main() {

@@ -1,7 +1,7 @@
-// Lattices of scatterers, as coarse as speckle allows, and how a beam walks them; tools/reference/lattice.rs
+// Lattices of scatterers, as coarse as speckle allows, and their enumeration along a beam; tools/reference/lattice.rs
 // says why. The includer declares tissues[], rows[] and frame and includes random.glsl.
 
-// A cell's edge on six levels in a row, and its volume on two: two levels on the volume has doubled.
+// Edges of cells on six successive levels, and volumes on two; the volume doubles every two levels.
 const float EDGES[6] = float[6](1.0, 1.122462, 1.259921, 1.4142135, 1.5874011, 1.7817974);
 const float VOLUMES[2] = float[2](1.0, 1.4142135);
 
@@ -34,37 +34,37 @@ bool present(Lattice lattice, uvec3 bits) {
     return (((bits.x & 255u) << 8u) | (bits.y & 255u)) < lattice.presence;
 }
 
-// Which lattice a piece of tissue needs, a number between levels: `wanted` of the axial row, or what still holds
-// eight cells for each of the tissue's own scatterers; coarser by `drowned`. Both are log2 of volumes, in cells of the finest.
+// Lattice level that a piece of tissue needs, not rounded: the coarser of `wanted`, of the axial row, and the level that still has
+// eight cells for each of the tissue's own scatterers; coarser by `drowned`. All are log2 of volumes, in cells of the finest.
 float wanted_level(uint tissue, float wanted, float drowned) {
     if (wanted <= ALL_LEVELS) return 0.0;
     float own = -log2(8.0 * tissues[tissue].density);
     return clamp(LEVELS_PER_OCTAVE * (max(wanted, own) + drowned), 0.0, float(LATTICE_LEVELS));
 }
 
-// Share of the power that a level carries where `wanted` is needed.
+// Share of the power that a level carries if level `wanted` is needed.
 float level_power(float wanted, int number) {
     float above = wanted - float(number);
     return min(clamp((above + LEVEL_FADE) / LEVEL_FADE, 0.0, 1.0), clamp((1.0 - above) / LEVEL_FADE, 0.0, 1.0));
 }
 
-// How a lattice is walked under a beam: axis a along it, b across, c through the slab of the layer.
+// Enumeration of a lattice under a beam: axis a along it, b across, c through the slab of the layer.
 struct Walk {
     uint a; uint b; uint c;
     vec2 along; vec2 across;   // per mm of a and b within the slab's middle plane: along the beam, and across
-    vec2 tilt;                 // what c falls by per mm of a and b within that plane
+    vec2 tilt;                 // decrease of c per mm of a and b within that plane
     float inverse_c;           // of the slab's normal
     float inverse_across;      // of across.y, without its sign
-    float slant;               // what lies 1 mm above the slab's middle plane, along c, lies this much across
+    float slant;               // shift across, mm, of a point 1 mm above the slab's middle plane along c
     float inverse_slant;
     float drift;               // of the axis, mm of b per mm of a
     float step;                // along the axis per mm of a
 };
 
-// Keeps away from zero, where a field squeezes tissue to nothing.
+// Keeps a divisor away from zero, where a field squeezes tissue to no volume.
 float at_least(float v, float least) { return mix(max(v, least), min(v, -least), v < 0.0); }
 
-// The three directions of the beam in the lattice's space: covectors, where tissue is deformed.
+// The three directions of the beam in the lattice's space; covectors in deformed tissue.
 Walk walk_of(vec3 d, vec3 lateral, vec3 up) {
     Walk w;
     vec3 size = abs(up);
@@ -96,22 +96,22 @@ Walk walk_of(vec3 d, vec3 lateral, vec3 up) {
 
 ivec3 unit_step(uint axis) { return ivec3(equal(uvec3(axis), uvec3(0u, 1u, 2u))); }
 
-// Cells, of edge 1 / inverse_h, whose middles lie in `ends` about `rest`: the first, and the first behind. At most
-// 1024: whatever a spoiled number says, the walk ends.
+// Cells, of edge 1 / inverse_h, whose centres lie in `ends` about `rest`: the first one, and the first one after them. At most
+// 1024, so that the loop over them ends even for NaN.
 ivec2 cells_between(vec2 ends, float rest, float inverse_h) {
     vec2 at = clamp(ceil((ends + rest) * inverse_h - 0.5), -1e6, 1e6);
     int first = whole(at.x);
     return ivec2(first, first + min(whole(clamp(at.y - at.x, 0.0, 1024.0)), 1024));
 }
 
-// Where along b in the plane at `da` lies what may be within `width` of the axis and `reach` of the slab's
+// Range along b, in the plane at `da`, that may be within `width` of the axis and within `reach` of the slab's
 // middle plane.
 vec2 row_ends(Walk walk, float da, float width, float reach) {
     float half_range = (width + abs(walk.slant) * reach) * walk.inverse_across;
     return walk.drift * da + vec2(-half_range, half_range);
 }
 
-// Of those in one row the cells that do.
+// Range along c of the cells in one row that are.
 ivec2 columns_between(Walk walk, vec2 at, float width, vec2 slab, float rest, float inverse_h) {
     float across = dot(walk.across, at);
     vec2 up = (vec2(-width, width) - across) * walk.inverse_slant;

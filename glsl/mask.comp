@@ -1,7 +1,7 @@
 // variants: bvh query(RAY_QUERY)
 #version 460
-// Along each scanline, straight through the masking geometry: is the sample outside, and what does
-// the acquired volume show there? One work group is one scanline in the middle of the slice.
+// Straight along each scanline through the masking geometry: the mask (1 outside) at each sample, and
+// the grey level of the acquired volume there. One work group is one scanline in the middle of the slice.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_samplerless_texture_functions : require
 #ifdef RAY_QUERY
@@ -44,10 +44,10 @@ layout(std430, binding = 11) readonly buffer TissueBuffer { Tissue tissues[]; };
 
 #include "crossings.glsl"
 
-shared float depths[MAX_CROSSINGS];       // mm at the probe's speed at which the sound that is there echoes,
-shared float rates[MAX_CROSSINGS + 1u];   // and mm of distance per mm of that depth: up to there, and behind the last
+shared float depths[MAX_CROSSINGS];       // depth at which each crossing echoes, mm at the probe's speed
+shared float rates[MAX_CROSSINGS + 1u];   // mm of distance per mm of depth, up to each crossing and behind the last
 
-// Distance per depth behind the first `passed` crossings: by the speed of the masking instance there.
+// Distance per depth behind the first `passed` crossings, from the speed of the masking instance there.
 float rate_behind(uint passed) {
     if (fusion.mask_speed == MASK_SPEED_PROBE) return 1.0;
     uint around = instance_behind(passed);
@@ -65,7 +65,7 @@ void time_crossings() {
     }
 }
 
-// By hand: the filters of many devices know only 256 places between two texels.
+// Linear filter by hand: the filters of many devices resolve only 256 positions between two texels.
 float acquired_level(vec3 voxel) {
     vec3 size = vec3(float(fusion.size_x), float(fusion.size_y), float(fusion.size_z));
     bool inside = all(greaterThanEqual(voxel, vec3(-0.5))) && all(lessThanEqual(voxel, size - 0.5));

@@ -1,5 +1,5 @@
-// Which medium encloses a point: a small stack of instance ids, entered in order. Stacks are passed
-// `inout` also where they are only read: a copy would move all of them.
+// The media that enclose a point: a small stack of instance ids, in the order of entry. Stacks are passed
+// `inout` even where they are only read: a copy would move the whole stack.
 //
 // The includer declares frame, instances[] and tissues[].
 
@@ -25,14 +25,14 @@ uint tissue_of(uint instance) {
     return instance == NONE ? frame.background : instances[instance].tissue;
 }
 
-// What sound asks of a tissue on its way: mm/us, MRayl, Np/mm at f0.
+// Properties of a tissue that matter to sound on its way: mm/us, MRayl, Np/mm at f0.
 struct Medium { float speed; float impedance; float absorption; };
 
 Medium medium_of(uint tissue) {
     return Medium(tissues[tissue].speed, tissues[tissue].impedance, tissues[tissue].absorption);
 }
 
-// Whether echoes from here are wanted: everywhere, or only inside the mask that is cut into an
+// True if echoes from here are wanted: everywhere, or only inside the mask that is cut into an
 // acquired image.
 bool is_heard(inout Media media) {
     if ((frame.flags & FLAG_MASKED) == 0u) return true;
@@ -60,8 +60,8 @@ bool cross_interface(inout Media media, uint instance, bool entering) {
     return true;
 }
 
-// Around the masks sound goes straight on. Of the weight, what is left behind a surface there: all
-// but what a fluid interface reflects at normal incidence.
+// Weight behind a surface around the masks, where sound goes straight on: all
+// except what a fluid interface reflects at normal incidence.
 float passed(float impedance1, float impedance2) {
     float r = (impedance2 - impedance1) / (impedance2 + impedance1);
     return 1.0 - r * r;

@@ -1,7 +1,7 @@
 // variants: bvh query(RAY_QUERY) count(COUNT)
 #version 460
-// Which media enclose the start of each line: signed crossings along its ray to infinity. Where only
-// what a mask encloses is heard, the way to it is the same for all paths of a line, which then begin
+// The media that enclose the start of each line, from signed crossings along its ray to infinity. If only
+// echoes from inside a mask are wanted, the way to it is the same for all paths of a line, which then begin
 // at its last surface.
 #extension GL_GOOGLE_include_directive : require
 #ifdef RAY_QUERY
@@ -29,9 +29,9 @@ layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline s
 #include "triangle.glsl"
 
 const uint ALL = 0u;
-const uint AROUND = 1u;         // what may enclose the line's start: its box does
+const uint AROUND = 1u;         // instances that may enclose the line's start: those whose box does
 const uint MASKS = 2u;
-uint wanted = ALL;              // what rays meet
+uint wanted = ALL;              // the instances that rays meet
 vec3 line_start;
 
 bool skips(uint instance) {
@@ -89,7 +89,7 @@ void note_crossing(uint instance, bool entering, uint order) {
 
 bool enters(vec3 d, Hit hit) { return dot(d, surface_geometric_normal(hit)) < 0.0; }
 
-// What encloses the start, once all crossings are noted. The outermost first: it is left last.
+// The media that enclose the start, once all crossings are noted; the outermost first, as it is left last.
 void enclose(inout Media media) {
     media.count = 0u;
     uint last = NONE;
@@ -125,12 +125,12 @@ void main() {
     line_start = o;
     Media media, after;
     media.count = 0u;
-    // A path that is aimed elsewhere has a way of its own.
+    // Paths with a random start or direction each have a way of their own.
     bool masked = (frame.flags & FLAG_MASKED) != 0u && frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
     float mask_t = 0.0, travelled = 0.0, weight = 1.0;
     uint interactions = 0u;
-    // Whether a mask is ahead; then what encloses the start; then the way to the mask, straight on as
-    // long as nothing is heard. One loop for all: the walk through the hierarchy is in the kernel once.
+    // Three tasks: whether a mask is ahead; the media around the start; the way to the mask, straight on as
+    // long as no echo is wanted. One loop for all, so that the kernel contains the traversal once.
     wanted = masked ? MASKS : AROUND;
     float t_min = 0.0;
     uint order = 0u;
@@ -168,7 +168,7 @@ void main() {
             t_min = hit.t + close;
             if (twin.instance != NONE) t_min = max(t_min, twin.t + close);
             if (wanted == ALL) copy_media(after, media);
-            // As in trace, the lower instance first.
+            // As in trace, the instance with the lower number first.
             bool turned = wanted == ALL && twin.instance < hit.instance;
             for (uint i = 0u; i < surfaces; ++i) {
                 Hit each = hit;

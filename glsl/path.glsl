@@ -13,7 +13,7 @@ struct Path {
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
     uint interactions; uint reflections; uint crossings;
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
-    float survival;     // chance that it had to be followed; its weight is over that
+    float survival;     // probability with which it was followed; its weight is divided by it
     bool branch;
 };
 
@@ -21,7 +21,7 @@ uvec4 draw(uint n, uint key, uint purpose) {
     return path_draw(n, key, purpose, frame.seed, (frame.flags & FLAG_SOBOL) != 0u);
 }
 
-// Numbers that belong to one line's interaction: what neighbouring lines must not do alike.
+// Random numbers of one line's interaction, for decisions that neighbouring lines must not share.
 const uint PURPOSE_DITHER = 0x51ed270bu;
 const uint PURPOSE_SURVIVAL = 0x2545f491u;
 
@@ -33,7 +33,7 @@ float clearance(vec3 p) {
     return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
 }
 
-// Path n of a line, and what encloses it, where origin lets it begin.
+// Path n of a line and the media around it, at the start that origin gives.
 void start(uint line, uint n, out Path path, inout Media media) {
     vec3 o, d, lateral;
     probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
@@ -71,9 +71,9 @@ void start(uint line, uint n, out Path path, inout Media media) {
     path.interactions = stacks[at + MAX_STACK + 3u];
 }
 
-// Whether rounding has brought back the triangle that the path starts on, which a straight line meets
-// only once. Where refraction leaves a path nearly along the triangle, no clearance would do. One that
-// was cut has several numbers: its corners say which it is.
+// True if by rounding the ray meets again the triangle on which the path starts, which a straight line meets
+// only once. For a path refracted nearly along the triangle no clearance would be enough. A triangle that
+// was cut has several numbers, so its corners are compared.
 bool is_left(Path path, Hit hit) {
     if (hit.instance != path.left_instance) return false;
     uint a = 3u * hit.primitive;

@@ -1,14 +1,14 @@
 // Scatterers of deformed tissue along a stretch: part of scatter.comp, which declares what is used here.
 
-// Tissue is squeezed to less than half of its length by no organ; a coarse field may say so where
-// surfaces slide past each other. There the search for scatterers is kept to what a frame affords: those
+// No organ squeezes tissue to less than half of its length, but a coarse field may contain such values where
+// surfaces slide past each other. There the search for scatterers is limited: those
 // at the beam's edge may be missed.
 const float MOST_SQUEEZED = 2.5;
 
 vec3 bounded(vec3 v) { return v * min(1.0, MOST_SQUEEZED * inversesqrt(max(dot(v, v), 1e-12))); }
 
 // Echo of a scatterer of deformed tissue at `rel` from the stretch's origin, if it is within the beam, the
-// slab of the layer and, along the beam, `x`: whether, and whether a sample could not hold it.
+// slab of the layer and the range `x` along the beam. Returns 1 if it is, and the number of samples that could not hold it.
 uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowned) {
     float along = dot(rel, s.d);
     float up = dot(rel, s.e_e);
@@ -29,8 +29,8 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
 }
 
 // Scatterers of one lattice of deformed tissue between two distances. Cells are found where the piece lies
-// in the reference shape, by the affine map at its middle and as much more as that misses; each scatterer
-// is then heard where it is, by the piece that holds it.
+// in the reference shape: by the affine map at its middle, widened by the map's error. Each scatterer
+// then echoes from its true place, in the piece that holds it.
 uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
     float h = lattice.edge, inverse_h = lattice.inverse_edge;
@@ -46,7 +46,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     if (!(width > 0.0)) return uvec3(0u);
     float reach = slab_of().y;
 
-    // How far tissue at the corners is from where the affine map puts it; half as much again for what is between.
+    // Error of the affine map at the corners, half as much again for the points between them.
     vec3 d = bounded(undeform(jacobian, s.d)), el = bounded(undeform(jacobian, s.e_l)), ee = bounded(undeform(jacobian, s.e_e));
     float miss = 0.0;
     for (uint i = 0u; i < 8u; ++i) {
@@ -60,7 +60,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     Walk walk = walk_of(along, across, up);
     float high = reach + miss + 0.51 * h * dot(abs(up), vec3(1.0));
     float wide = width + miss + 0.51 * h * dot(abs(across), vec3(1.0));
-    // Along the beam, of what is within the slab's middle plane.
+    // Along the beam, within the slab's middle plane.
     float deep = half_length + miss + 0.51 * h * dot(abs(along), vec3(1.0)) + high * abs(along[walk.c] * walk.inverse_c);
     float far = deep + (wide + high * abs(walk.slant)) * abs(walk.along.y / walk.across.y);
     float row_slope = 1.0 / at_least(walk.along.y, 1e-4);
@@ -68,7 +68,7 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     vec3 nearest = floor(middle * inverse_h);
     vec3 rest = fma(-nearest, vec3(h), middle);
     ivec3 base = ivec3(nearest);
-    // Squeezed tissue echoes as before, though its scatterers lie closer.
+    // Squeezed tissue keeps its echo level though its scatterers are closer together.
     float growth = abs(dot(jacobian[0], cross(jacobian[1], jacobian[2])));
     float strength = lattice.amplitude * s.weight * frame.volume_scale * sqrt(clamp(growth, LEAST_GROWTH, 1.0 / LEAST_GROWTH));
     float depth = tissues[s.tissue].texture_depth;
@@ -81,14 +81,14 @@ uvec3 march_piece(Stretch s, int number, vec2 x, float drowned) {
     uvec3 count = uvec3(0u);
     for (int i = plane.x; i < plane.y; ++i) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
-        // Of the plane's rows those within the piece's ends.
+        // The rows of the plane within the ends of the piece.
         vec2 within = (vec2(-deep, deep) - walk.along.x * da) * row_slope;
         vec2 ends = row_ends(walk, da, wide, high);
         ends = vec2(max(ends.x, min(within.x, within.y)), min(ends.y, max(within.x, within.y)));
         ivec2 row_range = cells_between(ends, rest[walk.b], inverse_h);
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);
-        // Threads that run together look each for its next scatterer; then all have one.
+        // Threads of a group first each search their next scatterer, so that all then have one to work on.
         while (j < row_range.y) {
             bool found = false;
             vec3 rel = vec3(0.0);

@@ -17,7 +17,7 @@ void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lat
     lateral = vec3(direction.z, 0.0, -direction.x);
 }
 
-// Axial sample at `kappa` pitches along a line, the nearest end where that lies outside; 0 for NaN.
+// Axial sample at `kappa` pitches along a line, limited to the ends; 0 for NaN.
 uint sample_at(float kappa) {
     return uint(whole(floor(clamp(mix(0.0, kappa, kappa > 0.0), 0.0, float(frame.samples - 1u)))));
 }
@@ -53,7 +53,7 @@ float face_distance(vec3 o, vec3 d) {
         float c = (distance_to_axis - frame.radius) * (distance_to_axis + frame.radius);
         t = c / (sqrt(discriminant) - b);
         vec2 p = q + t * v;
-        // Beside the edge: the sine of the angle between the two is positive.
+        // Beyond the edge if the sine of the angle between the two is positive.
         if (abs(p.x) * scanlines[frame.scanlines].cosine > p.y * scanlines[frame.scanlines].sine) { return -1.0; }
     } else {
         return -1.0;

@@ -20,8 +20,8 @@ uvec3 pcg3d(uvec3 v) {
 // [0, 1) with 24 bits.
 float unit(uint bits) { return float(bits >> 8u) * (1.0 / 16777216.0); }
 
-// Natural logarithm of a number in (2^-25, 1), within 3e-7 of itself. A device's own may be 2^-21 off, and
-// above 0, where next to 1 less than that is left.
+// Natural logarithm of a number in (2^-25, 1), relative error 3e-7. A device's own may be 2^-21 off and
+// positive, although the logarithm of a number close to 1 is smaller than that.
 float logarithm(float u) {
     // u = m 2^e, m within sqrt(2) of 1.
     int e = (floatBitsToInt(u) - 0x3f3504f3) >> 23;
@@ -66,7 +66,7 @@ uint owen(uint x, uint seed) {
 }
 
 // Instead of the first two words of path_random: over the paths they are the first two dimensions of a Sobol sequence, Owen
-// scrambled, its order shuffled so that the decisions of one path know nothing of each other (Burley,
+// scrambled, its order shuffled so that the decisions of one path are independent (Burley,
 // JCGT 9(4), 2020): the first 2^k paths cover the unit square evenly.
 uvec2 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
     uvec4 key = pcg4d(uvec4(0x9e3779b9u, bounce, purpose, seed));
@@ -82,7 +82,7 @@ uvec2 path_sobol(uint path, uint bounce, uint purpose, uint seed) {
     return uvec2(bitfieldReverse(laine_karras(index, key.y)), bitfieldReverse(laine_karras(second, key.z)));
 }
 
-// The words of a path as the frame draws them.
+// The random words of a path, from the sequence that the frame uses.
 uvec4 path_draw(uint path, uint bounce, uint purpose, uint seed, bool sobol) {
     uvec4 bits = path_random(path, bounce, purpose, seed);
     if (sobol) bits.xy = path_sobol(path, bounce, purpose, seed);

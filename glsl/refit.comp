@@ -1,5 +1,5 @@
-// Moves the boxes of one level of an eight-wide hierarchy to where its triangles are now. Which
-// triangles and children a node has, and in which order they are visited, stays as it was built.
+// Fits the boxes of one level of an eight-wide hierarchy to the present triangles. The
+// triangles and children of a node, and the order in which they are visited, stay as built.
 //
 // Eight threads per node, one per child, for which the node format (intersect_bvh.glsl) has a place.
 #version 460
@@ -22,7 +22,7 @@ layout(std430, binding = 2) readonly buffer Triangles { uint triangles[]; };
 layout(std430, binding = 3) buffer Boxes { float boxes[]; };     // per node: low, high
 layout(std430, binding = 4) readonly buffer Order { uint order[]; };
 
-// Of each child, and of what the union of the first 4, 2, 1 threads of a node has grown to.
+// Box of each child; then the unions of the boxes in the first 4, 2, 1 threads of a node.
 shared vec3 lows[64];
 shared vec3 highs[64];
 // Quantised planes of each child, one axis per word: lower plane in the low byte, upper above it.
@@ -57,7 +57,7 @@ Box child_box(uint node, uint child) {
     return box;
 }
 
-// What a - b lacks of the exact difference (Knuth 1969).
+// The rounding error of a - b: the exact difference minus the rounded one (Knuth 1969).
 vec3 lost(vec3 a, vec3 b, vec3 difference) {
     precise vec3 minus_b = difference - a;
     precise vec3 rest = (a - (difference - minus_b)) - (b + minus_b);
@@ -79,14 +79,14 @@ uvec3 exponents(vec3 low, vec3 high) {
         beyond.z || (just.z && more.z) ? 1u : 0u);
 }
 
-// Largest whole number of quanta up to low - corner, least one down to high - corner, both exactly.
+// Largest number of quanta not above low - corner, smallest not below high - corner, both exact.
 uvec3 quantised(vec3 corner, uvec3 exponent, vec3 low, vec3 high) {
     vec3 per_quantum = uintBitsToFloat((254u - exponent) << 23u);
     precise vec3 from = low - corner;
     precise vec3 to = high - corner;
     vec3 first = floor(from * per_quantum);
     vec3 last = ceil(to * per_quantum);
-    // Rounding may have moved a difference onto a plane, from above or from below.
+    // Corrects for a difference that rounding has moved onto a plane, from above or from below.
     vec3 under = min(sign(lost(low, corner, from)), vec3(0.0));
     vec3 over = max(sign(lost(high, corner, to)), vec3(0.0));
     first += mix(vec3(0.0), under, equal(first, from * per_quantum));

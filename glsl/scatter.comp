@@ -2,7 +2,7 @@
 #version 460
 // Echoes of scatterers and point targets along the segments of one scanline. One workgroup owns one
 // (scanline, chunk of its segments, window of samples) and gathers in shared memory, so that global
-// atomics happen once per sample. A thread walks what one segment has in one bin of samples.
+// atomics happen once per sample. A thread works on one segment in one bin of samples.
 #extension GL_GOOGLE_include_directive : require
 #include "shared.glsl"
 #include "random.glsl"
@@ -22,8 +22,8 @@ layout(std430, binding = 8) restrict buffer CounterBuffer { Counters counters; }
 layout(std430, binding = 9) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 layout(std430, binding = 10) restrict readonly buffer FieldBuffer { vec4 fields[]; };   // of the deforming one
 
-// Whether any instance's tissue deforms. Two modules: not every driver drops what a specialization
-// constant switches off, and the half for deformed tissue is the larger one.
+// True if any instance's tissue deforms. Two modules, as not every driver removes the code that a specialization
+// constant switches off, and the code for deformed tissue is the larger half.
 #ifdef DEFORMING_TISSUE
 const bool DEFORMING = true;
 #else
@@ -37,25 +37,25 @@ const bool DEFORMING = false;
 #include "deposit.glsl"
 
 const uint THREADS = 64u;
-const float POINT_SHIFT = 0.01234;   // of a layer's pitch
+const float POINT_SHIFT = 0.01234;   // shift of the layers' borders, in their pitch
 const float LOG2_E = 1.44269504;
-const float INVERSE_FALL = 1.38629436;    // of a beam's fall: its deviation squared is 1 over the two
-const float LEVEL_SPAN = 3.0;             // mm of depth between rows that are asked for the level they need
-const float SHAPE_SPAN = 0.6;             // mm of depth to either side by which the beam's change is known
+const float INVERSE_FALL = 1.38629436;    // 2 ln 2: times `shape.x` or `shape.y` it is 1 / sigma^2
+const float LEVEL_SPAN = 3.0;             // mm of depth between the rows whose lattice level is looked up
+const float SHAPE_SPAN = 0.6;             // mm of depth to either side, for differences of the beam's shape
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
-const int BESIDE = 2;                     // bins on each side whose scatterers may lie in the window
-const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // of a bin
+const int BESIDE = 2;                     // bins on each side whose scatterers may echo in the window
+const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // per bin
 const float SLOT_MARGIN = 0.5 / float(SCATTER_SLOT);
 const int SLOTS_BESIDE = BESIDE * int(SLOTS);
-const uint PIECES = SCATTER_BIN / SCATTER_PIECE;  // of a bin, in deformed tissue
-const float LEVEL_UNIT = 65536.0;         // of the integers by which levels are compared
+const uint PIECES = SCATTER_BIN / SCATTER_PIECE;  // per bin, in deformed tissue
+const float LEVEL_UNIT = 65536.0;         // integers per unit of level, for comparisons
 const int SILENT = -0x40000000;
 
 shared int echoes[2u * SCATTER_WINDOW];
-shared int loudest[(BINS + 2u * uint(BESIDE)) * SLOTS];   // per slot, of all segments of the scanline; also beside the window
-shared uint line_end[MAX_ELEVATION_LAYERS];   // stretches of the scanline's lines up to that of each layer
-shared uint work_at[THREADS];       // of some stretches: where they are, and
-shared uint work_end[THREADS];      // how many items of work they and those before them have
+shared int loudest[(BINS + 2u * uint(BESIDE)) * SLOTS];   // largest level per slot of all segments of the scanline; also beside the window
+shared uint line_end[MAX_ELEVATION_LAYERS];   // number of segments of the scanline in all layers up to each one
+shared uint work_at[THREADS];       // indices of some segments,
+shared uint work_end[THREADS];      // and the number of items of work up to each of them
 shared uint shared_candidates;
 shared uint shared_deposits;
 
@@ -119,7 +119,7 @@ float distance_at(Stretch s, float kappa) {
 
 uint row_at(float kappa) { return sample_at(kappa); }
 
-// A stretch with a number that is none has no echoes. NaN fails every comparison.
+// A stretch with NaN or infinity has no echoes. NaN fails every comparison.
 bool is_finite(Stretch s) {
     return abs(s.extent) < 1e18 && abs(s.time) < 1e18 && abs(s.weight) < 1e18 && abs(s.share) < 1e18
         && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)))
@@ -130,8 +130,8 @@ bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
 
 bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
 
-// What a rough reflection spreads over many resolution cells averages down; what lies off the
-// scanline is heard less. `shape`: of the row.
+// The factor on amplitudes: echoes that a rough reflection spreads over many resolution cells average out; a path off the
+// geometric scanline is received more weakly. `shape` is that of the row.
 float thinning(Stretch s, float x, vec4 shape) {
     float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
     float beam = beam_weight(s.off.x + x * s.off.y);
@@ -141,39 +141,39 @@ float thinning(Stretch s, float x, vec4 shape) {
     return beam * min(1.0, sqrt(s.share / cells));
 }
 
-// How loud its speckle is at distance x: one-way weight times echogenicity, log2.
+// Level of its speckle at distance x: one-way weight times echogenicity, log2.
 float level_at(Stretch s, float x) {
     uint row = row_at(kappa_at(s, x));
     float weight = s.weight * thinning(s, x, rows[row].shape);
     return log2(weight) - s.absorption * LOG2_E * x + tissues[s.tissue].level;
 }
 
-// First and last bin that a stretch passes; none: the last is before the first.
+// First and last bin that a stretch passes; if it passes none, the last is before the first.
 ivec2 bins_of(Stretch s) {
     float begin = kappa_at(s, 0.0), end = kappa_at(s, s.extent);
     if (!(end > 0.0) || !(begin < float(frame.samples))) return ivec2(0, -1);
     return ivec2(row_at(begin) / SCATTER_BIN, row_at(end) / SCATTER_BIN);
 }
 
-// First and last slot that a stretch fills, but for half a sample at either end: where the recording ends
-// stretches end too, and rounding must not decide.
+// First and last slot that a stretch fills, up to half a sample at either end: stretches also end where the
+// recording ends, and rounding must not decide whether the last slot is filled.
 ivec2 slots_of(Stretch s) {
     vec2 ends = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)), vec2(0.0), vec2(float(frame.samples))) / float(SCATTER_SLOT);
     return ivec2(whole(ceil(ends.x - SLOT_MARGIN)), whole(floor(ends.y + SLOT_MARGIN)) - 1);
 }
 
-// Level where a stretch is held against the others of a bin.
+// Level of a stretch for the comparison with the others in a bin.
 float level_in(Stretch s, int bin) {
     return level_at(s, clamp(distance_at(s, float(bin) * float(SCATTER_BIN) + 0.5 * float(SCATTER_BIN)), 0.0, s.extent));
 }
 
-// The slab of a layer about its middle, mm. Layers meet off the round numbers at which cells have their
-// middles: rounding must not give one to two layers, or to none.
+// The slab of a layer about its middle, mm. Borders of layers avoid the round numbers at which cells have their
+// centres: by rounding a cell could belong to two layers or to none.
 vec2 slab_of() { return (vec2(-1.0, 1.0) + 2.0 * POINT_SHIFT) * frame.elevation_reach; }
 
 #include "lattice.glsl"
 
-// Adds to a sample of the window; 1 where the sum could not hold it.
+// Adds to a sample of the window; returns 1 if the value is too large.
 uint deposit_at(int slot, vec2 v) {
     if (slot >= 0 && slot < int(min(SCATTER_WINDOW, frame.samples - window_begin))) {
         vec2 held = clamp(v, vec2(-ECHO_LIMIT), vec2(ECHO_LIMIT));
@@ -183,8 +183,8 @@ uint deposit_at(int slot, vec2 v) {
     return uint(!(max(abs(v.x), abs(v.y)) < ECHO_LIMIT));
 }
 
-// A scatterer's echo at the sample nearest to it. About halfway between two samples each gets a share: of
-// what rounding does to a place, little is then seen. 1 for each sample that could not hold it.
+// Adds a scatterer's echo to the sample nearest to it. About halfway between two samples each gets a share, so that
+// rounding of the place has little effect. Returns the number of samples for which the value is too large.
 uint deposit_near(float kappa, vec2 v) {
     float before = floor(clamp(kappa, -1e6, 1e6));
     float share = clamp(0.5 - (kappa - before - 0.5) / SAMPLE_BLEND, 0.0, 1.0);
@@ -193,7 +193,7 @@ uint deposit_near(float kappa, vec2 v) {
         slot += 1;
         share = 1.0;
     }
-    // A loop: where no thread of a group has a second share, no device spends time on it.
+    // A loop, so that no time is spent if no thread of a group has a second share.
     uint saturated = 0u;
     for (int i = 0; i < 2 && share > 0.0; ++i) {
         saturated += deposit_at(slot + i, share * v);
@@ -202,28 +202,28 @@ uint deposit_near(float kappa, vec2 v) {
     return saturated;
 }
 
-// Half the beam's width at a row, mm: an ellipse in the plane of width and height, of which the
-// layer's edge nearest to the middle counts.
+// Half the beam's width at a row, mm: the beam's section is an ellipse, of which the
+// edge of the layer nearest to the middle is taken.
 float half_width(Stretch s, vec4 shape) {
     float nearest = max(abs(s.layer_y) - frame.elevation_reach, 0.0);
     float height = nearest / frame.lateral_cut;
     return frame.lateral_cut * sqrt(max(1.0 - INVERSE_FALL * shape.y * height * height, 0.0) / (INVERSE_FALL * shape.x));
 }
 
-// Scatterers of one lattice near a stretch, plane by plane. x: the distances at which planes are crossed
-// that belong to this work. A cell counts when its middle is within the beam's width, taken where the
-// axis crosses the plane's middle, and within the layer's slab; its scatterer, within the stretch's ends.
+// Echoes of the scatterers of one lattice near a stretch, plane by plane. x: range of the distances of crossed planes
+// that belong to this work. A cell counts if its centre is within the beam's width, taken where the
+// axis crosses the plane's middle, and within the layer's slab; its scatterer, if it is within the stretch's ends.
 uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     Lattice lattice = lattice_of(s.tissue, number);
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
     float h = lattice.edge, inverse_h = lattice.inverse_edge;
-    // The lattice about the middle: what is summed below is small.
+    // Lattice coordinates relative to the middle, so that the sums below are small.
     float x_middle = clamp(0.5 * (x.x + x.y), 0.0, s.extent);
     vec3 middle = s.o + x_middle * s.d;
     vec3 nearest = floor(middle * inverse_h);
     vec3 rest = fma(-nearest, vec3(h), middle);
     ivec3 base = ivec3(nearest);
-    // From the stretch's own origin: bins that share an end then share out the planes alike.
+    // From the stretch's own origin, so that bins with a common end divide the planes consistently.
     vec2 ends = clamp(ceil((s.o[walk.a] + x / walk.step) / h - 0.5), -1e6, 1e6);
     ivec2 plane = ivec2(min(ends.x, ends.y), max(ends.x, ends.y)) - base[walk.a];
     plane.y = min(plane.y, plane.x + 1024);
@@ -241,7 +241,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
     uvec3 count = uvec3(0u);
     for (int i = plane.x; i < plane.y; ++i) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
-        float ahead = walk.step * da;         // of the middle, where the axis crosses the plane
+        float ahead = walk.step * da;         // distance from the middle to where the axis crosses the plane
         uint row = row_at(kappa_middle + ahead * per_mm);
         vec4 shape = rows[row].shape;
         float wanted = wanted_level(s.tissue, shape.w, drowned);
@@ -250,13 +250,13 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         if (!(power > 0.0) || !(width > 0.0)) continue;
         float x_plane = x_middle + ahead;
 
-        // Over the plane the beam's shape and the gain change as a parabola, through samples on both sides.
+        // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
         vec3 here = shape.xyz, shape_below = rows[below].shape.xyz, shape_above = rows[above].shape.xyz;
         vec3 slope = (shape_above - shape_below) * run;
         vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
-        // A row holds for its whole sample: its numbers are those of the sample's middle.
+        // The values of a row belong to the middle of its sample.
         float row_ahead = (float(row) + 0.5 - kappa_middle) / per_mm;
 
         float strength = lattice.amplitude * sqrt(power) * s.weight * thinning(s, x_plane, shape) * frame.volume_scale;
@@ -267,7 +267,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float constant = here.z - s.absorption * LOG2_E * x_middle;
 
         ivec2 row_range = cells_between(row_ends(walk, da, width, slab.y), rest[walk.b], inverse_h);
-        // Rows and their cells in one loop: threads that run together all have a cell nearly every time.
+        // Rows and their cells in one loop, so that nearly all threads of a group have a cell in each step.
         int j = row_range.x - 1;
         ivec2 column = ivec2(0);
         while (j < row_range.y) {
@@ -303,7 +303,7 @@ float end_width(Stretch s, vec2 x) {
     return max(half_width(s, rows[row_at(kappa_at(s, x.x))].shape), half_width(s, rows[row_at(kappa_at(s, x.y))].shape));
 }
 
-// How far ahead of the crossing of its plane a cell's scatterer can be.
+// Largest distance along the beam between a cell's scatterer and the crossing of its plane.
 float plane_margin(Stretch s, vec2 x, int number) {
     Walk walk = walk_of(s.d, s.e_l, s.e_e);
     float width = end_width(s, x);
@@ -314,14 +314,14 @@ float plane_margin(Stretch s, vec2 x, int number) {
 
 #include "pieces.glsl"
 
-// All that a stretch has in one bin of the window, or beside it.
+// Echoes of a stretch in one bin of the window, or beside it.
 uvec3 march_bin(Stretch s, int bin, int piece) {
     ivec2 passed = bins_of(s);
     float level = level_in(s, bin);
     uint middle = min(uint(bin) * SCATTER_BIN + SCATTER_BIN / 2u, frame.samples - 1u);
     float black = rows[middle].black;
     if (level < black - UNHEARD) return uvec3(0u);
-    // What something else is louder than all along the bin, as far as the stretch reaches.
+    // The lowest of the slots' loudest levels in the bin, over the part that the stretch reaches.
     vec2 reached = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)) / float(SCATTER_SLOT), -1e6, 1e6);
     int window = int(window_begin / SCATTER_SLOT) - SLOTS_BESIDE;
     int slot = max(whole(floor(reached.x)), bin * int(SLOTS));
@@ -338,13 +338,13 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
         end = begin + SCATTER_PIECE;
     }
     vec2 x = vec2(distance_at(s, float(begin)), distance_at(s, float(end)));
-    // Before the first sample and behind the last there is no other bin.
+    // The first and the last bin also have what lies before the first and behind the last sample.
     bool first = begin == 0u || bin == passed.x && (!field || x.x <= 0.0);
     bool last = end >= frame.samples || bin == passed.y && (!field || x.y >= s.extent);
     x = vec2(mix(max(x.x, 0.0), 0.0, first), mix(min(x.y, s.extent), s.extent, last));
     if (!(x.y > x.x)) return uvec3(0u);
 
-    // Levels that some plane may need; between the rows that are asked it is a twentieth of one at most.
+    // Levels that some plane may need. Between the rows looked up they differ by a twentieth of a level at most.
     float lowest = 1e9, highest = -1e9;
     int spans = clamp(whole(ceil(min((x.y - x.x) / LEVEL_SPAN, 64.0))), 2, 64);
     for (int i = 0; i <= spans; ++i) {
@@ -359,7 +359,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
         if (field) {
             count += march_piece(s, number, x, drowned);
         } else {
-            // Planes crossed beyond the ends have scatterers before them.
+            // Planes that are crossed beyond the ends may have scatterers within them.
             float margin = plane_margin(s, x, number);
             count += march_planes(s, number, x + margin * mix(vec2(0.0), vec2(-1.0, 1.0), bvec2(first, last)), drowned);
         }
@@ -367,7 +367,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     return count;
 }
 
-// One equally spaced sample looked up in the voxel grid; the jitter hides the grid from the carrier.
+// Echo of one equally spaced sample looked up in the voxel grid; the jitter decorrelates the grid from the carrier.
 uvec3 march_sample(Stretch s, int k) {
     float x = distance_at(s, float(k));
     if (!(x >= 0.0 && x < s.extent)) return uvec3(0u);
@@ -393,13 +393,13 @@ uvec3 march_sample(Stretch s, int k) {
     return uvec3(1u, 1u, deposit_near(kappa, q * rows[row_at(kappa + 0.5)].volume_gain));
 }
 
-// One point target: 1 for each sample that could not hold it.
+// Adds the echo of one point target; returns the number of samples for which the value is too large.
 uint march_point(Stretch s, vec4 point) {
     vec3 rel = point.xyz - s.o;
     float x = dot(rel, s.d);
     if (!(x >= 0.0 && x < s.extent)) return 0u;
     float rho_e = dot(rel, s.e_e);
-    // Layers meet off the round numbers at which points lie: rounding must not give one to two, or none.
+    // Borders of layers avoid the round numbers at which points lie: by rounding a point could belong to two or to none.
     float pitch = frame.slice_thickness / float(frame.layers);
     float height = rho_e - POINT_SHIFT * pitch;
     if (!(height >= -0.5 * pitch && height < 0.5 * pitch)) return 0u;
@@ -423,12 +423,12 @@ uint march_point(Stretch s, vec4 point) {
     return saturated;
 }
 
-// Whether the stretch may have a point target of a sphere in the window. The beam is widest at an end of what it passes.
+// True if the stretch may have a point target of a sphere in the window. The beam is widest at an end of the part considered.
 bool passes_sphere(Stretch s, vec4 sphere) {
     vec3 rel = sphere.xyz - s.o;
     float x = dot(rel, s.d);
     float r = sphere.w;
-    // A point sounds in four samples about its own.
+    // A point echoes in four samples around its own.
     vec2 kappa = vec2(kappa_at(s, x - r) - 3.0, kappa_at(s, x + r) + 3.0) - float(window_begin);
     if (!(x >= -r && x < s.extent + r && kappa.y >= 0.0 && kappa.x <= float(SCATTER_WINDOW)
         && abs(dot(rel, s.e_e)) <= (0.5 + POINT_SHIFT) * frame.slice_thickness / float(frame.layers) + r)) return false;
@@ -437,7 +437,7 @@ bool passes_sphere(Stretch s, vec4 sphere) {
     return abs(dot(rel, s.e_l)) <= width + r;
 }
 
-// Where stretch i of those of all the scanline's lines is.
+// Index of segment i of those of all the scanline's lines.
 uint stretch_at(uint scanline, uint i) {
     uint layer = 0u;
     while (i >= line_end[layer]) layer += 1u;
@@ -445,7 +445,7 @@ uint stretch_at(uint scanline, uint i) {
     return (layer * frame.scanlines + scanline) * frame.segment_capacity + i - before;
 }
 
-// First item of work and number of items: samples, or bins (of deformed tissue: pieces of them) of the
+// First item of work and number of items: samples, or bins (in deformed tissue pieces of bins) of the
 // window, and of those beside it.
 ivec2 work_of(Stretch s, bool voxel) {
     if (voxel) {
@@ -482,8 +482,8 @@ void main() {
     barrier();
     uint available = line_end[frame.layers - 1u];
 
-    // What drowns what: the loudest stretch in each slot, of all layers.
-    // Where there are few, several threads share a stretch.
+    // Masking: the level of the loudest stretch in each slot, of all layers.
+    // If there are few stretches, several threads share one.
     uint sharing = THREADS / clamp(available, 1u, THREADS);
     for (uint i = thread / sharing; i < available && !voxel; i += THREADS / sharing) {
         Stretch s = world_stretch(stretch_at(scanline, i));
@@ -535,7 +535,7 @@ void main() {
                 for (uint p = g * POINT_GROUP; p < end; ++p) count.z += march_point(w, points[p]);
             }
         }
-        // Here: naga loses values that two loops carry when they are used after both.
+        // Inside the loop: naga loses values that two loops carry when they are used after both.
         if (count.x > 0u) { atomicAdd(shared_candidates, count.x); atomicAdd(shared_deposits, count.y); }
         if (count.z > 0u) atomicAdd(counters.saturated, count.z);
         barrier();

@@ -1,4 +1,4 @@
-// Where a pixel of the image lies among the scanlines. The including kernel declares
+// The position of a pixel of the image among the scanlines. The including kernel declares
 // `readonly buffer FrameBuffer { Frame frame; }` first.
 
 #include "angles.glsl"

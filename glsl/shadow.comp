@@ -1,7 +1,7 @@
 // variants: bvh query(RAY_QUERY)
 #version 460
-// What the anatomy inside the mask takes from the sound, more than what is around the mask would
-// have: the transmitted path of each line, written down as pieces of straight lines of its level.
+// Shadows: the loss of sound in the anatomy inside the mask beyond the loss that the tissue around the mask would
+// cause. The level along the transmitted path of each line is written as pieces of straight lines.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #ifdef RAY_QUERY
@@ -46,7 +46,7 @@ layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline 
 #include "path.glsl"
 #include "wavefront.glsl"
 
-// Nepers of amplitude at which nothing is left.
+// Level, in nepers of amplitude, that stands for no sound at all.
 const float DARK = -200.0;
 const float NOTHING = 1e-30;
 
@@ -65,7 +65,7 @@ void middle(uint line, out Path path, inout Media media) {
     path.spread = vec3(0.0);
 }
 
-// Sends the path through; the part of its intensity that is reflected, 1 where nothing gets through.
+// Transmits the path; returns the reflected part of its intensity, 1 if nothing is transmitted.
 float pass(inout Path path, Met here, Medium t1, Medium t2) {
     Slope slope = slope_at(here, path, sample_at(frame.speed * path.time / frame.sample_pitch), 0.0);
     float reflected = reflectance_at(slope, path.direction, t1, t2);
@@ -86,9 +86,9 @@ void main() {
     float surrounding = tissues[frame.background].absorption;
     float level = 0.0;
     bool fresh = true;
-    // No mask lies on the line, or nothing gets past a surface.
+    // True if no mask lies on the line, or nothing is transmitted at a surface.
     bool lost = path.weight <= 0.0;
-    // The first of two surfaces that coincide was found; the ray looks for the other.
+    // True while the first of two coincident surfaces has been found and the ray searches for the other.
     bool pairing = false;
     Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
     float close = 0.0;
@@ -96,7 +96,7 @@ void main() {
     while (true) {
         Medium t1 = current_medium(media);
         bool heard = is_heard(media);
-        // Around the mask sound goes on at the speed of the recording.
+        // Around the mask sound travels at the speed assumed by the recording.
         Medium way = t1;
         if (!heard) {
             way.speed = frame.speed;
@@ -112,7 +112,7 @@ void main() {
             fresh = false;
         }
         float t_end = (time_end - path.time) * way.speed;
-        // Nothing is met by a ray without room.
+        // With t_max = -1 the ray meets nothing.
         Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.hit.t - close, 0.0) : path.t_min,
             pairing ? first.hit.t + close : (ends ? -1.0 : t_end), pairing ? first.hit.instance : NONE);
         Met here = surface_met(hit);
@@ -122,7 +122,7 @@ void main() {
             here = first;
             pairing = false;
         } else if (hit.instance == NONE) {
-            // What nothing follows holds to the end of the line.
+            // Marks the end of the list; the last piece extends to the end of the line.
             pieces[next] = vec4(FAR_PIECE, 0.0, 0.0, 0.0);
             break;
         } else {

@@ -1,4 +1,4 @@
-// The only CPU/GPU contract: structures and constants shared by every kernel.
+// Structures and constants shared by all kernels and the host: the only contract between CPU and GPU.
 // src/sim/layout.rs mirrors it; a test compares every offset by reflection, and every constant.
 //
 // Only scalars and vec4, so that std430 and #[repr(C)] agree and naga can read the kernels.
@@ -6,19 +6,19 @@
 
 const uint NONE = 0xffffffffu;
 const uint MAX_STACK = 16u;         // media that may enclose one point
-// What origin leaves of a line: number of media, media; distance (mm) and weight at which its paths
-// begin, as bits of floats, and the interactions up to there.
+// Words that origin writes for a line: number of media, media; distance (mm) and weight at which its paths
+// begin, as bits of floats, and the number of interactions up to there.
 const uint START_WORDS = MAX_STACK + 4u;
 const uint MAX_ELEVATION_LAYERS = 64u;
 const uint BVH_STACK = 32u;         // entries of the compute tracer's stack: the builder refuses deeper trees
 const float ECHO_LIMIT = 1073741824.0; // 2^30: accumulators of this magnitude may have lost an echo
-const uint MAX_PIECES = 64u;        // of the level of what is transmitted along a line
-const float FAR_PIECE = 1e30;       // begins behind every sample: there are no more
-// Outputs of a thread, which share what it reads.
+const uint MAX_PIECES = 64u;        // most pieces of the transmitted level along a line
+const float FAR_PIECE = 1e30;       // begin of the piece that ends the list, beyond every sample
+// Outputs that one thread computes from the values it reads.
 const int BEAM_LINES = 8;           // neighbouring scanlines of one sample
 const int AXIAL_SAMPLES = 8;        // neighbouring samples of one scanline
 const int BLUR_SUMS = 16;           // neighbouring sums of one column
-// Neighbours on each side over which is smoothed at most.
+// Most neighbours on each side over which is smoothed.
 const int LATERAL_REACH = 16;       // scanlines
 const int AXIAL_REACH = 32;         // samples
 
@@ -26,16 +26,16 @@ const uint SAMPLING_MAIN_PATH = 0u;
 const uint SAMPLING_PLAIN = 1u;
 const uint SAMPLING_SHARED_PRIMARY = 2u;
 
-// What the paths of a dispatch of trace do.
-const uint ROLE_WHOLE = 0u;         // they echo, and at every surface choose one way
-const uint ROLE_MAIN = 1u;          // they go through every surface and write down its interaction
-const uint ROLE_BRANCHES = 2u;      // they echo at what was written down and follow what is reflected there
-const float LEAST_SURVIVAL = 0.03125; // of the faint branches no smaller part is followed
+// Roles of the paths in a dispatch of trace.
+const uint ROLE_WHOLE = 0u;         // paths echo, and at every surface choose one direction
+const uint ROLE_MAIN = 1u;          // paths are transmitted at every surface and record the interaction
+const uint ROLE_BRANCHES = 2u;      // paths echo at the recorded interactions and follow what is reflected there
+const float LEAST_SURVIVAL = 0.03125; // smallest probability with which a faint branch is followed
 const uint ECHO_BLOCK = 8u;         // paths that one thread takes one after the other at an interaction
 
 const uint FLAG_ROUGH_TRANSMISSION = 1u;
 const uint FLAG_FACE_REFLECTION = 2u;
-const uint FLAG_COINCIDENT = 4u;    // some instances share triangles exactly
+const uint FLAG_COINCIDENT = 4u;    // some instances have triangles at exactly the same place
 const uint FLAG_WORLD_TEXTURE = 8u;
 const uint FLAG_COHERENT = 16u;     // surface coherence as in the paper, no split
 const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the lattice
@@ -50,22 +50,22 @@ const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
 const uint BLEND_MULTIBAND = 2u;
-const uint MASK_SPEED_PROBE = 0u;      // of samples on their way through masks
+const uint MASK_SPEED_PROBE = 0u;      // speed of samples through masks
 const uint MASK_SPEED_ENCLOSING = 1u;
 
 // Lattices of scatterers: two levels on cells have twice the volume.
 const uint LATTICE_LEVELS = 48u;
 const float LEVELS_PER_OCTAVE = 2.0;
-const float LEVEL_FADE = 0.15;      // part of a level over which the next one takes over
+const float LEVEL_FADE = 0.15;      // fraction of a level over which one lattice is cross-faded to the next
 const float ALL_LEVELS = -1000.0;
 const uint SCATTER_WINDOW = 1024u;  // samples that one workgroup of scatter gathers
-const uint SCATTER_BIN = 64u;       // samples in which a thread of it walks one stretch
-const uint SCATTER_SLOT = 16u;      // samples over which stretches are held against each other
-const float LEAST_GROWTH = 0.05;    // of tissue's volume; a coarse field may say less, or more than 1 over it
-const uint SCATTER_PIECE = 32u;     // samples in which deformed tissue is searched at once
-const float SAMPLE_BLEND = 0.0625;  // of a sample: about halfway between two, both get a share of a scatterer
+const uint SCATTER_BIN = 64u;       // samples of a stretch for which one thread of scatter works
+const uint SCATTER_SLOT = 16u;      // samples over which the levels of stretches are compared
+const float LEAST_GROWTH = 0.05;    // smallest relative volume of squeezed tissue, largest is its inverse; a coarse field may exceed both
+const uint SCATTER_PIECE = 32u;     // samples for which deformed tissue is searched together
+const float SAMPLE_BLEND = 0.0625;  // fraction of a sample, halfway between two, in which both get a share of a scatterer
 const uint POINT_GROUP = 8u;        // point targets that share a bounding sphere
-const float UNHEARD = 3.3219281;    // log2(10): 20 dB under black nothing is summed
+const float UNHEARD = 3.3219281;    // log2(10): what is more than 20 dB below black is not summed
 
 const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
@@ -93,16 +93,16 @@ struct Frame {
     float unused0; float unused1; float unused2;
 };
 
-// Of a scanline, in probe space: where it starts (mm, elevation aside) and the direction in which it
-// looks, (sine, 0, cosine). Behind the last one stands the face's edge, where another half pitch
-// would end.
+// A scanline in probe space: its start (mm, without elevation) and its
+// direction, (sine, 0, cosine). After the last one stands the face's edge, half a pitch
+// farther.
 struct Scanline { float x; float z; float sine; float cosine; };
 
 struct Tissue {
     float speed; float impedance; float absorption; float presence;   // mm/us, MRayl, Np/mm at f0, rho
     float mean; float sigma; float texture_depth; float texture_length; // calibrated amplitudes, k, mm
     uint seed;
-    float density;                     // of scatterers of one amplitude, per cell of the finest lattice, that make its speckle
+    float density;                     // scatterers of one amplitude, per cell of the finest lattice, that give its speckle statistics
     float amplitude;                   // RMS of a cell of the finest lattice, without texture
     float level;                       // echogenicity, log2
 };
@@ -118,9 +118,9 @@ struct Instance {
     vec4 texture_from_world[3];        // rigid: the frame in which the scatterer lattice rests
     uint tissue; int priority; uint surface_outside; uint surface_inside;
     uint first_triangle; uint triangles; uint bvh_root;   // of all that share a structure with it
-    uint slot;                         // the top-level entry that is shown, of those that the instance has
+    uint slot;                         // the one of its top-level entries that is shown
     vec4 low; vec4 high;               // object-space bounds of what is shown; w unused
-    uint field;                        // where its displacements begin, in vectors; NONE: none
+    uint field;                        // offset of its displacement field, in vectors; NONE: none
     uint masks;                        // 1: it is part of the fusion's mask
     uint owners;                       // word of triangles[] where the list begins of whose they are; 0: all its own
     float finest;                      // mm: over how much of the surface the first of `smoothed` normals is averaged
@@ -128,9 +128,9 @@ struct Instance {
 
 // Per axial sample k, at depth k * sample_pitch.
 struct Row {
-    vec4 shape;                                   // the two-way beam as scatterers hear it, log2: by how much it falls per mm^2
-                                                  // across and up, and the gain; and the level of the lattice that is as dense
-                                                  // as speckle needs, below ALL_LEVELS the finest. Read at once
+    vec4 shape;                                   // the two-way beam for scatterers, log2: decrease per mm^2 laterally
+                                                  // and in elevation; gain; and the level of the lattice that is as dense
+                                                  // as speckle needs, up to ALL_LEVELS the finest. One read for all four
     float sigma_lateral; float sigma_elevation;   // two-way widths, mm
     float volume_gain; float point_gain;          // applied to scatterers and points at deposit
     float surface_gain;                           // elevation normalisation and compensation at deposit
@@ -138,14 +138,14 @@ struct Row {
     float lateral_lines;                          // sigma_lateral in scanline pitches
     float tgc;                                    // linear, applied to the IQ in detect
     float compensation;                           // linear, attenuation compensation of a weight at this depth
-    float incoherent_gain;                        // keeps incoherent surface echoes at their energy through the averages
+    float incoherent_gain;                        // keeps the energy of incoherent surface echoes through the averages
     float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
     float black;                                  // one-way weight times echogenicity that shows as black, log2
     float sigma_wavefront;                        // mm: deviation across the wavefront that a surface refracts there
     float unused0; float unused1;
 };
 
-// A straight stretch of a path inside one medium.
+// A straight part of a path inside one medium.
 struct Segment {
     vec4 origin_length;    // world mm; length mm
     vec4 direction_time;   // unit; one-way time at the origin, us
@@ -154,21 +154,21 @@ struct Segment {
     uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
 };
 
-// A main path where it has arrived at a surface, before anything random.
+// The state of a main path on arrival at a surface, before any random choice.
 struct Interaction {
     vec4 origin_weight;
     vec4 direction_time;
     vec4 lateral_reflectance;
-    vec4 geometric_turn;   // normal turned against the path; deviation of the reflected direction over the beam
+    vec4 geometric_turn;   // normal turned against the path; standard deviation of the reflected direction over the beam
     vec4 shading;          // likewise; w unused
     vec4 spread;           // w unused
     uint path; uint instance; uint surface;
     uint before; uint behind;                        // tissues
     uint interactions; uint crossings;               // of the path up to here, with this one
-    uint enclosing; uint media[MAX_STACK];           // what encloses the path before the surface
+    uint enclosing; uint media[MAX_STACK];           // media that enclose the path before the surface
 };
 
-// How an acquired volume is mixed with the simulation.
+// The constants with which an acquired volume is mixed with the simulation.
 struct Fusion {
     vec4 voxel_from_world[3];                     // texel indices, integers at their centres
     uint size_x; uint size_y; uint size_z;        // texels
@@ -177,11 +177,11 @@ struct Fusion {
     uint blend; uint mask_speed;                  // BLEND_*, MASK_SPEED_*
 };
 
-const uint VIEW3D_CUT = 1u;         // what lies before the image plane is cut away
-const uint VIEW3D_IMAGE = 2u;       // the B-mode image is shown where it lies
-const uint VIEW3D_SOME_HIDDEN = 4u; // of some instance the opacity is 0
+const uint VIEW3D_CUT = 1u;         // the anatomy in front of the image plane is cut away
+const uint VIEW3D_IMAGE = 2u;       // the B-mode image is shown in its place
+const uint VIEW3D_SOME_HIDDEN = 4u; // at least one instance has opacity 0
 
-// How the anatomy is looked at from outside.
+// The view of the anatomy from outside.
 struct View3d {
     vec4 eye;          // world, mm
     vec4 right;        // world: one pixel to the right, at distance 1
@@ -193,15 +193,15 @@ struct View3d {
 
 struct Hit { float t; uint instance; uint primitive; float u; float v; };
 
-// What a frame reports; all counts.
+// The counters of a frame.
 struct Counters {
     uint saturated; uint segments_dropped; uint stack_overflow; uint paths_lost;
     uint rays; uint interactions; uint segments; uint candidates;
     uint deposits; uint node_visits; uint triangle_tests;   // these two and below only by kernels built with COUNT
     uint top_visits;                   // node visits of the top level
-    uint instances_reached;            // leaves of the top level that a ray came to
-    uint false_unions;                 // F1: of those, the ray misses the bounds of what is shown
-    uint false_boxes;                  // F2: it meets them, but no triangle
-    uint taken_even; uint taken_odd;   // pieces of work that the workers of trace took, in every other dispatch
+    uint instances_reached;            // leaves of the top level that rays reached
+    uint false_unions;                 // F1: those at which the ray misses the bounds of what is shown
+    uint false_boxes;                  // F2: those at which it meets the bounds, but no triangle
+    uint taken_even; uint taken_odd;   // pieces of work that the workers of trace have taken, in even and odd dispatches
     uint unused0; uint unused1; uint unused2;
 };

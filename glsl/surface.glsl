@@ -1,4 +1,4 @@
-// Where a ray met a surface. The includer declares instances[], vertices[], normals[], triangles[].
+// Place and normals of a hit. The includer declares instances[], vertices[], normals[], triangles[].
 
 // A vector scaled by a power of two at most once more than needed, so that its square neither
 // overflows nor vanishes for triangles of any size.

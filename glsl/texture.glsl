@@ -1,6 +1,6 @@
 // Low-frequency tissue texture: two octaves of value noise with unit variance.
 
-// One word of three: they fold into one that is then mixed (prospecting by C. Wellons' lowbias32).
+// A random word from three: they are folded into one, which is then mixed (C. Wellons' lowbias32).
 uint texture_hash(uint folded) {
     folded ^= folded >> 16u;
     folded *= 0x7feb352du;

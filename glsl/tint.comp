@@ -23,7 +23,7 @@ void main() {
     if ((pixel >> 24u) != 0u) {
         float m;
         if (fusion.blend == BLEND_MULTIBAND) {
-            // Each band has a border of its own width; the mask is the middle of all.
+            // Each band has its own width of border; the mask is the middle of all.
             m = clamp(mask[2u * at], 0.0, 1.0);
         } else {
             m = sums[2u * at] >= sums[2u * at + 1u] ? 1.0 : sums[2u * at] / sums[2u * at + 1u];

@@ -1,10 +1,10 @@
 // variants: bvh query(RAY_QUERY) count(COUNT)
 #version 460
 // Paths of one (scanline, elevation layer) through the anatomy: surface echoes are deposited,
-// stretches inside a medium are written out as segments for scatter. docs/kernels.md has the steps.
+// the parts inside a medium are written as segments for scatter. docs/kernels.md has the steps.
 //
-// In the main-path scheme two dispatches: one follows what is transmitted and writes down each of
-// its interactions, the next lets every path echo at each of them and follows what is reflected there.
+// The main-path scheme has two dispatches: the first follows the transmitted path and records each of
+// its interactions; the second lets every path echo at each of them and follows what is reflected there.
 #extension GL_GOOGLE_include_directive : require
 #extension GL_EXT_control_flow_attributes : require
 #ifdef RAY_QUERY
@@ -13,8 +13,8 @@
 #include "shared.glsl"
 #include "random.glsl"
 
-// Workers, each of which takes piece after piece of what is to be done: a path of a line, in the second
-// dispatch an interaction and an ECHO_BLOCK of paths. Those that run together are thus all at work.
+// Each worker takes one piece of work after the other: a path of a line; in the second
+// dispatch an interaction and an ECHO_BLOCK of paths. So all threads of a group stay busy.
 layout(local_size_x = 64) in;
 
 layout(std430, binding = 0) restrict readonly buffer FrameBuffer { Frame frame; };
@@ -41,18 +41,18 @@ layout(std430, binding = 16) restrict buffer InteractionBuffer { Interaction int
 layout(std430, binding = 17) restrict buffer InteractionCountBuffer { uint interaction_count[]; };
 layout(std430, binding = 18) restrict readonly buffer ScanlineBuffer { Scanline scanlines[]; };
 
-// What its paths are for. A variable: naga knows no operations on specialization constants.
+// The role of the paths. Copied to a variable, as naga knows no operations on specialization constants.
 layout(constant_id = 0) const uint ROLE = ROLE_WHOLE;
 uint role = ROLE;
 
 layout(push_constant) uniform Push {
     uint path_begin; uint path_count; uint line_begin; uint line_count;
-    uint pieces;      // of work; lines first
-    uint most;        // pieces that one worker takes
-    uint turn;        // which of two counters they are taken by; the other one is for the next dispatch
+    uint pieces;      // number of pieces of work; the line varies fastest
+    uint most;        // most pieces that one worker takes
+    uint turn;        // which of two counters deals them out; the other one is for the next dispatch
 };
 
-// Whether everything but masks is transparent to rays.
+// True if everything but masks is transparent to rays.
 bool masks_only = false;
 #define RAY_SKIPS(i) (masks_only && instances[i].masks == 0u)
 #define RAY_SELECTS masks_only
@@ -77,7 +77,7 @@ bool masks_only = false;
 #include "wavefront.glsl"
 #include "count.glsl"
 
-// What encloses the path, and what will behind the surface that it has met.
+// The media that enclose the path, and those behind the surface that it has met.
 Media media;
 Media after;
 
@@ -85,7 +85,8 @@ uint row_of(float time) {
     return sample_at(frame.speed * time / frame.sample_pitch);
 }
 
-// `dither`: each of N paths deposits an N-th; rounded alike, faint echoes would vanish as N grows.
+// `dither` randomises rounding: each of N paths deposits an N-th, and rounded to the nearest, faint echoes would vanish
+// as N grows.
 void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uvec4 dither) {
     uint l = line % frame.scanlines;
     float y = elevation(line / frame.scanlines);
@@ -110,13 +111,14 @@ void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uve
     }
 }
 
-// Whether no two paths of a line differ before their first reflection.
+// True if all paths of a line are equal up to their first reflection.
 bool paths_are_alike() {
     return frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0
         && (frame.flags & FLAG_ROUGH_TRANSMISSION) == 0u;
 }
 
-// Which part of the volume this path stands for, and how many paths average down its echoes.
+// Writes a segment, unless another path writes it. Its weight and share say which part of the volume echoes this path
+// stands for, and over how many paths they average.
 void emit_segment(inout Path path, uint line, uint n, uint instance, float extent) {
     bool whole = paths_are_alike() && (frame.sampling == SAMPLING_MAIN_PATH
         || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
@@ -162,7 +164,7 @@ struct Interface {
     uint before; uint behind;       // tissues
 };
 
-// What one path sends back from one interface: a part in phase, and one from behind the surface.
+// The echo of one path from one interface: a part in phase, and one from behind the surface.
 struct Echo {
     uint waiting;                   // bit 0: the part in phase, bit 1: the other
     uint key;
@@ -271,7 +273,7 @@ void recall(uint slot, out Path path, out Interface at) {
     for (uint i = 0u; i < media.count; ++i) media.ids[i] = interactions[slot].media[i];
 }
 
-// Paths of a piece of work; false: there is no such interaction.
+// Reads the paths of a piece of work; false if there is no such interaction.
 bool take(uint piece, out uint line, out uint next, out uint last, out uint main_path, out uint slot) {
     uint row = piece % line_count;
     uint at = piece / line_count;
@@ -298,7 +300,7 @@ bool take(uint piece, out uint line, out uint next, out uint last, out uint main
     return true;
 }
 
-// The next piece that there is, of at most `quota`; false: there is none.
+// Takes the next piece of work, `quota` at most; false if there is none.
 bool take_next(inout uint quota, inout uint line, inout uint next, inout uint last, inout uint main_path, inout uint slot) {
     bool found = false;
     while (quota > 0u && !found) {
@@ -319,7 +321,7 @@ void deposit_echo(inout Echo echo, uint line, uint n) {
     }
 }
 
-// The path, which has come to the transducer's face, turns round there; what that perfect mirror sends
+// Reflects a path at the transducer's face, a perfect mirror; the part that it sends
 // straight back is an echo.
 void bounce(inout Path path, inout Echo echo, uint line, bool heard) {
     vec3 side = world_vector(face_normal(probe_point(path.origin)));
@@ -335,10 +337,10 @@ void bounce(inout Path path, inout Echo echo, uint line, bool heard) {
     reflect_path(path, side, SPECULAR, 0.0);
 }
 
-// Splits the reflected part off a main path; whether path n follows it.
+// Makes the reflected part of a main path a branch; true if path n follows it.
 bool branch(inout Path path, uint line, uint n, uint key, float reflectance) {
     float wanted = clamp(ceil(float(frame.paths) * reflectance), 1.0, float(frame.paths));
-    // The fainter a branch, the rarer it is followed, and counts for as many.
+    // Russian roulette: the fainter a branch, the more rarely it is followed, with as much more weight.
     float level = path.weight * reflectance * rows[row_of(path.time)].compensation;
     path.survival = level < frame.branch_floor ? max(level / frame.branch_floor, LEAST_SURVIVAL) : 1.0;
     path.branch = true;
@@ -348,19 +350,19 @@ bool branch(inout Path path, uint line, uint n, uint key, float reflectance) {
     return float(n) < wanted && unit(line_random(line, n, key, PURPOSE_SURVIVAL).x) < path.survival;
 }
 
-// What encloses the path behind one or two surfaces that it has met.
+// Computes the media behind one or two surfaces that the path has met.
 void toggle(Met here, Met other, vec3 direction, uint copies) {
     copy_media(after, media);
-    // A loop: every copy of the call takes drivers time to compile.
+    // A loop, because drivers take time to compile each copy of the call.
     [[dont_unroll]] for (uint i = 0u; i < (other.hit.instance == NONE ? 1u : 2u); ++i) {
         bool enters = dot(direction, i == 0u ? here.normal : other.normal) < 0.0;
         if (!cross_interface(after, i == 0u ? here.hit.instance : other.hit.instance, enters)) atomicAdd(counters.stack_overflow, copies);
     }
 }
 
-// Refracts the path at normal n into the next medium; lost to total reflection, it has no weight.
+// Refracts the path at normal n into the next medium; under total reflection its weight becomes 0.
 void transmit(inout Path path, inout Interface at, vec3 n) {
-    // The middle of the beam may be totally reflected where the rest is not: it goes straight on.
+    // If the middle of the beam is totally reflected but the rest is not, the path goes straight on.
     bool through = transmit_path(path, n, at.geometric, tissues[at.before].speed, tissues[at.behind].speed) || at.curved;
     if (role == ROLE_MAIN) {
         path.weight *= mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
@@ -371,7 +373,7 @@ void transmit(inout Path path, inout Interface at, vec3 n) {
     copy_media(media, after);
 }
 
-// Reflects or transmits by chance; whether it reflects.
+// Chooses reflection or transmission at random; true for reflection.
 bool choose(inout Path path, uint n, uint key, float reflectance) {
     float choice = unit(draw(n, key, PURPOSE_CHOICE).x);
     if (path.interactions == 1u && !path.branch) choice = (float(n) + choice) / float(frame.paths);
@@ -381,25 +383,25 @@ bool choose(inout Path path, uint n, uint key, float reflectance) {
 }
 
 void main() {
-    // The next dispatch begins with nothing taken.
+    // Sets the other counter to zero for the next dispatch.
     if (gl_GlobalInvocationID.x == 0u) {
         if (turn == 0u) counters.taken_odd = 0u; else counters.taken_even = 0u;
     }
     float time_end = frame.depth / frame.speed;
     uint limit = 64u + frame.max_interactions;
     uint rays = 0u, met = 0u, written = 0u;
-    // Main paths that this one stands for.
+    // Number of paths for which this main path stands.
     uint copies = role == ROLE_MAIN && paths_are_alike() ? frame.paths : 1u;
-    // The piece of work: paths from `next` on of a line; a main path, and where its interactions are.
+    // The piece of work: paths of a line from `next` on; a main path, and the place of its interactions.
     uint line = 0u, next = 0u, last = 0u, main_path = NONE, slot = 0u;
     Path path;
     Echo echo;
     echo.waiting = 0u;
     uint n = 0u;
     bool going = false;
-    // Whether a mask is known to lie ahead of a path that is outside of all.
+    // True if a mask is known to lie ahead of a path that is outside of all masks.
     bool aimed = false;
-    // The first of two surfaces that coincide was found; the ray looks for the other.
+    // True while the first of two coincident surfaces has been found and the ray searches for the other.
     bool pairing = false;
     Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
     float close = 0.0;
@@ -432,7 +434,7 @@ void main() {
             going = true;
             if (role != ROLE_BRANCHES) {
                 start(line, n, path, media);
-                // Where all paths of a line begin alike, origin has looked.
+                // If all paths of a line begin alike, origin has checked it.
                 aimed = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;
                 continue;
             }
@@ -443,7 +445,7 @@ void main() {
             uint before = current_instance(media);
             Medium way = medium_of(tissue_of(before));
             bool heard = is_heard(media);
-            // An acquired image is laid out at the probe's speed: so is the way to the mask.
+            // The acquired image assumes the probe's speed, so the way to the mask has it too.
             if (!heard) way.speed = frame.speed;
             float t_end = (time_end - path.time) * way.speed;
             float face = path.reflections > 0u ? face_distance(probe_point(path.origin), probe_vector(path.direction)) : -1.0;
@@ -456,7 +458,7 @@ void main() {
                 mix(t_end, first.hit.t + close, pairing), mix(NONE, first.hit.instance, pairing));
             rays += 1u;
             if (masks_only) {
-                // Nothing more is heard of what flies past all masks.
+                // A path that misses all masks gives no more echoes.
                 if (hit.instance == NONE) path.weight = 0.0;
                 aimed = true;
                 continue;
@@ -497,7 +499,7 @@ void main() {
             }
             float past = here.hit.t + close;
             if (other.hit.instance != NONE) past = max(past, other.hit.t + close);
-            // Rounding chooses which of the two is found first; it must not choose whose echo it is.
+            // Rounding decides which of the two is found first; it must not decide which one echoes.
             if (other.hit.instance < here.hit.instance) {
                 Met found = here;
                 here = other;
@@ -519,7 +521,7 @@ void main() {
             advance(path, here.hit.t, way, here.position);
             leave(path, here.hit);
             if (passes) {
-                // The mask begins or ends within a medium: the stretch is cut there. Outside another
+                // The mask begins or ends within a medium: the segment is cut there. Outside the mask another
                 // medium begins, and sound goes straight on.
                 path.t_min = max(path.t_min, past - here.hit.t);
                 if (behind != before) {

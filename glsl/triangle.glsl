@@ -1,16 +1,16 @@
-// Where a ray meets a triangle, worked out alike by both tracers: what follows a path hangs on the
-// last bits of every hit, so that a device's own distance would show in the image.
+// Intersection of a ray with a triangle, computed alike for both tracers: the rest of a path depends on the
+// last bits of every hit, so a device's own distance would change the image.
 //
 // The includer declares instances[], vertices[], triangles[].
 
 struct ShearedRay {
     vec3 origin;
     vec3 shear;        // Woop, Benthin, Wald 2013, section 3.1
-    uint axis;         // along which the direction is largest
+    uint axis;         // axis along which the direction is largest
 };
 
-// `edges`: edge functions of the three corners; none has another's sign where the ray passes inside.
-// `sum`: of them; 0 for a triangle seen edge on, where t, u and v mean nothing.
+// `edges`: edge functions of the three corners; they have equal signs, or are zero, where the ray passes inside.
+// `sum`: their sum; 0 for a triangle seen edge on, where t, u and v are undefined.
 struct TriangleHit {
     vec3 edges;
     float sum;
@@ -49,7 +49,7 @@ vec3 object_direction(uint instance, vec3 d) {
     return e;
 }
 
-// Whose triangle it is, of those in the structure of `entered`, which instances at one place may share.
+// The instance to which a triangle belongs, in the structure of `entered`, which several instances may share.
 uint triangle_owner(uint entered, uint triangle) {
     uint list = instances[entered].owners;
     if (list == 0u) return entered;

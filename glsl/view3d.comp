@@ -21,20 +21,20 @@ layout(binding = 5) uniform accelerationStructureEXT tlas;
 layout(std430, binding = 5) readonly buffer NodeBuffer { uvec4 nodes[]; };
 #endif
 layout(std430, binding = 6) readonly buffer View3dBuffer { View3d view3d; };
-// Per instance: colour, opacity; 0: it is not there.
+// Colour and opacity of each instance; opacity 0: invisible.
 layout(std430, binding = 7) readonly buffer LookBuffer { vec4 looks[]; };
 layout(std430, binding = 8) readonly buffer PixelBuffer { uint pixels[]; };
 layout(std430, binding = 9) buffer PictureBuffer { uint picture[]; };
 
 const uint MAX_LAYERS = 24u;
 const float BEYOND = 1e9;
-// Instances whose first surface behind the section was met, a bit each; and the least priority that
+// Instances whose first surface behind the section has been met, one bit each; and the lowest priority that
 // still matters there.
 const uint SEEN_WORDS = 8u;
 const int LEAST = -2147483647;
 uint seen[SEEN_WORDS];
 int least;
-// What fills the point at which a cut anatomy begins.
+// The instance that encloses the point at which a cut anatomy begins.
 uint filled;
 
 bool view3d_skips(uint i) {
@@ -56,7 +56,7 @@ bool view3d_skips(uint i) {
 #include "transform.glsl"
 #include "housing.glsl"
 
-// What has been seen along the ray, and how much of what is behind still shows.
+// Colour accumulated along the ray, and the transparency of what is in front.
 vec3 colour;
 float clear;
 
@@ -65,7 +65,7 @@ void lay(vec3 shade, float opacity) {
     clear *= 1.0 - opacity;
 }
 
-// Two-sided: one light at the eye, one from above its left; `n` is unit and may face away.
+// Two-sided shading: one light at the eye, one from above left; `n` is a unit vector and may face away.
 vec3 lit(vec3 base, vec3 n, vec3 d) {
     float side = dot(n, d) > 0.0 ? -1.0 : 1.0;
     vec3 towards = side * n;
@@ -86,7 +86,7 @@ vec2 grey(float i, float j) {
     return pixel >> 24u == 0u ? vec2(0.0) : vec2(float(pixel & 0xffu) / 255.0, 1.0);
 }
 
-// The image at a place of it, in pixels, averaged over a square of `wide` pixels; whether there is one.
+// The image at a position, in pixels, averaged over a square of `wide` pixels; false outside the sector.
 bool image_at(vec2 place, float wide, out float level) {
     level = 0.0;
     vec2 middle = floor(place);
@@ -111,28 +111,28 @@ float past(vec3 o, vec3 d, float t) {
     return t + 4e-6 * max(max(p.x, p.y), max(p.z, 1.0));
 }
 
-// A surface at `hit` of the ray (o, d).
+// Adds the surface at `hit` of a ray along `d`.
 void lay_surface(Hit hit, vec3 d) {
     vec3 n = surface_shading_normal(hit);
     if (dot(n, n) == 0.0) n = surface_geometric_normal(hit);
     vec4 look = looks[hit.instance];
     float away = 1.0 - abs(dot(n, d));
-    // A thin wall seen edge on is thicker: outlines show, and what is within.
+    // A thin wall seen edge on is more opaque, so that outlines show as well as what is inside.
     float opacity = look.w >= 1.0 ? 1.0 : look.w + (1.0 - look.w) * 0.75 * away * away * away;
     lay(lit(look.xyz, n, d), opacity);
 }
 
-// The cut face of what fills the point at which the anatomy begins.
+// Adds the cut face of the instance that encloses the point at which the anatomy begins.
 void lay_section() {
     if (filled == NONE) return;
     vec4 look = looks[filled];
     lay(0.85 * look.xyz, look.w >= 1.0 ? 1.0 : 0.7 * look.w);
 }
 
-// What of the anatomy is between `begin` and `end`. Where it is cut, first what fills the point at
+// Adds the anatomy between `begin` and `end`. Where it is cut, first the instance that encloses the point at
 // `begin`: surfaces are closed, so the first one of an instance that the ray meets behind the point
-// tells whether it encloses the point; of those that do, the one of highest priority counts. One
-// loop for both: the walk through the hierarchy is in the kernel once.
+// shows whether it encloses the point; of those that do, the one of highest priority counts. One
+// loop for both, so that the kernel contains the traversal once.
 void anatomy(vec3 o, vec3 d, float begin, float end, bool cut) {
     bool filling = cut;
     float t = begin;
@@ -168,7 +168,7 @@ void anatomy(vec3 o, vec3 d, float begin, float end, bool cut) {
     }
 }
 
-// What a ray meets, from the eye on; `wide`: width of a pixel at distance 1.
+// Draws what a ray from the eye meets; `wide`: width of a pixel at distance 1.
 void look(vec3 o, vec3 d, float wide, vec3 background) {
     vec3 from = probe_point(o);
     vec3 to = probe_vector(d);
@@ -213,7 +213,7 @@ void main() {
     d /= size;
     float down = (float(j) + 0.5) / float(view3d.height);
     vec3 background = mix(vec3(0.075, 0.085, 0.1), vec3(0.02, 0.022, 0.027), down);
-    // NaN, too, is no ray.
+    // NaN is no ray either.
     bool is_ray = all(lessThan(abs(o), vec3(1e6))) && all(lessThan(abs(d), vec3(2.0)))
         && all(lessThan(abs(probe_point(o)), vec3(1e7))) && all(lessThan(abs(probe_vector(d)), vec3(2.0)));
     if (is_ray) look(o, d, length(view3d.right.xyz) / size, background);

@@ -146,7 +146,7 @@ pub fn acquire(
 /// axes of `settings` are those too; without a fan in them the sequence's fan is used.
 ///
 /// # Errors
-/// As [`reconstruct`].
+/// Those of [`reconstruct`].
 ///
 /// # Panics
 /// When the sequence lacks the poses that [`acquire`] writes.

@@ -56,7 +56,7 @@ pub use instance::ValidationLog;
 pub use kept::cache_folder;
 pub use kernel::Kernel;
 pub use memory::{Buffer, BufferKind, MemoryUse};
-pub use painter::{Interface, Painted, Painter, Placed, Shot};
+pub use painter::{InterfaceFrame, Painted, Painter, PlacedImage, Screenshot};
 pub use process::prepare_process;
 pub use reflect::{BindingInfo, BindingKind};
 pub use timer::FrameTimings;

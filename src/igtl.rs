@@ -18,8 +18,8 @@ mod tracking;
 pub mod wire;
 
 pub use picture::Picture;
-pub use server::{IgtlError, Server, Settings, Status};
-pub use tracking::{Pose, Tracked};
+pub use server::{IgtlError, Server, ServerSettings, Status};
+pub use tracking::{TrackedPose, TrackerState};
 
 /// Device name of the images.
 pub const IMAGE_DEVICE: &str = "BMode";

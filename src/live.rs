@@ -129,7 +129,7 @@ impl Pace {
         Grade {
             level,
             levels: ladder.map_or(1, |(ladder, _)| ladder.levels().len()),
-            counts: Level::of(&scene.probe, &scene.simulation, &scene.imaging),
+            counts: Level::of(scene),
             at_rest,
             budget_ms: scene.live.budget_ms(self.machine),
             pace_ms: ladder.and_then(|(_, governor)| governor.pace()),

@@ -19,20 +19,20 @@ pub use adjust::Adjusted;
 use adjust::{change, common, halfway, proposal};
 use bands::Bands;
 use statistics::Gathered;
-pub use statistics::{DEVELOPED, Level, Statistics, Width, depths};
+pub use statistics::{Level, SPECKLE_DEVIATION, Statistics, Width, depths};
 
 /// Changes smaller than these are not made, so that a second matching changes
 /// nothing: level in dB, dynamic range and sizes relative. All are finer than the precision of statistics
 /// over a few hundred patches of speckle.
-const SETTLED: adjust::Change = adjust::Change { level: 0.3, range: 0.01, size: 0.02 };
+const LEAST_CHANGE: adjust::Change = adjust::Change { level: 0.3, range: 0.01, size: 0.02 };
 /// Most rounds. Each proposal would be exact, but for clipping and for the sampling of narrow beams.
-const ROUNDS: usize = 8;
+const MOST_ROUNDS: usize = 8;
 /// Rounds after which only half of a proposal is taken: clipping may make them overshoot in turns.
-const WHOLE: usize = 3;
+const WHOLE_ROUNDS: usize = 3;
 /// Level of an acquired volume up to which it counts as black, 0..1: compression leaves some grey.
-const BLACK: f32 = 0.03;
+const BLACK_LEVEL: f32 = 0.03;
 /// Patches of speckle that each side needs: spread and size are then known to a tenth.
-const CELLS: f64 = 60.0;
+const LEAST_PATCHES: f64 = 60.0;
 /// Margins inside the border. The beam reaches over it, where nothing echoes: up to this many of its
 /// lateral deviations. The pulse of an echo of the border itself reaches farther: axial deviations.
 const MARGIN: (f64, f64) = (1.5, 3.0);
@@ -167,10 +167,10 @@ fn settle(
         let places = depths(&scene.probe);
         let places: Vec<f64> = compared.iter().map(|&i| places[i]).collect();
         let change = change(&scene.probe, &imaging, &stage.imaging, &places);
-        let settled = change.level <= SETTLED.level
-            && change.range <= SETTLED.range
-            && change.size <= SETTLED.size;
-        if settled || rounds == ROUNDS {
+        let settled = change.level <= LEAST_CHANGE.level
+            && change.range <= LEAST_CHANGE.range
+            && change.size <= LEAST_CHANGE.size;
+        if settled || rounds == MOST_ROUNDS {
             unmeasured(&stage.simulated, &acquired, options.adjusted, &mut notes);
             return Ok(Matching {
                 acquired,
@@ -183,7 +183,7 @@ fn settle(
             });
         }
         rounds += 1;
-        scene.imaging = match rounds <= WHOLE {
+        scene.imaging = match rounds <= WHOLE_ROUNDS {
             true => imaging,
             false => halfway(&stage.imaging, &imaging),
         };
@@ -254,7 +254,7 @@ fn acquired(
             "move the volume or the mask, or widen --band",
         ));
     }
-    let floor = vec![BLACK; probe.samples as usize];
+    let floor = vec![BLACK_LEVEL; probe.samples as usize];
     bands.keep_echoing(probe, &levels, &floor, &mut chosen);
     let mut gathered = Gathered::new(probe);
     gathered.add(probe, &levels, &chosen);
@@ -314,12 +314,12 @@ fn add_simulated(
 }
 
 fn enough(statistics: Statistics, side: &str, remedy: &str) -> Result<Statistics, MatchError> {
-    match statistics.cells >= CELLS {
+    match statistics.cells >= LEAST_PATCHES {
         true => Ok(statistics),
         false => Err(nothing(
             format!(
                 "there is too little {side} to be compared: {:.0} independent patches of speckle near the \
-                 border, {CELLS} are needed",
+                 border, {LEAST_PATCHES} are needed",
                 statistics.cells
             ),
             remedy,

@@ -45,14 +45,7 @@ pub fn gaussian(bits: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Sample mean and its distance from `expected` in standard errors.
-    fn standard_errors(samples: &[f64], expected: f64) -> f64 {
-        let n = samples.len() as f64;
-        let mean = samples.iter().sum::<f64>() / n;
-        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        ((mean - expected) / (variance / n).sqrt()).abs()
-    }
+    use crate::statistics::standard_errors;
 
     // 4 standard errors: chance 6e-5 per moment, and the seeds are fixed.
     #[test]
@@ -74,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn one_word_by_hand() {
+    fn one_word_equals_the_value_worked_out_by_hand() {
         // Worked through with the shader's definition in arbitrary-precision integers.
         let a = 1_013_904_223_u32;
         let step = |x: u32, y: u32, z: u32| x.wrapping_add(y.wrapping_mul(z));

@@ -18,7 +18,7 @@ mod symmetric;
 pub use error::RegisterError;
 pub use icp::{Fit, Residuals};
 pub use placement::Placement;
-pub use surface::Surface;
+pub use surface::TriangleSurface;
 
 /// Degrees of freedom of a registration. Neither mirrors.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

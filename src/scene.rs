@@ -3,6 +3,8 @@
 //! Units everywhere after load: mm, microseconds, MHz, hence speed mm/us and impedance MRayl
 //! (g/cm3 times mm/us). Attenuation stays dB/(cm MHz). Angles are radians.
 
+use std::ops::{Deref, DerefMut};
+
 use glam::DAffine3;
 
 pub mod animation;
@@ -36,6 +38,7 @@ pub use origin::{Origin, Origins};
 pub use tracker::Tracker;
 
 use crate::probe::Probe;
+use crate::settings::Settings;
 pub use crate::settings::{Display, Fusion, Imaging, Live, Simulation, Surface, Tissue};
 
 /// A triangle mesh in its own object space, mm.
@@ -143,14 +146,10 @@ pub struct Scene {
     pub graph: Graph,
     /// Point targets.
     pub wires: Vec<Wire>,
-    /// Transducer and its geometry.
-    pub probe: Probe,
+    /// How it is imaged; the scene's own fields to who only reads or sets them.
+    pub settings: Settings,
     /// World from probe space (x lateral, y elevation, z depth), rigid, mm.
     pub world_from_probe: DAffine3,
-    /// Path tracing and scatterers.
-    pub simulation: Simulation,
-    /// Image formation.
-    pub imaging: Imaging,
     /// A volume acquired elsewhere, which may be shown around the masking meshes.
     pub volume: Option<Acquired>,
     /// Fusion of the volume with the simulation; none: everything is simulated.
@@ -165,6 +164,20 @@ pub struct Scene {
     pub origins: Origins,
 }
 
+impl Deref for Scene {
+    type Target = Settings;
+
+    fn deref(&self) -> &Settings {
+        &self.settings
+    }
+}
+
+impl DerefMut for Scene {
+    fn deref_mut(&mut self) -> &mut Settings {
+        &mut self.settings
+    }
+}
+
 impl Scene {
     /// A scene with `probe` at the origin of an endless `background`, and nothing else.
     pub fn homogeneous(background: Tissue, probe: Probe) -> Self {
@@ -176,10 +189,8 @@ impl Scene {
             instances: Vec::new(),
             graph: Graph::default(),
             wires: Vec::new(),
-            probe,
+            settings: Settings::of(probe),
             world_from_probe: DAffine3::IDENTITY,
-            simulation: Simulation::default(),
-            imaging: Imaging::default(),
             volume: None,
             fusion: None,
             contact: None,

@@ -30,9 +30,8 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
-use crate::probe::Probe;
-use crate::scene::{Imaging, Scene, Simulation, Surface, Tissue, Wire};
-use crate::settings::Machine;
+use crate::scene::{Scene, Surface, Tissue, Wire};
+use crate::settings::{Machine, Settings};
 use batches::Room;
 use buffers::Buffers;
 use bvh::Splits;
@@ -60,7 +59,7 @@ pub enum SimError {
     World(#[from] world::WorldError),
 }
 
-/// What does the work on a device.
+/// The kind of machine that a device is: a software driver on the processor, or a GPU.
 pub fn machine(device: &Device) -> Machine {
     match device.info().kind {
         AdapterKind::Cpu => Machine::Software,
@@ -74,59 +73,55 @@ pub struct Simulator {
     frames: Frames,
     passes: Passes,
     coincident: bool,
-    settings: Settings,
+    sources: Sources,
     tables: Tables,
     shelf: Shelf,
     counting: bool,
-    /// Whether the last frame was mixed with an acquired volume.
+    /// True if the last frame was mixed with an acquired volume.
     fused: bool,
-    /// Where the next frames are copied.
+    /// The image into which the next frames are copied.
     shown_on: Option<Image>,
-    /// Once the anatomy was looked at.
+    /// The kernel and buffers of the 3D view; made when it is first asked for.
     viewer3d: Option<Viewer3d>,
     tinted_on: Option<(Image, Tint)>,
     read_out: ReadOut,
     update_time: Duration,
 }
 
-/// Tables of settings that were left, for as long as they may come back: levels of quality take turns.
+/// Tables of settings used before, kept because settings come back: live quality changes between levels.
 #[derive(Default)]
-struct Shelf(Vec<(Settings, Tables)>);
+struct Shelf(Vec<(Sources, Tables)>);
 
 impl Shelf {
-    /// More than levels of quality.
+    /// Most tables kept: more than there are levels of quality.
     const MOST: usize = 12;
 
-    fn take(&mut self, settings: &Settings) -> Option<Tables> {
-        let at = self.0.iter().position(|(made_of, _)| made_of == settings)?;
+    fn take(&mut self, sources: &Sources) -> Option<Tables> {
+        let at = self.0.iter().position(|(made_of, _)| made_of == sources)?;
         Some(self.0.remove(at).1)
     }
 
-    fn put(&mut self, settings: Settings, tables: Tables) {
+    fn put(&mut self, sources: Sources, tables: Tables) {
         if self.0.len() == Self::MOST {
             self.0.remove(0);
         }
-        self.0.push((settings, tables));
+        self.0.push((sources, tables));
     }
 }
 
-/// What the tables on the device were made of.
+/// The settings from which the tables on the device were made.
 #[derive(PartialEq)]
-struct Settings {
-    probe: Probe,
-    simulation: Simulation,
-    imaging: Imaging,
+struct Sources {
+    settings: Settings,
     tissues: Vec<Tissue>,
     surfaces: Vec<[Surface; 2]>,
     wires: Vec<Wire>,
 }
 
-impl Settings {
+impl Sources {
     fn of(scene: &Scene) -> Self {
         Self {
-            probe: scene.probe.clone(),
-            simulation: scene.simulation.clone(),
-            imaging: scene.imaging.clone(),
+            settings: scene.settings.clone(),
             tissues: scene.tissues.clone(),
             surfaces: scene.instances.iter().map(|i| i.surface).collect(),
             wires: scene.wires.clone(),
@@ -148,7 +143,7 @@ impl Simulator {
         Self::with_splits(device, library, scene, tracer, Splits::default())
     }
 
-    /// As [`Self::new`], with trees of the compute tracer built so.
+    /// Like [`Self::new`], with trees of the compute tracer built as `splits` says.
     ///
     /// # Errors
     /// Those of [`Self::new`].
@@ -171,7 +166,7 @@ impl Simulator {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
             coincident,
-            settings: Settings::of(scene),
+            sources: Sources::of(scene),
             tables,
             shelf: Shelf::default(),
             counting: false,
@@ -203,14 +198,14 @@ impl Simulator {
         self.device.upload_many(&arrays)
     }
 
-    /// Simulates one frame of `scene` as it stands: pose, placements and settings may differ from
-    /// those before, sizes (lines, samples, meshes, tissues, points, image, acquired volume; paths where each has
-    /// segments of its own) may not exceed those at creation. A change of settings waits for the
-    /// frames in flight. `index` selects the noise.
-    /// Returns the timings of the frames that have finished since the last call.
+    /// Simulates one frame of `scene` as it is now and returns the timings of the frames that have finished
+    /// since the last call. `index` is the frame's number and selects the noise.
+    /// Pose, placements and settings may differ from those of the frame before. Sizes (lines, samples, meshes,
+    /// tissues, points, image, acquired volume; paths where each has segments of its own) must not exceed those
+    /// at creation. A change of settings waits for the frames in flight.
     ///
     /// # Errors
-    /// What Vulkan says; a lost device names the last pass.
+    /// A Vulkan error; a lost device names the last pass.
     pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
         let exchanged = self.adopt(scene)?;
         let passes = &mut self.passes;
@@ -226,7 +221,7 @@ impl Simulator {
         }
         passes.run(&mut cmd, &BEAM)?;
         passes.run(&mut cmd, &AXIAL)?;
-        // The picture before is replaced as a whole.
+        // From here on the frame is not abandoned, so that the picture is replaced as a whole.
         cmd.keep_on();
         passes.run(&mut cmd, &DISPLAY)?;
         if scene.simulation.labels {
@@ -246,24 +241,25 @@ impl Simulator {
         Ok(self.frames.take_timings())
     }
 
-    /// Frames and 3D views to come are made only as long as nothing newer is wanted: while they are being
-    /// recorded, which where the window shares the queue takes about as long as they do, `wanted_no_longer`
-    /// is asked now and then. They then fail with [`GpuError::Abandoned`], and the picture before stays.
+    /// Sets the question by which frames and 3D views may be abandoned: `wanted_no_longer` is asked now and
+    /// then while they are recorded, and true means that something newer is wanted. They then fail with
+    /// [`GpuError::Abandoned`], and the last picture stays. Where the window shares the queue, recording a
+    /// frame takes about as long as the frame itself.
     pub fn abandon_when(&mut self, wanted_no_longer: Option<Abandon>) {
         self.frames.abandon_when(wanted_no_longer);
     }
 
     /// Takes over settings, strategies and placements that the device does not have yet, after the
-    /// frames in flight. How long structures took that had to be made anew.
+    /// frames in flight. Returns the time for structures that had to be built again.
     fn adopt(&mut self, scene: &Scene) -> Result<Duration, SimError> {
-        let settings = Settings::of(scene);
-        if settings != self.settings {
+        let sources = Sources::of(scene);
+        if sources != self.sources {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            let tables = self.shelf.take(&settings);
+            let tables = self.shelf.take(&sources);
             let tables = tables.unwrap_or_else(|| Tables::new(scene));
             let left = std::mem::replace(&mut self.tables, tables);
-            let before = std::mem::replace(&mut self.settings, settings);
+            let before = std::mem::replace(&mut self.sources, sources);
             self.shelf.put(before, left);
             self.upload_tables()?;
         }
@@ -276,12 +272,12 @@ impl Simulator {
         Ok(began.elapsed())
     }
 
-    /// True where the first frame will wait for the driver's compiler: its kernels have never run here.
+    /// True if the first frame will wait for the driver's compiler, because its kernels have never run here.
     pub fn compiles(&self) -> bool {
         self.passes.kernels.of(&SCATTER).is_new()
     }
 
-    /// Makes the pipelines again of `library`'s kernels, after the frames in flight.
+    /// Builds the pipelines again from `library`'s kernels, after the frames in flight.
     ///
     /// # Errors
     /// A kernel that the device refuses; the simulator keeps the ones that it had.
@@ -296,38 +292,38 @@ impl Simulator {
         Ok(())
     }
 
-    /// Takes the kernels of the compute tracer that count their steps (`node_visits` and below of
-    /// [`Self::counters`]), which slows rays, or those that do not.
+    /// Switches to the kernels of the compute tracer that count their steps (`node_visits` and the fields
+    /// after it in [`Self::counters`]) if `counting`, else to those that do not. Counting makes rays slower.
     ///
     /// # Errors
     /// A kernel that the device refuses.
     ///
     /// # Panics
-    /// With the ray query, whose steps nobody can count.
+    /// With the ray query, whose steps cannot be counted.
     pub fn count(&mut self, library: &Library, counting: bool) -> Result<(), SimError> {
         assert_eq!(self.passes.world.tracer(), Tracer::Bvh, "what is counted");
         self.counting = counting;
         self.reload(library)
     }
 
-    /// What the processor took to record the last frame's changes of the scene, trees that it built
-    /// for them included: also those of instances that no longer move with what they shared one with.
+    /// Processor time for recording the last frame's changes of the scene. Includes trees built for them, also
+    /// those of instances that have left the group with which they shared a structure.
     pub fn update_time(&self) -> Duration {
         self.update_time
     }
 
-    /// How the probe touched the skin in the last frame; none where the scene asks for no contact.
+    /// The contact of the probe with the skin in the last frame; none where the scene asks for no contact.
     pub fn contact(&self) -> Option<Touch> {
         self.passes.touch
     }
 
-    /// What the scene takes of the device's memory.
+    /// The device memory that the scene takes.
     pub fn memory(&self) -> Memory {
         let fusion = self.passes.fusion.as_ref();
         Memory { volume: fusion.map_or(0, Fused::volume_bytes), ..self.passes.world.memory() }
     }
 
-    /// Waits for the frames in flight; their timings, oldest first.
+    /// Waits for the frames in flight and returns their timings, oldest first.
     ///
     /// # Errors
     /// A lost device, with the last pass that had begun.
@@ -336,7 +332,7 @@ impl Simulator {
         Ok(self.frames.take_timings())
     }
 
-    /// Constants of the last frame.
+    /// The constants of the last frame.
     pub fn constants(&self) -> &layout::Frame {
         &self.passes.frame
     }
@@ -350,7 +346,7 @@ impl Simulator {
     /// the sector.
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn pixels(&mut self) -> Result<(u32, u32, Vec<u8>), SimError> {
         let (width, height) = (self.passes.frame.image_width, self.passes.frame.image_height);
         let mut bytes = vec![0; 4 * width as usize * height as usize];
@@ -365,7 +361,7 @@ impl Simulator {
         Ok((width, height, bytes))
     }
 
-    /// What the user should know of how the scene was uploaded.
+    /// A warning for the user about how the scene was uploaded, if there is one.
     pub fn warning(&self) -> Option<&str> {
         self.passes.fusion.as_ref().and_then(Fused::warning)
     }

@@ -28,6 +28,14 @@ impl Statistics {
     }
 }
 
+/// Distance of the mean of `samples` from `expected`, in standard errors of that mean.
+pub fn standard_errors(samples: &[f64], expected: f64) -> f64 {
+    let n = samples.len() as f64;
+    let mean = samples.iter().sum::<f64>() / n;
+    let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
+    (mean - expected).abs() / (variance / n).sqrt().max(f64::MIN_POSITIVE)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -39,5 +47,15 @@ mod tests {
         let three = Statistics::of([3.0, 1.0, 2.0]);
         assert_eq!([three.median, three.p95, three.p99], [2.0, 3.0, 3.0]);
         assert!(Statistics::of([]).median.is_nan());
+    }
+
+    #[test]
+    fn a_mean_is_as_far_off_as_its_spread_allows() {
+        // Variance 4 of 4 samples: a standard error of 1.
+        let samples = [1.0, 1.0, 4.0, 4.0].map(|x: f64| (x - 2.5) * 2.0 / 3f64.sqrt());
+        for expected in [-3.0, 0.0, 2.0] {
+            assert!((standard_errors(&samples, expected) - f64::abs(expected)).abs() < 1e-12);
+        }
+        assert_eq!(standard_errors(&[2.0; 5], 2.0), 0.0);
     }
 }

@@ -108,7 +108,7 @@ impl Volume {
     /// file's order.
     ///
     /// # Errors
-    /// Where the file, or the data file that it names, is missing, cut off or wrong.
+    /// A file, or a data file that it names, that is missing, cut off or wrong.
     pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
         let name = path.to_string_lossy().to_ascii_lowercase();
         let is = |ends: &[&str]| ends.iter().any(|e| name.ends_with(e));

@@ -143,7 +143,7 @@ fn points_lie_in_place_after_a_turn() {
     assert_in_place(&sequence, DVec3::splat(0.6));
 }
 
-/// Where voxels coincide with pixels, every grey level is kept.
+/// Every grey level is kept if voxels coincide with pixels.
 #[test]
 fn speckle_is_kept_to_the_last_grey_level() {
     let mut scene = scene(

@@ -179,7 +179,7 @@ fn compare(scene: &Scene, masked: &[Vec<i32>; 2], whole: &[Vec<i32>; 2]) -> [usi
 }
 
 #[test]
-fn only_what_the_mask_encloses_is_heard_and_it_is_what_it_was() {
+fn only_the_inside_of_the_mask_echoes_and_as_without_a_mask() {
     let device = test_device();
     let plain = load("").expect("sound");
     for tracer in [Tracer::Bvh, Tracer::RayQuery] {
@@ -409,7 +409,7 @@ fn a_volume_beyond_the_devices_limit_is_averaged_with_a_warning() {
     let library = Library::embedded();
     let mut simulator =
         Simulator::new(&device, &library, &scene, Tracer::Bvh).expect("a simulator");
-    let warning = simulator.warning().expect("it is told").to_owned();
+    let warning = simulator.warning().expect("a warning").to_owned();
     assert!(warning.contains("averaged to"), "{warning}");
     simulator.frame(&scene, 0).expect("a frame");
     let steps = simulator.fusion_steps().expect("read").expect("fused");

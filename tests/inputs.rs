@@ -80,7 +80,7 @@ fn every_mesh_is_loaded_or_refused_with_a_reason() {
 
 /// Khronos' validator stores its verdict beside each file.
 #[test]
-fn what_the_gltf_validator_refuses_is_not_loaded_in_silence() {
+fn files_that_the_gltf_validator_refuses_are_not_loaded_silently() {
     let Some(data) = shared_data() else { return };
     let (mut refused, mut silent) = (0, Vec::new());
     for path in meshes(&data.join("corpus-gltf-validator")) {
@@ -125,7 +125,7 @@ fn planted_outcomes_are_rejected() {
 
 /// Memory and time limits of the child hold.
 #[test]
-fn the_limits_bite() {
+fn the_limits_of_memory_and_time_hold() {
     // `tail` keeps its input until a line ends; here none does.
     let hungry = limited("head -c 1200000000 /dev/zero | tail > /dev/null", Path::new("x"));
     assert_eq!(hungry.code, Some(1), "{}", hungry.text);

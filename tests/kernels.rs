@@ -112,7 +112,7 @@ fn declared(kernel: &str) -> Vec<String> {
 }
 
 #[test]
-fn what_stages_and_jobs_bind_has_the_names_of_the_sources() {
+fn bindings_of_stages_and_jobs_have_the_names_of_the_sources() {
     for pass in stages::all() {
         assert_eq!(declared(pass.name), pass.binds, "{}", pass.name);
     }

@@ -175,7 +175,7 @@ fn settings_of_the_simulators_own_image_are_recovered() {
 }
 
 #[test]
-fn only_what_is_asked_for_is_fitted() {
+fn only_the_chosen_settings_are_fitted() {
     let folder = tempfile::tempdir().expect("a folder");
     acquire(folder.path());
     let (mut scene, _) = Scene::load(&folder.path().join("scene.toml"), &[]).expect("sound");
@@ -249,7 +249,7 @@ fn the_scene_file_is_written_and_nothing_else_in_it_changes() {
 }
 
 #[test]
-fn what_cannot_be_matched_is_said_and_nothing_is_written() {
+fn scenes_that_cannot_be_matched_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().expect("a folder");
     acquire(folder.path());
     let file = folder.path().join("scene.toml");

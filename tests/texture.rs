@@ -460,9 +460,9 @@ fn tissue_below_a_transform_that_scales_is_squeezed_as_its_keyframes_would_be() 
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-// By the lattice; voxels of the paper's grid are steps under the carrier, and get louder or fainter by up to 1 dB as they
-// are squeezed. Speckle of (20 mm / 0.7) x (28 mm / 0.16) cells: its mean power is good to 4.34 / sqrt(5000) = 0.06 dB in each frame;
-// four deviations of the difference.
+// By the lattice; voxels of the paper's grid are steps under the carrier, and get louder or fainter by up to 1 dB as
+// they are squeezed. Speckle of (20 mm / 0.7) x (28 mm / 0.16) cells: its mean power is good to 4.34 / sqrt(5000) =
+// 0.06 dB in each frame; four deviations of the difference.
 #[test]
 fn squeezed_tissue_is_as_bright_as_at_rest() {
     let power = |scene: &Scene| {

@@ -8,7 +8,7 @@ use glam::{DVec2, DVec3};
 use insonify::gpu::{Image, ImageDim, ImageFormat, test_device};
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
-use insonify::sim::view3d::Sight;
+use insonify::sim::view3d::CameraView;
 use insonify::sim::{Simulator, Tracer};
 use insonify::view::model::{Show, View3d};
 
@@ -53,7 +53,7 @@ fn ball(scene: &Scene, radius: f64, across: f64) -> String {
 }
 
 /// RGBA of both tracers, row by row.
-fn pictures(scene: &Scene, sight: &Sight) -> [Vec<[u8; 4]>; 2] {
+fn pictures(scene: &Scene, sight: &CameraView) -> [Vec<[u8; 4]>; 2] {
     let (device, library) = (test_device(), Library::embedded());
     let made = [Tracer::Bvh, Tracer::RayQuery].map(|tracer| {
         let mut simulator = Simulator::new(&device, &library, scene, tracer).unwrap();
@@ -125,12 +125,12 @@ fn a_ball_covers_what_perspective_says() {
 }
 
 #[test]
-fn what_is_before_the_image_plane_is_cut_away_and_only_that() {
+fn the_anatomy_in_front_of_the_image_plane_is_cut_away_and_only_that() {
     for (across, is_cut) in [(20.0, true), (-20.0, false)] {
         let (scene, mut view3d, _) = view(9.0, across);
         let count = |view3d: &View3d| {
             // Without the image, which would hide things behind it.
-            let sight = Sight { image: false, ..view3d.sight(SIZE) };
+            let sight = CameraView { image: false, ..view3d.sight(SIZE) };
             let pictures = pictures(&scene, &sight);
             pictures.map(|p| p.iter().filter(|p| is_ball(p)).count())
         };
@@ -164,7 +164,7 @@ fn a_ball_in_the_plane_shows_its_section() {
 }
 
 /// A colour under the kernel's light on a surface of this normal, turned against the ray.
-fn lit(sight: &Sight, colour: DVec3, normal: DVec3, d: DVec3) -> DVec3 {
+fn lit(sight: &CameraView, colour: DVec3, normal: DVec3, d: DVec3) -> DVec3 {
     let key = -sight.forward - 0.45 * sight.right.normalize() - 0.7 * sight.down.normalize();
     let key = key.normalize();
     let shine = normal.dot((key - d).normalize()).max(0.0).powi(16);
@@ -172,7 +172,13 @@ fn lit(sight: &Sight, colour: DVec3, normal: DVec3, d: DVec3) -> DVec3 {
 }
 
 /// Colour of a pixel seen through a ball of glass: its near wall, its far wall, the background.
-fn through(sight: &Sight, [i, j]: [u32; 2], centre: DVec3, radius: f64, opacity: f64) -> DVec3 {
+fn through(
+    sight: &CameraView,
+    [i, j]: [u32; 2],
+    centre: DVec3,
+    radius: f64,
+    opacity: f64,
+) -> DVec3 {
     let colour = DVec3::from_slice(&sight.looks[0].map(f64::from));
     let [off_x, off_y] =
         [0, 1].map(|a| f64::from([i, j][a]) + 0.5 - f64::from(sight.size[a]) / 2.0);
@@ -203,7 +209,7 @@ fn glass_is_seen_through_by_its_opacity() {
     view3d.camera.face(&scene.world_from_probe);
     view3d.camera.target = centre;
     let opacity = 0.4;
-    let mut sight = Sight { image: false, ..view3d.sight(SIZE) };
+    let mut sight = CameraView { image: false, ..view3d.sight(SIZE) };
     sight.looks[0][3] = opacity;
     for picture in pictures(&scene, &sight) {
         // The middle, and towards the rim on both sides.

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use std::{env, fs};
 
 use insonify::output;
-use insonify::sim::shaders::authors::stamp::{self, Entry};
+use insonify::sim::shaders::authors::stamp::{self, ModuleHashes};
 use insonify::sim::shaders::authors::{Error, bytes_of, compiler, source, validate};
 
 fn main() -> ExitCode {
@@ -49,8 +49,10 @@ fn run(glsl: &Path, spirv: &Path, root: &Path, check: bool) -> Result<Vec<String
         if !variant.keep_names {
             table += &format!("    (\"{stem}\", include_bytes!(\"{stem}.spv\")),\n");
         }
-        let entry =
-            Entry { source: source::hash(glsl, &variant, &version)?, spirv: source::fnv1a(&bytes) };
+        let entry = ModuleHashes {
+            source: source::hash(glsl, &variant, &version)?,
+            spirv: source::fnv1a(&bytes),
+        };
         outputs.insert(spirv.join(format!("{stem}.spv")), bytes);
         entries.insert(stem, entry);
     }

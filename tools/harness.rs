@@ -44,19 +44,19 @@ use insonify::sim::shaders::Library;
 use insonify::sim::stages;
 pub use run::run;
 
-/// Which inputs.
+/// The kinds of inputs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Case {
     /// Random numbers in a plausible frame.
     Random,
-    /// Nothing to do: no samples, no rays, no segments, no instances.
+    /// No work: no samples, no rays, no segments, no instances.
     Empty,
     /// One of everything.
     One,
-    /// Sizes that no work group divides; a linear probe, independent paths, voxels.
+    /// Sizes that are no multiple of a work group's; a linear probe, independent paths, voxels.
     Odd,
-    /// The remaining modes: a phased probe, surfaces that coincide, paths that share their first
-    /// stretch, coherent surfaces, a lattice that rests in the world.
+    /// The remaining modes: a phased probe, coincident surfaces, paths that share their first
+    /// segment, coherent surfaces, a lattice fixed in the world.
     Modes,
     /// NaN and infinity among the inputs.
     NotFinite,
@@ -71,33 +71,33 @@ impl Case {
 /// Size of [`Case::Random`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Size {
-    /// A twin needs well under a second.
+    /// Small enough that a twin needs well under a second.
     Small,
     /// 192 scanlines, 7 layers and 2048 samples as in the paper's Table I.
     Standard,
 }
 
-/// What a kernel does with a binding.
+/// The use that a kernel makes of a binding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
-    /// Reads it.
+    /// The kernel reads it.
     Read,
-    /// Adds to it: zero before a run.
+    /// The kernel adds to it; it is zero before a run.
     Sum,
-    /// Overwrites it.
+    /// The kernel overwrites it.
     Write,
 }
 
-/// What a kernel finds in one binding.
+/// The content of one binding before a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Input {
-    /// Name, also of its dump.
+    /// Name, also of its file in a dump.
     pub name: &'static str,
-    /// What the kernel does with it.
+    /// The use that the kernel makes of it.
     pub role: Role,
     /// Type of its words.
     pub element: Element,
-    /// Content; empty is no element.
+    /// Content; empty means no element.
     pub bytes: Vec<u8>,
 }
 
@@ -134,7 +134,7 @@ impl Input {
         input
     }
 
-    /// Makes it `count` words long, as a kernel that does not read it finds it.
+    /// Sets its content to `count` words, as a kernel that does not read it finds it.
     fn begin(&mut self, count: usize) {
         let word = match self.role {
             Role::Write => UNWRITTEN,
@@ -150,15 +150,15 @@ const UNWRITTEN: u32 = 0xffa5_a5a5;
 /// One run of a kernel: the content of its bindings in binding order, and its push constants.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Job {
-    /// Bindings; where a ray-query variant binds an acceleration structure, the compute variant's
-    /// nodes stand, and floats where an image is bound, of the size that `fusion` says.
+    /// Bindings. The nodes of the compute variant stand in for the acceleration structure of a ray-query
+    /// variant; floats stand in for an image, whose size is in `fusion`.
     pub inputs: Vec<Input>,
-    /// Push constants; of a kernel that is dispatched several times, what they are made of.
+    /// Push constants; for a kernel that is dispatched several times, the data from which they are computed.
     pub push: Vec<u8>,
 }
 
 impl Job {
-    /// Of a stage, from what it reads: the rest of what it binds is made, as large as the frame asks for.
+    /// The job of a stage, from the inputs that it reads; its other bindings get the size that the frame needs.
     pub fn of(pass: &Pass, given: Vec<Input>, push: Vec<u8>) -> Self {
         let mut job = Self { inputs: given, push };
         for name in pass.binds {
@@ -179,7 +179,7 @@ impl Job {
     /// Values of the binding called `name`, before the run.
     ///
     /// # Panics
-    /// Where the kernel has no such binding.
+    /// If the kernel has no such binding.
     pub fn get<T: Pod>(&self, name: &str) -> Vec<T> {
         bytemuck::pod_collect_to_vec(&self.inputs[self.index(name)].bytes)
     }
@@ -203,12 +203,12 @@ impl Job {
         found.unwrap_or_else(|| panic!("no binding '{name}'"))
     }
 
-    /// Values of the binding called `name` in what a run returned.
+    /// Values of the binding called `name` in the outputs of a run.
     pub fn after<T: Pod>(&self, outputs: &[Vec<u8>], name: &str) -> Vec<T> {
         bytemuck::pod_collect_to_vec(&outputs[self.index(name)])
     }
 
-    /// Changes values in what a run returned: how errors are planted.
+    /// Changes values in the outputs of a run; used to plant errors.
     fn edit<T: Pod>(&self, outputs: &mut [Vec<u8>], name: &str, change: impl FnOnce(&mut [T])) {
         let mut values = self.after(outputs, name);
         change(&mut values);
@@ -235,7 +235,7 @@ impl Extent {
 pub struct Subject {
     /// Name of the kernel and of its twin.
     pub name: &'static str,
-    /// What it binds and how it is dispatched, where that is a stage's.
+    /// The stage that states its bindings and dispatch; none for a kernel of the tests.
     pub pass: Option<&'static Pass>,
     /// The tolerance with its reason.
     pub tolerance: &'static str,
@@ -243,16 +243,16 @@ pub struct Subject {
     pub job: fn(Case, Size) -> Job,
     /// Bytes that a binding must have at least; checks dumps. [`sizes::of_frame`] for those of a frame.
     pub size: fn(&Job, &str) -> usize,
-    /// How it is dispatched, where not as its stage says.
+    /// Its dispatch, where it is not that of the stage.
     pub extent: Option<fn(&Job) -> Extent>,
-    /// Compares what a run left in the bindings with the twin.
+    /// Compares the outputs of a run with the twin.
     pub check: fn(&Job, &[Vec<u8>]) -> Vec<Check>,
-    /// Puts a small error into the outputs of a random case, which `check` must catch.
+    /// Puts a small error into the outputs of a random case; `check` must find it.
     pub plant: fn(&Job, &mut [Vec<u8>]),
 }
 
 impl Subject {
-    /// What the subject of a stage has of it.
+    /// A subject with the values that follow from its stage.
     const fn of(pass: &'static Pass) -> Self {
         Self {
             name: pass.name,
@@ -266,7 +266,7 @@ impl Subject {
         }
     }
 
-    /// Its variants among the kernels of `library`; all must give the same.
+    /// Its variants among the kernels of `library`; all must give the same results.
     pub fn stems<'a>(&self, library: &'a Library) -> Vec<&'a str> {
         let kernel = self.pass.map_or(self.name, |pass| pass.name);
         let own = |stem: &&str| {
@@ -281,7 +281,7 @@ impl Subject {
         }
     }
 
-    /// How it is dispatched on a job.
+    /// Its dispatch for a job.
     pub fn extent(&self, job: &Job) -> Extent {
         if let Some(extent) = self.extent {
             return extent(job);

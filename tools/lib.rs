@@ -1,4 +1,4 @@
-//! What insonify's authors and its tests need beside the program: the f64 twin of every kernel of
+//! Code for insonify's authors and its tests, beside the program: the f64 twin of every kernel of
 //! the image, the harness that compares a kernel with it, and the origin of a measurement.
 
 use std::path::Path;

@@ -70,11 +70,11 @@ enum TracerChoice {
 enum Command {
     /// Every strategy over the motion of a scene.
     Strategies(strategies::Arguments),
-    /// Where rebuilding beats selecting: over the distance between keyframes and their triangles.
+    /// Range in which rebuilding is faster than selecting, over the distance between keyframes and their triangles.
     Crossover(crossover::Arguments),
     /// Tables I to III of Starkov et al. 2019, beside the paper's numbers.
     Paper(paper::Arguments),
-    /// What each stage of a frame takes, beside its bytes and operations, and how long a picture takes.
+    /// Time of each stage of a frame, with its bytes and operations, and the time of a picture.
     Stages(stages::Arguments),
     /// Acceleration structures of the device alone.
     Builds(builds::Arguments),

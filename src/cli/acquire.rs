@@ -20,7 +20,7 @@ use super::reconstruct::{spacing, tell};
 pub struct Acquire {
     /// Scene file (.toml). Its pose of the probe is the middle of the sweep.
     scene: PathBuf,
-    /// How the probe goes: linear:LENGTH along its elevation axis, tilt:ANGLE about its lateral axis,
+    /// Path of the probe: linear:LENGTH along its elevation axis, tilt:ANGLE about its lateral axis,
     /// rotate:ANGLE about its depth axis, from the first frame to the last, e.g. linear:30mm or
     /// tilt:40deg; or a file (.csv, .toml) of its poses in the world: time_s, x_mm, y_mm, z_mm, qw, qx,
     /// qy, qz.

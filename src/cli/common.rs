@@ -258,7 +258,7 @@ pub struct Progress {
     count: u32,
     noun: String,
     start: Instant,
-    /// When the line is written next, s.
+    /// Time at which the line is written next, s.
     next: f64,
 }
 

@@ -30,7 +30,7 @@ pub struct Match {
     /// Width of the bands inside and outside the mask's border that are compared, mm.
     #[arg(long, default_value_t = 4.0, value_parser = band)]
     band: f64,
-    /// What is fitted.
+    /// Settings to be fitted.
     #[arg(long, value_enum, value_delimiter = ',', default_value = "gain,tgc,range,size")]
     fit: Vec<Fitted>,
     /// Realisations of the speckle that are simulated per round: more are surer.

@@ -44,7 +44,7 @@ pub struct Reconstruct {
     /// Voxels that a pixel goes to.
     #[arg(long, value_enum)]
     interpolation: Option<InterpolationChoice>,
-    /// What a voxel is that several pixels reach.
+    /// Value of a voxel that several pixels reach.
     #[arg(long, value_enum)]
     compounding: Option<CompoundingChoice>,
     /// Voxels of the longest line that fills a hole; 0 leaves holes.

@@ -53,10 +53,10 @@ pub struct Register {
     /// Frame of the volume's points, surface and landmarks where their files say none [default: lps].
     #[arg(long, value_enum)]
     frame: Option<FrameChoice>,
-    /// What may change: rotation and shift, or the scale as well.
+    /// Changes allowed: rotation and shift, or the scale as well.
     #[arg(long, value_enum, default_value = "rigid")]
     transformation: TransformationChoice,
-    /// Where the search begins without landmarks.
+    /// Start of the search without landmarks.
     #[arg(long, value_enum, default_value = "scene", conflicts_with_all = ["landmarks", "model_landmarks"])]
     start: Start,
     /// Moves this mesh or transform of the scene, with all below it, to the volume, instead of the
@@ -101,7 +101,7 @@ enum TransformationChoice {
 /// Value of `--start`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Start {
-    /// As the scene places the volume now.
+    /// The scene's present placement of the volume.
     Scene,
     /// The same, shifted so that the mean of the points lies on the centroid of the surface.
     Centroids,

@@ -110,7 +110,7 @@ pub fn run(args: &Render) -> Result<()> {
         let memory = device.memory();
         let report = json!({
             "scene": args.scene.display().to_string(),
-            "settings": facts::settings(&scene.probe, &scene.simulation, &scene.imaging),
+            "settings": facts::settings(&scene),
             "device": { "name": device.name(), "driver": device.driver(), "api": device.api_version() },
             "tracer": tracer.to_string(),
             "triangles": scene.triangles(),

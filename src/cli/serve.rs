@@ -11,7 +11,7 @@ use miette::{IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common};
 use insonify::gpu::Device;
-use insonify::igtl::{self, Picture, Server, Status, Tracked};
+use insonify::igtl::{self, Picture, Server, Status, TrackerState};
 use insonify::live::{self, Level, Pace};
 use insonify::output;
 use insonify::scene::Scene;
@@ -66,7 +66,7 @@ pub fn run(args: &Serve) -> Result<()> {
     let library = Library::embedded();
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let address = SocketAddr::new(args.igtl_bind, args.igtl_port);
-    let settings = igtl::Settings::new(scene.tracker.clone());
+    let settings = igtl::ServerSettings::new(scene.tracker.clone());
     let server = Server::bind(address, settings)
         .map_err(|error| miette!(help = error.remedy(), "{error}"))?;
     if !args.igtl_bind.is_loopback() {
@@ -97,7 +97,7 @@ fn simulate(
     let pause = Duration::from_secs_f64(1.0 / args.fps);
     let mut told = Told::default();
     let mut pace = Pace::new(sim::machine(device));
-    let own = Level::of(&scene.probe, &scene.simulation, &scene.imaging);
+    let own = Level::of(scene);
     let mut shown: Option<Shown> = None;
     let mut frames = 0;
     let mut due = began;
@@ -163,9 +163,11 @@ impl Told {
     /// Reports news of the tracker at once, of clients and errors once a second.
     fn tell(&mut self, server: &Server) {
         let tracker = match server.pose() {
-            Tracked::Never => String::new(),
-            Tracked::Live(pose) => format!("tracker: {} moves the probe", pose.device),
-            Tracked::Lost(pose) => format!("tracker: {} is lost; the probe stays", pose.device),
+            TrackerState::Never => String::new(),
+            TrackerState::Live(pose) => format!("tracker: {} moves the probe", pose.device),
+            TrackerState::Lost(pose) => {
+                format!("tracker: {} is lost; the probe stays", pose.device)
+            }
         };
         if tracker != self.tracker {
             eprintln!("{tracker}");

@@ -27,7 +27,7 @@ pub struct Vary {
     /// image [default: the scene's name and what is shown, here].
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// What the images show.
+    /// Subject of the images.
     #[arg(long, value_enum, default_value = "parameters")]
     show: Show,
     /// For blind rating: images in an order that this seed draws, numbered and without labels. Only the
@@ -41,14 +41,14 @@ pub struct Vary {
     common: Common,
 }
 
-/// What the images of a sheet show.
+/// The subject of the images of a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Show {
     /// The scene, then one parameter at a time below and above its value.
     Parameters,
-    /// How the fused image comes about: acquired volume, simulation, mask, both without and with blur.
+    /// The steps of fusion: acquired volume, simulation, mask, both images without and with blur.
     Steps,
-    /// What is shown around the mask: the acquired volume, nothing, or the scene's own scatterers.
+    /// The surroundings of the mask: the acquired volume, nothing, or the scene's own scatterers.
     Surroundings,
     /// The ways in which simulation and acquired volume meet.
     Blends,

@@ -7,7 +7,7 @@ use ash::{khr, vk};
 
 use super::error::{GpuError, during};
 use super::instance::{Instance, LOADER_LISTS};
-use super::queues::Plan;
+use super::queues::QueuePlan;
 
 /// Kinds of device, in the order of preference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -115,12 +115,12 @@ pub(crate) fn choose(
     instance: &Instance,
     selector: Option<&str>,
     presents: Option<Presents<'_>>,
-) -> Result<(Adapter, Plan), GpuError> {
+) -> Result<(Adapter, QueuePlan), GpuError> {
     let plan = |adapter: &Adapter| match presents {
-        None => Plan::alone(&adapter.families),
+        None => QueuePlan::alone(&adapter.families),
         Some(presents) => {
             let here = |family| adapter.swapchain && presents(adapter.physical, family);
-            Plan::with_window(&adapter.families, here)
+            QueuePlan::with_window(&adapter.families, here)
         }
     };
     let mut adapters = adapters(instance)?;
@@ -244,7 +244,7 @@ fn probe(
 
     // SAFETY: `physical` belongs to this instance.
     let families = unsafe { instance.raw.get_physical_device_queue_family_properties(physical) };
-    let family = Plan::alone(&families).map(|plan| plan.work.family as usize);
+    let family = QueuePlan::alone(&families).map(|plan| plan.work.family as usize);
     let timestamp_bits = family.map_or(0, |f| families[f].timestamp_valid_bits);
 
     let mut lacks = Vec::new();

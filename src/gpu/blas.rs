@@ -77,7 +77,7 @@ impl BlasOptions {
 pub struct Blas(pub(crate) Arc<RawAccel>);
 
 /// A mesh between its size query and its build.
-struct Planned<'a> {
+struct PlannedBuild<'a> {
     input: BlasInput<'a>,
     structure_bytes: u64,
     scratch_bytes: u64,
@@ -94,7 +94,7 @@ impl Blas {
         Self::build_timed(device, inputs, options).map(|(built, _)| built)
     }
 
-    /// As [`Self::build_many`], with its times and sizes.
+    /// Like [`Self::build_many`]; also returns times and sizes.
     pub(crate) fn build_timed(
         device: &Arc<Device>,
         inputs: &[BlasInput<'_>],
@@ -154,12 +154,12 @@ fn plan<'a>(
     device: &Device,
     input: BlasInput<'a>,
     options: BlasOptions,
-) -> Result<Planned<'a>, GpuError> {
+) -> Result<PlannedBuild<'a>, GpuError> {
     let accel = device.require_accel()?;
     let geometry = geometry(&input, 0);
     let info = build_info(&geometry, options);
     let sizes = build_sizes(accel, &info, input.triangles.len() as u32);
-    Ok(Planned {
+    Ok(PlannedBuild {
         input,
         structure_bytes: sizes.acceleration_structure_size,
         scratch_bytes: sizes.build_scratch_size.next_multiple_of(accel.scratch_alignment),
@@ -168,7 +168,7 @@ fn plan<'a>(
 
 fn build_batch(
     device: &Arc<Device>,
-    batch: &[Planned<'_>],
+    batch: &[PlannedBuild<'_>],
     options: BlasOptions,
     times: &mut BuildTimes,
 ) -> Result<Vec<Blas>, GpuError> {
@@ -206,7 +206,7 @@ fn build_batch(
 /// Builds a batch; returns milliseconds.
 fn record_builds(
     device: &Arc<Device>,
-    batch: &[Planned<'_>],
+    batch: &[PlannedBuild<'_>],
     options: BlasOptions,
     inputs: &Buffer,
     starts: &[u64],

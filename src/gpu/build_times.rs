@@ -40,7 +40,7 @@ pub struct RefitTimes {
 /// Builds the meshes as [`Blas::build_many`] does, and drops them.
 ///
 /// # Errors
-/// As [`Blas::build_many`].
+/// Those of [`Blas::build_many`].
 pub fn build_times(
     device: &Arc<Device>,
     inputs: &[BlasInput<'_>],
@@ -50,10 +50,10 @@ pub fn build_times(
 }
 
 /// Builds the meshes as [`DynamicBlas`], side by side, then refits them all. Geometry, structures and
-/// scratch memory of all meshes are held at once. `fast_trace` as in [`DynamicBlas::new`].
+/// scratch memory of all meshes are held at the same time. `fast_trace` is that of [`DynamicBlas::new`].
 ///
 /// # Errors
-/// As [`Blas::build_many`].
+/// Those of [`Blas::build_many`].
 pub fn refit_times(
     device: &Arc<Device>,
     inputs: &[BlasInput<'_>],

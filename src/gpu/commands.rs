@@ -8,12 +8,12 @@ use super::barrier::Stage;
 use super::descriptors;
 use super::device::Device;
 use super::error::GpuError;
-use super::frames::Slot;
+use super::frames::SubmissionSlot;
 use super::image::{Image, Sampler, whole};
 use super::kernel::Kernel;
 use super::memory::Buffer;
 use super::pieces::Groups;
-use super::queues::Lane;
+use super::queues::QueueUser;
 use super::reflect::BindingInfo;
 use super::timer::FrameTimings;
 use super::tlas::Tlas;
@@ -50,14 +50,14 @@ impl std::fmt::Display for Binding<'_> {
 /// It begins with a barrier that waits for all submissions before it, so two frames in flight
 /// overlap on the CPU and the device, but not on the device with each other.
 pub struct Commands<'a> {
-    slot: &'a mut Slot,
+    slot: &'a mut SubmissionSlot,
     frame: u64,
     /// Name of the current scope, for messages.
     scope: String,
 }
 
 impl<'a> Commands<'a> {
-    pub(crate) fn begin(slot: &'a mut Slot, frame: u64) -> Result<Self, GpuError> {
+    pub(crate) fn begin(slot: &'a mut SubmissionSlot, frame: u64) -> Result<Self, GpuError> {
         slot.begin()?;
         let commands = Self { slot, frame, scope: String::new() };
         commands.follow();
@@ -79,7 +79,7 @@ impl<'a> Commands<'a> {
         self.slot.commands
     }
 
-    /// See [`Slot::stage`].
+    /// See [`SubmissionSlot::stage`].
     pub(crate) fn stage(&mut self, bytes: &[u8]) -> Result<(Buffer, u64), GpuError> {
         self.slot.stage(bytes)
     }
@@ -324,7 +324,7 @@ impl<'a> Commands<'a> {
         self.slot.submit(self.frame)
     }
 
-    /// As [`Self::submit`], after `wait` at its stages; signals `done`.
+    /// Like [`Self::submit`], after `wait` at its stages; signals `done`.
     pub(crate) fn submit_between(
         self,
         wait: &[(vk::Semaphore, vk::PipelineStageFlags)],
@@ -350,12 +350,12 @@ impl Device {
         self.once_timed(record).map(|(result, _)| result)
     }
 
-    /// As [`Self::once`], with the times of the scopes that were recorded.
+    /// Like [`Self::once`]; also returns the times of the scopes that were recorded.
     pub fn once_timed<T>(
         self: &Arc<Self>,
         record: impl FnOnce(&mut Commands<'_>) -> Result<T, GpuError>,
     ) -> Result<(T, FrameTimings), GpuError> {
-        let mut slot = Slot::new(self, "once", Lane::Work)?;
+        let mut slot = SubmissionSlot::new(self, "once", QueueUser::Work)?;
         let mut commands = Commands::begin(&mut slot, 0)?;
         let result = record(&mut commands)?;
         let timings = commands.submit_and_wait()?;

@@ -13,10 +13,10 @@ use winit::window::Window;
 use super::adapter::{self, AdapterKind, DeviceInfo};
 use super::error::GpuError;
 use super::instance::{Instance, LOADER_LISTS, ValidationLog};
-use super::kept::{self, Kept};
+use super::kept::{self, PipelineStore};
 use super::memory::{MemoryUse, MemoryUseCounter};
 use super::queues::Queues;
-use super::surface::Probe;
+use super::surface::PresentProbe;
 
 /// Size of the blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
@@ -84,7 +84,7 @@ pub struct Device {
     pub(crate) accel: Option<AccelSupport>,
     pub(crate) physical: vk::PhysicalDevice,
     pub(crate) memory_use: MemoryUseCounter,
-    pub(crate) kept: Kept,
+    pub(crate) kept: PipelineStore,
     ray_query: bool,
     /// True for Mesa's driver for the processor.
     jit: bool,
@@ -120,7 +120,7 @@ impl Device {
         // Before the driver makes its folders.
         let jit_forgotten = kept::llvmpipe_has_nothing();
         let instance = Instance::new(options.validate || from_environment, window.is_some())?;
-        let probe = window.map(|window| Probe::new(&instance, window)).transpose();
+        let probe = window.map(|window| PresentProbe::new(&instance, window)).transpose();
         let probe = probe.map_err(|reason| GpuError::Window {
             device: options.selector.clone().unwrap_or_else(|| "any device".into()),
             reason,
@@ -149,7 +149,7 @@ impl Device {
             ),
         });
         let jit = adapter.driver == vk::DriverId::MESA_LLVMPIPE;
-        let kept = Kept::new(
+        let kept = PipelineStore::new(
             &raw,
             &adapter.properties,
             &adapter.info.name,

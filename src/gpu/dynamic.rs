@@ -31,7 +31,7 @@ pub struct DynamicSource<'a> {
 }
 
 /// Properties that a refit may not change.
-struct Built {
+struct BuiltTopology {
     /// The buffer of the triangles, which may have been dropped.
     triangles: Weak<RawBuffer>,
     first_triangle: u32,
@@ -47,7 +47,7 @@ pub struct DynamicBlas {
     max_triangles: u32,
     max_vertices: u32,
     fast_trace: bool,
-    built: Option<Built>,
+    built: Option<BuiltTopology>,
 }
 
 impl DynamicBlas {
@@ -184,7 +184,7 @@ impl DynamicBlas {
     ) -> Result<(), GpuError> {
         commands.barrier(Stage::Compute, Stage::Build);
         commands.barrier(Stage::Transfer, Stage::Build);
-        self.built = Some(Built::new(source));
+        self.built = Some(BuiltTopology::new(source));
         let stage = Stage::Build;
         for buffer in [source.vertices, source.triangles] {
             commands.uses(&buffer.0, buffer.name(), stage, false, "build");
@@ -205,7 +205,7 @@ impl DynamicBlas {
     }
 }
 
-impl Built {
+impl BuiltTopology {
     fn new(source: DynamicSource<'_>) -> Self {
         Self {
             triangles: Arc::downgrade(&source.triangles.0),

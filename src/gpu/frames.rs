@@ -14,7 +14,7 @@ use super::error::{GpuError, during};
 use super::kernel::Kernel;
 use super::memory::{Buffer, BufferKind};
 use super::pieces::Pieces;
-use super::queues::Lane;
+use super::queues::QueueUser;
 use super::timer::{FrameTimings, Timer};
 
 /// Number of frames that may be under way at a time. What the CPU writes per frame through
@@ -28,7 +28,7 @@ const MIN_STAGING_BYTES: u64 = 64 << 10;
 pub type Abandon = Arc<dyn Fn() -> bool + Send + Sync>;
 
 /// Command buffer, fence, descriptors, timer and staging memory of one submission.
-pub(crate) struct Slot {
+pub(crate) struct SubmissionSlot {
     pub(crate) device: Arc<Device>,
     pub(crate) commands: vk::CommandBuffer,
     pub(crate) descriptors: DescriptorPools,
@@ -42,7 +42,7 @@ pub(crate) struct Slot {
     new_kernels: Vec<u64>,
     /// Asked between two pieces, if there is one.
     pub(crate) abandon: Option<Abandon>,
-    lane: Lane,
+    lane: QueueUser,
     /// All command buffers; one more is made as soon as there are as many pieces.
     buffers: Vec<vk::CommandBuffer>,
     /// A fence for each piece except the last.
@@ -60,8 +60,8 @@ pub(crate) struct Slot {
     frame: u64,
 }
 
-impl Slot {
-    pub(crate) fn new(device: &Arc<Device>, name: &str, lane: Lane) -> Result<Self, GpuError> {
+impl SubmissionSlot {
+    pub(crate) fn new(device: &Arc<Device>, name: &str, lane: QueueUser) -> Result<Self, GpuError> {
         let timer = Timer::new(device, name)?;
         let mut slot = Self {
             device: device.clone(),
@@ -198,7 +198,7 @@ impl Slot {
         self.submit_between(frame, &[], &[])
     }
 
-    /// As [`Self::submit`], after `wait` have been signalled for the stages named with them; signals
+    /// Like [`Self::submit`], after `wait` have been signalled for the stages named with them; signals
     /// `done`.
     pub(crate) fn submit_between(
         &mut self,
@@ -301,7 +301,7 @@ impl Slot {
     }
 }
 
-impl Drop for Slot {
+impl Drop for SubmissionSlot {
     fn drop(&mut self) {
         self.wait_for_pieces();
         let raw = &self.device.raw;
@@ -322,7 +322,7 @@ impl Drop for Slot {
 
 /// Two slots, used in turn.
 pub struct Frames {
-    slots: [Slot; FRAMES_IN_FLIGHT],
+    slots: [SubmissionSlot; FRAMES_IN_FLIGHT],
     next: u64,
     finished: Vec<FrameTimings>,
     abandon: Option<Abandon>,
@@ -331,8 +331,9 @@ pub struct Frames {
 impl Frames {
     /// Makes the slots; `name` names their Vulkan objects.
     pub fn new(device: &Arc<Device>, name: &str) -> Result<Self, GpuError> {
-        let slot = |index: u32| -> Result<Slot, GpuError> {
-            let mut slot = Slot::new(device, &format!("{name} {index}"), Lane::Work)?;
+        let slot = |index: u32| -> Result<SubmissionSlot, GpuError> {
+            let mut slot =
+                SubmissionSlot::new(device, &format!("{name} {index}"), QueueUser::Work)?;
             slot.pieces = Some(Pieces::new(device.queues.are_shared()));
             Ok(slot)
         };
@@ -398,12 +399,12 @@ mod tests {
     use ash::vk;
 
     use super::super::{Commands, GpuError, test_device};
-    use super::{Lane, Slot};
+    use super::{QueueUser, SubmissionSlot};
 
     #[test]
     fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
         let device = test_device();
-        let mut slot = Slot::new(&device, "test", Lane::Work).unwrap();
+        let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
         let mut commands = Commands::begin(&mut slot, 0).unwrap();
         for _ in 0..4096 {
             commands.scope("trace");
@@ -424,7 +425,7 @@ mod tests {
     #[test]
     fn a_lost_device_names_the_last_pass_that_began() {
         let device = test_device();
-        let mut slot = Slot::new(&device, "test", Lane::Work).unwrap();
+        let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
         let mut commands = Commands::begin(&mut slot, 0).unwrap();
         commands.scope("trace");
         commands.scope("scatter");

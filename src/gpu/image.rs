@@ -7,7 +7,7 @@ use gpu_allocator::MemoryLocation;
 
 use super::device::Device;
 use super::error::{GpuError, during};
-use super::memory::Memory;
+use super::memory::CountedMemory;
 
 /// Number of axes of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -62,7 +62,7 @@ pub(crate) struct RawImage {
     format: ImageFormat,
     filterable: bool,
     /// `Some` except while the image is created or dropped.
-    memory: Option<Memory>,
+    memory: Option<CountedMemory>,
     device: Arc<Device>,
 }
 
@@ -198,7 +198,7 @@ impl RawImage {
         // SAFETY: the image was just made from this device.
         let requirements = unsafe { raw.get_image_memory_requirements(self.handle) };
         let location = MemoryLocation::GpuOnly;
-        let memory = Memory::new(&self.device, &self.name, requirements, location, false)?;
+        let memory = CountedMemory::new(&self.device, &self.name, requirements, location, false)?;
         let (block, offset) = memory.bind();
         // SAFETY: the memory fulfils the image's requirements and is owned by it from here on.
         unsafe { raw.bind_image_memory(self.handle, block, offset) }

@@ -55,7 +55,7 @@ pub(crate) fn llvmpipe_has_nothing() -> bool {
 }
 
 /// The pipeline cache of a device, and the content of its file.
-pub(crate) struct Kept {
+pub(crate) struct PipelineStore {
     raw: ash::Device,
     cache: vk::PipelineCache,
     device: String,
@@ -68,7 +68,7 @@ pub(crate) struct Kept {
     told: Arc<AtomicBool>,
 }
 
-impl Kept {
+impl PipelineStore {
     /// Takes over the content of `folder` for a device; `forgotten`: the driver has lost everything that it
     /// compiled before.
     pub(crate) fn new(
@@ -128,7 +128,7 @@ impl Kept {
 
     /// Tells the user the reason for the wait, once, if the returned value is not dropped within a second
     /// and one of `kernels` is new here.
-    pub(crate) fn patience(&self, kernels: impl IntoIterator<Item = u64>) -> Option<Patience> {
+    pub(crate) fn patience(&self, kernels: impl IntoIterator<Item = u64>) -> Option<WaitNotice> {
         let new = kernels.into_iter().any(|kernel| self.is_new(kernel));
         if !new || self.told.load(Ordering::Relaxed) {
             return None;
@@ -141,7 +141,7 @@ impl Kept {
                 eprintln!("compiling kernels for {device}, the first time only");
             }
         });
-        Some(Patience { _done: done })
+        Some(WaitNotice { _done: done })
     }
 
     /// Notes that these kernels have run; writes the driver's data if any is new.
@@ -171,7 +171,7 @@ impl Kept {
 }
 
 /// Guard of a wait, dropped when it is over.
-pub(crate) struct Patience {
+pub(crate) struct WaitNotice {
     _done: Sender<()>,
 }
 

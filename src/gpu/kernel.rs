@@ -15,11 +15,11 @@ use super::error::{GpuError, during};
 use super::reflect::{BindingInfo, BindingKind, Reflection, reflect};
 
 /// Size above which a module is compiled on a device of its own, words.
-const LARGE: usize = 1024;
+const LARGE_MODULE_WORDS: usize = 1024;
 
 /// Threads that make pipelines, as many at once as there are processors, in the order of the requests. Not rayon's
 /// own threads: scenes are loaded with those meanwhile.
-static MAKERS: LazyLock<ThreadPool> = LazyLock::new(|| {
+static PIPELINE_THREADS: LazyLock<ThreadPool> = LazyLock::new(|| {
     let threads = ThreadPoolBuilder::new().thread_name(|at| format!("pipelines {at}"));
     // A panic would end the process. Who needs the pipeline makes it itself, and meets the same.
     let threads = threads.panic_handler(|_| ());
@@ -62,7 +62,7 @@ impl Kernel {
         Ok(kernel)
     }
 
-    /// As [`Self::new`], but the pipeline is not made before the first dispatch or [`Self::prepare`]:
+    /// Like [`Self::new`], but the pipeline is not made before the first dispatch or [`Self::prepare`]:
     /// for kernels that many scenes do not need.
     ///
     /// # Errors
@@ -87,7 +87,9 @@ impl Kernel {
             device: device.clone(),
         };
         kernel.create_layouts()?;
-        let ahead = device.compiles_late() && device.kept.is_new(kernel.id) && spirv.len() > LARGE;
+        let ahead = device.compiles_late()
+            && device.kept.is_new(kernel.id)
+            && spirv.len() > LARGE_MODULE_WORDS;
         kernel.pipeline = Some(Arc::new(Pipeline {
             ahead: ahead.then(|| [device.name().to_owned(), name.to_owned()]),
             spirv: spirv.to_vec(),
@@ -116,7 +118,7 @@ impl Kernel {
     pub fn prepare(&self) {
         if let Some(pipeline) = self.0.pipeline.clone() {
             // The user of the pipeline gets the result.
-            MAKERS.spawn_fifo(move || {
+            PIPELINE_THREADS.spawn_fifo(move || {
                 let _ = pipeline.get();
             });
         }

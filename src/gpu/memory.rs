@@ -101,12 +101,12 @@ impl BufferKind {
 }
 
 /// Memory bound to a buffer or image; counted while it lives.
-pub(crate) struct Memory {
+pub(crate) struct CountedMemory {
     allocation: Allocation,
     device: Arc<Device>,
 }
 
-impl Memory {
+impl CountedMemory {
     pub(crate) fn new(
         device: &Arc<Device>,
         name: &str,
@@ -139,7 +139,7 @@ impl Memory {
     }
 }
 
-impl Drop for Memory {
+impl Drop for CountedMemory {
     fn drop(&mut self) {
         self.device.memory_use.remove(self.allocation.size());
         let allocation = std::mem::take(&mut self.allocation);
@@ -157,7 +157,7 @@ pub(crate) struct RawBuffer {
     pub(crate) size: u64,
     pub(crate) kind: BufferKind,
     /// `Some` except while the buffer is created or dropped.
-    memory: Option<Memory>,
+    memory: Option<CountedMemory>,
     device: Arc<Device>,
 }
 
@@ -210,7 +210,7 @@ impl Buffer {
         };
         // SAFETY: the buffer was just made from this device.
         let requirements = unsafe { device.raw.get_buffer_memory_requirements(handle) };
-        let memory = Memory::new(device, name, requirements, kind.location(), true)?;
+        let memory = CountedMemory::new(device, name, requirements, kind.location(), true)?;
         let (block, offset) = memory.bind();
         // SAFETY: the memory fulfils the buffer's requirements and is owned by it from here on.
         unsafe { device.raw.bind_buffer_memory(handle, block, offset) }

@@ -12,7 +12,7 @@ use super::commands::Commands;
 use super::device::Device;
 use super::error::{GpuError, during};
 use super::frames::FRAMES_IN_FLIGHT;
-use super::queues::Lane;
+use super::queues::QueueUser;
 
 /// Textures and buffers of the interface.
 pub(crate) struct Overlay {
@@ -28,12 +28,12 @@ pub(crate) struct Overlay {
 }
 
 /// Render pass, framebuffer and size to draw on.
-pub(crate) type Target = (vk::RenderPass, vk::Framebuffer, vk::Extent2D);
+pub(crate) type DrawTarget = (vk::RenderPass, vk::Framebuffer, vk::Extent2D);
 
 impl Overlay {
     pub(crate) fn new(device: &Arc<Device>, pass: vk::RenderPass) -> Result<Self, GpuError> {
         let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.queues.family(Lane::Window))
+            .queue_family_index(device.queues.family(QueueUser::Window))
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the family is the device's own; `Drop` destroys the pool.
         let pool = unsafe { device.raw.create_command_pool(&info, None) }
@@ -64,7 +64,7 @@ impl Overlay {
                 patch(&mut self.textures, id, change);
             }
             let all = ImageDelta::full(self.textures[&id].clone(), egui::TextureOptions::LINEAR);
-            let queue = self.device.queues.lock(Lane::Window);
+            let queue = self.device.queues.lock(QueueUser::Window);
             renderer
                 .set_texture(*queue, self.pool, id, &all)
                 .map_err(failed("uploading a texture of the interface"))?;
@@ -83,7 +83,7 @@ impl Overlay {
     pub(crate) fn draw(
         &mut self,
         commands: &Commands<'_>,
-        (pass, framebuffer, extent): Target,
+        (pass, framebuffer, extent): DrawTarget,
         primitives: &[egui::ClippedPrimitive],
         pixels_per_point: f32,
     ) -> Result<(), GpuError> {
@@ -122,7 +122,7 @@ fn patch(
         textures.insert(id, Arc::unwrap_or_clone(part));
         return;
     };
-    let whole = textures.get_mut(&id).expect("egui sets it whole first");
+    let whole = textures.get_mut(&id).expect("egui sends the whole texture before its parts");
     let ([width, height], stride) = (part.size, whole.size[0]);
     for row in 0..height {
         let to = (top + row) * stride + left;

@@ -12,16 +12,16 @@ use super::barrier::Stage;
 use super::commands::Commands;
 use super::device::Device;
 use super::error::{GpuError, during};
-use super::frames::{FRAMES_IN_FLIGHT, Slot};
+use super::frames::{FRAMES_IN_FLIGHT, SubmissionSlot};
 use super::image::{Image, whole};
 use super::memory::{Buffer, BufferKind};
 use super::overlay::Overlay;
-use super::queues::Lane;
+use super::queues::QueueUser;
 use super::surface::Surface;
-use super::swapchain::{Acquired, Swapchain};
+use super::swapchain::{AcquireResult, Swapchain};
 
 /// An image and its place in the window.
-pub struct Placed<'a> {
+pub struct PlacedImage<'a> {
     /// The image.
     pub image: &'a Image,
     /// Place in pixels of the window: left, top, right, bottom. Parts outside are cut off.
@@ -29,7 +29,7 @@ pub struct Placed<'a> {
 }
 
 /// One interface frame.
-pub struct Interface<'a> {
+pub struct InterfaceFrame<'a> {
     /// Pixels per point of the primitives.
     pub pixels_per_point: f32,
     /// Shapes in the order of drawing.
@@ -39,7 +39,7 @@ pub struct Interface<'a> {
 }
 
 /// The pixels of a window.
-pub struct Shot {
+pub struct Screenshot {
     /// Width and height in pixels.
     pub size: [u32; 2],
     /// RGBA, row by row, opaque.
@@ -49,7 +49,7 @@ pub struct Shot {
 /// Result of painting.
 pub enum Painted {
     /// The picture is on its way to the screen; with its pixels where they were asked for.
-    Shown(Option<Shot>),
+    Shown(Option<Screenshot>),
     /// Nothing was drawn: the window has no area, or the window system has no picture free.
     Skipped,
 }
@@ -58,7 +58,7 @@ pub enum Painted {
 pub struct Painter {
     overlay: Overlay,
     swapchain: Option<Swapchain>,
-    slots: [Slot; FRAMES_IN_FLIGHT],
+    slots: [SubmissionSlot; FRAMES_IN_FLIGHT],
     /// One per slot: signalled when its picture is free for drawing.
     free: [vk::Semaphore; FRAMES_IN_FLIGHT],
     pass: vk::RenderPass,
@@ -75,7 +75,7 @@ impl Painter {
     pub fn new(device: &Arc<Device>, window: Arc<Window>) -> Result<Self, GpuError> {
         let surface = Surface::new(device, window)?;
         let pass = render_pass(device, surface.format.format)?;
-        let slot = |name| Slot::new(device, name, Lane::Window);
+        let slot = |name| SubmissionSlot::new(device, name, QueueUser::Window);
         let mut made = Self {
             overlay: Overlay::new(device, pass)?,
             swapchain: None,
@@ -103,8 +103,8 @@ impl Painter {
     pub fn paint(
         &mut self,
         size: [u32; 2],
-        images: &[Placed<'_>],
-        interface: Interface<'_>,
+        images: &[PlacedImage<'_>],
+        interface: InterfaceFrame<'_>,
         shot: bool,
     ) -> Result<Painted, GpuError> {
         let slot = self.next as usize % FRAMES_IN_FLIGHT;
@@ -177,15 +177,15 @@ impl Painter {
                 return Ok(None);
             };
             match chain.acquire(self.free[slot])? {
-                Acquired::Picture(index) => return Ok(Some(index)),
-                Acquired::NotNow => return Ok(None),
-                Acquired::OutOfDate => chain.forget(),
+                AcquireResult::Picture(index) => return Ok(Some(index)),
+                AcquireResult::NotNow => return Ok(None),
+                AcquireResult::OutOfDate => chain.forget(),
             }
         }
         Ok(None)
     }
 
-    fn shot(&self, buffer: &Buffer, extent: vk::Extent2D) -> Shot {
+    fn shot(&self, buffer: &Buffer, extent: vk::Extent2D) -> Screenshot {
         let mut rgba = vec![0; buffer.size() as usize];
         // SAFETY: the copy was waited for, after a barrier to the host.
         unsafe { buffer.read_mapped(&mut rgba) };
@@ -196,7 +196,7 @@ impl Painter {
             }
             texel[3] = 255;
         }
-        Shot { size: [extent.width, extent.height], rgba }
+        Screenshot { size: [extent.width, extent.height], rgba }
     }
 
     /// Waits until no work of the window is under way.
@@ -204,7 +204,7 @@ impl Painter {
         for slot in &mut self.slots {
             slot.wait()?;
         }
-        let queue = self.device.queues.lock(Lane::Window);
+        let queue = self.device.queues.lock(QueueUser::Window);
         // SAFETY: the guard keeps other threads off the queue. Presentations have no fence.
         unsafe { self.device.raw.queue_wait_idle(*queue) }
             .map_err(super::swapchain::lost_or("waiting for the window"))
@@ -229,17 +229,17 @@ impl Drop for Painter {
 }
 
 /// Layout, stages and accesses of a picture between two uses.
-type Use = (vk::ImageLayout, vk::PipelineStageFlags, vk::AccessFlags);
+type PictureUse = (vk::ImageLayout, vk::PipelineStageFlags, vk::AccessFlags);
 
 /// State in which the window system hands it over: the semaphore is waited for before TRANSFER.
-const UNDEFINED: Use =
+const UNDEFINED: PictureUse =
     (vk::ImageLayout::UNDEFINED, vk::PipelineStageFlags::TRANSFER, vk::AccessFlags::empty());
-const COPY_TO: Use = (
+const COPY_TO: PictureUse = (
     vk::ImageLayout::TRANSFER_DST_OPTIMAL,
     vk::PipelineStageFlags::TRANSFER,
     vk::AccessFlags::TRANSFER_WRITE,
 );
-const DRAWN: Use = (
+const DRAWN: PictureUse = (
     vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
     vk::PipelineStageFlags::COLOR_ATTACHMENT_OUTPUT,
     vk::AccessFlags::from_raw(
@@ -247,12 +247,12 @@ const DRAWN: Use = (
             | vk::AccessFlags::COLOR_ATTACHMENT_WRITE.as_raw(),
     ),
 );
-const COPY_FROM: Use = (
+const COPY_FROM: PictureUse = (
     vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
     vk::PipelineStageFlags::TRANSFER,
     vk::AccessFlags::TRANSFER_READ,
 );
-const SHOWN: Use = (
+const SHOWN: PictureUse = (
     vk::ImageLayout::PRESENT_SRC_KHR,
     vk::PipelineStageFlags::BOTTOM_OF_PIPE,
     vk::AccessFlags::empty(),
@@ -278,7 +278,7 @@ fn render_pass(device: &Device, format: vk::Format) -> Result<vk::RenderPass, Gp
 }
 
 impl Commands<'_> {
-    fn move_window(&self, image: vk::Image, from: Use, to: Use) {
+    fn move_window(&self, image: vk::Image, from: PictureUse, to: PictureUse) {
         let barrier = [vk::ImageMemoryBarrier::default()
             .image(image)
             .old_layout(from.0)
@@ -305,7 +305,7 @@ impl Commands<'_> {
     }
 
     /// Scales an image, linearly, onto the part of its place that lies in the window.
-    fn blit(&mut self, placed: &Placed<'_>, window: vk::Image, extent: vk::Extent2D) {
+    fn blit(&mut self, placed: &PlacedImage<'_>, window: vk::Image, extent: vk::Extent2D) {
         let [width, height, _] = placed.image.extent();
         let axis = |low: f32, high: f32, limit: u32, texels: u32| {
             let clipped = [low, high].map(|x| x.clamp(0.0, limit as f32).round());

@@ -19,7 +19,7 @@ const SHARED_MS: f64 = 7.0;
 const ALONE_MS: f64 = 200.0;
 
 /// Number of pieces of a dispatch that was never timed.
-const UNTIMED: usize = 16;
+const UNTIMED_PIECES: usize = 16;
 
 /// A box of work groups: first one and extent, per axis.
 pub(crate) type Groups = [[u32; 3]; 2];
@@ -86,7 +86,7 @@ impl Pieces {
                 1.0 => (1, ms / dispatches as f64),
                 count => (count as usize, ms / count),
             },
-            (None, None) => (UNTIMED, self.budget_ms),
+            (None, None) => (UNTIMED_PIECES, self.budget_ms),
         };
         (cut(groups, count, whole), each_ms)
     }

@@ -8,8 +8,8 @@ use super::kept;
 /// a kernel compiled for the other width would end the process. If `LP_NATIVE_VECTOR_WIDTH` or
 /// `MESA_SHADER_CACHE_DIR` is set, both stay as they are.
 ///
-/// Also keeps glibc from making a heap for each thread: memory that drivers free there after compiling is not
-/// given back, 25 MB in two threads.
+/// Limits the number of glibc's heaps, which otherwise grows with the threads: memory that drivers free in them after
+/// compiling is not given back to the system, 25 MB in two threads.
 ///
 /// To be called first in `main`. Once there are other threads, it does nothing.
 pub fn prepare_process() {

@@ -6,7 +6,7 @@ use ash::vk;
 
 /// User of a queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Lane {
+pub(crate) enum QueueUser {
     /// The simulation, and everything without a window.
     Work,
     /// The window.
@@ -15,19 +15,19 @@ pub(crate) enum Lane {
 
 /// A queue by its family and its index there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Place {
+pub(crate) struct QueueIndex {
     pub(crate) family: u32,
     pub(crate) index: u32,
 }
 
 /// The queue of each lane; both may be the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Plan {
-    pub(crate) work: Place,
-    pub(crate) window: Place,
+pub(crate) struct QueuePlan {
+    pub(crate) work: QueueIndex,
+    pub(crate) window: QueueIndex,
 }
 
-impl Plan {
+impl QueuePlan {
     /// The plan without a window: one queue of a family with compute, with graphics if there is one, since
     /// every driver runs that at full speed. None where no family computes.
     pub(crate) fn alone(families: &[vk::QueueFamilyProperties]) -> Option<Self> {
@@ -48,7 +48,7 @@ impl Plan {
         let window =
             find(families, |family, flags| flags.contains(compute | graphics) && presents(family))?;
         let alone = find(families, |_, flags| flags.contains(compute) && !flags.contains(graphics));
-        let second = Place { index: 1, ..window };
+        let second = QueueIndex { index: 1, ..window };
         let several = families[window.family as usize].queue_count > 1;
         let work = alone.unwrap_or(if several { second } else { window });
         Some(Self { work, window })
@@ -67,18 +67,18 @@ impl Plan {
 fn find(
     families: &[vk::QueueFamilyProperties],
     fits: impl Fn(u32, vk::QueueFlags) -> bool,
-) -> Option<Place> {
+) -> Option<QueueIndex> {
     let mut numbered = (0..).zip(families);
     let fits =
         |(i, f): &(u32, &vk::QueueFamilyProperties)| f.queue_count > 0 && fits(*i, f.queue_flags);
     let (family, _) = numbered.find(fits)?;
-    Some(Place { family, index: 0 })
+    Some(QueueIndex { family, index: 0 })
 }
 
 /// The queues of a plan. No ownership has to move between two families: images are shared by both, and
 /// buffers belong to one lane.
 pub(crate) struct Queues {
-    plan: Plan,
+    plan: QueuePlan,
     work: Mutex<vk::Queue>,
     /// The window's queue, where it is another one.
     window: Option<Mutex<vk::Queue>>,
@@ -87,9 +87,9 @@ pub(crate) struct Queues {
 
 impl Queues {
     /// Takes the queues of `plan`, with which `device` was made.
-    pub(crate) fn new(device: &ash::Device, plan: Plan, with_window: bool) -> Self {
+    pub(crate) fn new(device: &ash::Device, plan: QueuePlan, with_window: bool) -> Self {
         // SAFETY: the device was made with these queues.
-        let queue = |at: Place| unsafe { device.get_device_queue(at.family, at.index) };
+        let queue = |at: QueueIndex| unsafe { device.get_device_queue(at.family, at.index) };
         let other = plan.window != plan.work;
         Self {
             work: Mutex::new(queue(plan.work)),
@@ -101,25 +101,25 @@ impl Queues {
 
     /// Locks the queue of `lane` against other threads. A handle stays usable after a panic elsewhere, so
     /// poisoning is ignored.
-    pub(crate) fn lock(&self, lane: Lane) -> MutexGuard<'_, vk::Queue> {
+    pub(crate) fn lock(&self, lane: QueueUser) -> MutexGuard<'_, vk::Queue> {
         let queue = match (lane, &self.window) {
-            (Lane::Window, Some(window)) => window,
+            (QueueUser::Window, Some(window)) => window,
             _ => &self.work,
         };
         queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The family of a lane's queue.
-    pub(crate) fn family(&self, lane: Lane) -> u32 {
+    pub(crate) fn family(&self, lane: QueueUser) -> u32 {
         match lane {
-            Lane::Work => self.plan.work.family,
-            Lane::Window => self.plan.window.family,
+            QueueUser::Work => self.plan.work.family,
+            QueueUser::Window => self.plan.window.family,
         }
     }
 
     /// The families that use the same images, if there are two.
     pub(crate) fn sharing(&self) -> Option<[u32; 2]> {
-        let [work, window] = [Lane::Work, Lane::Window].map(|lane| self.family(lane));
+        let [work, window] = [QueueUser::Work, QueueUser::Window].map(|lane| self.family(lane));
         (work != window).then_some([work, window])
     }
 
@@ -133,7 +133,7 @@ impl Queues {
 mod tests {
     use ash::vk;
 
-    use super::{Place, Plan};
+    use super::{QueueIndex, QueuePlan};
 
     const GRAPHICS: vk::QueueFlags = vk::QueueFlags::GRAPHICS;
     const COMPUTE: vk::QueueFlags = vk::QueueFlags::COMPUTE;
@@ -142,14 +142,14 @@ mod tests {
         vk::QueueFamilyProperties { queue_flags, queue_count, ..Default::default() }
     }
 
-    fn at(family: u32, index: u32) -> Place {
-        Place { family, index }
+    fn at(family: u32, index: u32) -> QueueIndex {
+        QueueIndex { family, index }
     }
 
     #[test]
     fn the_simulation_has_a_queue_of_its_own_where_there_is_one() {
         let all = GRAPHICS | COMPUTE | vk::QueueFlags::TRANSFER;
-        let plan = |families: &[_]| Plan::with_window(families, |_| true).unwrap();
+        let plan = |families: &[_]| QueuePlan::with_window(families, |_| true).unwrap();
         let amd = [family(all, 1), family(COMPUTE, 4)];
         let made = plan(&amd);
         assert_eq!((made.work, made.window), (at(1, 0), at(0, 0)));
@@ -168,18 +168,18 @@ mod tests {
     fn the_window_takes_a_family_that_presents() {
         let all = GRAPHICS | COMPUTE;
         let families = [family(COMPUTE, 1), family(all, 1), family(all, 1)];
-        let made = Plan::with_window(&families, |family| family == 2).unwrap();
+        let made = QueuePlan::with_window(&families, |family| family == 2).unwrap();
         assert_eq!((made.work, made.window), (at(0, 0), at(2, 0)));
-        assert_eq!(Plan::with_window(&families, |_| false), None);
-        assert_eq!(Plan::with_window(&families, |family| family == 0), None);
+        assert_eq!(QueuePlan::with_window(&families, |_| false), None);
+        assert_eq!(QueuePlan::with_window(&families, |family| family == 0), None);
         let empty = [family(all, 0)];
-        assert_eq!(Plan::with_window(&empty, |_| true), None);
+        assert_eq!(QueuePlan::with_window(&empty, |_| true), None);
     }
 
     #[test]
     fn without_a_window_one_queue_is_taken() {
         let all = GRAPHICS | COMPUTE;
-        let alone = |families: &[_]| Plan::alone(families).map(|plan| plan.families());
+        let alone = |families: &[_]| QueuePlan::alone(families).map(|plan| plan.families());
         assert_eq!(alone(&[family(COMPUTE, 4), family(all, 2)]), Some(vec![(1, 1)]));
         assert_eq!(alone(&[family(COMPUTE, 4)]), Some(vec![(0, 1)]));
         assert_eq!(alone(&[family(GRAPHICS, 4)]), None);

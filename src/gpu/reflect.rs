@@ -111,7 +111,7 @@ pub(crate) fn reflect(words: &[u32], specialization: &[(u32, u32)]) -> Result<Re
     }
     let mut bindings = Vec::new();
     let mut push_constant_bytes = 0;
-    let constants = Constants::read(words, specialization);
+    let constants = SpecConstants::read(words, specialization);
     for (id, _) in specialization {
         if !constants.ids.contains(id) {
             return Err(format!("it has no specialization constant {id}"));
@@ -197,7 +197,7 @@ fn block_name(ty: &Type) -> Option<String> {
 /// Constants as specialized, read from the words: spirq does not report the `WorkgroupSize`
 /// built-in, which holds `local_size_x_id`.
 #[derive(Default)]
-struct Constants {
+struct SpecConstants {
     ids: Vec<u32>,
     local_size: Option<[u32; 3]>,
     counts_groups: bool,
@@ -205,7 +205,7 @@ struct Constants {
     value_of: HashMap<u32, u32>,
 }
 
-impl Constants {
+impl SpecConstants {
     fn read(words: &[u32], specialization: &[(u32, u32)]) -> Self {
         const OP_EXECUTION_MODE: u32 = 16;
         const OP_CONSTANT: u32 = 43;

@@ -9,7 +9,7 @@ use winit::window::Window;
 use super::device::Device;
 use super::error::{GpuError, during};
 use super::instance::Instance;
-use super::queues::Lane;
+use super::queues::QueueUser;
 
 /// The surface of `window` for `instance`; the caller destroys it, before the window.
 fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, String> {
@@ -29,13 +29,13 @@ fn surface_of(instance: &Instance, window: &Window) -> Result<vk::SurfaceKHR, St
 }
 
 /// Finds devices and queue families that can show pictures in a window; used before a device is opened.
-pub(crate) struct Probe<'a> {
+pub(crate) struct PresentProbe<'a> {
     handle: vk::SurfaceKHR,
     functions: khr::surface::Instance,
     _window: &'a Window,
 }
 
-impl<'a> Probe<'a> {
+impl<'a> PresentProbe<'a> {
     /// Makes a probe; drop it before the instance.
     ///
     /// # Errors
@@ -58,7 +58,7 @@ impl<'a> Probe<'a> {
     }
 }
 
-impl Drop for Probe<'_> {
+impl Drop for PresentProbe<'_> {
     fn drop(&mut self) {
         // SAFETY: nothing was made of the surface.
         unsafe { self.functions.destroy_surface(self.handle, None) };
@@ -92,7 +92,7 @@ impl Surface {
         let supported = unsafe {
             made.functions.get_physical_device_surface_support(
                 device.physical,
-                device.queues.family(Lane::Window),
+                device.queues.family(QueueUser::Window),
                 surface,
             )
         };

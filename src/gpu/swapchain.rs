@@ -7,14 +7,14 @@ use ash::{khr, vk};
 use super::device::Device;
 use super::error::{GpuError, during};
 use super::image::whole;
-use super::queues::Lane;
+use super::queues::QueueUser;
 use super::surface::Surface;
 
 /// Longest wait for the window system, ns: it may hold back the pictures of a window that it does not show.
 const ACQUIRE_NS: u64 = 100_000_000;
 
 /// Result of acquiring a picture.
-pub(crate) enum Acquired {
+pub(crate) enum AcquireResult {
     /// Number of the picture.
     Picture(usize),
     /// The window has changed: a new swapchain is needed.
@@ -24,7 +24,7 @@ pub(crate) enum Acquired {
 }
 
 /// One picture of the window.
-pub(crate) struct Picture {
+pub(crate) struct WindowPicture {
     pub(crate) image: vk::Image,
     view: vk::ImageView,
     pub(crate) framebuffer: vk::Framebuffer,
@@ -36,7 +36,7 @@ pub(crate) struct Picture {
 /// Pictures of one size.
 pub(crate) struct Swapchain {
     pub(crate) extent: vk::Extent2D,
-    pub(crate) pictures: Vec<Picture>,
+    pub(crate) pictures: Vec<WindowPicture>,
     /// True where pictures can be copied from.
     pub(crate) readable: bool,
     /// True where the window system would like another size, but still shows the present one.
@@ -128,7 +128,7 @@ impl Swapchain {
         pass: vk::RenderPass,
     ) -> Result<(), vk::Result> {
         self.device.set_name(image, "window");
-        self.pictures.push(Picture {
+        self.pictures.push(WindowPicture {
             image,
             view: vk::ImageView::null(),
             framebuffer: vk::Framebuffer::null(),
@@ -169,7 +169,7 @@ impl Swapchain {
     }
 
     /// The next picture to draw on, free once `free` is signalled.
-    pub(crate) fn acquire(&mut self, free: vk::Semaphore) -> Result<Acquired, GpuError> {
+    pub(crate) fn acquire(&mut self, free: vk::Semaphore) -> Result<AcquireResult, GpuError> {
         // SAFETY: the semaphore has been waited for since its last use.
         let acquired = unsafe {
             let none = vk::Fence::null();
@@ -178,10 +178,10 @@ impl Swapchain {
         match acquired {
             Ok((index, suboptimal)) => {
                 self.stale |= suboptimal;
-                Ok(Acquired::Picture(index as usize))
+                Ok(AcquireResult::Picture(index as usize))
             }
-            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => Ok(Acquired::OutOfDate),
-            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(Acquired::NotNow),
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => Ok(AcquireResult::OutOfDate),
+            Err(vk::Result::TIMEOUT | vk::Result::NOT_READY) => Ok(AcquireResult::NotNow),
             Err(code) => Err(lost_or("acquiring a picture of the window")(code)),
         }
     }
@@ -194,7 +194,7 @@ impl Swapchain {
             .wait_semaphores(&drawn)
             .swapchains(&chains)
             .image_indices(&indices);
-        let queue = self.device.queues.lock(Lane::Window);
+        let queue = self.device.queues.lock(QueueUser::Window);
         // SAFETY: the picture was acquired, and its drawing is submitted and signals the semaphore.
         match unsafe { self.functions.queue_present(*queue, &info) } {
             Ok(suboptimal) => self.stale |= suboptimal,

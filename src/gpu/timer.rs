@@ -13,7 +13,7 @@ use super::memory::{Buffer, BufferKind};
 const MAX_SCOPES: u32 = 255;
 /// Number of scopes from which on only new names begin a scope: further batches count to the present scope, and
 /// the stages after them still get their own.
-const CROWDED: usize = 224;
+const MERGED_FROM: usize = 224;
 
 /// Times of one finished submission.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -88,7 +88,7 @@ impl Timer {
 
     /// Begins a scope and ends the one before.
     pub(crate) fn scope(&mut self, commands: vk::CommandBuffer, name: &str) {
-        if self.names.len() >= CROWDED && self.names.iter().any(|n| n == name) {
+        if self.names.len() >= MERGED_FROM && self.names.iter().any(|n| n == name) {
             return;
         }
         let index = self.names.len() as u32;

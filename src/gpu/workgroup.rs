@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 /// Size of a type, or the type that it points to.
 #[derive(Clone, Copy)]
-enum Type {
+enum SharedType {
     Bytes(u64),
     /// Pointer to a type in shared memory.
     Shared(u32),
@@ -24,7 +24,7 @@ pub(crate) fn shared_bytes(words: &[u32], value_of: &HashMap<u32, u32>) -> Resul
     const OP_VARIABLE: u32 = 59;
     const WORKGROUP: u32 = 4;
 
-    let mut types: HashMap<u32, Type> = HashMap::new();
+    let mut types: HashMap<u32, SharedType> = HashMap::new();
     let mut sum = 0u64;
     let mut at = 5; // after the header
     while let Some(&first) = words.get(at) {
@@ -34,7 +34,7 @@ pub(crate) fn shared_bytes(words: &[u32], value_of: &HashMap<u32, u32>) -> Resul
         };
         at += length;
         let bytes = |id: &u32| match types.get(id) {
-            Some(Type::Bytes(bytes)) => Some(*bytes),
+            Some(SharedType::Bytes(bytes)) => Some(*bytes),
             _ => None,
         };
         let (id, made) = match (op, w) {
@@ -49,12 +49,12 @@ pub(crate) fn shared_bytes(words: &[u32], value_of: &HashMap<u32, u32>) -> Resul
             }
             (OP_TYPE_STRUCT, &[_, id, ref members @ ..]) => (id, members.iter().map(bytes).sum()),
             (OP_TYPE_POINTER, &[_, id, WORKGROUP, to]) => {
-                types.insert(id, Type::Shared(to));
+                types.insert(id, SharedType::Shared(to));
                 continue;
             }
             (OP_VARIABLE, &[_, pointer, _, WORKGROUP, ..]) => {
                 let pointed = match types.get(&pointer) {
-                    Some(Type::Shared(to)) => bytes(to),
+                    Some(SharedType::Shared(to)) => bytes(to),
                     _ => None,
                 };
                 sum += pointed.ok_or("the size of its shared memory is no plain constant")?;
@@ -63,7 +63,7 @@ pub(crate) fn shared_bytes(words: &[u32], value_of: &HashMap<u32, u32>) -> Resul
             _ => continue,
         };
         if let Some(made) = made {
-            types.insert(id, Type::Bytes(made));
+            types.insert(id, SharedType::Bytes(made));
         }
     }
     u32::try_from(sum).map_err(|_| format!("its shared memory takes {sum} bytes"))

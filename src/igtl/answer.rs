@@ -5,16 +5,16 @@
 
 use std::time::Duration;
 
-use super::client::{Answer, Client, Wants};
-use super::message::{Content, Extension, Header, Message, Tool};
+use super::client::{Answer, Client, Subscriptions};
+use super::message::{Content, ExtendedHeader, Header, Message, TrackedTool};
 use super::picture::Published;
 use super::server::Shared;
-use super::tracking::Tracked;
+use super::tracking::TrackerState;
 use super::wire::Label;
 use super::{IMAGE_DEVICE, POSE_DEVICE};
 
 /// Types of messages from a client that have an effect.
-const TAKEN: [&str; 12] = [
+const ACCEPTED_TYPES: [&str; 12] = [
     "TRANSFORM",
     "TDATA",
     "GET_CAPABIL",
@@ -31,7 +31,7 @@ const TAKEN: [&str; 12] = [
 const OK: u8 = 0;
 const ERROR: u8 = 1;
 /// Kind of a tool with six degrees of freedom.
-const SIX: u8 = 2;
+const SIX_DEGREES_OF_FREEDOM: u8 = 2;
 /// Codes of STATUS: all is well, and there is no room.
 const STATUS_OK: u16 = 1;
 const STATUS_BUSY: u16 = 6;
@@ -103,7 +103,7 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
         let status = if ok { OK } else { ERROR };
         Answer::Message(respond(message, rts(of, status)))
     };
-    let choose = |change: &dyn Fn(&mut Wants)| {
+    let choose = |change: &dyn Fn(&mut Subscriptions)| {
         client.choose(change);
         status(true)
     };
@@ -136,7 +136,8 @@ fn reply(client: &Client, shared: &Shared, message: &Message) -> Result<(), Refu
 
 /// An answer under the query's name, in its header version and with its number.
 fn respond(query: &Message, content: Content) -> Vec<u8> {
-    let extension = query.extension.as_ref().map(|e| Extension { id: e.id, metadata: Vec::new() });
+    let extension =
+        query.extension.as_ref().map(|e| ExtendedHeader { id: e.id, metadata: Vec::new() });
     Message { device: query.device, extension, ..Message::new("", content) }.encode()
 }
 
@@ -145,7 +146,7 @@ fn rts(of: &str, status: u8) -> Content {
 }
 
 fn capability() -> Content {
-    let mut kinds: Vec<_> = TAKEN.iter().map(|k| Label::new(k)).collect();
+    let mut kinds: Vec<_> = ACCEPTED_TYPES.iter().map(|k| Label::new(k)).collect();
     kinds.push(Label::new("STP_TDATA"));
     Content::Capability(kinds)
 }
@@ -162,9 +163,9 @@ fn status(code: u16, name: &str, text: &str) -> Content {
 /// The present state, for GET_STATUS.
 fn state(shared: &Shared) -> Content {
     let text = match shared.tracking.now() {
-        Tracked::Never => "no pose has arrived yet",
-        Tracked::Live(_) => "the tracker moves the probe",
-        Tracked::Lost(_) => "the tracker is lost",
+        TrackerState::Never => "no pose has arrived yet",
+        TrackerState::Live(_) => "the tracker moves the probe",
+        TrackerState::Lost(_) => "the tracker is lost",
     };
     status(STATUS_OK, "OK", text)
 }
@@ -177,7 +178,11 @@ pub(super) fn no_room(most: usize) -> Vec<u8> {
 
 /// The probe's pose as a TDATA message.
 pub(super) fn tracking_message(frame: &Published) -> Vec<u8> {
-    let tool =
-        Tool { name: Label::new(POSE_DEVICE), kind: SIX, reserved: 0, matrix: frame.matrix() };
+    let tool = TrackedTool {
+        name: Label::new(POSE_DEVICE),
+        kind: SIX_DEGREES_OF_FREEDOM,
+        reserved: 0,
+        matrix: frame.matrix(),
+    };
     Message::new(POSE_DEVICE, Content::Tracking(vec![tool])).encode()
 }

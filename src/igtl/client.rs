@@ -12,9 +12,9 @@ use super::picture::Published;
 use super::server::Shared;
 
 /// Most answers that may wait. Nobody asks for so many before reading one.
-const ANSWERS: usize = 64;
+const MOST_ANSWERS: usize = 64;
 /// Time after which a thread that waits for the network checks its own time limit.
-pub(super) const LOOK: Duration = Duration::from_millis(250);
+pub(super) const CHECK_INTERVAL: Duration = Duration::from_millis(250);
 
 /// An answer to a query. Images and poses are looked up when they are sent, so that many queries
 /// hold no more memory than one.
@@ -26,7 +26,7 @@ pub(super) enum Answer {
 }
 
 /// Messages that a client receives unasked.
-pub(super) struct Wants {
+pub(super) struct Subscriptions {
     pub image: bool,
     pub transform: bool,
     /// Least time between TDATA messages; none: they are not wanted.
@@ -37,7 +37,7 @@ struct Outbox {
     answers: VecDeque<Answer>,
     /// The newest frame not yet sent to the client.
     frame: Option<Arc<Published>>,
-    wants: Wants,
+    wants: Subscriptions,
     tracking_sent: Option<Instant>,
     closed: bool,
 }
@@ -50,7 +50,7 @@ pub(super) struct Client {
 }
 
 /// The reason why nothing more can be sent.
-enum End {
+enum ConnectionEnd {
     /// The client has left, as it may at any time.
     Left,
     Fault(String),
@@ -66,7 +66,7 @@ pub(super) fn has_left(error: &std::io::Error) -> bool {
 }
 
 /// The next item that its thread sends.
-enum Next {
+enum NextMessage {
     Answer(Answer),
     Frame(Arc<Published>),
 }
@@ -79,7 +79,7 @@ impl Client {
             outbox: Mutex::new(Outbox {
                 answers: VecDeque::new(),
                 frame,
-                wants: Wants { image: true, transform: true, tracking: None },
+                wants: Subscriptions { image: true, transform: true, tracking: None },
                 tracking_sent: None,
                 closed: false,
             }),
@@ -101,7 +101,7 @@ impl Client {
     /// Queues an answer; returns false when too many wait.
     pub fn answer(&self, answer: Answer) -> bool {
         let mut outbox = lock(&self.outbox);
-        if outbox.answers.len() >= ANSWERS {
+        if outbox.answers.len() >= MOST_ANSWERS {
             return false;
         }
         outbox.answers.push_back(answer);
@@ -110,7 +110,7 @@ impl Client {
     }
 
     /// Changes the messages that it receives unasked.
-    pub fn choose(&self, change: impl FnOnce(&mut Wants)) {
+    pub fn choose(&self, change: impl FnOnce(&mut Subscriptions)) {
         change(&mut lock(&self.outbox).wants);
     }
 
@@ -127,17 +127,17 @@ impl Client {
     }
 
     /// Waits for the next item to send; none when the connection has ended.
-    fn next(&self) -> Option<Next> {
+    fn next(&self) -> Option<NextMessage> {
         let mut outbox = lock(&self.outbox);
         loop {
             if outbox.closed {
                 return None;
             }
             if let Some(answer) = outbox.answers.pop_front() {
-                return Some(Next::Answer(answer));
+                return Some(NextMessage::Answer(answer));
             }
             if let Some(frame) = outbox.frame.take() {
-                return Some(Next::Frame(frame));
+                return Some(NextMessage::Frame(frame));
             }
             outbox = self.changed.wait(outbox).unwrap_or_else(std::sync::PoisonError::into_inner);
         }
@@ -162,7 +162,7 @@ impl Client {
         while let Some(next) = self.next() {
             if let Err(end) = self.send(next, shared) {
                 match end {
-                    End::Fault(why) if !self.is_closed() => shared.fault(self, &why),
+                    ConnectionEnd::Fault(why) if !self.is_closed() => shared.fault(self, &why),
                     _ => {}
                 }
                 break;
@@ -171,12 +171,12 @@ impl Client {
         self.close();
     }
 
-    fn send(&self, next: Next, shared: &Shared) -> Result<(), End> {
+    fn send(&self, next: NextMessage, shared: &Shared) -> Result<(), ConnectionEnd> {
         let limit = shared.settings.send_timeout;
         let put = |bytes: &[u8]| write(&self.stream, bytes, limit);
         match next {
-            Next::Answer(Answer::Message(bytes)) => put(&bytes),
-            Next::Answer(answer) => {
+            NextMessage::Answer(Answer::Message(bytes)) => put(&bytes),
+            NextMessage::Answer(answer) => {
                 // Queued only where there is one, and from then on there always is.
                 let frame = shared.latest().expect("a frame was published");
                 match answer {
@@ -185,7 +185,7 @@ impl Client {
                     _ => put(&tracking_message(&frame)),
                 }
             }
-            Next::Frame(frame) => {
+            NextMessage::Frame(frame) => {
                 let (image, transform, tracking) = self.due();
                 if transform {
                     put(frame.transform())?;
@@ -204,22 +204,22 @@ impl Client {
 }
 
 /// Writes all of `bytes`, or fails after `limit`, however little and often the other side reads.
-fn write(mut stream: &TcpStream, mut bytes: &[u8], limit: Duration) -> Result<(), End> {
+fn write(mut stream: &TcpStream, mut bytes: &[u8], limit: Duration) -> Result<(), ConnectionEnd> {
     let end = Instant::now() + limit;
     while !bytes.is_empty() {
         match stream.write(bytes) {
-            Ok(0) => return Err(End::Left),
+            Ok(0) => return Err(ConnectionEnd::Left),
             Ok(count) => bytes = &bytes[count..],
             Err(error) => match error.kind() {
                 ErrorKind::Interrupted | ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
-                _ if has_left(&error) => return Err(End::Left),
-                _ => return Err(End::Fault(format!("sending: {error}"))),
+                _ if has_left(&error) => return Err(ConnectionEnd::Left),
+                _ => return Err(ConnectionEnd::Fault(format!("sending: {error}"))),
             },
         }
         if !bytes.is_empty() && Instant::now() > end {
             let limit = limit.as_secs_f64();
             let why = format!("it did not take a message within {limit} s");
-            return Err(End::Fault(why));
+            return Err(ConnectionEnd::Fault(why));
         }
     }
     Ok(())

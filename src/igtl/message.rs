@@ -1,13 +1,13 @@
 //! Messages: 58 bytes of header, then (header version 2) an extended header, the content, metadata.
 
 use super::image::Image;
-pub use super::metadata::{Entry, Extension};
+pub use super::metadata::{ExtendedHeader, MetadataEntry};
 use super::wire::{DecodeError, Label, Reader, Timestamp, checksum, put_floats};
 
 /// Bytes of a header.
 pub const HEADER: usize = 58;
 /// Bytes of a tool in a TDATA message.
-const TOOL: usize = 70;
+const TOOL_BYTES: usize = 70;
 
 /// The header of every message.
 #[derive(Clone, Debug, PartialEq)]
@@ -65,21 +65,21 @@ pub struct Message {
     /// Time of its making.
     pub time: Timestamp,
     /// Extended header and metadata of header version 2; none: version 1.
-    pub extension: Option<Extension>,
+    pub extension: Option<ExtendedHeader>,
     /// Content of the message.
     pub content: Content,
 }
 
 /// A tool of a TDATA message.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Tool {
+pub struct TrackedTool {
     /// Name.
     pub name: Label<20>,
     /// 1 tracker, 2 with all six degrees of freedom, 3 only its tip, 4 tip and axis.
     pub kind: u8,
     /// Not used by the protocol.
     pub reserved: u8,
-    /// As in [`Content::Transform`].
+    /// Matrix in the form of [`Content::Transform`].
     pub matrix: [f32; 12],
 }
 
@@ -89,7 +89,7 @@ pub enum Content {
     /// TRANSFORM: the first three rows of a matrix, column after column; the last is the shift, mm.
     Transform([f32; 12]),
     /// TDATA: places of tools.
-    Tracking(Vec<Tool>),
+    Tracking(Vec<TrackedTool>),
     /// IMAGE.
     Image(Box<Image>),
     /// STATUS.
@@ -171,12 +171,12 @@ impl Content {
                 Self::Transform(matrix)
             }
             "TDATA" => {
-                if !content.len().is_multiple_of(TOOL) {
+                if !content.len().is_multiple_of(TOOL_BYTES) {
                     return Err(odd("a TDATA"));
                 }
-                let tools = content.chunks_exact(TOOL).map(|tool| {
+                let tools = content.chunks_exact(TOOL_BYTES).map(|tool| {
                     let mut from = Reader::new(tool, "a TDATA");
-                    Ok(Tool {
+                    Ok(TrackedTool {
                         name: Label(from.array()?),
                         kind: from.u8()?,
                         reserved: from.u8()?,
@@ -268,7 +268,7 @@ impl Message {
         let (extension, content) = match header.version {
             1 => (None, body),
             _ => {
-                let (extension, content) = Extension::decode(body)?;
+                let (extension, content) = ExtendedHeader::decode(body)?;
                 (Some(extension), content)
             }
         };
@@ -283,7 +283,7 @@ impl Message {
     /// Reads a message and nothing behind it.
     ///
     /// # Errors
-    /// As [`Self::decode`], and bytes that are missing or left over.
+    /// Those of [`Self::decode`], and bytes that are missing or left over.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, DecodeError> {
         let (header, body) = bytes
             .split_first_chunk()

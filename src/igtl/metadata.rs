@@ -3,22 +3,22 @@
 use super::wire::{DecodeError, Reader};
 
 /// Least size of an extended header, bytes.
-const EXTENDED: usize = 12;
+const EXTENDED_HEADER_BYTES: usize = 12;
 /// Bytes of an entry in the index of the metadata.
-const INDEX: usize = 8;
+const INDEX_ENTRY_BYTES: usize = 8;
 
 /// Extended header and metadata.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Extension {
+pub struct ExtendedHeader {
     /// The sender's number of the message.
     pub id: u32,
     /// In the sender's order.
-    pub metadata: Vec<Entry>,
+    pub metadata: Vec<MetadataEntry>,
 }
 
 /// A key and a value of the metadata.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Entry {
+pub struct MetadataEntry {
     /// ASCII.
     pub key: Vec<u8>,
     /// Character set of the value, as IANA numbers them: 3 ASCII, 106 UTF-8.
@@ -27,11 +27,11 @@ pub struct Entry {
     pub value: Vec<u8>,
 }
 
-impl Extension {
+impl ExtendedHeader {
     /// Bytes before the content, and bytes after it.
     pub(super) fn encode(&self) -> [Vec<u8>; 2] {
-        let short = |n: usize| u16::try_from(n).expect("within the protocol");
-        let long = |n: usize| u32::try_from(n).expect("within the protocol");
+        let short = |n: usize| u16::try_from(n).expect("no longer than the protocol allows");
+        let long = |n: usize| u32::try_from(n).expect("no longer than the protocol allows");
         let mut index = short(self.metadata.len()).to_be_bytes().to_vec();
         let mut text = Vec::new();
         for entry in &self.metadata {
@@ -41,8 +41,8 @@ impl Extension {
             text.extend_from_slice(&entry.key);
             text.extend_from_slice(&entry.value);
         }
-        let mut front = Vec::with_capacity(EXTENDED);
-        front.extend((EXTENDED as u16).to_be_bytes());
+        let mut front = Vec::with_capacity(EXTENDED_HEADER_BYTES);
+        front.extend((EXTENDED_HEADER_BYTES as u16).to_be_bytes());
         front.extend(short(index.len()).to_be_bytes());
         front.extend(long(text.len()).to_be_bytes());
         front.extend(self.id.to_be_bytes());
@@ -57,7 +57,7 @@ impl Extension {
         let (text_size, id) = (from.u32()? as usize, from.u32()?);
         // Bytes that a later version may add to the extended header.
         from.take(
-            size.checked_sub(EXTENDED)
+            size.checked_sub(EXTENDED_HEADER_BYTES)
                 .ok_or(DecodeError::Length { what: "an extended header", bytes: size })?,
         )?;
         let rest = from.rest();
@@ -76,16 +76,16 @@ impl Extension {
     }
 }
 
-fn entries(index: &[u8], text: &[u8]) -> Result<Vec<Entry>, DecodeError> {
+fn entries(index: &[u8], text: &[u8]) -> Result<Vec<MetadataEntry>, DecodeError> {
     let mut index_from = Reader::new(index, "an index of metadata");
     let count = usize::from(index_from.u16()?);
-    let mut rows = Reader::new(index_from.take(count * INDEX)?, "an index of metadata");
+    let mut rows = Reader::new(index_from.take(count * INDEX_ENTRY_BYTES)?, "an index of metadata");
     index_from.end()?;
     let mut from = Reader::new(text, "metadata");
     let mut out = Vec::with_capacity(count);
     for _ in 0..count {
         let (key, encoding, value) = (rows.u16()?, rows.u16()?, rows.u32()?);
-        out.push(Entry {
+        out.push(MetadataEntry {
             key: from.take(key.into())?.to_vec(),
             encoding,
             value: from.take(value as usize)?.to_vec(),

@@ -7,14 +7,14 @@ use std::time::{Duration, Instant};
 use super::answer;
 use super::client::{Client, has_left};
 use super::message::{HEADER, Header, Message};
-use super::server::{Settings, Shared};
+use super::server::{ServerSettings, Shared};
 
 /// Most bytes of a message of a type that is read here: a thousand tools.
-const UNDERSTOOD: u64 = 70_000;
+const LONGEST_MESSAGE: u64 = 70_000;
 /// Least rate at which a long message that is skipped has to arrive, bytes per second.
-const PACE: f64 = 1e6;
+const LEAST_RATE: f64 = 1e6;
 /// Faulty messages in a row after which the connection is ended.
-const FAULTS: u32 = 16;
+const MOST_FAULTS: u32 = 16;
 
 /// A fault, by its effect.
 enum Fault {
@@ -43,8 +43,8 @@ pub(super) fn receive_all(client: &Client, shared: &Shared) {
             Fault::Message(why) => {
                 shared.fault(client, &why);
                 faults += 1;
-                if faults == FAULTS {
-                    shared.fault(client, &format!("{FAULTS} faulty messages in a row"));
+                if faults == MOST_FAULTS {
+                    shared.fault(client, &format!("{MOST_FAULTS} faulty messages in a row"));
                     break;
                 }
             }
@@ -59,7 +59,7 @@ pub(super) fn receive_all(client: &Client, shared: &Shared) {
 
 /// Reads the next message; returns false where the connection has ended between two messages.
 fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
-    let mut source = Source::new(&client.stream, &shared.settings);
+    let mut source = MessageStream::new(&client.stream, &shared.settings);
     let mut header = [0; HEADER];
     if !source.first(&mut header[..1])? {
         return Ok(false);
@@ -74,7 +74,7 @@ fn receive(client: &Client, shared: &Shared) -> Result<bool, Fault> {
         shared.count(|status| status.ignored += 1);
         return Ok(true);
     }
-    if header.body_size > UNDERSTOOD {
+    if header.body_size > LONGEST_MESSAGE {
         return Err(too_long(&header));
     }
     let mut body = vec![0; header.body_size as usize];
@@ -95,15 +95,15 @@ fn too_long(header: &Header) -> Fault {
 }
 
 /// A stream whose reads return now and then, and one message's time.
-struct Source<'s> {
+struct MessageStream<'s> {
     stream: &'s TcpStream,
     limit: Duration,
     /// Time by which the message has to be here.
     end: Instant,
 }
 
-impl<'s> Source<'s> {
-    fn new(stream: &'s TcpStream, settings: &Settings) -> Self {
+impl<'s> MessageStream<'s> {
+    fn new(stream: &'s TcpStream, settings: &ServerSettings) -> Self {
         Self { stream, limit: settings.message_timeout, end: Instant::now() }
     }
 
@@ -134,7 +134,7 @@ impl<'s> Source<'s> {
 
     /// Reads bytes without keeping them.
     fn skip(&mut self, mut count: u64) -> Result<(), Fault> {
-        self.end += Duration::from_secs_f64(count as f64 / PACE);
+        self.end += Duration::from_secs_f64(count as f64 / LEAST_RATE);
         let mut scratch = [0; 16 << 10];
         while count > 0 {
             let part = count.min(scratch.len() as u64) as usize;

@@ -10,18 +10,18 @@ use std::time::{Duration, Instant};
 
 use glam::DAffine3;
 
-use super::client::{Client, LOOK};
+use super::client::{CHECK_INTERVAL, Client};
 use super::picture::{Picture, Published};
-use super::tracking::{Tracked, Tracking};
+use super::tracking::{TrackerState, Tracking};
 use super::{answer, lock, receive};
 use crate::scene::tracker::Tracker;
 
 /// Time between two looks of the listener for clients.
-const LISTEN: Duration = Duration::from_millis(10);
+const ACCEPT_INTERVAL: Duration = Duration::from_millis(10);
 /// Most refused clients whose last bytes are read before they are dropped, and for how long: a
 /// connection that is closed over unread bytes is reset, and the refusal would never arrive.
-const LINGERING: usize = 16;
-const LINGER: Duration = Duration::from_millis(300);
+const MOST_LINGERING: usize = 16;
+const LINGER_TIME: Duration = Duration::from_millis(300);
 
 /// The reason why the server cannot run.
 #[derive(Debug, thiserror::Error)]
@@ -55,7 +55,7 @@ impl IgtlError {
 
 /// Settings for clients.
 #[derive(Clone, Debug)]
-pub struct Settings {
+pub struct ServerSettings {
     /// The tool that moves the probe, and its calibration.
     pub tracker: Tracker,
     /// Most clients at a time; further ones are told so and disconnected.
@@ -69,7 +69,7 @@ pub struct Settings {
     pub skipped_bytes: u64,
 }
 
-impl Settings {
+impl ServerSettings {
     /// The usual limits.
     pub fn new(tracker: Tracker) -> Self {
         Self {
@@ -109,7 +109,7 @@ pub struct Status {
 
 /// State shared by all threads.
 pub(super) struct Shared {
-    pub settings: Settings,
+    pub settings: ServerSettings,
     pub tracking: Tracking,
     latest: Mutex<Option<Arc<Published>>>,
     clients: Mutex<Vec<Arc<Client>>>,
@@ -170,18 +170,18 @@ impl Server {
     ///
     /// # Errors
     /// The address is taken, or not this machine's.
-    pub fn bind(address: SocketAddr, settings: Settings) -> Result<Self, IgtlError> {
+    pub fn bind(address: SocketAddr, settings: ServerSettings) -> Result<Self, IgtlError> {
         Self::bind_and_tell(address, settings, || {})
     }
 
-    /// As [`Server::bind`]; `told` is called, from threads of the server, whenever a pose has arrived and when
+    /// Like [`Server::bind`]; `told` is called, from threads of the server, whenever a pose has arrived and when
     /// clients or errors have changed. It must not wait.
     ///
     /// # Errors
-    /// As [`Server::bind`].
+    /// Those of [`Server::bind`].
     pub fn bind_and_tell(
         address: SocketAddr,
-        settings: Settings,
+        settings: ServerSettings,
         told: impl Fn() + Send + Sync + 'static,
     ) -> Result<Self, IgtlError> {
         let fail = |cause| IgtlError::Bind { address, cause };
@@ -202,7 +202,7 @@ impl Server {
         let thread = {
             let shared = Arc::clone(&shared);
             let builder = thread::Builder::new().name("igtl listener".to_owned());
-            builder.spawn(move || Doorman::new(shared).run(&listener)).map_err(fail)?
+            builder.spawn(move || Acceptor::new(shared).run(&listener)).map_err(fail)?
         };
         Ok(Self { shared, address: bound, listener: Some(thread) })
     }
@@ -213,7 +213,7 @@ impl Server {
     }
 
     /// State of the tracker. Does not wait for the network.
-    pub fn pose(&self) -> Tracked {
+    pub fn pose(&self) -> TrackerState {
         self.shared.tracking.now()
     }
 
@@ -258,13 +258,13 @@ impl Drop for Server {
 }
 
 /// Lets clients in, and removes those that have gone.
-struct Doorman {
+struct Acceptor {
     shared: Arc<Shared>,
     threads: Vec<(Arc<Client>, [JoinHandle<()>; 2])>,
     refused: VecDeque<(TcpStream, Instant)>,
 }
 
-impl Doorman {
+impl Acceptor {
     fn new(shared: Arc<Shared>) -> Self {
         Self { shared, threads: Vec::new(), refused: VecDeque::new() }
     }
@@ -283,7 +283,7 @@ impl Doorman {
                         self.shared.error(format!("accepting a client: {error}"));
                     }
                     self.see_out();
-                    thread::sleep(LISTEN);
+                    thread::sleep(ACCEPT_INTERVAL);
                 }
             }
         }
@@ -306,7 +306,7 @@ impl Doorman {
                 Ok(count) => count > 0,
                 Err(error) => error.kind() == ErrorKind::WouldBlock,
             };
-            open && since.elapsed() < LINGER
+            open && since.elapsed() < LINGER_TIME
         });
         let seated = self.threads.len();
         let mut before = seated;
@@ -326,8 +326,8 @@ impl Doorman {
         }
         stream.set_nonblocking(false)?;
         stream.set_nodelay(true)?;
-        stream.set_read_timeout(Some(LOOK))?;
-        stream.set_write_timeout(Some(LOOK))?;
+        stream.set_read_timeout(Some(CHECK_INTERVAL))?;
+        stream.set_write_timeout(Some(CHECK_INTERVAL))?;
         // Both under one lock: a frame that is published now reaches it one way or the other.
         let client = {
             let mut clients = lock(&self.shared.clients);
@@ -364,7 +364,7 @@ impl Doorman {
         stream.set_nonblocking(true)?;
         stream.write_all(&answer::no_room(most))?;
         stream.shutdown(Shutdown::Write)?;
-        self.refused.truncate(LINGERING - 1);
+        self.refused.truncate(MOST_LINGERING - 1);
         self.refused.push_front((stream, Instant::now()));
         Ok(())
     }

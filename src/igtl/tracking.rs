@@ -12,7 +12,7 @@ use crate::scene::tracker::{Tracker, rigid};
 
 /// A pose of the probe.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pose {
+pub struct TrackedPose {
     /// Calibrated: world from probe space, rigid, mm.
     pub world_from_probe: DAffine3,
     /// Time of its arrival here.
@@ -25,19 +25,19 @@ pub struct Pose {
 
 /// State of the tracker.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Tracked {
+pub enum TrackerState {
     /// No pose has arrived yet.
     Never,
     /// The latest pose is no older than the tracker's timeout.
-    Live(Pose),
+    Live(TrackedPose),
     /// It is older, or the tracker reports that it does not see the tool. The last pose: nothing has been seen
     /// since its arrival.
-    Lost(Pose),
+    Lost(TrackedPose),
 }
 
-impl Tracked {
+impl TrackerState {
     /// The last pose, live or not.
-    pub fn pose(&self) -> Option<&Pose> {
+    pub fn pose(&self) -> Option<&TrackedPose> {
         match self {
             Self::Never => None,
             Self::Live(pose) | Self::Lost(pose) => Some(pose),
@@ -48,11 +48,11 @@ impl Tracked {
 /// The latest pose, and the calibration of messages.
 pub(super) struct Tracking {
     tracker: Mutex<Tracker>,
-    last: Mutex<Option<Last>>,
+    last: Mutex<Option<LastPose>>,
 }
 
-struct Last {
-    pose: Pose,
+struct LastPose {
+    pose: TrackedPose,
     /// True where the tracker has since reported that it does not see the tool.
     missing: bool,
 }
@@ -72,14 +72,14 @@ impl Tracking {
         *lock(&self.last) = None;
     }
 
-    pub fn now(&self) -> Tracked {
+    pub fn now(&self) -> TrackerState {
         match &*lock(&self.last) {
-            None => Tracked::Never,
+            None => TrackerState::Never,
             Some(last) => {
                 let timeout = Duration::from_secs_f64(self.tracker().timeout);
                 match last.missing || last.pose.arrived.elapsed() > timeout {
-                    true => Tracked::Lost(last.pose),
-                    false => Tracked::Live(last.pose),
+                    true => TrackerState::Lost(last.pose),
+                    false => TrackerState::Live(last.pose),
                 }
             }
         }
@@ -121,8 +121,8 @@ impl Tracking {
         let world_from_probe = self.tracker().world_from_probe(reported);
         let mut last = lock(&self.last);
         let number = last.as_ref().map_or(0, |last| last.pose.number) + 1;
-        *last = Some(Last {
-            pose: Pose { world_from_probe, arrived: Instant::now(), number, device },
+        *last = Some(LastPose {
+            pose: TrackedPose { world_from_probe, arrived: Instant::now(), number, device },
             missing: false,
         });
         Ok(true)

@@ -2,24 +2,26 @@
 
 use std::collections::VecDeque;
 
-/// Number of frames whose median counts: one frame delayed by something else changes nothing.
-const COUNTED: usize = 3;
-/// Multiple of the budget above which a level is left for a coarser one.
-const OVER: f64 = 1.1;
-/// Share of the budget below which an estimate makes a finer level worth taking.
-const UNDER: f64 = 0.8;
-/// Most budgets that it may take by an estimate in proportion to its work, whatever else is estimated.
-const BOLD: f64 = 3.0;
-/// Number of budgets for its first frame at which a finer level is left at once.
-const FAILED: f64 = 2.0;
+/// Number of frames over which the median is taken: one frame delayed by something else changes nothing.
+const MEDIAN_FRAMES: usize = 3;
+/// Multiple of the budget above which a frame's time leads to a coarser level.
+const COARSER_ABOVE: f64 = 1.1;
+/// Share of the budget below which the expected time of a level must lie before it is taken.
+const FINER_BELOW: f64 = 0.8;
+/// Upper limit of a finer level's time in proportion to its work, in budgets. It holds also where two known levels
+/// give a smaller estimate.
+const MAX_PROPORTIONAL: f64 = 3.0;
+/// A finer level is left at once when one of its frames takes more than this many budgets.
+const FAILED_ABOVE: f64 = 2.0;
 /// Frames before a failed level is tried again, at first and at most: each failure doubles them.
-const PATIENCE: [u32; 2] = [30, 1920];
-/// Number of frames whose slowest counts in the estimate of a finer level: more than those of a heartbeat.
-const REMEMBERED: usize = 60;
-/// At rest, most budgets of a level that comes next at once.
-const SWIFT: f64 = 6.0;
-/// At rest, most budgets of an intermediate level, and its least time as a multiple of the shown level's.
-const ON_THE_WAY: [f64; 2] = [3.0, 1.5];
+const RETRY_FRAMES: [u32; 2] = [30, 1920];
+/// Number of frames whose slowest is used to estimate a finer level: more than a heartbeat has.
+const HISTORY_FRAMES: usize = 60;
+/// At rest, the scene's own level follows directly if it is expected within this many budgets.
+const OWN_LEVEL_BUDGETS: f64 = 6.0;
+/// Limits of an intermediate level at rest: its longest time in budgets, and its shortest time as a multiple of the
+/// shown level's.
+const INTERMEDIATE_LEVEL: [f64; 2] = [3.0, 1.5];
 
 /// Chooses a level from the times of frames and from nothing else: the same times give the same
 /// levels.
@@ -65,7 +67,7 @@ impl Governor {
             works,
             times: VecDeque::new(),
             frames: 0,
-            patience: PATIENCE[0],
+            patience: RETRY_FRAMES[0],
             came_from: None,
             failed: None,
             left: None,
@@ -94,7 +96,7 @@ impl Governor {
         }
         let speed = self.median().map(|ms| ms / self.works[self.level]);
         *self = Self::new(self.budget, works);
-        let fits = |work: f64| speed.is_some_and(|speed| speed * work <= UNDER * self.budget);
+        let fits = |work: f64| speed.is_some_and(|speed| speed * work <= FINER_BELOW * self.budget);
         if let Some(level) = self.works.iter().position(|&work| fits(work)) {
             self.level = level;
         }
@@ -102,7 +104,7 @@ impl Governor {
 
     /// Median time of the last frames at the present level, ms; none before the first.
     pub fn median(&self) -> Option<f64> {
-        let last = self.times.iter().rev().take(COUNTED);
+        let last = self.times.iter().rev().take(MEDIAN_FRAMES);
         median(last.copied().collect())
     }
 
@@ -140,26 +142,26 @@ impl Governor {
             }
             return;
         }
-        if self.times.len() == REMEMBERED {
+        if self.times.len() == HISTORY_FRAMES {
             self.times.pop_front();
         }
         self.times.push_back(ms);
         self.frames += 1;
-        if self.came_from.is_some() && ms > FAILED * self.budget {
+        if self.came_from.is_some() && ms > FAILED_ABOVE * self.budget {
             self.known[self.level] = Some(ms);
             return self.coarser();
         }
         // One frame may be delayed, two are not.
-        let Some(now) = self.median().filter(|_| self.times.len() >= COUNTED) else {
+        let Some(now) = self.median().filter(|_| self.times.len() >= MEDIAN_FRAMES) else {
             return;
         };
-        if let Some(before) = self.known[self.level].filter(|_| self.times.len() > COUNTED) {
+        if let Some(before) = self.known[self.level].filter(|_| self.times.len() > MEDIAN_FRAMES) {
             for known in self.known.iter_mut().flatten() {
                 *known *= now / before;
             }
         }
         self.known[self.level] = Some(now);
-        if now > OVER * self.budget {
+        if now > COARSER_ABOVE * self.budget {
             self.coarser();
         } else {
             self.finer();
@@ -173,12 +175,12 @@ impl Governor {
         }
         if let Some(before) = self.came_from {
             self.failed = Some(self.level);
-            self.patience = (2 * self.patience).min(PATIENCE[1]);
+            self.patience = (2 * self.patience).min(RETRY_FRAMES[1]);
             return self.go(before);
         }
         let fits = |&level: &usize| {
             let expected = self.expected(level);
-            expected.is_none_or(|ms| ms <= UNDER * self.budget)
+            expected.is_none_or(|ms| ms <= FINER_BELOW * self.budget)
         };
         let next = (self.level + 1..last).find(fits).unwrap_or(last);
         self.go(next);
@@ -196,8 +198,8 @@ impl Governor {
         let in_proportion = now / self.works[self.level];
         let fits = |&level: &usize| {
             let expected = self.expected(level).unwrap_or(f64::INFINITY);
-            slowest * expected <= UNDER * self.budget
-                && in_proportion * self.works[level] <= BOLD * self.budget
+            slowest * expected <= FINER_BELOW * self.budget
+                && in_proportion * self.works[level] <= MAX_PROPORTIONAL * self.budget
         };
         let least = self.failed.map_or(0, |failed| failed + 1);
         if let Some(next) = (least..self.level).find(fits) {
@@ -210,7 +212,7 @@ impl Governor {
     /// Largest median of the remembered frames.
     fn slowest(&self) -> f64 {
         let times: Vec<f64> = self.times.iter().copied().collect();
-        let medians = times.windows(COUNTED).filter_map(|w| median(w.to_vec()));
+        let medians = times.windows(MEDIAN_FRAMES).filter_map(|w| median(w.to_vec()));
         medians.fold(0.0, f64::max)
     }
 
@@ -229,10 +231,10 @@ impl Governor {
             return None;
         }
         let expected = |level| self.expected(level).unwrap_or(f64::INFINITY);
-        if expected(0) <= SWIFT * self.budget {
+        if expected(0) <= OWN_LEVEL_BUDGETS * self.budget {
             return Some(0);
         }
-        let [budgets, times] = ON_THE_WAY;
+        let [budgets, times] = INTERMEDIATE_LEVEL;
         let on_the_way = |&level: &usize| {
             let ms = expected(level);
             ms <= budgets * self.budget && ms >= times * expected(shown)
@@ -322,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn a_scene_whose_cost_beats_does_not_pump() {
+    fn a_scene_with_periodic_cost_stays_at_one_level() {
         for whole in [150.0, 300.0, 420.0, 600.0, 1000.0] {
             let mut governor = Governor::new(66.0, WORKS.to_vec());
             let cost = device(whole);

@@ -4,9 +4,8 @@ use std::fmt;
 
 use serde_json::{Value, json};
 
-use crate::probe::Probe;
 use crate::scene::Scene;
-use crate::settings::{Imaging, Simulation};
+use crate::settings::Settings;
 
 /// Fewest scanlines that still show a sector.
 const LEAST_SCANLINES: u32 = 32;
@@ -76,8 +75,8 @@ pub struct Level {
 }
 
 impl Level {
-    /// The present counts of a scene.
-    pub fn of(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Self {
+    /// The present counts of a scene's settings.
+    pub fn of(Settings { probe, simulation, imaging }: &Settings) -> Self {
         Self {
             scanlines: probe.scanlines,
             layers: probe.elevation_layers,
@@ -91,13 +90,8 @@ impl Level {
         }
     }
 
-    /// Gives a scene these counts.
-    pub fn apply(&self, scene: &mut Scene) {
-        self.set(&mut scene.probe, &mut scene.simulation, &mut scene.imaging);
-    }
-
     /// Gives settings these counts.
-    pub fn set(&self, probe: &mut Probe, simulation: &mut Simulation, imaging: &mut Imaging) {
+    pub fn apply(&self, Settings { probe, simulation, imaging }: &mut Settings) {
         probe.scanlines = self.scanlines;
         probe.elevation_layers = self.layers;
         probe.samples = self.samples;
@@ -166,11 +160,11 @@ impl Ladder {
     /// The levels of a scene. Where it mixes an acquired volume in, the picture keeps its size: the width of
     /// the blending is counted in pixels.
     pub fn of(scene: &Scene) -> Self {
-        Self::new(&scene.probe, &scene.simulation, &scene.imaging, scene.shows_volume())
+        Self::new(&scene.settings, scene.shows_volume())
     }
 
-    fn new(probe: &Probe, simulation: &Simulation, imaging: &Imaging, keeps_picture: bool) -> Self {
-        let own = Level::of(probe, simulation, imaging);
+    fn new(settings: &Settings, keeps_picture: bool) -> Self {
+        let (own, probe, imaging) = (Level::of(settings), &settings.probe, &settings.imaging);
         let sigma = probe.sigma_axial() * imaging.psf_scale[0];
         let least_samples = (LEAST_SIGMA_SAMPLES * probe.depth / sigma).ceil() as u32;
         let part = |count: u32, share: f64, least: u32| {
@@ -230,11 +224,10 @@ fn odd(layers: u32, share: f64) -> u32 {
 mod tests {
     use super::{Ladder, Level, odd};
     use crate::probe::Probe;
-    use crate::settings::{Imaging, Simulation};
+    use crate::settings::Settings;
 
     fn ladder(probe: &Probe, keeps_picture: bool) -> Ladder {
-        let (simulation, imaging) = (Simulation::default(), Imaging::default());
-        Ladder::new(probe, &simulation, &imaging, keeps_picture)
+        Ladder::new(&Settings::of(probe.clone()), keeps_picture)
     }
 
     fn counts(level: &Level) -> [u32; 6] {
@@ -253,7 +246,7 @@ mod tests {
         for (name, make) in Probe::PRESETS {
             let probe = make();
             let ladder = ladder(&probe, false);
-            let own = Level::of(&probe, &Simulation::default(), &Imaging::default());
+            let own = Level::of(&Settings::of(probe));
             assert_eq!(ladder.levels()[0], own, "{name}");
             let works = ladder.works();
             assert_eq!(works[0], 1.0);

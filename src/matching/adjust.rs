@@ -1,24 +1,24 @@
 //! The settings that make two bands alike, from the statistics of both.
 
-use super::statistics::{DEVELOPED, Statistics, depths};
+use super::statistics::{SPECKLE_DEVIATION, Statistics, depths};
 use crate::probe::Probe;
 use crate::scene::Imaging;
 
 /// Expected standard deviation of the difference of two neighbouring sliders, and, doubled, of the
 /// difference of a slider from the mean of its neighbours; dB. A scanner's sliders are set to a gentle
 /// curve. Where there are no data these alone act: the curve goes on flat.
-const SLOPE: f64 = 12.0;
-const BEND: f64 = 8.0;
+const SLIDER_DIFFERENCE: f64 = 12.0;
+const SLIDER_CURVATURE: f64 = 8.0;
 /// Natural difference between neighbouring tissues, dB.
-const INHOMOGENEOUS: f64 = 1.0;
+const TISSUE_DIFFERENCE: f64 = 1.0;
 /// Independent patches of speckle that a depth needs on either side.
-const FEWEST: f64 = 6.0;
+const LEAST_PATCHES: f64 = 6.0;
 /// Bounds of the settings. Sliders: those of scanners, and some more. Dynamic range: with less, speckle
 /// alone spans black to white; the largest is that of the scene file. Size: a narrower point-spread
 /// function is lost between samples and scanlines; for a wider one differences are not taken far enough.
-const SLIDER: f64 = 30.0;
-const RANGE: (f64, f64) = (20.0, 200.0);
-const SCALE: (f64, f64) = (0.25, 4.0);
+const LARGEST_SLIDER: f64 = 30.0;
+const DYNAMIC_RANGES: (f64, f64) = (20.0, 200.0);
+const PSF_SCALES: (f64, f64) = (0.25, 4.0);
 
 /// The settings that may change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -53,8 +53,9 @@ pub(super) fn common(simulated: &Statistics, acquired: &Statistics) -> Vec<(usiz
     pairs
         .filter_map(|(i, (a, b))| {
             let (n, m) = (a.area * inside, b.area * outside);
-            let variance = DEVELOPED * DEVELOPED * (1.0 / n + 1.0 / m) + INHOMOGENEOUS.powi(2);
-            let enough = n >= FEWEST && m >= FEWEST;
+            let variance = SPECKLE_DEVIATION * SPECKLE_DEVIATION * (1.0 / n + 1.0 / m)
+                + TISSUE_DIFFERENCE.powi(2);
+            let enough = n >= LEAST_PATCHES && m >= LEAST_PATCHES;
             Some((i, a.level?, b.level?, variance)).filter(|_| enough)
         })
         .collect()
@@ -96,7 +97,7 @@ pub(super) fn proposal(
         && let (Some(here), Some(there)) = (simulated.spread, acquired.spread)
     {
         let range = imaging.dynamic_range * here / there;
-        out.dynamic_range = round(bounded("dynamic_range", range, RANGE, " dB"), 0.1);
+        out.dynamic_range = round(bounded("dynamic_range", range, DYNAMIC_RANGES, " dB"), 0.1);
     }
     if adjusted.size {
         for (i, name, here, there) in [
@@ -109,7 +110,7 @@ pub(super) fn proposal(
                     false => "",
                 };
                 let scale = imaging.psf_scale[i] * there.relative / here.relative;
-                out.psf_scale[i] = round(bounded(name, scale, SCALE, why), 0.01);
+                out.psf_scale[i] = round(bounded(name, scale, PSF_SCALES, why), 0.01);
             }
         }
     }
@@ -139,10 +140,10 @@ pub(super) fn proposal(
             out.gain = round(mean(&|z, _| at(z)), 0.1);
         }
         let sliders = curve.map(|c| c - out.gain);
-        out.tgc_sliders = sliders.map(|s| round(s.clamp(-SLIDER, SLIDER), 0.1));
-        if sliders.iter().any(|s| s.abs() > SLIDER) {
+        out.tgc_sliders = sliders.map(|s| round(s.clamp(-LARGEST_SLIDER, LARGEST_SLIDER), 0.1));
+        if sliders.iter().any(|s| s.abs() > LARGEST_SLIDER) {
             notes.push(format!(
-                "brightness changes with depth by more than tgc_sliders of {SLIDER} dB can follow"
+                "brightness changes with depth by more than tgc_sliders of {LARGEST_SLIDER} dB can follow"
             ));
         }
     } else if adjusted.gain {
@@ -180,8 +181,10 @@ fn smooth(probe: &Probe, wanted: &[(f64, f64, f64)]) -> [f64; 8] {
         row[start..start + values.len()].copy_from_slice(values);
         row
     };
-    (0..7).for_each(|i| add(&stencil(i, &[-1.0, 1.0]), 0.0, SLOPE * SLOPE));
-    (0..6).for_each(|i| add(&stencil(i, &[1.0, -2.0, 1.0]), 0.0, BEND * BEND));
+    (0..7).for_each(|i| add(&stencil(i, &[-1.0, 1.0]), 0.0, SLIDER_DIFFERENCE * SLIDER_DIFFERENCE));
+    (0..6).for_each(|i| {
+        add(&stencil(i, &[1.0, -2.0, 1.0]), 0.0, SLIDER_CURVATURE * SLIDER_CURVATURE)
+    });
     // Positive definite as soon as there is one value: no pivots are needed.
     for i in 0..8 {
         let pivot = a[i];

@@ -2,14 +2,14 @@
 
 use crate::probe::Probe;
 use crate::scene::{Acquired, Scene};
-use crate::sim::fusion::Steps;
+use crate::sim::fusion::FusionSteps;
 use crate::sim::layout::Frame;
 
-/// Least share of samples above black within [`NEAR`]; with less the place is fluid, shadow, or
+/// Least share of samples above black within [`HALF_WINDOW`]; with less the place is fluid, shadow, or
 /// was never acquired, and shows no speckle.
-const ECHOING: f64 = 0.5;
+const LEAST_ECHOING: f64 = 0.5;
 /// Half the edge of the square around a sample in which it is judged, mm.
-const NEAR: f64 = 1.0;
+const HALF_WINDOW: f64 = 1.0;
 
 /// Places of the samples, [L][K].
 pub(super) struct Bands {
@@ -24,7 +24,7 @@ pub(super) struct Bands {
 
 impl Bands {
     /// Places of the samples of `scene`, whose last frame was `frame` with the intermediate `steps`.
-    pub fn new(scene: &Scene, acquired: &Acquired, frame: &Frame, steps: &Steps) -> Self {
+    pub fn new(scene: &Scene, acquired: &Acquired, frame: &Frame, steps: &FusionSteps) -> Self {
         let probe = &scene.probe;
         let (lines, samples) = (probe.scanlines as usize, probe.samples as usize);
         let (width, height) = (frame.image_width as usize, frame.image_height as usize);
@@ -109,10 +109,10 @@ impl Bands {
                 sums[(l + 1) * (samples + 1) + k + 1] = [before[0] + row[0], before[1] + row[1]];
             }
         }
-        let rows = (NEAR / probe.sample_pitch()) as usize;
+        let rows = (HALF_WINDOW / probe.sample_pitch()) as usize;
         for k in 0..samples {
             let pitch = probe.line_pitch(k as f64 * probe.sample_pitch());
-            let columns = ((NEAR / pitch.max(1e-9)) as usize).clamp(1, lines);
+            let columns = ((HALF_WINDOW / pitch.max(1e-9)) as usize).clamp(1, lines);
             let (k0, k1) = (k.saturating_sub(rows), (k + rows + 1).min(samples));
             for l in 0..lines {
                 let (l0, l1) = (l.saturating_sub(columns), (l + columns + 1).min(lines));
@@ -121,7 +121,7 @@ impl Bands {
                     f64::from(at(l1, k1) + at(l0, k0) - at(l0, k1) - at(l1, k0))
                 };
                 let at = l * samples + k;
-                chosen[at] &= sum(1) > ECHOING * sum(0);
+                chosen[at] &= sum(1) > LEAST_ECHOING * sum(0);
             }
         }
     }

@@ -39,8 +39,8 @@ impl Histogram {
         Some(self.middle(&Self::default(), 0.0))
     }
 
-    /// As [`Self::midmean`], of values that are not clipped at the ends: differences. Those of `beyond`
-    /// are only known to be larger than the value they are counted at, by an exponential amount of mean
+    /// Like [`Self::midmean`], for values that are not clipped at the ends: differences. Those of `beyond`
+    /// are only known to be larger than the value at which they are counted, by an exponential amount of mean
     /// `tail`.
     pub fn middle(&self, beyond: &Self, tail: f64) -> f64 {
         let total = (self.total + beyond.total) as f64;
@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_to_be_larger_is_spread_beyond() {
+    fn values_of_which_only_a_bound_is_known_are_spread_above_it() {
         let (mut known, mut beyond) = (Histogram::default(), Histogram::default());
         for _ in 0..1000 {
             known.add(0.1);

@@ -1,48 +1,49 @@
 //! Statistics of speckle that the eye compares at a border: brightness by depth, spread, size.
 //!
-//! All come from the log-compressed levels 0..1. Brightness is the mean of the middle half of the
+//! All are computed from the log-compressed levels 0..1. Brightness is the mean of the middle half of the
 //! values of a depth ([`Histogram::midmean`]). Spread and size come from differences of two samples,
-//! less what brightness changes by between their depths; of slow changes of anatomy they hardly have any (the structure function or variogram, Matheron,
+//! less the change of brightness between their depths, so that slow changes of anatomy have little effect (structure
+//! function or variogram, Matheron,
 //! Economic Geology 58, 1963): with m(u) the mean of the middle half of |difference| at distance u,
 //! `1 - (m(u) / m(far))^2` is the correlation, and m(far) the spread. For fully developed speckle it is
 //! a Gaussian within 4 % of its width, if the point-spread function is.
 //!
-//! Of a sample that is black only a bound is known. The intensity of speckle is exponential, so that
-//! below a level which it seldom reaches it lies by an exponential number of dB, of mean 10 / ln 10:
-//! that is added where one of two samples is black. Pairs of which both are black, or both white, say
-//! nothing.
+//! For a black sample only an upper bound is known. The intensity of speckle has an exponential distribution, so that
+//! it is below a rarely undercut level by an exponential number of dB, of mean 10 / ln 10:
+//! this is added if one of two samples is black. Pairs that are both black, or both white, are
+//! left out.
 
 use super::histogram::Histogram;
 use crate::probe::Probe;
 
 /// Begin and end of the far distances, half widths of the correlation. A Gaussian correlation has fallen to
 /// 2^-9 at the first; up to the second, anatomy has changed little.
-const FAR: (f64, f64) = (3.0, 5.0);
+const FAR_LAGS: (f64, f64) = (3.0, 5.0);
 /// Longest distance at which differences are taken, along the scanlines and across them, standard
 /// deviations of the simulated point-spread function at scale 1: with the speckle's half width of 1.1 of
 /// them enough for a scale of 4. A pulse is shorter than a beam is wide; 3 mm or so are both.
-const LONGEST: [f64; 2] = [48.0, 24.0];
+const LONGEST_LAGS: [f64; 2] = [48.0, 24.0];
 /// Half width of the largest speckle for which that is enough, in the same unit.
-const LARGEST: f64 = 4.8;
+const LARGEST_HALF_WIDTH: f64 = 4.8;
 /// Latest begin of the far distances, as a part of the longest distance.
-const LATEST: f64 = 0.8;
+const LATEST_FAR_LAG: f64 = 0.8;
 /// Width of a class of distances, in the same unit.
-const CLASS: f64 = 0.25;
+const LAG_CLASS: f64 = 0.25;
 /// Least length of a depth interval over which brightness is measured, mm; and the largest number of intervals.
-const DEPTH: (f64, usize) = (2.0, 40);
+const DEPTH_INTERVALS: (f64, usize) = (2.0, 40);
 
 /// Standard deviation of fully developed speckle after log compression, dB: 20 / ln 10 * pi / sqrt(24)
 /// (Burckhardt, IEEE Trans. Sonics Ultrason. 25, 1978; Dutt and Greenleaf, IEEE Trans. Ultrason.
 /// Ferroelectr. Freq. Control 43, 1996).
-pub const DEVELOPED: f64 = 5.57;
+pub const SPECKLE_DEVIATION: f64 = 5.57;
 /// Mean of the middle half of |difference| of two independent samples of such speckle, dB. Intensities
 /// are exponential, the difference of two log intensities logistic, with quantiles 2 artanh(p) of its
 /// magnitude: 10 / ln 10 * 4 (p artanh p + ln(1 - p^2) / 2) from p = 1/4 to 3/4.
-const DEVELOPED_DIFFERENCE: f64 = 4.947;
+const SPECKLE_DIFFERENCE: f64 = 4.947;
 /// Mean excess of a value below black, in such differences: 10 / ln 10 dB.
-const BELOW_BLACK: f64 = 4.343 / DEVELOPED_DIFFERENCE;
+const EXCESS_BELOW_BLACK: f64 = 4.343 / SPECKLE_DIFFERENCE;
 /// Smallest correlation that still depends on the width; below, chance decides.
-const TELLING: f64 = 0.2;
+const LEAST_CORRELATION: f64 = 0.2;
 
 /// Differences at one distance.
 #[derive(Clone, Default)]
@@ -127,7 +128,7 @@ pub struct Statistics {
 
 /// Number of depths at which brightness is measured.
 fn bins(probe: &Probe) -> usize {
-    ((probe.depth / DEPTH.0) as usize).clamp(1, DEPTH.1)
+    ((probe.depth / DEPTH_INTERVALS.0) as usize).clamp(1, DEPTH_INTERVALS.1)
 }
 
 /// Middle of each depth at which brightness is measured, mm along the scanlines.
@@ -141,8 +142,8 @@ impl Gathered {
         Self {
             levels: vec![Histogram::default(); bins(probe)],
             areas: vec![0.0; bins(probe)],
-            axial: vec![Lag::default(); (LONGEST[0] / CLASS) as usize],
-            lateral: vec![Lag::default(); (LONGEST[1] / CLASS) as usize],
+            axial: vec![Lag::default(); (LONGEST_LAGS[0] / LAG_CLASS) as usize],
+            lateral: vec![Lag::default(); (LONGEST_LAGS[1] / LAG_CLASS) as usize],
             moment: 0.0,
         }
     }
@@ -167,7 +168,7 @@ impl Gathered {
         let sigma = probe.sigma_axial();
         // Three samples per deviation of a point-spread function are enough.
         let step = ((sigma / 3.0 / dz) as usize).max(1);
-        let farthest = ((LONGEST[0] * sigma / dz) as usize).min(samples);
+        let farthest = ((LONGEST_LAGS[0] * sigma / dz) as usize).min(samples);
         for k in (0..samples).step_by(step) {
             let z = k as f64 * dz;
             let across = probe.line_pitch(z) / probe.sigma_lateral(z);
@@ -175,18 +176,18 @@ impl Gathered {
                 let at = l * samples + k;
                 let pair = |other: usize, distance: f64, trend: f32, lags: &mut [Lag]| {
                     if chosen[other] {
-                        let class = (distance / CLASS) as usize;
+                        let class = (distance / LAG_CLASS) as usize;
                         lags[class].add(distance, [levels[at], levels[other]], trend);
                     }
                 };
                 let along = |lag: usize| lag as f64 * dz / sigma;
                 for lag in (step..farthest.min(samples - k)).step_by(step) {
-                    if along(lag) < LONGEST[0] {
+                    if along(lag) < LONGEST_LAGS[0] {
                         let change = trend[k] - trend[k + lag];
                         pair(at + lag, along(lag), change, &mut self.axial);
                     }
                 }
-                for lag in (1..lines - l).take_while(|&lag| lag as f64 * across < LONGEST[1]) {
+                for lag in (1..lines - l).take_while(|&lag| lag as f64 * across < LONGEST_LAGS[1]) {
                     let distance = lag as f64 * across;
                     pair(at + lag * samples, distance, 0.0, &mut self.lateral);
                 }
@@ -198,11 +199,13 @@ impl Gathered {
         let area: f64 = self.areas.iter().sum();
         let depth = self.moment / area.max(f64::MIN_POSITIVE);
         let (sigma_axial, sigma_lateral) = (probe.sigma_axial(), probe.sigma_lateral(depth));
-        let (axial, lateral) =
-            (correlation(&self.axial, LONGEST[0]), correlation(&self.lateral, LONGEST[1]));
+        let (axial, lateral) = (
+            correlation(&self.axial, LONGEST_LAGS[0]),
+            correlation(&self.lateral, LONGEST_LAGS[1]),
+        );
         let found: Vec<f64> = [axial, lateral].iter().flatten().map(|c| c.far).collect();
         let far = found.iter().sum::<f64>() / found.len() as f64;
-        let spread = far * DEVELOPED / DEVELOPED_DIFFERENCE;
+        let spread = far * SPECKLE_DEVIATION / SPECKLE_DIFFERENCE;
         let width = |c: Option<Correlation>, sigma: f64| {
             c.map(|c| Width { relative: c.half, mm: c.half * sigma, open: c.open })
         };
@@ -210,8 +213,8 @@ impl Gathered {
         // The integral of a Gaussian that is 1/2 at h is h sqrt(pi / ln 2). A width without an end counts as the
         // largest speckle that would have one.
         let extent = |w: Option<Width>, sigma: f64| {
-            let half = w.map_or(LARGEST * sigma, |w| w.mm);
-            half.min(LARGEST * sigma) * 2.129
+            let half = w.map_or(LARGEST_HALF_WIDTH * sigma, |w| w.mm);
+            half.min(LARGEST_HALF_WIDTH * sigma) * 2.129
         };
         let cell = extent(axial, sigma_axial) * extent(lateral, sigma_lateral);
         let level = |(values, &area): (&Histogram, &f64)| Level { level: values.midmean(), area };
@@ -263,7 +266,7 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
     for _ in 0..50 {
         let differences = lags.iter().map(|lag| lag.differences.middle(&lag.beyond, tail));
         let differences: Vec<f64> = differences.collect();
-        let (from, to) = ((FAR.0 * half).min(LATEST * longest), FAR.1 * half);
+        let (from, to) = ((FAR_LAGS.0 * half).min(LATEST_FAR_LAG * longest), FAR_LAGS.1 * half);
         let is_far = |&i: &usize| (from..=to).contains(&distances[i]);
         let far = (0..lags.len()).filter(is_far);
         let (sum, count) = far.fold((0.0, 0.0), |(sum, count), i| {
@@ -277,7 +280,7 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
         let mut sums = [0.0; 2];
         for ((lag, u), difference) in lags.iter().zip(&distances).zip(&differences) {
             let r = 1.0 - (difference / far).powi(2);
-            if r < TELLING && sums[1] > 0.0 {
+            if r < LEAST_CORRELATION && sums[1] > 0.0 {
                 break;
             }
             // The first may be beyond already, where scanlines lie wide apart.
@@ -287,13 +290,15 @@ fn correlation(lags: &[Lag], longest: f64) -> Option<Correlation> {
             sums[1] += weight * u * u;
         }
         let next = (2f64.ln() * sums[1] / sums[0]).sqrt();
-        found = Some(Correlation { half: next, far, open: FAR.0 * next > longest });
-        if (next - half).abs() < 1e-4 * half && (tail / (far * BELOW_BLACK) - 1.0).abs() < 1e-4 {
+        found = Some(Correlation { half: next, far, open: FAR_LAGS.0 * next > longest });
+        if (next - half).abs() < 1e-4 * half
+            && (tail / (far * EXCESS_BELOW_BLACK) - 1.0).abs() < 1e-4
+        {
             break;
         }
         // Where scanlines lie wide apart the set of far pairs changes in jumps: half steps converge between two.
         half = (half + next) / 2.0;
-        tail = far * BELOW_BLACK;
+        tail = far * EXCESS_BELOW_BLACK;
     }
     found
 }

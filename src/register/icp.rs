@@ -9,31 +9,31 @@ use glam::{DAffine3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::symmetric::{Square, eigen};
-use super::{RegisterError, Surface, Transformation, scale_of};
+use super::{RegisterError, Transformation, TriangleSurface, scale_of};
 use crate::statistics::Statistics;
 
 /// Fewest points.
 pub const MIN_POINTS: usize = 10;
 
 /// Most steps.
-const ROUNDS: usize = 300;
+const MOST_STEPS: usize = 300;
 /// Largest movement of a typical point, mm, at which the search ends.
-const STILL: f64 = 1e-5;
+const CONVERGED: f64 = 1e-5;
 /// Biweight cutoff in standard deviations: 95 % efficient on normal errors (Holland and Welsch 1977).
-const TUKEY: f64 = 4.685;
+const BIWEIGHT_CUTOFF: f64 = 4.685;
 /// Standard deviation over median magnitude of a normal distribution.
-const NORMAL: f64 = 1.4826;
+const DEVIATION_PER_MEDIAN: f64 = 1.4826;
 /// Least cutoff, mm: below it distances are rounding.
-const EXACT: f64 = 1e-6;
+const LEAST_CUTOFF: f64 = 1e-6;
 /// Least and greatest scale of a similarity. A cloud of points that shrinks onto a spot of the surface
 /// fits it perfectly.
-const GROWTH: (f64, f64) = (0.5, 2.0);
+const SCALES: (f64, f64) = (0.5, 2.0);
 /// Mean squared change of distance by a unit motion below which the surface does not determine the motion.
-const LOOSE: f64 = 1e-3;
+const UNDETERMINED: f64 = 1e-3;
 
 /// Number of components of a motion: shift, rotation and growth, all in mm of a typical point's movement.
-const FREEDOMS: usize = 7;
-type Motion = [f64; FREEDOMS];
+const DEGREES_OF_FREEDOM: usize = 7;
+type Motion = [f64; DEGREES_OF_FREEDOM];
 
 /// Result of a fit of points to a surface.
 #[derive(Clone, Debug)]
@@ -69,7 +69,7 @@ pub struct Residuals {
 }
 
 impl Residuals {
-    fn of(matched: &[Matched], cutoff: f64) -> Self {
+    fn of(matched: &[MatchedPoint], cutoff: f64) -> Self {
         let near: Vec<f64> = matched.iter().map(|m| m.off).filter(|d| *d < cutoff).collect();
         let statistics = Statistics::of(near.iter().copied());
         let squares: f64 = near.iter().map(|d| d * d).sum();
@@ -90,7 +90,7 @@ impl Residuals {
 }
 
 /// A point at its present place, and its nearest point of the surface.
-struct Matched {
+struct MatchedPoint {
     at: DVec3,
     /// Unit vector from the surface to the point.
     away: DVec3,
@@ -106,7 +106,7 @@ struct Matched {
 /// the surface is large; a similarity that more than doubles or halves the scale.
 pub fn fit(
     points: &[DVec3],
-    surface: &Surface,
+    surface: &TriangleSurface,
     start: DAffine3,
     transformation: Transformation,
 ) -> Result<Fit, RegisterError> {
@@ -126,15 +126,15 @@ pub fn fit(
     }
     let mut cutoff = cutoff_of(&matched, f64::INFINITY);
     let (mut damping, mut rounds, mut settled) = (1e-3, 0, false);
-    while rounds < ROUNDS && !settled {
+    while rounds < MOST_STEPS && !settled {
         rounds += 1;
-        let system = System::of(&matched, cutoff, transformation);
+        let system = NormalEquations::of(&matched, cutoff, transformation);
         let cost = cost(&matched, cutoff);
         // Where no step helps, however short, this is the minimum.
         settled = true;
         while damping < 1e9 {
             let motion = system.step(damping);
-            if dot(&motion, &motion).sqrt() < STILL {
+            if dot(&motion, &motion).sqrt() < CONVERGED {
                 break;
             }
             let next = system.increment(&motion) * transform;
@@ -148,7 +148,7 @@ pub fn fit(
             damping *= 10.0;
         }
         let growth = scale_of(&transform) / scale_of(&start);
-        if !(GROWTH.0..=GROWTH.1).contains(&growth) {
+        if !(SCALES.0..=SCALES.1).contains(&growth) {
             return Err(RegisterError::data(
                 format!("the scale runs away: it is {growth:.2} times that of the start"),
                 "give --landmarks, register with --transformation rigid, or give points of more \
@@ -162,7 +162,7 @@ pub fn fit(
         residuals: Residuals::of(&matched, cutoff),
         rounds,
         settled,
-        loose: System::of(&matched, cutoff, transformation).loose(transformation),
+        loose: NormalEquations::of(&matched, cutoff, transformation).loose(transformation),
     })
 }
 
@@ -188,16 +188,16 @@ fn check(points: &[DVec3]) -> Result<(), RegisterError> {
     Ok(())
 }
 
-fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Matched> {
+fn matches(points: &[DVec3], surface: &TriangleSurface, transform: &DAffine3) -> Vec<MatchedPoint> {
     let matched = |p: &DVec3| {
         let at = transform.transform_point3(*p);
         let nearest = surface.nearest(at);
         let away = at - nearest.point;
         let off = away.length();
-        Matched {
+        MatchedPoint {
             at,
             // On the surface the difference is rounding.
-            away: if off > EXACT { away / off } else { nearest.normal },
+            away: if off > LEAST_CUTOFF { away / off } else { nearest.normal },
             off,
         }
     };
@@ -205,14 +205,14 @@ fn matches(points: &[DVec3], surface: &Surface, transform: &DAffine3) -> Vec<Mat
 }
 
 /// Cutoff from the median distance, at most `before`.
-fn cutoff_of(matched: &[Matched], before: f64) -> f64 {
+fn cutoff_of(matched: &[MatchedPoint], before: f64) -> f64 {
     let median = Statistics::of(matched.iter().map(|m| m.off)).median;
-    (TUKEY * NORMAL * median).max(EXACT).min(before)
+    (BIWEIGHT_CUTOFF * DEVIATION_PER_MEDIAN * median).max(LEAST_CUTOFF).min(before)
 }
 
 /// Sum of Tukey's biweight over the distances, mm2.
-fn cost(matched: &[Matched], cutoff: f64) -> f64 {
-    let loss = |m: &Matched| {
+fn cost(matched: &[MatchedPoint], cutoff: f64) -> f64 {
+    let loss = |m: &MatchedPoint| {
         let rest = 1.0 - (m.off / cutoff).powi(2).min(1.0);
         1.0 - rest.powi(3)
     };
@@ -220,9 +220,9 @@ fn cost(matched: &[Matched], cutoff: f64) -> f64 {
 }
 
 /// Normal equations of the distances, linear in a small motion about the points' centre.
-struct System {
+struct NormalEquations {
     /// Eigenvalues of the matrix, and their directions.
-    axes: [(f64, Motion); FREEDOMS],
+    axes: [(f64, Motion); DEGREES_OF_FREEDOM],
     gradient: Motion,
     weight: f64,
     centre: DVec3,
@@ -230,13 +230,13 @@ struct System {
     reach: f64,
 }
 
-impl System {
-    fn of(matched: &[Matched], cutoff: f64, transformation: Transformation) -> Self {
+impl NormalEquations {
+    fn of(matched: &[MatchedPoint], cutoff: f64, transformation: Transformation) -> Self {
         let count = matched.len() as f64;
         let centre = matched.iter().map(|m| m.at).sum::<DVec3>() / count;
         let squares = matched.iter().map(|m| m.at.distance_squared(centre));
         let reach = (squares.sum::<f64>() / count).sqrt();
-        let mut matrix: Square<FREEDOMS> = Default::default();
+        let mut matrix: Square<DEGREES_OF_FREEDOM> = Default::default();
         let (mut gradient, mut total) = (Motion::default(), 0.0);
         for m in matched.iter().filter(|m| m.off < cutoff) {
             let weight = (1.0 - (m.off / cutoff).powi(2)).powi(2);
@@ -247,8 +247,8 @@ impl System {
                 Transformation::Similarity => arm.dot(m.away),
             };
             let row = [shift.x, shift.y, shift.z, turn.x, turn.y, turn.z, growth];
-            for i in 0..FREEDOMS {
-                for j in 0..FREEDOMS {
+            for i in 0..DEGREES_OF_FREEDOM {
+                for j in 0..DEGREES_OF_FREEDOM {
                     matrix[i][j] += weight * row[i] * row[j];
                 }
                 gradient[i] += weight * m.off * row[i];
@@ -265,7 +265,7 @@ impl System {
         let mut motion = Motion::default();
         for (value, axis) in &self.axes {
             // Damped, so that it is positive also without an equation, such as for growth in a rigid fit.
-            let stiffness = value + damping * trace / FREEDOMS as f64;
+            let stiffness = value + damping * trace / DEGREES_OF_FREEDOM as f64;
             if stiffness > 0.0 {
                 let way = -dot(axis, &self.gradient) / stiffness;
                 for (m, a) in motion.iter_mut().zip(axis) {
@@ -288,7 +288,7 @@ impl System {
 
     /// Motions that hardly change any distance.
     fn loose(&self, transformation: Transformation) -> Vec<String> {
-        let least = LOOSE * self.weight.max(f64::MIN_POSITIVE);
+        let least = UNDETERMINED * self.weight.max(f64::MIN_POSITIVE);
         let mut out = Vec::new();
         for (_, vector) in self.axes.iter().filter(|(value, _)| *value < least) {
             let part = |i: usize| DVec3::new(vector[i], vector[i + 1], vector[i + 2]);

@@ -8,7 +8,7 @@ use super::{RegisterError, Transformation};
 /// Least breadth of landmarks as a share of their length: below it they are nearly on a line, and errors of a
 /// few mm turn everything right about it. Landmarks that leave a plane by less do not distinguish a structure
 /// from its mirror image.
-const BREADTH: f64 = 0.02;
+const LEAST_BREADTH: f64 = 0.02;
 
 /// A point known in both frames, mm.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,8 +45,8 @@ pub fn closed_form(
             "give its position in mm",
         ));
     }
-    let from = Cloud::of(landmarks.iter().map(|l| l.from));
-    let to = Cloud::of(landmarks.iter().map(|l| l.to));
+    let from = CentredPoints::of(landmarks.iter().map(|l| l.from));
+    let to = CentredPoints::of(landmarks.iter().map(|l| l.to));
     let is_flat = from.spread("volume")? | to.spread("model")?;
     let covariance =
         landmarks.iter().map(|l| outer(l.from - from.mean, l.to - to.mean)).sum::<DMat3>();
@@ -111,14 +111,14 @@ fn horn(sum: &DMat3) -> [[f64; 4]; 4] {
 }
 
 /// Points of one frame about their mean.
-struct Cloud {
+struct CentredPoints {
     mean: DVec3,
     /// Sum of squared distances from it.
     squares: f64,
     covariance: DMat3,
 }
 
-impl Cloud {
+impl CentredPoints {
     fn of(points: impl ExactSizeIterator<Item = DVec3> + Clone) -> Self {
         let count = points.len() as f64;
         let mean = points.clone().sum::<DVec3>() / count;
@@ -132,10 +132,10 @@ impl Cloud {
             eigen(self.covariance.to_cols_array_2d()).map(|(square, _)| square.max(0.0).sqrt());
         let cause = if length < 1e-3 {
             format!("the landmarks of the {side} are one point")
-        } else if breadth < BREADTH * length {
+        } else if breadth < LEAST_BREADTH * length {
             format!("the landmarks of the {side} lie on a line")
         } else {
-            return Ok(height < BREADTH * length);
+            return Ok(height < LEAST_BREADTH * length);
         };
         let remedy = "add one that is far from that line: the rotation about it is open";
         Err(RegisterError::data(cause, remedy))
@@ -234,7 +234,7 @@ mod tests {
     }
 
     #[test]
-    fn what_leaves_a_rotation_open_is_refused_with_a_remedy() {
+    fn landmarks_that_do_not_determine_a_rotation_are_refused_with_a_remedy() {
         let truth = similarity(1.0);
         let on_a_line = |n: usize| {
             let mut all = moved(truth, 4);

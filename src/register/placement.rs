@@ -7,7 +7,7 @@ use crate::scene::file::Entry;
 
 /// Steps per unit when writing shifts (mm), angles (degrees), axes and scales: a point 1 m away moves by
 /// nanometres.
-const STEPS: [f64; 4] = [1e6, 1e7, 1e9, 1e9];
+const STEPS_PER_UNIT: [f64; 4] = [1e6, 1e7, 1e9, 1e9];
 
 /// Scale, rotation and shift, rounded as written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,16 +30,16 @@ impl Placement {
         let scale = super::scale_of(similarity);
         let rotation = DQuat::from_mat3(&(similarity.matrix3 * scale.recip())).normalize();
         let (axis, angle) = rotation.to_axis_angle();
-        let degrees = round(angle.to_degrees(), STEPS[1]);
+        let degrees = round(angle.to_degrees(), STEPS_PER_UNIT[1]);
         let scaled = transformation == Transformation::Similarity;
         Self {
-            scale: if scaled { round(scale, STEPS[3]) } else { scale },
+            scale: if scaled { round(scale, STEPS_PER_UNIT[3]) } else { scale },
             axis: match degrees == 0.0 {
                 true => DVec3::Z,
-                false => axis.map(|x| round(x, STEPS[2])),
+                false => axis.map(|x| round(x, STEPS_PER_UNIT[2])),
             },
             degrees,
-            translate: similarity.translation.map(|x| round(x, STEPS[0])),
+            translate: similarity.translation.map(|x| round(x, STEPS_PER_UNIT[0])),
             scaled,
         }
     }

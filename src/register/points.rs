@@ -19,7 +19,7 @@ use table::{Row, Table};
 const MAX_TEXT: u64 = 128 << 20;
 const MAX_POINTS: usize = 1_000_000;
 /// Farthest coordinate, mm.
-const FAR: f64 = 1e6;
+const FARTHEST: f64 = 1e6;
 
 /// Names of coordinates, and the frame that they imply.
 const COORDINATES: [([&str; 3], Frame); 3] = [
@@ -231,7 +231,7 @@ fn far(path: &Path, line: u64, value: f64) -> RegisterError {
         path,
         line,
         format!("a coordinate is {value}"),
-        format!("it must be a number of at most {FAR} mm"),
+        format!("it must be a number of at most {FARTHEST} mm"),
     )
 }
 

@@ -14,10 +14,10 @@ use super::RegisterError;
 pub type Triangle = [DVec3; 3];
 
 /// Share of the largest coordinate by which boxes are widened, so that single precision cuts nothing off.
-const MARGIN: f32 = 1e-6;
+const BOX_MARGIN: f32 = 1e-6;
 
 /// A surface with a search for the nearest point.
-pub struct Surface {
+pub struct TriangleSurface {
     /// The triangles with area.
     triangles: Vec<Triangle>,
     boxes: Bvh2,
@@ -27,14 +27,14 @@ pub struct Surface {
 
 /// A point on a surface.
 #[derive(Clone, Copy, Debug)]
-pub struct Nearest {
+pub struct NearestPoint {
     /// Position, mm.
     pub point: DVec3,
     /// Unit normal of a triangle at the point.
     pub normal: DVec3,
 }
 
-impl Surface {
+impl TriangleSurface {
     /// The surface of these triangles, of any order and orientation; triangles without area do not count.
     ///
     /// # Errors
@@ -60,7 +60,7 @@ impl Surface {
         let (sum, centre) = weighted.fold((0.0, DVec3::ZERO), |(sum, centre), (area, middle)| {
             (sum + area, centre + area * middle)
         });
-        let margin = Vec3A::splat(MARGIN * low.abs().max(high.abs()).max_element() as f32);
+        let margin = Vec3A::splat(BOX_MARGIN * low.abs().max(high.abs()).max_element() as f32);
         let around = |t: &Triangle| {
             let tight = Aabb::from_points(&t.map(|p| p.as_vec3a()));
             Aabb::new(tight.min - margin, tight.max + margin)
@@ -71,8 +71,9 @@ impl Surface {
     }
 
     /// The point on the surface that is nearest to `p`.
-    pub fn nearest(&self, p: DVec3) -> Nearest {
-        let (mut best, mut nearest) = (f64::INFINITY, Nearest { point: p, normal: DVec3::ZERO });
+    pub fn nearest(&self, p: DVec3) -> NearestPoint {
+        let (mut best, mut nearest) =
+            (f64::INFINITY, NearestPoint { point: p, normal: DVec3::ZERO });
         let reach = |node: u32| from_box(self.boxes.nodes[node as usize].aabb(), p);
         // Nodes still to be visited, with the least squared distance of their content.
         let mut open = vec![(reach(0), 0)];
@@ -95,7 +96,8 @@ impl Surface {
                 let point = closest(triangle, p);
                 let off = point.distance_squared(p);
                 if off < best {
-                    (best, nearest) = (off, Nearest { point, normal: cross(triangle).normalize() });
+                    (best, nearest) =
+                        (off, NearestPoint { point, normal: cross(triangle).normalize() });
                 }
             }
         }
@@ -194,7 +196,8 @@ mod tests {
 
     #[test]
     fn the_nearest_point_of_a_box_is_its_closed_form() {
-        let surface = Surface::new(&triangles(&shapes::cuboid([20.0, 10.0, 6.0]))).expect("a box");
+        let surface =
+            TriangleSurface::new(&triangles(&shapes::cuboid([20.0, 10.0, 6.0]))).expect("a box");
         assert!((surface.size() - 536f64.sqrt()).abs() < 1e-9);
         assert!(surface.centre().length() < 1e-9);
         for (p, expected) in [
@@ -211,12 +214,12 @@ mod tests {
     }
 
     #[test]
-    fn of_many_triangles_none_is_nearer_and_none_has_a_nearer_point() {
+    fn the_nearest_point_is_that_of_brute_force() {
         let all: Vec<Triangle> = triangles(&shapes::sphere(30.0, 3))
             .into_iter()
             .map(|t| t.map(|p| p * DVec3::new(1.0, 0.4, 2.0) + DVec3::new(900.0, 0.0, -80.0)))
             .collect();
-        let surface = Surface::new(&all).expect("a surface");
+        let surface = TriangleSurface::new(&all).expect("a surface");
         // Points of each triangle, its edges and corners among them.
         let steps = || {
             (0..=20).flat_map(|i| (0..=20 - i).map(move |j| [i, j].map(|n| f64::from(n) / 20.0)))
@@ -240,7 +243,7 @@ mod tests {
     fn samples_lie_on_the_surface_as_many_as_its_area_says() {
         let all = triangles(&shapes::cuboid([20.0, 10.0, 6.0]));
         let made = samples(&all, 4000);
-        let surface = Surface::new(&all).expect("a box");
+        let surface = TriangleSurface::new(&all).expect("a box");
         assert!(made.iter().all(|&p| surface.nearest(p).point.distance(p) < 1e-12));
         let top = made.iter().filter(|p| p.z > 2.999).count() as f64;
         let share = 200.0 / (2.0 * (200.0 + 120.0 + 60.0));
@@ -250,14 +253,14 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_surface_is_refused() {
+    fn triangles_without_area_or_numbers_are_refused() {
         let line = [DVec3::ZERO, DVec3::X, 2.0 * DVec3::X];
         for (triangles, cause) in [
             (vec![], "no triangle"),
             (vec![line], "no triangle"),
             (vec![[DVec3::NAN, DVec3::X, DVec3::Y]], "no numbers"),
         ] {
-            let error = Surface::new(&triangles).map(|_| ()).expect_err(cause);
+            let error = TriangleSurface::new(&triangles).map(|_| ()).expect_err(cause);
             assert!(error.to_string().contains(cause), "{error}");
             assert!(samples(&triangles, 10).is_empty());
         }

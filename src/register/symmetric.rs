@@ -4,7 +4,7 @@
 pub type Square<const N: usize> = [[f64; N]; N];
 
 /// Most sweeps over a matrix; they converge quadratically, and ten are many.
-const SWEEPS: usize = 50;
+const MOST_SWEEPS: usize = 50;
 
 /// Eigenvalues of a symmetric matrix, the largest first, each with its unit eigenvector. Jacobi's
 /// method: rotations in the plane of two axes, each of which makes one pair of elements zero (Golub
@@ -13,7 +13,7 @@ pub fn eigen<const N: usize>(matrix: Square<N>) -> [(f64, [f64; N]); N] {
     let mut a = matrix;
     let mut vectors: Square<N> = std::array::from_fn(unit);
     let size: f64 = a.iter().flatten().map(|x| x * x).sum();
-    for _ in 0..SWEEPS {
+    for _ in 0..MOST_SWEEPS {
         let pairs = || (0..N).flat_map(|p| (p + 1..N).map(move |q| (p, q)));
         let rest: f64 = pairs().map(|(p, q)| a[p][q] * a[p][q]).sum();
         if rest <= f64::EPSILON.powi(2) * size {
@@ -102,7 +102,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_diagonal_repeated_or_zero_stays() {
+    fn diagonal_repeated_and_zero_eigenvalues_are_exact() {
         assert_eq!(eigen([[1.0, 0.0], [0.0, 3.0]]), [(3.0, [0.0, 1.0]), (1.0, [1.0, 0.0])]);
         assert_eq!(eigen([[0.0; 3]; 3]).map(|(value, _)| value), [0.0; 3]);
         // All ones: 3 along the diagonal, and a plane of zeros.

@@ -36,8 +36,9 @@ pub struct Facts {
     pub non_manifold_edges: usize,
 }
 
-/// Measures a welded mesh in mm and reports what is wrong with it. `units` is what its file was
-/// read in, for the advice on size, and `enlarged` the factor by which its node will enlarge it. Drops triangles whose corners are not numbers.
+/// Measures a welded mesh in mm and reports what is wrong with it. `units` is what its file was read in, for the
+/// advice on size, and `enlarged` the factor by which its node will enlarge it. Drops triangles whose corners are not
+/// numbers.
 pub(super) fn examine(
     path: &Path,
     soup: &mut Soup,

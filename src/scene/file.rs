@@ -14,13 +14,12 @@ mod graph;
 mod motion;
 mod nodes;
 mod paper;
-mod parameters;
 mod placing;
 mod playing;
-mod preset;
 mod probe;
 mod save;
 mod schema;
+mod settings;
 mod shelf;
 mod study;
 mod table;
@@ -33,17 +32,18 @@ pub use document::quoted;
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
-pub use preset::{Preset, load_preset};
 pub use save::{Entry, Note, save, save_with};
+pub use schema::reference;
+pub use settings::load_settings;
 pub use study::{Plan, Question, Scenario, Slice};
-pub use table::{changes, entries};
+pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
-use crate::probe::Probe;
-use crate::settings::units;
+use crate::settings::{Settings, units};
 use document::{Document, Source};
+use schema::Title;
 
-/// Pixels that a picture has beside each other at most: what files and messages can say.
+/// Largest width of a picture, pixels: the limit of image files and messages.
 const WIDEST: f64 = 65535.0;
 
 /// A pair of `overrides` as [`Scene::load`] takes them, from `path=value`.
@@ -70,11 +70,11 @@ impl Scene {
         Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
     }
 
-    /// As [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
+    /// Like [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
     /// order of [`Parameter::suggested`](super::vary::Parameter::suggested), others after them.
     ///
     /// # Errors
-    /// As there.
+    /// Those of [`Scene::load`].
     pub fn load_variants(
         path: &Path,
         overrides: &[(String, String)],
@@ -82,7 +82,7 @@ impl Scene {
         Self::load_with(path, overrides, true)
     }
 
-    /// `suggested`: with the variants of parameters of which the file says nothing.
+    /// Loads a scene with its variants; with `suggested` also those of parameters that the file does not vary.
     fn load_with(
         path: &Path,
         overrides: &[(String, String)],
@@ -94,18 +94,18 @@ impl Scene {
         let mut warnings = Vec::new();
 
         let mut tissues = tissues::Tissues::new(&document, &file.tissues)?;
+        let Title { background, .. } = Title::default();
         let background =
-            tissues.index("background", file.background.as_deref().unwrap_or("water"))?;
+            tissues.index("background", &file.background.clone().unwrap_or(background))?;
         let mut anatomy = anatomy::meshes(&document, &file.mesh, &mut tissues, &mut warnings)?;
         let graph = graph::build(&document, &file, &mut anatomy)?;
         let instances = anatomy.origins(&file.mesh);
-        let wires = anatomy::wires(&document, &file.wire)?;
-        let (probe, world_from_probe) = probe::build(&document, &file.probe)?;
-        let simulation = parameters::simulation(&document, &file.simulation, probe.frequency)?;
-        let imaging = parameters::imaging(&document, &file.imaging)?;
-        presentable(&document, &probe, imaging.image_height)?;
+        let wires = anatomy::wires(&file.wire);
+        let settings = settings::settings(&document, &file, None)?;
+        let world_from_probe = probe::pose(&document, "probe", &file.probe.stated)?;
+        presentable(&document, &settings)?;
         let volume = match &file.volume {
-            Some(table) => Some(fusion::volume(&document, table, &mut warnings)?),
+            Some(table) => Some(fusion::volume(&document, &table.stated, &mut warnings)?),
             None => None,
         };
         let fusion = fusion::fusion(
@@ -117,8 +117,8 @@ impl Scene {
         )?;
         let contact =
             contact::build(&document, file.contact.as_ref(), &anatomy.meshes, &anatomy.instances)?;
-        let tracker = tracker::build(&document, file.tracker.as_ref())?;
-        let live = parameters::live(&document, &file.live)?;
+        let tracker = tracker::build(&document, &file.tracker.stated)?;
+        let live = file.live.stated.get("");
         warnings.extend(tissues.unused());
         let name = file
             .name
@@ -134,10 +134,8 @@ impl Scene {
             instances: anatomy.instances,
             graph,
             wires,
-            probe,
+            settings,
             world_from_probe,
-            simulation,
-            imaging,
             volume,
             fusion,
             contact,
@@ -145,9 +143,7 @@ impl Scene {
             live,
             origins,
         };
-        let model =
-            (file.model.translate, file.model.rotate.as_ref(), schema::even(file.model.scale));
-        scene.place_model(placing::placement(&document, "model", model)?);
+        scene.place_model(placing::placement(&file.model.stated, ""));
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
@@ -161,13 +157,13 @@ impl Scene {
 pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
     let table = file.ok().and_then(|file| file.volume);
-    table.map_or_else(Vec::new, |table| table.other.files())
+    table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
 }
 
-/// A time as the command line and scene files write it: seconds, or with a unit. Finite.
+/// Parses a time as in scene files and on the command line: seconds, or with a unit. Returns s, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn seconds(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
@@ -179,10 +175,10 @@ pub fn seconds(text: &str) -> Result<f64, String> {
     }
 }
 
-/// A length as the command line and scene files write it: mm, or with a unit. Finite.
+/// Parses a length as in scene files and on the command line: mm, or with a unit. Returns mm, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn millimetres(text: &str) -> Result<f64, String> {
     let value = match text.trim().parse::<f64>() {
         Ok(value) => value,
@@ -194,10 +190,10 @@ pub fn millimetres(text: &str) -> Result<f64, String> {
     }
 }
 
-/// An angle as the command line and scene files write it, with its unit, in radians. Finite.
+/// Parses an angle as in scene files and on the command line, with its unit. Returns radians, finite.
 ///
 /// # Errors
-/// What is wrong with the text, in words.
+/// The fault of the text, in words.
 pub fn radians(text: &str) -> Result<f64, String> {
     let value = units::ANGLE.parse(text)?;
     match value.is_finite() {
@@ -207,8 +203,9 @@ pub fn radians(text: &str) -> Result<f64, String> {
 }
 
 /// Fails on a picture wider than can be written or sent.
-fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<(), SceneError> {
-    let [left, top, right, bottom] = probe.bounds();
+fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), SceneError> {
+    let height = settings.imaging.image_height;
+    let [left, top, right, bottom] = settings.probe.bounds();
     let width = (right - left) / (bottom - top) * f64::from(height);
     if width <= WIDEST {
         return Ok(());
@@ -221,7 +218,7 @@ fn presentable(document: &Document<'_>, probe: &Probe, height: u32) -> Result<()
     Err(document.fail("imaging.image_height", message, remedy))
 }
 
-/// Fails at `path` unless `value` lies in the closed range; NaN lies in none.
+/// Fails at `path` unless `value` is in the closed range; NaN is in no range.
 fn within(
     document: &Document<'_>,
     path: &str,

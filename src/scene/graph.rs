@@ -23,8 +23,8 @@ pub struct Node {
     pub name: String,
     /// Index of the parent, which is less than this node's own; none: the world.
     pub parent: Option<usize>,
-    /// Where the parent is a selector: the number of its choice with which this node is shown. None where
-    /// it is shown with every choice, as keyframed meshes are, which change with it.
+    /// If the parent is a selector: the number of its choice with which this node is shown. None if
+    /// it is shown with every choice, as meshes with keyframes are, which change with the choice.
     pub alternative: Option<usize>,
     /// Effect of the node.
     pub kind: NodeKind,

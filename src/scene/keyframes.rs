@@ -13,7 +13,7 @@ words! {
         /// level is rebuilt over the one that is shown, with its own tight box.
         #[default]
         Exchange = "exchange",
-        /// As `exchange`, but the top level is refitted. The compute tracer, whose top level is made on
+        /// Like `exchange`, but the top level is refitted. The compute tracer, whose top level is made on
         /// the host, keeps its tree and recomputes its boxes.
         Update = "update",
         /// Every keyframe is in the top level at all times, and rays ignore all but one: no builds.
@@ -23,11 +23,11 @@ words! {
         Selector = "selector",
         /// The keyframe's geometry is uploaded and its structure built, fast, when it is shown.
         Rebuild = "rebuild",
-        /// As `rebuild`, from geometry that has stayed on the device.
+        /// Like `rebuild`, from geometry that has stayed on the device.
         Cached = "cached",
         /// One structure for all keyframes, which must have equal triangles; its boxes follow the vertices.
         Refit = "refit",
-        /// As `refit`, over vertices between the keyframes.
+        /// Like `refit`, over vertices interpolated between the keyframes.
         Interpolate = "interpolate",
     }
 }

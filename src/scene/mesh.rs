@@ -51,6 +51,12 @@ impl Units {
     pub const NAMES: [(&str, f64); 5] =
         [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("in", 25.4)];
 
+    /// The names alone.
+    pub const WORDS: [&str; 5] = {
+        let [um, mm, cm, m, inch] = Self::NAMES;
+        [um.0, mm.0, cm.0, m.0, inch.0]
+    };
+
     /// The unit called `name`.
     pub fn named(name: &str) -> Option<Self> {
         let found = Self::NAMES.iter().find(|(n, _)| *n == name)?;

@@ -2,20 +2,22 @@
 
 use glam::{DAffine3, DMat3, DVec3};
 
+use crate::settings::words;
+
 /// Largest deviation of the axes of a rigid transform from unit vectors at right angles: the rounding of
 /// 32-bit floats and of three written decimals.
 const RIGID: f64 = 2e-3;
 /// Greatest distance from the origin at which a tool is tracked, mm.
 const FAR: f64 = 1e5;
 
-/// Meaning of x and y of the scene's world. z grows to the head in both.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Axes {
-    /// To the patient's left and back, as in DICOM, ITK and the volumes of a scene.
-    Lps,
-    /// To the patient's right and front, as in 3D Slicer.
-    Ras,
+words! {
+    /// Meaning of x and y of the scene's world. z grows to the head in both.
+    pub enum Axes {
+        /// To the patient's left and back, as in DICOM, ITK and the volumes of a scene.
+        Lps = "lps",
+        /// To the patient's right and front, as in 3D Slicer.
+        Ras = "ras",
+    }
 }
 
 /// Calibration and choice of a tracked tool.

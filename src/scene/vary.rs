@@ -2,9 +2,8 @@
 //! of the images, as in the user study of Starkov et al. 2019, section III-B. That tuned eleven major
 //! parameters and does not list them; [`SUGGESTED`] are ours.
 
-use super::{Imaging, Scene, Simulation};
-use crate::probe::Probe;
-use crate::settings::{Facts, Form, Group, Value};
+use crate::settings::units::ANGLE;
+use crate::settings::{Facts, Form, Group, Imaging, Probe, Settings, Simulation, Value};
 
 /// Distance from the scene's own value, below and above.
 #[derive(Clone, Copy, Debug)]
@@ -56,21 +55,15 @@ fn numbers<T: Group>() -> impl Iterator<Item = Parameter> {
             Form::Numbers(_) => (0..facts.parts.len()).map(Some).collect(),
             _ => Vec::new(),
         };
-        // An angle is left out: the probe may not be a sector.
-        let belongs = facts.limits.is_none() || facts.form.is_whole();
-        let parts = parts.into_iter().filter(move |_| belongs);
+        // The probe may not be a sector.
+        let parts = parts.into_iter().filter(|_| !facts.form.measures(&ANGLE));
         parts.map(|part| Parameter { table: T::TABLE, facts, part })
     })
 }
 
-/// The number of a group's setting; none where it is absent.
-fn number<T: Group>(settings: &T, parameter: &Parameter) -> Option<f64> {
-    match ((T::row(parameter.facts.key)?.get)(settings), parameter.part) {
-        (Value::Number(number), _) => Some(number),
-        (Value::Whole(count), _) => Some(f64::from(count)),
-        (Value::List(list), Some(part)) => list.get(part).copied(),
-        _ => None,
-    }
+/// The value of a group's setting.
+fn current<T: Group>(settings: &T, key: &str) -> Option<Value> {
+    T::row(key).map(|row| (row.get)(settings))
 }
 
 impl Parameter {
@@ -130,12 +123,22 @@ impl Parameter {
         self.facts.unit()
     }
 
-    /// The scene's own value, in [`Self::unit`]; none where the scene's probe does not have it.
-    pub fn value(&self, scene: &Scene) -> Option<f64> {
+    /// The value of its setting.
+    fn current(&self, settings: &Settings) -> Option<Value> {
         match self.table {
-            Probe::TABLE => number(&scene.probe, self),
-            Simulation::TABLE => number(&scene.simulation, self),
-            _ => number(&scene.imaging, self),
+            Probe::TABLE => current(&settings.probe, self.facts.key),
+            Simulation::TABLE => current(&settings.simulation, self.facts.key),
+            _ => current(&settings.imaging, self.facts.key),
+        }
+    }
+
+    /// Its value, in [`Self::unit`]; none where the probe does not have it.
+    pub fn value(&self, settings: &Settings) -> Option<f64> {
+        match (self.current(settings)?, self.part) {
+            (Value::Number(number), _) => Some(number),
+            (Value::Whole(count), _) => Some(f64::from(count)),
+            (Value::List(list), Some(part)) => list.get(part).copied(),
+            _ => None,
         }
     }
 
@@ -161,17 +164,14 @@ impl Parameter {
         }
     }
 
-    /// The entry of the scene file, path and value, for `value` in `scene`.
-    pub fn setting(&self, scene: &Scene, value: f64) -> (String, String) {
-        let text = match (self.part, Imaging::row(self.facts.key)) {
-            (Some(part), Some(row)) => match (row.get)(&scene.imaging) {
-                Value::List(mut list) => {
-                    list[part] = value;
-                    let list: Vec<_> = list.iter().map(f64::to_string).collect();
-                    format!("[{}]", list.join(","))
-                }
-                _ => value.to_string(),
-            },
+    /// The entry of the scene file, path and value, for `value` beside the other `settings`.
+    pub fn setting(&self, settings: &Settings, value: f64) -> (String, String) {
+        let text = match (self.part, self.current(settings)) {
+            (Some(part), Some(Value::List(mut list))) => {
+                list[part] = value;
+                let list: Vec<_> = list.iter().map(f64::to_string).collect();
+                format!("[{}]", list.join(","))
+            }
             _ => value.to_string(),
         };
         (self.path(), text)
@@ -199,7 +199,7 @@ pub fn short(value: f64) -> String {
     rounded.to_string()
 }
 
-/// A scene's settings with one parameter at another value.
+/// A scene with one parameter at another value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variant {
     /// The parameter.
@@ -208,21 +208,8 @@ pub struct Variant {
     pub value: f64,
     /// The equivalent entry of the scene file, path and value.
     pub setting: (String, String),
-    /// The transducer with the value.
-    pub probe: Probe,
-    /// Path tracing and scatterers with the value.
-    pub simulation: Simulation,
-    /// Image formation with the value.
-    pub imaging: Imaging,
-}
-
-impl Variant {
-    /// Puts its settings into the scene that it was made from.
-    pub fn apply(&self, scene: &mut Scene) {
-        scene.probe = self.probe.clone();
-        scene.simulation = self.simulation.clone();
-        scene.imaging = self.imaging.clone();
-    }
+    /// The scene's settings with it.
+    pub settings: Settings,
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! How an acquired volume is shown, and how it is mixed with the simulation.
+//! Settings of fusion: the display of an acquired volume, and its mixing with the simulation.
 
 use glam::DAffine3;
 
@@ -9,7 +9,7 @@ const INF: f64 = f64::INFINITY;
 const OFF: f64 = f64::NEG_INFINITY;
 
 words! {
-    /// What is shown around the masking meshes.
+    /// The picture around the masking meshes.
     pub enum Surroundings {
         /// The acquired volume.
         Volume = "volume",
@@ -21,7 +21,7 @@ words! {
 }
 
 words! {
-    /// How the two images meet at the border of the mask.
+    /// The transition between the two images at the border of the mask.
     pub enum Blend {
         /// Along the ramp that the box blur makes of the mask (the paper).
         Linear = "linear",
@@ -34,14 +34,15 @@ words! {
 }
 
 words! {
-    /// How fast the scanlines' samples go through the masking meshes, where mask and volume are looked up.
+    /// The speed at which the scanlines' samples pass through the masking meshes; mask and volume are looked up
+    /// there.
     #[derive(Default)]
     pub enum MaskSpeed {
-        /// As the sound does: at the speed of the tissue that the masking mesh encloses (the paper). The mask's far
+        /// The speed of the tissue that the masking mesh encloses, as for sound (the paper). The mask's far
         /// border lies where its surface echoes.
         #[default]
         Enclosing = "enclosing",
-        /// At the probe's speed, as around them: the volume is shown undistorted.
+        /// The probe's speed, as around the meshes: the volume is shown undistorted.
         Probe = "probe",
     }
 }
@@ -69,13 +70,13 @@ group! {
         background_shadows: bool = false,
             Facts::switch().label("Shadows");
     } beside {
-        /// The masking meshes, of which the union is simulated: indices into the scene's instances.
+        /// The masking meshes, as indices into the scene's instances; their union is simulated.
         masks: Vec<usize> = Vec::new();
     }
 }
 
 group! {
-    /// How an acquired volume is shown: where, and in which grey levels.
+    /// The display of an acquired volume: its placement and its grey levels.
     #[derive(Copy)]
     pub struct Display in "volume", from files {
         /// Stored value that is shown black.

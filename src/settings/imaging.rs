@@ -1,4 +1,4 @@
-//! Image formation, and how images keep pace.
+//! Settings of image formation and of live quality.
 
 use super::key::group;
 use super::units::{ATTENUATION, DURATION, LEVEL};
@@ -46,7 +46,7 @@ group! {
 }
 
 group! {
-    /// How the window and `serve` keep pace.
+    /// Live quality of the window and of `serve`.
     pub struct Live in "live" {
         /// Time that an image may take while the probe, the anatomy or a setting moves. Where the scene's own counts
         /// take longer, images are made with fewer lines, layers, samples and paths; at rest they are the scene's own.
@@ -58,8 +58,8 @@ group! {
 }
 
 impl Live {
-    /// The budget, ms: 15 images a second where a software driver does the work, 60 on a GPU, unless the
-    /// scene says it.
+    /// The time that an image may take, ms. Unless the scene says it: 15 images a second with a software
+    /// driver, 60 on a GPU.
     pub fn budget_ms(&self, machine: Machine) -> f64 {
         let default = match machine {
             Machine::Software => 0.066,
@@ -69,11 +69,11 @@ impl Live {
     }
 }
 
-/// What does the work.
+/// The kind of machine that computes the images.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Machine {
     /// A software driver: every path and scatterer costs time.
     Software,
-    /// A GPU: a frame of few paths leaves most of it idle.
+    /// A GPU: a frame with few paths does not use all of it.
     Gpu,
 }

@@ -1,4 +1,6 @@
-//! Rows: what is to be known of a key, and how its value is read from a field and put there.
+//! Rows of settings: the facts about a key, and the functions that get and set the value of its field.
+
+use glam::DVec3;
 
 use super::units::{ANGLE, Measure};
 
@@ -15,11 +17,15 @@ pub enum Value {
     Word(&'static str),
     /// Several numbers or quantities.
     List(Vec<f64>),
+    /// A name, or another text.
+    Text(String),
+    /// Several of them.
+    Texts(Vec<String>),
     /// The file does not say it.
     Absent,
 }
 
-/// What a key takes.
+/// The form of a key's value.
 #[derive(Clone, Copy, Debug)]
 pub enum Form {
     /// A number without a unit.
@@ -28,29 +34,38 @@ pub enum Form {
     Quantity(&'static Measure),
     /// A whole number from 0 on.
     Whole,
+    /// A whole number, also below 0: a [`Value::Number`].
+    Integer,
     /// True or false.
     Switch,
     /// One of these words.
     Words(&'static [&'static str]),
-    /// So many numbers.
+    /// This many numbers.
     Numbers(usize),
-    /// So many quantities.
+    /// This many quantities.
     Quantities(&'static Measure, usize),
+    /// Three numbers, not all zero.
+    Direction,
+    /// One number, or one for each axis: a list of three.
+    Factors,
+    /// A text.
+    Text,
+    /// Several texts.
+    Texts,
+    /// A text, or several: a list.
+    OneOrSeveral,
+    /// A text, or `true`.
+    TextOrTrue,
 }
 
 impl Form {
-    /// Whether it takes counts.
-    pub fn is_whole(&self) -> bool {
-        matches!(self, Self::Whole)
-    }
-
     /// Whether it takes quantities of this measure.
     pub fn measures(&self, measure: &Measure) -> bool {
         matches!(self, Self::Quantity(own) if *own == measure)
     }
 }
 
-/// The state of a key in which what it sets is off.
+/// The value of a key that switches off what the key sets.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Off {
     /// This value.
@@ -59,29 +74,31 @@ pub enum Off {
     Absent,
 }
 
-/// All that is to be known of a key.
+/// The facts about a key.
 #[derive(Clone, Copy, Debug)]
 pub struct Facts {
-    /// The key in its table.
+    /// The key in its table; with those of tables between them: `rotate.axis`.
     pub key: &'static str,
-    /// What it takes.
+    /// The form of its value.
     pub form: Form,
     /// Least and largest value that a scene file may give, of each number of a list.
     pub range: [f64; 2],
     /// Ends of the console's slider.
     pub usual: [f64; 2],
-    /// What the console calls it.
+    /// Its name in the console.
     pub label: &'static str,
     /// The section of the console in which it stands; empty: the first one.
     pub under: &'static str,
-    /// When it is off, and the console's word for that.
+    /// The value that switches it off, and the console's word for that.
     pub off: Option<(Off, &'static str)>,
-    /// What each number of a list is called.
+    /// The name of each number of a list.
     pub parts: &'static [&'static str],
-    /// What a plain count counts: "pixels".
+    /// The things that a plain count counts: "pixels".
     pub counted: &'static str,
-    /// The default in words, where it is no value.
+    /// The default in words, if it is not a single value.
     pub default: Option<&'static str>,
+    /// True if its table needs it.
+    pub required: bool,
     /// The range in words, where two numbers do not say it.
     pub limits: Option<&'static str>,
     /// What it is, in Markdown.
@@ -90,7 +107,7 @@ pub struct Facts {
 
 /// A key with the field behind it.
 pub struct Row<T> {
-    /// What is to be known of it.
+    /// The facts about the key.
     pub facts: Facts,
     /// The field's value.
     pub get: fn(&T) -> Value,
@@ -136,6 +153,7 @@ impl Facts {
             parts: &[],
             counted: "",
             default: None,
+            required: false,
             limits: None,
             meaning: "",
         }
@@ -158,7 +176,7 @@ impl Facts {
 
     /// True or false.
     pub const fn switch() -> Self {
-        Self::new(Form::Switch, f64::NEG_INFINITY, f64::INFINITY)
+        Self::of(Form::Switch)
     }
 
     /// One of the words of `W`.
@@ -168,7 +186,7 @@ impl Facts {
 
     /// One of these words.
     pub const fn one_of(words: &'static [&'static str]) -> Self {
-        Self::new(Form::Words(words), f64::NEG_INFINITY, f64::INFINITY)
+        Self::of(Form::Words(words))
     }
 
     /// `parts.len()` numbers, each within these limits; `parts` are what they are called.
@@ -186,6 +204,22 @@ impl Facts {
         most: f64,
     ) -> Self {
         Self::new(Form::Quantities(measure, count), least, most)
+    }
+
+    /// What takes this form, without limits.
+    pub const fn of(form: Form) -> Self {
+        Self::new(form, f64::NEG_INFINITY, f64::INFINITY)
+    }
+
+    /// One factor or three, within these limits.
+    pub const fn factors(least: f64, most: f64) -> Self {
+        Self::new(Form::Factors, least, most)
+    }
+
+    /// Without which its table is no such table.
+    pub const fn required(mut self) -> Self {
+        self.required = true;
+        self.by_default("required")
     }
 
     /// Called so by the console.
@@ -237,7 +271,7 @@ impl Facts {
     }
 
     /// With its key and its meaning, unless the key has been given.
-    pub(super) const fn named(mut self, key: &'static str, meaning: &'static str) -> Self {
+    pub(crate) const fn named(mut self, key: &'static str, meaning: &'static str) -> Self {
         if self.key.is_empty() {
             self.key = key;
         }
@@ -249,6 +283,11 @@ impl Facts {
     pub const fn key(mut self, key: &'static str) -> Self {
         self.key = key;
         self
+    }
+
+    /// The key without the tables in which it stands.
+    fn name(&self) -> &'static str {
+        self.key.rsplit('.').next().unwrap_or(self.key)
     }
 
     /// What it is, in Markdown.
@@ -288,13 +327,22 @@ impl Facts {
             (Value::Whole(count), _) => count.to_string(),
             (Value::Switch(on), _) => on.to_string(),
             (Value::Word(word), _) => format!("\"{word}\""),
+            (Value::List(all), Form::Factors) if all.iter().all(|v| *v == all[0]) => plain(all[0]),
             (Value::List(all), _) => listed(all),
+            (Value::Text(text), _) => format!("{text:?}"),
+            (Value::Texts(texts), _) => format!("{texts:?}"),
         })
     }
 
-    /// What is wrong with a value of this key, and what to do: none where it lies in the range. NaN lies in none.
+    /// The fault of a value outside the key's range, and its remedy; none for a value in the range. NaN is in no range.
     pub fn fault(&self, value: &Value) -> Option<(String, String)> {
         let all = match value {
+            Value::List(all) if matches!(self.form, Form::Direction) => {
+                let direction = DVec3::from_slice(all).try_normalize();
+                let cause = format!("this {} has no length", self.name());
+                let remedy = "give a vector such as [0, 0, 1]".to_owned();
+                return direction.is_none().then_some((cause, remedy));
+            }
             Value::Number(number) => std::slice::from_ref(number),
             Value::List(all) => all,
             Value::Whole(count) => return self.outside(f64::from(*count)),
@@ -305,7 +353,7 @@ impl Facts {
 
     fn outside(&self, number: f64) -> Option<(String, String)> {
         let [least, most] = self.range;
-        // What has no ends is checked by whoever knows what fits.
+        // A key without limits is checked by the code that knows its limits.
         let endless = least == f64::NEG_INFINITY && most == f64::INFINITY;
         if endless || (least..=most).contains(&number) {
             return None;
@@ -318,17 +366,17 @@ impl Facts {
             true => format!("it must be at least {least}{unit}"),
             false => format!("it must lie between {least} and {most}{unit}"),
         };
-        Some((format!("{} is {number}{unit}", self.key), remedy))
+        Some((format!("{} is {number}{unit}", self.name()), remedy))
     }
 }
 
-/// A number as TOML reads it back, to the last bit.
+/// The text of a number that TOML reads back exactly.
 pub fn plain(value: f64) -> String {
     let text = format!("{value:?}");
     text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
 }
 
-/// In degrees where they are the same number: most people would write them.
+/// The text of an angle: in degrees, as most people write them, if they give exactly the same number.
 fn angle(radians: f64) -> String {
     let degrees = (radians.to_degrees() * 1e9).round() / 1e9;
     match degrees * (std::f64::consts::PI / 180.0) == radians {
@@ -337,14 +385,14 @@ fn angle(radians: f64) -> String {
     }
 }
 
-/// Declares the settings of a table, a field and its row at a time. The fields of `beside` are no keys of their own;
-/// the rows of `last` are those of keys that are no field.
+/// Declares the settings of a table, each field with its row. The fields of `beside` are no keys of their own;
+/// the rows of `last` are those of keys that have no field.
 macro_rules! group {
     ($(#[$meta:meta])* pub struct $name:ident in $table:literal {
         $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr, $facts:expr;)*
     } $(beside { $($(#[doc = $other_doc:literal])+ $other:ident: $other_type:ty = $other_default:expr;)* })?
     ) => {
-        $crate::settings::key::group! {
+        $crate::settings::group! {
             $(#[$meta])* pub struct $name in $table, from files {
                 $($(#[doc = $doc])+ $field: $type, $facts;)*
             } $(beside { $($(#[doc = $other_doc])+ $other: $other_type;)* })?
@@ -374,7 +422,7 @@ macro_rules! group {
             fn rows() -> &'static [$crate::settings::Row<Self>] {
                 use $crate::settings::{Facts, Field, Row};
                 static ROWS: std::sync::LazyLock<Vec<Row<$name>>> = std::sync::LazyLock::new(|| {
-                    let rows = [$(Row {
+                    let rows = vec![$(Row {
                         facts: {
                             const FACTS: Facts = $facts;
                             FACTS.named(stringify!($field), concat!($($doc),+))
@@ -382,15 +430,11 @@ macro_rules! group {
                         get: |from: &$name| from.$field.get(),
                         set: |to: &mut $name, value| to.$field.set(value),
                     }),*];
-                    #[allow(unused_mut)]
-                    let mut all: Vec<Row<$name>> = Vec::new();
-                    all.extend(rows);
-                    $(all.extend($last);)?
-                    all
+                    rows.into_iter()$(.chain($last))?.collect()
                 });
                 &ROWS
             }
         }
     };
 }
-pub(super) use group;
+pub(crate) use group;

@@ -93,7 +93,7 @@ const DEGREE: f64 = PI / 180.0;
 const KINDS: [&str; 3] = ["convex", "linear", "phased"];
 
 impl Kind {
-    /// What scene files call it.
+    /// The word for it in scene files.
     pub fn word(&self) -> &'static str {
         match self {
             Self::Convex { .. } => KINDS[0],
@@ -102,7 +102,7 @@ impl Kind {
         }
     }
 
-    /// The arrangement of this name with what it shares with this one, else as the presets have it.
+    /// The arrangement of this name. It keeps the values that this arrangement has too, else it has those of the presets.
     pub fn turned(self, word: &str) -> Self {
         let view = match self {
             Self::Convex { field_of_view, .. } | Self::Phased { field_of_view } => field_of_view,
@@ -126,7 +126,7 @@ impl Kind {
     }
 }
 
-/// The rows of what [`Kind`] holds. A key of another arrangement is absent, and setting it changes nothing.
+/// The rows of the values in [`Kind`]. A key of another arrangement is absent, and setting it changes nothing.
 fn shape() -> [Row<Probe>; 4] {
     const KIND: Facts = Facts::one_of(&KINDS).key("kind").label("Kind");
     const RADIUS: Facts =

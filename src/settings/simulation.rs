@@ -7,11 +7,11 @@ use super::words;
 
 const INF: f64 = f64::INFINITY;
 const OFF: f64 = f64::NEG_INFINITY;
-/// Levels may be switched off (minus infinity) but not boundless.
+/// Upper limit of levels, dB; there is no lower one, as minus infinity switches them off.
 const LOUDEST: f64 = 200.0;
 
 words! {
-    /// Which paths are followed.
+    /// The scheme by which paths are followed.
     pub enum Sampling {
         /// The transmitted path always continues; reflected branches are spawned. Our default, a
         /// stand-in for the adaptive scheme of Mattausch et al. 2018.
@@ -24,7 +24,7 @@ words! {
 }
 
 words! {
-    /// Where the paths' random decisions come from.
+    /// The source of the paths' random numbers.
     pub enum Sequence {
         /// A Sobol sequence over the paths, Owen-scrambled: less noise with as many paths.
         Sobol = "sobol",
@@ -34,7 +34,7 @@ words! {
 }
 
 words! {
-    /// What thickness does to the phase of a surface echo.
+    /// The effect of a surface's thickness on the phase of its echo.
     pub enum Coherence {
         /// Coherent part at the surface, the rest as static speckle; energy independent of N.
         Split = "split",
@@ -64,14 +64,14 @@ words! {
 }
 
 words! {
-    /// To what the scatterer lattice is fixed.
+    /// The frame in which the scatterer lattice rests.
     pub enum TextureSpace {
-        /// To the tissue: speckle moves with the anatomy and, where keyframes share their topology,
+        /// The tissue: speckle moves with the anatomy and, if keyframes share their topology,
         /// deforms with it.
         Tissue = "tissue",
-        /// To the instance: speckle moves with it as a whole; what changes its shape slides through it.
+        /// The instance: speckle moves with it as a whole; an anatomy that changes its shape slides through it.
         Object = "object",
-        /// To the world: anatomy slides through the speckle, as in the paper.
+        /// The world: anatomy slides through the speckle, as in the paper.
         World = "world",
     }
 }
@@ -182,20 +182,20 @@ group! {
     }
 }
 
-/// How much work a frame is worth.
+/// A preset of quality: the work per frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quality {
-    /// As fast as can be, for trying things out.
+    /// Fast, for trying things out.
     Draft,
-    /// What the machine does in reasonable time.
+    /// The best that the machine computes in reasonable time.
     Standard,
     /// A proof, on any machine: many paths, a fine lattice, the whole slice.
     Reference,
 }
 
 impl Simulation {
-    /// Edge of a lattice cell, mm, where nobody says it: it follows the wavelength, 0.15 mm at 7 MHz,
-    /// as far as a scene file may say it. `frequency` in MHz.
+    /// Default edge of a lattice cell, mm, at `frequency` MHz: proportional to the wavelength, 0.15 mm at 7 MHz,
+    /// up to the largest edge that a scene file may give.
     pub fn default_cell(frequency: f64) -> f64 {
         (1.05 / frequency).min(10.0)
     }
@@ -205,8 +205,8 @@ impl Simulation {
         self.density_scale.min(1.0)
     }
 
-    /// By what a cell is smaller than it would be without [`Self::density_scale`]: it holds one
-    /// scatterer at most, so more of them need more cells.
+    /// The factor by which a cell's edge is smaller than without [`Self::density_scale`]: a cell holds one
+    /// scatterer at most, so more scatterers need more cells.
     pub fn crowding(&self) -> f64 {
         self.density_scale.max(1.0).cbrt()
     }
@@ -225,7 +225,7 @@ impl Simulation {
         self.scatterers_per_resolution_cell = scatterers;
         self.volume_floor = volume_floor;
         self.branch_floor = branch_floor;
-        // A voxel's edge is a look, not a cost: there is one lookup per sample whatever its size.
+        // The edge of a voxel changes the texture, not the cost: there is one lookup per sample for any edge.
         if self.scatter_mode == ScatterMode::Lattice {
             self.cell *= cell;
         }

@@ -1,4 +1,4 @@
-//! How interfaces reflect.
+//! Settings of reflection at interfaces.
 
 use super::key::group;
 use super::units::{LENGTH, LEVEL};
@@ -7,7 +7,7 @@ const INF: f64 = f64::INFINITY;
 const OFF: f64 = f64::NEG_INFINITY;
 
 group! {
-    /// How an interface reflects, seen from one side.
+    /// Reflection at an interface, seen from one side.
     #[derive(Copy)]
     pub struct Surface in "mesh", from files {
         /// Exponent of the micro-normals' power-cosine lobe: 0 is diffuse, `inf` a mirror.

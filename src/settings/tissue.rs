@@ -42,9 +42,9 @@ group! {
     } beside {
         /// Name in scene files.
         name: String;
-        /// How the outside of an organ of this tissue reflects unless a mesh says otherwise.
+        /// Reflection at the outside of an organ of this tissue, unless a mesh says otherwise.
         surface: Surface;
-        /// Where the numbers come from, one line per number; shown to the user.
+        /// The sources of the numbers, one line per number; shown to the user.
         source: String;
     }
 }
@@ -77,7 +77,7 @@ mod tests {
         water.attenuation_exponent = 2.0;
         approx::assert_relative_eq!(decibel(&water, 1.0), 0.0022, max_relative = 1e-12);
         approx::assert_relative_eq!(decibel(&water, 7.0), 0.1078, max_relative = 1e-12);
-        // Those that ship are proportional to it, to the bit.
+        // Shipped tissues are proportional to the frequency, exactly.
         let liver = Tissue::shipped("liver").expect("shipped");
         assert_eq!(
             liver.absorption(3.3),

@@ -1,67 +1,33 @@
 //! Quantities of scene files: a number in the unit used inside, or a string with its unit.
 
 use std::fmt;
-use std::marker::PhantomData;
 
-use serde::de::{Deserialize, DeserializeSeed, Deserializer, Error, Visitor};
+use serde::de::{DeserializeSeed, Deserializer, Error, Visitor};
 
-/// What is measured, and its units.
+/// A measure: a kind of quantity with its units.
 #[derive(Debug, PartialEq)]
 pub struct Measure {
-    /// What the reference calls it.
+    /// Its name in the reference (docs/scenes.md).
     pub name: &'static str,
     /// Noun for messages, with article.
     what: &'static str,
     /// Units with their factors to the one used inside, which is the first and that of a plain number.
     units: &'static [(&'static str, f64)],
-    /// What the reference says beside the units.
+    /// A remark of the reference beside the units.
     pub note: &'static str,
-    /// Whether a plain number is accepted.
+    /// True if a plain number is accepted.
     plain: bool,
 }
 
-/// A kind of quantity as a type.
-pub trait Dimension {
-    /// What is measured.
-    const MEASURE: &'static Measure;
-}
-
-/// A value of dimension `D` in the unit used inside. Never NaN; may be infinite.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Quantity<D>(pub f64, PhantomData<D>);
-
-impl<D> Quantity<D> {
-    /// A value in the unit used inside.
-    pub fn new(value: f64) -> Self {
-        Self(value, PhantomData)
-    }
-
-    /// Nothing, or 0 dB.
-    pub fn zero() -> Self {
-        Self::new(0.0)
-    }
-}
-
 macro_rules! measures {
-    ($($(#[$doc:meta])* $alias:ident, $tag:ident, $constant:ident: $name:literal, $what:literal,
-        $plain:literal, $note:literal, [$($unit:expr),+];)+
+    ($($(#[$doc:meta])* $constant:ident: $name:literal, $what:literal, $plain:literal, $note:literal,
+        [$($unit:expr),+];)+
     ) => {
         $(
             $(#[$doc])*
             pub const $constant: Measure = Measure {
                 name: $name, what: $what, units: &[$($unit),+], note: $note, plain: $plain,
             };
-
-            /// Marker of the dimension.
-            #[derive(Clone, Copy, Debug, PartialEq)]
-            pub struct $tag;
-
-            impl Dimension for $tag {
-                const MEASURE: &'static Measure = &$constant;
-            }
-
-            $(#[$doc])*
-            pub type $alias = Quantity<$tag>;
         )+
 
         /// All measures, in the order of the reference.
@@ -71,33 +37,33 @@ macro_rules! measures {
 
 measures! {
     /// mm.
-    Length, InLength, LENGTH: "length", "a length", true, "",
+    LENGTH: "length", "a length", true, "",
         [("mm", 1.0), ("cm", 10.0), ("m", 1000.0), ("um", 1e-3)];
     /// Radians. A plain number is refused: most people would mean degrees.
-    Angle, InAngle, ANGLE: "angle", "an angle", false, "a plain number other than 0 is refused",
+    ANGLE: "angle", "an angle", false, "a plain number other than 0 is refused",
         [("rad", 1.0), ("deg", std::f64::consts::PI / 180.0)];
     /// MHz.
-    Frequency, InFrequency, FREQUENCY: "frequency", "a frequency", true, "",
+    FREQUENCY: "frequency", "a frequency", true, "",
         [("MHz", 1.0), ("kHz", 1e-3), ("Hz", 1e-6)];
     /// mm/us.
-    Speed, InSpeed, SPEED: "speed", "a speed of sound", true, "",
+    SPEED: "speed", "a speed of sound", true, "",
         [("mm/us", 1.0), ("m/s", 1e-3), ("km/s", 1.0)];
     /// g/cm3.
-    Density, InDensity, DENSITY: "density", "a density", true, "",
+    DENSITY: "density", "a density", true, "",
         [("g/cm3", 1.0), ("kg/m3", 1e-3), ("g/cm^3", 1.0), ("kg/m^3", 1e-3)];
     /// dB/(cm MHz).
-    Attenuation, InAttenuation, ATTENUATION: "attenuation", "an attenuation", true,
+    ATTENUATION: "attenuation", "an attenuation", true,
         "one way, at 1 MHz",
         [("dB/cm/MHz", 1.0), ("dB/(cm MHz)", 1.0), ("dB/m/MHz", 1e-2), ("dB/mm/MHz", 10.0)];
     /// s.
-    Duration, InDuration, DURATION: "duration", "a duration", true, "", [("s", 1.0), ("ms", 1e-3)];
+    DURATION: "duration", "a duration", true, "", [("s", 1.0), ("ms", 1e-3)];
     /// Times per second, Hz.
-    Rate, InRate, RATE: "rate", "a rate", true, "", [("Hz", 1.0)];
+    RATE: "rate", "a rate", true, "", [("Hz", 1.0)];
     /// MRayl.
-    Impedance, InImpedance, IMPEDANCE: "impedance", "an impedance", true, "",
+    IMPEDANCE: "impedance", "an impedance", true, "",
         [("MRayl", 1.0), ("kg/m2/s", 1e-6), ("Rayl", 1e-6)];
     /// dB.
-    Level, InLevel, LEVEL: "level", "a level", true,
+    LEVEL: "level", "a level", true,
         "of amplitude: 20 dB are a factor of 10; `\"-inf dB\"` or `-inf` is off",
         [("dB", 1.0)];
 }
@@ -117,7 +83,7 @@ impl Measure {
     /// Parses "60 mm".
     ///
     /// # Errors
-    /// What is wrong with the text, and which units there are.
+    /// A message with the fault of the text and the units that exist.
     pub fn parse(&self, text: &str) -> Result<f64, String> {
         let text = text.trim();
         let end = (0..=text.len())
@@ -185,12 +151,6 @@ impl<'de> DeserializeSeed<'de> for &Measure {
     }
 }
 
-impl<'de, D: Dimension> Deserialize<'de> for Quantity<D> {
-    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
-        D::MEASURE.deserialize(deserializer).map(Self::new)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -230,14 +190,11 @@ mod tests {
 
     #[test]
     fn plain_numbers_are_in_the_inside_unit_except_angles() {
-        #[derive(serde::Deserialize)]
-        struct Values {
-            length: Length,
-            angle: Angle,
-        }
-        let values: Values = toml::from_str("length = 60\nangle = 0").expect("plain");
-        assert_eq!((values.length.0, values.angle.0), (60.0, 0.0));
-        assert!(toml::from_str::<Values>("length = 60\nangle = 65").is_err());
-        assert!(toml::from_str::<Values>("length = nan\nangle = 0").is_err());
+        let read = |measure: &Measure, text: &str| {
+            let value = toml::de::ValueDeserializer::parse(text).expect("TOML");
+            measure.deserialize(value).ok()
+        };
+        assert_eq!((read(&LENGTH, "60"), read(&ANGLE, "0")), (Some(60.0), Some(0.0)));
+        assert_eq!((read(&ANGLE, "65"), read(&LENGTH, "nan")), (None, None));
     }
 }

@@ -1,10 +1,10 @@
-//! Settings that take one of a few words.
+//! Settings whose value is one of a few words.
 
 /// A choice between words of a scene file.
 pub trait Words: Copy + PartialEq + Sized + 'static {
     /// The words, in the order in which they are listed.
     const WORDS: &'static [&'static str];
-    /// What they stand for, in the same order.
+    /// The choices that the words stand for, in the same order.
     const ALL: &'static [Self];
 
     /// The word for this choice.

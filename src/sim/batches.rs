@@ -1,4 +1,4 @@
-//! How the paths of a frame are dealt out, so that their segments find room.
+//! Batches: how many paths of a frame are traced before their segments are scattered.
 
 use super::layout;
 use super::pass::{Sizes, lines};
@@ -9,35 +9,35 @@ use crate::gpu::Device;
 /// Largest segment buffer, bytes: the portable minimum of maxStorageBufferRange is 128 MiB.
 const SEGMENT_BUDGET: u64 = 96 << 20;
 
-/// Segments and threads that a frame may have of a device.
+/// The memory and threads of a device that a frame may use.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Room {
-    /// For segments, bytes.
+    /// Bytes for segments.
     pub(super) segments: u64,
-    /// Threads that the device runs at once, about.
+    /// Threads that the device runs at once, approximately.
     pub(super) at_once: u32,
 }
 
 impl Room {
-    /// On a device where no buffers have been made yet.
+    /// The room on a device where no buffers have been made yet.
     pub(super) fn of(device: &Device) -> Self {
         Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once() }
     }
 }
 
-/// How the paths of a frame are dealt out.
+/// The paths of a frame divided into batches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Batches {
     /// Segments that one line may hold; no batch can exceed it.
     pub(super) capacity: u32,
     /// Paths traced before their segments are scattered.
     pub(super) paths: u32,
-    /// How `trace` goes over them.
+    /// The dispatches in which `trace` works on them.
     pub(super) rounds: Rounds,
 }
 
 impl Batches {
-    /// As many paths together as `room` has segments for.
+    /// The largest batches for whose segments `room` has memory.
     pub(super) fn new(frame: &layout::Frame, room: &Room) -> Self {
         let per_path = per_path(frame);
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
@@ -54,7 +54,7 @@ impl Batches {
         Self { capacity: paths * per_path, paths, rounds: Rounds::new(frame, paths, room.at_once) }
     }
 
-    /// What sizes of buffers follow from, of a frame dealt out so.
+    /// The numbers from which buffer sizes follow, for a frame divided into these batches.
     pub(super) fn sizes(&self, frame: &layout::Frame, tables: &Tables) -> Sizes {
         Sizes {
             frame: *frame,
@@ -65,9 +65,9 @@ impl Batches {
     }
 }
 
-/// Segments for which a path has room. One of B interactions has at most B + 1; one of the main-path
-/// scheme also those of its branches, three times as many, most of which end under the volume floor:
-/// what does not fit is counted and reported.
+/// Segments for which a path has room. A path with B interactions has at most B + 1 segments. In the
+/// main-path scheme its branches have more, most of which end below the volume floor: room for three times
+/// as many. What does not fit is counted and reported.
 pub(super) fn per_path(frame: &layout::Frame) -> u32 {
     let branches = frame.sampling == layout::SAMPLING_MAIN_PATH;
     (frame.max_interactions + 1) * if branches { 4 } else { 1 }

@@ -9,22 +9,22 @@ use super::stages;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
 use crate::scene::Scene;
 
-/// Everything that is not geometry, as far as a scene's frames have needed it.
+/// All buffers of the frame but the geometry; made when a frame of the scene first needs them.
 pub(super) struct Buffers {
     made: BTreeMap<&'static str, (&'static Array, Buffer)>,
-    /// What they have room for.
+    /// The sizes for which they have room.
     room: Sizes,
 }
 
 impl Buffers {
-    /// What frames of `scene` need, for sizes up to `room`.
+    /// The buffers that frames of `scene` need, for sizes up to `room`.
     pub(super) fn new(device: &Arc<Device>, scene: &Scene, room: Sizes) -> Result<Self, GpuError> {
         let mut buffers = Self { made: BTreeMap::new(), room };
         buffers.add(device, stages::needed(scene))?;
         Ok(buffers)
     }
 
-    /// Makes those of `arrays` that are not there yet.
+    /// Makes those of `arrays` that do not exist yet.
     pub(super) fn add(
         &mut self,
         device: &Arc<Device>,
@@ -49,29 +49,29 @@ impl Buffers {
         self.made.contains_key(name)
     }
 
-    /// Whether all have room for frames of `sizes`.
+    /// True if all have room for frames of `sizes`.
     pub(super) fn hold(&self, sizes: &Sizes) -> bool {
         self.made.values().all(|(array, buffer)| buffer.size() >= array.bytes(sizes))
     }
 
-    /// What they have room for.
+    /// The sizes for which they have room.
     pub(super) fn room(&self) -> &Sizes {
         &self.room
     }
 
-    /// Those whose content is their own, in the order of their names.
+    /// The arrays with memory of their own, ordered by name.
     pub(super) fn arrays(&self) -> Vec<&'static Array> {
         self.made.values().map(|(array, _)| *array).filter(|a| a.within.is_none()).collect()
     }
 
-    /// Zeroes what kernels add to.
+    /// Sets to zero the buffers to which kernels add.
     pub(super) fn clear(&self, cmd: &mut Commands<'_>) {
         for (_, buffer) in self.made.values().filter(|(array, _)| array.zeroed) {
             cmd.fill(buffer, 0);
         }
     }
 
-    /// What the last frame, of `sizes`, left in one of them.
+    /// The content of buffer `name` after the last frame, which had these `sizes`.
     pub(super) fn read(
         &self,
         device: &Arc<Device>,

@@ -26,10 +26,10 @@ pub use refit::{Levels, levels};
 /// A node as the kernel reads it: 80 bytes.
 pub type Node = [u32; 20];
 
-/// Left on the stack by the top level while a mesh is walked, beside one entry per level.
-const ENTRY: usize = 1;
+/// Stack entries that the top level leaves while a mesh is traversed, beside one entry per level.
+const TOP_LEVEL_ENTRIES: usize = 1;
 
-const MESH: BvhBuildParams = BvhBuildParams {
+const MESH_BUILD: BvhBuildParams = BvhBuildParams {
     pre_split: false,
     ploc_search_distance: PlocSearchDistance::Medium,
     search_depth_threshold: 3,
@@ -40,15 +40,15 @@ const MESH: BvhBuildParams = BvhBuildParams {
     collapse_traversal_cost: 1.0,
 };
 
-/// A quick build, for a tree that lives for one keyframe.
-const FAST: BvhBuildParams = BvhBuildParams {
+/// Parameters of a quick build, for a tree that is used for one keyframe only.
+const QUICK_BUILD: BvhBuildParams = BvhBuildParams {
     ploc_search_distance: PlocSearchDistance::Minimum,
     search_depth_threshold: 1,
     reinsertion_batch_ratio: 0.0,
-    ..MESH
+    ..MESH_BUILD
 };
 
-/// Why a scene cannot be traced by the compute tracer.
+/// The error of a scene that the compute tracer cannot trace.
 #[derive(Debug, thiserror::Error)]
 pub enum BvhError {
     /// The traversal stack would overflow.
@@ -59,12 +59,12 @@ pub enum BvhError {
     TooDeep(usize),
 }
 
-/// Whether the builder of a tree may cut triangles.
+/// The choice between trees that may cut triangles and trees that must not.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Splits {
-    /// No: what is refitted must not be cut, and what is built for one keyframe has no time for it.
+    /// Triangles stay whole: for trees that are refitted, and for trees that serve one keyframe only.
     Object,
-    /// Where it makes rays cheaper: builds take longer, and cut triangles are stored several times.
+    /// Triangles are cut where rays become faster. Builds take longer, and cut triangles are stored several times.
     #[default]
     Spatial,
 }
@@ -74,22 +74,22 @@ pub enum Splits {
 pub struct MeshBvh {
     nodes: Vec<CwBvhNode>,
     depth: usize,
-    /// `triangle_order[i]` is the index in [`Mesh::triangles`] of the i-th triangle in leaf order; those
-    /// that were cut are there several times.
+    /// `triangle_order[i]` is the index in [`Mesh::triangles`] of the i-th triangle in leaf order; a triangle
+    /// that was cut occurs several times.
     pub triangle_order: Vec<u32>,
     /// Smallest and largest corner of the mesh, object space.
     pub bounds: [[f32; 3]; 2],
 }
 
 impl MeshBvh {
-    /// Builds the hierarchy of a mesh with finite coordinates; an empty mesh has an empty one.
+    /// Builds the hierarchy of a mesh with finite coordinates; the hierarchy of an empty mesh is empty.
     pub fn build(mesh: &Mesh) -> Self {
-        Self::with(mesh, MESH)
+        Self::with(mesh, MESH_BUILD)
     }
 
-    /// As [`Self::build`], sooner and for slower rays.
+    /// Like [`Self::build`], but faster to build and slower for rays.
     pub fn build_fast(mesh: &Mesh) -> Self {
-        Self::with(mesh, FAST)
+        Self::with(mesh, QUICK_BUILD)
     }
 
     fn with(mesh: &Mesh, params: BvhBuildParams) -> Self {
@@ -97,14 +97,18 @@ impl MeshBvh {
         Self::of(wide(&boxes, params))
     }
 
-    /// Builds the hierarchy of `triangles` over `positions`, of which some may be others'.
+    /// Builds the hierarchy of `triangles`, indices into `positions`; unused positions are allowed.
     pub fn over(positions: &[[f32; 3]], triangles: &[[u32; 3]], splits: Splits) -> Self {
         Self::of(match splits {
-            Splits::Object => wide(&boxes(positions, triangles), MESH),
+            Splits::Object => wide(&boxes(positions, triangles), MESH_BUILD),
             Splits::Spatial => {
                 let mut tree = split::tree(positions, triangles);
-                ReinsertionOptimizer::default().run(&mut tree, MESH.reinsertion_batch_ratio, None);
-                bvh2_to_cwbvh(&tree, MESH.max_prims_per_leaf, true, false)
+                ReinsertionOptimizer::default().run(
+                    &mut tree,
+                    MESH_BUILD.reinsertion_batch_ratio,
+                    None,
+                );
+                bvh2_to_cwbvh(&tree, MESH_BUILD.max_prims_per_leaf, true, false)
             }
         })
     }
@@ -118,12 +122,12 @@ impl MeshBvh {
         }
     }
 
-    /// How many nodes of 80 bytes this mesh takes.
+    /// The number of nodes, of 80 bytes each.
     pub fn node_count(&self) -> usize {
         self.nodes.len()
     }
 
-    /// The nodes as they stand in a buffer from `root` on; leaf-ordered triangles begin at
+    /// The nodes as a buffer holds them from node `root` on; the triangles in leaf order begin at
     /// `first_triangle`.
     pub fn nodes_at(&self, root: u32, first_triangle: u32) -> impl Iterator<Item = Node> + '_ {
         let moved = move |&node: &CwBvhNode| place(node, root, first_triangle);
@@ -135,7 +139,7 @@ impl MeshBvh {
 pub(super) fn binary(boxes: &[Aabb]) -> Bvh2 {
     match boxes.is_empty() {
         true => Bvh2::default(),
-        false => build_bvh2(boxes, MESH, &mut Duration::default()),
+        false => build_bvh2(boxes, MESH_BUILD, &mut Duration::default()),
     }
 }
 
@@ -152,7 +156,7 @@ fn wide(boxes: &[Aabb], params: BvhBuildParams) -> CwBvh {
     }
 }
 
-/// Levels of the tree; parents come before their children.
+/// The number of levels of the tree; parents come before their children.
 fn depth(nodes: &[CwBvhNode]) -> usize {
     let mut levels = vec![1; nodes.len()];
     for (i, node) in nodes.iter().enumerate() {
@@ -163,35 +167,35 @@ fn depth(nodes: &[CwBvhNode]) -> usize {
     levels.into_iter().max().unwrap_or(0)
 }
 
-/// The node with its references moved to where its children and primitives lie in the buffers.
+/// The node with its references moved to the places of its children and primitives in the buffers.
 fn place(mut node: CwBvhNode, first_node: u32, first_primitive: u32) -> Node {
     node.child_base_idx += first_node;
     node.primitive_base_idx += first_primitive;
     bytemuck::cast(node)
 }
 
-/// What the top level holds at one place.
+/// One placed mesh (or several that share a structure) in the top level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placed {
-    /// Index of the instance; it may have several places, of which rays enter only the one that its
-    /// row's `slot` names.
+    /// Index of the instance. An instance may be placed several times; rays enter only the place that
+    /// `slot` in its row names.
     pub instance: u32,
-    /// Box around everything that may be found there, object space, mm.
+    /// Box around everything that can be there, object space, mm.
     pub bounds: [[f32; 3]; 2],
     /// World from object space, mm.
     pub world_from_object: DAffine3,
-    /// Whether instances share it of which some are not shown.
+    /// True if several instances share it and some of them are not shown.
     pub partial: bool,
 }
 
-/// All nodes of a scene. First come the header, the top level and its table of instances, so that
-/// moving an instance rewrites only those; behind them the meshes' trees.
+/// All nodes of a scene. The header, the top level and its table of instances come first, so that
+/// moving an instance rewrites only these; the trees of the meshes follow.
 #[derive(Clone)]
 pub struct SceneBvh {
     /// The buffer's contents.
     pub nodes: Vec<Node>,
-    /// Per place of the last [`Self::place`]: what the row of its instance says as `slot` while the
-    /// place is the one that rays enter.
+    /// For each place of the last [`Self::place`]: the value that `slot` in its instance's row has while
+    /// rays enter this place.
     pub slots: Vec<u32>,
     top: Bvh2,
     deepest: usize,
@@ -207,8 +211,8 @@ impl SceneBvh {
         Self { nodes, slots: Vec::new(), top: Bvh2::default(), deepest: 0, capacity }
     }
 
-    /// A scene of meshes, whose leaf-ordered triangles begin at `first_triangles`, with room for
-    /// `capacity` places; and the root of each, NONE for an empty mesh.
+    /// A scene of meshes, whose triangles in leaf order begin at `first_triangles`, with room for
+    /// `capacity` places; and the root node of each mesh, NONE for an empty one.
     pub fn of(meshes: &[MeshBvh], first_triangles: &[u32], capacity: usize) -> (Self, Vec<u32>) {
         let mut scene = Self::new(capacity);
         let trees = meshes.iter().zip(first_triangles);
@@ -216,8 +220,8 @@ impl SceneBvh {
         (scene, roots)
     }
 
-    /// Appends a mesh's tree, whose leaf-ordered triangles begin at `first_triangle`; its root, NONE
-    /// for an empty mesh.
+    /// Appends the tree of a mesh, whose triangles in leaf order begin at `first_triangle`. Returns its root
+    /// node, NONE for an empty mesh.
     pub fn add(&mut self, tree: &MeshBvh, first_triangle: u32) -> u32 {
         let root = self.nodes.len() as u32;
         self.nodes.extend(tree.nodes_at(root, first_triangle));
@@ -225,19 +229,19 @@ impl SceneBvh {
         if tree.nodes.is_empty() { NONE } else { root }
     }
 
-    /// Appends room for `count` nodes of trees to come; the first of them.
+    /// Appends room for `count` nodes of later trees. Returns the number of the first node.
     pub fn reserve(&mut self, count: usize) -> u32 {
         let first = self.nodes.len() as u32;
         self.nodes.resize(self.nodes.len() + count, [0; 20]);
         first
     }
 
-    /// Counts with the depth of a tree that is put into reserved room.
+    /// Takes into account the depth of a tree that will be put into reserved room.
     pub fn deepen(&mut self, tree: &MeshBvh) {
         self.deepest = self.deepest.max(tree.depth);
     }
 
-    /// Forgets the meshes' trees, once the device has them; the top level stays.
+    /// Removes the trees of the meshes, once the device has them; the top level stays.
     pub fn forget_meshes(&mut self) {
         self.nodes.truncate(self.table() + self.capacity.div_ceil(20));
         self.nodes.shrink_to_fit();
@@ -247,12 +251,12 @@ impl SceneBvh {
         1 + self.capacity
     }
 
-    /// Makes the top level over `placed` and returns the nodes that changed: the buffer's beginning.
-    /// With `refit` the tree of the last call is kept where it has as many places, and only its boxes
-    /// follow.
+    /// Builds the top level over `placed` and returns the nodes that changed: the beginning of the buffer.
+    /// With `refit`, and if the number of places is that of the last call, the tree is kept and only its boxes
+    /// are updated.
     ///
     /// # Errors
-    /// When the kernel's stack could overflow.
+    /// An error when the kernel's stack could overflow.
     pub fn place(&mut self, placed: &[Placed], refit: bool) -> Result<&[Node], BvhError> {
         assert!(placed.len() <= self.capacity, "more places than reserved");
         let boxes: Vec<Aabb> =
@@ -266,7 +270,7 @@ impl SceneBvh {
             self.top = top_tree(&boxes);
         }
         let wide = bvh2_to_cwbvh(&self.top, 1, true, false);
-        let needed = depth(&wide.nodes) + ENTRY + self.deepest;
+        let needed = depth(&wide.nodes) + TOP_LEVEL_ENTRIES + self.deepest;
         if needed > BVH_STACK {
             return Err(BvhError::TooDeep(needed));
         }
@@ -291,12 +295,13 @@ impl SceneBvh {
     }
 }
 
-/// One box per leaf, because entering an instance costs more than a box.
+/// The tree of the top level. It has one box per leaf, because entering an instance costs more than a box.
 fn top_tree(boxes: &[Aabb]) -> Bvh2 {
     if boxes.is_empty() {
         return Bvh2::default();
     }
-    let params = BvhBuildParams { max_prims_per_leaf: 1, reinsertion_batch_ratio: 1.0, ..MESH };
+    let params =
+        BvhBuildParams { max_prims_per_leaf: 1, reinsertion_batch_ratio: 1.0, ..MESH_BUILD };
     let mut tree = build_bvh2(boxes, params, &mut Duration::default());
     tree.update_primitives_to_nodes();
     tree

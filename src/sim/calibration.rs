@@ -1,5 +1,4 @@
-//! Levels: what an echo must be worth so that speckle, points, surfaces and noise show at their
-//! stated brightness.
+//! Calibration: the gains with which speckle, points, surfaces and noise have their stated brightness.
 //!
 //! Everything is relative to a perfect flat mirror, which deposits 1 and shows envelope 1.
 
@@ -18,7 +17,7 @@ const LIVER_LEVEL: f64 = -45.0;
 /// Largest compensation of surface echoes at deposit, dB. They are up to 45 dB above speckle, so
 /// that they need less to stay above the rounding, and more would cost headroom.
 const SURFACE_COMPENSATION_LIMIT: f64 = 42.0;
-/// Scatterers count up to this many sigmas of the beam from its axis (amplitude .044).
+/// Half-width of the beam within which scatterers count, in sigmas (amplitude .044 at the edge).
 pub const LATERAL_CUT: f64 = 2.5;
 /// Largest brightening of layers that sample only a part of the beam, as a power: 30 dB. Beyond,
 /// the layers miss the beam altogether and darkness is the honest picture.
@@ -137,10 +136,10 @@ impl<'a> Calibration<'a> {
         sum.max(1e-12)
     }
 
-    /// What keeps an incoherent surface echo at its energy through the averages over layers and
+    /// The gain that keeps the energy of an incoherent surface echo through the averages over layers and
     /// over neighbouring scanlines: 1 / sqrt(P_e P_l), P = sum_ij w_i w_j c(|i - j| pitch) /
-    /// (sum w)^2 with c the chance that two points lie in one phase cell, 1 - distance / cell.
-    /// Without it interfaces would fade as layers are added.
+    /// (sum w)^2 with c the probability that two points lie in one phase cell, 1 - distance / cell.
+    /// Without it interfaces would become darker with more layers.
     pub fn incoherent_gain(&self, z: f64) -> f64 {
         let kept = |weights: &[f64], pitch: f64| {
             let chance =
@@ -162,8 +161,8 @@ impl<'a> Calibration<'a> {
         (kept(&layers, layer_pitch) * kept(&lines, probe.line_pitch(z))).sqrt().recip()
     }
 
-    /// Energy of the whole two-way beam across and up, pi sigma_x sigma_e, over what the layers hear of
-    /// it: each its slab, to the edge of an ellipse of [`LATERAL_CUT`] sigmas.
+    /// Energy of the whole two-way beam across and in elevation, pi sigma_x sigma_e, divided by the part that
+    /// the layers receive: each receives its slab, to the edge of an ellipse of [`LATERAL_CUT`] sigmas.
     pub fn beam_power(&self, z: f64) -> f64 {
         let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
         let heard: f64 = self
@@ -188,8 +187,8 @@ impl<'a> Calibration<'a> {
         TAU * self.sigma_lateral(z) * axial * up
     }
 
-    /// Level of the lattice that is as dense as speckle needs at depth `z`: the log2 of the volume that
-    /// a cell may have, in cells of the finest one. Minus infinity: none may be thinned.
+    /// Level of the lattice that is as dense as speckle needs at depth `z`: the log2 of the largest volume
+    /// of a cell, in cells of the finest lattice. Minus infinity: scatterers must not be thinned out.
     pub fn lattice_level(&self, z: f64) -> f64 {
         let simulation = &self.scene.simulation;
         if simulation.scatterers_per_resolution_cell <= 0.0 {
@@ -199,8 +198,8 @@ impl<'a> Calibration<'a> {
         (volume / simulation.cell.powi(3)).log2()
     }
 
-    /// What shows as black at depth `z`: one-way weight times echogenicity, log2. Minus infinity where
-    /// nothing may be left out. Paths that share what they carry are held against their share.
+    /// The level that shows as black at depth `z`: one-way weight times echogenicity, log2. Minus infinity
+    /// where nothing may be left out. Where N paths share an echo, the level is divided by N.
     pub fn black(&self, z: f64) -> f64 {
         let (imaging, simulation) = (&self.scene.imaging, &self.scene.simulation);
         if simulation.scatterers_per_resolution_cell <= 0.0 {
@@ -225,13 +224,14 @@ impl<'a> Calibration<'a> {
         rho * (1.0 + square).powi(2) / (square * square + 6.0 * square + 3.0)
     }
 
-    /// Scatterers of `tissue` in a resolution cell at depth `z`, where nothing drowns it and one lattice sounds alone.
+    /// Scatterers of `tissue` in a resolution cell at depth `z`, where no louder tissue masks it and only one
+    /// lattice is in use.
     pub fn scatterers_at(&self, tissue: &Tissue, z: f64) -> f64 {
         let density = self.scatterer_density(tissue);
         let steps = f64::from(LEVELS_PER_OCTAVE);
         let octaves = match self.lattice_level(z) {
             f64::NEG_INFINITY => 0.0,
-            // As long as eight cells hold one of a sparse tissue's own.
+            // A sparse tissue has coarser cells, as long as there are eight for each of its scatterers.
             thinned => thinned.max(-(8.0 * density).log2()).max(0.0),
         };
         let volume = ((steps * octaves).floor() / steps).exp2();
@@ -257,8 +257,7 @@ impl<'a> Calibration<'a> {
         amplitude(LIVER_LEVEL + self.scene.simulation.speckle_gain)
     }
 
-    /// What a scatterer's calibrated amplitude is multiplied with at depth `z`, before attenuation
-    /// compensation.
+    /// The factor on a scatterer's calibrated amplitude at depth `z`, before attenuation compensation.
     ///
     /// Lattice: E|IQ|^2 = C^2 v h^-3 (int u^2 dz) pi sigma_x sigma_e over [`Self::beam_power`], v the power
     /// of a cell; v = 1 is liver.
@@ -292,7 +291,7 @@ impl<'a> Calibration<'a> {
                     .sum();
                 let sigma = self.sigma_elevation(z);
                 let layers: f64 = self.elevations().map(|y| (-y * y / (sigma * sigma)).exp()).sum();
-                // Voxels far longer than the pulse hold next to nothing at the carrier; they may
+                // Voxels far longer than the pulse have almost no energy at the carrier frequency; they may
                 // be dark rather than amplified without limit.
                 axial.max(0.01 * self.axial_energy(0)) * lateral * layers.max(1e-12)
             }
@@ -300,7 +299,7 @@ impl<'a> Calibration<'a> {
         self.speckle_target() / energy.sqrt()
     }
 
-    /// What a point's stated amplitude is multiplied with at depth `z`, before compensation: like
+    /// The factor on a point's stated amplitude at depth `z`, before compensation: like
     /// scatterers it brightens where the beam is narrow, 1/sqrt(sigma_x sigma_e), and shows its
     /// stated amplitude at the transmit focus. sigma_e is taken there too: where the lens focuses
     /// at another depth, points between the two foci are brighter than stated.
@@ -339,7 +338,7 @@ mod tests {
     use crate::probe::Probe;
     use crate::scene::{Scene, Tissue};
 
-    /// Noise over echo grows by what the pulse lacks, and the noise that is shown stays.
+    /// Less transmit power lowers the echoes; the noise that is shown stays the same.
     #[test]
     fn with_less_power_echoes_sink_into_the_same_noise() {
         let mut scene =
@@ -354,7 +353,7 @@ mod tests {
         let [weaker, same] = shown(&scene);
         approx::assert_abs_diff_eq!(weaker - echo, -9.0, epsilon = 1e-9);
         approx::assert_abs_diff_eq!(same, noise, epsilon = 1e-9);
-        // Made up for by gain, the noise is brighter.
+        // If the gain compensates for the lower power, the noise is brighter.
         scene.imaging.gain += 9.0;
         let [back, brighter] = shown(&scene);
         approx::assert_abs_diff_eq!(back, echo, epsilon = 1e-9);

@@ -1,4 +1,4 @@
-//! How well the transducer's face is joined to the skin: sound does not cross air.
+//! Acoustic contact between the transducer's face and the skin: sound does not cross air.
 //!
 //! Each of a number of points of the face is coupled where it is pressed into the skin, or where the gap
 //! to it along the beam is no wider than the gel fills. Water and tissue against air have a reflection
@@ -12,21 +12,21 @@ use crate::scene::Scene;
 pub use skin::{Skin, Skins};
 
 /// Points of the face in a row, at least; a whole number of them belongs to each scanline.
-const COLUMNS: u32 = 128;
+const LEAST_COLUMNS: u32 = 128;
 /// Rows of points along the elements' height.
 const ROWS: u32 = 7;
 
-/// How a probe is held.
+/// The contact of a probe with the skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Touch {
     /// Share of the face that is coupled, 0 to 1.
     pub share: f64,
-    /// How far the face is pushed in beyond the undeformed skin, mm: the mean over the face, in which
-    /// what is not pushed in counts as 0.
+    /// Indentation: the distance by which the face is pushed in beyond the undeformed skin, mm. The mean over
+    /// the face, where parts that are not pushed in count as 0.
     pub depth: f64,
 }
 
-/// Which elements are coupled. The face has as many elements as scanlines, side by side.
+/// The coupled share of each element. The face has as many elements as scanlines, side by side.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coupling {
     /// The face as a whole.
@@ -41,7 +41,7 @@ impl Coupling {
         let contact = scene.contact.as_ref()?;
         let skin = skins.of(scene);
         let (probe, place) = (&scene.probe, scene.world_from_probe);
-        let per_element = COLUMNS.div_ceil(probe.scanlines.max(1));
+        let per_element = LEAST_COLUMNS.div_ceil(probe.scanlines.max(1));
         let columns = probe.scanlines * per_element;
         let (mut coupled, mut depth) = (vec![0u32; probe.scanlines as usize], 0.0);
         for column in 0..columns {
@@ -70,9 +70,9 @@ impl Coupling {
     }
 }
 
-/// What `beam` reads: for each of the scene's L scanlines the share of its transmit aperture that is
-/// coupled, then L + 1 sums: how many elements before the i-th are not. Without `coupling` every element
-/// is coupled.
+/// The table that `beam` reads. For each of the scene's L scanlines the coupled share of its transmit
+/// aperture, then L + 1 sums: the number of elements before the i-th that are not coupled. Without
+/// `coupling` every element is coupled.
 pub fn table(scene: &Scene, coupling: Option<&Coupling>) -> Vec<f32> {
     let lines = scene.probe.scanlines as usize;
     let mut out = vec![1.0; lines];
@@ -93,13 +93,13 @@ pub fn table(scene: &Scene, coupling: Option<&Coupling>) -> Vec<f32> {
 /// Half an aperture of `width` mm, in elements; at least half an element.
 pub(super) fn reach(scene: &Scene, width: f64) -> f64 {
     let pitch = scene.probe.face_width() / f64::from(scene.probe.scanlines.max(1));
-    // A wider aperture than all of the face's is all of the face.
+    // An aperture wider than the face is the whole face.
     let widest = f64::from(scene.probe.scanlines);
     (0.5 * width / pitch).min(widest).max(0.5)
 }
 
-/// Where the aperture of a scanline has its middle, in elements from the face's edge: the lines of a
-/// phased array share theirs.
+/// The centre of a scanline's aperture, in elements from the edge of the face. All lines of a phased array
+/// have the same centre.
 fn middle(scene: &Scene, line: usize) -> f64 {
     match scene.probe.kind {
         crate::probe::Kind::Phased { .. } => 0.5 * f64::from(scene.probe.scanlines),
@@ -107,8 +107,8 @@ fn middle(scene: &Scene, line: usize) -> f64 {
     }
 }
 
-/// Share of the elements within `reach` of `middle` that are coupled; those beyond the face's edge are
-/// not there. `air[i]` is how many before the i-th are not coupled.
+/// Share of the elements within `reach` of `middle` that are coupled; elements beyond the edge of the face
+/// do not count. `air[i]` is the number of elements before the i-th that are not coupled.
 fn coupled(air: &[f64], middle: f64, reach: f64) -> f64 {
     let count = (air.len() - 1) as f64;
     let (left, right) = ((middle - reach).max(0.0), (middle + reach).min(count));

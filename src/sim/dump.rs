@@ -1,4 +1,4 @@
-//! The last frame in a folder: stages to look at, and what every kernel had bound.
+//! Writes the last frame into a folder: the stages of image formation, and the bindings of every kernel.
 
 mod bindings;
 mod rf;
@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use super::{SimError, Simulator};
 use crate::scene::Scene;
 
-/// Folder in a dump with what the kernels had bound.
+/// The folder in a dump that holds the bindings of the kernels.
 pub const KERNELS: &str = "kernels";
 
-/// Why a frame was not dumped.
+/// The error of a dump.
 #[derive(Debug, thiserror::Error)]
 pub enum DumpError {
     /// The frame cannot be read back, or its geometry not laid out.
@@ -23,7 +23,7 @@ pub enum DumpError {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What the system says.
+        /// The system's message.
         cause: String,
     },
 }
@@ -34,14 +34,13 @@ impl DumpError {
     }
 }
 
-/// Writes the last frame of `scene` into `dir`, which is made where it does not exist: the stages
-/// by number and name (`0_echoes.npy` to `5_bmode.png`, of a fused frame to `9_simulation.png`) with
-/// their axes beside them (`.json`), and
-/// in [`KERNELS`] the bindings of every kernel by name, as `kernels run NAME --input DIR` reads
-/// them.
+/// Writes the last frame of `scene` into `dir`, which is created if it does not exist. The stages have a
+/// number and a name (`0_echoes.npy` to `5_bmode.png`, of a fused frame to `9_simulation.png`) and their
+/// axes beside them (`.json`). [`KERNELS`] has the bindings of every kernel by name, as
+/// `kernels run NAME --input DIR` reads them.
 ///
 /// # Errors
-/// What the file system or the device says.
+/// A file-system or device error.
 pub fn frame(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
     for dir in [dir, &dir.join(KERNELS)] {
         std::fs::create_dir_all(dir).map_err(|e| DumpError::file(dir, e))?;
@@ -53,7 +52,7 @@ pub fn frame(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(),
 /// Writes an image, RGBA bytes row by row, as 8-bit grey PNG: its red channel.
 ///
 /// # Errors
-/// What the file system says.
+/// A file-system error.
 ///
 /// # Panics
 /// When `rgba` has not `4 * width * height` bytes.

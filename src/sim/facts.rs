@@ -1,12 +1,11 @@
-//! What reports say of a frame.
+//! Facts about a frame for reports.
 
 use serde_json::{Value, json};
 
-use crate::probe::Probe;
-use crate::scene::{Imaging, Simulation};
+use crate::settings::Settings;
 
 /// Settings of a frame, and the counts that follow from them.
-pub fn settings(probe: &Probe, simulation: &Simulation, imaging: &Imaging) -> Value {
+pub fn settings(Settings { probe, simulation, imaging }: &Settings) -> Value {
     let lines = probe.scanlines * probe.elevation_layers;
     json!({
         "counts": {

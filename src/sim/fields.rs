@@ -1,20 +1,21 @@
-//! Where tissue has gone: displacement fields of instances whose keyframes share their topology, so
-//! that speckle follows the deformation.
+//! Displacement fields of instances whose keyframes share their topology: they say where each tissue point
+//! is now, so that speckle follows the deformation.
 //!
-//! A field lives in the instance's texture space, over the shape of keyframe 0: the tissue point P
-//! of the reference shape is at P + v(P) now. It is known on the surfaces alone - a vertex is the same
-//! tissue point in every keyframe - and is made up between them: the affine map that fits best plus
-//! the smoothest remainder, one that minimises the area-weighted misfit on the surfaces and a
-//! membrane's energy, and is harmonic where there is no surface. Homogeneous strain and rotation are
-//! exact; a membrane alone would flatten them next to the surfaces, as nothing holds it outside.
+//! A field is given in the instance's texture space, over the shape of keyframe 0: the tissue point P
+//! of the reference shape is at P + v(P) now. The displacement is known on the surfaces alone, where a vertex
+//! is the same tissue point in every keyframe. Between them it is the affine map that fits best plus the
+//! smoothest remainder, which minimises the area-weighted misfit on the surfaces and the energy of a
+//! membrane, and is harmonic where there is no surface. Homogeneous strain and rotation are exact. A
+//! membrane alone would give too little strain next to the surfaces, as nothing holds it outside.
 //!
-//! Tissue that placements squeeze or stretch as time passes (a palpated artery below a transform that scales) has a
-//! field as well: one cell, as the map is affine, over the shape at rest; or what its keyframes' field becomes by it.
+//! Tissue that placements scale in time (a palpated artery below a transform that scales) has a field as
+//! well. If it has no keyframes, this is one cell over the shape at rest, as the map is affine; else the field of
+//! its keyframes, mapped the same way.
 //!
-//! Who draws frames calls [`Fields::build`] once per scene, binds [`Fields::padded`] as `fields` (four
-//! floats per vector, which a device reads at once) and writes [`Fields::offset`] into `field` of every
-//! instance's row whenever keyframes or settings have changed. Each instance has one field more, that of the shape
-//! between keyframes, which is overwritten: before a frame, [`Fields::blend`] says with what.
+//! To draw frames: call [`Fields::build`] once per scene, bind [`Fields::padded`] as `fields` (four
+//! floats per vector, so that a device reads them at once) and write [`Fields::offset`] into `field` of every
+//! instance's row whenever keyframes or settings have changed. Each instance has one field more, for the shape
+//! between keyframes; before a frame it is overwritten as [`Fields::blend`] says.
 
 mod grid;
 mod solve;
@@ -31,50 +32,50 @@ use crate::settings::TextureSpace;
 pub use grid::Grid;
 use solve::{Patch, Solver};
 
-/// Vectors before a field's displacements: origin (mm), nodes per mm in each axis, nodes in each axis.
+/// Vectors in the header of a field: origin (mm), nodes per mm in each axis, number of nodes in each axis.
 pub const HEADER: u32 = 3;
 
 /// Displacement fields of a scene's instances.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Fields {
-    /// Field after field: its header, then a displacement (mm) per node, x running fastest.
+    /// All fields in sequence: a header, then a displacement (mm) per node, x running fastest.
     pub values: Vec<[f32; 3]>,
-    /// Per instance of the scene.
-    slots: Vec<Option<Slots>>,
-    /// Per instance: its placement at rest, where time squeezes it.
+    /// For each instance the places of its fields; none without a field.
+    slots: Vec<Option<FieldOffsets>>,
+    /// For each instance its placement at rest; none where no placement scales it in time.
     rests: Vec<Option<DAffine3>>,
 }
 
-/// The fields of one instance, one after the other.
+/// The places of one instance's fields in the values; the fields follow each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Slots {
-    /// Of keyframe 0; `blended` where keyframes have none.
+struct FieldOffsets {
+    /// Offset of the field of keyframe 0; equal to `blended` if keyframes have none.
     first: u32,
     stride: u32,
-    /// For what lies between keyframes, whichever strategy shows it: strategies are exchanged live; and for what
-    /// placements squeeze.
+    /// Offset of the field for shapes between keyframes and for shapes that placements scale. Every strategy has
+    /// it, as strategies can be exchanged while the program runs.
     blended: u32,
 }
 
-/// How the field between keyframes is made: `count` vectors from `target` on are the sum of the
+/// A weighted sum of keyframes' fields: `count` vectors from `target` on are the sum of the
 /// weighted ones from `sources` on, all counted in vectors of [`Fields::values`]. Weights sum to 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Blend {
-    /// Where each keyframe's displacements begin, and its weight.
+pub struct FieldBlend {
+    /// The place of each keyframe's displacements, and its weight.
     pub sources: [(u32, f64); 4],
-    /// Where the sum goes.
+    /// The place of the sum.
     pub target: u32,
-    /// Vectors.
+    /// The number of vectors.
     pub count: u32,
 }
 
 impl Fields {
-    /// Fields of every instance that has keyframes of shared topology, from the vertices of all
-    /// instances of its group, which must keep their places relative to each other, and of those that placements
-    /// squeeze. Others have none.
+    /// Computes the fields of every instance that has keyframes of shared topology, or that placements scale in
+    /// time; other instances have none. A field is fitted to the vertices of all instances of its group, which
+    /// must keep their places relative to each other.
     pub fn build(scene: &Scene) -> Self {
         let rests = scene.graph.rests(scene.instances.len());
-        let made: Vec<Option<Made>> =
+        let made: Vec<Option<InstanceFields>> =
             (0..scene.instances.len()).into_par_iter().map(|i| make(scene, i, &rests)).collect();
         let mut fields = Self { rests, ..Self::default() };
         for made in made {
@@ -85,7 +86,7 @@ impl Fields {
         fields
     }
 
-    /// As if nothing deformed.
+    /// No fields: nothing deforms.
     pub fn none(scene: &Scene) -> Self {
         Self {
             values: Vec::new(),
@@ -94,7 +95,7 @@ impl Fields {
         }
     }
 
-    fn append(&mut self, made: &Made) -> Slots {
+    fn append(&mut self, made: &InstanceFields) -> FieldOffsets {
         let first = self.values.len() as u32;
         let header = made.grid.header();
         for displacements in &made.keyframes {
@@ -108,10 +109,10 @@ impl Fields {
             Some(displacements) => self.values.extend_from_slice(displacements),
             None => self.values.resize(self.values.len() + nodes, [0.0; 3]),
         }
-        Slots { first, stride: HEADER + nodes as u32, blended }
+        FieldOffsets { first, stride: HEADER + nodes as u32, blended }
     }
 
-    /// What the kernels bind: a buffer is never empty.
+    /// The buffer that kernels bind; it is never empty.
     pub fn padded(&self) -> Vec<[f32; 4]> {
         match self.is_empty() {
             true => vec![[0.0; 4]],
@@ -119,13 +120,13 @@ impl Fields {
         }
     }
 
-    /// Whether no instance deforms.
+    /// True if no instance deforms.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Where the field of instance `i` in its present shape begins, in vectors; [`NONE`] for an
-    /// instance without one, or where `simulation.texture_space` lets tissue slide.
+    /// The offset, in vectors, of the field of instance `i` in its present shape; [`NONE`] for an
+    /// instance without one, or where `simulation.texture_space` does not move speckle with the tissue.
     pub fn offset(&self, scene: &Scene, i: usize) -> u32 {
         if scene.simulation.texture_space != TextureSpace::Tissue {
             return NONE;
@@ -138,14 +139,14 @@ impl Fields {
         })
     }
 
-    /// How the device makes the field of instance `i` before a frame; none where keyframes are shown as they are, and
-    /// where [`Self::follow`] makes it.
-    pub fn blend(&self, scene: &Scene, i: usize) -> Option<Blend> {
+    /// The sum by which the device computes the field of instance `i` before a frame; none where a keyframe is
+    /// shown unchanged, and where [`Self::follow`] computes it.
+    pub fn blend(&self, scene: &Scene, i: usize) -> Option<FieldBlend> {
         let keyframes = &scene.instances[i].keyframes;
         let between = keyframes.strategy == Strategy::Interpolate && self.rests[i].is_none();
         let slots = self.slots[i].filter(|_| between)?;
         let at = |keyframe: usize| slots.first + keyframe as u32 * slots.stride + HEADER;
-        Some(Blend {
+        Some(FieldBlend {
             sources: keyframes.blend.map(|(keyframe, weight)| (at(keyframe), weight)),
             target: slots.blended + HEADER,
             count: slots.stride - HEADER,
@@ -154,8 +155,8 @@ impl Fields {
 }
 
 impl Fields {
-    /// Brings the fields of what placements squeeze to where these are now. Returns the vectors of [`Self::values`]
-    /// that have changed.
+    /// Updates the fields of the instances that placements scale to the placements of now. Returns the ranges of
+    /// [`Self::values`], in vectors, that have changed.
     pub fn follow(&mut self, scene: &Scene) -> Vec<Range<usize>> {
         let mut changed = Vec::new();
         for (i, instance) in scene.instances.iter().enumerate() {
@@ -173,9 +174,9 @@ impl Fields {
         changed
     }
 
-    /// Present displacements, at the nodes, of an instance that placements squeeze: those of its keyframes, and then
-    /// the affine map from its texture space at rest to the present one.
-    fn squeezed(&self, instance: &Instance, rest: &DAffine3, slots: Slots) -> Vec<[f32; 3]> {
+    /// Present displacements, at the nodes, of an instance that placements scale: those of its keyframes followed
+    /// by the affine map from its texture space at rest to the present one.
+    fn squeezed(&self, instance: &Instance, rest: &DAffine3, slots: FieldOffsets) -> Vec<[f32; 3]> {
         let placed = &instance.world_from_object;
         let map = texture_from_object(placed) * texture_from_object(rest).inverse();
         let keyframes = &instance.keyframes;
@@ -200,23 +201,24 @@ impl Fields {
     }
 }
 
-/// Texture space is the object's but for a rigid movement.
+/// The map from object to texture space: the placement without its rigid part.
 fn texture_from_object(world_from_object: &DAffine3) -> DAffine3 {
     rigid(world_from_object).inverse() * *world_from_object
 }
 
-/// Vectors with a fourth float, which means nothing.
+/// The vectors with an unused fourth float.
 pub fn padded(vectors: &[[f32; 3]]) -> Vec<[f32; 4]> {
     vectors.iter().map(|&[x, y, z]| [x, y, z, 0.0]).collect()
 }
 
 /// Fields of one instance.
-struct Made {
+struct InstanceFields {
     grid: Grid,
     keyframes: Vec<Vec<[f32; 3]>>,
 }
 
-/// Meshes of an instance's keyframes, where a vertex is the same tissue point in all of them.
+/// Meshes of an instance's keyframes; none unless all share their topology and at least one differs from the
+/// first.
 fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>> {
     let meshes: Vec<&Mesh> =
         (instance.keyframes.meshes.iter()).map(|&m| &scene.meshes[m]).collect();
@@ -226,7 +228,7 @@ fn keyframes<'a>(scene: &'a Scene, instance: &Instance) -> Option<Vec<&'a Mesh>>
     (others.iter().all(same) && others.iter().any(moves)).then_some(meshes)
 }
 
-fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made> {
+fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<InstanceFields> {
     let instance = &scene.instances[index];
     let rest = |i: usize| rests[i].unwrap_or(scene.instances[i].world_from_object);
     let texture_from_world = rigid(&rest(index)).inverse();
@@ -236,11 +238,11 @@ fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made>
         mesh.positions.iter().map(place).collect::<Vec<_>>()
     };
     let Some(own) = keyframes(scene, instance) else {
-        // Of shapes that are exchanged for others, all.
+        // The grid holds all shapes that the instance may show.
         rests[index]?;
         let shown = instance.keyframes.meshes.iter().chain([&instance.mesh]);
         let all = shown.flat_map(|&mesh| vertices(&scene.meshes[mesh]));
-        return Some(Made { grid: Grid::one_cell(all), keyframes: Vec::new() });
+        return Some(InstanceFields { grid: Grid::one_cell(all), keyframes: Vec::new() });
     };
     let patch =
         |i: usize, meshes| Patch { meshes, texture_from_object: texture_from_world * rest(i) };
@@ -257,7 +259,7 @@ fn make(scene: &Scene, index: usize, rests: &[Option<DAffine3>]) -> Option<Made>
     patches.push(patch(index, own));
     let solver = Solver::new(&grid, &patches);
     let keyframes = (0..count).into_par_iter().map(|k| solver.displacements(k)).collect();
-    Some(Made { grid, keyframes })
+    Some(InstanceFields { grid, keyframes })
 }
 
 #[cfg(test)]

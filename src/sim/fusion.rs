@@ -1,5 +1,5 @@
 //! Fusion of the simulated image with an acquired volume: the volume on the device, the constants of its
-//! kernels, and what the last fused frame consisted of.
+//! kernels, and the intermediate images of the last fused frame.
 
 use std::sync::Arc;
 
@@ -9,27 +9,27 @@ use super::{layout, placement};
 use crate::gpu::{Commands, Device, GpuError, Image};
 use crate::scene::{Acquired, Fusion, Scene};
 use crate::settings::{Blend, MaskSpeed};
-use texture::Texture;
+use texture::VolumeTexture;
 
 pub use super::stages::tint::Tint;
-pub use steps::Steps;
+pub use steps::FusionSteps;
 
 mod steps;
 mod texture;
 
-/// Everything of which a frame without fusion has no need, its buffers aside.
+/// All that only frames with fusion need, except its buffers.
 pub(super) struct Fused {
-    /// The volume; it outlives buffers that become too small.
-    texture: Arc<Texture>,
+    /// The volume. It is kept when buffers are made larger.
+    texture: Arc<VolumeTexture>,
     /// The time of the volume that the frame shows.
     now: usize,
     pub(super) pyramid: Pyramid,
-    /// Whether the last frame was blended by bands.
+    /// True if the last frame was blended by bands.
     banded: bool,
 }
 
 impl Fused {
-    /// Uploads the scene's volume, unless `before` has it; none where the scene has none.
+    /// Uploads the scene's volume, unless `before` has it; returns none for a scene without a volume.
     pub(super) fn new(
         device: &Arc<Device>,
         scene: &Scene,
@@ -40,7 +40,7 @@ impl Fused {
         };
         let texture = match before {
             Some(before) => Arc::clone(&before.texture),
-            None => Arc::new(Texture::new(device, acquired)?),
+            None => Arc::new(VolumeTexture::new(device, acquired)?),
         };
         Ok(Some(Self { texture, now: acquired.now, pyramid: Pyramid::default(), banded: false }))
     }
@@ -55,7 +55,7 @@ impl Fused {
         self.texture.bytes()
     }
 
-    /// What the user should know of the volume.
+    /// A warning for the user about the volume, if there is one.
     pub(super) fn warning(&self) -> Option<&str> {
         self.texture.warning.as_deref()
     }
@@ -84,8 +84,8 @@ impl Fused {
         }
     }
 
-    /// Sets the frame's constants, and makes room for what it needs; before the barrier that clears
-    /// wait for.
+    /// Writes the frame's constants and makes room for what it needs. To be called before the barrier
+    /// behind the clearing of the buffers.
     pub(super) fn update(
         &mut self,
         cmd: &mut Commands<'_>,

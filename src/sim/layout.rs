@@ -1,5 +1,5 @@
-//! `#[repr(C)]` mirror of `glsl/shared.glsl`; a test compares every offset by reflection, and every
-//! constant.
+//! The structures that the host shares with the kernels: `#[repr(C)]` mirror of `glsl/shared.glsl`. A test compares
+//! every offset, by reflection, and every constant.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -10,123 +10,124 @@ macro_rules! constants {
     ($($(#[$doc:meta])* pub const $name:ident: $ty:ty = $value:expr;)*) => {
         $($(#[$doc])* pub const $name: $ty = $value;)*
 
-        /// Name and value of each, for the comparison with those of `glsl/shared.glsl`.
+        /// Name and value of each constant, for the comparison with those of `glsl/shared.glsl`.
         pub const CONSTANTS: &[(&str, f64)] = &[$((stringify!($name), $name as f64)),*];
     };
 }
 
 constants! {
-    /// No instance.
+    /// The index that stands for no instance.
     pub const NONE: u32 = u32::MAX;
-    /// Media that may enclose one point.
+    /// Most media that may enclose one point.
     pub const MAX_STACK: usize = 16;
-    /// Words that `origin` leaves of a line: number of media and media; distance and weight at which its
-    /// paths begin, and the interactions up to there.
+    /// Words that `origin` writes for a line: number of media and the media; then distance and weight at which its
+    /// paths begin, and the number of interactions up to there.
     pub const START_WORDS: usize = MAX_STACK + 4;
 
-    /// Elevation layers of a frame at most.
+    /// Most elevation layers of a frame.
     pub const MAX_ELEVATION_LAYERS: u32 = crate::probe::MAX_ELEVATION_LAYERS;
-    /// Entries of the compute tracer's stack: deeper trees are refused.
+    /// Entries of the compute tracer's stack; scenes with deeper trees are refused.
     pub const BVH_STACK: usize = 32;
-    /// Magnitude at and beyond which accumulators may have lost an echo; an i32 has one more bit.
+    /// Magnitude from which on an accumulator may have lost an echo; an i32 has one more bit.
     pub const ECHO_LIMIT: f64 = (1u32 << 30) as f64;
 
-    /// Pieces of the level of what is transmitted along a line.
+    /// Most pieces into which the transmitted level along a line is divided.
     pub const MAX_PIECES: usize = 64;
-    /// Where a piece begins that is none: behind every sample.
+    /// The beginning of a piece that marks the end of the list: beyond every sample.
     pub const FAR_PIECE: f32 = 1e30;
 
-    /// Neighbouring scanlines of one sample that a thread of `beam` makes.
+    /// Neighbouring scanlines of one sample that one thread of `beam` computes.
     pub const BEAM_LINES: u32 = 8;
-    /// Scanlines on each side that `beam` smooths over at most.
+    /// Most scanlines on each side over which `beam` smooths.
     pub const LATERAL_REACH: i32 = 16;
-    /// Samples on each side that `axial` smooths over at most.
+    /// Most samples on each side over which `axial` smooths.
     pub const AXIAL_REACH: i32 = 32;
-    /// Neighbouring samples of one scanline that a thread of `axial` makes.
+    /// Neighbouring samples of one scanline that one thread of `axial` computes.
     pub const AXIAL_SAMPLES: u32 = 8;
-    /// Neighbouring sums of one column that a thread of `blur` makes.
+    /// Neighbouring sums of one column that one thread of `blur` computes.
     pub const BLUR_SUMS: u32 = 16;
 
-    /// The blurred mask weighs the acquired image.
+    /// Blend: the blurred mask is the weight of the acquired image.
     pub const BLEND_LINEAR: u32 = 0;
-    /// Its smoothstep does.
+    /// Blend: the smoothstep of the blurred mask is the weight.
     pub const BLEND_SMOOTH: u32 = 1;
-    /// A pyramid of the mask weighs those of the images.
+    /// Blend by bands: a pyramid of the mask has the weights of the images' pyramids.
     pub const BLEND_MULTIBAND: u32 = 2;
-    /// Samples go through masks at the probe's speed.
+    /// Samples pass through masks at the probe's speed.
     pub const MASK_SPEED_PROBE: u32 = 0;
-    /// At that of the tissue which the masking mesh encloses.
+    /// Samples pass through masks at the speed of the tissue around the masking mesh.
     pub const MASK_SPEED_ENCLOSING: u32 = 1;
 
-    /// The transmitted path always continues, reflected branches are spawned.
+    /// Sampling: the transmitted path always continues, and reflected branches begin at its surfaces.
     pub const SAMPLING_MAIN_PATH: u32 = 0;
-    /// Independent paths.
+    /// Sampling: independent paths.
     pub const SAMPLING_PLAIN: u32 = 1;
-    /// Paths that part at the first interaction.
+    /// Sampling: paths that are equal up to the first interaction.
     pub const SAMPLING_SHARED_PRIMARY: u32 = 2;
 
     /// Number of the coarsest lattice of scatterers.
     pub const LATTICE_LEVELS: u32 = 48;
     /// Lattices after which cells have twice the volume.
     pub const LEVELS_PER_OCTAVE: f32 = 2.0;
-    /// Part of a level over which the next one takes over.
+    /// Fraction of a level over which one lattice is cross-faded to the next.
     pub const LEVEL_FADE: f32 = 0.15;
-    /// A row whose lattice level, the last of its `shape`, is not above this asks for the finest lattice,
-    /// whatever drowns it.
+    /// Value of the last `shape` of a row, the lattice level, up to which the finest lattice is used, even where
+    /// louder tissue masks it.
     pub const ALL_LEVELS: f32 = -1000.0;
     /// Samples that one workgroup of `scatter` gathers.
     pub const SCATTER_WINDOW: u32 = 1024;
-    /// Samples in which a thread of it walks one stretch.
+    /// Samples of a stretch for which one thread of `scatter` works.
     pub const SCATTER_BIN: u32 = 64;
-    /// Samples in which deformed tissue is searched at once.
+    /// Samples for which deformed tissue is searched together.
     pub const SCATTER_PIECE: u32 = 32;
-    /// Share of its volume to which tissue can be squeezed; to 1 over it, it can be stretched. A coarse field may say more.
+    /// Smallest fraction of its volume to which tissue is taken to be squeezed; the largest is its inverse. A coarse
+    /// field may have values beyond.
     pub const LEAST_GROWTH: f32 = 0.05;
-    /// Samples over which stretches are held against each other.
+    /// Samples over which the levels of segments are compared with each other.
     pub const SCATTER_SLOT: u32 = 16;
-    /// Of a sample: about halfway between two samples, both get a share of a scatterer's echo.
+    /// Fraction of a sample: this close to the middle between two samples, a scatterer's echo is shared by both.
     pub const SAMPLE_BLEND: f32 = 0.0625;
     /// Point targets that share a bounding sphere.
     pub const POINT_GROUP: u32 = 8;
-    /// log2(10): 20 dB under black nothing is summed.
+    /// log2(10): what is more than 20 dB below black is not summed.
     pub const UNHEARD: f32 = std::f32::consts::LOG2_10;
-    /// Paths that echo and choose one way at every surface.
+    /// Role: paths that echo at every surface and choose one direction there.
     pub const ROLE_WHOLE: u32 = 0;
-    /// Main paths, which write their interactions down.
+    /// Role: main paths, which record their interactions.
     pub const ROLE_MAIN: u32 = 1;
-    /// Echoes at the interactions written down, and what is reflected there.
+    /// Role: echoes at the recorded interactions, and the branches reflected there.
     pub const ROLE_BRANCHES: u32 = 2;
-    /// Of the faint branches no smaller part is followed.
+    /// Smallest probability with which a faint branch is followed.
     pub const LEAST_SURVIVAL: f32 = 1.0 / 32.0;
-    /// Paths that one thread takes one after the other at an interaction.
+    /// Paths that one thread follows one after the other at an interaction.
     pub const ECHO_BLOCK: u32 = 8;
 
     /// Curved array.
     pub const KIND_CONVEX: u32 = 0;
     /// Flat array.
     pub const KIND_LINEAR: u32 = 1;
-    /// All lines from one point.
+    /// Phased array: all lines start at one point.
     pub const KIND_PHASED: u32 = 2;
 
     /// Transmitted rays refract at the sampled micro-normal.
     pub const FLAG_ROUGH_TRANSMISSION: u32 = 1;
     /// Reflected paths bounce off the transducer's face.
     pub const FLAG_FACE_REFLECTION: u32 = 2;
-    /// Some instances share triangles exactly.
+    /// Some instances have triangles at exactly the same place.
     pub const FLAG_COINCIDENT: u32 = 4;
-    /// The scatterer lattice rests in the world.
+    /// The scatterer lattice is fixed in the world.
     pub const FLAG_WORLD_TEXTURE: u32 = 8;
-    /// Surface coherence as in the paper, no split.
+    /// Coherence of surface echoes as in the paper, without a split into two parts.
     pub const FLAG_COHERENT: u32 = 16;
-    /// Paper-like voxel grid instead of the lattice.
+    /// Voxel grid of scatterers as in the paper, instead of the lattice.
     pub const FLAG_VOXEL: u32 = 32;
     /// Reflectances of curved surfaces averaged over the beam.
     pub const FLAG_FOOTPRINT: u32 = 64;
     /// Paths draw from a Sobol sequence.
     pub const FLAG_SOBOL: u32 = 128;
-    /// Ray query: several top-level entries of an instance share a mask bit.
+    /// Ray query: several top-level entries of an instance have the same mask bit.
     pub const FLAG_SLOTS: u32 = 256;
-    /// Only what a masking instance encloses is heard.
+    /// Only what a masking instance encloses gives echoes.
     pub const FLAG_MASKED: u32 = 512;
     /// Surfaces refract by their mean slope over the wavefront's width.
     pub const FLAG_WAVEFRONT: u32 = 1024;
@@ -135,11 +136,11 @@ constants! {
     /// A path goes down below a surface that it has met by this part of its way at least.
     pub const LEAST_DESCENT: f32 = 1e-3;
 
-    /// What lies before the image plane is cut away.
+    /// The anatomy in front of the image plane is cut away.
     pub const VIEW3D_CUT: u32 = 1;
-    /// The B-mode image is shown where it lies.
+    /// The B-mode image is shown in its place.
     pub const VIEW3D_IMAGE: u32 = 2;
-    /// Of some instance the opacity is 0.
+    /// At least one instance has opacity 0.
     pub const VIEW3D_SOME_HIDDEN: u32 = 4;
 }
 
@@ -160,7 +161,7 @@ macro_rules! shared {
 }
 
 shared! {
-    /// Everything that is constant over one frame.
+    /// Constants of one frame.
     struct Frame {
         world_from_probe: Rows,
         probe_from_world: Rows,
@@ -177,7 +178,7 @@ shared! {
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
         branch_floor: f32, unused0: f32, unused1: f32, unused2: f32,
     }
-    /// Where a scanline starts and looks, in probe space; behind the last one the face's edge.
+    /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }
     /// Acoustic properties at the centre frequency.
     struct Tissue {
@@ -200,7 +201,7 @@ shared! {
         low: [f32; 4], high: [f32; 4],
         field: u32, masks: u32, owners: u32, finest: f32,
     }
-    /// What one axial sample needs to know.
+    /// Constants of one axial sample.
     struct Row {
         shape: [f32; 4],
         sigma_lateral: f32, sigma_elevation: f32,
@@ -209,7 +210,7 @@ shared! {
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
         black: f32, sigma_wavefront: f32, unused0: f32, unused1: f32,
     }
-    /// A straight stretch of a path inside one medium.
+    /// A straight part of a path inside one medium.
     struct Segment {
         origin_length: [f32; 4],
         direction_time: [f32; 4],
@@ -217,7 +218,7 @@ shared! {
         spread: [f32; 4],
         tissue: u32, instance: u32, line: u32, handedness: f32,
     }
-    /// A main path where it has arrived at a surface, before anything random.
+    /// The state of a main path on arrival at a surface, before any random choice.
     struct Interaction {
         origin_weight: [f32; 4],
         direction_time: [f32; 4],
@@ -230,19 +231,19 @@ shared! {
         interactions: u32, crossings: u32,
         enclosing: u32, media: [u32; MAX_STACK],
     }
-    /// How an acquired volume is mixed with the simulation.
+    /// The constants with which an acquired volume is mixed with the simulation.
     struct Fusion {
         voxel_from_world: Rows,
         size_x: u32, size_y: u32, size_z: u32, blur: u32,
         slope: f32, intercept: f32, blend: u32, mask_speed: u32,
     }
-    /// How the anatomy is looked at from outside.
+    /// The view of the anatomy from outside.
     struct View3d {
         eye: [f32; 4], right: [f32; 4], down: [f32; 4], forward: [f32; 4],
         width: u32, height: u32, flags: u32, unused0: u32,
         housing: [f32; 4],
     }
-    /// What a frame reports.
+    /// The counters of a frame.
     struct Counters {
         saturated: u32, segments_dropped: u32, stack_overflow: u32, paths_lost: u32,
         rays: u32, interactions: u32, segments: u32, candidates: u32,
@@ -264,17 +265,17 @@ pub const PACKED: u32 = 2;
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Interpolation {
-    /// Vectors to make.
+    /// Number of vectors to compute.
     pub count: u32,
-    /// Where the first is written: apart from every source that is read, or exactly on one.
+    /// Place of the first result: it overlaps no source that is read, or is exactly one of them.
     pub target: u32,
     /// [`SUM`], [`UNIT`] or [`PACKED`].
     pub kind: u32,
     /// Words from one vector to the next: 3, or 4 of which the last stays as it is; 1 where they are packed.
     pub stride: u32,
-    /// Where the keyframes begin.
+    /// Place of each keyframe's first vector.
     pub sources: [u32; 4],
-    /// Weight of each; one of weight 0 is not read.
+    /// Weight of each keyframe; one with weight 0 is not read.
     pub weights: [f32; 4],
 }
 
@@ -282,31 +283,31 @@ pub struct Interpolation {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 pub struct RefitLevel {
-    /// Where the level's nodes begin in the list of node numbers.
+    /// Place of the level's first node in the list of node numbers.
     pub first: u32,
-    /// How many there are.
+    /// Number of nodes.
     pub count: u32,
 }
 
-/// A ray of `rays`, which intersects a list of them.
+/// A ray for the kernel `rays`, which intersects a list of rays.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Ray {
     /// Start, mm.
     pub origin: [f32; 3],
-    /// Distance from which on it meets surfaces, in lengths of the direction.
+    /// Smallest distance at which it meets surfaces, in lengths of the direction.
     pub t_min: f32,
-    /// Not necessarily a unit vector.
+    /// Direction, not necessarily a unit vector.
     pub direction: [f32; 3],
-    /// Distance at which it ends, in the same lengths.
+    /// Largest distance, in the same lengths.
     pub t_max: f32,
-    /// Instance that it does not meet; [`NONE`]: it meets all.
+    /// Instance that the ray does not meet; [`NONE`]: it meets all.
     pub skip: u32,
     /// Ray query: bits of the entries that are shown.
     pub mask: u32,
-    /// Ray query: 1 where rows choose among their entries.
+    /// Ray query: 1 if rows choose among their entries.
     pub slots: u32,
-    /// Nothing.
+    /// Unused.
     pub unused: u32,
 }
 
@@ -314,7 +315,7 @@ pub struct Ray {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct RayHit {
-    /// Place from the barycentric coordinates, mm.
+    /// Position from the barycentric coordinates, mm.
     pub position: [f32; 3],
     /// Distance along the ray, in lengths of its direction.
     pub t: f32,
@@ -322,17 +323,17 @@ pub struct RayHit {
     pub geometric: [f32; 3],
     /// First barycentric coordinate.
     pub u: f32,
-    /// Outward normal between the vertices' own.
+    /// Outward normal, interpolated between the normals of the vertices.
     pub shading: [f32; 3],
     /// Second barycentric coordinate.
     pub v: f32,
-    /// Whose surface it is; [`NONE`]: the ray meets nothing.
+    /// Instance whose surface it is; [`NONE`]: the ray meets nothing.
     pub instance: u32,
     /// Number of the triangle.
     pub primitive: u32,
-    /// Nodes visited, where they are counted.
+    /// Nodes visited, if they are counted.
     pub node_visits: u32,
-    /// Triangles tested, where they are counted.
+    /// Triangles tested, if they are counted.
     pub triangle_tests: u32,
     /// Counts of the top level and of false intersections, in the order of [`Counters`].
     pub counts: [u32; 4],

@@ -1,6 +1,6 @@
-//! What is said of a stage of the frame, once: its kernel, what that binds, the buffers that it is the
+//! The description of a stage of the frame ([`Pass`]): its kernel, what that binds, the buffers that it is the
 //! first to fill, its threads, and what waits for it. Creating, growing, clearing, reloading, dumping and
-//! the tests of single kernels are loops over this.
+//! the tests of single kernels are loops over these descriptions, so that each fact stands once.
 
 use super::layout::Frame;
 use crate::gpu::Stage;
@@ -16,7 +16,7 @@ pub struct Sizes {
     pub tissues: u64,
     /// Main paths that are traced together.
     pub main_paths: u64,
-    /// Interactions that they may have.
+    /// Interactions that these main paths may have.
     pub interactions: u64,
 }
 
@@ -45,22 +45,22 @@ pub fn lines(frame: &Frame) -> u32 {
 /// A buffer that kernels bind.
 #[derive(Clone, Copy, Debug)]
 pub struct Array {
-    /// Its name in the kernels' sources and in dumps.
+    /// Name in the kernels' sources and in dumps.
     pub name: &'static str,
     /// Type of its words.
     pub element: Element,
-    /// Words of an entry.
+    /// Words per entry.
     pub words: usize,
-    /// Entries; none where it is a part of the anatomy, which decides.
+    /// Number of entries; none for a part of the anatomy, whose size follows from the scene's geometry.
     pub entries: Option<fn(&Sizes) -> u64>,
-    /// Zero when a frame begins: kernels add to it.
+    /// True if it is set to zero when a frame begins, because kernels add to it.
     pub zeroed: bool,
-    /// The buffer whose memory it has, until that one is filled.
+    /// The buffer whose memory this one uses until that buffer is filled.
     pub within: Option<&'static str>,
 }
 
 impl Array {
-    /// Of entries that consist of `words` words.
+    /// An array whose entries consist of `words` words.
     pub const fn new(
         name: &'static str,
         element: Element,
@@ -70,33 +70,33 @@ impl Array {
         Self { name, element, words, entries: Some(entries), zeroed: false, within: None }
     }
 
-    /// Of entries that are structures `T`.
+    /// An array whose entries are structures `T`.
     pub const fn of<T>(name: &'static str, element: Element, entries: fn(&Sizes) -> u64) -> Self {
         Self::new(name, element, size_of::<T>() / 4, entries)
     }
 
-    /// A part of the anatomy.
+    /// An array that is a part of the anatomy.
     pub const fn anatomy(name: &'static str, element: Element, words: usize) -> Self {
         Self { name, element, words, entries: None, zeroed: false, within: None }
     }
 
-    /// The same, zero when a frame begins.
+    /// The same array, set to zero when a frame begins.
     pub const fn zeroed(self) -> Self {
         Self { zeroed: true, ..self }
     }
 
-    /// The same, in the memory of another one.
+    /// The same array in the memory of the array `other`.
     pub const fn within(self, other: &'static str) -> Self {
         Self { within: Some(other), ..self }
     }
 
-    /// Bytes that it has in a frame of these sizes; 0 of a part of the anatomy.
+    /// Size in bytes in a frame of these sizes; 0 for a part of the anatomy.
     pub fn bytes(&self, sizes: &Sizes) -> u64 {
         4 * self.words as u64 * self.entries.map_or(0, |entries| entries(sizes))
     }
 }
 
-/// How much of a kernel runs.
+/// The amount of threads of a dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Extent {
     /// Threads per axis, rounded up to whole work groups.
@@ -105,42 +105,42 @@ pub enum Extent {
     Groups([u32; 3]),
 }
 
-/// In which variants a kernel is compiled.
+/// The variants in which a kernel is compiled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Variants {
-    /// In one.
+    /// One variant.
     One,
-    /// One per tracer.
+    /// One variant per tracer.
     Tracer,
-    /// One per tracer, and one that counts the steps of the compute tracer.
+    /// One variant per tracer, and one that counts the steps of the compute tracer.
     Counting,
-    /// For tissue that is rigid, and for tissue that deforms.
+    /// One variant for rigid tissue and one for deforming tissue.
     Tissue,
 }
 
 /// A stage of the frame: one kernel.
 pub struct Pass {
-    /// Name of its time in a frame, and of its kernel but for the variant.
+    /// Name under which its time is reported, and name of its kernel without the variant.
     pub name: &'static str,
     /// Variants of its kernel.
     pub variants: Variants,
     /// Specialization constants of the kernel, by id.
     pub constants: &'static [(u32, u32)],
-    /// What the kernel binds, by number: names of arrays; `nodes`, whatever the tracer walks; `acquired`,
+    /// The kernel's bindings in order: names of arrays; `nodes`, the structure that the tracer walks; `acquired`,
     /// the volume.
     pub binds: &'static [&'static str],
-    /// The buffers that it is the first to fill.
+    /// The buffers that this stage is the first to fill.
     pub makes: &'static [Array],
-    /// How much of it runs; none where each dispatch is told.
+    /// The size of its dispatch; none where each dispatch is given its own.
     pub extent: Option<fn(&Frame) -> Extent>,
-    /// What waits until it is done.
+    /// The stage of the pipeline that waits until it is done.
     pub then: Stage,
-    /// Whether frames of a scene run it: its buffers are made then.
+    /// Returns true if frames of a scene run it; its buffers are then made.
     pub needed: fn(&Scene) -> bool,
 }
 
 impl Pass {
-    /// What most of them are.
+    /// The values that most stages have.
     pub const USUAL: Self = Self {
         name: "",
         variants: Variants::One,
@@ -153,12 +153,12 @@ impl Pass {
     };
 }
 
-/// A thread per line.
+/// One thread per line.
 pub(super) fn per_line(frame: &Frame) -> Extent {
     Extent::Threads([lines(frame), 1, 1])
 }
 
-/// A thread per pixel of the image.
+/// One thread per pixel of the image.
 pub(super) fn per_pixel(frame: &Frame) -> Extent {
     Extent::Threads([frame.image_width, frame.image_height, 1])
 }

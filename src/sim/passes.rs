@@ -1,4 +1,4 @@
-//! Recording of the stages of a frame, each with what it binds and the barrier behind it.
+//! Records the stages of a frame, each with its bindings and the barrier behind it.
 
 use std::cmp::Reverse;
 use std::sync::Arc;
@@ -16,24 +16,24 @@ use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
 use crate::settings::Blend;
 
-/// What the stages work on.
+/// The kernels, buffers and geometry on which the stages work.
 pub(super) struct Passes {
     pub(super) kernels: Kernels,
     pub(super) buffers: Buffers,
-    /// Where the scene has an acquired volume.
+    /// None where the scene has no acquired volume.
     pub(super) fusion: Option<Fused>,
     pub(super) skins: Skins,
-    /// How the probe touched the skin in the last frame.
+    /// The contact of the probe with the skin in the last frame.
     pub(super) touch: Option<Touch>,
     pub(super) world: World,
     pub(super) frame: layout::Frame,
-    /// Those of the picture that there is.
+    /// Constants of the frame whose picture is complete.
     pub(super) shown: layout::Frame,
     pub(super) batches: Batches,
 }
 
 impl Passes {
-    /// Brings the device up to date with `scene`; what the processor took for it.
+    /// Brings the device up to date with `scene`; returns the processor time for it.
     pub(super) fn update(
         &mut self,
         cmd: &mut Commands,
@@ -58,7 +58,7 @@ impl Passes {
         Ok(began.elapsed())
     }
 
-    /// Holds the probe's face against the skin: which of its elements are coupled.
+    /// Computes which elements of the probe's face are coupled to the skin, and writes them to the device.
     pub(super) fn touch(&mut self, cmd: &mut Commands, scene: &Scene) -> Result<(), GpuError> {
         let coupling = Coupling::of(scene, &mut self.skins);
         let shares = contact::table(scene, coupling.as_ref());
@@ -72,12 +72,12 @@ impl Passes {
         cmd.barrier(Stage::Transfer, Stage::Compute);
     }
 
-    /// Records a pass as it says itself.
+    /// Records a pass with the threads and buffers that it states.
     pub(super) fn run(&self, cmd: &mut Commands, pass: &Pass) -> Result<(), GpuError> {
         self.run_with(cmd, pass, &[])
     }
 
-    /// As [`Self::run`], with the buffers `given` instead of those of their names.
+    /// Like [`Self::run`], with the buffers `given` instead of those of the same names.
     pub(super) fn run_with(
         &self,
         cmd: &mut Commands,
@@ -85,7 +85,7 @@ impl Passes {
         given: &[(&str, &Buffer)],
     ) -> Result<(), GpuError> {
         cmd.scope(pass.name);
-        let extent = pass.extent.expect("what runs as it says has an extent");
+        let extent = pass.extent.expect("a pass recorded this way states its extent");
         self.record(cmd, pass, extent(&self.frame), &[], given)
     }
 
@@ -120,7 +120,7 @@ impl Passes {
         }
     }
 
-    /// Traces a batch of paths; `turn` as in [`super::rounds::Rounds::of`].
+    /// Traces a batch of paths; `turn` is that of [`super::rounds::Rounds::of`].
     pub(super) fn trace(
         &self,
         cmd: &mut Commands,
@@ -147,7 +147,7 @@ impl Passes {
         let (Some(fused), Some(fusion)) = (&self.fusion, &scene.fusion) else {
             return Ok(false);
         };
-        // What `display` has left is read, not only copied.
+        // The output of `display` is read by kernels here, not only copied.
         cmd.barrier(Stage::Compute, Stage::Compute);
         self.run(cmd, &MASK)?;
         let mut prescan = &self.buffers["prescan"];
@@ -157,7 +157,7 @@ impl Passes {
             prescan = &self.buffers["shaded"];
         }
         self.run_with(cmd, &CONVERT, &[("prescan", prescan)])?;
-        // Where it is not blended by bands, the kernel does not read their change.
+        // Without blending by bands, the kernel binds any buffer as `change` and does not read it.
         let mut change = &self.buffers["background"];
         match fusion.blend {
             Blend::Multiband => {
@@ -177,12 +177,12 @@ impl Passes {
 }
 
 /// The kernels of the passes that frames of a scene may run.
-pub(super) struct Kernels(Vec<Made>);
+pub(super) struct Kernels(Vec<PassKernel>);
 
-struct Made {
+struct PassKernel {
     pass: &'static Pass,
     kernel: Kernel,
-    /// Whether the frames that the scene began with run it.
+    /// True if the frames that the scene began with run it.
     needed: bool,
 }
 
@@ -198,7 +198,7 @@ impl Kernels {
         Self::of_passes(device, library, passes, world, counting)
     }
 
-    /// The same of another library, or that count or do not.
+    /// The same kernels from another library, in the variants that count steps if `counting`.
     pub(super) fn again(
         &self,
         device: &Arc<Device>,
@@ -229,9 +229,9 @@ impl Kernels {
             };
             let stem = suffix.map_or(pass.name.into(), |suffix| format!("{}_{suffix}", pass.name));
             let kernel = Kernel::when_needed(device, &stem, library.words(&stem), pass.constants)?;
-            kernels.push(Made { pass, kernel, needed });
+            kernels.push(PassKernel { pass, kernel, needed });
         }
-        // What takes longest is begun first.
+        // The kernels that take longest to compile begin first.
         let mut due: Vec<_> = kernels.iter().filter(|made| made.needed).collect();
         due.sort_by_key(|made| Reverse(library.words(made.kernel.name()).len()));
         due.iter().for_each(|made| made.kernel.prepare());
@@ -239,13 +239,14 @@ impl Kernels {
     }
 
     pub(super) fn of(&self, pass: &Pass) -> &Kernel {
-        let is =
-            |made: &&Made| made.pass.name == pass.name && made.pass.constants == pass.constants;
+        let is = |made: &&PassKernel| {
+            made.pass.name == pass.name && made.pass.constants == pass.constants
+        };
         &self.0.iter().find(is).expect("a pass of the scene").kernel
     }
 }
 
-/// The frame's constants, with what only the world and the room for segments decide.
+/// The frame's constants, including those that depend on the world and on the room for segments.
 pub(super) fn frame_constants(
     scene: &Scene,
     world: &World,

@@ -68,7 +68,7 @@ mod tests {
     }
 
     #[test]
-    fn rows_are_rows() {
+    fn matrix_rows_transform_as_the_matrix_does() {
         let matrix = DAffine3::from_scale_rotation_translation(
             DVec3::new(1.0, 2.0, 3.0),
             glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),

@@ -1,20 +1,20 @@
-//! The image copied out with its frame, where the one before was read: reading it then costs no
+//! A copy of the image made within its frame, if the image before was read: reading it then needs no
 //! submission of its own.
 
 use crate::gpu::{Buffer, BufferKind, Commands, GpuError, Stage};
 
-/// Where the last frame's image was copied, if it was.
+/// The copy of the last frame's image, if there is one.
 #[derive(Default)]
 pub(super) struct ReadOut {
     copy: Option<Buffer>,
-    /// Somebody has read the last frame's image.
+    /// True if the image of the last frame has been read.
     wanted: bool,
-    /// It holds the last frame's.
+    /// True if the copy is of the last frame.
     is_current: bool,
 }
 
 impl ReadOut {
-    /// Records the copy of a finished image, of which somebody has wanted the one before.
+    /// Records the copy of a finished image, if the image before was read.
     pub(super) fn record(
         &mut self,
         cmd: &mut Commands<'_>,
@@ -35,7 +35,7 @@ impl ReadOut {
         Ok(())
     }
 
-    /// The last frame's image, if it was copied; the next one will be.
+    /// The copy of the last frame's image, if there is one; asks for a copy of the next.
     pub(super) fn take(&mut self) -> Option<&Buffer> {
         self.wanted = true;
         self.copy.as_ref().filter(|_| self.is_current)

@@ -1,9 +1,9 @@
-//! Frames of another size than the simulator was made for, and where they are shown.
+//! Frames larger than the simulator was made for, and the image in which they are shown.
 
 use super::batches::Room;
 use super::buffers::Buffers;
 use super::passes::frame_constants;
-use super::{Fused, Settings, SimError, Simulator, Tables};
+use super::{Fused, SimError, Simulator, Sources, Tables};
 use crate::gpu::Image;
 use crate::scene::Scene;
 
@@ -31,16 +31,16 @@ impl Simulator {
         (passes.frame, passes.batches) = (frame, batches);
         passes.shown = frame;
         self.tables = tables;
-        self.settings = Settings::of(scene);
+        self.sources = Sources::of(scene);
         self.read_out = super::ReadOut::default();
-        // No frame is in the new buffers.
+        // The new buffers hold no frame yet.
         self.fused = false;
         self.upload_tables()?;
         Ok(true)
     }
 
-    /// Copies the next frames to an image of their size, [`image_size`] texels of RGBA; with nothing
-    /// they stay in their buffer.
+    /// Copies the next frames into an image of their size, [`image_size`] texels of RGBA; with none they stay in
+    /// their buffer.
     pub fn show_on(&mut self, image: Option<Image>) {
         self.shown_on = image;
     }

@@ -1,13 +1,13 @@
-//! What the last frame left in the buffers, to look at.
+//! Results of the last frame, read from its buffers.
 
 use super::pass::Sizes;
 use super::{SimError, Simulator, layout};
 
 impl Simulator {
-    /// What the last frame counted.
+    /// The counters of the last frame.
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn counters(&mut self) -> Result<layout::Counters, SimError> {
         Ok(bytemuck::pod_read_unaligned(&self.read("counters")?))
     }
@@ -15,7 +15,7 @@ impl Simulator {
     /// The integer accumulators of the last frame, surface then volume echoes: complex pairs, [L][K].
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn echoes(&mut self) -> Result<[Vec<i32>; 2], SimError> {
         let both = [self.read("surface_echoes")?, self.read("volume_echoes")?];
         Ok(both.map(|bytes| bytemuck::pod_collect_to_vec(&bytes)))
@@ -25,7 +25,7 @@ impl Simulator {
     /// were traced in several batches, those of the last batch.
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn segments(&mut self) -> Result<Vec<Vec<layout::Segment>>, SimError> {
         let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read("segment_count")?);
         let segments: Vec<layout::Segment> = bytemuck::pod_collect_to_vec(&self.read("segments")?);
@@ -37,7 +37,7 @@ impl Simulator {
     /// Echoes after the lateral stage, with noise, before the axial kernel: complex pairs, [L][K].
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn lateral(&mut self) -> Result<Vec<f32>, SimError> {
         self.floats("lateral")
     }
@@ -45,7 +45,7 @@ impl Simulator {
     /// Complex baseband before TGC, relative to a perfect mirror: complex pairs, [L][K].
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn iq(&mut self) -> Result<Vec<f32>, SimError> {
         self.floats("iq")
     }
@@ -53,7 +53,7 @@ impl Simulator {
     /// Log-compressed envelope, 0..1: [L][K].
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn log_image(&mut self) -> Result<Vec<f32>, SimError> {
         self.floats("log_image")
     }
@@ -62,7 +62,7 @@ impl Simulator {
         Ok(bytemuck::pod_collect_to_vec(&self.read(name)?))
     }
 
-    /// What the last frame left in the buffer `name`.
+    /// The content of buffer `name` after the last frame.
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, SimError> {
         self.frames.wait()?;
         Ok(self.passes.buffers.read(&self.device, name, &self.sizes())?)

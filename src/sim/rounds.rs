@@ -9,10 +9,10 @@ use super::layout::{
 
 /// Largest buffer of interactions, bytes; frames that have more are traced by groups of lines.
 const INTERACTION_BUDGET: u64 = 32 << 20;
-/// Work groups that Vulkan promises along an axis.
+/// Work groups that every Vulkan device supports along an axis.
 const MOST_GROUPS: u32 = 65_535;
 
-/// Path 0 alone writes segments: in the main-path scheme, where all paths start alike.
+/// True if path 0 alone writes segments: in the main-path scheme, if all paths start alike.
 pub(super) fn one_speaks_for_all(frame: &Frame) -> bool {
     let alike = frame.origin_jitter <= 0.0
         && frame.emission_lobe <= 0.0
@@ -20,7 +20,7 @@ pub(super) fn one_speaks_for_all(frame: &Frame) -> bool {
     frame.sampling == SAMPLING_MAIN_PATH && alike
 }
 
-/// Paths that can be traced together as far as their interactions go.
+/// Paths for whose interactions there is memory at the same time.
 pub(super) fn most_paths(frame: &Frame) -> u32 {
     if frame.sampling != SAMPLING_MAIN_PATH {
         return MOST_GROUPS;
@@ -38,22 +38,22 @@ fn path_bytes(frame: &Frame) -> u64 {
     u64::from(slots(frame)) * size_of::<Interaction>() as u64
 }
 
-/// Most threads of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan promises.
+/// Most threads of a dispatch: four times what the largest GPU runs at once, and far fewer than Vulkan allows.
 const MOST_WORKERS: u32 = 1 << 20;
 
-/// Pieces of work that a worker does, one after the other, where there are enough of them.
+/// Pieces of work that a worker does one after the other, if there are enough.
 const PIECES: u32 = 8;
 
 /// One dispatch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
-    /// [`ROLE_WHOLE`], [`ROLE_MAIN`] or [`ROLE_BRANCHES`]: what its paths are for.
+    /// The role of its paths: [`ROLE_WHOLE`], [`ROLE_MAIN`] or [`ROLE_BRANCHES`].
     pub role: u32,
-    /// Push constants: first path, paths, first line, lines; pieces of work, how many of them a worker
-    /// may take, and by which of two counters.
+    /// Push constants: first path, number of paths, first line, number of lines, pieces of work, most pieces that a
+    /// worker may take, and which of two counters deals them out.
     pub push: [u32; 7],
-    /// Threads. Each takes piece after piece, so that of those that run together none waits for another's
-    /// longer path.
+    /// Number of threads. Each takes one piece after the other, so that no thread waits for the longer path of
+    /// another one.
     pub workers: u32,
 }
 
@@ -64,21 +64,21 @@ impl Round {
     }
 }
 
-/// How many lines and main paths of each are traced together.
+/// The number of lines, and of main paths per line, that are traced together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
     lines: u32,
-    /// Main paths of a line; none where paths choose at every surface.
+    /// Main paths per line; 0 where paths choose a direction at every surface.
     mains: u32,
     slots: u32,
-    /// Threads that the device runs at once, about.
+    /// Threads that the device runs at once, approximately.
     pub(super) at_once: u32,
 }
 
 impl Rounds {
-    /// For batches of up to `paths` paths of each line, on a device that runs about `at_once` threads at
-    /// once: no more lines are traced together than give each of them a main path, so that a device with few
-    /// holds few interactions.
+    /// The rounds for batches of up to `paths` paths per line, on a device that runs about `at_once` threads at
+    /// once. Only as many lines are traced together as give each of these threads a main path, so that a device
+    /// with few threads stores few interactions.
     pub fn new(frame: &Frame, paths: u32, at_once: u32) -> Self {
         let lines = frame.scanlines * frame.layers;
         let mains = match frame.sampling {
@@ -92,7 +92,7 @@ impl Rounds {
         let useful = at_once.checked_div(mains).unwrap_or(u32::MAX);
         let together = affordable.min(useful).clamp(1, lines.max(1));
         Self {
-            // Groups of one size.
+            // The lines in groups of equal size.
             lines: lines.div_ceil(lines.div_ceil(together).max(1)).max(1),
             mains,
             slots: slots(frame),
@@ -100,7 +100,7 @@ impl Rounds {
         }
     }
 
-    /// Roles of the dispatches to come.
+    /// The roles of the dispatches.
     pub fn roles(&self) -> &'static [u32] {
         match self.mains {
             0 => &[ROLE_WHOLE],
@@ -108,18 +108,18 @@ impl Rounds {
         }
     }
 
-    /// Main paths traced together.
+    /// Main paths that are traced together.
     pub fn main_paths(&self) -> u64 {
         u64::from(self.lines) * u64::from(self.mains)
     }
 
-    /// Interactions for which there must be room.
+    /// The interactions for which there must be memory.
     pub fn interactions(&self) -> u64 {
         self.main_paths() * u64::from(self.slots)
     }
 
-    /// The dispatches that trace `paths` of all lines, in order, each after the one before. `turn`: which
-    /// of the frame's two counters the first of them uses, and then the next one to come.
+    /// The dispatches that trace `paths` of all lines, in order, each after the one before. `turn` is the number
+    /// of the frame's counter, of two, that the first dispatch uses; it is advanced to the next one.
     pub fn of(&self, frame: &Frame, paths: Range<u32>, turn: &mut u32) -> Vec<Round> {
         let all = frame.scanlines * frame.layers;
         let (begin, count) = (paths.start, paths.len() as u32);
@@ -127,7 +127,8 @@ impl Rounds {
             let pieces = lines * per_line;
             let workers = self.at_once.max(pieces / PIECES);
             let workers = workers.min(pieces).clamp(1, MOST_WORKERS);
-            // Twice its share: others' pieces may be larger. Those that begin later then find none.
+            // Twice an equal share, because pieces of other workers may be larger. Workers that begin later then
+            // find none.
             let most = 2 * pieces.div_ceil(workers);
             let push = [begin, count, line, lines, pieces, most, *turn];
             *turn ^= 1;
@@ -167,7 +168,7 @@ mod tests {
         }
     }
 
-    /// How often the rounds of `role` take each line.
+    /// For each line, the number of rounds of `role` that take it.
     fn lines(rounds: &[Round], role: u32) -> Vec<u32> {
         let mut taken = vec![0; 192 * 7];
         for round in rounds.iter().filter(|r| r.role == role) {
@@ -195,7 +196,7 @@ mod tests {
             }
             let most = |rounds: &[Round]| rounds.iter().map(|r| r.workers).max();
             assert!(most(&taken) <= Some(64 * MOST_GROUPS));
-            // Where one main path stands for all, a batch has them all.
+            // If one main path serves all paths, one batch holds all paths.
             let all = Rounds::new(&frame, frame.paths, 1 << 18);
             let all = all.of(&frame, 0..frame.paths, &mut 0);
             assert!(most(&all) <= Some(64 * MOST_GROUPS));
@@ -203,7 +204,7 @@ mod tests {
             assert!(
                 taken.iter().zip([0, 1].into_iter().cycle()).all(|(r, turn)| r.push[6] == turn)
             );
-            // Main paths are there before their branches.
+            // Main paths come before their branches.
             let roles: Vec<u32> = taken.iter().map(|r| r.role).collect();
             assert!(roles.chunks(2).all(|r| r == [ROLE_MAIN, ROLE_BRANCHES]));
         }
@@ -235,7 +236,7 @@ mod tests {
         for role in [ROLE_MAIN, ROLE_BRANCHES] {
             assert_eq!(lines(&taken, role), [1; 192 * 7]);
         }
-        // A device of no threads is none; it still gets a line.
+        // Even for 0 threads at once, one line is traced.
         assert_eq!(Rounds::new(&frame, 8, 0).main_paths(), 1);
     }
 }

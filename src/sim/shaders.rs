@@ -1,4 +1,4 @@
-//! The compiled kernels: what is embedded, what it was compiled from, and reloading.
+//! The compiled kernels: embedded modules, the stamp of their sources, and reloading.
 //!
 //! `spirv/` is checked in, so that nobody but an author of kernels needs a GLSL compiler.
 //! `tools/compile.rs` writes it; `tests/spirv.rs` fails when it is stale or invalid.
@@ -18,7 +18,7 @@ const EMBEDDED: &[(&str, &[u8])] = include!("../../spirv/embedded.rs");
 pub struct Library {
     words: BTreeMap<String, Vec<u32>>,
     #[cfg(feature = "compile")]
-    watched: Option<reload::Watched>,
+    watched: Option<reload::WatchedSources>,
 }
 
 impl Library {

@@ -1,4 +1,4 @@
-//! The stages of a frame, each in a file of its own: [`Pass`] says what it is.
+//! The stages of a frame, each in a file of its own and described by a [`Pass`].
 
 use super::pass::{Array, Pass};
 use crate::scene::Scene;
@@ -34,27 +34,27 @@ mod shadow;
 pub(super) mod tint;
 mod trace;
 
-/// Those of every frame, in order, and labels where they are wanted.
+/// Stages of every frame, in order; the last, labels, runs only where labels are wanted.
 pub const IMAGE: [&Pass; 9] =
     [&ORIGIN, &TRACE[0], &TRACE[1], &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY, &LABEL];
 
-/// Those of frames that show an acquired volume, in order.
+/// Stages of frames that show an acquired volume, in order.
 pub const FUSION: [&Pass; 10] =
     [&MASK, &SHADOW, &DARKEN, &CONVERT, &DIFFERENCE, &REDUCE, &COLLAPSE, &BLUR, &FUSE, &TINT];
 
-/// All of them.
+/// All stages.
 pub fn all() -> impl Iterator<Item = &'static Pass> {
     IMAGE.into_iter().chain(FUSION)
 }
 
-/// Names of all of them, in order: each times its part of a frame under its own.
+/// Names of all stages, in order; the time of a stage is reported under its name.
 pub fn names() -> Vec<&'static str> {
     let mut names: Vec<&str> = all().map(|pass| pass.name).collect();
     names.dedup();
     names
 }
 
-/// Those that frames of a scene may ever run, whatever becomes of its settings.
+/// Stages that frames of a scene may run, with any settings.
 pub(super) fn of(scene: &Scene) -> impl Iterator<Item = &'static Pass> {
     let fusion = scene.volume.is_some().then_some(FUSION);
     IMAGE.into_iter().chain(fusion.into_iter().flatten())
@@ -66,7 +66,7 @@ pub(super) fn needed(scene: &Scene) -> impl Iterator<Item = &'static Array> {
     INPUTS.iter().chain(passes.flat_map(|pass| pass.makes))
 }
 
-/// The array of a name that some kernel binds; none where it is no stage's.
+/// The array that kernels bind under `name`; none if no stage has it.
 pub fn array(name: &str) -> Option<Array> {
     let arrays = all().flat_map(|pass| pass.makes).chain(&INPUTS).chain(&ANATOMY);
     arrays.copied().find(|array| array.name == name)

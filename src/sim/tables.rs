@@ -1,4 +1,4 @@
-//! What the kernels read: a scene as the structures of [`layout`](super::layout), computed in f64.
+//! Tables for the kernels: a scene as the structures of [`layout`](super::layout), computed in f64.
 
 use super::calibration::{Calibration, LATERAL_CUT, amplitude};
 use super::contact::reach;
@@ -11,19 +11,20 @@ use crate::settings::{
     Coherence, Imaging, Refraction, Sampling, ScatterMode, Sequence, TextureSpace,
 };
 
-/// The kernel ends a path by setting its weight to 0, which has to be below every limit.
+/// Lower limit of the weights of paths. The kernel ends a path by setting its weight to 0, which has to be
+/// below every limit.
 const LEAST_WEIGHT: f32 = 1e-30;
-/// An amplitude twice as large, dB.
+/// Level of an amplitude twice as large, dB.
 const DECIBEL_PER_OCTAVE: f64 = 6.020_599_913;
-/// Roughness at and above which a surface is a perfect mirror.
+/// Roughness from which on a surface is a perfect mirror.
 const MIRROR: f64 = 1e9;
 
-/// Kernels read 0 as "none"; infinity is no number to compute with.
+/// The value, or 0 for infinity: kernels read 0 as "none" and do not compute with infinity.
 fn finite_or_zero(x: f64) -> f32 {
     if x.is_finite() { x as f32 } else { 0.0 }
 }
 
-/// Everything that is constant over frame `frame_index`, but for the flag of coincident surfaces,
+/// The constants of frame `frame_index`, without the flag of coincident surfaces,
 /// which depends on triangles, and the segments that a line may hold, which depend on the buffers.
 pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
     let calibration = Calibration::new(scene);
@@ -101,9 +102,9 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
     }
 }
 
-/// What does not change from frame to frame, in the device's layout.
+/// The tables that stay the same from frame to frame, in the device's layout.
 pub struct Tables {
-    /// One per scanline, and the face's edge.
+    /// One per scanline, and one for the edge of the face.
     pub scanlines: Vec<layout::Scanline>,
     /// One per axial sample.
     pub rows: Vec<layout::Row>,
@@ -130,7 +131,7 @@ impl Tables {
         }
     }
 
-    /// The buffers that they fill, by name, with their content.
+    /// Names of the buffers that the tables fill, with their content.
     pub fn arrays(&self) -> [(&'static str, &[u8]); 6] {
         [
             ("scanlines", bytemuck::cast_slice(&self.scanlines)),
@@ -143,7 +144,7 @@ impl Tables {
     }
 }
 
-/// Where each scanline starts and looks, and behind the last one the face's edge.
+/// Start and direction of each scanline; the last entry is the edge of the face.
 pub fn scanlines(probe: &Probe) -> Vec<layout::Scanline> {
     let edge = probe.ray_across(0.5);
     let rays = (0..probe.scanlines).map(|l| probe.ray(l, 0)).chain([edge]);
@@ -156,8 +157,8 @@ pub fn scanlines(probe: &Probe) -> Vec<layout::Scanline> {
     .collect()
 }
 
-/// `shape` of a row: of a beam with these deviations across and up, mm, and this gain, the log2 of its fall per
-/// mm^2 and of the gain; the lattice level stands behind them.
+/// `shape` of a row, for a beam with these standard deviations laterally and in elevation, mm, and this gain:
+/// the log2 of its decrease per mm^2 in both directions, the log2 of the gain, and the lattice level.
 pub fn beam_shape(sigmas: [f64; 2], gain: f64, level: f64) -> [f32; 4] {
     let [across, up] = sigmas.map(|s| 0.5 * std::f64::consts::LOG2_E / (s * s));
     [across, up, gain.log2(), level].map(|v| v as f32)
@@ -222,7 +223,7 @@ pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
                 mean: mean as f32,
                 sigma: sigma as f32,
                 texture_depth: tissue.texture_depth as f32,
-                // The kernel divides by it; without texture its value is of no matter.
+                // The kernel divides by it; without texture any positive value will do.
                 texture_length: if tissue.texture_length > 0.0 {
                     tissue.texture_length as f32
                 } else {
@@ -288,8 +289,8 @@ pub fn points(scene: &Scene) -> Vec<[f32; 4]> {
         .collect()
 }
 
-/// Point targets and, behind them, a sphere around each [`layout::POINT_GROUP`] of them: centre and radius,
-/// mm. What is far from the sphere is far from all of them.
+/// Point targets followed by a sphere around each [`layout::POINT_GROUP`] of them: centre and radius,
+/// mm. What is far from the sphere is far from all its points.
 pub fn with_spheres(mut points: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
     let spheres: Vec<[f32; 4]> = (points.chunks(layout::POINT_GROUP as usize))
         .map(|group| {
@@ -298,7 +299,7 @@ pub fn with_spheres(mut points: Vec<[f32; 4]>) -> Vec<[f32; 4]> {
                 .map(|of| places.clone().reduce(of).expect("not empty"));
             let centre = 0.5 * (low + high);
             let radius = places.map(|p| p.distance(centre)).fold(0.0, f32::max);
-            // More than rounding takes off.
+            // The margin is larger than the rounding.
             centre.extend(1.001 * radius + 1e-3).to_array()
         })
         .collect();

@@ -1,4 +1,4 @@
-//! Which of the two tracers finds the surfaces.
+//! The choice between the two tracers, which find the surfaces along rays.
 
 use std::fmt;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ pub use trial::Trial;
 
 mod trial;
 
-/// How rays find surfaces.
+/// The ways in which rays find surfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Tracer {
     /// The device's ray query.
@@ -20,11 +20,11 @@ pub enum Tracer {
 }
 
 impl Tracer {
-    /// The wanted tracer; without a wish the device's ray query where it has one in hardware, else
-    /// the compute hierarchy, which is two to three times as fast as ray queries that a driver on
-    /// the processor emulates (benches/RESULTS.md); with a line that says why where there are none. A
-    /// ray query is tried first on the scene's own rays; where the device keeps anything from one start
-    /// to the next, once per geometry.
+    /// Chooses the tracer. If `wanted` names none, it is the device's ray query if the hardware has one, else the
+    /// compute tracer, which is two to three times as fast as a ray query that a driver emulates on the
+    /// processor (benches/RESULTS.md). A ray query is first tried on the scene's own rays; if the device keeps
+    /// results from one start to the next, only once per geometry. Returns the tracer, and a line that says why
+    /// the ray query is not used where that needs saying.
     pub fn choose(
         wanted: Option<Self>,
         device: &Arc<Device>,
@@ -51,7 +51,7 @@ impl Tracer {
         }
     }
 
-    /// What ends the names of this tracer's kernels, as in `trace_bvh` and `trace_query`.
+    /// The end of the names of this tracer's kernels, as in `trace_bvh` and `trace_query`.
     pub fn suffix(self) -> &'static str {
         match self {
             Self::RayQuery => "query",
@@ -60,7 +60,7 @@ impl Tracer {
     }
 }
 
-/// Whether the device's ray query finds what it should; the error completes "the ray query ...".
+/// Checks that the device's ray query finds what it should; the error completes "the ray query ...".
 fn tried(device: &Arc<Device>, library: &Library, scene: &Scene) -> Result<(), String> {
     let id = trial::id(library, scene);
     if device.remembers(id) {

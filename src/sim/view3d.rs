@@ -1,4 +1,4 @@
-//! The anatomy as an eye sees it: a picture through the structures that sound is traced with.
+//! The 3D view: a picture of the anatomy from outside, by rays through the structures in which sound is traced.
 
 use std::sync::Arc;
 
@@ -12,18 +12,18 @@ use crate::gpu::{
     Binding, Buffer, BufferKind, Commands, Device, FrameTimings, GpuError, Image, Kernel, Stage,
 };
 
-/// How far the probe's housing stands out beside the face, mm.
-const RIM: f64 = 3.0;
+/// Distance by which the probe's housing is wider than the face on each side, mm.
+const HOUSING_RIM: f64 = 3.0;
 /// Half the width of a probe whose face is a point, mm.
-const POINT: f64 = 10.0;
+const POINT_FACE_HALF_WIDTH: f64 = 10.0;
 /// Height of the probe's head above the middle of its face, mm.
 pub const HEAD: f64 = 32.0;
 /// Height of head and handle, mm.
 pub const HANDLE: f64 = 105.0;
 
-/// What is seen, from where.
+/// A view: the camera, and what is visible.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Sight {
+pub struct CameraView {
     /// Width and height of the picture, pixels.
     pub size: [u32; 2],
     /// The eye, world, mm.
@@ -34,16 +34,16 @@ pub struct Sight {
     pub right: DVec3,
     /// One pixel down at distance 1.
     pub down: DVec3,
-    /// What lies on the eye's side of the image plane is cut away.
+    /// True if everything on the eye's side of the image plane is cut away.
     pub cut: bool,
-    /// The B-mode image is shown where it lies.
+    /// True if the B-mode image is shown in its place.
     pub image: bool,
-    /// Colour (0..1) and opacity of each of the scene's instances; opacity 0: it is not there.
+    /// Colour (0..1) and opacity of each of the scene's instances; opacity 0: invisible.
     pub looks: Vec<[f32; 4]>,
 }
 
-impl Sight {
-    /// As the kernel reads it, for a probe.
+impl CameraView {
+    /// The constants for the kernel, for the probe of `frame`.
     pub fn constants(&self, frame: &Frame) -> layout::View3d {
         let vector = |v: DVec3| {
             let [x, y, z] = v.as_vec3().to_array();
@@ -67,8 +67,7 @@ impl Sight {
     }
 }
 
-/// The probe's housing, mm: half its width, half its thickness, height of its head, and of head and
-/// handle.
+/// The probe's housing, mm: half its width, half its thickness, height of its head, height of head and handle.
 pub fn housing(frame: &Frame) -> [f32; 4] {
     let half_width = match frame.kind {
         layout::KIND_CONVEX => {
@@ -76,13 +75,18 @@ pub fn housing(frame: &Frame) -> [f32; 4] {
             f64::from(frame.radius) * half.min(std::f64::consts::FRAC_PI_2).sin()
         }
         layout::KIND_LINEAR => f64::from(frame.width) / 2.0,
-        _ => POINT - RIM,
+        _ => POINT_FACE_HALF_WIDTH - HOUSING_RIM,
     };
     let half_thickness = f64::from(frame.face_height) / 2.0;
-    [(half_width + RIM) as f32, (half_thickness + RIM) as f32, HEAD as f32, HANDLE as f32]
+    [
+        (half_width + HOUSING_RIM) as f32,
+        (half_thickness + HOUSING_RIM) as f32,
+        HEAD as f32,
+        HANDLE as f32,
+    ]
 }
 
-/// Kernel and buffers of the picture, as large as the largest so far.
+/// Kernel and buffers of the picture. Buffers grow to the largest picture so far.
 pub(super) struct Viewer3d {
     kernel: Kernel,
     constants: Buffer,
@@ -95,7 +99,7 @@ impl Viewer3d {
         device: &Arc<Device>,
         library: &Library,
         tracer: Tracer,
-        sight: &Sight,
+        sight: &CameraView,
     ) -> Result<Self, GpuError> {
         let stem = format!("view3d_{}", tracer.suffix());
         let size = size_of::<layout::View3d>() as u64;
@@ -108,20 +112,20 @@ impl Viewer3d {
         })
     }
 
-    fn holds(&self, sight: &Sight) -> bool {
+    fn holds(&self, sight: &CameraView) -> bool {
         let [looks, picture] = bytes(sight);
         self.looks.size() >= looks && self.picture.size() >= picture
     }
 }
 
-/// Of looks and picture.
-fn bytes(sight: &Sight) -> [u64; 2] {
+/// Bytes of looks and picture.
+fn bytes(sight: &CameraView) -> [u64; 2] {
     let [width, height] = sight.size.map(u64::from);
     [16 * sight.looks.len() as u64, 4 * width * height].map(|size| size.max(16))
 }
 
-/// Looks and picture.
-fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError> {
+/// The buffers of looks and picture.
+fn buffers(device: &Arc<Device>, sight: &CameraView) -> Result<[Buffer; 2], GpuError> {
     let [looks, picture] = bytes(sight);
     Ok([
         device.buffer("looks", looks, BufferKind::Storage)?,
@@ -130,8 +134,8 @@ fn buffers(device: &Arc<Device>, sight: &Sight) -> Result<[Buffer; 2], GpuError>
 }
 
 impl Simulator {
-    /// Pictures the anatomy of the last frame on `image`, RGBA of the sight's size, with that frame's
-    /// probe and B-mode image; waits for it. The time that it took on the device.
+    /// Draws the anatomy of the last frame into `image`, RGBA of the view's size, with that frame's
+    /// probe and B-mode image, and waits for it. Returns the time that it took on the device.
     ///
     /// # Errors
     /// Device out of memory; a lost device.
@@ -141,7 +145,7 @@ impl Simulator {
     pub fn view3d(
         &mut self,
         library: &Library,
-        sight: &Sight,
+        sight: &CameraView,
         image: &Image,
     ) -> Result<FrameTimings, SimError> {
         let passes = &self.passes;
@@ -151,11 +155,11 @@ impl Simulator {
             None => Viewer3d::new(&self.device, library, passes.world.tracer(), sight)?,
         };
         if !viewer3d.holds(sight) {
-            // The pipeline stays: a window that is dragged larger asks for many sizes.
+            // Only buffers are made again, not the pipeline: dragging the window asks for many sizes.
             self.frames.wait()?;
             [viewer3d.looks, viewer3d.picture] = buffers(&self.device, sight)?;
         }
-        // It stays where the picture is abandoned.
+        // Stored before recording, so that it is kept if the picture is abandoned.
         let viewer3d = self.viewer3d.insert(viewer3d);
         let mut cmd = self.frames.begin()?;
         cmd.scope("view3d");
@@ -171,12 +175,12 @@ impl Viewer3d {
     fn record(
         &self,
         cmd: &mut Commands<'_>,
-        sight: &Sight,
+        sight: &CameraView,
         passes: &super::Passes,
         fused: bool,
     ) -> Result<(), GpuError> {
         let (frame, world) = (&passes.buffers["frame"], &passes.world);
-        // The last frame may have been abandoned.
+        // The constants of the last complete picture: the last frame may have been abandoned.
         let constants = sight.constants(&passes.shown);
         cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;
         cmd.write(&self.constants, 0, bytemuck::bytes_of(&constants))?;

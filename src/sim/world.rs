@@ -1,4 +1,4 @@
-//! The anatomy on the device: geometry, instance rows, and what a tracer walks.
+//! The anatomy on the device: geometry, instance rows, and the structures that a tracer walks.
 
 mod arrays;
 mod changing;
@@ -24,16 +24,16 @@ use entry::Mask;
 use joined::Sets;
 use top::Top;
 
-/// Why the anatomy is not on the device.
+/// The error of an anatomy that cannot be put on the device.
 #[derive(Debug, thiserror::Error)]
 pub enum WorldError {
-    /// The device refuses.
+    /// The device refused a buffer, a structure or a kernel.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The hierarchy does not fit its kernel.
+    /// The hierarchy is too deep for its kernel.
     #[error(transparent)]
     Bvh(#[from] BvhError),
-    /// A node that only the compute tracer has.
+    /// A node that only the compute tracer supports.
     #[error(
         "`{0}`: the strategy `selector`, a node with the union of its children's boxes, is one of the compute tracer: \
          take --tracer bvh, or the strategy `mask`, which builds nothing either, or `exchange`"
@@ -48,21 +48,21 @@ pub struct World {
     geometry: Geometry,
     fields: Fields,
     places: Vec<Place>,
-    /// Of instances that change their shape on the device.
+    /// For each instance that changes its shape on the device, the room for it.
     regions: Vec<Option<Place>>,
     sets: Sets,
-    /// Per instance whether it has left those that it shared a structure with.
+    /// For each instance, true if it has left the instances with which it shared a structure.
     apart: Vec<bool>,
     changing: Changing,
     top: Top,
     rows: Vec<layout::Instance>,
     mask: Mask,
-    /// What decides which memory there is; present shapes aside.
+    /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
     kernels: Arc<Kernels>,
 }
 
-/// The kernels that make shapes.
+/// The kernels that compute shapes.
 pub struct Kernels {
     interpolate: Kernel,
     refit: Kernel,
@@ -77,7 +77,7 @@ impl Kernels {
     }
 }
 
-/// What all kernels of both tracers bind.
+/// The buffers that all kernels of both tracers bind.
 struct Geometry {
     instances: Buffer,
     vertices: Buffer,
@@ -103,8 +103,8 @@ impl World {
         Self::with_splits(device, kernels, scene, tracer, Splits::default())
     }
 
-    /// As [`Self::new`], with trees of the compute tracer built so. What moves by refit, and what is
-    /// built for one keyframe, is never cut.
+    /// Like [`Self::new`], with trees of the compute tracer built as `splits` says. Trees that are refitted or
+    /// built for one keyframe are never cut.
     ///
     /// # Errors
     /// Those of [`Self::new`].
@@ -120,7 +120,7 @@ impl World {
         Self::with_fields(device, kernels, scene, tracer, splits, fields, apart)
     }
 
-    /// As [`Self::with_splits`], with displacement fields made before.
+    /// Like [`Self::with_splits`], with displacement fields that exist already.
     pub(super) fn with_fields(
         device: &Arc<Device>,
         kernels: &Arc<Kernels>,
@@ -136,7 +136,7 @@ impl World {
         {
             return Err(WorldError::Selector(node.name.clone()));
         }
-        // What the first update runs is compiled meanwhile.
+        // The kernels of the first update are compiled while the rest is made.
         if scene.instances.iter().any(|i| i.keyframes.strategy.needs_shared_topology()) {
             kernels.interpolate.prepare();
             if tracer == Tracer::Bvh {
@@ -186,8 +186,8 @@ impl World {
         failed.map_or(Ok(world), Err)
     }
 
-    /// Whether [`Self::update`] can show `scene`: its keyframes and strategies are those of [`Self::new`],
-    /// and what shares a structure has stayed together.
+    /// True if [`Self::update`] can show `scene`: keyframes and strategies are those of [`Self::new`],
+    /// and the instances that share a structure have stayed together.
     pub fn serves(&self, scene: &Scene) -> bool {
         let same = |made: &Keyframes, now: &Keyframes| {
             made.deforms_as(now) && made.strategy == now.strategy
@@ -200,9 +200,9 @@ impl World {
         self.made_for.len() == now.len() && self.made_for.iter().zip(now).all(|(a, b)| same(a, b))
     }
 
-    /// Uploads `scene` anew where [`Self::serves`] says no. How tissue deforms, which takes long to
-    /// find, is kept where only strategies or placements were exchanged. What has left those that it
-    /// shared a structure with has one of its own from then on, so that it can go on moving.
+    /// Uploads `scene` again where [`Self::serves`] is false. Displacement fields, which take long to compute, are
+    /// kept if only strategies or placements have changed. An instance that has left those with which it
+    /// shared a structure gets one of its own, so that it can go on moving.
     ///
     /// # Errors
     /// Those of [`Self::new`]; the world then is what it was.
@@ -224,12 +224,12 @@ impl World {
         self.changing.reload(&self.kernels);
     }
 
-    /// Records what changed since the last call: shapes, instance rows and the top level, or nothing;
-    /// with the barriers between them and to the kernels behind. Returns whether anything did.
-    /// Meshes and the number of instances must be those of [`Self::new`], and [`Self::serves`] must say yes.
+    /// Records what has changed since the last call (shapes, instance rows and the top level), with the barriers
+    /// between them and to the kernels behind. Returns true if anything has changed.
+    /// Meshes and the number of instances must be those of [`Self::new`], and [`Self::serves`] must be true.
     ///
     /// # Errors
-    /// When recording fails, or the moved instances need a deeper top level than the kernel walks.
+    /// An error of recording, or moved instances that need a deeper top level than the kernel can walk.
     pub fn update(
         &mut self,
         commands: &mut Commands<'_>,
@@ -274,7 +274,7 @@ impl World {
         Ok(changed)
     }
 
-    /// How rays find surfaces here.
+    /// The tracer of this world.
     pub fn tracer(&self) -> Tracer {
         self.tracer
     }
@@ -289,7 +289,7 @@ impl World {
         &self.geometry.fields
     }
 
-    /// What kernels bind as `name`, where it is a part of the anatomy ([`super::stages::ANATOMY`]).
+    /// The binding of `name`, if it is a part of the anatomy ([`super::stages::ANATOMY`]).
     pub fn binding(&self, name: &str) -> Option<Binding<'_>> {
         let geometry = &self.geometry;
         Some(Binding::Buffer(match name {
@@ -304,12 +304,12 @@ impl World {
         }))
     }
 
-    /// Whether any instance's tissue deforms.
+    /// True if the tissue of any instance deforms.
     pub fn deforms(&self) -> bool {
         !self.fields.is_empty()
     }
 
-    /// What a kernel of this world's tracer binds as `nodes` or `tlas`.
+    /// The binding of `nodes` or `tlas` for kernels of this world's tracer.
     pub fn structure(&self) -> Binding<'_> {
         self.top.binding()
     }
@@ -325,7 +325,7 @@ impl World {
         ]
     }
 
-    /// Mask bits that a ray query is started with, and whether rows choose among the entries that
+    /// Mask bits with which a ray query starts, and true if rows choose among the entries that
     /// these let pass: a frame's `ray_mask` and FLAG_SLOTS.
     pub fn ray_mask(&self) -> (u32, bool) {
         (self.mask.bits, self.mask.ambiguous)
@@ -336,8 +336,8 @@ impl World {
         &self.rows
     }
 
-    /// Index in [`crate::scene::Mesh::triangles`] of a hit's primitive, for what `instance` shows:
-    /// `mesh`.
+    /// Index in [`crate::scene::Mesh::triangles`] of the triangle with number `primitive` in a hit, for
+    /// `instance` while it shows `mesh`.
     pub fn triangle(&self, instance: usize, mesh: usize, primitive: u32) -> usize {
         let meshes = &self.made_for[instance].meshes;
         let shape = meshes.iter().position(|&m| m == mesh).unwrap_or(0);

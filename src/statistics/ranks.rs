@@ -204,7 +204,7 @@ mod tests {
     }
 
     #[test]
-    fn two_things_are_a_sign_test() {
+    fn friedmans_test_of_two_things_is_a_sign_test() {
         let test = friedman(&[vec![1, 2], vec![1, 2], vec![1, 2], vec![2, 1]]).expect("blocks");
         // Rank sums 5 and 7 of 4 blocks: 12 / (4 2 3) (1 + 1).
         assert_eq!(test.statistic, 1.0);

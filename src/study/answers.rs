@@ -20,7 +20,7 @@ pub const DEGREES: usize = 5;
 /// The whole file.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct File {
+struct AnswersFile {
     format: String,
     version: u32,
     study: String,
@@ -99,7 +99,7 @@ impl Answers {
         let fail = |cause: &str, remedy: &str| Err(StudyError::new(path, cause, remedy));
         let text = text_of(path, MAX_TEXT, "check the path of the answers")?;
         let foreign = "give a file that the form saved";
-        let file: File = match serde_json::from_str(&text) {
+        let file: AnswersFile = match serde_json::from_str(&text) {
             Ok(file) => file,
             Err(e) => return fail(&format!("is not a file of answers: {e}"), foreign),
         };
@@ -194,7 +194,7 @@ impl Answers {
 /// Reads several filled forms of one study, each of which counts once.
 ///
 /// # Errors
-/// As [`Answers::read`]; two files that were saved from one filled form.
+/// Those of [`Answers::read`]; two files that were saved from one filled form.
 pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, StudyError> {
     let mut all: Vec<Answers> = Vec::new();
     for path in paths {

@@ -15,7 +15,7 @@ pub use tables::{Cell, Table, csv, markdown, plain};
 
 /// Ratings of the images before one background.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Rated {
+pub struct BackgroundRatings {
     /// Name of the background.
     pub background: String,
     /// Number of times it had each rank, from the first, in complete rankings.
@@ -24,7 +24,7 @@ pub struct Rated {
     pub agreement: [usize; DEGREES],
 }
 
-impl Rated {
+impl BackgroundRatings {
     /// Mean rank; NaN without a ranking.
     pub fn mean_rank(&self) -> f64 {
         let sum: usize = (1..).zip(&self.ranks).map(|(rank, n)| rank * n).sum();
@@ -42,29 +42,29 @@ impl Rated {
 
 /// All backgrounds of one scenario, or of all scenarios.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Part {
+pub struct ResultsPart {
     /// Name of the scenario; none for all together.
     pub scenario: Option<String>,
     /// Ratings, one per background.
-    pub rated: Vec<Rated>,
+    pub rated: Vec<BackgroundRatings>,
 }
 
 /// Two backgrounds, by the blocks in which one had the better rank.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Pair {
+pub struct BackgroundPair {
     /// Names.
     pub backgrounds: [String; 2],
     /// Number of blocks in which each was before the other.
     pub before: [usize; 2],
     /// Probability of the two-sided exact sign test.
     pub p: f64,
-    /// That probability corrected for the number of pairs, after Holm.
+    /// The probability, corrected for the number of pairs after Holm.
     pub corrected: f64,
 }
 
 /// Number of times that images with one parameter changed were chosen.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Chosen {
+pub struct ChoiceCounts {
     /// The parameter's key in `[vary]`.
     pub parameter: String,
     /// Numbers of choices below the scene's own value, at it, above it.
@@ -81,13 +81,13 @@ pub struct Results {
     /// Number of scenarios, and of slices of all scenarios.
     pub places: [usize; 2],
     /// Results of each scenario, then of all together.
-    pub parts: Vec<Part>,
+    pub parts: Vec<ResultsPart>,
     /// Test over the backgrounds, with the complete rankings as blocks; none without one.
     pub friedman: Option<Friedman>,
     /// Comparisons of every two backgrounds.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<BackgroundPair>,
     /// Choices, one entry per parameter of the key.
-    pub chosen: Vec<Chosen>,
+    pub chosen: Vec<ChoiceCounts>,
     /// Number of times that the image of the scene itself was chosen.
     pub unperturbed: usize,
     /// The mean of that number if images were drawn at random.
@@ -116,7 +116,7 @@ impl Results {
             for row in choices().map(row).filter(|r| r.parameter == parameter) {
                 counts[(row.direction() + 1) as usize] += 1;
             }
-            Chosen { parameter: parameter.to_owned(), counts }
+            ChoiceCounts { parameter: parameter.to_owned(), counts }
         };
         Self {
             study: key.id().to_owned(),
@@ -162,7 +162,7 @@ fn blocks(key: &Key, all: &[Answers], scenario: Option<&str>) -> Vec<Vec<usize>>
     rankings.filter_map(block).collect()
 }
 
-fn part(key: &Key, all: &[Answers], scenario: Option<&str>) -> Part {
+fn part(key: &Key, all: &[Answers], scenario: Option<&str>) -> ResultsPart {
     let blocks = blocks(key, all, scenario);
     let rated = |(place, background): (usize, &str)| {
         let mut ranks = vec![0; key.backgrounds().len()];
@@ -179,22 +179,22 @@ fn part(key: &Key, all: &[Answers], scenario: Option<&str>) -> Part {
                 agreement[degree - 1] += 1;
             }
         }
-        Rated { background: background.to_owned(), ranks, agreement }
+        BackgroundRatings { background: background.to_owned(), ranks, agreement }
     };
-    Part {
+    ResultsPart {
         scenario: scenario.map(str::to_owned),
         rated: key.backgrounds().into_iter().enumerate().map(rated).collect(),
     }
 }
 
-fn pairs(backgrounds: &[&str], blocks: &[Vec<usize>]) -> Vec<Pair> {
+fn pairs(backgrounds: &[&str], blocks: &[Vec<usize>]) -> Vec<BackgroundPair> {
     let count = backgrounds.len();
     let each = (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b)));
-    let mut pairs: Vec<Pair> = each
+    let mut pairs: Vec<BackgroundPair> = each
         .map(|(a, b)| {
             let first = blocks.iter().filter(|block| block[a] < block[b]).count();
             let before = [first, blocks.len() - first];
-            Pair {
+            BackgroundPair {
                 backgrounds: [a, b].map(|i| backgrounds[i].to_owned()),
                 before,
                 p: sign_test(before[0], before[1]),

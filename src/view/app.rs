@@ -14,7 +14,7 @@ use super::open::{Open, Plan};
 use super::session::{Wake, waker};
 use super::statistics::Times;
 use super::{Options, ViewError};
-use crate::gpu::{GpuError, Shot, ValidationLog};
+use crate::gpu::{GpuError, Screenshot, ValidationLog};
 use crate::scene::Scene;
 use crate::sim::SimError;
 
@@ -26,7 +26,7 @@ pub(super) struct App {
     plan: Plan,
     open: Option<Open>,
     statistics: Times,
-    /// When device and simulation were made anew last.
+    /// Time at which device and simulation were last made anew.
     lost: Option<Instant>,
     log: Option<ValidationLog>,
     failure: Option<ViewError>,
@@ -134,7 +134,7 @@ impl App {
         }
     }
 
-    fn save(&self, shot: &Shot) -> Result<(), ViewError> {
+    fn save(&self, shot: &Screenshot) -> Result<(), ViewError> {
         let Some(file) = &self.plan.options.screenshot else {
             return Ok(());
         };

@@ -13,7 +13,7 @@ use serde_json::{Map, Value};
 use self::files::{Claim, grey_png, scaled};
 use super::deaths::CAPTURE;
 use super::engine::Frame;
-use crate::gpu::{GpuError, Shot};
+use crate::gpu::{GpuError, Screenshot};
 use crate::output::movie::{Movie, MovieError};
 
 /// The settings written beside a picture: see `docs/window.md`.
@@ -60,7 +60,7 @@ pub(super) struct Still {
     /// The text written beside it and into it.
     pub(super) sidecar: Sidecar,
     /// The image with its marks, as in the window.
-    pub(super) marked: Option<Shot>,
+    pub(super) marked: Option<Screenshot>,
 }
 
 /// File format of a clip.

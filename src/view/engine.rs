@@ -90,7 +90,7 @@ pub struct Frame {
     pub timings: FrameTimings,
     /// Moment at which it was finished.
     pub finished: Instant,
-    /// From reading the order to the finished picture, ms.
+    /// Time from reading the order to the finished picture, ms.
     pub wall_ms: f64,
     /// Time of the processor to bring acceleration structures up to date, ms.
     pub update_ms: f64,
@@ -162,7 +162,7 @@ enum Job {
     Open(Box<Scene>, Order),
     /// The last image once more, at a finer level.
     Refined(usize),
-    /// Only the anatomy, while something moves or at rest.
+    /// A picture of the 3D view.
     View3d {
         moving: bool,
     },

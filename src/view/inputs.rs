@@ -9,7 +9,7 @@ use super::link::{Bell, Link, Report};
 use super::model::{Kept, Model, Ways, age};
 use super::pads::{Pads, Word};
 use super::{Listen, ViewError};
-use crate::igtl::{PORT, Tracked};
+use crate::igtl::{PORT, TrackerState};
 use crate::scene::Tracker;
 use crate::scene::file::load_trajectory;
 
@@ -148,7 +148,7 @@ impl Inputs {
         let Some(report) = &self.report else {
             return false;
         };
-        if let Tracked::Live(pose) = &report.tracked
+        if let TrackerState::Live(pose) = &report.tracked
             && std::mem::replace(&mut self.followed, pose.number) != pose.number
         {
             model.track(&pose.device.text(), pose.world_from_probe, pose.arrived);
@@ -161,12 +161,12 @@ impl Inputs {
     /// its last pose reads differently.
     fn next(&self) -> Option<Instant> {
         match &self.report.as_ref()?.tracked {
-            Tracked::Never => None,
-            Tracked::Live(pose) => {
+            TrackerState::Never => None,
+            TrackerState::Live(pose) => {
                 let timeout = Duration::from_secs_f64(self.tracker.timeout);
                 pose.arrived.checked_add(timeout + Duration::from_millis(1))
             }
-            Tracked::Lost(pose) => {
+            TrackerState::Lost(pose) => {
                 let (_, rest) = age(pose.arrived.elapsed());
                 Instant::now().checked_add(rest)
             }

@@ -10,7 +10,7 @@ use winit::event_loop::EventLoopProxy;
 
 use super::session::Wake;
 use crate::gpu::{Device, GpuError, Image};
-use crate::igtl::{IgtlError, Picture, Server, Settings, Status, Tracked};
+use crate::igtl::{IgtlError, Picture, Server, ServerSettings, Status, TrackerState};
 use crate::scene::Tracker;
 use crate::sim::layout;
 
@@ -49,7 +49,7 @@ pub(super) struct Report {
     /// Numbers of clients and messages so far.
     pub(super) status: Status,
     /// State of the tracker.
-    pub(super) tracked: Tracked,
+    pub(super) tracked: TrackerState,
 }
 
 /// The server, if there is one; window and simulation share it. Nothing done under its lock waits for
@@ -73,7 +73,7 @@ impl Link {
         let mut server = self.lock();
         // The old one first: it may hold the port.
         *server = None;
-        let (at, settings) = (SocketAddr::new(address, port), Settings::new(tracker));
+        let (at, settings) = (SocketAddr::new(address, port), ServerSettings::new(tracker));
         let opened = Server::bind_and_tell(at, settings, move || bell.ring())?;
         Ok(server.insert(opened).address())
     }

@@ -5,13 +5,13 @@ use glam::DAffine3;
 use super::model::Camera;
 use crate::gpu::Image;
 use crate::probe::Probe;
-use crate::sim::view3d::Sight;
+use crate::sim::view3d::CameraView;
 
 /// The wanted view of the anatomy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Look {
     /// The simulation's part of it.
-    pub sight: Sight,
+    pub sight: CameraView,
     /// The camera from which it was made.
     pub camera: Camera,
 }

@@ -128,7 +128,7 @@ pub struct Order {
     pub reads_back: bool,
     /// Number that grows with every change.
     pub revision: u64,
-    /// When the change was made: an input event's arrival.
+    /// Time of the change: the arrival of the input event.
     pub at: Instant,
 }
 

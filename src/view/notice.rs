@@ -5,14 +5,15 @@ use egui::{Align2, Color32, FontId, Rect, Ui, vec2};
 use super::inputs::Inputs;
 use super::model::age;
 use super::style;
-use crate::igtl::Tracked;
+use crate::igtl::TrackerState;
 
 /// Room for the texts on both sides, points.
 const TEXTS: f32 = 300.0;
 
 /// Draws the warning that the tracker is lost: the probe is not at its tool's place.
 pub(super) fn show(ui: &Ui, inputs: &Inputs) {
-    let Some(Tracked::Lost(pose)) = inputs.report.as_ref().map(|report| &report.tracked) else {
+    let Some(TrackerState::Lost(pose)) = inputs.report.as_ref().map(|report| &report.tracked)
+    else {
         return;
     };
     let (since, _) = age(pose.arrived.elapsed());

@@ -160,8 +160,8 @@ impl Open {
         Ok((Self::with(session, model, state, input, window), log))
     }
 
-    /// The same window with another simulation on a new device, with what there is to say of it. The log is the
-    /// new device's.
+    /// The same window with another simulation on a new device; `problem` is shown in it. The log is the new
+    /// device's.
     pub(super) fn again(
         self,
         plan: &Plan,

@@ -97,7 +97,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_held_is_not_written() {
+    fn held_images_are_not_written() {
         let device = test_device();
         let mut ring = Ring::new(&device, "B-mode");
         let held = ring.free([8, 8]).unwrap();

@@ -14,7 +14,7 @@ use super::model::sheet::{Moment, Sheet};
 use super::model::sidecar::{self, Area};
 use super::model::{Axis, Cine, Model};
 use super::saved::Notices;
-use crate::gpu::{DeviceInfo, Image, Shot};
+use crate::gpu::{DeviceInfo, Image, Screenshot};
 use crate::sim::facts;
 
 /// Most frames of the loop.
@@ -145,7 +145,7 @@ impl Tools {
     }
 
     /// Saves the wanted content. `marked` is the picture of the window around the image.
-    pub(super) fn save(&mut self, model: &Model, marked: Option<Shot>) {
+    pub(super) fn save(&mut self, model: &Model, marked: Option<Screenshot>) {
         let Some(wanted) = self.due.take() else {
             return;
         };
@@ -250,11 +250,10 @@ impl Tools {
 fn settings(model: &Model, frame: &Frame, pose: Option<&DAffine3>) -> Sidecar {
     // The settings of the level that it was made at: they give this very image.
     let mut settings = (*frame.settings).clone();
-    let counts = &frame.grade.counts;
-    counts.set(&mut settings.probe, &mut settings.simulation, &mut settings.imaging);
+    frame.grade.counts.apply(&mut settings);
     let set = model.entries(&settings, pose).into_iter();
     let set: Sidecar = set.map(|(path, value)| (path, value.into())).collect();
-    let all = facts::settings(&settings.probe, &settings.simulation, &settings.imaging);
+    let all = facts::settings(&settings);
     let said =
         [("set", set.into()), ("settings", all), ("tracer", settings.tracer.to_string().into())];
     said.into_iter().map(|(key, value)| (key.to_owned(), value)).collect()
@@ -268,14 +267,14 @@ impl Frame {
 }
 
 /// The part of a picture of the window inside `area`, pixels: left, top, right, bottom.
-pub(super) fn cropped(shot: &Shot, area: [f32; 4]) -> Shot {
+pub(super) fn cropped(shot: &Screenshot, area: [f32; 4]) -> Screenshot {
     let limit = |at: f32, size: u32| at.round().clamp(0.0, size as f32) as usize;
     let [width, height] = shot.size;
     let (left, right) = (limit(area[0], width), limit(area[2], width));
     let (top, bottom) = (limit(area[1], height), limit(area[3], height));
     let row =
         |y: usize| &shot.rgba[4 * (y * width as usize + left)..4 * (y * width as usize + right)];
-    Shot {
+    Screenshot {
         size: [(right - left) as u32, (bottom - top) as u32],
         rgba: (top..bottom).flat_map(row).copied().collect(),
     }
@@ -283,11 +282,12 @@ pub(super) fn cropped(shot: &Shot, area: [f32; 4]) -> Shot {
 
 #[cfg(test)]
 mod tests {
-    use super::{Shot, cropped};
+    use super::{Screenshot, cropped};
 
     #[test]
     fn a_part_of_a_picture_is_that_part() {
-        let shot = Shot { size: [4, 3], rgba: (0..12).flat_map(|i| [i, 0, 0, 255]).collect() };
+        let shot =
+            Screenshot { size: [4, 3], rgba: (0..12).flat_map(|i| [i, 0, 0, 255]).collect() };
         let part = cropped(&shot, [1.2, 0.6, 9.0, 3.0]);
         assert_eq!(part.size, [3, 2]);
         let red: Vec<u8> = part.rgba.chunks(4).map(|p| p[0]).collect();

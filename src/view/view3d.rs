@@ -297,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_eye_looks_at_is_in_the_middle() {
+    fn the_target_of_the_camera_is_in_the_middle() {
         let place = Place { rect: Rect::from_min_size(pos2(300.0, 20.0), vec2(400.0, 500.0)) };
         let camera = Camera::front(&glam::DAffine3::IDENTITY, DVec3::X, 50.0);
         let seen = place.project(&camera, DVec3::X).expect("in front");

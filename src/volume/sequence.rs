@@ -45,7 +45,7 @@ impl Sequence {
     /// header has no entries for it has no poses.
     ///
     /// # Errors
-    /// As for a volume, and where entries of frames are malformed or a frame is a volume itself.
+    /// Those of a volume; malformed entries of frames; a frame that is a volume itself.
     pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
         let (fields, data) = meta::fields(path)?;
         let mut header = meta::of_fields(&fields, data)?;

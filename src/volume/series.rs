@@ -15,7 +15,7 @@ impl Volume {
     /// once.
     ///
     /// # Errors
-    /// As [`Volume::load`]; files that do not agree, or are too large together. Also the number of the
+    /// Those of [`Volume::load`]; files that do not agree, or are too large together. Also the number of the
     /// file.
     ///
     /// # Panics

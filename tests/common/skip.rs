@@ -32,7 +32,7 @@ fn is_forbidden(lacking: Lacking, rule: Option<&str>) -> bool {
 }
 
 #[test]
-fn what_lacks_is_told_apart() {
+fn missing_tools_and_missing_data_are_told_apart() {
     use Lacking::{Data, Tool};
     let rules = [None, Some(""), Some("0"), Some("1"), Some("all")];
     assert_eq!(rules.map(|rule| is_forbidden(Tool, rule)), [false, false, false, true, true]);

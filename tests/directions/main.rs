@@ -37,7 +37,7 @@ fn covers(allowed: &str, used: &str) -> bool {
     used == allowed || used.strip_prefix(allowed).is_some_and(|rest| rest.starts_with("::"))
 }
 
-/// Uses that the table does not allow, and permissions that nothing needs.
+/// Uses that the table does not allow, and permissions that no code needs.
 fn differences(table: &Table, found: &BTreeMap<String, Uses>) -> Vec<String> {
     let mut out = Vec::new();
     for (folder, uses) in found {
@@ -88,7 +88,7 @@ fn a_planted_use_is_found_however_it_is_written() {
         let found = BTreeMap::from([("low".to_owned(), uses::of_source("low::deep", source))]);
         differences(&table, &found).join("\n")
     };
-    // Both permissions are needed, or that would be said.
+    // Both permissions are needed; otherwise the test would report one.
     let sound =
         "use crate::ground::A; use crate::high::floor::{self, B}; use crate::low::C; use super::D;";
     assert_eq!(said(sound), "");

@@ -15,7 +15,7 @@ pub struct Uses {
     pub paths: BTreeMap<String, String>,
 }
 
-/// What each module at the crate's root uses, without tests.
+/// The uses of each module at the crate's root, without tests.
 pub fn of_library(root: &Path) -> BTreeMap<String, Uses> {
     let mut out = BTreeMap::new();
     for item in parsed(root).items {
@@ -31,14 +31,14 @@ pub fn of_library(root: &Path) -> BTreeMap<String, Uses> {
     out
 }
 
-/// What the module of a file uses, of this library and of another crate that it is in.
+/// The uses of the module in a file: of this library, and of another crate if the file belongs to one.
 pub fn of_module(file: &Path, name: &str) -> Uses {
     let mut uses = Uses::default();
     uses.file(file, &[name.to_owned()]);
     uses
 }
 
-/// What a source uses that stands for the module `path`.
+/// The uses of a source text, read as the module `path`.
 pub fn of_source(path: &str, source: &str) -> Uses {
     let mut uses = Uses::default();
     let module: Vec<String> = path.split("::").map(str::to_owned).collect();
@@ -52,7 +52,7 @@ fn parsed(file: &Path) -> syn::File {
     syn::parse_file(&text).unwrap_or_else(|e| panic!("{}: {e}", file.display()))
 }
 
-/// Where the source of a module is that `folder` holds.
+/// The path of the source of a module in `folder`.
 fn found(folder: &Path, name: &str, attrs: &[Attribute]) -> PathBuf {
     assert!(!attrs.iter().any(|a| a.path().is_ident("path")), "`{name}` stands elsewhere");
     let beside = folder.join(format!("{name}.rs"));
@@ -134,7 +134,7 @@ impl Uses {
         }
     }
 
-    /// Follows a path from `begin`, of which `rest` is what comes next.
+    /// Follows a path from `begin` through the tokens of `rest`.
     fn follow(&mut self, begin: &[String], rest: &[TokenTree], file: &Path) {
         let next = match rest {
             [a, b, next, ..] if is(a, ':') && is(b, ':') => next,
@@ -151,7 +151,7 @@ impl Uses {
         }
     }
 
-    /// Goes on by the first of `rest`.
+    /// Follows the path by the first token of `rest`.
     fn step(&mut self, begin: &[String], rest: &[TokenTree], file: &Path) {
         let TokenTree::Ident(name) = &rest[0] else {
             return self.found(begin, file);
@@ -176,7 +176,7 @@ impl Uses {
     }
 }
 
-/// Whether what comes after these tokens goes on with a path.
+/// True if these tokens end in `::`, so that a path continues after them.
 fn continues(before: &[TokenTree]) -> bool {
     matches!(before, [.., a, b] if is(a, ':') && is(b, ':'))
 }

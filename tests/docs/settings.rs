@@ -1,31 +1,29 @@
-//! The text lines of `docs/scenes.md` that follow from the program: a row of a table for each setting, the units, and
+//! The text lines of `docs/scenes.md` that follow from the program: a row of a table for each key, the units, and
 //! the parameters of `insonify vary`. `INSONIFY_BLESS=1 cargo test --test docs` writes them.
 
+use insonify::scene::file::{Key, reference};
 use insonify::scene::tissue::table;
 use insonify::scene::vary::Parameter;
 use insonify::settings::units::MEASURES;
-use insonify::settings::{
-    Display, Facts, Form, Fusion, Group, Imaging, Live, Probe, Simulation, Surface, Tissue, Value,
-    plain,
-};
+use insonify::settings::{Facts, Form, Group, Probe, Tissue, plain};
 
 /// A line of a table: the section's heading, the first word of the table's head, and the cells.
 #[derive(Debug, PartialEq)]
 pub struct Line {
-    section: &'static str,
+    section: String,
     head: &'static str,
     cells: Vec<String>,
 }
 
 impl Line {
-    fn new(section: &'static str, head: &'static str, cells: &[&str]) -> Self {
+    fn new(section: &str, head: &'static str, cells: &[&str]) -> Self {
         let cells = cells.iter().map(|cell| (*cell).to_owned()).collect();
-        Self { section, head, cells }
+        Self { section: section.to_owned(), head, cells }
     }
 
-    /// The first cell with its blanks, by which the line is found.
-    fn start(&self) -> String {
-        format!("| {} |", self.cells[0])
+    /// The table in which it stands: its section, and the first word of its head.
+    pub fn table(&self) -> (String, &'static str) {
+        (self.section.clone(), self.head)
     }
 
     fn text(&self) -> String {
@@ -45,6 +43,13 @@ fn type_of(form: Form) -> String {
         Form::Words(_) => "one of".to_owned(),
         Form::Numbers(count) => format!("{count} numbers"),
         Form::Quantities(measure, count) => format!("{count} {}s", measure.name),
+        Form::Integer => "integer".to_owned(),
+        Form::Direction => "3 numbers".to_owned(),
+        Form::Factors => "number or 3 numbers".to_owned(),
+        Form::Text => "text".to_owned(),
+        Form::Texts => "list of texts".to_owned(),
+        Form::OneOrSeveral => "text or list of texts".to_owned(),
+        Form::TextOrTrue => "text or true".to_owned(),
     }
 }
 
@@ -59,54 +64,40 @@ fn range_of(facts: &Facts) -> String {
             let words: Vec<_> = words.iter().map(|word| format!("`\"{word}\"`")).collect();
             words.join(", ")
         }
-        (_, Form::Switch, _) => String::new(),
+        (_, Form::Direction, _) => "not zero".to_owned(),
+        (.., [f64::NEG_INFINITY, f64::INFINITY]) => String::new(),
         (.., [least, f64::INFINITY]) => format!("at least {least}{unit}"),
         (.., [least, most]) => format!("{least} to {most}{unit}"),
     }
 }
 
-/// The default of a group's setting, in the reference's form.
-fn default_of(facts: &Facts, value: Value) -> String {
-    let text = facts.text(&value).unwrap_or_default();
-    match facts.form {
-        Form::Quantity(_) => format!("`{}`", text.trim_matches('"')),
-        _ => format!("`{text}`"),
+/// A line for each key. A table in a table has a heading of its own, or its keys are those of the outer one.
+fn keys(document: &str) -> Vec<Line> {
+    let mut out = Vec::new();
+    for (table, keys) in reference() {
+        for Key { path, facts, default } in keys {
+            let mut place = (table.to_owned(), path.as_str());
+            if let Some((inner, key)) = path.split_once('.')
+                && heading(document, &format!("{table}.{inner}")).is_some()
+            {
+                place = (format!("{table}.{inner}"), key);
+            }
+            let (section, key) = place;
+            let default = match (facts.required, key.rsplit_once('.')) {
+                (true, Some((inner, _))) => format!("required in `{inner}`"),
+                _ => default,
+            };
+            let key = format!("`{key}`");
+            let cells = [&key, &type_of(facts.form), &default, &range_of(facts), facts.meaning()];
+            out.push(Line::new(&section, "Key", &cells));
+        }
     }
+    out
 }
 
-/// A text line for each setting of a group in the table of this heading. `before` stands before the keys; `default` is
-/// the default of all; none: the row's own, or the value in `from`.
-fn of_group<T: Group>(from: Option<&T>, (before, default): (&str, Option<&str>)) -> Vec<Line> {
-    let rows = T::rows().iter();
-    let line = |row: &insonify::settings::Row<T>| {
-        let facts = &row.facts;
-        let value = from.map(|from| default_of(facts, (row.get)(from)));
-        let own = facts.default.map(str::to_owned).or(value);
-        let default = default.map(str::to_owned).or(own).unwrap_or_default();
-        let meaning = match before {
-            "" => facts.meaning(),
-            _ => "The same, met from within.",
-        };
-        let key = format!("`{before}{}`", facts.key);
-        let cells = [&key, &type_of(facts.form), &default, &range_of(facts), meaning];
-        Line::new(T::TABLE, "Key", &cells)
-    };
-    rows.map(line).collect()
-}
-
-/// Every line that the program knows, by tables.
-pub fn lines() -> Vec<Line> {
-    let preset = ("", Some("preset"));
-    let plain = ("", None);
-    let mut out = of_group::<Probe>(None, preset);
-    out.extend(of_group(Some(&Simulation::default()), plain));
-    out.extend(of_group(Some(&Imaging::default()), plain));
-    out.extend(of_group(Some(&Live::default()), plain));
-    out.extend(of_group(Some(&Fusion::default()), plain));
-    out.extend(of_group::<Display>(None, plain));
-    out.extend(of_group::<Tissue>(None, plain));
-    out.extend(of_group::<Surface>(None, plain));
-    out.extend(of_group::<Surface>(None, ("inside.", Some("as outside"))));
+/// Every line that the program knows of this document, by tables.
+pub fn lines(document: &str) -> Vec<Line> {
+    let mut out = keys(document);
     out.extend(MEASURES.iter().map(|measure| {
         let units = match measure.note {
             "" => measure.allowed(),
@@ -160,45 +151,33 @@ fn tissue(tissue: &Tissue) -> Line {
     Line::new(Tissue::TABLE, "Tissue", &cells)
 }
 
-/// Paths of the keys that have a row.
-pub fn keys() -> Vec<String> {
-    let lines = lines().into_iter().filter(|line| line.head == "Key");
-    lines.map(|line| format!("{}.{}", line.section, line.cells[0].trim_matches('`'))).collect()
-}
-
-/// The document with these lines: existing ones are replaced, others follow the one before.
+/// The document with these lines for those of its tables.
 pub fn written(document: &str, lines: &[Line]) -> String {
     let mut out: Vec<String> = document.lines().map(str::to_owned).collect();
-    let mut last = 0;
-    for line in lines {
-        let table = table(&out, line);
-        let there = table.clone().find(|&at| out[at].starts_with(&line.start()));
-        last = match there {
-            Some(at) => {
-                out[at] = line.text();
-                at
-            }
-            None => {
-                let at = if table.contains(&last) { last + 1 } else { table.end };
-                out.insert(at, line.text());
-                at
-            }
-        };
+    for table in lines.chunk_by(|a, b| a.table() == b.table()) {
+        let text = out.join("\n");
+        out.splice(place(&text, &table[0]), table.iter().map(Line::text));
     }
     out.join("\n") + "\n"
 }
 
+/// Number of the line with the heading of a section.
+fn heading(document: &str, section: &str) -> Option<usize> {
+    let named = format!("[{section}]");
+    document.lines().position(|line| line.starts_with('#') && line.contains(&named))
+}
+
 /// Numbers of the lines of the table in which `line` belongs, without its head.
-fn table(lines: &[String], line: &Line) -> std::ops::Range<usize> {
-    let named = match line.section {
-        "" => "Quantities and units".to_owned(),
-        section => format!("[{section}]"),
+fn place(document: &str, line: &Line) -> std::ops::Range<usize> {
+    let section = match line.section.as_str() {
+        "" => Some(0),
+        section => heading(document, section),
     };
-    let section = lines.iter().position(|l| l.starts_with('#') && l.contains(&named));
-    let section = section.unwrap_or_else(|| panic!("no heading {named}"));
+    let section = section.unwrap_or_else(|| panic!("no heading {}", line.section));
     let head = format!("| {} |", line.head);
-    let table = lines[section..].iter().position(|l| l.starts_with(&head));
+    let mut below = document.lines().skip(section);
+    let table = below.position(|l| l.starts_with(&head));
     let start = section + table.unwrap_or_else(|| panic!("no table {head}")) + 2;
-    let length = lines[start..].iter().position(|l| !l.starts_with('|'));
-    start..start + length.unwrap_or(lines.len() - start)
+    let length = document.lines().skip(start).take_while(|l| l.starts_with('|')).count();
+    start..start + length
 }

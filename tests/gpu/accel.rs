@@ -229,7 +229,7 @@ fn geometry_that_cannot_be_built_is_refused_by_name() {
     assert_clean(device);
 }
 
-/// As on a driver without the extensions: everything except rays works, and the error gives the reason.
+/// Without the extensions everything except rays works, and the error gives the reason.
 #[test]
 fn a_device_without_acceleration_structures_runs_kernels_and_refuses_rays() {
     let options = DeviceOptions {
@@ -264,7 +264,7 @@ fn a_device_without_acceleration_structures_runs_kernels_and_refuses_rays() {
     assert_clean(device);
 }
 
-/// As on GPUs for data centres: structures are built and timed, rays are refused.
+/// Without ray queries, as on GPUs for data centres, structures are built and timed, and rays are refused.
 #[test]
 fn structures_are_built_and_timed_without_ray_queries() {
     if ray_query_device().is_none() {

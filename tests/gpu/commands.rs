@@ -54,7 +54,7 @@ fn two_frames_in_flight_keep_their_own_parameters_and_times() {
 }
 
 #[test]
-fn what_a_submission_uses_may_be_dropped_before_it_has_run() {
+fn objects_of_a_submission_may_be_dropped_before_it_has_run() {
     let device = test_device();
     let mut frames = Frames::new(&device, "frame").unwrap();
     let b = buffer_of(&device, "b", &[0; 4096]);

@@ -244,7 +244,7 @@ fn missing_barriers_and_stale_top_levels_are_reported() {
 }
 
 #[test]
-fn what_cannot_be_built_or_refitted_is_refused_by_name() {
+fn meshes_that_cannot_be_built_or_refitted_are_refused_by_name() {
     let Some(device) = ray_query_device() else {
         return;
     };

@@ -5,7 +5,7 @@ use std::net::{Ipv4Addr, SocketAddr, TcpStream};
 use std::time::{Duration, Instant};
 
 use insonify::igtl::message::{Content, HEADER, Header, Message};
-use insonify::igtl::{Picture, Server, Settings};
+use insonify::igtl::{Picture, Server, ServerSettings};
 use insonify::scene::Tracker;
 use insonify::sim::layout;
 
@@ -14,17 +14,17 @@ pub const PATIENCE: Duration = Duration::from_secs(20);
 
 /// Short limits, so that a test can wait for them; but a pose never grows old, however busy the
 /// machine is.
-pub fn settings() -> Settings {
+pub fn settings() -> ServerSettings {
     let tracker = Tracker { timeout: 3600.0, ..Tracker::default() };
-    Settings {
+    ServerSettings {
         clients: 4,
         message_timeout: Duration::from_millis(400),
         send_timeout: Duration::from_millis(800),
-        ..Settings::new(tracker)
+        ..ServerSettings::new(tracker)
     }
 }
 
-pub fn serve(settings: Settings) -> Server {
+pub fn serve(settings: ServerSettings) -> Server {
     let any = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
     Server::bind(any, settings).expect("a free port")
 }

@@ -1,7 +1,9 @@
 //! Properties of the codec: no input makes it panic, and it reads what it writes.
 
 use insonify::igtl::image::{Image, Scalar};
-use insonify::igtl::message::{Content, Entry, Extension, HEADER, Header, Message, Tool};
+use insonify::igtl::message::{
+    Content, ExtendedHeader, HEADER, Header, Message, MetadataEntry, TrackedTool,
+};
 use insonify::igtl::wire::{Label, Timestamp, checksum};
 use insonify::scene::tracker::Axes;
 use proptest::collection::vec;
@@ -35,13 +37,9 @@ fn matrix() -> impl Strategy<Value = [f32; 12]> {
     proptest::array::uniform12(-1e6_f32..1e6)
 }
 
-fn tool() -> impl Strategy<Value = Tool> {
-    (name(), any::<u8>(), any::<u8>(), matrix()).prop_map(|(name, kind, reserved, matrix)| Tool {
-        name,
-        kind,
-        reserved,
-        matrix,
-    })
+fn tool() -> impl Strategy<Value = TrackedTool> {
+    (name(), any::<u8>(), any::<u8>(), matrix())
+        .prop_map(|(name, kind, reserved, matrix)| TrackedTool { name, kind, reserved, matrix })
 }
 
 fn image() -> impl Strategy<Value = Image> {
@@ -87,9 +85,9 @@ fn content() -> impl Strategy<Value = Content> {
 
 fn message() -> impl Strategy<Value = Message> {
     let entry = (vec(any::<u8>(), 0..20), any::<u16>(), vec(any::<u8>(), 0..20))
-        .prop_map(|(key, encoding, value)| Entry { key, encoding, value });
+        .prop_map(|(key, encoding, value)| MetadataEntry { key, encoding, value });
     let extension =
-        (any::<u32>(), vec(entry, 0..4)).prop_map(|(id, metadata)| Extension { id, metadata });
+        (any::<u32>(), vec(entry, 0..4)).prop_map(|(id, metadata)| ExtendedHeader { id, metadata });
     let extension = proptest::option::of(extension);
     (name(), any::<u64>(), extension, content()).prop_map(|(device, time, extension, content)| {
         Message { device, time: Timestamp(time), extension, content }

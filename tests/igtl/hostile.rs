@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use glam::DAffine3;
 use insonify::igtl::message::{Content, HEADER, Message};
 use insonify::igtl::wire::checksum;
-use insonify::igtl::{Server, Tracked};
+use insonify::igtl::{Server, TrackerState};
 
 use crate::client::{Client, grey, query, serve, settings, shift, until};
 
@@ -48,9 +48,9 @@ fn a_wrong_checksum_costs_the_message_and_many_the_connection() {
     client.send_bytes(&wrong);
     until("it is told", || server.status().errors == 1);
     assert!(last_error(&server).contains("checksum"), "{}", last_error(&server));
-    assert_eq!(server.pose(), Tracked::Never);
+    assert_eq!(server.pose(), TrackerState::Never);
     client.transform("Probe", shift(1.0, 0.0, 0.0));
-    until("the next one counts", || server.pose() != Tracked::Never);
+    until("the next one counts", || server.pose() != TrackerState::Never);
     for _ in 0..40 {
         client.send_bytes(&wrong);
     }
@@ -93,7 +93,7 @@ fn long_messages_of_other_types_are_skipped() {
     );
     client.send(&Message::new("MR", Content::Image(Box::new(image))));
     client.transform("Probe", shift(1.0, 0.0, 0.0));
-    until("what follows is found", || server.pose() != Tracked::Never);
+    until("what follows is found", || server.pose() != TrackerState::Never);
     assert_eq!((server.status().ignored, server.status().errors), (1, 0));
 }
 
@@ -133,7 +133,7 @@ fn silence_between_messages_is_no_fault() {
     let mut client = Client::connect(&server);
     std::thread::sleep(Duration::from_millis(900));
     client.transform("Probe", shift(1.0, 0.0, 0.0));
-    until("it is here", || server.pose() != Tracked::Never);
+    until("it is here", || server.pose() != TrackerState::Never);
     assert_eq!(server.status().errors, 0);
 }
 
@@ -201,7 +201,7 @@ fn noise_and_false_lengths_end_the_connection() {
 }
 
 #[test]
-fn who_leaves_in_the_middle_leaves_nothing_behind() {
+fn clients_that_leave_within_a_message_leave_nothing_behind() {
     let server = serve(settings());
     server.publish(grey(1000, 1000), &DAffine3::IDENTITY);
     for cut in [0, 3, HEADER, HEADER + 5] {
@@ -217,7 +217,7 @@ fn who_leaves_in_the_middle_leaves_nothing_behind() {
 }
 
 #[test]
-fn who_asks_and_never_reads_is_sent_away() {
+fn clients_that_ask_and_never_read_are_disconnected() {
     let server = serve(settings());
     server.publish(grey(1000, 1000), &DAffine3::IDENTITY);
     let mut client = Client::connect(&server);

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
-use insonify::igtl::message::{Content, Extension, Message};
+use insonify::igtl::message::{Content, ExtendedHeader, Message};
 use insonify::igtl::wire::Label;
 use insonify::igtl::{IMAGE_DEVICE, POSE_DEVICE};
 
@@ -18,7 +18,7 @@ fn status(client: &mut Client, kind: &str) -> u8 {
 }
 
 #[test]
-fn what_there_is_not_is_answered_so() {
+fn queries_for_missing_things_are_answered_as_such() {
     let server = serve(settings());
     let mut client = Client::connect(&server);
     for (asked, answered) in [
@@ -54,7 +54,7 @@ fn capability_and_status_are_told_in_the_query_s_version() {
     }
 
     client.send(&Message {
-        extension: Some(Extension { id: 41, metadata: Vec::new() }),
+        extension: Some(ExtendedHeader { id: 41, metadata: Vec::new() }),
         ..query("GET_STATUS", "me")
     });
     let message = client.receive().expect("an answer");

@@ -4,9 +4,9 @@ use std::net::Ipv4Addr;
 use std::time::{Duration, Instant};
 
 use glam::{DAffine3, DQuat, DVec3};
-use insonify::igtl::message::{Content, Entry, Extension, Message, Tool};
+use insonify::igtl::message::{Content, ExtendedHeader, Message, MetadataEntry, TrackedTool};
 use insonify::igtl::wire::Label;
-use insonify::igtl::{IMAGE_DEVICE, POSE_DEVICE, Server, Settings, Tracked};
+use insonify::igtl::{IMAGE_DEVICE, POSE_DEVICE, Server, ServerSettings, TrackerState};
 use insonify::scene::Tracker;
 use insonify::scene::tracker::Axes;
 
@@ -19,8 +19,8 @@ fn place(server: &Server) -> DVec3 {
 }
 
 /// Settings whose world is the tracker's, with one tool and a short timeout.
-fn plain() -> Settings {
-    Settings {
+fn plain() -> ServerSettings {
+    ServerSettings {
         tracker: Tracker {
             device: Some("ProbeToReference".to_owned()),
             timeout: 1.0,
@@ -35,24 +35,24 @@ fn plain() -> Settings {
 #[test]
 fn the_tool_moves_the_probe_until_it_is_lost() {
     let server = serve(plain());
-    assert_eq!(server.pose(), Tracked::Never);
+    assert_eq!(server.pose(), TrackerState::Never);
     let mut tracker = Client::connect(&server);
     tracker.transform("StylusToReference", shift(9.0, 9.0, 9.0));
     until("the stylus is counted", || server.status().ignored == 1);
-    assert_eq!(server.pose(), Tracked::Never, "another tool");
+    assert_eq!(server.pose(), TrackerState::Never, "another tool");
 
     let sent = Instant::now();
     tracker.transform("ProbeToReference", shift(1.0, 2.0, 3.0));
-    until("a pose", || server.pose() != Tracked::Never);
+    until("a pose", || server.pose() != TrackerState::Never);
     assert_eq!(place(&server), DVec3::new(1.0, 2.0, 3.0));
     let pose = *server.pose().pose().expect("a pose");
     assert!(pose.arrived >= sent && pose.number == 1 && pose.device.is("ProbeToReference"));
 
-    until("it is lost", || matches!(server.pose(), Tracked::Lost(_)));
+    until("it is lost", || matches!(server.pose(), TrackerState::Lost(_)));
     assert!(pose.arrived.elapsed() >= Duration::from_secs(1));
-    assert_eq!(server.pose(), Tracked::Lost(pose), "the last pose is kept");
+    assert_eq!(server.pose(), TrackerState::Lost(pose), "the last pose is kept");
     tracker.transform("ProbeToReference", shift(4.0, 5.0, 6.0));
-    until("it is back", || matches!(server.pose(), Tracked::Live(_)));
+    until("it is back", || matches!(server.pose(), TrackerState::Live(_)));
     assert_eq!(place(&server), DVec3::new(4.0, 5.0, 6.0));
     assert_eq!(server.status().errors, 0);
 }
@@ -81,10 +81,10 @@ fn calibration_and_axes_are_applied() {
         ),
         ..Tracker::default()
     };
-    let server = serve(Settings { tracker, ..settings() });
+    let server = serve(ServerSettings { tracker, ..settings() });
     let mut client = Client::connect(&server);
     client.transform("anything", shift(10.0, 20.0, 30.0));
-    until("a pose", || server.pose() != Tracked::Never);
+    until("a pose", || server.pose() != TrackerState::Never);
     // (10, 20, 70) in the tracker's frame; a quarter turn about x takes y to z and z to -y.
     let face = server.pose().pose().expect("a pose").world_from_probe;
     let expected = DVec3::new(10.0, -70.0, 120.0);
@@ -104,7 +104,7 @@ fn calibration_and_axes_are_applied() {
 fn tdata_name_the_tool() {
     let server = serve(plain());
     let mut client = Client::connect(&server);
-    let tool = |name: &str, x: f32| Tool {
+    let tool = |name: &str, x: f32| TrackedTool {
         name: Label::new(name),
         kind: 2,
         reserved: 0,
@@ -112,44 +112,44 @@ fn tdata_name_the_tool() {
     };
     let tools = vec![tool("Stylus", 1.0), tool("ProbeToReference", 2.0), tool("Bed", 3.0)];
     client.send(&Message::new("Tracker", Content::Tracking(tools)));
-    until("a pose", || server.pose() != Tracked::Never);
+    until("a pose", || server.pose() != TrackerState::Never);
     assert_eq!(place(&server).x, 2.0);
 }
 
 #[test]
 fn a_tool_that_plus_does_not_see_is_lost_at_once() {
     let settings =
-        Settings { tracker: Tracker { timeout: 3600.0, ..plain().tracker }, ..settings() };
+        ServerSettings { tracker: Tracker { timeout: 3600.0, ..plain().tracker }, ..settings() };
     let server = serve(settings);
     let mut client = Client::connect(&server);
     let mut send = |status: &str, x: f32| {
-        let entry = Entry {
+        let entry = MetadataEntry {
             key: b"TransformStatus".to_vec(),
             encoding: 3,
             value: status.as_bytes().to_vec(),
         };
         client.send(&Message {
-            extension: Some(Extension { id: 1, metadata: vec![entry] }),
+            extension: Some(ExtendedHeader { id: 1, metadata: vec![entry] }),
             ..Message::new("ProbeToReference", Content::Transform(shift(x, 0.0, 0.0)))
         });
     };
     send("OK", 1.0);
-    until("a pose", || matches!(server.pose(), Tracked::Live(_)));
+    until("a pose", || matches!(server.pose(), TrackerState::Live(_)));
     send("OUT_OF_VIEW", 7.0);
-    until("it is lost", || matches!(server.pose(), Tracked::Lost(_)));
+    until("it is lost", || matches!(server.pose(), TrackerState::Lost(_)));
     let last = server.pose().pose().expect("a pose").world_from_probe;
     assert_eq!(last.translation.x, 1.0, "what it saw last");
     send("OK", 2.0);
-    until("it is back", || matches!(server.pose(), Tracked::Live(_)));
+    until("it is back", || matches!(server.pose(), TrackerState::Live(_)));
     assert_eq!(place(&server).x, 2.0);
 }
 
 #[test]
-fn what_is_no_pose_is_told_and_leaves_the_last_one() {
+fn invalid_poses_are_reported_and_leave_the_last_one() {
     let server = serve(plain());
     let mut client = Client::connect(&server);
     client.transform("ProbeToReference", shift(1.0, 0.0, 0.0));
-    until("a pose", || server.pose() != Tracked::Never);
+    until("a pose", || server.pose() != TrackerState::Never);
     let mut scaled = shift(0.0, 0.0, 0.0);
     scaled[0] = 1.5;
     let mirrored = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0, 0.0];
@@ -218,7 +218,7 @@ fn colours_are_sent_as_such_and_what_is_transparent_is_black() {
 
 #[test]
 fn a_client_that_does_not_read_delays_nobody() {
-    let server = serve(Settings { send_timeout: Duration::from_secs(3), ..settings() });
+    let server = serve(ServerSettings { send_timeout: Duration::from_secs(3), ..settings() });
     let idle = Client::connect(&server);
     let mut reader = Client::connect(&server);
     until("both are in", || server.status().clients == 2);

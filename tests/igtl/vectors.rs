@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DVec3};
 use insonify::igtl::image::Scalar;
-use insonify::igtl::message::{Content, Extension, HEADER, Header, Message};
+use insonify::igtl::message::{Content, ExtendedHeader, HEADER, Header, Message};
 use insonify::igtl::wire::DecodeError;
 use insonify::scene::tracker::Axes;
 use serde_json::Value;
@@ -41,7 +41,7 @@ fn decoded(name: &str, wire: &[u8]) -> Message {
 }
 
 #[test]
-fn what_pyigtl_writes_is_read_as_it_was_meant() {
+fn messages_of_pyigtl_are_read_with_their_meaning() {
     let quarter = [0.0, 1.0, 0.0, -1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 10.5, -20.25, 30.125];
     for (name, hex) in [("TRANSFORM", TRANSFORM), ("TRANSFORM_2", TRANSFORM_2)] {
         let message = decoded(name, &bytes(hex));
@@ -150,7 +150,7 @@ fn the_reference_library_s_messages_are_read_and_written() {
     let told = decoded("positionFormat2", &wire("positionFormat2"));
     assert_eq!(told.metadata("First patient age").as_deref(), Some("22"));
     assert_eq!(told.metadata("Second patient age").as_deref(), Some("25"));
-    assert_eq!(told.extension.map(|Extension { id, .. }| id), Some(1));
+    assert_eq!(told.extension.map(|ExtendedHeader { id, .. }| id), Some(1));
 
     // The comparison has to notice a wrong number.
     let mut planted = MATRIX;

@@ -106,8 +106,8 @@ pub fn around(direction: DVec3, count: u32) -> impl Iterator<Item = DVec3> {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Verdict {
     Same,
-    /// As the reference's answer to a ray displaced by no more than the rounding: it passes an outline, where the
-    /// device may also meet just the corner of a triangle.
+    /// Equal to the reference's answer to a ray displaced by no more than the rounding: the ray passes an outline,
+    /// where the device may also meet just the corner of a triangle.
     Displaced,
     Wrong,
 }

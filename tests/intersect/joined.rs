@@ -106,7 +106,7 @@ fn keyframes_of_one_group_share_structures() {
 
 /// A ray enters a shared structure once; and the comparison notices triangles with a wrong owner.
 #[test]
-fn what_is_shared_is_entered_once_and_a_wrong_owner_is_noticed() {
+fn a_shared_structure_is_entered_once_and_a_wrong_owner_is_noticed() {
     let scene = nested();
     let mut rig = Rig::new(&scene, Tracer::Bvh);
     let rays = rays(&scene, 4000, 5);

@@ -53,7 +53,7 @@ fn a_stale_keyframe_is_noticed() {
 
 /// Each strategy records only what it has to when the keyframe changes, and nothing otherwise.
 #[test]
-fn only_what_a_strategy_needs_is_recorded() {
+fn each_strategy_records_only_what_it_needs() {
     for strategy in Strategy::ALL.iter().copied() {
         let mut scene = beating(strategy);
         let mut rig = Rig::new(&scene, Tracer::Bvh);

@@ -50,7 +50,7 @@ fn overwrite(json: &mut Value, accessor: &Value, values: &[f32]) {
 }
 
 #[test]
-fn of_moving_nodes() {
+fn mistakes_in_moving_nodes_are_refused() {
     refused(
         &tree(),
         &[
@@ -165,7 +165,7 @@ fn of_moving_nodes() {
 }
 
 #[test]
-fn of_skins_and_morph_targets() {
+fn mistakes_in_skins_and_morph_targets_are_refused() {
     refused(
         &bending(),
         &[
@@ -248,7 +248,7 @@ fn of_skins_and_morph_targets() {
 }
 
 #[test]
-fn of_files_that_are_no_gltf() {
+fn animations_of_other_formats_are_refused() {
     let issues = load_animated(Path::new("a.obj"), &Options::default(), Choice::First);
     let issues: Vec<Issue> = issues.expect_err("no animation in OBJ");
     assert!(issues[0].message.contains("only .gltf and .glb files"), "{issues:?}");
@@ -268,7 +268,7 @@ fn tents(heights: &[&str]) -> Result<(Vec<insonify::scene::Mesh>, Vec<Issue>), V
 }
 
 #[test]
-fn of_files_that_are_keyframes() {
+fn mistakes_in_files_of_keyframes_are_reported() {
     let (meshes, issues) = tents(&["9", "5", "1"]).expect("sound");
     assert!(issues.is_empty(), "{issues:?}");
     assert!(meshes.iter().all(|m| m.shares_topology(&meshes[0])));
@@ -292,7 +292,7 @@ fn of_files_that_are_keyframes() {
 }
 
 #[test]
-fn of_files_of_different_topology() {
+fn files_of_different_topology_are_loaded_each_on_its_own() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let (first, second) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
     std::fs::write(&first, TENT.replace("HIGH", "9")).expect("written");
@@ -306,7 +306,7 @@ fn of_files_of_different_topology() {
 
 /// A seam that opens: vertices that coincide at first, but not always, stay apart.
 #[test]
-fn of_welding_what_parts() {
+fn vertices_that_separate_later_are_not_welded() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let (first, second) = (folder.path().join("a.obj"), folder.path().join("b.obj"));
     std::fs::write(&first, TENT.replace("HIGH", "9")).expect("written");
@@ -326,7 +326,7 @@ fn of_welding_what_parts() {
 
 /// Damaged copies of sound files are read or refused, none panics.
 #[test]
-fn of_chance_never_panic() {
+fn random_damage_never_panics() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let mut state = 7u64;
     let mut random = move |below: usize| {

@@ -93,8 +93,8 @@ const BESIDE: [f64; 2] = [-31.0, -1.0];
 const INSIDE: [f64; 2] = [1.0, 31.0];
 const BOX: [f64; 2] = [35.0, 85.0];
 
-// 0.3 dB is the table's; 60 lines of 50 mm hold 9 000 grains each: 0.07 dB on the difference. The histogram's bins are a
-// few hundredths of the overlap's width, and chance adds 0.01: 0.03 for gCNR.
+// 0.3 dB is the table's; 60 lines of 50 mm hold 9 000 grains each: 0.07 dB on the difference. The histogram's bins
+// are a few hundredths of the overlap's width, and chance adds 0.01: 0.03 for gCNR.
 fn echogenicity(bench: &Bench, physics: Physics) -> Outcome {
     let mut out = Outcome::default();
     let mut pairs = [Vec::new(), Vec::new()];

@@ -8,7 +8,7 @@ use insonify::scene::fusion::Acquired;
 use insonify::scene::{Scene, shapes};
 use insonify::settings::Words;
 use insonify::settings::{Blend, Fusion, MaskSpeed, Surroundings};
-use insonify::sim::fusion::Steps;
+use insonify::sim::fusion::FusionSteps;
 use insonify::sim::{Simulator, Tracer, shaders::Library};
 use insonify::volume::Voxels;
 
@@ -19,7 +19,7 @@ const TRACERS: [Tracer; 2] = [Tracer::Bvh, Tracer::RayQuery];
 
 /// The steps of the frame, its grey levels (none where transparent), and their width.
 struct Fused {
-    steps: Steps,
+    steps: FusionSteps,
     levels: Vec<Option<u8>>,
     width: u32,
 }

@@ -3,7 +3,7 @@
 use glam::{DAffine3, DVec3};
 use insonify::probe::{Kind, Probe};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Surface, Tissue, Wire, shapes};
-use insonify::settings::{Imaging, Simulation};
+use insonify::settings::Simulation;
 
 /// A tissue of `speed` mm/us and impedance `impedance` MRayl, attenuating `attenuation` dB/(cm MHz),
 /// with sparse scatterers of liver's brightness.
@@ -43,11 +43,10 @@ pub fn linear(lines: u32, width: f64, background: Tissue) -> Scene {
         elevation_layers: 1,
         ..Probe::paper_table1()
     };
-    Scene {
-        simulation: Simulation { paths: 1, max_reflections: 0, ..Simulation::default() },
-        imaging: Imaging { noise: f64::NEG_INFINITY, ..Imaging::default() },
-        ..Scene::homogeneous(background, probe)
-    }
+    let mut scene = Scene::homogeneous(background, probe);
+    scene.simulation = Simulation { paths: 1, max_reflections: 0, ..Simulation::default() };
+    scene.imaging.noise = f64::NEG_INFINITY;
+    scene
 }
 
 /// Adds a mirror-like body at the place given by `at`; later bodies win where they overlap.
@@ -84,7 +83,8 @@ pub fn add_point(scene: &mut Scene, at: [f64; 3], amplitude: f64) {
     scene.wires.push(Wire { ends: [at; 2], spacing: 1.0, amplitude });
 }
 
-/// Adds a ball of `radius` mm around `centre`, made of 20 480 triangles: its faces are up to 2.5e-4 of the radius inside.
+/// Adds a ball of `radius` mm around `centre`, made of 20 480 triangles: its faces are up to 2.5e-4 of the radius
+/// inside.
 pub fn add_sphere(scene: &mut Scene, radius: f64, tissue: Tissue, centre: DVec3) {
     let at = DAffine3::from_translation(centre);
     add_body(scene, shapes::sphere(radius, 5), tissue, at);

@@ -14,8 +14,8 @@ use crate::scenes::{add_box, linear, silent};
 /// Frequency, MHz; and speed to which the machine and, unless stated, the medium are set, mm/us.
 const FREQUENCY: f64 = 7.0;
 const SPEED: f64 = 1.540;
-/// Sample pitch, mm, and place of the interface, samples. At this fraction the
-/// squares of the cubic's four shares sum to their mean over all fractions, 0.7757: a mirror there shows the mean energy.
+/// Sample pitch, mm, and place of the interface, samples. At this fraction the squares of the cubic's four shares sum
+/// to their mean over all fractions, 0.7757: a mirror there shows the mean energy.
 const PITCH: f64 = 12.5 / 256.0;
 const PLACE: f64 = 80.222_782;
 const SAMPLES: u32 = 128;

@@ -128,9 +128,9 @@ fn a_change_between_frames_is_as_if_the_file_had_said_it() {
     assert_eq!(device.validation_messages(), Vec::<String>::new());
 }
 
-/// Where everything moves together, the probe's image stays; where one part stays behind, it does not.
+/// The image stays the same if everything moves with the probe; it changes if one part stays behind.
 #[test]
-fn what_moves_together_looks_the_same() {
+fn moving_everything_together_changes_no_image() {
     let device = test_device();
     let folder = folder();
     let turn = DQuat::from_axis_angle(DVec3::new(0.6, 0.0, 0.8), 0.7);

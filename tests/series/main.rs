@@ -274,7 +274,7 @@ fn volumes_beyond_the_devices_limit_are_averaged_alike() {
     };
     scene.volume = Some(series.clone());
     let mut all = simulator(&device, &scene);
-    let warning = all.warning().expect("it is told").to_owned();
+    let warning = all.warning().expect("a warning").to_owned();
     assert!(warning.contains("at 3 times is larger"), "{warning}");
     for time in [2, 0, 1] {
         scene.set_time(time as f64);

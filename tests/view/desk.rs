@@ -132,7 +132,7 @@ impl Desk {
         Self::open_scaled(scene, arguments, 1.0)
     }
 
-    /// As [`Self::open`], on a display where a point is `scale` pixels.
+    /// Like [`Self::open`], on a display where a point is `scale` pixels.
     pub fn open_scaled(scene: &str, arguments: &[&str], scale: f64) -> Option<Self> {
         let scaled = |_: &Path, command: &mut Command| {
             command.env("WINIT_X11_SCALE_FACTOR", scale.to_string());
@@ -140,7 +140,7 @@ impl Desk {
         Self::open_on(Display::open()?, scene, arguments, scaled)
     }
 
-    /// As [`Self::open`], on a display, with other files in the scene's folder, or another environment: `prepare`
+    /// Like [`Self::open`], on a display, with other files in the scene's folder, or another environment: `prepare`
     /// changes both.
     pub fn open_on(
         display: Display,

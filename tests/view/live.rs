@@ -7,7 +7,7 @@ use super::tools::sidecar;
 use super::{IMAGE, SCENE, brightness, difference};
 
 #[test]
-fn what_moves_is_coarse_and_what_rests_is_the_scenes_own() {
+fn moving_scenes_are_coarse_and_resting_ones_have_the_scenes_own_quality() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name).to_str().expect("UTF-8").to_owned();
     let (json, scene, rendered) = (path("times.json"), path("scene.toml"), path("rendered.png"));

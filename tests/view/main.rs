@@ -209,7 +209,7 @@ fn difference(a: &[u8], b: &[u8]) -> f64 {
 }
 
 #[test]
-fn what_has_changed_is_noticed() {
+fn the_comparison_of_pictures_notices_a_change() {
     assert_eq!(brightness(&[0, 10, 20]), 10.0);
     assert_eq!(difference(&[0, 10, 20], &[3, 10, 17]), 2.0);
 }

@@ -8,7 +8,7 @@ use super::skip::{Lacking, skip};
 use super::{IMAGE, SCENE, brightness, difference};
 
 #[test]
-fn a_window_that_is_torn_about_shows_its_image_at_last() {
+fn a_window_resized_many_times_shows_its_image_at_last() {
     let Some(mut desk) = Desk::open(SCENE, &["--validate"]) else {
         return;
     };

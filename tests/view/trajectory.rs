@@ -10,7 +10,7 @@ use crate::{IMAGE, SCENE, brightness, difference};
 const WAY: &str = "time_s,x_mm,y_mm,z_mm\n0,0,0,0\n0.25,6,0,0\n0.5,12,0,0\n";
 
 #[test]
-fn what_was_recorded_is_replayed() {
+fn a_recorded_trajectory_is_replayed() {
     let Some(mut desk) = Desk::open(SCENE, &["--validate"]) else {
         return;
     };

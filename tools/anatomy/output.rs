@@ -14,14 +14,14 @@ use crate::pose::{self, Pose};
 pub fn obj(name: &str, axes: &str, surface: &Surface) -> String {
     let mut out = format!("# {name}, mm; {axes}\n");
     for p in &surface.positions {
-        writeln!(out, "v {:.3} {:.3} {:.3}", p.x, p.y, p.z).expect("strings grow");
+        writeln!(out, "v {:.3} {:.3} {:.3}", p.x, p.y, p.z).expect("text in memory");
     }
     for n in &surface.normals {
-        writeln!(out, "vn {:.3} {:.3} {:.3}", n.x, n.y, n.z).expect("strings grow");
+        writeln!(out, "vn {:.3} {:.3} {:.3}", n.x, n.y, n.z).expect("text in memory");
     }
     for t in &surface.triangles {
         let [a, b, c] = t.map(|i| i + 1);
-        writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}").expect("strings grow");
+        writeln!(out, "f {a}//{a} {b}//{b} {c}//{c}").expect("text in memory");
     }
     out
 }

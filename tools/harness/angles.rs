@@ -1,4 +1,4 @@
-//! `angles`: circle and arcs by sums and products alone.
+//! `angles`: sines, cosines and arcs from sums and products alone.
 
 use super::inputs::Random;
 use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
@@ -15,7 +15,7 @@ pub const SUBJECT: Subject = Subject {
     extent: Some(|job| Extent::threads(arguments(job).len() as u32, 1)),
     check,
     plant: |job, outputs| {
-        // What a device's own sine may be off.
+        // The largest error that a device's own sine may have.
         job.edit(outputs, "results", |results: &mut [[f32; 4]]| {
             let middle = results.len() / 2;
             results[middle][1] += f32::powi(2.0, -11);
@@ -38,14 +38,14 @@ fn job(case: Case, size: Size) -> Job {
     };
     let mut values: Vec<[f32; 4]> = (0..count)
         .map(|i| {
-            // Within half a turn, and as far as a carrier turns over a line.
+            // Half of them within half a turn, half as far as a carrier turns over a line.
             let far = if i % 2 == 0 { 0.5 } else { 2000.0 };
             let [turns, y, x] = [far, 130.0, 130.0].map(|r| random.within(-r, r) as f32);
             [turns, y, x, random.within(-1.0, 1.0) as f32]
         })
         .collect();
     if case == Case::Modes {
-        // Where the circle is put together, and the ends.
+        // Arguments at which the formula for the circle changes, and the ends.
         let quarters = values.iter_mut().zip(-12i16..=12);
         for (value, quarter) in quarters {
             let [y, x] = [quarter % 3, quarter % 2].map(f32::from);

@@ -1,4 +1,4 @@
-//! `axial`: the pulse's envelope along each line. What it detects of it is the subject `detect`.
+//! `axial`: the pulse's envelope along each line. Its detection is the subject `detect`.
 
 use super::inputs::{Random, frame, rows, samples};
 use super::{Case, Check, Input, Job, Size, Subject};

@@ -24,7 +24,7 @@ pub const SUBJECT: Subject = Subject {
     ..Subject::of(&stages::BLUR)
 };
 
-/// Whether the source has rows and columns exchanged.
+/// True if the source has rows and columns exchanged.
 fn turned(job: &Job) -> bool {
     job.push.iter().any(|&b| b != 0)
 }

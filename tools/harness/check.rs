@@ -7,17 +7,17 @@ pub struct Check {
     pub what: &'static str,
     /// Comparisons made.
     pub count: usize,
-    /// Difference where it is worst relative to what is allowed there; infinite where one is NaN
+    /// The largest difference relative to its tolerance; infinite where one value is NaN
     /// and the other is not.
     pub error: f64,
-    /// What is allowed there.
+    /// The tolerance there.
     pub allowed: f64,
-    /// Index of that place.
+    /// The index of that place.
     pub at: usize,
 }
 
 impl Check {
-    /// Nothing exceeds what is allowed.
+    /// True if nothing exceeds its tolerance.
     pub fn passed(&self) -> bool {
         self.error <= self.allowed
     }
@@ -47,12 +47,12 @@ impl Check {
         Self::of_same_length(what, got.len(), expected.len(), errors, |_| 0.0)
     }
 
-    /// A count of differing things, of which `allowed` may differ.
+    /// A number of `differing` things out of `of`; at most `allowed` may differ.
     pub fn count(what: &'static str, of: usize, differing: usize, allowed: usize) -> Self {
         Self { what, count: of, error: differing as f64, allowed: allowed as f64, at: 0 }
     }
 
-    /// One number.
+    /// The check of one error.
     pub fn one(what: &'static str, error: f64, allowed: f64) -> Self {
         let error = if error.is_nan() { f64::INFINITY } else { error };
         Self { what, count: 1, error, allowed, at: 0 }

@@ -1,4 +1,4 @@
-//! `collapse`: a level of the blend's pyramid added to what the coarser ones give.
+//! `collapse`: one level of the blend's pyramid added to the result of the coarser ones.
 
 use super::inputs::Random;
 use super::reduce::{level, noise, size_of_level};
@@ -34,7 +34,7 @@ pub const SUBJECT: Subject = Subject {
     ..Subject::of(&stages::COLLAPSE)
 };
 
-/// Pixels along x and y of the level and of the next coarser one, which is not there at the top.
+/// Pixels along x and y of the level and of the next coarser one; 0 if there is none.
 fn sizes(job: &Job) -> [[usize; 2]; 2] {
     let [width, height, coarsest]: [u32; 3] = bytemuck::pod_read_unaligned(&job.push);
     let fine = [width, height].map(|n| n as usize);

@@ -7,7 +7,7 @@ use crate::reference::convert;
 use insonify::sim::layout::Frame;
 use insonify::sim::stages;
 
-/// As of `display`: white noise, positions good to about 1e-6 of the image.
+/// Largest difference of levels, as in `display`: white noise, positions exact to about 1e-6 of the image.
 const LEVEL: f64 = 2e-3;
 
 pub const SUBJECT: Subject = Subject {
@@ -45,7 +45,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         true => 1.0,
         false => LEVEL,
     };
-    // Next to a value that is not finite, what is left of it is anything: 0 times infinity.
+    // Beside a value that is not finite any result is allowed: its weight may be 0, and 0 times infinity is NaN.
     let finite = |v: f64, got: f32| if v.is_finite() { v } else { f64::from(got) };
     let expected = |which: usize, got: &[f32]| -> Vec<f64> {
         let values = converted.iter().zip(got);

@@ -25,7 +25,7 @@ fn job(case: Case, size: Size) -> Job {
     let mut random = Random(14);
     let mut pieces = Vec::new();
     for _ in 0..lines(&frame) {
-        // As many as there is room for, or few; several that begin at one place; the dark.
+        // As many pieces as there is room for, or few; several that begin at one place; the level of no sound.
         let count = match random.word() % 4 {
             0 => MAX_PIECES - 1,
             _ => 1 + random.word() as usize % 6,

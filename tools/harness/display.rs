@@ -95,7 +95,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-/// Whether the sector's edge runs within [`EDGE`] of pixel `i`.
+/// True if the sector's edge is within [`EDGE`] of pixel `i`.
 pub(super) fn near_edge(frame: &Frame, i: usize) -> bool {
     let pitch = f64::from(frame.pixel_pitch);
     let width = frame.image_width as usize;

@@ -12,10 +12,10 @@ use insonify::sim::shaders::Library;
 
 use super::{Case, Check, Element, Job, Role, SUBJECTS, Size, Subject, run};
 
-/// Writes every binding of a job, or of what a run left behind.
+/// Writes the contents of every binding of a job, before or after a run.
 ///
 /// # Errors
-/// What the file system says.
+/// A file-system error.
 pub fn write(dir: &Path, job: &Job, contents: &[Vec<u8>]) -> std::io::Result<()> {
     fs::create_dir_all(dir)?;
     for (input, bytes) in job.inputs.iter().zip(contents) {
@@ -31,7 +31,7 @@ pub fn write(dir: &Path, job: &Job, contents: &[Vec<u8>]) -> std::io::Result<()>
 }
 
 /// Replaces the bindings of `job` that the kernel reads and the folder has; returns their names.
-/// Accumulators and outputs begin anew, as large as the frame asks for.
+/// Accumulators and outputs start anew, in the size that the frame needs.
 ///
 /// # Errors
 /// A sentence on an array that cannot be read or is too small for the frame.
@@ -90,11 +90,11 @@ pub fn read(dir: &Path, subject: &Subject, job: &mut Job) -> Result<Vec<&'static
     Ok(found)
 }
 
-/// Runs the first variant of the kernel `name` on what lies in `dir`, as [`read`] finds it, and compares
+/// Runs the first variant of the kernel `name` on the files in `dir`, read by [`read`], and compares
 /// it with its twin.
 ///
 /// # Panics
-/// Where `dir` has next to nothing of what the kernel reads, or the kernel does not run.
+/// If `dir` lacks most of the kernel's inputs, or the kernel does not run.
 pub fn check(device: &Arc<Device>, library: &Library, dir: &Path, name: &str) -> Vec<Check> {
     let subject = SUBJECTS.iter().find(|s| s.name == name).expect(name);
     let mut job = (subject.job)(Case::One, Size::Small);

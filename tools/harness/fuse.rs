@@ -7,7 +7,7 @@ use crate::reference::fuse;
 use insonify::sim::layout::{BLEND_LINEAR, BLEND_MULTIBAND, BLEND_SMOOTH, Fusion};
 use insonify::sim::stages;
 
-/// Distance from the middle between two grey levels at which either will do: single precision of
+/// Distance from the middle between two grey levels within which either level is correct: single precision of
 /// numbers to 255.
 const ROUNDING: f64 = 1e-4;
 

@@ -51,7 +51,7 @@ pub fn dimensions(case: Case, size: Size) -> [u32; 3] {
 pub fn straight_frame(case: Case, size: Size) -> Frame {
     let mut frame = frame(case, size);
     match case {
-        // Not what the rays' elevation, a constant 0, is multiplied by: a compiler may leave that out.
+        // Not the factors of the rays' elevation: it is a constant 0, so a compiler may leave the product out.
         Case::NotFinite => frame.world_from_probe[0][2] = f32::NAN,
         Case::Modes => frame.flags |= FLAG_COINCIDENT,
         _ => {}
@@ -150,12 +150,12 @@ pub fn scanlines(frame: &Frame) -> Input {
     Input::floats("scanlines", bytemuck::cast_slice(&table))
 }
 
-/// Index l K + k of every sample.
+/// The number of samples of all scanlines.
 pub fn samples(frame: &Frame) -> usize {
     frame.scanlines as usize * frame.samples as usize
 }
 
-/// Lines of a frame.
+/// The number of lines of a frame.
 pub fn lines(frame: &Frame) -> usize {
     frame.scanlines as usize * frame.layers as usize
 }

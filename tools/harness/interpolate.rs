@@ -23,7 +23,7 @@ pub const SUBJECT: Subject = Subject {
     extent: Some(|job| Extent::threads(push(job).count, 1)),
     check,
     plant: |job, outputs| {
-        // Of numbers about 1.
+        // Rounding of numbers about 1.
         let target = (push(job).stride * push(job).target) as usize;
         job.edit(outputs, "values", |values: &mut [f32]| {
             values[target + 5] += 1e-4;

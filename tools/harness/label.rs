@@ -52,7 +52,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     }
     vec![
         Check::count("labels", got.len(), wrong, 0),
-        // As many as lie so close by chance; else the comparison excuses everything.
+        // Not more samples than lie so close by chance are left out; otherwise the comparison would allow any result.
         Check::count("samples at a crossing", got.len(), near, got.len() / 50),
     ]
 }

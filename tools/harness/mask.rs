@@ -12,7 +12,7 @@ use insonify::sim::stages;
 
 /// Distance from a crossing, mm, within which a sample may be on either side.
 const EDGE: f64 = 1e-3;
-/// Grey levels of white noise may differ by this: places are good to 1e-4 of a texel.
+/// Largest difference of grey levels in white noise: positions are exact to 1e-4 of a texel.
 const LEVEL: f64 = 1e-3;
 
 pub const SUBJECT: Subject = Subject {
@@ -118,7 +118,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let allowed = |i: usize| if at_end(places[i]) { 1.0 } else { LEVEL };
     vec![
         Check::count("mask", got.len(), wrong, 0),
-        // As many as lie so close by chance; else the comparison excuses everything.
+        // Not more samples than lie so close by chance are left out; otherwise the comparison would allow any result.
         Check::count("samples at a crossing", got.len(), near, got.len() / 50),
         Check::close("grey level", &shown, &expected, allowed),
     ]

@@ -10,7 +10,7 @@ use super::{Case, Check, Element, Extent, Input, Job, Size, Subject};
 use crate::reference::Owned;
 use insonify::sim::layout::{NONE, Ray, RayHit};
 
-/// Crossings closer together than this, mm, may change places in single precision; so may a
+/// Distance, mm, below which two crossings may change their order in single precision, and so may a
 /// crossing and an end of the ray.
 const MARGIN: f64 = 1e-3;
 
@@ -126,7 +126,7 @@ fn compare(owned: &Owned, ray: &Ray, hit: &RayHit, worst: &mut Worst) {
         worst.wrong += usize::from(surely.is_some());
         return;
     }
-    // The first for sure, or one before it that may count or is as near.
+    // The first crossing that surely counts, or one before it that may count or is equally near.
     let candidates = seen.iter().filter(|c| surely.is_none_or(|s| c.t <= s.t + MARGIN));
     let same = |c: &&&crate::reference::world::Crossing| {
         c.instance == hit.instance && (c.t - t).abs() < MARGIN

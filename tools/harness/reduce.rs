@@ -45,7 +45,7 @@ pub(super) fn size_of_level(case: Case, size: Size) -> [u32; 2] {
     }
 }
 
-/// A level of noise, of which a half has no weight and a strip is not simulated.
+/// A level of noise; half of it has no weight, and a strip is not simulated.
 pub(super) fn noise(random: &mut Random, size: [u32; 2]) -> Vec<[f32; 3]> {
     let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
     pixels
@@ -65,7 +65,7 @@ pub(super) fn noise(random: &mut Random, size: [u32; 2]) -> Vec<[f32; 3]> {
         .collect()
 }
 
-/// A level as the twin reads it.
+/// A level in the form of the twin.
 pub(super) fn level(size: [usize; 2], sums: &[[f32; 3]]) -> Level {
     Level { size, sums: sums.iter().map(|s| s.map(f64::from)).collect() }
 }

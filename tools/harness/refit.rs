@@ -43,7 +43,7 @@ fn push(job: &Job) -> RefitLevel {
     bytemuck::pod_read_unaligned(&job.push)
 }
 
-/// Meshes; of three, the first rests.
+/// The meshes of a case; if there are three, the first one does not move.
 fn meshes(case: Case, size: Size) -> Vec<Mesh> {
     let fine = match size {
         Size::Small => 3,
@@ -158,7 +158,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-/// Whether all that a node encloses is.
+/// True if everything that a node encloses is finite.
 fn finite(node: &[u32], geometry: Geometry<'_>, boxes: &[Box3]) -> bool {
     (0..8).all(|c| match refit::child(node, c) {
         Child::Empty => true,

@@ -12,9 +12,9 @@ use insonify::sim::layout::{Fusion, Instance};
 use insonify::sim::pass;
 use insonify::sim::rounds::Round;
 
-/// What a run left behind.
+/// The result of a run.
 pub struct Outcome {
-    /// Content of every binding in binding order; acceleration structures are as given.
+    /// Content of every binding in binding order; acceleration structures are unchanged.
     pub outputs: Vec<Vec<u8>>,
     /// Time on the device, milliseconds; NaN where it has no timestamps.
     pub milliseconds: f64,
@@ -23,7 +23,7 @@ pub struct Outcome {
 /// Uploads `job`, dispatches `kernel` once and reads all bindings back.
 ///
 /// # Errors
-/// What the device says; bindings or push constants that do not fit the kernel.
+/// A device error; bindings or push constants that do not fit the kernel.
 pub fn run(
     device: &Arc<Device>,
     kernel: &Kernel,
@@ -84,7 +84,7 @@ pub fn run(
     Ok(Outcome { outputs, milliseconds })
 }
 
-/// The kernel for each role that some round has.
+/// The kernel specialised for each role that occurs in the rounds.
 fn specialized(kernel: &Kernel, rounds: &[Round]) -> Result<BTreeMap<u32, Kernel>, GpuError> {
     let roles: BTreeSet<u32> = rounds.iter().map(|round| round.role).collect();
     let made = |role| Ok((role, kernel.specialized(&Round::constants(role))?));
@@ -123,11 +123,11 @@ fn build(device: &Arc<Device>, job: &Job) -> Result<Tlas, GpuError> {
         blas.extend(Blas::build_many(device, &[input], BlasOptions::default())?);
     }
     let mut tlas = Tlas::new(device, "scene", instances.len().max(1) as u32)?;
-    // An entry lies where its row says: rows are laid out for the compute tracer.
+    // Entries are in the order of the rows' slots, which are laid out for the compute tracer.
     let mut order: Vec<_> = instances.iter().enumerate().collect();
     order.retain(|(_, i)| i.triangles > 0);
     order.sort_by_key(|(_, i)| i.slot);
-    // One stands for all that share a structure.
+    // One instance represents all that share a structure.
     order.dedup_by(|(_, b), (_, a)| a.owners != 0 && a.slot == b.slot);
     let placed: Vec<_> = order
         .into_iter()

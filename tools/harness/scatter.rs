@@ -8,13 +8,13 @@ use insonify::sim::layout::{self, Counters, FLAG_VOXEL, Frame};
 use insonify::sim::stages;
 use insonify::sim::tables::with_spheres;
 
-/// Samples beyond the first window of one case; no multiple of a bin or a slot.
+/// Samples beyond the first window, in one case; no multiple of a bin or a slot.
 const BEYOND: u32 = 211;
 
-/// The kernel for worlds in which tissue deforms.
+/// The kernel for worlds with deforming tissue.
 pub const DEFORMING: Subject = Subject { name: "scatter_deforming", job, ..RIGID };
 
-/// The kernel for worlds in which none does.
+/// The kernel for worlds without deforming tissue.
 pub const RIGID: Subject = Subject {
     name: "scatter_rigid",
     tolerance: "norm within 0.2 %: distances of 100 mm round at 8e-6 mm, 3e-4 rad of the carrier, and \
@@ -32,7 +32,7 @@ pub const RIGID: Subject = Subject {
     ..Subject::of(&stages::SCATTER)
 };
 
-/// Segments as `trace`'s twin finds them, in the device's slots.
+/// Segments found by the twin of `trace`, in the device's slots.
 fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
     let owned = worlds::owned(job);
     let mut world = owned.world();
@@ -70,7 +70,7 @@ fn job(case: Case, size: Size) -> Job {
     job_of(scene(case, size), case)
 }
 
-/// The world of a case. Finite tissues: here the segments are not.
+/// The world of a case. Its tissues are finite: here it is the segments that are not.
 fn scene(case: Case, size: Size) -> Job {
     let case = match case {
         Case::NotFinite => Case::Random,
@@ -78,7 +78,7 @@ fn scene(case: Case, size: Size) -> Job {
     };
     let mut job = Job { inputs: trace::scene(case, size), push: Vec::new() };
     if case == Case::Modes {
-        // As many samples that the work groups of a second window have some.
+        // Enough samples to reach into a second window.
         let mut frame: Frame = job.one("frame");
         frame.samples = layout::SCATTER_WINDOW + BEYOND;
         frame.sample_pitch = frame.depth / frame.samples as f32;
@@ -99,7 +99,7 @@ fn stiff(mut job: Job) -> Job {
 fn job_of(mut job: Job, case: Case) -> Job {
     let mut frame: Frame = job.one("frame");
     let mut random = Random(9);
-    // Little wires: most stretches are far from most of them.
+    // Short wires: most segments are far from most of them.
     let wires = if case == Case::Empty { 0 } else { 10 };
     let points: Vec<[f32; 4]> = (0..wires)
         .flat_map(|_| {

@@ -1,4 +1,4 @@
-//! `shadow`: the level of what is transmitted along each line.
+//! `shadow`: the transmitted level along each line.
 
 use super::inputs::{frame, rows, scanlines};
 use super::worlds;
@@ -11,9 +11,9 @@ use insonify::sim::layout::{
 };
 use insonify::sim::stages;
 
-/// Nepers by which a level may differ in samples that no piece begins beside.
+/// Largest difference of levels, nepers, in samples where no piece begins.
 const LEVEL: f64 = 2e-3;
-/// Samples about the beginning of a piece in which the level may be that of either side.
+/// Distance from the beginning of a piece, in samples, within which the level may be that of either side.
 const EDGE: f64 = 0.01;
 
 pub const SUBJECT: Subject = Subject {
@@ -83,7 +83,7 @@ pub(super) fn unpack(pieces: &[[f32; 4]]) -> Vec<Vec<Piece>> {
 
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let mut owned = worlds::owned(job);
-    // How a surface echoes does not matter here: to the twin all are mirrors.
+    // The echo properties of surfaces do not matter here: in the twin all are mirrors.
     let sides = owned.instances.iter();
     let sides = sides.map(|i| i.surface_outside.max(i.surface_inside) as usize + 1);
     let mirror = Surface { roughness: 1e9, ..Surface::default() };
@@ -94,7 +94,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let twin = shadow::shadow(&world, &starts);
     let pieces: Vec<[f32; 4]> = job.after(outputs, "pieces");
     let got = unpack(&pieces);
-    // What no sound reaches is dark, whichever way it came about.
+    // Levels below -40 nepers count as equal: hardly any sound gets there.
     let dark = |level: f64| level.max(-40.0);
     let alike = |got: &[Piece], expected: &[Piece]| {
         (0..frame.samples).map(f64::from).all(|k| {
@@ -106,7 +106,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     };
     let wrong = got.iter().zip(&twin).filter(|(got, twin)| !alike(got, twin));
     let wrong = wrong.count();
-    // Else nothing would be compared.
+    // Otherwise nothing would be compared.
     let flat = twin.iter().filter(|p| p.len() < 3).count();
     vec![
         Check::count("lines", twin.len(), wrong, twin.len() / 60),

@@ -13,7 +13,7 @@ use insonify::sim::layout::{
 use insonify::sim::rounds::Rounds;
 use insonify::sim::stages;
 
-/// So few that each takes several pieces of work, and that there are several groups of lines.
+/// Number of workers: so few that each takes several pieces of work, and that there are several groups of lines.
 const WORKERS: u32 = 64;
 
 pub const SUBJECT: Subject = Subject {
@@ -43,11 +43,11 @@ pub const SUBJECT: Subject = Subject {
     ..Subject::of(&stages::TRACE[0])
 };
 
-/// The dispatches for the paths that a job's push constants ask for.
+/// The dispatches for the paths in a job's push constants.
 pub fn rounds(job: &Job, frame: &Frame) -> Rounds {
     let paths = match job.push.as_slice().try_into() {
         Ok(push) => bytemuck::cast::<[u8; 8], [u32; 2]>(push)[1],
-        // Another kernel's.
+        // The job of another kernel, whose push constants are different.
         Err(_) => frame.paths,
     };
     Rounds::new(frame, paths, WORKERS)
@@ -149,7 +149,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-/// Segments of either list without a partner in the other.
+/// The number of segments of both lists without a partner in the other.
 fn unmatched(mut got: Vec<Segment>, expected: &[Segment]) -> usize {
     let mut missing = 0;
     for segment in expected {

@@ -1,5 +1,5 @@
-//! Small worlds for the tracing kernels: ellipsoids and boxes, as the device's buffers and as the
-//! twins read them.
+//! Small worlds for the tracing kernels: ellipsoids and boxes, in the form of the device's buffers and of the
+//! twins.
 
 use glam::{DAffine3, DQuat, DVec3};
 
@@ -29,7 +29,7 @@ impl Builder {
         self.again(self.meshes.len() - 1, at, tissue, priority);
     }
 
-    /// Places a mesh that has been placed before.
+    /// Places a mesh again.
     pub fn again(&mut self, mesh: usize, at: DAffine3, tissue: u32, priority: i32) {
         self.placements.push((mesh, at));
         self.instances.push(Instance {
@@ -50,7 +50,7 @@ impl Builder {
         self.instances[index].masks = 1;
     }
 
-    /// Lets the tissue of the instance placed last be somewhere else than in its reference shape: by
+    /// Displaces the tissue of the instance placed last from its reference shape: by
     /// up to 3 mm, strained by up to a quarter.
     fn deform(&mut self) {
         let (origin, spacing, size) = (DVec3::new(-20.0, -16.0, -14.0), 4.0, [11_u8, 9, 8]);
@@ -210,7 +210,7 @@ pub fn world(case: Case) -> Builder {
     builder
 }
 
-/// What the twins read, taken from a job's bindings; what the kernel does not bind is empty.
+/// The world of the twins, from a job's bindings; arrays that the kernel does not bind are empty.
 pub fn owned(job: &Job) -> Owned {
     let frame = job.optional::<Frame>("frame").first().copied().unwrap_or_default();
     // Without the spheres around them. `trace` binds none and only asks whether there are any.
@@ -236,14 +236,14 @@ fn fields(job: &Job) -> Vec<[f32; 3]> {
     job.optional::<[f32; 4]>("fields").iter().map(|&[x, y, z, _]| [x, y, z]).collect()
 }
 
-/// Bytes of a binding of [`Builder::inputs`], or of the displacement fields, that the instances of `job`
-/// refer to; 0 of others.
+/// Bytes of a binding of [`Builder::inputs`], or of the displacement fields, to which the instances of `job`
+/// refer; 0 for other bindings.
 pub fn size(job: &Job, name: &str) -> usize {
     let instances: Vec<Instance> = job.optional("instances");
     let triangles: Vec<[u32; 3]> = job.optional("triangles");
     let ends = instances.iter().map(|i| (i.first_triangle + i.triangles) as usize);
     let end = ends.max().unwrap_or(0);
-    // As many as there are: a kernel without them has none, a dump may have lost some.
+    // No more than exist: a job of another kernel has none, and a dump may lack some.
     let used = &triangles[..end.min(triangles.len())];
     match name {
         "vertices" | "normals" | "smoothed" => {

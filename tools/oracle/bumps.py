@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Wires behind a bumpy layer in a full-wave simulation (2-D), as a linear array images them.
 
-Writes place, width and level of each wire as JSON, with what made them, to hold ours against (tests/bumps.rs). The wave
+Writes place, width and level of each wire as JSON, with what made them, to hold ours against (tests/bumps/full_wave.rs). The wave
 equation is solved by the k-space pseudospectral scheme of k-Wave (Treeby and Cox 2010), in single precision, which
 k-wave-python's own NumPy solver takes several times as long for. One simulation per wire and surface: sound from the
 wire to the face, which by reciprocity is also the way there (single scattering). Beams are formed from it by delay and
@@ -9,7 +9,7 @@ sum at the machine's speed, with Gaussian apertures as wide as ours. Bumps are t
 simulation has them.
 
     venv/bin/pip install numpy scipy
-    venv/bin/python tools/oracle/bumps.py tests/bumps.json
+    venv/bin/python tools/oracle/bumps.py tests/bumps/full_wave.json
 
 About a minute per simulation, 12 of them. Units: mm, us, MHz.
 """

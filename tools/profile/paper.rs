@@ -37,7 +37,7 @@ pub struct Arguments {
     /// Poses of Table II [default: 24; 6 with --quick].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     poses: Option<u32>,
-    /// How often each pose and keyframe is measured [default: 3; 1 with --quick].
+    /// Measurements of each pose and keyframe [default: 3; 1 with --quick].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     rounds: Option<u32>,
     /// Overrides an entry of all scene files, e.g. --set probe.scanlines=64.

@@ -1,4 +1,4 @@
-//! Complex baseband accumulators, filled as the kernels fill theirs and once more without rounding.
+//! Complex baseband accumulators, filled as in the kernels, and a second time without rounding.
 
 use std::f64::consts::TAU;
 
@@ -12,7 +12,7 @@ const LIMIT: f64 = (1u32 << 30) as f64;
 pub struct Accumulator {
     /// Sum of amplitude times scale, not rounded.
     pub exact: Vec<f64>,
-    /// Sum of the rounded terms: what the device holds where it rounds each deposit likewise.
+    /// Sum of the rounded terms: the device's value if it rounds each deposit in the same way.
     pub fixed: Vec<i64>,
     /// Deposits that reached each (l, k): their number bounds the rounding, half a unit each.
     pub deposits: Vec<u32>,
@@ -24,11 +24,11 @@ pub struct Accumulator {
     frequency: f64,
 }
 
-/// Rounding to the nearest unit.
+/// Dither that rounds to the nearest unit.
 pub const NEAREST: [f64; 8] = [0.5; 8];
 
-/// What four samples get of an echo that lies `f` behind the second of them, 0 to 1: the cubic through
-/// them. Their centre is the echo's; they neither widen it nor make it lean.
+/// Shares of four samples in an echo that lies `f` behind the second of them, 0 to 1, by the cubic through
+/// them. They keep the echo's centre, its width and its symmetry.
 fn shares(f: f64) -> [f64; 4] {
     let (behind, ahead) = (1.0 - f, 2.0 - f);
     [
@@ -39,14 +39,14 @@ fn shares(f: f64) -> [f64; 4] {
     ]
 }
 
-/// Fixed point as the device rounds it; also whether it was clamped.
+/// Fixed point, rounded as on the device; and true if it was clamped.
 fn to_fixed(scaled: f64, dither: f64) -> (i64, bool) {
     let rounded = (scaled + dither).floor();
     (rounded.clamp(-LIMIT, LIMIT) as i64, rounded.abs() > LIMIT)
 }
 
 impl Accumulator {
-    /// All zero, sized for `frame`.
+    /// An accumulator for `frame`, all zero.
     pub fn new(frame: &Frame) -> Self {
         let size = frame.scanlines as usize * frame.samples as usize;
         Self {
@@ -66,7 +66,7 @@ impl Accumulator {
         self.speed * time / self.pitch
     }
 
-    /// Sample that owns one-way time `time`: floor, clamped into the line.
+    /// The sample of one-way time `time`: floor, clamped into the line.
     pub fn sample(&self, time: f64) -> usize {
         (self.kappa(time).floor() as i64).clamp(0, self.samples - 1) as usize
     }
@@ -74,7 +74,7 @@ impl Accumulator {
     /// Adds one echo of `amplitude` at one-way time `time` (us) on scanline `l`, turned by `phase` (rad)
     /// beyond the carrier and shared by four samples; `gain` is per sample and includes the
     /// fixed-point scale. `dither` is added before rounding down: real and imaginary part of the first
-    /// sample, then of the next ones. Echoes at no finite time are lost.
+    /// sample, then of the next ones. Echoes at a time that is not finite are lost.
     pub fn deposit(
         &mut self,
         l: u32,
@@ -96,9 +96,9 @@ impl Accumulator {
         }
     }
 
-    /// Adds one echo to the nearest sample, with the phase of its own time: of many, which lie anywhere
-    /// between samples, the sum is as fine as the pulse. Within [`SAMPLE_BLEND`] about the middle between
-    /// two samples each gets a share: what rounding does to a place then changes little.
+    /// Adds one echo to the nearest sample, with the phase of its own time: the sum of many echoes, which lie anywhere
+    /// between samples, is as fine as the pulse. Within [`SAMPLE_BLEND`] of the middle between
+    /// two samples each gets a share, so that rounding of the place has little effect.
     pub fn deposit_nearest(
         &mut self,
         l: u32,
@@ -166,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Largest difference between the accumulator and echoes (l, k real, amplitude) summed in place.
+    /// Largest difference between the accumulator and the direct sum of echoes (l, k real, amplitude).
     fn worst(exact: &[f64], echoes: &[(usize, f64, f64)]) -> f64 {
         let mut expected = vec![0.0; 32];
         for &(l, kappa, amplitude) in echoes {

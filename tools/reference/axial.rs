@@ -2,7 +2,7 @@
 
 use insonify::sim::layout::Frame;
 
-/// Baseband lines `lateral` convolved with the axial kernel; outside a line there is nothing.
+/// Baseband lines `lateral` convolved with the axial kernel; zero outside a line.
 pub fn axial(frame: &Frame, lateral: &[f32]) -> Vec<f64> {
     let samples = i64::from(frame.samples);
     let sigma = f64::from(frame.axial_sigma);

@@ -4,7 +4,7 @@
 use super::random::{gaussian, pcg4d};
 use insonify::sim::layout::{FLAG_VOXEL, Frame, KIND_PHASED, Row};
 
-/// Narrower kernels than this, in scanlines, smooth nothing.
+/// Width, in scanlines, below which a lateral kernel does not smooth.
 const NARROWEST: f64 = 0.05;
 
 /// Complex baseband lines: index 2 (l K + k) + {0: real, 1: imaginary}.
@@ -42,7 +42,7 @@ pub fn beam(
                         sums.volume += w * f64::from(volume[i]) * f64::from(row.volume_undo);
                     }
                 }
-                let own = at(0).expect("the line itself is inside");
+                let own = at(0).expect("the scanline itself is inside");
                 let scatterers = if frame.flags & FLAG_VOXEL != 0 {
                     sums.volume * (sums.full / sums.here).sqrt()
                 } else {
@@ -57,15 +57,15 @@ pub fn beam(
     out
 }
 
-/// (l, k) of which some accumulator is at the fixed-point limit.
+/// Number of (l, k) at which some accumulator is at the fixed-point limit.
 pub fn saturated(surface: &[i32], volume: &[i32]) -> u32 {
     let full = |v: &[i32]| v.iter().any(|x| x.unsigned_abs() >= 1 << 30);
     let pairs = surface.chunks(2).zip(volume.chunks(2));
     pairs.filter(|(s, v)| full(s) || full(v)).count() as u32
 }
 
-/// What is left of the echoes of line `l`: coupled shares of what sends and of what receives, element by
-/// element.
+/// The factor on the echoes of line `l`: coupled share of the transmit aperture times that of the receive
+/// aperture, element by element.
 fn coupling(frame: &Frame, row: &Row, contact: &[f32], l: u32) -> f64 {
     let (transmit, air) = contact.split_at(frame.scanlines as usize);
     let count = f64::from(frame.scanlines);
@@ -120,13 +120,13 @@ mod tests {
         vec![row; samples]
     }
 
-    /// All elements are coupled.
+    /// The table of a face with all elements coupled.
     fn joined(frame: &Frame) -> Vec<f32> {
         let lines = frame.scanlines as usize;
         [vec![1.0; lines], vec![0.0; lines + 1]].concat()
     }
 
-    // Of eight elements the last three are in air; apertures are three elements wide, on transmit as on
+    // The last three of eight elements are in air; apertures are three elements wide, on transmit and on
     // receive, and two at the edges of the face.
     #[test]
     fn lines_lose_what_sends_and_what_receives() {

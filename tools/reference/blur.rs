@@ -2,14 +2,14 @@
 
 use insonify::sim::layout::{Frame, Fusion};
 
-/// Width and height of an image of the frame; `turned` has rows and columns exchanged.
+/// Width and height of an image of the frame; rows and columns exchanged if `turned`.
 pub fn dimensions(frame: &Frame, turned: bool) -> [u32; 2] {
     let [width, height] = [frame.image_width, frame.image_height];
     if turned { [height, width] } else { [width, height] }
 }
 
 /// Sums over the box down the columns of an image of pairs of values, with rows and columns exchanged:
-/// index x height + y. Beyond the image's edge its outermost pixels count on.
+/// index x height + y. Beyond the image's edge its outermost pixels are repeated.
 pub fn blur(frame: &Frame, fusion: &Fusion, source: &[f32], turned: bool) -> Vec<[f64; 2]> {
     let [width, height] = dimensions(frame, turned).map(i64::from);
     let (pairs, _) = source.as_chunks::<2>();

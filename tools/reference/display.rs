@@ -45,7 +45,7 @@ pub fn sector(frame: &Frame, x: f64, z: f64) -> Option<[f64; 2]> {
     inside.then_some([column, depth / f64::from(frame.sample_pitch)])
 }
 
-/// Bilinear in values per sample of the scanlines, clamped at the edges.
+/// Bilinear interpolation of values per sample of the scanlines, clamped at the edges.
 pub fn sample(frame: &Frame, log_image: &[f32], column: f64, row: f64) -> f64 {
     let clamped = |v: f64, n: u32| v.clamp(0.0, f64::from(n) - 1.0);
     let (column, row) = (clamped(column, frame.scanlines), clamped(row, frame.samples));

@@ -1,4 +1,4 @@
-//! Where tissue has gone: trilinear displacements over a grid.
+//! Displacement fields: trilinear displacements over a grid.
 
 use glam::{DMat3, DVec3};
 
@@ -81,7 +81,7 @@ impl<'a> Field<'a> {
         found
     }
 
-    /// How many times its volume at rest the tissue around the reference point `p` takes now.
+    /// The relative volume of the tissue around the reference point `p`: present volume over volume at rest.
     pub fn growth(&self, p: DVec3) -> f64 {
         (DMat3::IDENTITY + self.with_gradient(p).1).determinant().abs()
     }
@@ -97,7 +97,7 @@ impl<'a> Field<'a> {
         self.displacements.iter().fold(0.0, longest)
     }
 
-    /// Bound on the gradient: how much further apart, per mm, two points can be displaced. Along an
+    /// Bound on the gradient: the largest change of displacement per mm between two points. Along an
     /// axis the derivative lies between those along the edges of a cell.
     pub fn steepness(&self) -> f64 {
         let [nx, ny, _] = self.size;

@@ -30,7 +30,7 @@ pub fn tissue(speed: f32, impedance: f32, absorption: f32) -> Tissue {
 }
 
 impl Fixture {
-    /// Background is the first of `tissues`; surface 0 is a thin perfect mirror's lobe.
+    /// A world without meshes. The background is the first of `tissues`; surface 0 is a thin perfect mirror's lobe.
     pub fn new(tissues: Vec<Tissue>) -> Self {
         let identity = rows_of(&DAffine3::IDENTITY);
         let samples = 400;
@@ -86,7 +86,7 @@ impl Fixture {
         }
     }
 
-    /// Triangles as flat corner triples, outward, with a normal per corner.
+    /// Places triangles given as flat corner triples, outward, with a normal per corner.
     fn place_flat(&mut self, corners: &[[DVec3; 2]], tissue: u32, priority: i32, at: &DAffine3) {
         let positions: Vec<_> = corners.iter().map(|c| c[0].as_vec3().to_array()).collect();
         let normals: Vec<_> = corners.iter().map(|c| c[1].as_vec3().to_array()).collect();

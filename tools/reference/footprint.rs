@@ -1,8 +1,8 @@
 //! Reflectance of a curved interface averaged over the width of the beam.
 //!
-//! A ray stands for a beam. Where a surface curves by kappa along the plane of incidence, a ray xi
+//! A ray stands for a beam. If a surface curves by kappa along the plane of incidence, a ray xi
 //! beside it meets the surface at sin i' = sin i + kappa xi (exact for a cylinder), and beyond 1 it
-//! passes by. With xi normal of deviation sigma, sin i' is normal of deviation kappa sigma.
+//! misses. If xi is normal with standard deviation sigma, sin i' is normal with kappa sigma.
 
 use super::acoustics::{Fluid, reflection};
 
@@ -14,7 +14,7 @@ const RULE: [[f64; 2]; 4] = [
     [0.960_289_856_497_536_3, 0.101_228_536_290_376_3],
 ];
 
-/// Mass of the standard normal distribution below `x`: Abramowitz and Stegun 7.1.26, within 1e-7.
+/// Standard normal distribution function at `x`: Abramowitz and Stegun 7.1.26, within 1e-7.
 fn normal_mass(x: f64) -> f64 {
     let z = x.abs() / std::f64::consts::SQRT_2;
     let t = 1.0 / (1.0 + 0.327_591_1 * z);
@@ -23,7 +23,7 @@ fn normal_mass(x: f64) -> f64 {
     if x < 0.0 { tail } else { 1.0 - tail }
 }
 
-/// Mean intensity reflectance at incidence `cos_i`; `width` is curvature times the deviation of the
+/// Mean intensity reflectance at incidence `cos_i`; `width` is curvature times the standard deviation of the
 /// beam, dimensionless.
 pub fn reflectance(before: Fluid, after: Fluid, cos_i: f64, width: f64) -> f64 {
     let at = |cos_i: f64| reflection(before, after, cos_i).powi(2);
@@ -35,7 +35,7 @@ pub fn reflectance(before: Fluid, after: Fluid, cos_i: f64, width: f64) -> f64 {
     let between =
         |a: f64, b: f64| normal_mass((b - centre) / width) - normal_mass((a - centre) / width);
     let totally = between(critical, 1.0) + between(-1.0, -critical);
-    // Below the critical angle, by s = critical sin(phi): what is steep at the edge becomes smooth.
+    // Below the critical angle, with s = critical sin(phi), which makes the steep integrand at the edge smooth.
     let angle = |s: f64| (s / critical).clamp(-1.0, 1.0).asin();
     let (from, to) = (angle(centre - 4.0 * width), angle(centre + 4.0 * width));
     let (mut sum, mut norm) = (0.0, 0.0);
@@ -59,7 +59,7 @@ mod tests {
         Fluid { speed, impedance: speed * density }
     }
 
-    /// Rays beside each other, one by one.
+    /// The mean over rays beside each other, computed one by one.
     fn by_rays(before: Fluid, after: Fluid, centre: f64, width: f64) -> f64 {
         let (mut sum, mut norm) = (0.0, 0.0);
         for i in 0..200_000 {

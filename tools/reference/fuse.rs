@@ -8,8 +8,8 @@ pub fn weight(fusion: &Fusion, [mask, weight]: [f32; 2]) -> f64 {
     if fusion.blend == BLEND_SMOOTH { m * m * (3.0 - 2.0 * m) } else { m }
 }
 
-/// Grey level 0..=255 before rounding of one pixel inside the sector; none where it is no number.
-/// `change` is what blending by bands adds to the acquired image.
+/// Grey level 0..=255 before rounding of one pixel inside the sector; none for NaN.
+/// `change` is the value that blending by bands adds to the acquired image.
 pub fn level(
     fusion: &Fusion,
     simulated: u32,

@@ -1,4 +1,4 @@
-//! The transducer as the kernels know it: lines and face, from the frame's numbers.
+//! The transducer as in the kernels: lines and face, from the frame's numbers.
 
 use glam::{DAffine3, DVec3};
 

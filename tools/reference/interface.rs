@@ -1,4 +1,4 @@
-//! One meeting of a path with a surface: normals, reflectance and echo.
+//! Arrival of a path at a surface: normals, reflectance and echo.
 
 use glam::DVec3;
 
@@ -12,32 +12,32 @@ use super::wavefront::{Slope, turned};
 use super::world::{Crossing, World};
 use insonify::sim::layout::{FLAG_COHERENT, Row, Surface, Tissue};
 
-/// Roughness exponents from here on are perfect mirrors.
+/// Roughness exponent from which on a surface is a perfect mirror.
 pub(super) const MIRROR: f64 = 1e9;
 /// Edge of the cells that share the random phase of a thick surface's echo, mm.
 const PHASE_CELL: f64 = 0.5;
-/// By how much of a cell the cells are moved off the round numbers at which faces are modelled.
+/// Shift of these cells, in their edge, away from the round numbers at which faces are modelled.
 const PHASE_SHIFT: f64 = 0.381_966;
-/// Micro-normals tried.
+/// Micro-normals tried before giving up.
 const ATTEMPTS: u32 = 8;
 
-/// A sampled micro-normal and where it mirrors the path to.
+/// A sampled micro-normal, and the direction into which it mirrors the path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Micro {
     pub(super) normal: DVec3,
     pub(super) reflected: DVec3,
 }
 
-/// What a path meets. Normals are unit and turned against the path.
+/// The interface at which a path arrives. Normals are unit vectors turned against the path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Interface {
-    /// Of the triangle.
+    /// Normal of the triangle.
     pub(super) geometric: DVec3,
     /// Averaged over the wavefront: the one that refracts.
     pub(super) refracting: DVec3,
     /// None when no attempt was acceptable: no echo, no reflected path.
     pub(super) micro: Option<Micro>,
-    /// Before and behind.
+    /// Fluids before and behind.
     pub(super) fluids: [Fluid; 2],
     /// Intensity reflectance R at the refracting normal, where the surface curves or is rough its mean
     /// over the beam; 1 at total reflection.

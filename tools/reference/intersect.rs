@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use insonify::scene::{Scene, triangle};
 
-/// Where a ray meets a triangle.
+/// A hit of a ray on a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Ray parameter: mm for a unit direction.

@@ -1,14 +1,14 @@
-//! Twin of `label`: the instance that each sample lies in, straight along its scanline.
+//! Twin of `label`: the instance at each sample, straight along its scanline.
 
 use super::mask::middle;
 use super::world::{Crossing, World};
 
-/// What a scanline meets, and where it is.
+/// The crossings of a scanline and the instances around it.
 #[derive(Clone, Debug)]
 pub struct Labels {
-    /// Its crossings, by distance.
+    /// The crossings, by distance.
     pub crossings: Vec<Crossing>,
-    /// The instance before the first, and behind each.
+    /// The instance before the first crossing, and behind each.
     around: Vec<Option<u32>>,
 }
 
@@ -42,7 +42,7 @@ mod tests {
         let mut world = Fixture::new(vec![tissue(1.5, 1.5, 0.0); 3]);
         world.block([-5.0, -5.0, 10.0], [5.0, 5.0, 30.0], 1, 0);
         world.block([-2.0, -2.0, 15.0], [2.0, 2.0, 20.0], 2, 1);
-        // Of lower priority it is not seen where it overlaps the first.
+        // It has a lower priority, so it is not labelled where it overlaps the first.
         world.block([-3.0, -3.0, 25.0], [3.0, 3.0, 40.0], 2, -1);
         let labels = &label(&world.world())[0];
         let found = [5.0, 12.0, 17.0, 22.0, 28.0, 35.0, 45.0].map(|z| labels.at(z));

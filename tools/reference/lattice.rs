@@ -1,4 +1,4 @@
-//! Lattices of scatterers, as coarse as speckle allows: which of them sound, and what a cell holds.
+//! Lattices of scatterers, as coarse as speckle allows: the levels in use, and the content of a cell.
 
 use std::f32::consts::SQRT_2;
 
@@ -7,9 +7,9 @@ use glam::{DVec3, I64Vec3};
 use super::random::{pcg3d, pcg4d, unit};
 use insonify::sim::layout::{ALL_LEVELS, LATTICE_LEVELS, LEVEL_FADE, LEVELS_PER_OCTAVE, Tissue};
 
-/// Cell edges of six levels in a row: sixth roots of 1, 2, 4, 8, 16 and 32.
+/// Cell edges of six successive levels: sixth roots of 1, 2, 4, 8, 16 and 32.
 const EDGES: [f32; 6] = [1.0, 1.122_462, 1.259_921, SQRT_2, 1.587_401_1, 1.781_797_4];
-/// Cell volumes of two levels in a row.
+/// Cell volumes of two successive levels.
 const VOLUMES: [f32; 2] = [1.0, SQRT_2];
 
 /// The scatterer of one cell.
@@ -36,8 +36,9 @@ impl Level {
     /// Level `number` of `tissue`, where the finest has cells of `cell` mm.
     ///
     /// Scatterers have one amplitude and either sign. With `density` of them per cell of the finest
-    /// level they have the fourth moment of the tissue's own, and while a coarser level can hold as
-    /// many it does; then it is full, with fewer and louder ones. The power per volume is the same.
+    /// level they have the fourth moment of the tissue's own scatterers. A coarser level has equally many as long as
+    /// its cells can hold them; beyond that every cell is full, and scatterers are fewer and louder. The power per
+    /// volume is the same.
     pub fn new(tissue: &Tissue, cell: f32, number: u32) -> Self {
         let volume = f64::from(VOLUMES[number as usize % 2] * (1u32 << (number / 2)) as f32);
         let presence = (f64::from(tissue.density) * volume).min(1.0);
@@ -50,7 +51,7 @@ impl Level {
         }
     }
 
-    /// What `cell` holds, if anything.
+    /// The scatterer in `cell`, if there is one.
     pub fn scatterer(&self, cell: I64Vec3) -> Option<Scatterer> {
         let at = [cell.x, cell.y, cell.z];
         let words = pcg3d(std::array::from_fn(|i| (at[i] as u32).wrapping_add(self.key[i])));
@@ -65,14 +66,14 @@ impl Level {
     }
 }
 
-/// Edge of a cell of level `number`, mm: rounded as the kernels round it.
+/// Edge of a cell of level `number`, mm, rounded as in the kernels.
 pub fn edge(cell: f32, number: u32) -> f64 {
     f64::from(cell * EDGES[number as usize % 6] * (1u32 << (number / 6)) as f32)
 }
 
-/// Which lattice a piece of tissue needs, as a number between levels: the coarser of what is dense enough
-/// for speckle (`wanted`, of the axial row) and what still holds eight cells for each of the tissue's own
-/// scatterers; coarser by `drowned`, the log2 of the power by which something louder drowns it.
+/// Lattice level that a piece of tissue needs, not rounded: the coarser of the level that is dense enough
+/// for speckle (`wanted`, of the axial row) and the level that still has eight cells for each of the tissue's own
+/// scatterers; coarser by `drowned`, the log2 of the power by which something louder masks it.
 pub fn wanted_level(tissue: &Tissue, wanted: f64, drowned: f64) -> f64 {
     if wanted <= f64::from(ALL_LEVELS) {
         return 0.0;
@@ -82,8 +83,8 @@ pub fn wanted_level(tissue: &Tissue, wanted: f64, drowned: f64) -> f64 {
         .clamp(0.0, f64::from(LATTICE_LEVELS))
 }
 
-/// Share of the power that level `number` carries where `wanted` is needed: all up to a little before the
-/// next one, which then takes over.
+/// Share of the power that level `number` carries if level `wanted` is needed: all of it until shortly before the
+/// next level, to which it is cross-faded.
 pub fn level_power(wanted: f64, number: u32) -> f64 {
     let above = wanted - f64::from(number);
     let fade = f64::from(LEVEL_FADE);

@@ -1,5 +1,5 @@
-//! Twin of `mask`: along each scanline, whether a sample lies outside the masking instances, and what
-//! the acquired volume shows there.
+//! Twin of `mask`: along each scanline the mask, 1 outside the masking instances, and the grey level
+//! of the acquired volume.
 
 use glam::DVec3;
 
@@ -10,22 +10,22 @@ use insonify::sim::layout::{Frame, Fusion, MASK_SPEED_PROBE};
 /// Crossings of one scanline with the masking instances, in order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Crossings {
-    /// Masking instances around the start.
+    /// Number of masking instances around the start.
     pub enclosing: i32,
-    /// Those that it meets.
+    /// Crossings along the scanline.
     pub along: Vec<Met>,
-    /// Distance per depth before the first.
+    /// Distance per depth before the first crossing.
     rate: f64,
 }
 
-/// A crossing. Depths are mm at the probe's speed: where the sound that is there echoes.
+/// A crossing. Its depth, mm at the probe's speed, is that of an echo from there.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Met {
     /// Distance, mm.
     pub distance: f64,
     /// Depth, mm.
     pub depth: f64,
-    /// Whether the scanline goes in.
+    /// True if the scanline enters the instance.
     pub entry: bool,
     /// Distance per depth behind it.
     rate: f64,
@@ -56,7 +56,7 @@ pub(super) fn middle(frame: &Frame, l: u32) -> (DVec3, DVec3) {
     (place.transform_point3(start), world_line(frame, l, 0).direction)
 }
 
-/// The crossings of each scanline. What it leaves more often than it enters encloses its start.
+/// The crossings of each scanline. Instances that it leaves more often than it enters enclose its start.
 pub fn crossings(world: &World, fusion: &Fusion) -> Vec<Crossings> {
     let masks = |instance: u32| world.instances[instance as usize].masks != 0;
     (0..world.frame.scanlines)

@@ -1,4 +1,4 @@
-//! Twin of `origin`: which media enclose the start of each line, and where its paths begin.
+//! Twin of `origin`: the media that enclose the start of each line, and the place where its paths begin.
 
 use super::geometry::world_line;
 use super::stack::Stack;
@@ -6,10 +6,10 @@ use super::way::Start;
 use super::world::{Crossing, World};
 use insonify::sim::layout::{MAX_STACK, START_WORDS};
 
-/// Most crossings followed.
+/// Most crossings that are followed.
 const CROSSINGS: usize = 64;
 
-/// One start per line e * scanlines + l, and how often there were more media than a stack holds.
+/// One start per line e * scanlines + l, and the number of media that did not fit into a stack.
 pub fn origin(world: &World) -> (Vec<Start>, u32) {
     let mut overflow = 0;
     let mut starts = Vec::new();
@@ -29,7 +29,7 @@ pub fn origin(world: &World) -> (Vec<Start>, u32) {
     (starts, overflow)
 }
 
-/// Instances left more often than entered, the one whose last exit is farthest first.
+/// Instances left more often than entered; the one whose last exit is farthest comes first.
 fn enclosing(crossings: &[Crossing]) -> Vec<u32> {
     let mut instances: Vec<u32> = Vec::new();
     for c in crossings.iter().rev().filter(|c| !c.entry) {
@@ -42,7 +42,7 @@ fn enclosing(crossings: &[Crossing]) -> Vec<u32> {
     instances
 }
 
-/// The layout of the device's buffer.
+/// The starts in the layout of the device's buffer.
 pub fn pack(starts: &[Start]) -> Vec<u32> {
     let mut packed = vec![0; starts.len() * START_WORDS];
     for (slot, start) in packed.chunks_mut(START_WORDS).zip(starts) {
@@ -56,7 +56,7 @@ pub fn pack(starts: &[Start]) -> Vec<u32> {
     packed
 }
 
-/// What one line's words in the device's buffer say.
+/// The start in one line's words of the device's buffer.
 pub fn unpack(words: &[u32; START_WORDS]) -> Start {
     let count = (words[0] as usize).min(MAX_STACK);
     Start {
@@ -96,12 +96,12 @@ mod tests {
         packed.extend([0.0_f32, 1.0].map(f32::to_bits));
         packed.push(0);
         assert_eq!(pack(&stacks), packed);
-        let back: [u32; START_WORDS] = packed.try_into().expect("one line's");
+        let back: [u32; START_WORDS] = packed.try_into().expect("the words of one line");
         assert_eq!(unpack(&back), stacks[0]);
     }
 
     #[test]
-    fn of_more_than_fit_the_outermost_are_kept() {
+    fn if_media_do_not_fit_the_outermost_are_kept() {
         let most = MAX_STACK as u32;
         let radii: Vec<f64> = (1..=most + 2).map(|i| 2.0 * f64::from(i)).collect();
         let (stacks, overflow) = origin(&spheres(&radii).world());

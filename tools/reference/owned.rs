@@ -1,4 +1,4 @@
-//! Arrays of one's own that the twins read.
+//! A world with arrays of its own, for the twins.
 
 use super::world::{Geometry, World, affine};
 use super::{origin, trace};
@@ -6,7 +6,7 @@ use insonify::scene::Mesh;
 use insonify::scene::smoothed::{FINEST, smoothed};
 use insonify::sim::layout::{Frame, Instance, Row, Surface, Tissue};
 
-/// Owns what a [`World`] borrows, in the device's layout and units.
+/// The arrays that a [`World`] borrows, in the device's layout and units.
 #[derive(Clone, Debug, Default)]
 pub struct Owned {
     /// Constants of the frame.
@@ -63,7 +63,7 @@ impl Owned {
         self.triangles.extend(moved);
     }
 
-    /// Borrows it all.
+    /// The world that borrows these arrays.
     pub fn world(&self) -> World<'_> {
         World {
             frame: &self.frame,
@@ -82,7 +82,7 @@ impl Owned {
         }
     }
 
-    /// Segments per line and surface echoes, every line starting inside what encloses its origin.
+    /// Segments per line and surface echoes; every line starts inside the media that enclose its origin.
     pub fn traced(&self) -> trace::Traced {
         let world = self.world();
         trace::trace(&world, &origin::origin(&world).0)

@@ -1,4 +1,4 @@
-//! A path between two interactions, and how a mirror turns it.
+//! A path between two interactions, and its reflection by a mirror.
 
 use glam::DVec3;
 
@@ -9,17 +9,17 @@ use super::random::pcg4d;
 use super::stack::Stack;
 use insonify::sim::layout::Frame;
 
-/// Purpose of the numbers that are added to an echo before it is rounded down.
+/// Purpose of the random numbers that are added to an echo before it is rounded down.
 const PURPOSE_DITHER: u32 = 0x51ed_270b;
-/// Purpose of the number that decides whether a faint branch is followed.
+/// Purpose of the random number that decides whether a faint branch is followed.
 pub(super) const PURPOSE_SURVIVAL: u32 = 0x2545_f491;
 
-/// Whether a path was split and how it goes on.
+/// The origin of a path, and its continuation at interactions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// Transmitted path of main-path sampling; spawns branches.
+    /// Transmitted path of main-path sampling; branches split off from it.
     Main,
-    /// Reflected off the main path.
+    /// Reflected part of a main path.
     Branch,
     /// One stochastic choice at every interaction.
     Single,
@@ -47,7 +47,7 @@ pub(super) struct Path {
     pub(super) interactions: u32,
     pub(super) reflections: u32,
     pub(super) spread: [f64; 3],
-    /// Chance that it had to be followed; its weight is over that.
+    /// Probability with which it was followed; its weight is divided by it.
     pub(super) survival: f64,
     pub(super) stack: Stack,
     pub(super) t_min: f64,
@@ -59,14 +59,14 @@ impl Path {
         self.interactions + 32 * self.reflections
     }
 
-    /// Amplitude factor for how far off the geometric scanline the path is.
+    /// Amplitude factor of echoes, from the path's distance to the geometric scanline.
     pub(super) fn beam_weight(&self, frame: &Frame) -> f64 {
         let (l, layer) = self.scanline(frame.scanlines);
         let line = world_line(frame, l, layer);
         beam_weight(frame, (self.origin - line.origin).dot(line.lateral))
     }
 
-    /// What is added before rounding down: per sample of a deposit, real and imaginary part.
+    /// The numbers added before rounding down: for each sample of a deposit, real and imaginary part.
     pub(super) fn dither(&self, frame: &Frame) -> [f64; 8] {
         let words = self.line_random(frame, PURPOSE_DITHER);
         std::array::from_fn(|i| {
@@ -76,7 +76,7 @@ impl Path {
         })
     }
 
-    /// Numbers that belong to the line's interaction just reached: what neighbouring lines must not do alike.
+    /// Random numbers of the line's interaction just reached, for decisions that neighbouring lines must not share.
     pub(super) fn line_random(&self, frame: &Frame, purpose: u32) -> [u32; 4] {
         pcg4d([self.line, self.n, self.key(), frame.seed ^ purpose])
     }
@@ -87,12 +87,12 @@ impl Path {
     }
 }
 
-/// Distance from `p` below which a surface is the one just left.
+/// Distance from `p` within which a surface is the one just left.
 pub(super) fn step(p: DVec3) -> f64 {
     4e-6 * p.abs().max_element().max(1.0)
 }
 
-/// Turns the path back along `direction`, mirrored by the plane of normal `m`.
+/// Reflects the path into `direction`, mirrored by the plane of normal `m`.
 pub(super) fn reflect(path: &mut Path, direction: DVec3, m: DVec3) {
     path.direction = direction;
     path.lateral = mirror(path.lateral, m);
@@ -100,8 +100,8 @@ pub(super) fn reflect(path: &mut Path, direction: DVec3, m: DVec3) {
     path.reflections += 1;
 }
 
-/// The lobe of a rough reflection, and the `turn` of a curved one, rad: their variance per axis grows
-/// with the distance.
+/// Adds the lobe of a rough reflection, and the `turn` of a curved one, rad, to the spread: their variance per axis
+/// grows with the distance.
 pub(super) fn widen(path: &mut Path, roughness: f64, turn: f64) {
     if roughness < MIRROR {
         path.spread[2] += 4.0 / (roughness + 2.0);

@@ -2,7 +2,7 @@
 //! spline with application to image mosaics, ACM Transactions on Graphics 2(4), 1983), of an image
 //! of which only a part is known.
 
-/// The generating kernel at offsets -2..=2, the binomial one.
+/// The generating kernel at offsets -2..=2, a binomial one.
 const GENERATING: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
 
 /// A level, row by row.
@@ -26,7 +26,7 @@ pub fn difference(simulated: u32, acquired: f32, [mask, weight]: [f32; 2]) -> [f
     [inside * difference, inside, sector]
 }
 
-/// The next coarser level. What lies beyond the image has no weight.
+/// The next coarser level. Pixels beyond the image have no weight.
 pub fn reduce(fine: &Level) -> Level {
     let size = fine.size.map(|n| n.div_ceil(2));
     let mut sums = Vec::new();
@@ -44,7 +44,7 @@ pub fn reduce(fine: &Level) -> Level {
     Level { size, sums }
 }
 
-/// Pixels of a level of `size` that give to pixel `at` of the next, and how much.
+/// Pixels of a level of `size` that contribute to pixel `at` of the next level, and their weights.
 fn children(size: [usize; 2], at: [usize; 2]) -> Vec<(usize, f64)> {
     let along = |axis: usize| {
         let first = 2 * at[axis];
@@ -56,8 +56,8 @@ fn children(size: [usize; 2], at: [usize; 2]) -> Vec<(usize, f64)> {
     along(1).flat_map(|(y, wy)| along(0).map(move |(x, wx)| (y * size[0] + x, wx * wy))).collect()
 }
 
-/// What the blend adds to the acquired image at each pixel of `fine`, from the next coarser level and
-/// what it adds there; none where `fine` is the coarsest.
+/// The values that the blend adds to the acquired image at each pixel of `fine`, from the next coarser level and
+/// the values added there; `coarse` is none if `fine` is the coarsest.
 pub fn collapse(fine: &Level, coarse: Option<(&Level, &[f64])>) -> Vec<f64> {
     // Per pixel, sums over its parents of difference, its weight, blended value and its weight.
     let mut expected = vec![[0.0; 4]; fine.sums.len()];
@@ -81,7 +81,7 @@ pub fn collapse(fine: &Level, coarse: Option<(&Level, &[f64])>) -> Vec<f64> {
         .collect()
 }
 
-/// What the blend over `levels` levels above the finest adds to the acquired image.
+/// The values that the blend over `levels` levels above the finest adds to the acquired image.
 pub fn blend(finest: Level, levels: u32) -> Vec<f64> {
     let mut pyramid = vec![finest];
     for _ in 0..levels {

@@ -1,15 +1,15 @@
-//! Random numbers of the paths, over which they may be a Sobol sequence.
+//! Random numbers of the paths; over the paths they may be a Sobol sequence.
 
 pub use insonify::random::{gaussian, pcg3d, pcg4d, unit};
 use insonify::sim::layout::{FLAG_SOBOL, Frame};
 
-/// Micro-normal of an interaction; the attempt 0..=7 is added.
+/// Purpose: micro-normal of an interaction; the attempt 0..=7 is added.
 pub const PURPOSE_NORMAL: u32 = 0;
-/// Thickness met by an echo.
+/// Purpose: thickness met by an echo.
 pub const PURPOSE_THICKNESS: u32 = 16;
-/// Reflect or transmit.
+/// Purpose: choice between reflection and transmission.
 pub const PURPOSE_CHOICE: u32 = 17;
-/// Lateral displacement of a path's origin.
+/// Purpose: lateral displacement of a path's origin.
 pub const PURPOSE_JITTER: u32 = 18;
 
 /// The words of path `path` at `bounce` for one purpose.
@@ -29,8 +29,8 @@ fn owen(x: u32, seed: u32) -> u32 {
     laine_karras(x.reverse_bits(), seed).reverse_bits()
 }
 
-/// As [`path_random`], but over the paths the first two words are a Sobol sequence, Owen scrambled,
-/// its order shuffled so that the decisions of one path know nothing of each other (Burley, JCGT 9(4),
+/// Like [`path_random`], but over the paths the first two words are a Sobol sequence, Owen scrambled,
+/// its order shuffled so that the decisions of one path are independent (Burley, JCGT 9(4),
 /// 2020).
 pub fn path_sobol(path: u32, bounce: u32, purpose: u32, seed: u32) -> [u32; 4] {
     let [shuffle, a, b, _] = pcg4d([0x9e37_79b9, bounce, purpose, seed]);
@@ -47,7 +47,7 @@ pub fn path_sobol(path: u32, bounce: u32, purpose: u32, seed: u32) -> [u32; 4] {
     [owen(index.reverse_bits(), a), owen(second, b), z, w]
 }
 
-/// The words of a path as the frame draws them: from the Sobol sequence with FLAG_SOBOL.
+/// The random words of a path, from the sequence that the frame uses: the Sobol sequence with FLAG_SOBOL.
 pub fn draw(frame: &Frame, path: u32, bounce: u32, purpose: u32) -> [u32; 4] {
     if frame.flags & FLAG_SOBOL != 0 {
         path_sobol(path, bounce, purpose, frame.seed)
@@ -59,14 +59,7 @@ pub fn draw(frame: &Frame, path: u32, bounce: u32, purpose: u32) -> [u32; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    /// Sample mean and its distance from `expected` in standard errors.
-    fn standard_errors(samples: &[f64], expected: f64) -> f64 {
-        let n = samples.len() as f64;
-        let mean = samples.iter().sum::<f64>() / n;
-        let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-        ((mean - expected) / (variance / n).sqrt()).abs()
-    }
+    use insonify::statistics::standard_errors;
 
     // A (0, 2)-sequence: of the first 2^k paths each elementary interval of area 2^-k holds one.
     #[test]

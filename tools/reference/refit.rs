@@ -13,10 +13,10 @@ pub type Extent = [[f32; 3]; 2];
 
 const NOTHING: Extent = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
 
-/// What one child of a node is.
+/// One child of a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Child {
-    /// There is none.
+    /// No child.
     Empty,
     /// A node, by number.
     Inner(u32),
@@ -33,7 +33,7 @@ pub struct Geometry<'a> {
     pub triangles: &'a [[u32; 3]],
 }
 
-/// Child `c` of 0..8 of the node that these words are.
+/// Child `c` of 0..8 of the node with these words.
 pub fn child(node: &[u32], c: usize) -> Child {
     let inner = node[3] >> 24;
     let kind = node[6 + c / 4] >> (8 * (c % 4)) & 0xff;
@@ -73,7 +73,7 @@ fn union([low, high]: Extent, other: Extent) -> Extent {
     ]
 }
 
-/// Corner, exponents and planes; what the children are stays.
+/// Writes corner, exponents and planes of a node; the kinds of its children stay.
 fn encode(node: &mut [u32], [low, high]: Extent, children: &[Extent; 8]) {
     let mut header = node[3] & 0xff00_0000;
     for axis in 0..3 {

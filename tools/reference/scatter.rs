@@ -11,11 +11,11 @@ use super::world::World;
 use super::{Accumulator, Segment};
 use insonify::sim::layout::{FLAG_VOXEL, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD};
 
-/// Layers meet this part of their pitch off the round numbers at which points lie: rounding must not
-/// give one to two layers, or to none.
+/// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
+/// could belong to two layers or to none.
 const POINT_SHIFT: f64 = 0.012_34;
 
-/// A segment seen from one space: world or its texture's.
+/// A segment in one space: the world's or that of its texture.
 struct Tube<'a> {
     world: &'a World<'a>,
     segment: &'a Segment,
@@ -28,7 +28,7 @@ struct Tube<'a> {
     layer_offset: f64,
     /// Distance from the geometric scanline, mm: at the start and per mm.
     off: [f64; 2],
-    /// How the tissue is displaced in the tube's space.
+    /// Displacements of the tissue in the tube's space; none where it does not deform.
     field: Option<Deformed<'a>>,
 }
 
@@ -42,8 +42,8 @@ struct Deformed<'a> {
 }
 
 impl Deformed<'_> {
-    /// A middle and a distance of all points of the reference shape from which tissue can be within
-    /// `radius` of `p`, relative to where it is: v differs by no more than `steepness` times the
+    /// Centre and radius of a ball that holds all points of the reference shape whose tissue can be within
+    /// `radius` of `p`, relative to `p`: v differs by no more than `steepness` times the
     /// distance there, which is no more than radius / (1 - steepness).
     fn back(&self, p: DVec3, radius: f64) -> (DVec3, f64) {
         if self.steepness < 1.0 {
@@ -55,7 +55,7 @@ impl Deformed<'_> {
     }
 }
 
-/// [`Tube::level`] of the loudest stretch that fills each slot of a scanline.
+/// For each slot of a scanline, [`Tube::level`] of the loudest segment that fills it.
 type Loudest = Vec<f64>;
 
 /// Echoes of all segments, in units of 1 / volume_scale.
@@ -102,7 +102,7 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
     out
 }
 
-/// 1 / sigma^2 of the beam across and up.
+/// 1 / sigma^2 of the beam laterally and in elevation.
 fn falling(row: &Row) -> [f64; 2] {
     [row.sigma_lateral, row.sigma_elevation].map(|sigma| f64::from(sigma).powi(-2))
 }
@@ -162,7 +162,7 @@ impl<'a> Tube<'a> {
         &self.world.rows[out.sample(self.time(x))]
     }
 
-    /// Weight at distance `x` but for absorption: less off the scanline, and averaged down where a rough
+    /// Weight at distance `x` without absorption: smaller off the scanline, and averaged where a rough
     /// reflection has spread the path over many resolution cells.
     fn weight(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.spread;
@@ -179,7 +179,7 @@ impl<'a> Tube<'a> {
         (-f64::from(self.tissue.absorption) * x).exp()
     }
 
-    /// How loud its speckle is at distance `x`: one-way weight times echogenicity, log2.
+    /// Level of its speckle at distance `x`: one-way weight times echogenicity, log2.
     fn level(&self, x: f64, out: &Accumulator) -> f64 {
         (self.weight(x, self.row(x, out)) * self.absorbed(x)).log2() + f64::from(self.tissue.level)
     }
@@ -199,7 +199,7 @@ impl<'a> Tube<'a> {
         first..last
     }
 
-    /// The slots that it fills, but for half a sample at either end.
+    /// The slots that it fills, up to half a sample at either end.
     fn filled(&self, out: &Accumulator) -> std::ops::Range<u32> {
         let samples = f64::from(self.world.frame.samples);
         let at = |x: f64| out.kappa(self.time(x)).clamp(0.0, samples) / f64::from(SCATTER_SLOT);
@@ -207,15 +207,15 @@ impl<'a> Tube<'a> {
         (at(0.0) - margin).ceil() as u32..(at(self.segment.length) + margin).floor() as u32
     }
 
-    /// The place in a bin at which it is held against the others there.
+    /// The place in a bin at which its level is compared with the others there.
     fn within(&self, bin: u32, out: &Accumulator) -> f64 {
         debug_assert!(self.bins(out).contains(&bin));
         let middle = f64::from(bin * SCATTER_BIN + SCATTER_BIN / 2);
         self.distance(middle).clamp(0.0, self.segment.length)
     }
 
-    /// By how much power, log2, something drowns it all along `bin`, as far as it reaches; nothing where
-    /// nobody would hear it.
+    /// The power, log2, by which something louder masks it all along `bin`, as far as it reaches; none where
+    /// it would not be heard.
     fn drowned(&self, bin: u32, loudest: &Loudest, out: &Accumulator) -> Option<f64> {
         let level = self.level(self.within(bin, out), out);
         let middle = (bin * SCATTER_BIN + SCATTER_BIN / 2).min(self.world.frame.samples - 1);
@@ -229,15 +229,15 @@ impl<'a> Tube<'a> {
         (level >= black - f64::from(UNHEARD)).then(|| 2.0 * above.max(0.0))
     }
 
-    /// The slab of a layer about its middle, mm: layers meet off the round numbers at which cells have their
-    /// middles.
+    /// The slab of a layer about its middle, mm. Borders of layers avoid the round numbers at which cells have their
+    /// centres.
     fn slab(&self) -> [f64; 2] {
         let reach = f64::from(self.world.frame.elevation_reach);
         [-1.0, 1.0].map(|side| (side + 2.0 * POINT_SHIFT) * reach)
     }
 
-    /// Half the beam's width at `row`, mm: an ellipse in the plane of width and height, of which the
-    /// layer's edge nearest to the middle counts.
+    /// Half the beam's width at `row`, mm: the beam's section is an ellipse, of which the
+    /// edge of the layer nearest to the middle is taken.
     fn half_width(&self, row: &Row) -> f64 {
         let frame = self.world.frame;
         let cut = f64::from(frame.lateral_cut);
@@ -246,7 +246,7 @@ impl<'a> Tube<'a> {
         cut * f64::from(row.sigma_lateral) * (1.0 - height * height).max(0.0).sqrt()
     }
 
-    /// Echo of something of `amplitude`, all but absorption and `beam`, at `from` the tube's origin.
+    /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`.
     fn echo(&self, from: DVec3, amplitude: f64, beam: f64, out: &mut Accumulator) {
         let x = from.dot(self.direction);
         let scale = f64::from(self.world.frame.volume_scale);
@@ -256,20 +256,20 @@ impl<'a> Tube<'a> {
         });
     }
 
-    /// The beam's two-way amplitude off its axis, as wide as a row says.
+    /// The beam's two-way amplitude off its axis, with the widths of a row.
     fn beam(&self, from: DVec3, row: &Row) -> f64 {
         self.beam_of(from, falling(row))
     }
 
-    /// The same by 1 / sigma^2 across and up.
+    /// The same from 1 / sigma^2 laterally and in elevation.
     fn beam_of(&self, from: DVec3, [lateral, elevation]: [f64; 2]) -> f64 {
         let across = from.dot(self.lateral);
         let up = self.layer_offset + from.dot(self.elevation);
         (-0.5 * (across * across * lateral + up * up * elevation)).exp()
     }
 
-    /// 1 / sigma^2 at distance `x`: a row's is that of its sample's middle, and between them lies the parabola
-    /// through the nearest three.
+    /// 1 / sigma^2 at distance `x`: the value of a row is that of its sample's middle, and between them lies the
+    /// parabola through the nearest three.
     fn between_rows(&self, x: f64, out: &Accumulator) -> [f64; 2] {
         let last = self.world.rows.len() - 1;
         let at = (out.kappa(self.time(x)) - 0.5).clamp(0.0, last as f64);

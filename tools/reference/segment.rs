@@ -1,4 +1,4 @@
-//! A straight stretch of a path, widened to f64.
+//! A straight part of a path, in f64.
 
 use glam::DVec3;
 

@@ -1,5 +1,5 @@
-//! Twin of `shadow`: what the anatomy inside the mask takes from the sound, in excess of what the
-//! tissue around the mask would have.
+//! Twin of `shadow`: the loss of sound in the anatomy inside the mask, beyond the loss that the
+//! tissue around the mask would cause.
 
 use super::geometry::world_line;
 use super::interface::{self, Interface};
@@ -8,17 +8,17 @@ use super::way::{Start, Toggled};
 use super::world::World;
 use insonify::sim::layout::MAX_PIECES;
 
-/// Level of what nothing gets through, nepers.
+/// Level that stands for no sound at all, nepers.
 const DARK: f64 = -200.0;
 
-/// Where the level of the transmitted sound goes straight.
+/// A piece of a line in which the transmitted level changes linearly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Piece {
     /// Axial sample at which it begins.
     pub begin: f64,
     /// Level there, nepers of the two-way amplitude.
     pub level: f64,
-    /// What is lost per sample, nepers.
+    /// Loss per sample, nepers.
     pub slope: f64,
 }
 
@@ -29,7 +29,7 @@ pub fn level(pieces: &[Piece], k: f64) -> f64 {
     piece.level - piece.slope * (k - piece.begin)
 }
 
-/// Pieces of each line e * scanlines + l, from where its paths begin.
+/// Pieces of each line e * scanlines + l, from the place where its paths begin.
 pub fn shadow(world: &World, starts: &[Start]) -> Vec<Vec<Piece>> {
     let lines = 0..world.frame.layers * world.frame.scanlines;
     lines
@@ -89,12 +89,12 @@ fn follow(world: &World, mut path: Path) -> Vec<Piece> {
         let (mut speed, absorption) = (f64::from(tissue.speed), f64::from(tissue.absorption));
         let heard = world.is_heard(&path.stack);
         if !heard {
-            // Around the mask sound goes on at the speed of the recording.
+            // Around the mask sound travels at the speed assumed by the recording.
             speed = frame.speed.into();
             surrounding = absorption;
         }
         let excess = if heard { absorption - surrounding } else { 0.0 };
-        // The device keeps one place for what marks the end.
+        // The device's list keeps its last place for the piece that marks the end.
         let full = pieces.len() + 2 == MAX_PIECES;
         let ends = lost || full || crossing == 64 + frame.max_interactions;
         if fresh || ends {

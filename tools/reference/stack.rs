@@ -7,7 +7,7 @@ use insonify::sim::layout::{FLAG_MASKED, Frame, Instance, MAX_STACK};
 pub struct Stack(pub Vec<u32>);
 
 impl Stack {
-    /// Pushes `instance`; false when the stack is full and nothing was done.
+    /// Pushes `instance`; false if the stack is full and unchanged.
     pub fn enter(&mut self, instance: u32) -> bool {
         let room = self.0.len() < MAX_STACK;
         if room {
@@ -23,7 +23,7 @@ impl Stack {
         }
     }
 
-    /// Whether echoes from here are wanted: everywhere, or in a masked frame inside a masking instance.
+    /// True if echoes from here are wanted: everywhere, or in a masked frame inside a masking instance.
     pub fn is_heard(&self, frame: &Frame, instances: &[Instance]) -> bool {
         let masks = |&i: &u32| instances[i as usize].masks != 0;
         frame.flags & FLAG_MASKED == 0 || self.0.iter().any(masks)

@@ -1,4 +1,4 @@
-//! Random fields fixed to a tissue: what a voxel of the paper's grid holds, and the low-frequency texture.
+//! Random fields fixed to a tissue: voxels of the paper's grid, and the low-frequency texture.
 
 use glam::{DVec3, I64Vec3};
 
@@ -8,10 +8,10 @@ use insonify::sim::layout::Tissue;
 /// Standard deviation of the two octaves before they are scaled: ((26/35)^3 / 3 * 5/4)^(1/2).
 const DEVIATION: f64 = 0.413_29;
 
-/// What one voxel holds.
+/// The scatterer of one voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Voxel {
-    /// How far into its sample it sounds, [0, 1).
+    /// Place of its echo within the sample, [0, 1).
     pub jitter: f64,
     /// Amplitude before the low-frequency texture.
     pub amplitude: f64,
@@ -21,7 +21,7 @@ fn words(cell: I64Vec3, seed: u32) -> [u32; 4] {
     pcg4d([cell.x as u32, cell.y as u32, cell.z as u32, seed])
 }
 
-/// What the voxel `cell` holds in `tissue`, if anything.
+/// The scatterer of voxel `cell` in `tissue`, if there is one.
 pub fn voxel(tissue: &Tissue, cell: I64Vec3) -> Option<Voxel> {
     let [x, y, z, w] = words(cell, tissue.seed);
     // The low bytes: unit() uses the upper 24 bits, so presence does not bias the jitter.

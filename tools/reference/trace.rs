@@ -15,14 +15,14 @@ use insonify::sim::layout::{
     SAMPLING_SHARED_PRIMARY,
 };
 
-/// What `trace` leaves behind.
+/// The results of `trace`.
 #[derive(Clone, Debug)]
 pub struct Traced {
     /// Surface echoes, in units of 1 / surface_scale.
     pub surface: Accumulator,
-    /// Segments per line e * scanlines + l, by path; none is dropped for want of room.
+    /// Segments per line e * scanlines + l, by path; none is dropped for lack of room.
     pub segments: Vec<Vec<Segment>>,
-    /// Counts; `segments_dropped` is what the frame's capacity would not hold.
+    /// Counters; `segments_dropped` is the number beyond the frame's capacity.
     pub counters: Counters,
 }
 
@@ -32,7 +32,7 @@ struct Tracer<'a> {
     out: Traced,
 }
 
-/// Follows all paths of all lines from where they begin.
+/// Follows all paths of all lines from their starts.
 pub fn trace(world: &World, starts: &[Start]) -> Traced {
     let frame = world.frame;
     let lines = frame.layers * frame.scanlines;
@@ -142,7 +142,7 @@ impl Tracer<'_> {
                     if same && heard[0] == heard[1] {
                         path.t_min = last + step(path.origin + last * path.direction);
                     } else {
-                        // The mask begins or ends within a medium: the stretch is cut there. Outside
+                        // The mask begins or ends within a medium: the segment is cut there. Outside the mask
                         // another medium begins, and sound goes straight on.
                         self.emit(&path, hit.t);
                         self.advance(&mut path, hit.t);
@@ -175,8 +175,8 @@ impl Tracer<'_> {
         }
     }
 
-    /// Whether nothing more is heard of the path: it is outside of all masks, and none is ahead, nor
-    /// the face that would send it back.
+    /// True if the path gives no more echoes: it is outside of all masks, and neither a mask nor
+    /// a face that would reflect it is ahead.
     fn flies_past(&self, path: &Path, t_end: f64, mask_ahead: bool) -> bool {
         let frame = self.world.frame;
         let bounces = frame.flags & FLAG_FACE_REFLECTION != 0
@@ -185,7 +185,7 @@ impl Tracer<'_> {
         !self.world.is_heard(&path.stack) && !mask_ahead && !bounces
     }
 
-    /// Speed at which a path goes on: that of its medium, and of the acquired image around the masks.
+    /// Speed of a path: that of its medium, or around the masks that of the acquired image.
     fn speed(&self, media: &Stack) -> f64 {
         let (tissue, _) = self.world.medium(media);
         let heard = self.world.is_heard(media);
@@ -212,7 +212,7 @@ impl Tracer<'_> {
         (t < limit).then(|| (t, world.transform_vector3(normal).normalize()))
     }
 
-    /// What the transducer's face, a perfect mirror, sends back along the path.
+    /// Deposits the part that the transducer's face, a perfect mirror, sends back along the path.
     fn face_echo(&mut self, path: &Path, normal: DVec3) {
         let cos = -path.direction.dot(normal);
         let lobe = (2.0 * cos * cos - 1.0).max(0.0);
@@ -243,7 +243,7 @@ impl Tracer<'_> {
         path.t_min = step(path.origin);
     }
 
-    /// The reflected part that main-path sampling splits off, followed to its end.
+    /// Follows the reflected part that main-path sampling splits off, to its end.
     fn branch(&mut self, main: &Path, interface: &Interface) {
         let frame = self.world.frame;
         let Some(echo) = interface.micro.filter(|_| main.reflections < frame.max_reflections)
@@ -256,7 +256,7 @@ impl Tracer<'_> {
         if f64::from(main.n) >= branches {
             return;
         }
-        // The fainter a branch, the rarer it is followed, and counts for as many.
+        // Russian roulette: the fainter a branch, the more rarely it is followed, with as much more weight.
         let row = &self.world.rows[self.out.surface.sample(path.time)];
         let level = path.weight * big_r * f64::from(row.compensation);
         let floor = f64::from(frame.branch_floor);
@@ -276,7 +276,7 @@ impl Tracer<'_> {
         }
     }
 
-    /// Reflects or transmits by chance; whether the path goes on.
+    /// Chooses reflection or transmission at random; true if the path continues.
     fn choose(&mut self, path: &mut Path, interface: &Interface, after: Stack) -> bool {
         let frame = self.world.frame;
         let mut u = unit(draw(frame, path.n, path.key(), PURPOSE_CHOICE)[0]);
@@ -314,14 +314,14 @@ impl Tracer<'_> {
         true
     }
 
-    /// Whether the volume echoes of a branch would be drowned.
+    /// True if the volume echoes of a branch are below the volume floor.
     fn is_faint(&self, path: &Path) -> bool {
         let row = &self.world.rows[self.out.surface.sample(path.time)];
         path.weight * path.survival * f64::from(row.compensation)
             < f64::from(self.world.frame.volume_floor)
     }
 
-    /// Keeps the stretch of `length` ahead of the path, if scatterers or points can lie there.
+    /// Stores the segment of `length` ahead of the path, if scatterers or points can lie there.
     fn emit(&mut self, path: &Path, length: f64) {
         let (tissue, instance) = self.world.medium(&path.stack);
         let scatters = self.world.tissues[tissue as usize].presence > 0.0;
@@ -362,7 +362,7 @@ impl Tracer<'_> {
     }
 }
 
-/// Weight and share of a path that speaks for itself only.
+/// Weight and share of a path that stands for itself only.
 fn own_share(path: &Path) -> (f64, f64) {
     (
         path.weight * path.survival.sqrt() * path.share,

@@ -1,49 +1,49 @@
 //! Sound around the masks of a fused image: it goes straight on, is absorbed, and loses at each surface
-//! what a fluid interface reflects at normal incidence.
+//! the part that a fluid interface reflects at normal incidence.
 
 use super::stack::Stack;
 use super::world::{Crossing, World};
 use insonify::sim::layout::{FLAG_COINCIDENT, FLAG_MASKED};
 
-/// Crossings farther apart than this, mm, are not the same surface.
+/// Largest distance of crossings, mm, that can be the same surface.
 const COINCIDENT: f64 = 1e-3;
 
-/// Where the paths of a line begin.
+/// The start of the paths of a line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Start {
     /// Media there.
     pub media: Stack,
     /// Distance along the line, mm.
     pub travelled: f64,
-    /// Weight that is left; 0 where nothing of the line is heard.
+    /// Weight at the start; 0 if nothing of the line is heard.
     pub weight: f64,
-    /// Interfaces up to there.
+    /// Interfaces before the start.
     pub interactions: u32,
 }
 
 impl Start {
-    /// At the line's own start.
+    /// The line's own start, at the face.
     pub fn at_face(media: Stack) -> Self {
         Self { media, travelled: 0.0, weight: 1.0, interactions: 0 }
     }
 }
 
-/// One meeting with a surface, or with two that coincide.
+/// A crossing of one surface, or of two coincident ones.
 pub(super) struct Toggled {
-    /// Whose echo it is.
+    /// The crossing that echoes.
     pub(super) hit: Crossing,
     /// Media behind.
     pub(super) after: Stack,
     /// Distance of the last crossing that counted.
     pub(super) last: f64,
-    /// How many crossings that were.
+    /// Number of crossings that were counted.
     pub(super) count: usize,
-    /// How many media were one too many.
+    /// Number of media that did not fit into the stack.
     pub(super) overflow: u32,
 }
 
 impl World<'_> {
-    /// What the first of `crossings` does to the media.
+    /// The change of media at the first of `crossings`.
     pub(super) fn toggled(&self, stack: &Stack, crossings: &[Crossing]) -> Toggled {
         let nearest = crossings[0];
         let mut here = vec![nearest];
@@ -72,20 +72,20 @@ impl World<'_> {
         }
     }
 
-    /// Share of the weight that is left behind a surface around the masks between these media.
+    /// Share of the weight transmitted by a surface around the masks between these media.
     pub(super) fn passed(&self, before: &Stack, after: &Stack) -> f64 {
         let impedance = |s| f64::from(self.tissues[self.medium(s).0 as usize].impedance);
         let (z1, z2) = (impedance(before), impedance(after));
         1.0 - ((z2 - z1) / (z2 + z1)).powi(2)
     }
 
-    /// Share of the weight that is left after `t` mm in these media.
+    /// Share of the weight that remains after `t` mm in these media.
     pub(super) fn unabsorbed(&self, media: &Stack, t: f64) -> f64 {
         let tissue = &self.tissues[self.medium(media).0 as usize];
         (-f64::from(tissue.absorption) * t).exp()
     }
 
-    /// Whether echoes are wanted from where these media are.
+    /// True if echoes are wanted from inside these media.
     pub(super) fn is_heard(&self, media: &Stack) -> bool {
         media.is_heard(self.frame, self.instances)
     }
@@ -94,13 +94,13 @@ impl World<'_> {
         self.instances[crossing.instance as usize].masks != 0
     }
 
-    /// Whether one of `crossings` is with a mask.
+    /// True if one of `crossings` is with a mask.
     pub(super) fn meets_mask(&self, crossings: &[Crossing]) -> bool {
         crossings.iter().any(|c| self.masks(c))
     }
 
-    /// Where paths begin whose line starts in `media` and goes on through `crossings`: at the last
-    /// surface before something is heard. Also how many media were one too many.
+    /// The start of the paths of a line that begins in `media` and continues through `crossings`: the last
+    /// surface before something is heard. Also the number of media that did not fit into the stack.
     pub(super) fn start(&self, media: Stack, crossings: &[Crossing]) -> (Start, u32) {
         let frame = self.frame;
         let alike = frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0;

@@ -1,4 +1,4 @@
-//! What the tracing twins read: the device's arrays with brute-force rays over all triangles.
+//! The world of the tracing twins: the device's arrays, with brute-force rays over all triangles.
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -7,7 +7,7 @@ use super::stack::Stack;
 use insonify::scene::triangle;
 use insonify::sim::layout::{Frame, Instance, NONE, Row, Rows, Surface, Tissue};
 
-/// Crossings of one instance from one side closer together than this, mm, are one crossing: a ray
+/// Distance, mm, below which crossings of one instance from one side are one crossing: a ray
 /// through an edge meets both its triangles.
 const SAME_CROSSING: f64 = 1e-6;
 
@@ -21,13 +21,13 @@ pub struct Geometry<'a> {
     /// The same averaged over the surface, packed ([`insonify::scene::smoothed`]).
     pub smoothed: &'a [[u32; 4]],
     /// Vertex indices, counter-clockwise seen from outside; an instance owns the range
-    /// `first_triangle..first_triangle + triangles`, or shares it. Behind them, lists of whose the
-    /// shared ones are.
+    /// `first_triangle..first_triangle + triangles`, or shares it. Behind them, lists of the instances to which
+    /// the shared ones belong.
     pub triangles: &'a [[u32; 3]],
 }
 
 impl Geometry<'_> {
-    /// Whose `triangle` is, of those in the range of `instance`, which has this index.
+    /// The instance to which `triangle` belongs, of those that share the range of `instance`, which has this index.
     fn owner(&self, instance: &Instance, index: usize, triangle: usize) -> usize {
         if instance.owners == 0 {
             return index;
@@ -70,12 +70,12 @@ pub struct Crossing {
     pub triangle: usize,
     /// Barycentric weights of the second and third vertex.
     pub uv: [f64; 2],
-    /// Whether the ray goes in.
+    /// True if the ray enters the instance.
     pub entry: bool,
 }
 
 impl Crossing {
-    /// 1 where the ray goes in, -1 where it comes out.
+    /// 1 where the ray enters, -1 where it leaves.
     pub fn sign(&self) -> i32 {
         if self.entry { 1 } else { -1 }
     }
@@ -99,8 +99,8 @@ fn widen(v: [f32; 3]) -> DVec3 {
 }
 
 impl World<'_> {
-    /// The instance around a ray behind the first `passed` of its crossings, `all` of which are given: that of the
-    /// highest priority, of equals the one entered last. None: nothing is around.
+    /// The instance around a ray behind the first `passed` of its crossings, `all` of which are given: the one of the
+    /// highest priority, among equals the one entered last. None if nothing is around.
     pub fn behind(&self, all: &[Crossing], passed: usize) -> Option<u32> {
         let around = all[passed..].iter().filter(|candidate| {
             let own = all[passed..].iter().filter(|c| c.instance == candidate.instance);
@@ -111,7 +111,7 @@ impl World<'_> {
             let entered = all[..passed].iter().rposition(enters).map_or(0, |i| i + 1);
             (self.instances[c.instance as usize].priority, entered)
         };
-        // Of several that are alike the first: the one left first.
+        // Among equals the first in the list, which is left first.
         let best = around.reduce(|best, next| if rank(&next) > rank(&best) { next } else { best });
         best.map(|crossing| crossing.instance)
     }
@@ -228,7 +228,7 @@ impl World<'_> {
         }
     }
 
-    /// How the tissue of `instance` is displaced in its texture space; none where it does not deform.
+    /// The displacement field of `instance` in its texture space; none where its tissue does not deform.
     pub fn field(&self, instance: u32) -> Option<Field<'_>> {
         let world = self.frame.flags & insonify::sim::layout::FLAG_WORLD_TEXTURE != 0;
         if instance == NONE || world {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
 use insonify::register::landmarks::Landmark;
-use insonify::register::surface::{Surface, Triangle, samples};
+use insonify::register::surface::{Triangle, TriangleSurface, samples};
 use insonify::register::{RegisterError, points};
 use insonify::scene::graph::{Placed, is_even};
 use insonify::scene::{Acquired, Mesh, Scene, mesh};
@@ -75,7 +75,7 @@ pub fn outside(points: &[DVec3], volume: &Acquired) -> Option<String> {
 }
 
 /// The model's surface in the world, in the scene's present state.
-pub fn surface(args: &Register, scene: &Scene) -> Result<Surface> {
+pub fn surface(args: &Register, scene: &Scene) -> Result<TriangleSurface> {
     let still = scene.still();
     let mut triangles = Vec::new();
     for name in &args.surface {
@@ -95,7 +95,7 @@ pub fn surface(args: &Register, scene: &Scene) -> Result<Surface> {
             triangles.extend(placed(&still.meshes[instance.mesh], &instance.world_from_object));
         }
     }
-    Ok(Surface::new(&triangles)?)
+    Ok(TriangleSurface::new(&triangles)?)
 }
 
 /// The node called `name`, which carries the whole surface.

@@ -167,7 +167,7 @@ impl Maker<'_> {
         let mut caption = scene.name.clone();
         if let Some(variant) = variant.checked_sub(1) {
             let variant = &loaded.variants[variant];
-            variant.apply(&mut scene);
+            scene.settings.clone_from(&variant.settings);
             self.common.settle_simulation(&mut scene.simulation, self.device);
             caption = format!("{caption}, {}", variant.parameter.caption(variant.value));
         }

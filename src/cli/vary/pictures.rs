@@ -125,7 +125,7 @@ impl Studio {
         }];
         let mut changed = scene.clone();
         for (done, variant) in (2..).zip(variants) {
-            variant.apply(&mut changed);
+            changed.settings.clone_from(&variant.settings);
             settle(&mut changed);
             let parameter = variant.parameter;
             let caption = parameter.caption(variant.value);

@@ -6,17 +6,17 @@ use super::AccelSupport;
 use crate::gpu::adapter::Adapter;
 use crate::gpu::error::{GpuError, during};
 use crate::gpu::instance::{Instance, LOADER_LISTS};
-use crate::gpu::queues::{Place, Plan};
+use crate::gpu::queues::{QueueIndex, QueuePlan};
 
 /// Opens the logical device with the queues of `plan`, and whatever this program can use of what the adapter offers.
 pub(super) fn device(
     instance: &Instance,
     adapter: &Adapter,
-    plan: &Plan,
+    plan: &QueuePlan,
     window: bool,
 ) -> Result<ash::Device, GpuError> {
     // The window's picture should not wait for the simulation's.
-    let priority = |family, index| match window && plan.window == (Place { family, index }) {
+    let priority = |family, index| match window && plan.window == (QueueIndex { family, index }) {
         true => 1.0,
         false => 0.5,
     };

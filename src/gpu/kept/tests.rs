@@ -32,7 +32,7 @@ fn data() -> Vec<u8> {
 }
 
 #[test]
-fn what_is_written_is_read_again_and_a_broken_file_is_not() {
+fn written_files_are_read_again_and_broken_files_are_not() {
     let known = BTreeSet::from([3, u64::MAX, 17]);
     let bytes = encode(&known, &data());
     assert_eq!(decode(&bytes), Some((known, data())));

@@ -75,7 +75,7 @@ fn without_data_the_curve_goes_on_flat() {
 }
 
 #[test]
-fn what_may_not_change_stays_and_bounds_are_said() {
+fn fixed_settings_stay_and_bounds_are_reported() {
     let probe = Probe::linear();
     let now = Imaging { tgc_sliders: [2.0; 8], ..Imaging::default() };
     let simulated = band(&probe, |_| Some(0.4));

@@ -91,9 +91,9 @@ fn the_closed_form_of_the_difference_is_what_is_said() {
     // The quantile function of |logistic|, integrated over the middle half; and by its density.
     let primitive = |p: f64| 2.0 * (p * p.atanh() + (1.0 - p * p).ln() / 2.0);
     let mean = 2.0 * (primitive(0.75) - primitive(0.25)) * 10.0 / std::f64::consts::LN_10;
-    assert!((mean - DEVELOPED_DIFFERENCE).abs() < 5e-4, "{mean}");
+    assert!((mean - SPECKLE_DIFFERENCE).abs() < 5e-4, "{mean}");
     let deviation = 10.0 / std::f64::consts::LN_10 * std::f64::consts::PI / 6f64.sqrt();
-    assert!((deviation - DEVELOPED).abs() < 5e-3, "{deviation}");
+    assert!((deviation - SPECKLE_DEVIATION).abs() < 5e-3, "{deviation}");
 }
 
 #[test]
@@ -105,7 +105,7 @@ fn spread_and_size_are_those_of_the_speckle() {
     let tolerance = allowed(&reference);
     assert!(reference.cells > 3000.0 && tolerance < 0.06, "{}", reference.cells);
     let close = |a: f64, b: f64, tolerance: f64| (a / b - 1.0).abs() < tolerance;
-    assert!(close(spread, DEVELOPED, tolerance), "{spread} dB");
+    assert!(close(spread, SPECKLE_DEVIATION, tolerance), "{spread} dB");
     for scale in [[2.0, 1.5], [1.0, 3.0], [1.4, 2.1]] {
         let wider = speckle(&probe, scale, 2);
         let found = measured(&probe, &shown(&probe, &wider, 40.0, |_| -25.0));
@@ -120,7 +120,7 @@ fn spread_and_size_are_those_of_the_speckle() {
         // A size that is wrong by a quarter is noticed.
         assert!(!close(axial, 1.25 * scale[0], both), "{both}");
         let spread = found.spread.expect("far pairs") * 40.0;
-        assert!(close(spread, DEVELOPED, both), "{spread} dB");
+        assert!(close(spread, SPECKLE_DEVIATION, both), "{spread} dB");
     }
 }
 

@@ -68,8 +68,8 @@ fn error(found: &DAffine3, truth: &DAffine3) -> (f64, f64) {
     (off.fold(0.0, f64::max), angle.to_degrees())
 }
 
-fn surface() -> Surface {
-    Surface::new(&MODEL).expect("a surface")
+fn surface() -> TriangleSurface {
+    TriangleSurface::new(&MODEL).expect("a surface")
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn points_of_something_else_do_no_harm() {
     let mut transform = DAffine3::IDENTITY;
     for _ in 0..50 {
         let matched = matches(&points, &surface(), &transform);
-        let system = System::of(&matched, 1e9, Transformation::Rigid);
+        let system = NormalEquations::of(&matched, 1e9, Transformation::Rigid);
         transform = system.increment(&system.step(1e-6)) * transform;
     }
     let (worse, _) = error(&transform, &truth);
@@ -166,8 +166,8 @@ fn a_scale_is_found_where_it_may_change_and_kept_where_not() {
 }
 
 #[test]
-fn what_the_surface_leaves_open_stays_and_is_said() {
-    let ball = Surface::new(&triangles(&shapes::sphere(30.0, 5), |p| p)).expect("a ball");
+fn motions_that_the_surface_does_not_determine_stay_and_are_reported() {
+    let ball = TriangleSurface::new(&triangles(&shapes::sphere(30.0, 5), |p| p)).expect("a ball");
     let points: Vec<_> = samples(&triangles(&shapes::sphere(30.0, 5), |p| p), 1000)
         .into_iter()
         .map(|p| p + DVec3::new(3.0, -2.0, 1.0))
@@ -180,7 +180,7 @@ fn what_the_surface_leaves_open_stays_and_is_said() {
     let quarter = triangles(&shapes::cuboid([50.0, 40.0, 30.0]), |p| p);
     let floor: Vec<_> = quarter.iter().copied().filter(|t| t.iter().all(|p| p.z < 0.0)).collect();
     let points = samples(&floor, 500);
-    let plane = Surface::new(&floor).expect("a plane");
+    let plane = TriangleSurface::new(&floor).expect("a plane");
     // Its rim would hold larger ones.
     let small: Vec<_> = points.into_iter().map(|p| p * DVec3::new(0.5, 0.5, 1.0)).collect();
     let made = fit(&small, &plane, DAffine3::IDENTITY, Transformation::Similarity).expect("found");
@@ -190,7 +190,7 @@ fn what_the_surface_leaves_open_stays_and_is_said() {
 }
 
 #[test]
-fn what_cannot_be_laid_onto_a_surface_is_refused() {
+fn points_that_do_not_fit_a_surface_are_refused() {
     let good = cloud(&truth(1.0), 50, 0.0, 0.0);
     let mut broken = good.clone();
     broken[7].z = f64::INFINITY;

@@ -6,7 +6,7 @@ use glam::DVec3;
 use serde::Deserialize;
 use serde_json::Value;
 
-use super::{FAR, MAX_POINTS, Point, agreed, far, frame_named, too_many, unknown_frame};
+use super::{FARTHEST, MAX_POINTS, Point, agreed, far, frame_named, too_many, unknown_frame};
 use crate::register::RegisterError;
 use crate::volume::Frame;
 
@@ -71,7 +71,7 @@ pub(super) fn read(
                     "place it again, or take it out",
                 ));
             };
-            if let Some(value) = position.iter().find(|x| x.abs() > FAR) {
+            if let Some(value) = position.iter().find(|x| x.abs() > FARTHEST) {
                 return Err(far(path, 0, *value));
             }
             if out.len() >= MAX_POINTS {

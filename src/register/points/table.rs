@@ -5,7 +5,7 @@ use std::path::Path;
 use csv::{ReaderBuilder, StringRecord, Trim};
 use glam::DVec3;
 
-use super::{FAR, MAX_POINTS, far, frame_named, too_many, unknown_frame};
+use super::{FARTHEST, MAX_POINTS, far, frame_named, too_many, unknown_frame};
 use crate::register::RegisterError;
 use crate::settings::suggest;
 use crate::volume::Frame;
@@ -113,7 +113,7 @@ impl<'p> Table<'p> {
             let cell = cell.ok_or_else(|| fail(format!("the row ends before column `{name}`")))?;
             let value = cell.parse::<f64>();
             out[axis] = value.map_err(|_| fail(format!("{name}: `{cell}` is not a number")))?;
-            if out[axis].is_nan() || out[axis].abs() > FAR {
+            if out[axis].is_nan() || out[axis].abs() > FARTHEST {
                 return Err(far(self.path, row.line, out[axis]));
             }
         }

@@ -1,20 +1,20 @@
 //! The clock of a period: place in a period at the scene's time.
 
-use serde::Deserialize;
-
 use super::EDGE;
+use crate::settings::words;
 
-/// Behaviour after the end of a period.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Loop {
-    /// The same period again.
-    #[default]
-    Repeat,
-    /// No change: the last state stays.
-    Once,
-    /// The period backwards, then forwards again: a cycle lasts two periods.
-    PingPong,
+words! {
+    /// Behaviour after the end of a period.
+    #[derive(Default)]
+    pub enum Loop {
+        /// The same period again.
+        #[default]
+        Repeat = "repeat",
+        /// No change: the last state stays.
+        Once = "once",
+        /// The period backwards, then forwards again: a cycle lasts two periods.
+        PingPong = "ping-pong",
+    }
 }
 
 /// A clock that counts periods.

@@ -133,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn sine_is_the_sine() {
+    fn a_sine_motion_follows_the_sine() {
         let motion = Motion::Sine {
             clock: Clock { phase: 0.125, ..clock(2.0) },
             translation: DVec3::new(3.0, 0.0, -1.0),

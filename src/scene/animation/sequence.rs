@@ -1,19 +1,19 @@
 //! The sequence of keyframes over time, and the shapes between them.
 
-use serde::Deserialize;
-
 use super::EDGE;
 use super::clock::{Clock, Loop};
+use crate::settings::words;
 
-/// Interpolation of shapes between keyframes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Interpolation {
-    /// On the straight line between two.
-    #[default]
-    Linear,
-    /// On the cubic through four whose velocity is continuous (Catmull and Rom 1974).
-    Cubic,
+words! {
+    /// Interpolation of shapes between keyframes.
+    #[derive(Default)]
+    pub enum Interpolation {
+        /// On the straight line between two.
+        #[default]
+        Linear = "linear",
+        /// On the cubic through four whose velocity is continuous (Catmull and Rom 1974).
+        Cubic = "cubic",
+    }
 }
 
 /// Numbers of up to four keyframes and their weights, which sum to 1; unused ones weigh nothing.

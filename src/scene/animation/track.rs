@@ -218,7 +218,7 @@ impl Channel<DQuat> {
     /// A channel of rotations; they need not be of unit length.
     ///
     /// # Errors
-    /// As [`Channel::new`], and a zero quaternion.
+    /// Those of [`Channel::new`], and a zero quaternion.
     pub fn rotations(
         times: Vec<f64>,
         mut values: Vec<DQuat>,

@@ -6,21 +6,36 @@ use glam::DAffine3;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::placing::placement;
-use super::playing::{self, Played, Playing};
-use super::schema::{MeshTable, WireTable};
-use super::shelf::Shelf;
+use super::nodes::NodeKeys;
+use super::placing::{PLACE, placement};
+use super::playing::{self, Following, Played, Playing};
+use super::shelf::{MeshKeys, Shelf};
 use super::table::Table;
 use super::tissues::Tissues;
-use super::within;
-use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Surface, Wire};
+use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Wire};
+use crate::settings::group;
+use crate::settings::units::{LENGTH, LEVEL};
 
-/// Distance of a wire's points that no spacing of a scanner resolves and no frame affords.
+/// Smallest spacing of a wire's points, mm: no scanner resolves less, and no frame has time for more points.
 const MIN_SPACING: f64 = 1e-3;
 
-/// What a mesh table of the file has become.
+group! {
+    /// A string of point scatterers on a straight line, or one point.
+    pub struct WireKeys in "wire" {
+        /// One end in the world.
+        from: [f64; 3] = [0.0; 3], PLACE.required();
+        /// The other end.
+        to: Option<[f64; 3]> = None, PLACE.by_default("one point");
+        /// Distance of the points, rounded so that both ends have one. All wires together may have 1000000 points.
+        spacing: f64 = 0.1, Facts::quantity(&LENGTH, MIN_SPACING, 1e4);
+        /// Echo of one point; 0 dB is a perfect flat mirror.
+        amplitude: f64 = 0.0, Facts::quantity(&LEVEL, -300.0, 60.0);
+    }
+}
+
+/// The instances made from a mesh table of the file.
 pub(super) struct Placed {
-    /// Parent from object, unmoved.
+    /// Parent from object, at rest.
     pub rest: DAffine3,
     /// Its instances; several only with an animation.
     pub instances: Range<usize>,
@@ -28,25 +43,24 @@ pub(super) struct Placed {
     pub playing: Option<Playing>,
 }
 
-/// What all mesh tables hold.
+/// The meshes and instances of all mesh tables.
 #[derive(Default)]
 pub(super) struct Anatomy {
     pub meshes: Vec<Mesh>,
-    /// Where they are in their parents, unmoved.
+    /// Instances, each placed in its parent at rest.
     pub instances: Vec<Instance>,
-    /// By table.
+    /// For each table its instances.
     pub placed: Vec<Placed>,
 }
 
 impl Anatomy {
-    /// Where the file describes each instance.
-    pub fn origins(&self, tables: &[Table<Surface, MeshTable>]) -> Vec<Origin> {
-        let of = |(Table { other: table, .. }, placed): (&Table<Surface, MeshTable>, &Placed)| {
-            let origin = Origin {
-                mesh: table.name.clone(),
-                // What switches an animation is the mesh's own.
-                selector: table.parent.clone().filter(|_| table.keyframes.is_some()),
-            };
+    /// For each instance the place of its description in the file.
+    pub fn origins(&self, tables: &[Table<MeshKeys>]) -> Vec<Origin> {
+        let of = |(Table { stated, .. }, placed): (&Table<MeshKeys>, &Placed)| {
+            let NodeKeys { name, parent } = stated.get("");
+            // An animation is switched by the mesh itself.
+            let selector = parent.filter(|_| stated.has("keyframes"));
+            let origin = Origin { mesh: name, selector };
             std::iter::repeat_n(origin, placed.instances.len())
         };
         tables.iter().zip(&self.placed).flat_map(of).collect()
@@ -56,33 +70,34 @@ impl Anatomy {
 /// Reads every mesh.
 pub(super) fn meshes(
     document: &Document<'_>,
-    tables: &[Table<Surface, MeshTable>],
+    tables: &[Table<MeshKeys>],
     tissues: &mut Tissues<'_>,
     warnings: &mut Vec<Issue>,
 ) -> Result<Anatomy, SceneError> {
     let mut shelf = Shelf::default();
     let mut out = Anatomy::default();
-    for (i, Table { stated, other: table }) in tables.iter().enumerate() {
+    for (i, Table { stated, .. }) in tables.iter().enumerate() {
         let path = format!("mesh.{i}");
-        if out.instances.iter().any(|other| other.name == table.name) {
+        let NodeKeys { name, .. } = stated.get("");
+        let keys: MeshKeys = stated.get("");
+        if out.instances.iter().any(|other| other.name == name) {
             return Err(document.fail(
                 &format!("{path}.name"),
-                format!("there are two meshes named `{}`", table.name),
+                format!("there are two meshes named `{name}`"),
                 "give each its own name",
             ));
         }
-        let tissue = tissues.index(&format!("{path}.tissue"), &table.tissue)?;
+        let tissue = tissues.index(&format!("{path}.tissue"), &keys.tissue)?;
         let mut outside = tissues.get(tissue).surface;
-        let playing = playing::read(document, table, &path, &mut shelf, warnings)?;
+        let playing = playing::read(document, (stated, &name), &path, &mut shelf, warnings)?;
         let shapes = match &playing {
             Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
-            None => vec![shelf.shapes(document, table, &path, warnings)?],
+            None => vec![shelf.shapes(document, (stated, &name), &path, warnings)?],
         };
-        let place = (table.translate, table.rotate.as_ref(), table.scale);
-        let rest = placement(document, &path, place)?;
-        stated.put(document, &path, &mut outside)?;
+        let rest = placement(stated, "");
+        stated.put("", &mut outside);
         let mut inside = outside;
-        table.inside.stated.put(document, &format!("{path}.inside"), &mut inside)?;
+        stated.put("inside.", &mut inside);
         let first = out.instances.len();
         for shapes in shapes {
             out.instances.push(Instance {
@@ -90,12 +105,12 @@ pub(super) fn meshes(
                 mesh: shapes.mesh,
                 keyframes: Keyframes {
                     meshes: shapes.keyframes,
-                    strategy: table.strategy.unwrap_or_default(),
+                    strategy: stated.get::<Following>("").strategy,
                     ..Keyframes::default()
                 },
                 shown: true,
                 tissue,
-                priority: table.priority,
+                priority: keys.priority,
                 world_from_object: rest,
                 surface: [outside, inside],
             });
@@ -106,7 +121,7 @@ pub(super) fn meshes(
     Ok(out)
 }
 
-/// The placed wires have no more points than a frame affords.
+/// Fails if the placed wires have more points than a frame may have.
 pub(super) fn countable(document: &Document<'_>, wires: &[Wire]) -> Result<(), SceneError> {
     let counts = wires.iter().map(Wire::asks_for);
     let (sum, most) = (counts.clone().sum::<f64>(), f64::from(Wire::MOST));
@@ -121,25 +136,11 @@ pub(super) fn countable(document: &Document<'_>, wires: &[Wire]) -> Result<(), S
     }
 }
 
-pub(super) fn wires(
-    document: &Document<'_>,
-    tables: &[WireTable],
-) -> Result<Vec<Wire>, SceneError> {
-    let mut out = Vec::new();
-    for (i, table) in tables.iter().enumerate() {
-        let from = table.from.map(|q| q.0);
-        let to = table.to.map_or(from, |t| t.map(|q| q.0));
-        for v in from.into_iter().chain(to) {
-            within(document, &format!("wire.{i}"), v, -1e5, 1e5, "mm")?;
-        }
-        let spacing = table.spacing.map_or(0.1, |q| q.0);
-        within(document, &format!("wire.{i}.spacing"), spacing, MIN_SPACING, 1e4, "mm")?;
-        within(document, &format!("wire.{i}.amplitude"), table.amplitude.0, -300.0, 60.0, "dB")?;
-        out.push(Wire {
-            ends: [from, to],
-            spacing,
-            amplitude: 10f64.powf(table.amplitude.0 / 20.0),
-        });
-    }
-    Ok(out)
+pub(super) fn wires(tables: &[Table<WireKeys>]) -> Vec<Wire> {
+    let wire = |table: &Table<WireKeys>| {
+        let WireKeys { from, to, spacing, amplitude } = table.stated.get("");
+        let ends = [from, to.unwrap_or(from)];
+        Wire { ends, spacing, amplitude: 10f64.powf(amplitude / 20.0) }
+    };
+    tables.iter().map(wire).collect()
 }

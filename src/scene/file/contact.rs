@@ -3,9 +3,10 @@
 use super::document::Document;
 use super::error::SceneError;
 use super::fusion::closed_mesh;
-use super::schema::ContactTable;
-use super::within;
+use super::table::Table;
 use crate::scene::{Contact, Instance, Mesh};
+use crate::settings::units::LENGTH;
+use crate::settings::{Form, group};
 
 /// A good layer of coupling gel, mm. Scanning guides ask for enough of it that no air is left between
 /// face and skin, which a few millimetres do on a body that is not flat; stand-off pads, for what lies
@@ -14,28 +15,40 @@ const GEL: f64 = 3.0;
 /// Thicker than any stand-off pad, mm.
 const THICKEST: f64 = 30.0;
 
+group! {
+    /// The skin, which the probe has to touch.
+    pub struct ContactKeys in "contact" {
+        /// Names of the meshes, of which the union is the body that the probe is held to: the skin, or where that is a
+        /// thin layer also what lies below it. They must be closed; `cap_openings` closes a mesh file.
+        mesh: Vec<String> = Vec::new(), Facts::of(Form::Texts).required().limits("at least one");
+        /// Widest gap between face and skin, along the beam, that sound still crosses. A layer of coupling gel fills a
+        /// few millimetres, a stand-off pad 5 to 20. The meshes are rigid: where real skin would yield and lie around a
+        /// curved face, what it would yield belongs to the gap.
+        gel: f64 = GEL, Facts::quantity(&LENGTH, 0.0, THICKEST);
+    }
+}
+
 pub(super) fn build(
     document: &Document<'_>,
-    table: Option<&ContactTable>,
+    table: Option<&Table<ContactKeys>>,
     meshes: &[Mesh],
     instances: &[Instance],
 ) -> Result<Option<Contact>, SceneError> {
     let Some(table) = table else {
         return Ok(None);
     };
-    if table.mesh.is_empty() {
+    let ContactKeys { mesh, gel } = table.stated.get("");
+    if mesh.is_empty() {
         return Err(document.fail(
             "contact.mesh",
             "no mesh is named",
             "name the closed mesh of the skin, or leave [contact] out: then sound gets in everywhere",
         ));
     }
-    let skin = table.mesh.iter().enumerate().map(|(i, name)| {
+    let skin = mesh.iter().enumerate().map(|(i, name)| {
         let path = format!("contact.mesh.{i}");
         closed_mesh(document, &path, name, "the skin", meshes, instances)
     });
     let skin = skin.collect::<Result<_, _>>()?;
-    let gel = table.gel.map_or(GEL, |gel| gel.0);
-    within(document, "contact.gel", gel, 0.0, THICKEST, "mm")?;
     Ok(Some(Contact { skin, gel }))
 }

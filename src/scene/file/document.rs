@@ -1,4 +1,4 @@
-//! The text of a scene file with its overrides, and where each value stands in it.
+//! The text of a scene file with its overrides, and the place of each value in it.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -23,14 +23,14 @@ pub(super) struct Source {
     overrides: Vec<Override>,
 }
 
-/// One `path = value` of the command line, or of a sweep. Its spans count from `start`, past the file's text.
+/// One `path = value` of the command line or of a study. Its spans count from `start`, after the file's text.
 #[derive(Clone)]
 struct Override {
     path: String,
     /// The path's parts.
     segments: Vec<String>,
     shown: String,
-    /// `v = value` behind so many blanks that its spans come out in this numbering.
+    /// `v = value` after as many blanks as give its spans this numbering.
     padded: String,
     start: usize,
 }
@@ -42,7 +42,7 @@ pub(super) struct Document<'s> {
 }
 
 impl Source {
-    /// Reads the file; takes note of the overrides.
+    /// Reads the file and stores the overrides.
     pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
         let fail =
             |cause: String| SceneError::file(path, cause, "check the path of the scene file");
@@ -62,7 +62,7 @@ impl Source {
         let last = all.last().map(|o| o.start + o.shown.len());
         let mut start = last.unwrap_or(self.text.len()) + 1;
         for (path, value) in overrides {
-            // Whatever is not TOML is taken for a string: shells eat the quotes of "80 mm".
+            // A value that is not TOML is a string: shells remove the quotes of "80 mm".
             let written = match DeValue::parse(value) {
                 Ok(_) => value.clone(),
                 Err(_) => format!("{value:?}"),
@@ -129,9 +129,11 @@ impl Source {
 }
 
 impl Document<'_> {
-    /// A scene file as the schema understands it.
+    /// A scene file as the schema understands it, all values in their ranges.
     pub fn parse(&self) -> Result<File, SceneError> {
-        self.parse_as()
+        let file: File = self.parse_as()?;
+        file.check(self)?;
+        Ok(file)
     }
 
     /// The file as `T` understands it.
@@ -140,14 +142,14 @@ impl Document<'_> {
         let deserializer = toml::de::Deserializer::from(root);
         let mut track = serde_path_to_error::Track::new();
         let tracked = serde_path_to_error::Deserializer::new(deserializer, &mut track);
-        // Behind a pointer each table is compiled once; by itself three times, a quarter of the library.
+        // With dynamic dispatch each table is compiled once; with generics three times, a quarter of the library.
         let mut erased = <dyn erased_serde::Deserializer<'_>>::erase(tracked);
         let read = erased_serde::deserialize(&mut erased);
         drop(erased);
         read.map_err(|e| {
             let path: Vec<_> = track.path().iter().map(segment).collect();
             let names: Vec<_> = path.iter().map(String::as_str).collect();
-            // On its way through the pointer an error keeps its words, and lines say where it came along.
+            // Dynamic dispatch keeps an error's message in its first line and appends lines about its origin.
             let message = e.to_string();
             let message = message.lines().next().unwrap_or_default();
             let span = match message.starts_with("unknown field") {
@@ -198,7 +200,7 @@ impl Document<'_> {
         self.source.error(self.span_of(path), message.into(), Some(remedy.into()))
     }
 
-    /// Whether the top-level `table` has a key other than `but`.
+    /// True if the top-level `table` has a key other than `but`.
     pub fn says_of(&self, table: &str, but: &str) -> bool {
         let table = self.root.get(table).and_then(|v| v.get_ref().as_table());
         table.is_some_and(|t| t.keys().any(|key| key.get_ref() != but))
@@ -212,7 +214,7 @@ impl Document<'_> {
         }
     }
 
-    /// Where the value of a dotted path, or its nearest parent, begins: for the order of tables.
+    /// The offset, in bytes, of the value of a dotted path or of its nearest parent: for the order of tables.
     pub fn place(&self, path: &str) -> usize {
         self.span_of(path).start
     }
@@ -222,7 +224,7 @@ impl Document<'_> {
         self.span(&segments.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
-    /// Where the key of a path stands.
+    /// The span of the key of a path, bytes.
     fn key_span(&self, path: &[&str]) -> Range<usize> {
         let Some((last, above)) = path.split_last() else { return 0..0 };
         let table = match above {

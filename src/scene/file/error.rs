@@ -1,4 +1,4 @@
-//! Errors of scene files: where, why, and what to write instead.
+//! Errors of scene files, with place, cause and remedy.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -15,7 +15,7 @@ use crate::settings::suggest;
 pub struct SceneError {
     /// Cause.
     pub message: String,
-    /// What to do about it.
+    /// Remedy.
     #[help]
     pub remedy: Option<String>,
     /// The scene file, or `--set` where an override is at fault.

@@ -5,45 +5,54 @@ use std::sync::Arc;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::motion;
+use super::motion::{Cycle, PERIOD, PERIODS, UPDATES};
 use super::placing::placement;
-use super::schema::{Files, FusionTable, VolumeTable, even};
-use super::table::Table;
-use crate::scene::animation::{Interpolation, Loop, Sequence};
+use super::table::{Stated, Table};
+use crate::scene::animation::{Clock, Interpolation, Loop, Sequence};
 use crate::scene::fusion::open_edges;
 use crate::scene::{Acquired, Display, Fusion, Instance, Mesh, Warning};
-use crate::settings::{Group, Surroundings, suggest};
+use crate::settings::{Form, Surroundings, group, suggest};
 use crate::volume::{Volume, Voxels};
 
 /// Most volumes over time: 30 a second for half a minute, as keyframes of a mesh.
 const MAX_VOLUMES: usize = 1000;
 
-impl VolumeTable {
-    /// The files as they are written, at least one.
-    pub(super) fn files(&self) -> Vec<PathBuf> {
-        match &self.file {
-            Files::One(file) => vec![file.into()],
-            Files::Several(files) => files.iter().map(PathBuf::from).collect(),
-        }
+group! {
+    /// A volume acquired elsewhere.
+    pub struct VolumeKeys in "volume" {
+        /// `.mha`, `.mhd`, `.nrrd`, `.nhdr`, `.nii`, `.nii.gz` or `.dcm`; the path is relative to the scene file. A file
+        /// of several volumes, or a list of files of one each, is a volume that changes with time.
+        file: Vec<String> = Vec::new(), Facts::of(Form::OneOrSeveral).required();
+        /// Time in which all volumes are shown, as of a selector.
+        period: Option<f64> = None, PERIOD.by_default("of the file");
+        /// Volumes per second, instead of `period`. One of the two is required where the file has no time.
+        rate: Option<f64> = None, UPDATES.by_default("of the file");
     }
+}
 
-    /// Where the file of this number stands in the table.
-    fn key(&self, number: usize) -> String {
-        match self.file {
-            Files::One(_) => "volume.file".to_owned(),
-            Files::Several(_) => format!("volume.file.{number}"),
-        }
+group! {
+    /// The meshes of the mask.
+    pub struct MaskKeys in "fusion" {
+        /// Names of the meshes, of which the union is simulated. They must be closed; `cap_openings` closes a mesh
+        /// file.
+        mask: Vec<String> = Vec::new(), Facts::of(Form::Texts).required().limits("at least one");
     }
+}
+
+/// The files of a volume as they are written, at least one.
+pub(super) fn files(stated: &Stated) -> Vec<PathBuf> {
+    let VolumeKeys { file, .. } = stated.get("");
+    file.iter().map(PathBuf::from).collect()
 }
 
 /// Reads the volume and places it.
 pub(super) fn volume(
     document: &Document<'_>,
-    Table { stated, other: table }: &Table<Display, VolumeTable>,
+    stated: &Stated,
     warnings: &mut Vec<Warning>,
 ) -> Result<Acquired, SceneError> {
     let folder = document.source.path.parent().unwrap_or(Path::new(""));
-    let files: Vec<_> = table.files().iter().map(|f| folder.join(f)).collect();
+    let files: Vec<_> = files(stated).iter().map(|f| folder.join(f)).collect();
     if !(1..=MAX_VOLUMES).contains(&files.len()) {
         return Err(document.fail(
             "volume.file",
@@ -51,26 +60,36 @@ pub(super) fn volume(
             format!("name 1 to {MAX_VOLUMES}"),
         ));
     }
-    timing(document, table)?;
+    let timing: VolumeKeys = stated.get("");
+    if timing.period.is_some() && timing.rate.is_some() {
+        return Err(document.fail(
+            "volume.rate",
+            "`rate` and `period` both say how fast the volumes follow each other",
+            "remove one of them",
+        ));
+    }
     let (mut volume, found) = Volume::load_series(&files).map_err(|(number, error)| {
         let remedy = match files.len() {
             1 => "give a volume file that `insonify check` accepts".to_owned(),
             _ => error.remedy.clone(),
         };
-        document.fail(&table.key(number), format!("the volume cannot be used: {error}"), remedy)
+        let key = match stated.text("file") {
+            Some(_) => "volume.file".to_owned(),
+            None => format!("volume.file.{number}"),
+        };
+        document.fail(&key, format!("the volume cannot be used: {error}"), remedy)
     })?;
     warnings.extend(found);
-    let sequence = sequence(document, table, volume.later.len() + 1, volume.interval)?;
-    let place = (table.translate, table.rotate.as_ref(), even(table.scale));
-    let world_from_lps = placement(document, "volume", place)?;
-    // All that is stored of a byte; of other types only the range in use says what is white.
-    // Of all volumes: what is grey in one is as grey in the next.
+    let sequence = sequence(document, stated, volume.later.len() + 1, volume.interval)?;
+    let world_from_lps = placement(stated, "");
+    // Bytes have their full range. Other types have the range that their values use.
+    // It is the range of all volumes, so that equal values have equal grey levels at all times.
     let range = match &volume.voxels {
         Voxels::U8(_) => (0.0, 255.0),
         _ => (volume.statistics.min, volume.statistics.max),
     };
     let mut display = Display { black: range.0, white: range.1, world_from_lps };
-    stated.put(document, Display::TABLE, &mut display)?;
+    stated.put("", &mut display);
     let Display { black, white, .. } = display;
     for (key, level) in [("black", black), ("white", white)] {
         if !level.is_finite() {
@@ -103,38 +122,19 @@ pub(super) fn volume(
     })
 }
 
-/// Checks what the table says of time.
-fn timing(document: &Document<'_>, table: &VolumeTable) -> Result<(), SceneError> {
-    let period = table.period.map_or(1.0, |p| p.0);
-    motion::clock(document, "volume", period, (table.phase, table.mode, table.rate))?;
-    match table.period.is_some() && table.rate.is_some() {
-        true => Err(document.fail(
-            "volume.rate",
-            "`rate` and `period` both say how fast the volumes follow each other",
-            "remove one of them",
-        )),
-        false => Ok(()),
-    }
-}
-
-/// When each of `count` volumes is shown, which follow each other every `interval` seconds by their file;
-/// none of one volume.
+/// The sequence that shows `count` volumes, which follow each other every `interval` seconds by their file;
+/// none for a single volume.
 fn sequence(
     document: &Document<'_>,
-    table: &VolumeTable,
+    stated: &Stated,
     count: usize,
     interval: Option<f64>,
 ) -> Result<Option<Sequence>, SceneError> {
     if count == 1 {
-        let keys = [
-            ("period", table.period.is_some()),
-            ("rate", table.rate.is_some()),
-            ("phase", table.phase.is_some()),
-            ("loop", table.mode.is_some()),
-        ];
-        return match keys.iter().find(|k| k.1) {
+        let keys = ["period", "rate", "phase", "loop"];
+        return match keys.iter().find(|key| stated.has(key)) {
             None => Ok(None),
-            Some((key, _)) => Err(document.fail(
+            Some(key) => Err(document.fail(
                 &format!("volume.{key}"),
                 format!("`{key}` is for volumes that follow each other in time, and there is one"),
                 "remove it, or name several files",
@@ -148,23 +148,25 @@ fn sequence(
             format!("leave out some: up to {MAX_VOLUMES} can be shown"),
         ));
     }
-    // To and fro, the last one stands at the end of the period.
-    let steps = match table.mode.unwrap_or_default() {
+    // Played to and fro, the last volume is shown at the end of the period.
+    let VolumeKeys { period, rate, .. } = stated.get("");
+    let Cycle { phase, mode } = stated.get("");
+    let steps = match mode {
         Loop::PingPong => count - 1,
         Loop::Repeat | Loop::Once => count,
     };
     let turns = steps as f64;
-    let own = table.period.map(|p| ("volume.period", p.0));
-    let by_rate = table.rate.map(|rate| ("volume.rate", turns / rate.0));
-    let stated = interval.map(|seconds| ("volume.file", turns * seconds));
-    let Some((key, period)) = own.or(by_rate).or(stated) else {
+    let own = period.map(|period| ("volume.period", period));
+    let by_rate = rate.map(|rate| ("volume.rate", turns / rate));
+    let by_file = interval.map(|seconds| ("volume.file", turns * seconds));
+    let Some((key, period)) = own.or(by_rate).or(by_file) else {
         return Err(document.fail(
             "volume.file",
             format!("there are {count} volumes over time, and nothing says how fast they follow each other"),
             "add rate = \"20 Hz\", or the time in which all are shown: period = \"0.8 s\"",
         ));
     };
-    let (least, most) = motion::PERIODS;
+    let (least, most) = PERIODS;
     if !(least..=most).contains(&period) {
         return Err(document.fail(
             key,
@@ -172,19 +174,19 @@ fn sequence(
             format!("set a rate by which they take between {least} and {most} s"),
         ));
     }
-    let clock = motion::clock(document, "volume", period, (table.phase, table.mode, None))?;
+    let clock = Clock { period, phase, mode, rate: None };
     Ok(Some(Sequence::even(clock, count, Interpolation::default())))
 }
 
 /// The settings of the fusion, with the meshes that its mask names.
 pub(super) fn fusion(
     document: &Document<'_>,
-    table: Option<&Table<Fusion, FusionTable>>,
+    table: Option<&Table<Fusion>>,
     has_volume: bool,
     meshes: &[Mesh],
     instances: &[Instance],
 ) -> Result<Option<Fusion>, SceneError> {
-    let Some(Table { stated, other: table }) = table else {
+    let Some(Table { stated, .. }) = table else {
         return match has_volume {
             true => Err(document.fail(
                 "volume",
@@ -194,8 +196,8 @@ pub(super) fn fusion(
             false => Ok(None),
         };
     };
-    let mut out = Fusion::default();
-    stated.put(document, Fusion::TABLE, &mut out)?;
+    let mut out: Fusion = stated.get("");
+    let MaskKeys { mask } = stated.get("");
     if out.surroundings == Surroundings::Volume && !has_volume {
         return Err(document.fail(
             "fusion.surroundings",
@@ -203,14 +205,14 @@ pub(super) fn fusion(
             "add [volume] with file = \"NAME.mha\", or set surroundings = \"none\" or \"scatterers\"",
         ));
     }
-    if table.mask.is_empty() {
+    if mask.is_empty() {
         return Err(document.fail(
             "fusion.mask",
             "the mask names no mesh",
             "name the closed mesh around what is simulated",
         ));
     }
-    let masks = table.mask.iter().enumerate();
+    let masks = mask.iter().enumerate();
     let masks = masks.map(|(i, name)| {
         let path = format!("fusion.mask.{i}");
         closed_mesh(document, &path, name, "a mask", meshes, instances)

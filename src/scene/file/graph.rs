@@ -1,4 +1,4 @@
-//! The graph of a scene file: what selectors choose from, and what each node does.
+//! The graph of a scene file: its nodes, their effects, and the choices of its selectors.
 
 use std::collections::HashMap;
 
@@ -7,16 +7,28 @@ use glam::{DAffine3, DVec3};
 use super::anatomy::Anatomy;
 use super::document::Document;
 use super::error::SceneError;
+use super::motion::{self, PERIOD};
 use super::nodes::{Entry, Kind, depths, entries, parents};
-use super::schema::{File, SelectorTable};
-use super::{motion, placing};
+use super::placing::placement;
+use super::playing::Following;
+use super::schema::File;
+use super::table::Stated;
 use crate::scene::animation::{Motion, Sequence};
 use crate::scene::graph::{Graph, Node, NodeKind};
+use crate::settings::group;
 
-/// Factors and shifts, mm, of a placement with all parents at rest: beyond them single precision
+/// Limits of the factors and shifts, mm, of a placement with all parents at rest: beyond them single precision
 /// resolves nothing, or the placement has no inverse.
 const SCALES: (f64, f64) = (1e-6, 1e6);
 const FAR: f64 = 1e6;
+
+group! {
+    /// A selector, which shows its choices one after the other.
+    pub struct SelectorKeys in "selector" {
+        /// Time in which all choices are shown.
+        period: Option<f64> = None, PERIOD.by_default("required");
+    }
+}
 
 /// Makes the graph of all nodes; gives the instances with keyframes the number and the strategy of
 /// their selectors. Empty where no mesh has a parent and no node is written.
@@ -39,8 +51,8 @@ pub(super) fn build(
     for (e, entry) in entries.iter().enumerate() {
         match entry.kind {
             Kind::Selector(number) => {
-                let table = &file.selector[number];
-                family.choose(e, table, number, anatomy, &mut choices)?;
+                let stated = &file.selector[number].stated;
+                family.choose(e, stated, number, anatomy, &mut choices)?;
             }
             Kind::Mesh(i) if switched(anatomy, i).is_some() => family.under_selector(e)?,
             Kind::Group | Kind::Transform(_) | Kind::Mesh(_) => {}
@@ -82,7 +94,7 @@ pub(super) fn build(
                 playing.grow(&mut graph, node, placed.instances.start);
             }
         }
-        // Nobody of the file is below the nodes that have just grown.
+        // No node of the file is below the nodes just added.
         rests.resize(graph.nodes.len(), rest);
     }
     Ok(graph)
@@ -98,17 +110,17 @@ fn switched(anatomy: &Anatomy, table: usize) -> Option<usize> {
     waits.then_some(instance)
 }
 
-/// Numbers the selectors that animations of mesh files are: one for all meshes of one parent that
+/// Numbers the selectors that stand for animations of mesh files: one for all meshes of one parent that
 /// change at the same times.
 fn group_played(file: &File, anatomy: &mut Anatomy) {
     let mut groups: Vec<(Option<&str>, &Sequence)> = Vec::new();
-    for (table, placed) in file.mesh.iter().map(|t| &t.other).zip(&anatomy.placed) {
+    for (stated, placed) in file.mesh.iter().map(|table| &table.stated).zip(&anatomy.placed) {
         let played = placed.playing.iter().flat_map(|p| &p.meshes);
         for (mesh, instance) in played.zip(placed.instances.clone()) {
             let Some(sequence) = &mesh.sequence else {
                 continue;
             };
-            let key = (table.parent.as_deref(), sequence);
+            let key = (stated.text("parent"), sequence);
             let group = groups.iter().position(|g| *g == key).unwrap_or_else(|| {
                 groups.push(key);
                 groups.len() - 1
@@ -119,12 +131,12 @@ fn group_played(file: &File, anatomy: &mut Anatomy) {
     }
 }
 
-/// What selectors choose from.
+/// The choices of selectors.
 #[derive(Default)]
 struct Choices {
-    /// By the selector's entry, its order over time.
+    /// For each selector, by its entry, the order of its choices over time.
     sequences: HashMap<usize, Sequence>,
-    /// By the child's entry, its number.
+    /// For each child, by its entry, its number among the choices.
     alternatives: HashMap<usize, usize>,
 }
 
@@ -155,17 +167,17 @@ impl Family<'_> {
     fn choose(
         &self,
         e: usize,
-        table: &SelectorTable,
+        stated: &Stated,
         number: usize,
         anatomy: &mut Anatomy,
         choices: &mut Choices,
     ) -> Result<(), SceneError> {
         let path = &self.entries[e].path;
-        let name = &table.name;
+        let name = self.entries[e].name;
         let fail = |path: &str, message: String, remedy: &str| {
             Err(self.document.fail(path, message, remedy))
         };
-        let strategy = table.strategy.unwrap_or_default();
+        let Following { strategy, interpolation } = stated.get("");
         let mut alternatives = 0;
         let mut count: Option<(usize, &str)> = None;
         for &child in &self.children[e] {
@@ -228,14 +240,13 @@ impl Family<'_> {
             }
             (Some((count, _)), _) => count,
         };
-        let period = table.period.ok_or_else(|| {
+        let SelectorKeys { period } = stated.get("");
+        let period = period.ok_or_else(|| {
             let message = format!("selector `{name}` has no period");
             let remedy = "add the time in which all its choices are shown: period = \"0.8 s\"";
             self.document.fail(path, message, remedy)
         })?;
-        let settings = (table.phase, table.mode, table.rate);
-        let clock = motion::clock(self.document, path, period.0, settings)?;
-        let interpolation = table.interpolation.unwrap_or_default();
+        let clock = motion::clock(stated, "", period);
         let sequence = Sequence::even(clock, count, interpolation);
         choices.sequences.insert(e, sequence);
         Ok(())
@@ -251,13 +262,10 @@ impl Family<'_> {
         Ok(match self.entries[e].kind {
             Kind::Group => NodeKind::Group,
             Kind::Transform(i) => {
-                let table = &self.file.transform[i];
-                let path = &self.entries[e].path;
-                let place = (table.translate, table.rotate.as_ref(), table.scale);
-                let moves = |t| motion::motion(self.document, t, &format!("{path}.motion"));
+                let stated = &self.file.transform[i].stated;
                 NodeKind::Transform {
-                    rest: placing::placement(self.document, path, place)?,
-                    motion: table.motion.as_ref().map_or(Ok(Motion::Still), moves)?,
+                    rest: placement(stated, ""),
+                    motion: motion::motion(self.document, stated, &self.entries[e].path)?,
                 }
             }
             Kind::Selector(_) => {

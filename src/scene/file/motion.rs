@@ -4,105 +4,185 @@ use glam::DVec3;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::placing::{factors, shift, turn};
-use super::schema::{BetweenRows, MotionKind, MotionTable, Rotation};
+use super::placing::{AXIS, PLACE, TURN};
+use super::table::Stated;
 use super::{trajectory, within};
 use crate::scene::animation::{Clock, Curve, Fetal, Loop, Motion, Trs, Turn};
-use crate::settings::units::{Duration, Rate};
+use crate::settings::units::{DURATION, RATE};
+use crate::settings::{Facts, Form, group, words};
 
 /// Shortest and longest period, s: a microsecond, which no frame resolves, to a day.
 pub(super) const PERIODS: (f64, f64) = (1e-6, 86_400.0);
-/// Updates per second: from one a day to more than any frame rate.
-const RATES: (f64, f64) = (1e-5, 1e6);
-/// Factors by which tissue is squeezed or stretched: half and twice is more than tissue bears, and as far as its
-/// scatterers are found (`docs/kernels.md`, Deformed tissue).
+/// Factors by which tissue may be squeezed or stretched: half and twice is more than real tissue bears, and the limit
+/// to which its scatterers are found (`docs/kernels.md`, Deformed tissue).
 pub(super) const SQUEEZE: (f64, f64) = (0.4, 2.5);
-/// A burst of general movements and the pause after it where the file does not say, s: lively enough
-/// for a short clip. Fetuses of 8 to 19 weeks rest for up to 13 minutes (de Vries, Visser and Prechtl
-/// 1985, Early Human Development 12, 99-120).
-const BURST: f64 = 4.0;
-const PAUSE: f64 = 6.0;
+/// Updates per second: from one a day to more than any frame rate.
+pub(super) const UPDATES: Facts = Facts::quantity(&RATE, 1e-5, 1e6);
+/// The time in which all is shown once.
+pub(super) const PERIOD: Facts = Facts::quantity(&DURATION, PERIODS.0, PERIODS.1);
+/// Longest mean of a burst of movements or of a pause, s.
+const LONGEST: f64 = 3600.0;
 
-/// The clock of a motion or of a selector, at `path`.
-pub(super) fn clock(
-    document: &Document<'_>,
-    path: &str,
-    period: f64,
-    (phase, mode, rate): (Option<f64>, Option<Loop>, Option<Rate>),
-) -> Result<Clock, SceneError> {
-    let at = |key: &str| format!("{path}.{key}");
-    within(document, &at("period"), period, PERIODS.0, PERIODS.1, "s")?;
-    let phase = phase.unwrap_or(0.0);
-    within(document, &at("phase"), phase, 0.0, 1.0, "")?;
-    Ok(Clock {
-        period,
-        phase,
-        mode: mode.unwrap_or_default(),
-        rate: updates(document, path, rate)?,
-    })
-}
-
-fn updates(
-    document: &Document<'_>,
-    path: &str,
-    rate: Option<Rate>,
-) -> Result<Option<f64>, SceneError> {
-    if let Some(rate) = rate {
-        let path = format!("{path}.rate");
-        within(document, &path, rate.0, RATES.0, RATES.1, "Hz")?;
+words! {
+    /// Kind of a motion.
+    pub enum Kind {
+        /// To and fro.
+        Sine = "sine",
+        /// Round and round.
+        Orbit = "orbit",
+        /// Bursts of movements at irregular times.
+        Fetal = "fetal",
+        /// Along a trajectory.
+        File = "file",
     }
-    Ok(rate.map(|rate| rate.0))
 }
 
-/// What `table`, at `path`, describes.
+words! {
+    /// Interpolation between the rows of a trajectory.
+    pub enum Between {
+        /// Straight, and rotations along the great circle.
+        Linear = "linear",
+        /// As in the row before.
+        Step = "step",
+    }
+}
+
+group! {
+    /// Phase of a period, and its end.
+    pub struct Cycle in "" {
+        /// Place in the period at time 0.
+        phase: f64 = 0.0, Facts::number(0.0, 1.0);
+        /// After a period: again; stay; or back the same way, and again.
+        mode: Loop = Loop::Repeat, Facts::word::<Loop>().key("loop");
+    }
+}
+
+group! {
+    /// Rate of updates.
+    pub struct Updates in "" {
+        /// Updates per second; nothing changes between them.
+        rate: Option<f64> = None, UPDATES.by_default("always");
+    }
+}
+
+group! {
+    /// Motion of a transform.
+    pub struct MotionKeys in "transform.motion" {
+        /// What it is.
+        kind: Kind = Kind::Sine, Facts::word::<Kind>().required();
+        /// Time of one oscillation or turn. Sine and orbit.
+        period: Option<f64> = None, PERIOD.by_default("required");
+        /// Amplitude of the shift. Sine and fetal, which need this or `rotate` (sine: or `scale`).
+        translate: [f64; 3] = [0.0; 3], PLACE;
+        /// Axis of rotation. Sine, orbit and fetal.
+        axis: [f64; 3] = [0.0, 0.0, 1.0], AXIS;
+        /// Amplitude of the rotation; of an orbit the angle of one period.
+        angle: f64 = 0.0, TURN;
+        /// Factor, or factors along x, y, z, at the sine's height. Applied before `rotate`. Sine only.
+        scale: [f64; 3] = [1.0; 3], Facts::factors(SQUEEZE.0, SQUEEZE.1);
+        /// A point on the axis of `rotate`, a joint; the point about which `scale` squeezes.
+        centre: [f64; 3] = [0.0; 3], PLACE;
+        /// Which movements. Fetal only.
+        seed: u32 = 1, Facts::whole(0, u32::MAX).limits("32 bits");
+        // Lively enough for a short clip. Fetuses of 8 to 19 weeks rest for up to 13 minutes (de Vries, Visser and
+        // Prechtl 1985, Early Human Development 12, 99-120).
+        /// Mean length of a burst. Fetal only.
+        duration: f64 = 4.0, Facts::quantity(&DURATION, 0.1, LONGEST);
+        /// Mean length of a pause. Fetal only.
+        pause: f64 = 6.0, Facts::quantity(&DURATION, 0.0, LONGEST);
+        /// Trajectory, relative to the scene file. File only.
+        file: Option<String> = None, Facts::of(Form::Text).by_default("required");
+        /// Between rows: straight, and rotations along the great circle; or as in the row before. File only.
+        interpolation: Between = Between::Linear, Facts::word::<Between>();
+    }
+}
+
+/// Keys of some kinds of motion only, with these kinds; `kind` and `rate` belong to all.
+const OWN: [(&str, &[Kind]); 12] = {
+    use Kind::{Fetal, File, Orbit, Sine};
+    [
+        ("period", &[Sine, Orbit]),
+        ("phase", &[Sine, Orbit, File]),
+        ("loop", &[Sine, Orbit, File]),
+        ("translate", &[Sine, Fetal]),
+        ("rotate", &[Sine, Orbit, Fetal]),
+        ("scale", &[Sine]),
+        ("centre", &[Sine, Orbit, Fetal]),
+        ("seed", &[Fetal]),
+        ("duration", &[Fetal]),
+        ("pause", &[Fetal]),
+        ("file", &[File]),
+        ("interpolation", &[File]),
+    ]
+};
+
+/// The clock of a motion, a selector or an animation, as the table `below` states it.
+pub(super) fn clock(stated: &Stated, below: &str, period: f64) -> Clock {
+    let Cycle { phase, mode } = stated.get(below);
+    let Updates { rate } = stated.get(below);
+    Clock { period, phase, mode, rate }
+}
+
+/// The duration of a file, s, as a period; of a single, constant state any will do. Fails at `path` if it is no period.
+pub(super) fn lasting(
+    document: &Document<'_>,
+    path: &str,
+    (start, end): (f64, f64),
+) -> Result<f64, SceneError> {
+    let period = if end > start { end - start } else { 1.0 };
+    within(document, &format!("{path}.period"), period, PERIODS.0, PERIODS.1, "s")?;
+    Ok(period)
+}
+
+/// The motion that the table `motion` of the transform at `path` describes.
 pub(super) fn motion(
     document: &Document<'_>,
-    table: &MotionTable,
+    stated: &Stated,
     path: &str,
 ) -> Result<Motion, SceneError> {
-    fit(document, table, path)?;
-    let parts = Parts { document, table, path };
-    let settings = (table.phase, table.mode, table.rate);
-    Ok(match table.kind {
-        MotionKind::Sine => {
+    if !stated.has("motion") {
+        return Ok(Motion::Still);
+    }
+    let path = &format!("{path}.motion");
+    let keys: MotionKeys = stated.get("motion.");
+    let parts = Parts { document, stated, keys: &keys, path };
+    parts.fit()?;
+    let translation = DVec3::from(keys.translate);
+    Ok(match keys.kind {
+        Kind::Sine => {
             parts.moves()?;
             Motion::Sine {
-                clock: clock(document, path, parts.period()?, settings)?,
-                translation: parts.translation()?,
-                turn: parts.turn(table.rotate.as_ref())?,
-                scale: factors(document, &format!("{path}.scale"), table.scale, SQUEEZE)?,
+                clock: clock(stated, "motion.", parts.need("period", keys.period)?),
+                translation,
+                turn: parts.turn()?,
+                scale: keys.scale.into(),
             }
         }
-        MotionKind::Orbit => {
-            let rotate = parts.need("rotate", table.rotate.as_ref())?;
+        Kind::Orbit => {
+            parts.need("rotate", parts.has("rotate").then_some(()))?;
             Motion::Orbit {
-                clock: clock(document, path, parts.period()?, settings)?,
-                turn: parts.turn(Some(rotate))?,
+                clock: clock(stated, "motion.", parts.need("period", keys.period)?),
+                turn: parts.turn()?,
             }
         }
-        MotionKind::Fetal => {
+        Kind::Fetal => {
             parts.moves()?;
-            let lasting = |key: &str, given: Option<Duration>, default: f64, least: f64| {
-                let value = given.map_or(default, |d| d.0);
-                within(document, &format!("{path}.{key}"), value, least, 3600.0, "s")?;
-                Ok(value)
-            };
             Motion::Fetal(Fetal {
-                seed: table.seed.unwrap_or(1),
-                translation: parts.translation()?,
-                turn: parts.turn(table.rotate.as_ref())?,
-                duration: lasting("duration", table.duration, BURST, 0.1)?,
-                pause: lasting("pause", table.pause, PAUSE, 0.0)?,
-                rate: updates(document, path, table.rate)?,
+                seed: keys.seed,
+                translation,
+                turn: parts.turn()?,
+                duration: keys.duration,
+                pause: keys.pause,
+                rate: stated.get::<Updates>("motion.").rate,
             })
         }
-        MotionKind::File => {
-            let file = parts.need("file", table.file.as_ref())?;
+        Kind::File => {
+            let file = parts.need("file", keys.file.as_ref())?;
             let folder = document.source.path.parent();
             let full = folder.map_or_else(|| file.into(), |p| p.join(file));
-            let curve = match table.interpolation.unwrap_or_default() {
-                BetweenRows::Linear => Curve::Linear,
-                BetweenRows::Step => Curve::Step,
+            let curve = match keys.interpolation {
+                Between::Linear => Curve::Linear,
+                Between::Step => Curve::Step,
             };
             let at = format!("{path}.file");
             let text = trajectory::text(&full).map_err(|cause| {
@@ -111,10 +191,8 @@ pub(super) fn motion(
             })?;
             let track = trajectory::parse(&full, &text, curve)?;
             let (start, end) = track.span().expect("a trajectory has rows");
-            // One row is a placement, which any period shows.
-            let period = if end > start { end - start } else { 1.0 };
             Motion::Track {
-                clock: clock(document, path, period, settings)?,
+                clock: clock(stated, "motion.", lasting(document, path, (start, end))?),
                 start,
                 rest: Trs::default(),
                 track: Box::new(track),
@@ -123,44 +201,34 @@ pub(super) fn motion(
     })
 }
 
-/// Refuses keys of another kind of motion.
-fn fit(document: &Document<'_>, table: &MotionTable, path: &str) -> Result<(), SceneError> {
-    use MotionKind::{Fetal, File, Orbit, Sine};
-    let keys: [(&str, bool, &[MotionKind]); 12] = [
-        ("period", table.period.is_some(), &[Sine, Orbit]),
-        ("phase", table.phase.is_some(), &[Sine, Orbit, File]),
-        ("loop", table.mode.is_some(), &[Sine, Orbit, File]),
-        ("translate", table.translate.is_some(), &[Sine, Fetal]),
-        ("rotate", table.rotate.is_some(), &[Sine, Orbit, Fetal]),
-        ("scale", table.scale.is_some(), &[Sine]),
-        ("centre", table.centre.is_some(), &[Sine, Orbit, Fetal]),
-        ("seed", table.seed.is_some(), &[Fetal]),
-        ("duration", table.duration.is_some(), &[Fetal]),
-        ("pause", table.pause.is_some(), &[Fetal]),
-        ("file", table.file.is_some(), &[File]),
-        ("interpolation", table.interpolation.is_some(), &[File]),
-    ];
-    let unfit = |key: &&(&str, bool, &[MotionKind])| key.1 && !key.2.contains(&table.kind);
-    let Some((key, ..)) = keys.iter().find(unfit) else {
-        return Ok(());
-    };
-    let own = keys.iter().filter(|k| k.2.contains(&table.kind));
-    let own: Vec<_> = own.map(|k| format!("`{}`", k.0)).collect();
-    Err(document.fail(
-        &format!("{path}.{key}"),
-        format!("`{key}` does not belong to this kind of motion"),
-        format!("it takes `kind`, `rate`, {}", own.join(", ")),
-    ))
-}
-
 /// A motion table with its place.
 struct Parts<'a> {
     document: &'a Document<'a>,
-    table: &'a MotionTable,
+    stated: &'a Stated,
+    keys: &'a MotionKeys,
     path: &'a str,
 }
 
 impl Parts<'_> {
+    fn has(&self, key: &str) -> bool {
+        self.stated.has(&format!("motion.{key}"))
+    }
+
+    /// Refuses keys of another kind of motion.
+    fn fit(&self) -> Result<(), SceneError> {
+        let fits = |kinds: &[Kind]| kinds.contains(&self.keys.kind);
+        let Some((key, _)) = OWN.iter().find(|(key, kinds)| self.has(key) && !fits(kinds)) else {
+            return Ok(());
+        };
+        let own = OWN.iter().filter(|(_, kinds)| fits(kinds));
+        let own: Vec<_> = own.map(|(key, _)| format!("`{key}`")).collect();
+        Err(self.document.fail(
+            &format!("{}.{key}", self.path),
+            format!("`{key}` does not belong to this kind of motion"),
+            format!("it takes `kind`, `rate`, {}", own.join(", ")),
+        ))
+    }
+
     fn need<T>(&self, key: &str, given: Option<T>) -> Result<T, SceneError> {
         given.ok_or_else(|| {
             self.document.fail(
@@ -171,45 +239,26 @@ impl Parts<'_> {
         })
     }
 
-    fn period(&self) -> Result<f64, SceneError> {
-        Ok(self.need("period", self.table.period)?.0)
-    }
-
-    /// Something has to be moved by.
+    /// Fails if a table states nothing that moves the node.
     fn moves(&self) -> Result<(), SceneError> {
-        let table = self.table;
-        match table.translate.is_some() || table.rotate.is_some() || table.scale.is_some() {
-            true => Ok(()),
-            false if table.kind == MotionKind::Sine => {
-                self.need("translate`, `rotate` or `scale", None)
-            }
-            false => self.need("translate` or `rotate", None),
-        }
-    }
-
-    fn translation(&self) -> Result<DVec3, SceneError> {
-        let Some(lengths) = self.table.translate else {
-            return Ok(DVec3::ZERO);
+        let moves = ["translate", "rotate", "scale"].iter().any(|key| self.has(key));
+        let needed = match self.keys.kind {
+            Kind::Sine => "translate`, `rotate` or `scale",
+            _ => "translate` or `rotate",
         };
-        shift(self.document, &format!("{}.translate", self.path), lengths)
+        self.need(needed, moves.then_some(()))
     }
 
-    fn turn(&self, rotate: Option<&Rotation>) -> Result<Turn, SceneError> {
-        let at = |key: &str| format!("{}.{key}", self.path);
-        let mut out = Turn::default();
-        if let Some(rotate) = rotate {
-            (out.axis, out.angle) = turn(self.document, &at("rotate"), rotate)?;
+    fn turn(&self) -> Result<Turn, SceneError> {
+        if self.has("centre") && !self.has("rotate") && !self.has("scale") {
+            return Err(self.document.fail(
+                &format!("{}.centre", self.path),
+                "`centre` is that of `rotate` or `scale`, and neither is given",
+                "add one of them or remove `centre`",
+            ));
         }
-        if let Some(centre) = self.table.centre {
-            if rotate.is_none() && self.table.scale.is_none() {
-                return Err(self.document.fail(
-                    &at("centre"),
-                    "`centre` is that of `rotate` or `scale`, and neither is given",
-                    "add one of them or remove `centre`",
-                ));
-            }
-            out.centre = shift(self.document, &at("centre"), centre)?;
-        }
-        Ok(out)
+        let MotionKeys { axis, angle, centre, .. } = self.keys;
+        let axis = DVec3::from(*axis).normalize();
+        Ok(Turn { axis, angle: *angle, centre: DVec3::from(*centre) })
     }
 }

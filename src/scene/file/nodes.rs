@@ -1,11 +1,22 @@
-//! The nodes of a scene file, and who is whose child.
+//! The nodes of a scene file, and their parents.
 
 use std::collections::HashMap;
 
 use super::document::Document;
 use super::error::SceneError;
 use super::schema::File;
-use crate::settings::suggest;
+use super::table::{Keys, Table};
+use crate::settings::{Form, group, suggest};
+
+group! {
+    /// Keys of every node.
+    pub struct NodeKeys in "group" {
+        /// Name in messages, and for `--set`.
+        name: String = String::new(), Facts::of(Form::Text).required().limits("unique");
+        /// Group, transform or selector that it belongs to.
+        parent: Option<String> = None, Facts::of(Form::Text).by_default("the world");
+    }
+}
 
 /// A table that is a node.
 pub(super) struct Entry<'f> {
@@ -30,22 +41,22 @@ pub(super) fn entries<'f>(
     document: &Document<'_>,
     file: &'f File,
 ) -> Result<Vec<Entry<'f>>, SceneError> {
-    let mut out = Vec::new();
-    let mut add = |kind, path: String, name: &'f String, parent: &'f Option<String>| {
-        out.push(Entry { path, name, parent: parent.as_deref(), kind });
-    };
-    for (i, t) in file.group.iter().enumerate() {
-        add(Kind::Group, format!("group.{i}"), &t.name, &t.parent);
+    fn all<'f, K: Keys>(
+        tables: &'f [Table<K>],
+        kind: fn(usize) -> Kind,
+    ) -> impl Iterator<Item = Entry<'f>> {
+        tables.iter().enumerate().map(move |(i, Table { stated, .. })| Entry {
+            path: format!("{}.{i}", K::TABLE),
+            name: stated.text("name").unwrap_or_default(),
+            parent: stated.text("parent"),
+            kind: kind(i),
+        })
     }
-    for (i, t) in file.transform.iter().enumerate() {
-        add(Kind::Transform(i), format!("transform.{i}"), &t.name, &t.parent);
-    }
-    for (i, t) in file.selector.iter().enumerate() {
-        add(Kind::Selector(i), format!("selector.{i}"), &t.name, &t.parent);
-    }
-    for (i, t) in file.mesh.iter().enumerate() {
-        add(Kind::Mesh(i), format!("mesh.{i}"), &t.other.name, &t.other.parent);
-    }
+    let mut out: Vec<Entry<'f>> = all(&file.group, |_| Kind::Group)
+        .chain(all(&file.transform, Kind::Transform))
+        .chain(all(&file.selector, Kind::Selector))
+        .chain(all(&file.mesh, Kind::Mesh))
+        .collect();
     out.sort_by_key(|e| document.place(&e.path));
     let mut names = HashMap::new();
     for (e, entry) in out.iter().enumerate() {
@@ -97,11 +108,11 @@ pub(super) fn depths(
 ) -> Result<Vec<usize>, SceneError> {
     let mut depths: Vec<Option<usize>> = vec![None; entries.len()];
     for start in 0..entries.len() {
-        // Up to an entry whose depth is known, and down again.
+        // First up to an entry whose depth is known, then down again.
         let mut chain = Vec::new();
         let mut at = Some(start);
         while let Some(e) = at.filter(|&e| depths[e].is_none()) {
-            // After as many steps as there are nodes it goes in circles.
+            // More steps than there are nodes mean a cycle.
             if chain.len() == entries.len() {
                 let by = parents[e].expect("it was come by");
                 let by = match by == e {

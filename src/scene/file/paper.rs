@@ -1,4 +1,4 @@
-//! The way of the paper (Starkov et al. 2019) where ours differs by default: `docs/paper.md` says how and why.
+//! Settings of the paper (Starkov et al. 2019) where our defaults differ; `docs/paper.md` says how and why.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ const SIMULATION: [(&str, &str); 7] = [
     ("simulation.scatter_mode", "voxel"),
     ("simulation.texture_space", "world"),
 ];
-/// How it is mixed with an acquired volume, where it has one.
+/// Settings for a scene with an acquired volume.
 const FUSION: [(&str, &str); 4] = [
     ("fusion.blend", "linear"),
     ("fusion.blur", "32"),
@@ -20,9 +20,9 @@ const FUSION: [(&str, &str); 4] = [
     ("fusion.background_shadows", "false"),
 ];
 
-/// Overrides, as [`crate::scene::Scene::load`] takes them, with which the scene file at `path` is imaged as in the
-/// paper; with `selectors` keyframes are switched by its selector nodes, which only the compute tracer has. Of a file
-/// that cannot be read those that every scene takes: whoever loads it says what is wrong.
+/// Overrides, for [`crate::scene::Scene::load`], with which the scene file at `path` is imaged as in the
+/// paper. With `selectors` keyframes are switched by the paper's selector nodes, which only the compute tracer has.
+/// For a file that cannot be read these are the overrides for every scene: loading it then reports the fault.
 pub fn paper(path: &Path, selectors: bool) -> Vec<(String, String)> {
     let text = std::fs::read_to_string(path).unwrap_or_default();
     let file: toml::Table = toml::from_str(&text).unwrap_or_default();

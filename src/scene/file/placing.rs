@@ -1,75 +1,52 @@
-//! Where things are: shift, rotation and scale of meshes, transforms and motions.
+//! Placements: shift, rotation and scale of meshes, transforms and motions.
 
 use glam::{DAffine3, DQuat, DVec3};
 
-use super::document::Document;
-use super::error::SceneError;
-use super::schema::{Factors, Rotation};
-use super::within;
-use crate::settings::units::Length;
+use super::table::Stated;
+use crate::settings::units::{ANGLE, LENGTH};
+use crate::settings::{Facts, Form, group};
 
 /// Least and largest factor by which a placement scales.
 pub const SCALES: [f64; 2] = [1e-6, 1e6];
+/// An axis of rotation.
+pub(super) const AXIS: Facts = Facts::of(Form::Direction).key("rotate.axis").required();
+/// The angle about it.
+pub(super) const TURN: Facts = Facts::quantity(&ANGLE, -1e3, 1e3).key("rotate.angle").required();
+/// Three lengths from a place where anatomy may be.
+pub(super) const PLACE: Facts = Facts::quantities(&LENGTH, 3, -1e5, 1e5);
 
-/// World from object: scale, then rotate, then translate.
-pub(super) fn placement(
-    document: &Document<'_>,
-    path: &str,
-    (translate, rotate, scale): (Option<[Length; 3]>, Option<&Rotation>, Option<Factors>),
-) -> Result<DAffine3, SceneError> {
-    let scale = factors(document, &format!("{path}.scale"), scale, SCALES.into())?;
-    let rotation = match rotate {
-        Some(rotation) => {
-            let (axis, angle) = turn(document, &format!("{path}.rotate"), rotation)?;
-            DQuat::from_axis_angle(axis, angle)
-        }
-        None => DQuat::IDENTITY,
-    };
-    let translation = match translate {
-        Some(translate) => shift(document, &format!("{path}.translate"), translate)?,
-        None => DVec3::ZERO,
-    };
-    Ok(DAffine3::from_scale_rotation_translation(scale, rotation, translation))
-}
-
-/// Unit axis and angle, rad.
-pub(super) fn turn(
-    document: &Document<'_>,
-    path: &str,
-    rotation: &Rotation,
-) -> Result<(DVec3, f64), SceneError> {
-    let axis = DVec3::from(rotation.axis).try_normalize().ok_or_else(|| {
-        let remedy = "give a vector such as [0, 0, 1]";
-        let path = format!("{path}.axis");
-        document.fail(&path, "this axis has no length", remedy)
-    })?;
-    let angle = rotation.angle.0;
-    within(document, &format!("{path}.angle"), angle, -1e3, 1e3, "rad")?;
-    Ok((axis, angle))
-}
-
-/// Factors along the axes, each within `range`; 1 where none are given.
-pub(super) fn factors(
-    document: &Document<'_>,
-    path: &str,
-    given: Option<Factors>,
-    range: (f64, f64),
-) -> Result<DVec3, SceneError> {
-    let Factors(factors) = given.unwrap_or(Factors([1.0; 3]));
-    for factor in factors {
-        within(document, path, factor, range.0, range.1, "")?;
+group! {
+    /// Size of something that keeps its proportions.
+    pub struct Size in "" {
+        /// Size factor. Applied first, about the origin.
+        scale: f64 = 1.0, Facts::number(SCALES[0], SCALES[1]);
     }
-    Ok(factors.into())
 }
 
-/// A vector, mm.
-pub(super) fn shift(
-    document: &Document<'_>,
-    path: &str,
-    lengths: [Length; 3],
-) -> Result<DVec3, SceneError> {
-    for length in lengths {
-        within(document, path, length.0, -1e5, 1e5, "mm")?;
+group! {
+    /// Size of something that may be stretched.
+    pub struct Stretch in "" {
+        /// Factor, or factors along x, y, z. Applied first, about the origin.
+        scale: [f64; 3] = [1.0; 3], Facts::factors(SCALES[0], SCALES[1]);
     }
-    Ok(lengths.map(|length| length.0).into())
+}
+
+group! {
+    /// Direction and place.
+    pub struct Placed in "" {
+        /// Axis of the rotation, through the origin.
+        axis: [f64; 3] = [0.0, 0.0, 1.0], AXIS;
+        /// Angle, by the right-hand rule.
+        angle: f64 = 0.0, TURN;
+        /// Shift. Applied last.
+        translate: [f64; 3] = [0.0; 3], PLACE;
+    }
+}
+
+/// World from object, as the table `below` says it: scale, then rotate, then translate.
+pub(super) fn placement(stated: &Stated, below: &str) -> DAffine3 {
+    let scale = stated.get::<Stretch>(below).scale;
+    let Placed { axis, angle, translate } = stated.get(below);
+    let rotation = DQuat::from_axis_angle(DVec3::from(axis).normalize(), angle);
+    DAffine3::from_scale_rotation_translation(scale.into(), rotation, translate.into())
 }

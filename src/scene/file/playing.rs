@@ -1,4 +1,4 @@
-//! Meshes whose file brings an animation: nodes that move, and shapes at times of their own.
+//! Meshes whose file contains an animation: moving nodes, and shapes over time.
 
 use std::path::Path;
 
@@ -7,17 +7,28 @@ use glam::DAffine3;
 use super::document::Document;
 use super::error::SceneError;
 use super::motion;
-use super::schema::{AnimationName, MeshTable};
-use super::shelf::{Shapes, Shelf};
-use crate::scene::Issue;
+use super::shelf::{self, Shapes, Shelf};
+use super::table::Stated;
 use crate::scene::animation::{Clock, Interpolation, Motion, Sequence};
 use crate::scene::graph::{Graph, Node, NodeKind};
 use crate::scene::mesh::{self, AnimatedNode, Choice, Placement};
+use crate::scene::{Issue, Strategy};
+use crate::settings::{Value, group};
 
-/// The animation of one mesh table, read.
+group! {
+    /// Strategy and interpolation for shapes that change.
+    pub struct Following in "" {
+        /// How the device follows.
+        strategy: Strategy = Strategy::Exchange, Facts::word::<Strategy>();
+        /// Shapes between keyframes: on straight lines, or smoothly. With `interpolate` only.
+        interpolation: Interpolation = Interpolation::Linear, Facts::word::<Interpolation>();
+    }
+}
+
+/// The animation of one mesh table, as read from its file.
 pub(super) struct Playing {
     clock: Clock,
-    /// When the animation begins, in the file's time, s.
+    /// The begin of the animation, in the file's time, s.
     start: f64,
     nodes: Vec<AnimatedNode>,
     /// The meshes that it moves.
@@ -36,32 +47,26 @@ pub(super) struct Played {
     node: Option<usize>,
 }
 
-/// Reads the animation that `table`, at `path` in the file, names.
+/// Reads the animation that the table of the mesh `name`, at `path` in the file, names.
 pub(super) fn read(
     document: &Document<'_>,
-    table: &MeshTable,
+    (stated, name): (&Stated, &str),
     path: &str,
     shelf: &mut Shelf,
     warnings: &mut Vec<Issue>,
 ) -> Result<Option<Playing>, SceneError> {
-    let Some(animation) = &table.animation else {
-        let keys = [
-            ("phase", table.phase.is_some()),
-            ("loop", table.mode.is_some()),
-            ("rate", table.rate.is_some()),
-            ("strategy", table.strategy.is_some()),
-            ("interpolation", table.interpolation.is_some()),
-        ];
-        return match keys.iter().find(|k| k.1) {
+    let Some(animation) = stated.value("animation") else {
+        let keys = ["phase", "loop", "rate", "strategy", "interpolation"];
+        return match keys.iter().find(|key| stated.has(key)) {
             None => Ok(None),
-            Some((key, _)) => Err(document.fail(
+            Some(key) => Err(document.fail(
                 &format!("{path}.{key}"),
                 format!("`{key}` of a mesh applies to its `animation`"),
                 "set it on the [[selector]] that is the mesh's parent",
             )),
         };
     };
-    let Some(file) = &table.file else {
+    let Some(file) = stated.text("file") else {
         return Err(document.fail(
             &format!("{path}.animation"),
             "only a `file` brings an animation",
@@ -70,37 +75,34 @@ pub(super) fn read(
     };
     let folder = document.source.path.parent().unwrap_or(Path::new(""));
     let choice = match animation {
-        AnimationName::First => Choice::First,
-        AnimationName::Named(name) => Choice::Named(name),
+        Value::Text(name) => Choice::Named(name),
+        _ => Choice::First,
     };
-    let (found, issues) = mesh::load_animated(&folder.join(file), &Shelf::options(table), choice)
-        .map_err(|issues| {
-        let about = |i: &Issue| i.is_error() && i.message.contains("animation");
-        let key = match issues.iter().any(about) {
-            true => "animation",
-            false => "file",
-        };
-        Shelf::unread(document, &issues, &table.name, path, key)
-    })?;
-    warnings.extend(issues.into_iter().map(|w| w.of(&table.name)));
-    let (start, end) = found.span;
-    // A single keyframe is a state, which any period shows.
-    let period = if end > start { end - start } else { 1.0 };
-    let settings = (table.phase, table.mode, table.rate);
-    let clock = motion::clock(document, path, period, settings)?;
-    let interpolation = table.interpolation.unwrap_or(Interpolation::Linear);
+    let options = shelf::options(&stated.get(""));
+    let (found, issues) =
+        mesh::load_animated(&folder.join(file), &options, choice).map_err(|issues| {
+            let about = |i: &Issue| i.is_error() && i.message.contains("animation");
+            let key = match issues.iter().any(about) {
+                true => "animation",
+                false => "file",
+            };
+            Shelf::unread(document, &issues, name, path, key)
+        })?;
+    warnings.extend(issues.into_iter().map(|w| w.of(name)));
+    let clock = motion::clock(stated, "", motion::lasting(document, path, found.span)?);
+    let Following { interpolation, .. } = stated.get("");
     let several = found.meshes.len() > 1;
     let mut meshes: Vec<Played> = Vec::new();
     for mesh in found.meshes {
         let mut name = match several {
-            true => format!("{}/{}", table.name, mesh.name),
-            false => table.name.clone(),
+            true => format!("{name}/{}", mesh.name),
+            false => name.to_owned(),
         };
         // Names need not be unique in the file.
         if meshes.iter().any(|m| m.name == name) {
             name = format!("{name} {}", meshes.len() + 1);
         }
-        let times: Vec<f64> = mesh.times.iter().map(|t| t - start).collect();
+        let times: Vec<f64> = mesh.times.iter().map(|t| t - found.span.0).collect();
         let shapes = mesh.shapes.into_iter().map(|shape| shelf.add(&name, shape));
         meshes.push(Played {
             shapes: shapes.collect(),
@@ -109,11 +111,11 @@ pub(super) fn read(
             name,
         });
     }
-    Ok(Some(Playing { clock, start, nodes: found.nodes, meshes }))
+    Ok(Some(Playing { clock, start: found.span.0, nodes: found.nodes, meshes }))
 }
 
 impl Played {
-    /// What its instance takes from it.
+    /// The shapes of its instance.
     pub fn shapes(&self) -> Shapes {
         Shapes {
             name: self.name.clone(),

@@ -4,42 +4,52 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::{PoseTable, ProbeTable};
-use super::table::{Stated, Table};
+use super::table::Stated;
 use super::within;
 use crate::probe::Probe;
-use crate::settings::{Group, Value, suggest};
+use crate::settings::units::LENGTH;
+use crate::settings::{Form, Group, Value, group, suggest};
 
 /// Lateral and depth axes nearer to parallel than this (sine) define no image plane.
 const PARALLEL: f64 = 1e-3;
+const INF: f64 = f64::INFINITY;
 
-pub(super) fn build(
-    document: &Document<'_>,
-    table: &Table<Probe, ProbeTable>,
-) -> Result<(Probe, DAffine3), SceneError> {
-    let preset = table.other.preset.as_deref().unwrap_or("paper-table1");
+group! {
+    /// The preset of a probe, which other keys change.
+    pub struct PresetKey in "probe" {
+        /// One of the presets in the table below.
+        preset: String = "paper-table1".to_owned(), Facts::of(Form::Text);
+    }
+}
+
+group! {
+    /// Pose of the probe.
+    pub struct Pose in "probe.pose" {
+        /// Centre of the face in the world.
+        position: [f64; 3] = [0.0; 3], Facts::quantities(&LENGTH, 3, -INF, INF).limits("finite");
+        /// Depth axis in the world; any length.
+        direction: [f64; 3] = [0.0, 0.0, 1.0], Facts::of(Form::Direction);
+        /// Lateral axis, towards the last scanline; its part across `direction` is taken.
+        lateral: [f64; 3] = [1.0, 0.0, 0.0], Facts::of(Form::Direction).limits("not along `direction`");
+    }
+}
+
+pub(super) fn build(document: &Document<'_>, stated: &Stated) -> Result<Probe, SceneError> {
+    let PresetKey { preset } = stated.get("");
     let presets = &Probe::PRESETS;
     let make = presets.iter().find(|p| p.0 == preset).ok_or_else(|| {
-        let remedy = suggest::among(preset, presets.iter().map(|p| p.0));
+        let remedy = suggest::among(&preset, presets.iter().map(|p| p.0));
         document.fail("probe.preset", format!("unknown preset `{preset}`"), remedy)
     })?;
     let mut out = make.1();
-    arrange(document, &table.stated, &mut out)?;
-    table.stated.put(document, Probe::TABLE, &mut out)?;
-    let pose = match &table.other.pose {
-        Some(pose) => place(document, "probe.pose", pose)?,
-        None => DAffine3::IDENTITY,
-    };
-    Ok((out, pose))
+    arrange(document, stated, &mut out)?;
+    stated.put("", &mut out);
+    Ok(out)
 }
 
-/// Gives `out`, which is as the preset has it, the arrangement that is stated. Keys of another arrangement are refused,
-/// and so is one that lacks a key which the preset has not either.
-fn arrange(
-    document: &Document<'_>,
-    stated: &Stated<Probe>,
-    out: &mut Probe,
-) -> Result<(), SceneError> {
+/// Sets the arrangement that is stated in `out`, which holds the preset. Keys of another arrangement are refused,
+/// and so is an arrangement of which neither the file nor the preset states a needed key.
+fn arrange(document: &Document<'_>, stated: &Stated, out: &mut Probe) -> Result<(), SceneError> {
     const KEYS: [&str; 3] = ["radius", "field_of_view", "width"];
     let preset = out.clone();
     let absent = |probe: &Probe, key: &str| {
@@ -78,32 +88,27 @@ fn arrange(
     }
 }
 
-/// The pose that the table at `path` describes.
-pub(super) fn place(
+/// World from probe, by the table `pose` of the table at `path`.
+pub(super) fn pose(
     document: &Document<'_>,
     path: &str,
-    pose: &PoseTable,
+    stated: &Stated,
 ) -> Result<DAffine3, SceneError> {
-    let position = DVec3::from(pose.position.map(|q| q.0));
-    look(position, pose.direction.into(), pose.lateral.into()).map_err(|fault| {
+    let Pose { position, direction, lateral } = stated.get("pose.");
+    look(position.into(), direction.into(), lateral.into()).map_err(|fault| {
         let [key, message, remedy] = fault;
-        document.fail(&format!("{path}.{key}"), message, remedy)
+        document.fail(&format!("{path}.pose.{key}"), message, remedy)
     })
 }
 
-/// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it; or which
-/// of them is at fault, why, and what to do.
+/// World from probe: z along `direction`, x along the part of `lateral` perpendicular to it, of which both have a
+/// length; or the key that is at fault, the cause and the remedy.
 pub(super) fn look(
     position: DVec3,
     direction: DVec3,
     lateral: DVec3,
 ) -> Result<DAffine3, [&'static str; 3]> {
-    let unit = |key, v: DVec3| {
-        let remedy = "give a vector such as [0, 0, 1]";
-        v.try_normalize().ok_or([key, "this direction has no length", remedy])
-    };
-    let z = unit("direction", direction)?;
-    let lateral = unit("lateral", lateral)?;
+    let (z, lateral) = (direction.normalize(), lateral.normalize());
     let across = lateral - z * lateral.dot(z);
     if across.length() < PARALLEL {
         return Err([

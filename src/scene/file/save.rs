@@ -1,4 +1,4 @@
-//! Settings written back into a scene file: its comments, its order and all that is not set stay as
+//! Writing settings back into a scene file: its comments, its order and all other keys stay as
 //! they are.
 
 use std::path::{Component, Path, PathBuf};
@@ -8,18 +8,16 @@ use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value}
 
 use super::document::{Source, segments};
 use super::error::SceneError;
-use super::placing::placement;
-use super::schema::even;
 use super::tissues::Tissues;
-use super::{parameters, probe};
+use super::{probe, settings};
 use crate::output::files;
 use crate::settings::suggest;
 
-/// What is wrong with a setting, and what to do about it.
+/// The fault of a setting, and the remedy.
 type Misfit = (String, String);
 
-/// What is to be written: a path as [`crate::scene::Scene::load`] takes it and its value, or none where
-/// the key is to go. Names with dots stand in quotes, as in TOML: `mesh."a.b".roughness`.
+/// A setting to be written: its path, as [`crate::scene::Scene::load`] takes it, and its value, or none if
+/// the key is to be removed. Names with dots are quoted, as in TOML: `mesh."a.b".roughness`.
 pub type Entry = (String, Option<String>);
 
 /// A comment above the key at a path: the path, and one line of text. It takes the place of comments there
@@ -37,10 +35,10 @@ pub fn save(from: &Path, to: &Path, settings: &[Entry]) -> Result<(), SceneError
     save_with(from, to, settings, &[])
 }
 
-/// As [`save`], with `notes` above their keys.
+/// Like [`save`], with `notes` above their keys.
 ///
 /// # Errors
-/// As there; the key of a note that is not in the file.
+/// Those of [`save`]; a note whose key is not in the file.
 pub fn save_with(
     from: &Path,
     to: &Path,
@@ -49,7 +47,7 @@ pub fn save_with(
 ) -> Result<(), SceneError> {
     let misfit = |(message, remedy): Misfit| SceneError::file(from, message, &remedy);
     let source = Source::read(from, &[])?;
-    // Its own error would have no remedy.
+    // The scene file's parser gives an error with a remedy; that of toml_edit has none.
     source.document()?;
     let mut document: DocumentMut = source
         .text()
@@ -86,34 +84,16 @@ pub fn save_with(
     })
 }
 
-/// Fails on what could not be read again: nothing of that is written.
+/// Fails if the result could not be read again; nothing is written then.
 fn check(source: &Source) -> Result<(), SceneError> {
     let document = source.document()?;
     let file = document.parse()?;
-    let (probe, _) = probe::build(&document, &file.probe)?;
-    parameters::simulation(&document, &file.simulation, probe.frequency)?;
-    parameters::imaging(&document, &file.imaging)?;
-    parameters::live(&document, &file.live)?;
-    Tissues::new(&document, &file.tissues)?;
-    if let Some(t) = file.volume.as_ref().map(|t| &t.other) {
-        let place = (t.translate, t.rotate.as_ref(), even(t.scale));
-        placement(&document, "volume", place)?;
-    }
-    let t = &file.model;
-    let place = (t.translate, t.rotate.as_ref(), even(t.scale));
-    placement(&document, "model", place)?;
-    for (i, t) in file.transform.iter().enumerate() {
-        let path = format!("transform.{i}");
-        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
-    }
-    for (i, t) in file.mesh.iter().map(|t| &t.other).enumerate() {
-        let path = format!("mesh.{i}");
-        placement(&document, &path, (t.translate, t.rotate.as_ref(), t.scale))?;
-    }
-    Ok(())
+    settings::settings(&document, &file, None)?;
+    probe::pose(&document, "probe", &file.probe.stated)?;
+    Tissues::new(&document, &file.tissues).map(|_| ())
 }
 
-/// A value as the command line takes it: what is not TOML is a text.
+/// A value as the command line takes it: text that is not TOML is a string.
 fn parsed(value: &str) -> Value {
     value.parse().unwrap_or_else(|_| Value::from(value))
 }
@@ -187,7 +167,7 @@ fn into_value(
             replace_value(inner, value);
             Ok(())
         }
-        // The others would be counted anew.
+        // Removing an element would renumber the others.
         ([_], None) => Err(whole(name)),
         (_, value) => into_value(inner, rest[0], &rest[1..], value),
     }
@@ -198,7 +178,7 @@ fn whole(name: &str) -> Misfit {
     (cause, "set it as a whole".to_owned())
 }
 
-/// Which of a list's elements is meant: by name, or counted from 0.
+/// The index of the element that a part of a path means: by name, or counted from 0.
 fn element(list: &str, wanted: &str, names: &[Option<String>]) -> Result<usize, Misfit> {
     let by_name = names.iter().position(|n| n.as_deref() == Some(wanted));
     let counted = || wanted.parse().ok().filter(|&i: &usize| i < names.len());
@@ -215,7 +195,7 @@ fn name_of(table: &dyn TableLike) -> Option<String> {
     Some(table.get("name")?.as_str()?.to_owned())
 }
 
-/// Puts `new` in the place of `old` with its blanks and comments; lists of one length one by one.
+/// Replaces `old` by `new` and keeps its blanks and comments; in lists of equal length element by element.
 fn replace_value(old: &mut Value, new: Value) {
     match (&mut *old, new) {
         (Value::Array(old), Value::Array(new)) if old.len() == new.len() => {
@@ -306,7 +286,7 @@ impl Moved {
     /// The relative path of `file`, which is named from the old folder, as seen from the new one.
     fn seen(&self, file: &Path) -> String {
         let full = self.old.join(file);
-        // A link in between would make `..` mean another folder.
+        // A symbolic link on the way would make `..` mean another folder.
         let folder = full.parent().and_then(|p| p.canonicalize().ok());
         let full = match (folder, full.file_name()) {
             (Some(folder), Some(name)) => folder.join(name),

@@ -1,408 +1,150 @@
-//! The keys of a scene file. What is absent keeps its default.
+//! The tables of a scene file, with the groups of keys in each.
 
 use std::collections::BTreeMap;
-use std::fmt;
+use std::iter::empty;
 
 use serde::Deserialize;
-use serde::de::value::SeqAccessDeserializer;
-use serde::de::{Deserializer, Error, SeqAccess, Visitor};
 
-use super::table::Table;
+use super::anatomy::WireKeys;
+use super::contact::ContactKeys;
+use super::document::{Document, quoted};
+use super::error::SceneError;
+use super::fusion::{MaskKeys, VolumeKeys};
+use super::graph::SelectorKeys;
+use super::motion::{Cycle, MotionKeys, Updates};
+use super::nodes::NodeKeys;
+use super::placing::{Placed, Size, Stretch};
+use super::playing::Following;
+use super::probe::{Pose, PresetKey};
+use super::shelf::{MeshKeys, ShapeKeys};
+use super::table::{Key, Keys, Table, defaults, keys};
+use super::tissues::TissueKeys;
+use super::tracker::{MatrixKey, TrackerKeys};
 use super::vary::VaryTable;
-use crate::scene::animation::{Interpolation, Loop};
-use crate::scene::keyframes::Strategy;
-use crate::scene::tracker::Axes;
-use crate::settings::units::{Angle, Duration, Impedance, Length, Level, Rate};
-use crate::settings::{Display, Fusion, Imaging, Live, Probe, Simulation, Surface, Tissue};
+use crate::settings::{
+    Display, Form, Fusion, Imaging, Live, Probe, Simulation, Surface, Tissue, group,
+};
 
-/// The whole file.
+group! {
+    /// Keys at the top of the file.
+    pub struct Title in "" {
+        /// Title.
+        name: Option<String> = None, Facts::of(Form::Text).by_default("the file's name");
+        /// Tissue outside every mesh.
+        background: String = "water".to_owned(), Facts::of(Form::Text);
+    }
+}
+
+/// The whole file. Absent keys have their defaults.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct File {
     pub name: Option<String>,
     pub background: Option<String>,
     #[serde(default)]
-    pub probe: Table<Probe, ProbeTable>,
+    pub probe: Table<Probe>,
     #[serde(default)]
     pub simulation: Table<Simulation>,
     #[serde(default)]
     pub imaging: Table<Imaging>,
     #[serde(default)]
-    pub model: ModelTable,
-    pub volume: Option<Table<Display, VolumeTable>>,
-    pub fusion: Option<Table<Fusion, FusionTable>>,
-    pub contact: Option<ContactTable>,
-    pub tracker: Option<TrackerTable>,
+    pub model: Table<Size>,
+    pub volume: Option<Table<Display>>,
+    pub fusion: Option<Table<Fusion>>,
+    pub contact: Option<Table<ContactKeys>>,
+    #[serde(default)]
+    pub tracker: Table<TrackerKeys>,
     #[serde(default)]
     pub live: Table<Live>,
     #[serde(default, alias = "sweep")]
     pub vary: VaryTable,
     #[serde(default)]
-    pub group: Vec<GroupTable>,
+    pub group: Vec<Table<NodeKeys>>,
     #[serde(default)]
-    pub transform: Vec<TransformTable>,
+    pub transform: Vec<Table<MotionKeys>>,
     #[serde(default)]
-    pub selector: Vec<SelectorTable>,
+    pub selector: Vec<Table<SelectorKeys>>,
     #[serde(default)]
-    pub mesh: Vec<Table<Surface, MeshTable>>,
+    pub mesh: Vec<Table<MeshKeys>>,
     #[serde(default)]
-    pub wire: Vec<WireTable>,
+    pub wire: Vec<Table<WireKeys>>,
     #[serde(default)]
-    pub tissues: BTreeMap<String, Table<Tissue, TissueTable>>,
+    pub tissues: BTreeMap<String, Table<Tissue>>,
 }
 
-#[derive(Debug, Default, Deserialize)]
-pub struct ProbeTable {
-    pub preset: Option<String>,
-    pub pose: Option<PoseTable>,
-}
+macro_rules! tables {
+    ($($of:ty, $table:literal: $($keys:expr),+;)+) => {
+        $(impl Keys for $of {
+            const TABLE: &'static str = $table;
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct PoseTable {
-    #[serde(default = "origin")]
-    pub position: [Length; 3],
-    #[serde(default = "z_axis")]
-    pub direction: [f64; 3],
-    #[serde(default = "x_axis")]
-    pub lateral: [f64; 3],
-}
-
-fn origin() -> [Length; 3] {
-    [Length::new(0.0); 3]
-}
-
-fn z_axis() -> [f64; 3] {
-    [0.0, 0.0, 1.0]
-}
-
-fn x_axis() -> [f64; 3] {
-    [1.0, 0.0, 0.0]
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct VolumeTable {
-    pub file: Files,
-    pub period: Option<Duration>,
-    pub rate: Option<Rate>,
-    pub phase: Option<f64>,
-    #[serde(rename = "loop")]
-    pub mode: Option<Loop>,
-    pub translate: Option<[Length; 3]>,
-    pub rotate: Option<Rotation>,
-    pub scale: Option<f64>,
-}
-
-/// Where the whole model is.
-#[derive(Debug, Default, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ModelTable {
-    pub translate: Option<[Length; 3]>,
-    pub rotate: Option<Rotation>,
-    pub scale: Option<f64>,
-}
-
-/// Factors of what keeps its proportions.
-pub fn even(scale: Option<f64>) -> Option<Factors> {
-    scale.map(|factor| Factors([factor; 3]))
-}
-
-#[derive(Debug, Deserialize)]
-pub struct FusionTable {
-    pub mask: Vec<String>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ContactTable {
-    pub mesh: Vec<String>,
-    pub gel: Option<Length>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TrackerTable {
-    pub device: Option<String>,
-    pub timeout: Option<Duration>,
-    pub axes: Option<Axes>,
-    pub world_from_reference: Option<RigidTable>,
-    pub tool_from_probe: Option<RigidTable>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct RigidTable {
-    pub translate: Option<[Length; 3]>,
-    pub rotate: Option<Rotation>,
-    pub matrix: Option<[f64; 16]>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct GroupTable {
-    pub name: String,
-    pub parent: Option<String>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct TransformTable {
-    pub name: String,
-    pub parent: Option<String>,
-    pub translate: Option<[Length; 3]>,
-    pub rotate: Option<Rotation>,
-    pub scale: Option<Factors>,
-    pub motion: Option<MotionTable>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct SelectorTable {
-    pub name: String,
-    pub parent: Option<String>,
-    pub period: Option<Duration>,
-    pub phase: Option<f64>,
-    #[serde(rename = "loop")]
-    pub mode: Option<Loop>,
-    pub rate: Option<Rate>,
-    pub strategy: Option<Strategy>,
-    pub interpolation: Option<Interpolation>,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MotionTable {
-    pub kind: MotionKind,
-    pub period: Option<Duration>,
-    pub phase: Option<f64>,
-    #[serde(rename = "loop")]
-    pub mode: Option<Loop>,
-    pub rate: Option<Rate>,
-    pub translate: Option<[Length; 3]>,
-    pub rotate: Option<Rotation>,
-    pub scale: Option<Factors>,
-    pub centre: Option<[Length; 3]>,
-    pub seed: Option<u32>,
-    pub duration: Option<Duration>,
-    pub pause: Option<Duration>,
-    pub file: Option<String>,
-    pub interpolation: Option<BetweenRows>,
-}
-
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "lowercase")]
-pub enum MotionKind {
-    Sine,
-    Orbit,
-    Fetal,
-    File,
-}
-
-#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "lowercase")]
-pub enum BetweenRows {
-    #[default]
-    Linear,
-    Step,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct MeshTable {
-    pub name: String,
-    pub parent: Option<String>,
-    pub file: Option<String>,
-    pub keyframes: Option<Vec<String>>,
-    pub animation: Option<AnimationName>,
-    pub phase: Option<f64>,
-    #[serde(rename = "loop")]
-    pub mode: Option<Loop>,
-    pub rate: Option<Rate>,
-    pub strategy: Option<Strategy>,
-    pub interpolation: Option<Interpolation>,
-    pub node: Option<String>,
-    pub shape: Option<Shape>,
-    pub units: Option<UnitName>,
-    pub tissue: String,
-    #[serde(default)]
-    pub priority: i32,
-    pub translate: Option<[Length; 3]>,
-    pub rotate: Option<Rotation>,
-    pub scale: Option<Factors>,
-    #[serde(default)]
-    pub inside: Table<Surface>,
-    #[serde(default)]
-    pub cap_openings: bool,
-}
-
-/// Factors along x, y and z: three, or one for all.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Factors(pub [f64; 3]);
-
-impl<'de> Deserialize<'de> for Factors {
-    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
-        struct OneOrThree;
-
-        impl<'de> Visitor<'de> for OneOrThree {
-            type Value = Factors;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a number or 3 numbers: along x, y and z")
+            fn keys() -> Vec<Key> {
+                empty()$(.chain($keys))+.collect()
             }
+        })+
 
-            fn visit_f64<E: Error>(self, factor: f64) -> Result<Self::Value, E> {
-                Ok(Factors([factor; 3]))
-            }
-
-            fn visit_i64<E: Error>(self, factor: i64) -> Result<Self::Value, E> {
-                self.visit_f64(factor as f64)
-            }
-
-            fn visit_u64<E: Error>(self, factor: u64) -> Result<Self::Value, E> {
-                self.visit_f64(factor as f64)
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
-                <[f64; 3]>::deserialize(SeqAccessDeserializer::new(list)).map(Factors)
-            }
+        /// All tables, as the reference writes them, with their keys.
+        pub fn reference() -> Vec<(&'static str, Vec<Key>)> {
+            vec![$(($table, <$of>::keys())),+]
         }
-
-        deserializer.deserialize_any(OneOrThree)
-    }
+    };
 }
 
-/// One file, or several in the order of time.
-#[derive(Debug, PartialEq)]
-pub enum Files {
-    One(String),
-    Several(Vec<String>),
+tables! {
+    Title, "": defaults::<Title>("");
+    Probe, "probe": defaults::<PresetKey>(""), keys::<Probe>("", "preset"), defaults::<Pose>("pose.");
+    MeshKeys, "mesh": defaults::<NodeKeys>(""), defaults::<MeshKeys>(""), defaults::<Cycle>(""),
+        defaults::<Updates>(""), defaults::<Following>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
+        keys::<Surface>("", ""), keys::<Surface>("inside.", "as outside"), defaults::<ShapeKeys>("shape.");
+    NodeKeys, "group": defaults::<NodeKeys>("");
+    MotionKeys, "transform": defaults::<NodeKeys>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
+        defaults::<MotionKeys>("motion."), defaults::<Cycle>("motion."), defaults::<Updates>("motion.");
+    SelectorKeys, "selector": defaults::<NodeKeys>(""), defaults::<SelectorKeys>(""), defaults::<Cycle>(""),
+        defaults::<Updates>(""), defaults::<Following>("");
+    WireKeys, "wire": defaults::<WireKeys>("");
+    Tissue, "tissues.NAME": defaults::<TissueKeys>(""), keys::<Tissue>("", "");
+    Simulation, "simulation": defaults::<Simulation>("");
+    Imaging, "imaging": defaults::<Imaging>("");
+    Size, "model": defaults::<Size>(""), defaults::<Placed>("");
+    Display, "volume": defaults::<VolumeKeys>(""), defaults::<Cycle>(""), defaults::<Size>(""),
+        defaults::<Placed>(""), keys::<Display>("", "");
+    Fusion, "fusion": defaults::<MaskKeys>(""), defaults::<Fusion>("");
+    ContactKeys, "contact": defaults::<ContactKeys>("");
+    TrackerKeys, "tracker": defaults::<TrackerKeys>(""),
+        defaults::<Placed>("world_from_reference."), defaults::<MatrixKey>("world_from_reference."),
+        defaults::<Placed>("tool_from_probe."), defaults::<MatrixKey>("tool_from_probe.");
+    Live, "live": defaults::<Live>("");
 }
 
-impl<'de> Deserialize<'de> for Files {
-    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
-        struct OneOrSeveral;
-
-        impl<'de> Visitor<'de> for OneOrSeveral {
-            type Value = Files;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("text or list of texts: one file, or several in the order of time")
-            }
-
-            fn visit_str<E: Error>(self, file: &str) -> Result<Self::Value, E> {
-                Ok(Files::One(file.to_owned()))
-            }
-
-            fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Self::Value, A::Error> {
-                Vec::deserialize(SeqAccessDeserializer::new(list)).map(Files::Several)
-            }
+impl File {
+    /// Fails at the first value out of its range.
+    pub fn check(&self, document: &Document<'_>) -> Result<(), SceneError> {
+        fn one<'t, K: Keys>(
+            document: &Document<'_>,
+            table: impl Into<Option<&'t Table<K>>>,
+        ) -> Result<(), SceneError> {
+            table.into().map_or(Ok(()), |table| table.check(document, K::TABLE))
         }
-
-        deserializer.deserialize_any(OneOrSeveral)
-    }
-}
-
-/// Which animation of a file.
-#[derive(Debug, PartialEq)]
-pub enum AnimationName {
-    First,
-    Named(String),
-}
-
-impl<'de> Deserialize<'de> for AnimationName {
-    fn deserialize<R: Deserializer<'de>>(deserializer: R) -> Result<Self, R::Error> {
-        struct AsName;
-
-        impl Visitor<'_> for AsName {
-            type Value = AnimationName;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("text or true: the name of an animation, or the first one")
-            }
-
-            fn visit_bool<E: Error>(self, value: bool) -> Result<Self::Value, E> {
-                match value {
-                    true => Ok(AnimationName::First),
-                    false => Err(E::custom("leave `animation` out for a mesh without one")),
-                }
-            }
-
-            fn visit_str<E: Error>(self, name: &str) -> Result<Self::Value, E> {
-                Ok(AnimationName::Named(name.to_owned()))
-            }
+        fn all<K: Keys>(document: &Document<'_>, tables: &[Table<K>]) -> Result<(), SceneError> {
+            let mut numbered = (0..).zip(tables);
+            numbered.try_for_each(|(i, table)| table.check(document, &format!("{}.{i}", K::TABLE)))
         }
-
-        deserializer.deserialize_any(AsName)
+        one(document, &self.probe)?;
+        one(document, &self.simulation)?;
+        one(document, &self.imaging)?;
+        one(document, &self.model)?;
+        one(document, self.volume.as_ref())?;
+        one(document, self.fusion.as_ref())?;
+        one(document, self.contact.as_ref())?;
+        one(document, &self.tracker)?;
+        one(document, &self.live)?;
+        all(document, &self.group)?;
+        all(document, &self.transform)?;
+        all(document, &self.selector)?;
+        all(document, &self.mesh)?;
+        all(document, &self.wire)?;
+        let mut tissues = self.tissues.iter();
+        tissues.try_for_each(|(name, table)| {
+            table.check(document, &format!("tissues.{}", quoted(name)))
+        })
     }
-}
-
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Eq)]
-#[serde(rename_all = "lowercase")]
-pub enum UnitName {
-    Um,
-    Mm,
-    Cm,
-    M,
-    In,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(rename_all = "lowercase", deny_unknown_fields)]
-pub enum Shape {
-    Sphere {
-        radius: Length,
-        #[serde(default = "five")]
-        subdivisions: u32,
-    },
-    Ellipsoid {
-        radii: [Length; 3],
-        #[serde(default = "five")]
-        subdivisions: u32,
-    },
-    Cylinder {
-        radius: Length,
-        length: Length,
-        #[serde(default = "fine")]
-        segments: u32,
-    },
-    Box {
-        size: [Length; 3],
-    },
-    Plane {
-        size: [Length; 2],
-        thickness: Length,
-    },
-}
-
-fn five() -> u32 {
-    5
-}
-
-fn fine() -> u32 {
-    96
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Rotation {
-    pub axis: [f64; 3],
-    pub angle: Angle,
-}
-
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct WireTable {
-    pub from: [Length; 3],
-    pub to: Option<[Length; 3]>,
-    pub spacing: Option<Length>,
-    #[serde(default = "Level::zero")]
-    pub amplitude: Level,
-}
-
-#[derive(Debug, Deserialize)]
-pub struct TissueTable {
-    pub based_on: Option<String>,
-    pub impedance: Option<Impedance>,
-    pub source: Option<String>,
 }

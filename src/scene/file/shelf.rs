@@ -1,22 +1,80 @@
-//! Shapes of a scene file: mesh files, keyframes, and built-in shapes. What several instances name
+//! Shapes of a scene file: mesh files, keyframes, and built-in shapes. A file that several instances name
 //! is read once.
 
 use std::path::{Path, PathBuf};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::schema::{MeshTable, Shape, UnitName};
-use super::within;
+use super::table::Stated;
 use crate::scene::mesh::{self, Options, Units};
 use crate::scene::{Issue, Mesh, shapes};
+use crate::settings::units::LENGTH;
+use crate::settings::{Facts, Form, group};
 
 /// Most keyframes of a mesh: 30 a second for half a minute.
 const MAX_KEYFRAMES: usize = 1000;
+/// A length of a shape.
+const LONG: Facts = Facts::quantity(&LENGTH, 1e-3, 1e4).required();
+/// Number of divisions of the faces of a round shape.
+const FINE: Facts = Facts::whole(0, shapes::MAX_SUBDIVISIONS);
+
+/// Several lengths of a shape.
+const fn longs(count: usize) -> Facts {
+    Facts::quantities(&LENGTH, count, 1e-3, 1e4).required()
+}
+
+group! {
+    /// A placed mesh.
+    pub struct MeshKeys in "mesh" {
+        /// Tissue that it encloses: one of `[tissues]` or a shipped one.
+        tissue: String = String::new(), Facts::of(Form::Text).required();
+        /// Who wins where meshes overlap: the highest.
+        priority: i32 = 0, Facts::of(Form::Integer).limits("32 bits, signed");
+        /// `.obj`, `.gltf`, `.glb` or `.stl`; the path is relative to the scene file.
+        file: Option<String> = None, Facts::of(Form::Text);
+        /// Instead of `file`: the shapes that it takes one after the other. The parent must be a selector.
+        keyframes: Option<Vec<String>> = None, Facts::of(Form::Texts).limits("up to 1000 files");
+        /// Animation of a `.gltf` or `.glb` file: its name, or `true` for the first one. See below.
+        animation: Option<String> = None, Facts::of(Form::TextOrTrue).by_default("none");
+        /// Only this glTF node with its children, or this OBJ object or group. Files only.
+        node: Option<String> = None, Facts::of(Form::Text).by_default("everything");
+        /// Unit of the numbers in the file. Files only.
+        units: Option<&'static str> = None, Facts::one_of(&Units::WORDS).by_default("mm; metres in glTF");
+        /// Close holes by fans to their centres. Files only.
+        cap_openings: bool = false, Facts::switch();
+    }
+}
+
+group! {
+    /// A shape instead of a file.
+    pub struct ShapeKeys in "mesh.shape" {
+        /// Radius.
+        ball: f64 = 0.0, LONG.key("sphere.radius");
+        /// 20 * 4^n triangles.
+        ball_divisions: u32 = 5, FINE.key("sphere.subdivisions");
+        /// Semi-axes along x, y, z.
+        radii: [f64; 3] = [0.0; 3], longs(3).key("ellipsoid.radii");
+        /// 20 * 4^n triangles.
+        divisions: u32 = 5, FINE.key("ellipsoid.subdivisions");
+        /// Radius.
+        radius: f64 = 0.0, LONG.key("cylinder.radius");
+        /// Length along z.
+        length: f64 = 0.0, LONG.key("cylinder.length");
+        /// Sides of the polygon that stands for the circle.
+        segments: u32 = 96, Facts::whole(3, 4096).key("cylinder.segments");
+        /// Edges along x, y, z.
+        edges: [f64; 3] = [0.0; 3], longs(3).key("box.size");
+        /// Edges along x and y of a slab whose front is at z = 0.
+        size: [f64; 2] = [0.0; 2], longs(2).key("plane.size");
+        /// The slab reaches from z = 0 to here.
+        thickness: f64 = 0.0, LONG.key("plane.thickness");
+    }
+}
 
 /// Meshes read so far.
 #[derive(Default)]
 pub(super) struct Shelf {
-    /// All of them.
+    /// All meshes.
     pub meshes: Vec<Mesh>,
     read: Vec<Read>,
 }
@@ -25,11 +83,11 @@ pub(super) struct Shelf {
 struct Read {
     files: Files,
     options: Options,
-    /// Where they lie among the meshes.
+    /// Their indices among the meshes.
     meshes: Vec<usize>,
 }
 
-/// What a mesh is made of.
+/// The files from which a mesh is read.
 #[derive(Clone, PartialEq)]
 enum Files {
     One(PathBuf),
@@ -41,28 +99,24 @@ enum Files {
 pub(super) struct Shapes {
     /// Name of the instance.
     pub name: String,
-    /// The one at first.
+    /// The first shape.
     pub mesh: usize,
-    /// All of them; empty where the shape is constant.
+    /// All shapes; empty if the shape is constant.
     pub keyframes: Vec<usize>,
 }
 
 impl Shelf {
-    /// Reads or builds what `table`, at `path` in the file, names.
+    /// Reads or builds the shapes that the table of the mesh `name`, at `path` in the file, names.
     pub fn shapes(
         &mut self,
         document: &Document<'_>,
-        table: &MeshTable,
+        (stated, name): (&Stated, &str),
         path: &str,
         warnings: &mut Vec<Issue>,
     ) -> Result<Shapes, SceneError> {
-        let name = &table.name;
-        let given = [
-            ("file", table.file.is_some()),
-            ("keyframes", table.keyframes.is_some()),
-            ("shape", table.shape.is_some()),
-        ];
-        let given: Vec<_> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
+        let keys: MeshKeys = stated.get("");
+        let given = ["file", "keyframes", "shape"].into_iter().filter(|key| stated.has(key));
+        let given: Vec<_> = given.collect();
         let [given] = given[..] else {
             return Err(document.fail(
                 path,
@@ -75,9 +129,9 @@ impl Shelf {
             ));
         };
         let folder = document.source.path.parent().unwrap_or(Path::new(""));
-        let files = match (&table.file, &table.keyframes, &table.shape) {
-            (Some(file), ..) => Files::One(folder.join(file)),
-            (_, Some(files), _) => {
+        let files = match (&keys.file, &keys.keyframes) {
+            (Some(file), _) => Files::One(folder.join(file)),
+            (_, Some(files)) => {
                 if !(1..=MAX_KEYFRAMES).contains(&files.len()) {
                     return Err(document.fail(
                         &format!("{path}.keyframes"),
@@ -87,17 +141,16 @@ impl Shelf {
                 }
                 Files::Keyframes(files.iter().map(|file| folder.join(file)).collect())
             }
-            (_, _, shape) => {
-                let shape = shape.as_ref().expect("one of the three is given");
-                let mesh = built(document, table, shape, path)?;
+            (None, None) => {
+                let mesh = built(document, (stated, name), path)?;
                 return Ok(Shapes {
-                    name: name.clone(),
+                    name: name.to_owned(),
                     mesh: self.add(name, mesh),
                     keyframes: Vec::new(),
                 });
             }
         };
-        let options = Self::options(table);
+        let options = options(&keys);
         let known = self.read.iter().find(|r| r.files == files && r.options == options);
         let meshes = match known {
             Some(read) => read.meshes.clone(),
@@ -112,23 +165,13 @@ impl Shelf {
             }
         };
         Ok(Shapes {
-            name: name.clone(),
+            name: name.to_owned(),
             mesh: meshes[0],
             keyframes: match files {
                 Files::One(_) => Vec::new(),
                 Files::Keyframes(_) => meshes,
             },
         })
-    }
-
-    /// How the files of `table` are read.
-    pub fn options(table: &MeshTable) -> Options {
-        Options {
-            units: table.units.map(length_of),
-            node: table.node.clone(),
-            cap_openings: table.cap_openings,
-            ..Options::default()
-        }
     }
 
     /// The error for mesh files that cannot be used, at the key that names them.
@@ -153,7 +196,7 @@ impl Shelf {
         )
     }
 
-    /// Keeps a mesh; its number.
+    /// Stores a mesh and returns its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
         self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
         self.meshes.len() - 1
@@ -170,78 +213,47 @@ fn load(files: &Files, options: &Options) -> Result<(Vec<Mesh>, Vec<Issue>), Vec
     }
 }
 
+/// Options for reading the files of a mesh.
+pub(super) fn options(keys: &MeshKeys) -> Options {
+    Options {
+        units: keys.units.and_then(Units::named),
+        node: keys.node.clone(),
+        cap_openings: keys.cap_openings,
+        ..Options::default()
+    }
+}
+
 /// A built-in shape, with none of the keys that files take.
 fn built(
     document: &Document<'_>,
-    table: &MeshTable,
-    shape: &Shape,
+    (stated, name): (&Stated, &str),
     path: &str,
 ) -> Result<Mesh, SceneError> {
-    let extra = [
-        ("units", table.units.is_some()),
-        ("node", table.node.is_some()),
-        ("cap_openings", table.cap_openings),
-    ];
-    if let Some((key, _)) = extra.iter().find(|e| e.1) {
+    let capped = stated.get::<MeshKeys>("").cap_openings;
+    let is_extra = |key: &&str| stated.has(key) && (*key != "cap_openings" || capped);
+    if let Some(key) = ["units", "node", "cap_openings"].into_iter().find(is_extra) {
         return Err(document.fail(
             &format!("{path}.{key}"),
-            format!("mesh `{}`: `{key}` applies to files, not to shapes", table.name),
+            format!("mesh `{name}`: `{key}` applies to files, not to shapes"),
             "remove it",
         ));
     }
-    build(document, shape, &format!("{path}.shape"))
-}
-
-fn length_of(unit: UnitName) -> Units {
-    let name = match unit {
-        UnitName::Um => "um",
-        UnitName::Mm => "mm",
-        UnitName::Cm => "cm",
-        UnitName::M => "m",
-        UnitName::In => "in",
-    };
-    Units::named(name).expect("every unit of the schema has a length")
-}
-
-fn build(document: &Document<'_>, shape: &Shape, path: &str) -> Result<Mesh, SceneError> {
-    let long = |key: &str, v: f64| {
-        within(document, &format!("{path}.{key}"), v, 1e-3, 1e4, "mm")?;
-        Ok(v)
-    };
-    let count = |key: &str, v: u32, least: u32, most: u32| {
-        let (least, most) = (f64::from(least), f64::from(most));
-        within(document, &format!("{path}.{key}"), f64::from(v), least, most, "")?;
-        Ok(v)
-    };
-    let fine = shapes::MAX_SUBDIVISIONS;
-    Ok(match shape {
-        Shape::Sphere { radius, subdivisions } => shapes::sphere(
-            long("sphere.radius", radius.0)?,
-            count("sphere.subdivisions", *subdivisions, 0, fine)?,
-        ),
-        Shape::Ellipsoid { radii, subdivisions } => {
-            for r in radii {
-                long("ellipsoid.radii", r.0)?;
-            }
-            let n = count("ellipsoid.subdivisions", *subdivisions, 0, fine)?;
-            shapes::ellipsoid(radii.map(|r| r.0), n)
-        }
-        Shape::Cylinder { radius, length, segments } => shapes::cylinder(
-            long("cylinder.radius", radius.0)?,
-            long("cylinder.length", length.0)?,
-            count("cylinder.segments", *segments, 3, 4096)?,
-        ),
-        Shape::Box { size } => {
-            for s in size {
-                long("box.size", s.0)?;
-            }
-            shapes::cuboid(size.map(|s| s.0))
-        }
-        Shape::Plane { size, thickness } => {
-            for s in size {
-                long("plane.size", s.0)?;
-            }
-            shapes::plane(size.map(|s| s.0), long("plane.thickness", thickness.0)?)
+    let kinds = ["sphere", "ellipsoid", "cylinder", "box", "plane"];
+    let given = kinds.into_iter().filter(|kind| stated.has(&format!("shape.{kind}")));
+    let given: Vec<_> = given.collect();
+    let s: ShapeKeys = stated.get("shape.");
+    Ok(match given[..] {
+        ["sphere"] => shapes::sphere(s.ball, s.ball_divisions),
+        ["ellipsoid"] => shapes::ellipsoid(s.radii, s.divisions),
+        ["cylinder"] => shapes::cylinder(s.radius, s.length, s.segments),
+        ["box"] => shapes::cuboid(s.edges),
+        ["plane"] => shapes::plane(s.size, s.thickness),
+        _ => {
+            return Err(document.fail(
+                &format!("{path}.shape"),
+                format!("mesh `{name}` has {} shapes", given.len()),
+                format!("give one of `{}`", kinds.join("`, `")),
+            ));
         }
     })
 }

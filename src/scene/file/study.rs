@@ -1,5 +1,5 @@
-//! Plans of user studies: which scenes are shown from where and before which backgrounds, and what is
-//! asked about the images. `docs/studies.md` describes the file.
+//! Plans of user studies: the scenes, their views and backgrounds, and the questions
+//! about the images. `docs/studies.md` describes the file.
 
 use std::path::{Path, PathBuf};
 
@@ -8,35 +8,34 @@ use serde::Deserialize;
 
 use super::document::Source;
 use super::error::SceneError;
-use super::placing::placement;
-use super::probe::{look, place};
-use super::schema::{PoseTable, Rotation};
+use super::placing::{Placed, placement};
+use super::probe::{self, look, pose};
+use super::table::{Key, Keys, Table, defaults};
 use super::trajectory;
 use super::within;
 use crate::scene::Scene;
-use crate::settings::units::Length;
-use crate::settings::{Surroundings, Words};
+use crate::settings::{Form, Surroundings, Words, group};
 
-/// Most cases of a study: the paper has 27, an assessor a day.
+/// Most cases of a study; the paper has 27, for which an assessor needs a day.
 const MAX_CASES: usize = 999;
 /// Longest text that is shown, bytes.
 const MAX_WORDS: usize = 4000;
-/// Height of an image in pixels where the plan says nothing: the paper's 621 come to some 50 MB.
+/// Default height of an image, pixels; the paper's 621 images take about 50 MB.
 const HEIGHT: u32 = 320;
 
-/// What a study shows and asks.
+/// The plan of a study: its images and questions.
 pub struct Plan {
     /// Headline of the form.
     pub title: String,
-    /// What the assessor is told first: plain text, an empty line between paragraphs.
+    /// Introduction for the assessor: plain text, an empty line between paragraphs.
     pub introduction: String,
-    /// What surrounds the simulated part, in the order of the tables.
+    /// Surroundings of the simulated part, in the order of the tables.
     pub backgrounds: Vec<Surroundings>,
     /// Most rows of pixels of an image; larger ones are reduced.
     pub image_height: u32,
-    /// What is asked.
+    /// The questions.
     pub question: Question,
-    /// The scenes, at least one, of different names.
+    /// The scenes, at least one, with different names.
     pub scenarios: Vec<Scenario>,
     source: Source,
 }
@@ -67,11 +66,11 @@ fn agreement() -> [String; 5] {
 pub struct Scenario {
     /// Name in key and tables; the assessor does not see it.
     pub name: String,
-    /// What the assessor reads above its images; empty: nothing.
+    /// Title above its images for the assessor; empty: none.
     pub title: String,
     /// The scene file, seen from the current folder.
     pub scene: PathBuf,
-    /// Where it is imaged from, at least one place, of different names.
+    /// The positions of the transducer, at least one, with different names.
     pub slices: Vec<Slice>,
 }
 
@@ -80,7 +79,7 @@ pub struct Scenario {
 pub struct Slice {
     /// Name in key and tables; the assessor does not see it.
     pub name: String,
-    /// What the assessor reads where its images are ranked; empty: nothing.
+    /// Title for the assessor where its images are ranked; empty: none.
     pub title: String,
     pose: Pose,
 }
@@ -101,7 +100,7 @@ impl Slice {
             Pose::Absolute(pose) => pose,
             Pose::Relative(pose) => scene.world_from_probe * pose,
         };
-        // Minus zero is no place.
+        // Adding zero turns -0 into 0.
         let rounded = |v: DVec3, unit: f64| (v * unit).round() / unit + DVec3::ZERO;
         let position = rounded(exact.translation, 1e4);
         let direction = rounded(exact.matrix3.z_axis, 1e7);
@@ -145,22 +144,30 @@ struct ScenarioTable {
     title: String,
     scene: String,
     #[serde(default)]
-    slice: Vec<SliceTable>,
+    slice: Vec<Table<SliceKeys>>,
 }
 
-#[derive(Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SliceTable {
-    name: String,
-    #[serde(default)]
-    title: String,
-    pose: Option<PoseTable>,
-    translate: Option<[Length; 3]>,
-    rotate: Option<Rotation>,
+group! {
+    /// A position of the transducer.
+    pub struct SliceKeys in "scenario.slice" {
+        /// Name in key and tables.
+        name: String = String::new(), Facts::of(Form::Text).required();
+        /// What the assessor reads where its images are ranked.
+        title: String = String::new(), Facts::of(Form::Text);
+    }
+}
+
+impl Keys for SliceKeys {
+    const TABLE: &'static str = "scenario.slice";
+
+    fn keys() -> Vec<Key> {
+        let own = defaults::<Self>("").chain(defaults::<Placed>(""));
+        own.chain(defaults::<probe::Pose>("pose.")).collect()
+    }
 }
 
 impl Plan {
-    /// Reads a plan. The scenes that it names are not looked at.
+    /// Reads a plan. The scenes that it names are not read.
     ///
     /// # Errors
     /// The first mistake, with file, line, column and remedy.
@@ -181,7 +188,10 @@ impl Plan {
         for (i, scenario) in table.scenario.iter().enumerate() {
             let at = format!("scenario.{i}");
             let slices = scenario.slice.iter();
-            check.names(&format!("{at}.slice"), slices.clone().map(|s| &*s.name))?;
+            check.names(
+                &format!("{at}.slice"),
+                slices.clone().filter_map(|s| s.stated.text("name")),
+            )?;
             let slices = slices
                 .enumerate()
                 .map(|(j, slice)| slice_of(&source, &format!("{at}.slice.{j}"), slice))
@@ -225,7 +235,7 @@ impl Plan {
     }
 }
 
-/// Checks what the types of the tables leave open.
+/// Checks conditions that the types of the tables do not express.
 struct Check<'s> {
     source: &'s Source,
 }
@@ -256,8 +266,9 @@ impl Check<'_> {
             all.push(own(&format!("scenario.{i}.title"), &scenario.title));
             all.push(own(&format!("scenario.{i}.name"), &scenario.name));
             for (j, slice) in scenario.slice.iter().enumerate() {
-                all.push(own(&format!("scenario.{i}.slice.{j}.title"), &slice.title));
-                all.push(own(&format!("scenario.{i}.slice.{j}.name"), &slice.name));
+                let SliceKeys { name, title } = slice.stated.get("");
+                all.push(own(&format!("scenario.{i}.slice.{j}.title"), &title));
+                all.push(own(&format!("scenario.{i}.slice.{j}.name"), &name));
             }
         }
         match all.iter().find(|(_, text)| text.len() > MAX_WORDS) {
@@ -283,7 +294,7 @@ impl Check<'_> {
         Ok(())
     }
 
-    /// At least one, none empty, none twice.
+    /// Fails unless there is at least one name, none is empty and none occurs twice.
     fn names<'n>(
         &self,
         path: &str,
@@ -310,24 +321,24 @@ impl Check<'_> {
     }
 }
 
-fn slice_of(source: &Source, path: &str, table: &SliceTable) -> Result<Slice, SceneError> {
+fn slice_of(source: &Source, path: &str, table: &Table<SliceKeys>) -> Result<Slice, SceneError> {
     let document = source.document()?;
-    let moved = table.translate.is_some() || table.rotate.is_some();
-    let pose = match &table.pose {
-        Some(_) if moved => {
+    table.check(&document, path)?;
+    let stated = &table.stated;
+    let SliceKeys { name, title } = stated.get("");
+    let moved = stated.has("translate") || stated.has("rotate");
+    let pose = match stated.has("pose") {
+        true if moved => {
             return Err(document.fail(
                 path,
-                format!("`{}` has a pose, and a shift from the scene's own", table.name),
+                format!("`{name}` has a pose, and a shift from the scene's own"),
                 "give either `pose`, or `translate` and `rotate`",
             ));
         }
-        Some(pose) => Pose::Absolute(place(&document, &format!("{path}.pose"), pose)?),
-        None => {
-            let shift = (table.translate, table.rotate.as_ref(), None);
-            Pose::Relative(placement(&document, path, shift)?)
-        }
+        true => Pose::Absolute(pose(&document, path, stated)?),
+        false => Pose::Relative(placement(stated, "")),
     };
-    Ok(Slice { name: table.name.clone(), title: table.title.clone(), pose })
+    Ok(Slice { name, title, pose })
 }
 
 #[cfg(test)]

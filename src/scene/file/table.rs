@@ -1,64 +1,122 @@
-//! Tables of settings, read by their rows.
+//! Tables of scene files, read by the rows of their keys.
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::marker::PhantomData;
 
-use serde::de::value::StrDeserializer;
-use serde::de::{DeserializeSeed, Deserializer, Error, IntoDeserializer, MapAccess, Visitor};
-use serde::{Deserialize, forward_to_deserialize_any};
+use serde::Deserialize;
+use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, Visitor};
 
 use super::document::Document;
 use super::error::SceneError;
 use super::save::Entry;
-use crate::settings::{Group, Row, Value};
+use crate::settings::{Facts, Form, Group, Row, Value};
 
-/// A table of a scene file: settings, and what else stands there.
-#[derive(Debug)]
-pub struct Table<T: Group, X = Nothing> {
-    /// The settings that it states.
-    pub stated: Stated<T>,
-    /// Its other keys.
-    pub other: X,
+/// Contents of a table of scene files.
+pub trait Keys: 'static {
+    /// The table, as the reference writes it: `tissues.NAME`.
+    const TABLE: &'static str;
+
+    /// All keys.
+    fn keys() -> Vec<Key>;
 }
 
-/// No other keys.
-#[derive(Debug, Default, Deserialize)]
-pub struct Nothing {}
-
-/// Values of the settings of which a table speaks.
-pub struct Stated<T: Group> {
-    /// Of each row.
-    values: Vec<Option<Value>>,
-    of: PhantomData<T>,
+/// A key of a table.
+pub struct Key {
+    /// Its place in the table, with those of the tables in between: `inside.roughness`.
+    pub path: String,
+    /// All facts about it.
+    pub facts: &'static Facts,
+    /// Its default, as the reference writes it.
+    pub default: String,
 }
 
-impl<T: Group> Default for Stated<T> {
+/// The keys of a group whose defaults are not always the same, in the table `below` of theirs; `default` says what
+/// they are, where their rows do not.
+pub(super) fn keys<T: Group>(
+    below: &'static str,
+    default: &'static str,
+) -> impl Iterator<Item = Key> {
+    T::rows().iter().map(move |Row { facts, .. }| Key {
+        path: format!("{below}{}", facts.key),
+        facts,
+        default: match default {
+            "" => facts.default.unwrap_or_default().to_owned(),
+            words => words.to_owned(),
+        },
+    })
+}
+
+/// As [`keys`], of a group with defaults.
+pub(super) fn defaults<T: Group + Default>(below: &'static str) -> impl Iterator<Item = Key> {
+    let value = |row: &Row<T>| match (row.facts.default, (row.get)(&T::default())) {
+        (None, Value::Text(text)) => format!("`{text}`"),
+        (None, value) => {
+            let text = row.facts.text(&value).map(|text| match row.facts.form {
+                Form::Quantity(_) => format!("`{}`", text.trim_matches('"')),
+                _ => format!("`{text}`"),
+            });
+            text.unwrap_or_default()
+        }
+        (Some(words), _) => words.to_owned(),
+    };
+    let all = keys::<T>(below, "").zip(T::rows());
+    all.map(move |(key, row)| Key { default: value(row), ..key })
+}
+
+/// A table with the keys of `K`.
+pub struct Table<K> {
+    /// The values that it states.
+    pub stated: Stated,
+    of: PhantomData<K>,
+}
+
+/// Values of the keys that a table states.
+#[derive(Debug, Default)]
+pub struct Stated {
+    /// By the key's place in the table.
+    values: BTreeMap<String, Value>,
+    /// The tables in it.
+    tables: BTreeSet<String>,
+}
+
+impl<K> Default for Table<K> {
     fn default() -> Self {
-        Self { values: vec![None; T::rows().len()], of: PhantomData }
+        Self { stated: Stated::default(), of: PhantomData }
     }
 }
 
-impl<T: Group, X: Default> Default for Table<T, X> {
-    fn default() -> Self {
-        Self { stated: Stated::default(), other: X::default() }
-    }
-}
-
-impl<T: Group> fmt::Debug for Stated<T> {
+impl<K> fmt::Debug for Table<K> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let stated = T::rows().iter().zip(&self.values);
-        f.debug_map().entries(stated.map(|(row, value)| (row.facts.key, value))).finish()
+        self.stated.fmt(f)
     }
 }
 
-impl<T: Group> Stated<T> {
-    /// The value of a key; none where the table does not say it.
+impl<K: Keys> Table<K> {
+    /// Fails at the first value out of its range; `path` is the table's.
+    pub fn check(&self, document: &Document<'_>, path: &str) -> Result<(), SceneError> {
+        for key in K::keys() {
+            let value = self.stated.value(&key.path);
+            if let Some((message, remedy)) = value.and_then(|value| key.facts.fault(value)) {
+                return Err(document.fail(&format!("{path}.{}", key.path), message, remedy));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Stated {
+    /// The value of a key; none if the table does not state it.
     pub fn value(&self, key: &str) -> Option<&Value> {
-        let at = T::rows().iter().position(|row| row.facts.key == key)?;
-        self.values[at].as_ref()
+        self.values.get(key)
     }
 
-    /// The number at a key; none where the table does not say it.
+    /// Returns whether the table has the key, or a table of this name.
+    pub fn has(&self, key: &str) -> bool {
+        self.values.contains_key(key) || self.tables.contains(key)
+    }
+
+    /// The number at a key; none if the table does not state it.
     pub fn number(&self, key: &str) -> Option<f64> {
         match self.value(key) {
             Some(Value::Number(number)) => Some(*number),
@@ -66,143 +124,133 @@ impl<T: Group> Stated<T> {
         }
     }
 
-    /// Puts what the table at `path` states into `out`.
-    ///
-    /// # Errors
-    /// The first value out of its range.
-    pub fn put(&self, document: &Document<'_>, path: &str, out: &mut T) -> Result<(), SceneError> {
-        for (row, value) in T::rows().iter().zip(&self.values) {
-            let Some(value) = value else { continue };
-            if let Some((message, remedy)) = row.facts.fault(value) {
-                return Err(document.fail(&format!("{path}.{}", row.facts.key), message, remedy));
-            }
-            (row.set)(out, value);
+    /// The text at a key; none if the table does not state it.
+    pub fn text(&self, key: &str) -> Option<&str> {
+        match self.value(key) {
+            Some(Value::Text(text)) => Some(text),
+            _ => None,
         }
-        Ok(())
+    }
+
+    /// Writes the settings that the table `below` states into `out`.
+    pub fn put<T: Group>(&self, below: &str, out: &mut T) {
+        for row in T::rows() {
+            if let Some(value) = self.values.get(&format!("{below}{}", row.facts.key)) {
+                (row.set)(out, value);
+            }
+        }
+    }
+
+    /// The settings that the table `below` states, and defaults of the others.
+    pub fn get<T: Group + Default>(&self, below: &str) -> T {
+        let mut out = T::default();
+        self.put(below, &mut out);
+        out
     }
 }
 
-impl<'de, T: Group, X: Deserialize<'de>> Deserialize<'de> for Table<T, X> {
+impl<'de, K: Keys> Deserialize<'de> for Table<K> {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct AsTable<T, X>(PhantomData<(T, X)>);
-
-        impl<'de, T: Group, X: Deserialize<'de>> Visitor<'de> for AsTable<T, X> {
-            type Value = Table<T, X>;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
-                let mut stated = Stated::default();
-                let other = X::deserialize(Others { map, stated: &mut stated, fields: &[] })?;
-                Ok(Table { stated, other })
-            }
-        }
-
-        deserializer.deserialize_map(AsTable(PhantomData))
+        let mut table = Self::default();
+        let below = String::new();
+        let reader = Reader { keys: &K::keys(), below, stated: &mut table.stated };
+        reader.deserialize(deserializer)?;
+        Ok(table)
     }
 }
 
-/// A table without its settings: those go where they are stated, when they are met.
-struct Others<'s, A, T: Group> {
-    map: A,
-    stated: &'s mut Stated<T>,
-    /// Keys of the rest.
-    fields: &'static [&'static str],
+/// Reader of a table, or of the table in it whose keys begin with `below`.
+struct Reader<'r> {
+    keys: &'r [Key],
+    below: String,
+    stated: &'r mut Stated,
 }
 
-impl<'de, A: MapAccess<'de>, T: Group> Deserializer<'de> for Others<'_, A, T> {
-    type Error = A::Error;
-
-    fn deserialize_struct<V: Visitor<'de>>(
-        self,
-        _: &'static str,
-        fields: &'static [&'static str],
-        visitor: V,
-    ) -> Result<V::Value, A::Error> {
-        visitor.visit_map(Self { fields, ..self })
+impl<'r> Reader<'r> {
+    /// The keys from here on.
+    fn here(&self) -> impl Iterator<Item = (&'r str, &'r Key)> {
+        let keys = self.keys;
+        let below = self.below.clone();
+        keys.iter().filter_map(move |key| Some((key.path.strip_prefix(&below)?, key)))
     }
 
-    fn deserialize_any<V: Visitor<'de>>(self, visitor: V) -> Result<V::Value, A::Error> {
-        visitor.visit_map(self)
-    }
-
-    forward_to_deserialize_any! {
-        bool i8 i16 i32 i64 u8 u16 u32 u64 f32 f64 char str string bytes byte_buf option unit unit_struct
-        newtype_struct seq tuple tuple_struct map enum identifier ignored_any
+    /// Names of keys and tables.
+    fn names(&self) -> Vec<&'r str> {
+        let names = self.here().map(|(path, _)| path.split('.').next().unwrap_or(path));
+        let mut seen = BTreeSet::new();
+        names.filter(|name| seen.insert(*name)).collect()
     }
 }
 
-impl<'de, A: MapAccess<'de>, T: Group> MapAccess<'de> for Others<'_, A, T> {
-    type Error = A::Error;
+impl<'de> Visitor<'de> for Reader<'_> {
+    type Value = ();
 
-    fn next_key_seed<K: DeserializeSeed<'de>>(
-        &mut self,
-        seed: K,
-    ) -> Result<Option<K::Value>, A::Error> {
-        loop {
-            let known = Known::<T> { fields: self.fields, of: PhantomData };
-            match self.map.next_key_seed(known)? {
-                None => return Ok(None),
-                Some(Name::Row(at)) => {
-                    let value = self.map.next_value_seed(&T::rows()[at].facts.form)?;
-                    self.stated.values[at] = Some(value);
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a table")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
+        while let Some(name) = map.next_key_seed(Name(&self.names()))? {
+            let path = format!("{}{name}", self.below);
+            match self.keys.iter().find(|key| key.path == path) {
+                Some(key) => {
+                    let value = map.next_value_seed(&key.facts.form)?;
+                    self.stated.values.insert(path, value);
                 }
-                Some(Name::Other(name)) => {
-                    let name: StrDeserializer<'_, A::Error> = name.into_deserializer();
-                    return seed.deserialize(name).map(Some);
+                None => {
+                    let below = format!("{path}.");
+                    let inner = Reader { keys: self.keys, below, stated: &mut *self.stated };
+                    map.next_value_seed(inner)?;
+                    self.stated.tables.insert(path);
                 }
             }
         }
+        let lacks = |(name, key): &(&str, &Key)| {
+            key.facts.required && !name.contains('.') && self.stated.value(&key.path).is_none()
+        };
+        match self.here().find(lacks) {
+            Some((name, _)) => Err(A::Error::custom(format!("missing field `{name}`"))),
+            None => Ok(()),
+        }
     }
+}
 
-    fn next_value_seed<V: DeserializeSeed<'de>>(&mut self, seed: V) -> Result<V::Value, A::Error> {
-        self.map.next_value_seed(seed)
+impl<'de> DeserializeSeed<'de> for Reader<'_> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<(), D::Error> {
+        deserializer.deserialize_map(self)
     }
 }
 
-/// A key of a table.
-enum Name {
-    /// The setting of this row.
-    Row(usize),
-    Other(&'static str),
-}
+/// Reader of a key, which must be one of these names.
+struct Name<'n>(&'n [&'n str]);
 
-/// Takes the keys of the rows of `T` and of `fields`.
-struct Known<T> {
-    fields: &'static [&'static str],
-    of: PhantomData<T>,
-}
-
-impl<T: Group> Visitor<'_> for Known<T> {
-    type Value = Name;
+impl<'n> Visitor<'_> for Name<'n> {
+    type Value = &'n str;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a key")
     }
 
-    fn visit_str<E: Error>(self, text: &str) -> Result<Name, E> {
-        let rows = T::rows();
-        if let Some(at) = rows.iter().position(|row| row.facts.key == text) {
-            return Ok(Name::Row(at));
-        }
-        if let Some(name) = self.fields.iter().find(|name| **name == text) {
-            return Ok(Name::Other(name));
-        }
-        let all = self.fields.iter().copied().chain(rows.iter().map(|row| row.facts.key));
-        let all: Vec<_> = all.map(|name| format!("`{name}`")).collect();
-        let all = all.join(", ");
-        Err(E::custom(format!("unknown field `{text}`, expected one of {all}")))
+    fn visit_str<E: Error>(self, text: &str) -> Result<&'n str, E> {
+        let known = self.0.iter().find(|name| **name == text);
+        known.copied().ok_or_else(|| unknown(text, self.0.iter()))
     }
 }
 
-impl<'de, T: Group> DeserializeSeed<'de> for Known<T> {
-    type Value = Name;
+impl<'de, 'n> DeserializeSeed<'de> for Name<'n> {
+    type Value = &'n str;
 
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Name, D::Error> {
+    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<&'n str, D::Error> {
         deserializer.deserialize_identifier(self)
     }
+}
+
+/// The error for a key that is none of `all`, in the words of derived readers.
+pub(super) fn unknown<E: Error>(key: &str, all: impl Iterator<Item = impl fmt::Display>) -> E {
+    let all: Vec<_> = all.map(|name| format!("`{name}`")).collect();
+    E::custom(format!("unknown field `{key}`, expected one of {}", all.join(", ")))
 }
 
 /// Every setting of a group as an entry of the table at `path`.
@@ -213,8 +261,13 @@ pub fn entries<T: Group>(settings: &T, path: &str) -> Vec<Entry> {
     rows.map(entry).collect()
 }
 
-/// What the table at `path`, which gives `from` now, has to say so that it gives `to`.
+/// The entries by which the table at `path`, which gives `from` now, gives `to`.
 pub fn changes<T: Group>(from: &T, to: &T, path: &str) -> Vec<Entry> {
-    let pairs = entries(from, path).into_iter().zip(entries(to, path));
+    differing(entries(from, path), entries(to, path))
+}
+
+/// Those of `to` that are not as in `from`, which has the same keys in the same order.
+pub fn differing(from: Vec<Entry>, to: Vec<Entry>) -> Vec<Entry> {
+    let pairs = from.into_iter().zip(to);
     pairs.filter(|(from, to)| from != to).map(|(_, entry)| entry).collect()
 }

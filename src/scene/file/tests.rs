@@ -114,7 +114,7 @@ fn a_whole_scene_is_understood() {
     assert!((scene.wires[0].amplitude - 0.1).abs() < 1e-12);
 }
 
-/// As the program writes paths: names with dots in quotes, names that TOML would quote without.
+/// Paths as the program writes them: names with dots in quotes, other names without, even those that TOML would quote.
 #[test]
 fn overrides_name_what_has_dots_in_its_name() {
     let case = Case::new();

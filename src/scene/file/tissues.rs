@@ -4,16 +4,29 @@ use std::collections::BTreeMap;
 
 use super::document::{Document, quoted};
 use super::error::SceneError;
-use super::schema::TissueTable;
 use super::table::Table;
 use crate::scene::tissue::table;
 use crate::scene::{Issue, Tissue};
-use crate::settings::{Group, suggest};
+use crate::settings::units::IMPEDANCE;
+use crate::settings::{Form, Group, group, suggest};
 
-type Tables = BTreeMap<String, Table<Tissue, TissueTable>>;
+type Tables = BTreeMap<String, Table<Tissue>>;
 
-/// Impedance stated beside speed and density may differ from their product by this fraction:
-/// tables round to two digits. More, and refraction and reflection would contradict each other.
+group! {
+    /// Keys of a tissue beside its acoustics.
+    pub struct TissueKeys in "tissues.NAME" {
+        /// Shipped tissue, or another one of this file.
+        based_on: Option<String> = None, Facts::of(Form::Text).by_default("itself, if shipped");
+        /// Only checked: a stated value that contradicts the product is an error.
+        impedance: Option<f64> = None,
+            Facts::of(Form::Quantity(&IMPEDANCE)).by_default("density times speed").limits("within 2 % of it");
+        /// Where the numbers come from.
+        source: Option<String> = None, Facts::of(Form::Text).by_default("base, marked as changed");
+    }
+}
+
+/// Largest relative difference between a stated impedance and the product of speed and density:
+/// tables round to two digits. With a larger one refraction and reflection would contradict each other.
 const IMPEDANCE_TOLERANCE: f64 = 0.02;
 
 /// Tissues that a scene may name, and those that it has named.
@@ -81,11 +94,11 @@ fn unknown<'n>(
     document.fail(path, format!("unknown tissue `{name}`"), remedy)
 }
 
-/// Names of the tissues from which `name` takes what it does not say, the nearest first.
+/// Names of the tissues from which `name` takes the values that it does not state, the nearest first.
 pub(super) fn bases(tables: &Tables, name: &str) -> Vec<String> {
     let mut out: Vec<String> = Vec::new();
     let mut at = name;
-    while let Some(base) = tables.get(at).and_then(|table| table.other.based_on.as_deref())
+    while let Some(base) = tables.get(at).and_then(|table| table.stated.text("based_on"))
         && base != at
     {
         out.push(base.to_owned());
@@ -106,7 +119,7 @@ fn resolve(
     let path = format!("tissues.{}", quoted(name));
     let based_on = format!("{path}.based_on");
     chain.push(name.to_owned());
-    let base = match table.other.based_on.as_deref() {
+    let base = match table.stated.text("based_on") {
         Some(base) if base != name && chain.iter().any(|c| c == base) => {
             return Err(document.fail(
                 &based_on,
@@ -123,16 +136,16 @@ fn resolve(
         None => Tissue::shipped(name),
     };
     let tissue = over(document, table, base, &path, name)?;
-    if let Some(stated) = table.other.impedance {
+    if let Some(stated) = table.stated.number("impedance") {
         let product = tissue.impedance();
-        let off = (stated.0 - product).abs() / stated.0;
+        let off = (stated - product).abs() / stated;
         // Written so that a zero or infinite impedance fails as well.
         if !matches!(off.partial_cmp(&IMPEDANCE_TOLERANCE), Some(std::cmp::Ordering::Less)) {
             return Err(document.fail(
                 &format!("{path}.impedance"),
                 format!(
                     "impedance {} MRayl differs from density times speed, {product:.4} MRayl, by {:.1} %",
-                    stated.0,
+                    stated,
                     off * 100.0
                 ),
                 "correct speed or density, or leave impedance out (it is derived); 2 % are allowed",
@@ -142,10 +155,10 @@ fn resolve(
     Ok(tissue)
 }
 
-/// What `table` states over `base`.
+/// The tissue `base` with the values that `table` states.
 fn over(
     document: &Document<'_>,
-    table: &Table<Tissue, TissueTable>,
+    table: &Table<Tissue>,
     base: Option<Tissue>,
     path: &str,
     name: &str,
@@ -166,9 +179,9 @@ fn over(
         ..Tissue::shipped("liver").expect("the reference tissue is shipped")
     });
     out.name = name.to_owned();
-    table.stated.put(document, path, &mut out)?;
-    out.source = match &table.other.source {
-        Some(source) => source.clone(),
+    table.stated.put("", &mut out);
+    out.source = match table.stated.text("source") {
+        Some(source) => source.to_owned(),
         None => match out.source.as_str() {
             "scene file" => out.source,
             inherited => format!("changed by the scene file; before that\n{inherited}"),

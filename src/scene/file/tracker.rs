@@ -5,62 +5,74 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::document::Document;
 use super::error::SceneError;
 use super::placing::placement;
-use super::schema::{RigidTable, TrackerTable};
-use super::within;
+use super::table::Stated;
 use crate::scene::tracker::{Axes, Tracker, rigid};
+use crate::settings::units::DURATION;
+use crate::settings::{Form, group};
 
 /// Bytes that a name may have on the wire.
 const NAME: usize = 20;
 
-pub(super) fn build(
-    document: &Document<'_>,
-    table: Option<&TrackerTable>,
-) -> Result<Tracker, SceneError> {
-    let mut out = Tracker::default();
-    let Some(table) = table else {
-        return Ok(out);
-    };
-    if let Some(device) = &table.device {
-        if device.is_empty() || device.len() > NAME {
-            return Err(document.fail(
-                "tracker.device",
-                format!("`{device}` has {} bytes", device.len()),
-                format!(
-                    "names have 1 to {NAME} bytes in OpenIGTLink, which cuts longer ones: give what \
-                     arrives"
-                ),
-            ));
-        }
-        out.device = Some(device.clone());
+group! {
+    /// A tracked tool that moves the probe.
+    pub struct TrackerKeys in "tracker" {
+        /// Name of the TRANSFORM message, or of the tool in TDATA messages.
+        device: Option<String> = None,
+            Facts::of(Form::Text).by_default("every tool").limits("not empty, at most 20 bytes");
+        /// Silence after which the tracker counts as lost. The probe stays where it was.
+        timeout: f64 = 0.5, Facts::quantity(&DURATION, 0.01, 3600.0);
+        /// What x and y of the world are: left and back of the patient, as in the volumes of scenes, or right and
+        /// front. What is sent is RAS.
+        axes: Axes = Axes::Lps, Facts::word::<Axes>();
     }
-    if let Some(timeout) = table.timeout {
-        within(document, "tracker.timeout", timeout.0, 0.01, 3600.0, "s")?;
-        out.timeout = timeout.0;
-    }
-    out.axes = table.axes.unwrap_or(Axes::Lps);
-    // The tracker's frame is taken for RAS unless the file says where it is.
-    out.world_from_reference = out.axes.to_ras();
-    if let Some(given) = &table.world_from_reference {
-        out.world_from_reference = transform(document, "tracker.world_from_reference", given)?;
-    }
-    if let Some(given) = &table.tool_from_probe {
-        out.tool_from_probe = transform(document, "tracker.tool_from_probe", given)?;
-    }
-    Ok(out)
 }
 
-/// Either the matrix, or rotation and shift.
-fn transform(
-    document: &Document<'_>,
-    path: &str,
-    table: &RigidTable,
-) -> Result<DAffine3, SceneError> {
-    let Some(rows) = table.matrix else {
-        return placement(document, path, (table.translate, table.rotate.as_ref(), None));
+group! {
+    /// A rigid transform, instead of rotation and shift.
+    pub struct MatrixKey in "" {
+        /// The same as a matrix, row by row as PLUS writes it; the shift, in mm, is the fourth column.
+        matrix: Option<[f64; 16]> = None,
+            Facts::of(Form::Numbers(16)).limits("rigid to 0.002, without the other keys");
+    }
+}
+
+pub(super) fn build(document: &Document<'_>, stated: &Stated) -> Result<Tracker, SceneError> {
+    let TrackerKeys { device, timeout, axes } = stated.get("");
+    if let Some(device) = &device
+        && (device.is_empty() || device.len() > NAME)
+    {
+        return Err(document.fail(
+            "tracker.device",
+            format!("`{device}` has {} bytes", device.len()),
+            format!(
+                "names have 1 to {NAME} bytes in OpenIGTLink, which cuts longer ones: give what \
+                 arrives"
+            ),
+        ));
+    }
+    let place = |name: &str, default: DAffine3| match stated.has(name) {
+        true => transform(document, stated, name),
+        false => Ok(default),
     };
-    let path = format!("{path}.matrix");
-    let fail = |why: String, remedy| Err(document.fail(&path, why, remedy));
-    if table.translate.is_some() || table.rotate.is_some() {
+    Ok(Tracker {
+        device,
+        timeout,
+        axes,
+        // The tracker's frame is taken for RAS unless the file says where it is.
+        world_from_reference: place("world_from_reference", axes.to_ras())?,
+        tool_from_probe: place("tool_from_probe", DAffine3::IDENTITY)?,
+    })
+}
+
+/// What the table `name` says: either the matrix, or rotation and shift.
+fn transform(document: &Document<'_>, stated: &Stated, name: &str) -> Result<DAffine3, SceneError> {
+    let below = format!("{name}.");
+    let Some(rows) = stated.get::<MatrixKey>(&below).matrix else {
+        return Ok(placement(stated, &below));
+    };
+    let fail =
+        |why: String, remedy| Err(document.fail(&format!("tracker.{below}matrix"), why, remedy));
+    if ["translate", "rotate"].iter().any(|key| stated.has(&format!("{below}{key}"))) {
         return fail(
             "both a matrix and a rotation or shift are given".to_owned(),
             "give one of them",

@@ -19,7 +19,7 @@ const MAX_ROWS: usize = 200_000;
 /// Farthest position, mm, as for everything that is placed.
 const FAR: f64 = 1e5;
 
-/// The columns that there can be.
+/// Names of all possible columns.
 const NAMES: [&str; 11] =
     ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "sx", "sy", "sz"];
 
@@ -29,14 +29,14 @@ struct Column {
     places: Vec<Range<usize>>,
 }
 
-/// A file as it was read.
+/// The columns of a file, as read.
 struct Table<'t> {
     path: &'t Path,
     text: &'t str,
     columns: BTreeMap<&'static str, Column>,
 }
 
-/// Text of the file at `path`, or why there is none.
+/// Text of the file at `path`, or the reason why it cannot be read.
 pub(super) fn text(path: &Path) -> Result<String, String> {
     let info = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
     if !info.is_file() {
@@ -109,7 +109,7 @@ fn too_many(path: &Path, text: &str, at: Range<usize>) -> SceneError {
 }
 
 fn of_csv<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
-    // Cells with their places; lines without anything, and those that begin with #, say nothing.
+    // Cells with their places; empty lines and lines that begin with # are left out.
     let cells = |line: &'t str| {
         let start = line.as_ptr() as usize - text.as_ptr() as usize;
         let mut at = start;
@@ -277,7 +277,7 @@ impl Table<'_> {
         Ok(track)
     }
 
-    /// What a channel refuses, at its row.
+    /// The error for samples that a channel refuses, at their row.
     fn refused(&self, error: &TrackError, time: &Column, q: Option<[&Column; 4]>) -> SceneError {
         match (error, q) {
             (TrackError::Order(row), _) => {
@@ -294,7 +294,7 @@ impl Table<'_> {
                 let message = "this quaternion is zero, which is no rotation".to_owned();
                 self.fail(at, message, "no rotation is qw, qx, qy, qz = 1, 0, 0, 0")
             }
-            // The rest has been checked; it would still be told.
+            // Other errors have been excluded by checks; if one occurs, it is reported all the same.
             (error, _) => self.fail(0..0, error.to_string(), ""),
         }
     }

@@ -7,7 +7,8 @@ use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visi
 
 use super::document::Document;
 use super::error::SceneError;
-use super::{parameters, probe};
+use super::settings;
+use super::table::unknown;
 use crate::scene::Scene;
 use crate::scene::vary::{Parameter, Variant};
 use crate::settings::{Form, Value};
@@ -40,7 +41,7 @@ impl<'de> Deserialize<'de> for VaryTable {
     }
 }
 
-/// Takes the key of a parameter.
+/// Reads the key of a parameter.
 struct Key;
 
 impl Visitor<'_> for Key {
@@ -51,10 +52,7 @@ impl Visitor<'_> for Key {
     }
 
     fn visit_str<E: Error>(self, text: &str) -> Result<Parameter, E> {
-        Parameter::of(text).ok_or_else(|| {
-            let all: Vec<_> = Parameter::all().map(|p| format!("`{}`", p.key())).collect();
-            E::custom(format!("unknown field `{text}`, expected one of {}", all.join(", ")))
-        })
+        Parameter::of(text).ok_or_else(|| unknown(text, Parameter::all().map(|p| p.key())))
     }
 }
 
@@ -66,7 +64,7 @@ impl<'de> DeserializeSeed<'de> for Key {
     }
 }
 
-/// Takes a list of values of this form.
+/// Reads a list of values of this form.
 struct Values(Form);
 
 impl<'de> Visitor<'de> for Values {
@@ -133,7 +131,7 @@ pub(super) fn variants(
     Ok(out)
 }
 
-/// The settings of the document with one more override: what `render` makes of it, checks included.
+/// The settings of the document with one more override, checked as `render` does.
 fn settled(
     document: &Document<'_>,
     parameter: Parameter,
@@ -143,8 +141,6 @@ fn settled(
     let source = document.source.with(std::slice::from_ref(&setting));
     let document = source.document()?;
     let file = document.parse()?;
-    let (probe, _) = probe::build(&document, &file.probe)?;
-    let simulation = parameters::simulation(&document, &file.simulation, probe.frequency)?;
-    let imaging = parameters::imaging(&document, &file.imaging)?;
-    Ok(Variant { parameter, value, setting, probe, simulation, imaging })
+    let settings = settings::settings(&document, &file, None)?;
+    Ok(Variant { parameter, value, setting, settings })
 }

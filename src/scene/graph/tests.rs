@@ -158,7 +158,7 @@ fn topology_is_shared_where_triangles_and_vertex_counts_agree() {
 }
 
 #[test]
-fn only_what_time_squeezes_has_a_shape_at_rest() {
+fn only_instances_scaled_in_time_have_a_placement_at_rest() {
     let clock = Clock { period: 4.0, ..Clock::default() };
     let sine = |scale: DVec3, angle: f64| Motion::Sine {
         clock,

@@ -20,7 +20,7 @@ impl Mesh {
 
 /// Reads files that are the shapes of one surface over time, in order; positions end in mm.
 ///
-/// Where all files have as many vertices and the same triangles, the first is repaired and split at
+/// If all files have the same number of vertices and the same triangles, the first is repaired and split at
 /// creases as [`load`] does it, and the others follow vertex by vertex: the meshes share their topology
 /// ([`Mesh::shares_topology`]), and normals are those of each shape. Vertices are welded where they
 /// coincide in every shape, and triangles dropped that have no area in any. Where the files differ, each

@@ -1,5 +1,5 @@
-//! Hierarchies whose triangles move: in which order nodes are refitted on the device, and how much
-//! slower a refitted hierarchy has become.
+//! Hierarchies whose triangles move: the order in which nodes are refitted on the device, and the cost of
+//! rays in a refitted hierarchy.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
@@ -8,18 +8,18 @@ use super::MeshBvh;
 use crate::scene::Mesh;
 use crate::sim::layout::RefitLevel;
 
-/// The nodes of hierarchies level by level, deepest first, as `refit` takes them.
+/// The nodes of hierarchies level by level, deepest first, in the order that `refit` needs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Levels {
     /// Numbers of the nodes in the scene's buffer.
     pub order: Vec<u32>,
-    /// One dispatch each, in this order, with a barrier between two of them.
+    /// The part of `order` for each dispatch, in sequence; there is a barrier between two dispatches.
     pub ranges: Vec<RefitLevel>,
 }
 
-/// The levels of `trees`, each with the number of its root in the scene's buffer
-/// ([`super::SceneBvh::add`]): trees that are refitted together share their dispatches. Empty
-/// trees may be among them, with any root.
+/// The levels of `trees`, each given with the number of its root in the scene's buffer
+/// ([`super::SceneBvh::add`]). Trees that are refitted together share their dispatches. Empty trees are
+/// allowed, with any root.
 pub fn levels(trees: &[(&MeshBvh, u32)]) -> Levels {
     let mut by_level: Vec<Vec<u32>> = Vec::new();
     for &(tree, root) in trees {
@@ -40,7 +40,7 @@ pub fn levels(trees: &[(&MeshBvh, u32)]) -> Levels {
     levels
 }
 
-/// Level of each node, 0 the root; parents come before their children.
+/// The level of each node, 0 for the root; parents come before their children.
 fn levels_of(tree: &MeshBvh) -> Vec<usize> {
     let mut levels = vec![0; tree.nodes.len()];
     for (i, node) in tree.nodes.iter().enumerate() {
@@ -52,12 +52,12 @@ fn levels_of(tree: &MeshBvh) -> Vec<usize> {
 }
 
 impl MeshBvh {
-    /// Cost of a ray in this hierarchy once its vertices lie at `positions` and it was refitted,
-    /// relative to that where it was built: `mesh` is what it was built from. 1 where the mesh rests or
-    /// is shifted; at 1.5 a new hierarchy pays. The cost is the surface-area heuristic's (Goldsmith,
-    /// Salmon 1987; MacDonald, Booth 1990) with one for a node as for a triangle,
-    /// `sum(A) / A_root` over nodes and, as often as they hold triangles, leaves. 1 for a mesh without
-    /// surface.
+    /// The cost of a ray in this hierarchy after refitting it to vertices at `positions`, relative to the cost
+    /// where it was built. `mesh` is the mesh from which it was built. The result is 1 where the mesh is
+    /// unchanged or only shifted, and 1 for a mesh without surface; at 1.5 a new hierarchy is worth its build.
+    /// The cost is that of the surface-area heuristic (Goldsmith, Salmon 1987; MacDonald, Booth 1990) with equal
+    /// costs of node and triangle: `sum(A) / A_root` over all nodes and over the leaves, a leaf once for each of
+    /// its triangles.
     ///
     /// # Panics
     /// When there are fewer positions than vertices, or `mesh` has other triangles.
@@ -109,7 +109,7 @@ mod tests {
     use crate::sim::bvh::{Node, SceneBvh};
     use insonify_tools::reference::refit::{Child, Geometry, child, refit};
 
-    /// The heart-like pulse of a mesh: every vertex moves by up to 4 mm, neighbours alike.
+    /// A mesh deformed like a beating heart: every vertex moves by up to 4 mm, neighbours alike.
     fn pulsed(mesh: &Mesh) -> Vec<[f32; 3]> {
         let moved = |p: &[f32; 3]| {
             let swell = 1.0 + 0.2 * (0.3 * p[0] + 0.2 * p[1]).sin();
@@ -118,7 +118,7 @@ mod tests {
         mesh.positions.iter().map(moved).collect()
     }
 
-    /// A permutation of the vertices: neighbours are torn apart.
+    /// The vertices of a mesh in permuted order, so that neighbours are moved far apart.
     fn shuffled(mesh: &Mesh) -> Vec<[f32; 3]> {
         let n = mesh.positions.len();
         let step =
@@ -154,7 +154,7 @@ mod tests {
         }
     }
 
-    /// Triangles that leave the quantised boxes above them; 0 where a hierarchy holds its mesh.
+    /// The number of triangles that are not inside the quantised boxes above them; 0 for a correct hierarchy.
     fn outside(nodes: &[Node], root: u32, geometry: Geometry<'_>) -> usize {
         let node = &nodes[root as usize];
         let held = |c: usize, p: [f32; 3]| {

@@ -1,7 +1,7 @@
-//! Spatial splits: a binary tree in whose leaves lie parts of triangles (Stich, Friedrich, Dietrich
+//! Spatial splits: builds a binary tree whose leaves hold parts of triangles (Stich, Friedrich, Dietrich
 //! 2009, "Spatial splits in bounding volume hierarchies").
 //!
-//! Where the boxes of two children would overlap, a plane is tried that cuts the triangles across it;
+//! If the boxes of two children would overlap, a plane is tried that cuts the triangles across it;
 //! both sides then hold the triangle, each with the box around its part. A ray that meets the triangle
 //! at a part's place finds it there. Leaves that hold parts cannot be refitted: a moved triangle's part
 //! is not known.
@@ -18,25 +18,25 @@ use obvhs::{
 
 use bins::{BINS, Bins, Division, NOTHING, cheapest};
 
-/// Children whose common box has less than this share of the root's surface are not cut (alpha of the
-/// paper).
+/// Nodes are not cut where the common box of their children has less than this share of the root's surface
+/// (alpha of the paper).
 const LEAST_OVERLAP: f32 = 1e-5;
-/// Parts beyond one per triangle, over the number of triangles (choice).
-const MOST_MORE: f64 = 0.5;
-/// Below this depth nodes are halved by number, so that no geometry makes a deep tree.
-const DEEPEST: usize = 40;
-/// Nodes of more parts are built by several threads.
-const WORTH_A_THREAD: usize = 4096;
+/// Most parts beyond one per triangle, relative to the number of triangles (choice).
+const MOST_DUPLICATES: f64 = 0.5;
+/// Depth below which nodes are halved by number, so that no geometry makes a deep tree.
+const MOST_LEVELS: usize = 40;
+/// Nodes with more parts than this are built by several threads.
+const PARALLEL_PARTS: usize = 4096;
 
-/// A triangle, or what of it lies in a box.
+/// A triangle, or the part of it that lies in a box.
 #[derive(Clone, Copy, Debug)]
-struct Part {
+struct TrianglePart {
     bounds: Aabb,
     triangle: u32,
 }
 
 enum Tree {
-    Leaf(Part),
+    Leaf(TrianglePart),
     Node(Aabb, Box<[Tree; 2]>),
 }
 
@@ -49,27 +49,27 @@ impl Tree {
     }
 }
 
-/// A tree over the parts of `triangles`, one part to a leaf; `primitive_indices` says whose each is.
+/// A tree over the parts of `triangles`, one part per leaf; `primitive_indices` has the triangle of each part.
 pub(super) fn tree(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Bvh2 {
     if triangles.is_empty() {
         return Bvh2::default();
     }
-    let whole = |(t, corners): (usize, &[u32; 3])| Part {
+    let whole = |(t, corners): (usize, &[u32; 3])| TrianglePart {
         bounds: Aabb::from_points(&corners.map(|v| Vec3A::from(positions[v as usize]))),
         triangle: t as u32,
     };
-    let parts: Vec<Part> = triangles.iter().enumerate().map(whole).collect();
+    let parts: Vec<TrianglePart> = triangles.iter().enumerate().map(whole).collect();
     let builder =
         Builder { positions, triangles, least_overlap: LEAST_OVERLAP * around(&parts).half_area() };
-    let spare = (MOST_MORE * parts.len() as f64) as usize;
+    let spare = (MOST_DUPLICATES * parts.len() as f64) as usize;
     flat(builder.build(parts, spare, 0))
 }
 
-fn around(parts: &[Part]) -> Aabb {
+fn around(parts: &[TrianglePart]) -> Aabb {
     (parts.iter()).fold(Aabb::INVALID, |all, part| all.union(&part.bounds))
 }
 
-/// The tree's nodes level by level, as reinsertion expects them.
+/// The nodes of the tree level by level, as reinsertion expects them.
 fn flat(tree: Tree) -> Bvh2 {
     let mut nodes = vec![Bvh2Node::default()];
     let mut primitive_indices = Vec::new();
@@ -101,26 +101,27 @@ fn flat(tree: Tree) -> Bvh2 {
 struct Builder<'a> {
     positions: &'a [[f32; 3]],
     triangles: &'a [[u32; 3]],
-    /// Half a surface, mm^2.
+    /// Half a surface area, mm^2.
     least_overlap: f32,
 }
 
 impl Builder<'_> {
-    /// The tree over `parts`, of which there is one at least, with up to `spare` more.
-    fn build(&self, parts: Vec<Part>, spare: usize, depth: usize) -> Tree {
+    /// Builds the tree over `parts`, of which there is at least one; cuts may add up to `spare` more.
+    fn build(&self, parts: Vec<TrianglePart>, spare: usize, depth: usize) -> Tree {
         if let [part] = parts[..] {
             return Tree::Leaf(part);
         }
         let (bounds, count) = (around(&parts), parts.len());
         let [left, right] = self.divide(parts, &bounds, spare, depth);
-        // What is spare goes with the parts, whoever builds first. Measured: by surface, the heart's rays
-        // would visit 3 % more nodes, since large nodes spend it on cuts that bring little.
+        // `spare` is divided by the number of parts. Measured: divided by surface, rays in the heart
+        // visit 3 % more nodes, as large nodes use it for cuts of little benefit.
         let all = left.len() + right.len();
         let spare = spare - (all - count);
-        let share = |parts: &Vec<Part>| (spare as u64 * parts.len() as u64 / all as u64) as usize;
+        let share =
+            |parts: &Vec<TrianglePart>| (spare as u64 * parts.len() as u64 / all as u64) as usize;
         let shares = [share(&left), share(&right)];
         let build = |parts, spare| self.build(parts, spare, depth + 1);
-        let children = match count > WORTH_A_THREAD {
+        let children = match count > PARALLEL_PARTS {
             true => {
                 let (left, right) =
                     rayon::join(|| build(left, shares[0]), || build(right, shares[1]));
@@ -131,16 +132,16 @@ impl Builder<'_> {
         Tree::Node(bounds, Box::new(children))
     }
 
-    /// Both children's parts, none of them empty.
+    /// Divides the parts between two children, neither of them empty.
     fn divide(
         &self,
-        mut parts: Vec<Part>,
+        mut parts: Vec<TrianglePart>,
         bounds: &Aabb,
         spare: usize,
         depth: usize,
-    ) -> [Vec<Part>; 2] {
+    ) -> [Vec<TrianglePart>; 2] {
         let count = parts.len();
-        if depth < DEEPEST {
+        if depth < MOST_LEVELS {
             let centres = centres(&parts);
             let whole = by_objects(&parts, &centres);
             let overlap = whole.map_or(*bounds, |whole| {
@@ -169,8 +170,8 @@ impl Builder<'_> {
         [parts, right]
     }
 
-    /// The best plane that cuts what lies across it.
-    fn by_space(&self, parts: &[Part], bounds: &Aabb, spare: usize) -> Option<Division> {
+    /// The best plane that cuts the parts lying across it.
+    fn by_space(&self, parts: &[TrianglePart], bounds: &Aabb, spare: usize) -> Option<Division> {
         let along = |axis| {
             let bins = Bins::new(bounds, axis, parts.len());
             let mut entering = [NOTHING; BINS];
@@ -193,8 +194,8 @@ impl Builder<'_> {
         cheapest((0..3).filter_map(along))
     }
 
-    /// Both sides of a plane. What lies across it is cut, unless one side grows by less with all of it.
-    fn cut(&self, parts: &[Part], bounds: &Aabb, at: Division) -> [Vec<Part>; 2] {
+    /// The parts on both sides of a plane. Parts across it are cut, unless one side grows less by taking them whole.
+    fn cut(&self, parts: &[TrianglePart], bounds: &Aabb, at: Division) -> [Vec<TrianglePart>; 2] {
         let axis = at.axis;
         let plane = Bins::new(bounds, axis, parts.len()).plane(at.bin);
         let (mut left, mut right) = (Vec::new(), Vec::new());
@@ -203,19 +204,19 @@ impl Builder<'_> {
             let [in_left, in_right] = self.clip(&part, axis, plane);
             if !in_right.valid() {
                 let bounds = if in_left.valid() { in_left } else { part.bounds };
-                left.push(Part { bounds, ..part });
+                left.push(TrianglePart { bounds, ..part });
                 continue;
             }
             if !in_left.valid() {
-                right.push(Part { bounds: in_right, ..part });
+                right.push(TrianglePart { bounds: in_right, ..part });
                 continue;
             }
             let cut = low.cost() + high.cost();
             let all_left = low.grown(&part.bounds).cost() + high.without_one().cost();
             let all_right = low.without_one().cost() + high.grown(&part.bounds).cost();
             if cut <= all_left && cut <= all_right {
-                left.push(Part { bounds: in_left, ..part });
-                right.push(Part { bounds: in_right, ..part });
+                left.push(TrianglePart { bounds: in_left, ..part });
+                right.push(TrianglePart { bounds: in_right, ..part });
             } else if all_left <= all_right {
                 (low, high) = (low.grown(&part.bounds), high.without_one());
                 left.push(part);
@@ -227,9 +228,9 @@ impl Builder<'_> {
         [left, right]
     }
 
-    /// Boxes around what of a part lies on each side of a plane; [`Aabb::INVALID`] where nothing does. What
-    /// touches the plane from one side lies on that side alone.
-    fn clip(&self, part: &Part, axis: usize, plane: f32) -> [Aabb; 2] {
+    /// Boxes around the portions of a part on both sides of a plane; [`Aabb::INVALID`] for an empty side. A part
+    /// that only touches the plane belongs to the side on which it lies.
+    fn clip(&self, part: &TrianglePart, axis: usize, plane: f32) -> [Aabb; 2] {
         let bounds = &part.bounds;
         if bounds.max[axis] <= plane {
             return [*bounds, Aabb::INVALID];
@@ -261,13 +262,13 @@ impl Builder<'_> {
     }
 }
 
-fn centres(parts: &[Part]) -> Aabb {
+fn centres(parts: &[TrianglePart]) -> Aabb {
     let centres = parts.iter().map(|part| part.bounds.center());
     centres.fold(Aabb::INVALID, |all, centre| all.union(&Aabb::from_point(centre)))
 }
 
-/// The best way to divide parts by the middles of their boxes; none where all lie at one place.
-fn by_objects(parts: &[Part], centres: &Aabb) -> Option<Division> {
+/// The best division of parts by the centres of their boxes; none where all centres are equal.
+fn by_objects(parts: &[TrianglePart], centres: &Aabb) -> Option<Division> {
     let along = |axis| {
         let bins = Bins::new(centres, axis, parts.len());
         let mut entering = [NOTHING; BINS];
@@ -282,7 +283,7 @@ fn by_objects(parts: &[Part], centres: &Aabb) -> Option<Division> {
     cheapest((0..3).filter_map(along))
 }
 
-/// A box that holds where an edge meets a plane across it, to the rounding of single precision.
+/// A box that contains the intersection of an edge with a plane, within the rounding of single precision.
 fn crossing(a: [f32; 3], b: [f32; 3], axis: usize, plane: f32) -> Aabb {
     let [a, b] = [a, b].map(|p| DVec3::from(p.map(f64::from)));
     let share = (f64::from(plane) - a[axis]) / (b[axis] - a[axis]);

@@ -1,4 +1,4 @@
-//! Trees and the top level over them, walked as the kernel does.
+//! Tests of trees and of the top level, traversed as the kernel does.
 
 use super::*;
 
@@ -23,8 +23,8 @@ fn sheet(n: u32) -> Mesh {
     }
 }
 
-/// Walks a tree as the kernel does; checks that each child's quantised box, widened by half of
-/// the kernel's margin, holds the triangles below it, and counts how often each is reached.
+/// Traverses a tree as the kernel does. Checks that the quantised box of each child, widened by half of
+/// the kernel's margin, contains the triangles below it, and counts how often each triangle is reached.
 fn walk(nodes: &[Node], node: u32, mesh: &Mesh, order: &[u32], seen: &mut [u32]) -> Aabb {
     let node: CwBvhNode = bytemuck::cast(nodes[node as usize]);
     let mut all = Aabb::INVALID;
@@ -89,7 +89,7 @@ fn places(trees: &[(usize, f64)], of: &[MeshBvh]) -> Vec<Placed> {
     placed.collect()
 }
 
-/// Where a point of the middle of each place is found, by a walk over the top level.
+/// The places whose boxes contain a point, found by a walk over the top level.
 fn reached(scene: &SceneBvh, p: Vec3A) -> Vec<u32> {
     let mut todo = vec![scene.nodes[0][0]];
     let mut found = Vec::new();

@@ -20,11 +20,11 @@ fn largest_gaussian() -> f64 {
 const LARGEST_TEXTURE: f64 = 1.5 / 0.413_29;
 
 impl Calibration<'_> {
-    /// Largest amplitude and power over all tissues at depth `z`. What is drowned sounds by louder
-    /// scatterers, as much as its weight is less.
+    /// Largest amplitude and power over all tissues at depth `z`. Tissue masked by a louder one has fewer
+    /// scatterers, each louder in proportion.
     fn loudest(&self, z: f64) -> (f64, f64) {
         let voxel = self.scene.simulation.scatter_mode == ScatterMode::Voxel;
-        // Of the next level where it takes over.
+        // The level is that of the next lattice at the end of the cross-fade.
         let step = 1.0 / f64::from(LEVELS_PER_OCTAVE);
         let thinned = self.lattice_level(z).max(0.0) + step;
         let over = |(a, p): (f64, f64), tissue: &Tissue| {
@@ -99,8 +99,7 @@ impl Calibration<'_> {
     /// Bound on one component of the surface echoes' sum in one sample at depth `z`, compensated.
     /// N paths of share 1/N add gamma A at most coherently and sqrt(1 - gamma^2) sqrt(N) A when
     /// all incoherent phases agree, times their gain G, A <= gain; sum <= sqrt(1 + N G^2) (Cauchy
-    /// and Schwarz). The
-    /// layers' weights sum to 1. Two such interfaces may share a sample.
+    /// and Schwarz). The layers' weights sum to 1. Two such interfaces may share a sample.
     pub fn surface_bound(&self, z: f64) -> f64 {
         let loudest = self
             .scene

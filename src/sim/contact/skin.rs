@@ -1,4 +1,4 @@
-//! The body's surface as it stands, found by lines.
+//! The skin: the surface of the body as it is now, found by intersecting lines.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,27 +15,27 @@ use crate::sim::bvh;
 /// an edge meets both its triangles.
 const SAME_CROSSING: f64 = 1e-6;
 /// Layers of a body that are no farther apart than this, mm, touch: meshes are rounded to hundredths.
-const JOINED: f64 = 0.1;
+const TOUCHING: f64 = 0.1;
 /// Boxes are widened by this much of the mesh's extent, so that single precision misses no triangle.
-const MARGIN: f32 = 1e-5;
+const BOX_MARGIN: f32 = 1e-5;
 
-/// Hierarchies over the triangles of meshes, made when a mesh is first skin.
+/// Hierarchies over the triangles of meshes, built when a mesh is first used as skin.
 #[derive(Default)]
 pub struct Skins {
-    trees: HashMap<usize, Arc<Tree>>,
+    trees: HashMap<usize, Arc<MeshTree>>,
 }
 
 impl Skins {
-    /// The skin of `scene` as it stands, with the shapes and places of now; without `contact`, or while
-    /// none of it is shown, there is none. Scenes of other meshes need skins of their own.
+    /// The skin of `scene` with the shapes and placements of now; empty without `contact` or while none of it
+    /// is shown. A scene with other meshes needs its own `Skins`.
     pub fn of(&mut self, scene: &Scene) -> Skin {
         let named = scene.contact.iter().flat_map(|c| &c.skin);
         let placed = named.map(|&i| &scene.instances[i]).filter(|i| i.shown);
-        let bodies = placed.map(|placed| Body {
+        let bodies = placed.map(|placed| PlacedSkin {
             tree: self
                 .trees
                 .entry(placed.mesh)
-                .or_insert_with(|| Arc::new(Tree::new(&scene.meshes[placed.mesh])))
+                .or_insert_with(|| Arc::new(MeshTree::new(&scene.meshes[placed.mesh])))
                 .clone(),
             object_from_world: placed.world_from_object.inverse(),
         });
@@ -43,46 +43,46 @@ impl Skins {
     }
 }
 
-/// The body's surface at one time.
+/// The surface of the body at one time.
 #[derive(Clone)]
 pub struct Skin {
-    bodies: Vec<Body>,
+    bodies: Vec<PlacedSkin>,
 }
 
 #[derive(Clone)]
-struct Body {
-    tree: Arc<Tree>,
+struct PlacedSkin {
+    tree: Arc<MeshTree>,
     object_from_world: DAffine3,
 }
 
 /// A line's crossing of a triangle.
 struct Crossing {
     t: f64,
-    /// The line goes in.
+    /// True if the line enters the mesh here.
     entry: bool,
-    /// Outward, of any length.
+    /// Outward normal, of any length.
     normal: DVec3,
 }
 
-/// A part of a line in the body.
-struct Stretch {
+/// A part of a line that lies in the body.
+struct Chord {
     begin: f64,
     end: f64,
-    /// Outward where it begins, of any length.
+    /// Outward normal at `begin`, of any length.
     normal: DVec3,
 }
 
 /// A mesh's triangles with boxes around them, object space.
-struct Tree {
+struct MeshTree {
     positions: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     boxes: Bvh2,
 }
 
-impl Tree {
+impl MeshTree {
     fn new(mesh: &Mesh) -> Self {
         let [low, high] = mesh.bounds().map(Vec3A::from);
-        let margin = Vec3A::splat(MARGIN * (low.abs().max(high.abs())).max_element());
+        let margin = Vec3A::splat(BOX_MARGIN * (low.abs().max(high.abs())).max_element());
         let around = |t: &[u32; 3]| {
             let tight = Aabb::from_points(&t.map(|i| Vec3A::from(mesh.positions[i as usize])));
             Aabb::new(tight.min - margin, tight.max + margin)
@@ -96,13 +96,13 @@ impl Tree {
         }
     }
 
-    /// Where the line meets triangles, in order.
+    /// Crossings of the line with triangles, in order.
     fn crossings(&self, origin: DVec3, direction: DVec3) -> Vec<Crossing> {
         let mut found: Vec<Crossing> = Vec::new();
         let Some(root) = self.boxes.nodes.first() else {
             return found;
         };
-        // The hierarchy is walked forward only: from before everything that the line can meet.
+        // The hierarchy is traversed forward only, so the ray starts before everything that the line can meet.
         let (middle, radius) = (root.aabb().center(), root.aabb().diagonal().length());
         let length = direction.length();
         let back = (middle.as_dvec3() - origin).length() + f64::from(radius);
@@ -132,7 +132,7 @@ impl Tree {
 impl Skin {
     /// Stretches of the line `origin + t direction` (world, mm) that lie in the body, in order; layers
     /// that touch are one.
-    fn stretches(&self, origin: DVec3, direction: DVec3) -> Vec<Stretch> {
+    fn stretches(&self, origin: DVec3, direction: DVec3) -> Vec<Chord> {
         let mut crossings: Vec<Crossing> = Vec::new();
         for body in &self.bodies {
             let object = &body.object_from_world;
@@ -145,7 +145,7 @@ impl Skin {
             }));
         }
         crossings.sort_by(|a, b| a.t.total_cmp(&b.t));
-        let mut stretches: Vec<Stretch> = Vec::new();
+        let mut stretches: Vec<Chord> = Vec::new();
         let (mut depth, mut begin, mut normal) = (0i32, 0.0, DVec3::ZERO);
         for crossing in crossings {
             let before = depth;
@@ -154,25 +154,25 @@ impl Skin {
                 (begin, normal) = (crossing.t, crossing.normal);
             } else if before == 1 && depth == 0 {
                 let end = crossing.t;
-                match stretches.last_mut().filter(|s| begin - s.end < JOINED) {
+                match stretches.last_mut().filter(|s| begin - s.end < TOUCHING) {
                     Some(last) => last.end = end,
-                    None => stretches.push(Stretch { begin, end, normal }),
+                    None => stretches.push(Chord { begin, end, normal }),
                 }
             }
         }
         stretches
     }
 
-    /// Where a ray (world, mm; its direction a unit vector) comes to the skin from outside: the point,
-    /// and the outward normal of the triangle there.
+    /// The first point at which a ray (world, mm; `direction` a unit vector) enters the body from outside, and
+    /// the outward normal of the triangle there.
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(DVec3, DVec3)> {
         let stretches = self.stretches(origin, direction);
         let first = stretches.into_iter().find(|s| s.begin >= 0.0)?;
         Some((origin + first.begin * direction, first.normal.normalize()))
     }
 
-    /// How far the skin is ahead of a point (world, mm) along a unit `direction`, mm; below 0 where the
-    /// point lies in the body: then as far back it was entered. None: there is no body ahead.
+    /// Distance from a point (world, mm) along a unit `direction` to the skin, mm; negative for a point in the
+    /// body: the distance back to where the line entered it. None if there is no body ahead.
     pub fn gap(&self, point: DVec3, direction: DVec3) -> Option<f64> {
         let stretches = self.stretches(point, direction);
         let ahead = stretches.into_iter().find(|s| s.end >= 0.0);

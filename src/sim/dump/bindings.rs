@@ -1,4 +1,4 @@
-//! What the kernels of a frame had bound, by the names of their bindings.
+//! Writes what the kernels of a frame had bound, by the names of the bindings.
 
 use std::path::Path;
 
@@ -11,18 +11,19 @@ use crate::output::npy::{self, Element};
 use crate::scene::Scene;
 
 /// Writes `NAME.npy` for everything that a kernel reads, of the last frame: constants and geometry
-/// as uploaded, and what the kernels before it left. Accumulators and outputs are not here: a
-/// kernel that runs alone starts them anew. Of a frame whose paths are traced in several batches,
-/// the segments are the last batch's; `push` is the first's.
+/// as uploaded, and the output of earlier kernels. Accumulators and outputs are not written: a
+/// kernel that runs alone starts with new ones. If the paths were traced in several batches,
+/// the segments are those of the last batch; `push` is that of the first.
 ///
 /// Geometry is always laid out for the compute tracer, whichever traced the frame, with every
-/// triangle once: their order means nothing to the ray query, nor to a hit who else has its triangle.
+/// triangle once: the ray query does not depend on their order, and a hit does not depend on other
+/// instances with the same triangle.
 pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
     let still = scene.still();
     let arrays = Arrays::new(&still, Tracer::Bvh, Splits::Object, Fields::build(&still));
     let arrays = arrays.map_err(|e| SimError::World(e.into()))?;
     let nodes = &arrays.bvh.expect("made for the compute tracer").nodes;
-    // The tissue of a still scene rests: where it has gone, the device knows.
+    // A still scene has no displacements; the rows on the device have the fields of this frame.
     let mut instances = arrays.instances;
     for (row, real) in instances.iter_mut().zip(simulator.passes.world.rows()) {
         row.field = real.field;
@@ -66,7 +67,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     Ok(())
 }
 
-/// Zeroes the slots that no path has written: nobody clears them on the device.
+/// Sets to zero the slots that no path has written; the device does not clear them.
 fn clear_unused(segments: &mut [u8], counts: &[u32], capacity: usize) {
     let each = size_of::<layout::Segment>();
     for (line, &count) in segments.chunks_mut(capacity * each).zip(counts) {

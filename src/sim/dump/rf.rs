@@ -1,4 +1,4 @@
-//! Radio-frequency lines, of which a frame only has the baseband.
+//! Radio-frequency (RF) lines, computed from the baseband of a frame.
 
 use crate::probe::Probe;
 

@@ -1,4 +1,4 @@
-//! The stages of image formation, to look at.
+//! Writes the stages of image formation as arrays and images.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use crate::scene::Scene;
 
 /// One axis of a dumped array.
 struct Axis {
-    /// What it runs over.
+    /// Name of the quantity along the axis.
     name: &'static str,
     /// Unit of `start` and `step`.
     unit: &'static str,
@@ -19,7 +19,7 @@ struct Axis {
     start: f64,
     /// Distance between entries.
     step: f64,
-    /// Entries.
+    /// Number of entries.
     size: usize,
 }
 

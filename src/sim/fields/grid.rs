@@ -3,7 +3,7 @@
 use glam::{DVec3, UVec3};
 
 /// Nodes along the longest axis.
-const LONGEST: f64 = 24.0;
+const LONGEST_AXIS_NODES: f64 = 24.0;
 
 /// Smallest and largest coordinates of some points; the origin twice where there is none.
 fn ends(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
@@ -28,7 +28,7 @@ impl Grid {
     pub fn around(points: impl Iterator<Item = DVec3>) -> Self {
         let (low, high) = ends(points);
         let extent = high - low;
-        let spacing = (extent.max_element() / (LONGEST - 3.0)).max(1e-3);
+        let spacing = (extent.max_element() / (LONGEST_AXIS_NODES - 3.0)).max(1e-3);
         // Rounded up: the centre stays where it is.
         let cells = (extent / spacing - 1e-9).ceil().max(DVec3::ONE) + 2.0;
         Self { origin: (low + high - cells * spacing) / 2.0, spacing, size: cells.as_uvec3() + 1 }
@@ -41,7 +41,7 @@ impl Grid {
         Self { origin: (low + high - edge) / 2.0, spacing: edge, size: UVec3::splat(2) }
     }
 
-    /// The grid that [`Self::header`] told of, as far as single precision keeps it.
+    /// The grid that [`Self::header`] describes, in single precision.
     pub fn from_header(vectors: &[[f32; 3]]) -> Self {
         let [origin, scale, size] = std::array::from_fn(|i| DVec3::from(vectors[i].map(f64::from)));
         Self { origin, spacing: scale.x.recip(), size: size.as_uvec3() }
@@ -86,7 +86,7 @@ impl Grid {
         Some((cell.as_uvec3(), weights))
     }
 
-    /// What the kernels read before the displacements.
+    /// The header that kernels read before the displacements.
     pub fn header(&self) -> [[f32; 3]; 3] {
         let scale = DVec3::splat(self.spacing.recip());
         [self.origin, scale, self.size.as_dvec3()].map(|v| v.as_vec3().to_array())

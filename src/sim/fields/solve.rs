@@ -9,14 +9,14 @@ use crate::scene::Mesh;
 const SAMPLE_PITCH: f64 = 0.5;
 /// Most parts of a triangle's edge: triangles much larger than the grid are cut coarser.
 const MOST_PARTS: f64 = 128.0;
-/// Weight of the membrane, in units of the spacing: surfaces give way by about this part of the
+/// Weight of the membrane, in units of the spacing: surfaces are missed by about this fraction of the
 /// spacing times the change of strain across them.
 const STIFFNESS: f64 = 0.01;
 /// Residual, relative to the first, at which the displacements are good enough: they are those of the
 /// remainder that is not affine, a few mm, and the carrier's phase asks for 1e-3 mm.
 const RESIDUAL: f64 = 1e-4;
 /// Steps after which the iteration ends in any case; it needs about a hundred.
-const STEPS: usize = 400;
+const MOST_STEPS: usize = 400;
 
 /// A surface that moves with the tissue.
 pub(super) struct Patch<'a> {
@@ -26,7 +26,7 @@ pub(super) struct Patch<'a> {
 }
 
 /// One place of a surface.
-struct Sample {
+struct SurfaceSample {
     cell: UVec3,
     weights: [f64; 8],
     place: DVec3,
@@ -42,8 +42,8 @@ struct Sample {
 pub(super) struct Solver<'a> {
     grid: &'a Grid,
     patches: &'a [Patch<'a>],
-    samples: Vec<Sample>,
-    /// Per node, weights of the 27 nodes around it, those outside the grid 0.
+    samples: Vec<SurfaceSample>,
+    /// Weights of the 27 nodes around each node; 0 for those outside the grid.
     stencil: Vec<[f64; 27]>,
     centre: DVec3,
     /// Inverse of the samples' second moments about `centre`.
@@ -52,7 +52,7 @@ pub(super) struct Solver<'a> {
 
 impl<'a> Solver<'a> {
     pub(super) fn new(grid: &'a Grid, patches: &'a [Patch<'a>]) -> Self {
-        let samples: Vec<Sample> =
+        let samples: Vec<SurfaceSample> =
             (patches.iter().enumerate()).flat_map(|(i, patch)| patch.samples(grid, i)).collect();
         let area: f64 = samples.iter().map(|s| s.area).sum();
         let sum: DVec3 = samples.iter().map(|s| s.area * s.place).sum();
@@ -62,7 +62,7 @@ impl<'a> Solver<'a> {
         for s in &samples {
             moments += s.area * outer(s.place - centre, s.place - centre);
         }
-        // A flat patch says nothing of what lies across it.
+        // A flat patch has no second moment across it; without this term the matrix would be singular.
         let trace = moments.x_axis.x + moments.y_axis.y + moments.z_axis.z;
         moments += DMat3::from_diagonal(DVec3::splat(1e-9 * trace + f64::MIN_POSITIVE));
         let mut solver = Self {
@@ -161,7 +161,7 @@ impl<'a> Solver<'a> {
         let mut norm = inner(&residual, &direction);
         let enough = norm * RESIDUAL * RESIDUAL;
         let mut image = vec![DVec3::ZERO; u.len()];
-        for _ in 0..STEPS {
+        for _ in 0..MOST_STEPS {
             if norm.cmple(enough).all() {
                 break;
             }
@@ -204,13 +204,13 @@ impl Patch<'_> {
         self.texture_from_object.transform_point3(DVec3::from(p.map(f64::from)))
     }
 
-    fn displacement(&self, sample: &Sample, keyframe: usize) -> DVec3 {
+    fn displacement(&self, sample: &SurfaceSample, keyframe: usize) -> DVec3 {
         let moved = sample.corners.map(|v| self.point(keyframe, v) - self.point(0, v));
         sample.shares.x * moved[0] + sample.shares.y * moved[1] + sample.shares.z * moved[2]
     }
 
     /// Middles of equal parts of every triangle of keyframe 0, where they lie on the grid.
-    fn samples(&self, grid: &Grid, patch: usize) -> Vec<Sample> {
+    fn samples(&self, grid: &Grid, patch: usize) -> Vec<SurfaceSample> {
         let mut samples = Vec::new();
         let end = grid.place(grid.size - 1);
         for &corners in &self.meshes[0].triangles {
@@ -224,14 +224,22 @@ impl Patch<'_> {
             let area = (b - a).cross(c - a).length() / 2.0 / (parts * parts);
             let count = parts as u32;
             for (i, j) in (0..count).flat_map(|i| (0..count - i).map(move |j| (i, j))) {
-                // The part that points as the triangle does, and the one beside it that does not.
+                // Centres of the part with the triangle's orientation and of the reversed part beside it.
                 for third in 1..=(if i + j + 1 < count { 2 } else { 1 }) {
                     let inside = f64::from(third) / 3.0;
                     let (u, v) = ((f64::from(i) + inside) / parts, (f64::from(j) + inside) / parts);
                     let shares = DVec3::new(1.0 - u - v, u, v);
                     let place = shares.x * a + shares.y * b + shares.z * c;
                     if let Some((cell, weights)) = grid.weights(place) {
-                        samples.push(Sample { cell, weights, place, area, patch, corners, shares });
+                        samples.push(SurfaceSample {
+                            cell,
+                            weights,
+                            place,
+                            area,
+                            patch,
+                            corners,
+                            shares,
+                        });
                     }
                 }
             }

@@ -9,7 +9,7 @@ fn scene() -> Scene {
     Scene::homogeneous(liver, Probe::paper_table1())
 }
 
-/// Adds `mesh` and, as its second keyframe, the same moved by `displaced` in object space.
+/// Adds `mesh` and, as its second keyframe, the same mesh moved by `displaced` in object space.
 fn add(scene: &mut Scene, mesh: Mesh, at: DAffine3, displaced: impl Fn(DVec3) -> DVec3) {
     let mut moved = mesh.clone();
     for p in &mut moved.positions {
@@ -85,7 +85,7 @@ fn shell_errors(grouped: bool) -> [f64; 2] {
     let shrink = |p: DVec3| -0.2 * p;
     add(&mut scene, shapes::sphere(10.0, 3), DAffine3::IDENTITY, shrink);
     add(&mut scene, shapes::sphere(18.0, 4), DAffine3::IDENTITY, |_| DVec3::ZERO);
-    // The outer one moves, lest it need no field; so little that nothing is seen of it.
+    // The outer sphere moves by a negligible amount: if it did not move, it would have no field.
     scene.meshes[3].positions[0][0] += 1e-6;
     if !grouped {
         scene.instances[0].keyframes.group = None;

@@ -1,4 +1,4 @@
-//! What the last fused frame consisted of, to look at and to run its kernels alone.
+//! The intermediate images of the last fused frame, to look at and to run its kernels alone.
 
 use super::super::{SimError, Simulator};
 use crate::scene::Scene;
@@ -6,7 +6,7 @@ use crate::scene::Scene;
 use crate::settings::Blend;
 
 /// The steps of the last fused frame, row by row where they are images.
-pub struct Steps {
+pub struct FusionSteps {
     /// Mask (1 outside) and grey level 0..1 of the volume: pairs, [L][K].
     pub prescan: Vec<f32>,
     /// Grey level 0..1 of the volume per pixel; 0 outside the sector.
@@ -21,8 +21,8 @@ pub struct Steps {
 }
 
 impl Simulator {
-    /// What the fusion has bound beside the frame's buffers, if the last frame, of `scene`, showed an
-    /// acquired volume: names with floats.
+    /// The bindings of the fusion's kernels that are not buffers of the frame, as name and floats; empty unless the
+    /// last frame, of `scene`, showed an acquired volume.
     pub(in crate::sim) fn fusion_dump(
         &mut self,
         scene: &Scene,
@@ -43,8 +43,8 @@ impl Simulator {
     /// The steps of the last frame, if it showed an acquired volume.
     ///
     /// # Errors
-    /// What Vulkan says.
-    pub fn fusion_steps(&mut self) -> Result<Option<Steps>, SimError> {
+    /// A Vulkan error.
+    pub fn fusion_steps(&mut self) -> Result<Option<FusionSteps>, SimError> {
         if !self.fused {
             return Ok(None);
         }
@@ -54,7 +54,7 @@ impl Simulator {
         let (masks, _) = mask.as_chunks::<2>();
         let (sums, _) = sums.as_chunks::<2>();
         let mean = |s: &[f32; 2]| if s[1] > 0.0 { s[0] / s[1] } else { 0.0 };
-        Ok(Some(Steps {
+        Ok(Some(FusionSteps {
             prescan: self.floats("prescan")?,
             background: self.floats("background")?,
             mask: masks.iter().map(|m| m[0]).collect(),

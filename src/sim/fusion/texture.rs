@@ -9,9 +9,9 @@ use crate::scene::Acquired;
 use crate::scene::fusion::TEXTURE_BUDGET as BUDGET;
 use crate::volume::Voxels;
 
-/// The textures, and what their texels mean, which is the same at all times.
-pub(in crate::sim) struct Texture {
-    /// All on the device: which of them is shown costs nothing.
+/// The textures and the meaning of their texels, which is the same at all times.
+pub(in crate::sim) struct VolumeTexture {
+    /// One texture per time, all on the device, so that changing the time costs nothing.
     pub(in crate::sim) images: Vec<Image>,
     /// Texel indices from voxel indices.
     pub(in crate::sim) texel_from_voxel: DAffine3,
@@ -19,7 +19,7 @@ pub(in crate::sim) struct Texture {
     pub(in crate::sim) scale: f64,
     /// See `scale`.
     pub(in crate::sim) offset: f64,
-    /// What was lost on the way, for the user.
+    /// A warning for the user, if detail was lost on the way.
     pub(in crate::sim) warning: Option<String>,
 }
 
@@ -31,12 +31,12 @@ struct Texels {
     offset: f64,
 }
 
-impl Texture {
-    /// Uploads the voxels of all times. What is beyond the device's limit or [`BUDGET`] is averaged over
-    /// blocks of whole voxels first, alike at all times.
+impl VolumeTexture {
+    /// Uploads the voxels of all times. Volumes beyond the device's limit or [`BUDGET`] are first averaged
+    /// over blocks of whole voxels, in the same way at all times.
     ///
     /// # Errors
-    /// What the device says.
+    /// A device error.
     pub(in crate::sim) fn new(device: &Arc<Device>, acquired: &Acquired) -> Result<Self, GpuError> {
         let limit = device.limits().max_image_3d as usize;
         let block = block(acquired, limit, BUDGET);
@@ -47,7 +47,7 @@ impl Texture {
             let averaged = (!whole).then(|| average(voxels, acquired.size, block, size));
             let voxels = averaged.as_ref().unwrap_or(voxels);
             let (image, texels) = match make(device, size, texels(voxels, acquired)) {
-                // 16-bit images are not everywhere.
+                // Not every device supports 16-bit images.
                 Err(GpuError::Unsupported { .. }) => make(device, size, floats(voxels, acquired))?,
                 made => made?,
             };
@@ -76,13 +76,13 @@ impl Texture {
     }
 }
 
-impl Texture {
+impl VolumeTexture {
     /// Texels along each axis.
     pub(in crate::sim) fn extent(&self) -> [u32; 3] {
         self.images[0].extent()
     }
 
-    /// Bytes of all of them.
+    /// Bytes of all textures.
     pub(in crate::sim) fn bytes(&self) -> u64 {
         self.images.iter().map(Image::bytes).sum()
     }
@@ -127,8 +127,9 @@ fn texel_bytes(voxels: &Voxels) -> u64 {
     }
 }
 
-/// Voxels along each axis that one texel stands for, so that each texture keeps to `limit` texels
-/// along an axis and all to `budget` bytes; where they must be coarser, along the axis of most texels.
+/// The block of voxels along each axis that one texel stands for, such that each texture has at most `limit`
+/// texels along an axis and all have at most `budget` bytes. Where blocks must grow, they grow along the axis
+/// with the most texels.
 fn block(acquired: &Acquired, limit: usize, budget: u64) -> [usize; 3] {
     let mut block = acquired.size.map(|n| n.div_ceil(limit));
     loop {
@@ -167,7 +168,7 @@ fn average(voxels: &Voxels, whole: [usize; 3], block: [usize; 3], size: [usize; 
             }
         }
     }
-    // In the type that they came in: the texture's size was reckoned with it.
+    // The type of the voxels is kept, because the texture's size was computed with it.
     match voxels {
         Voxels::U8(_) => Voxels::U8(means.iter().map(|v| v.round() as u8).collect()),
         Voxels::I8(_) => Voxels::I8(means.iter().map(|v| v.round() as i8).collect()),
@@ -196,7 +197,7 @@ fn texels(voxels: &Voxels, acquired: &Acquired) -> Texels {
     Texels { format, bytes, scale, offset: lowest }
 }
 
-/// The voxels as floats; what is no finite number is black.
+/// The voxels as floats; NaN and infinities become black.
 fn floats(voxels: &Voxels, acquired: &Acquired) -> Texels {
     let values = (0..voxels.len()).map(|i| match voxels.get(i) {
         v if v.is_finite() => v as f32,

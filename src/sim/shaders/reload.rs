@@ -1,4 +1,4 @@
-//! Kernels that are recompiled while the program runs; the last good ones stay (feature `compile`).
+//! Kernels that are recompiled while the program runs; on an error the last good ones stay (feature `compile`).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -9,10 +9,10 @@ use super::Library;
 use super::authors::source::{self, file_error};
 use super::authors::{Error, compiler};
 
-/// A folder of sources and what has been seen of it.
-pub(super) struct Watched {
+/// A folder of sources and its last known state.
+pub(super) struct WatchedSources {
     dir: PathBuf,
-    /// Modification time of every file at the last look; `None` before the first.
+    /// Modification time of every file at the last check; `None` before the first.
     seen: Option<BTreeMap<PathBuf, SystemTime>>,
     /// Hash of the sources of the words in use, per stem.
     loaded: BTreeMap<String, String>,
@@ -20,18 +20,19 @@ pub(super) struct Watched {
 
 impl Library {
     /// The kernels of `dir`, compiled now and again whenever [`Library::poll`] finds them changed.
-    /// Kernels that `dir` lacks stay the embedded ones.
+    /// Kernels that are missing in `dir` stay the embedded ones.
     pub fn with_sources(dir: impl Into<PathBuf>) -> Result<Self, Error> {
         let mut library = Self::embedded();
-        library.watched = Some(Watched { dir: dir.into(), seen: None, loaded: BTreeMap::new() });
+        library.watched =
+            Some(WatchedSources { dir: dir.into(), seen: None, loaded: BTreeMap::new() });
         library.poll()?;
         Ok(library)
     }
 
-    /// Looks whether sources have changed (by modification time) and recompiles what depends on
-    /// them. Returns the stems whose words are new; pipelines made of them are to be made again.
+    /// Checks whether sources have changed (by modification time) and recompiles the kernels that depend on
+    /// them. Returns the stems whose words are new; their pipelines must be built again.
     /// On an error every kernel keeps its last good words, and the error is returned once, not on
-    /// every call. Without sources: nothing changes.
+    /// every call. Without sources nothing changes.
     pub fn poll(&mut self) -> Result<Vec<String>, Error> {
         let Some(watched) = &mut self.watched else {
             return Ok(Vec::new());

@@ -1,4 +1,4 @@
-//! `blur`: mask and weight summed over a box, down the columns, each time exchanged with the rows.
+//! `blur`: sums of mask and weight over a box, down the columns; each pass exchanges rows and columns.
 
 use super::super::layout::BLUR_SUMS;
 use super::super::pass::{Array, Extent, Pass, Sizes};
@@ -7,21 +7,21 @@ use crate::gpu::{Commands, GpuError};
 use crate::output::npy::Element::Float;
 use crate::scene::Scene;
 
-/// The stage, once for each direction.
+/// The stage; it runs once for each direction.
 pub const BLUR: Pass = Pass {
     name: "blur",
     binds: &["frame", "fusion", "mask", "sums"],
     makes: &[
         Array::new("sums", Float, 2, Sizes::pixels),
-        // Those of the columns alone, column by column.
+        // Sums of the columns alone, stored column by column.
         Array::new("down", Float, 2, Sizes::pixels),
     ],
-    // `fuse` binds the sums, also where it does not read them.
+    // `fuse` binds the sums even if it does not read them.
     needed: Scene::shows_volume,
     ..Pass::USUAL
 };
 
-/// Threads for an image, `turned` where columns are read as rows.
+/// The threads for an image; `turned` if rows and columns are exchanged.
 pub fn extent([width, height]: [u32; 2], turned: bool) -> Extent {
     let [width, height] = if turned { [height, width] } else { [width, height] };
     Extent::Threads([width, height.div_ceil(BLUR_SUMS), 1])

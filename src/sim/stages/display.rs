@@ -10,7 +10,7 @@ pub const DISPLAY: Pass = Pass {
     binds: &["frame", "log_image", "grey", "pixels"],
     makes: &[Array::new("pixels", Word, 1, Sizes::pixels)],
     extent: Some(per_pixel),
-    // The finished image is copied.
+    // The finished image is copied next.
     then: Stage::Transfer,
     ..Pass::USUAL
 };

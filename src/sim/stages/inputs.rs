@@ -1,4 +1,4 @@
-//! What the processor gives the kernels of a frame.
+//! The arrays that the processor gives to the kernels of a frame.
 
 use super::super::layout::{
     Counters, Frame, Instance, POINT_GROUP, Row, Scanline, Surface, Tissue,
@@ -6,8 +6,8 @@ use super::super::layout::{
 use super::super::pass::Array;
 use crate::output::npy::Element::{Float, Word};
 
-/// The frame's constants, the scene's tables, what the probe touches; and the counters, which every
-/// kernel may add to.
+/// The frame's constants, the scene's tables, the contact of the probe; and the counters, to which every
+/// kernel may add.
 pub static INPUTS: [Array; 9] = [
     Array::of::<Frame>("frame", Word, |_| 1),
     Array::of::<Scanline>("scanlines", Float, |s| u64::from(s.frame.scanlines) + 1),

@@ -1,4 +1,4 @@
-//! `label`, where labels are wanted: the anatomy along the scanlines, as it is.
+//! `label`: the anatomy along the scanlines, without refraction; runs only where labels are wanted.
 
 use super::super::layout::Frame;
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};

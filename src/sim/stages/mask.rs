@@ -1,4 +1,4 @@
-//! `mask`, of frames that show an acquired volume: masking meshes and volume along the scanlines.
+//! `mask`, in frames that show an acquired volume: masking meshes and volume along the scanlines.
 
 use super::super::layout::{Frame, Fusion};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};

@@ -1,4 +1,4 @@
-//! `origin`: what encloses the start of each line, and where its paths begin.
+//! `origin`: the media that enclose the start of each line, and the place where its paths begin.
 
 use super::super::layout::START_WORDS;
 use super::super::pass::{Array, Pass, Sizes, Variants, per_line};

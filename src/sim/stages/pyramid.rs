@@ -1,5 +1,5 @@
-//! `difference`, `reduce`, `collapse`: blending by bands, over a pyramid of what is simulated minus what
-//! was acquired.
+//! `difference`, `reduce`, `collapse`: blending by bands, over a pyramid of the simulated image minus the
+//! acquired one.
 
 use std::sync::Arc;
 
@@ -9,7 +9,7 @@ use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
 use crate::scene::Scene;
 use crate::settings::Blend;
 
-/// The finest level.
+/// The stage that computes the finest level.
 pub const DIFFERENCE: Pass = Pass {
     name: "difference",
     binds: &["frame", "pixels", "background", "mask", "level"],
@@ -18,11 +18,11 @@ pub const DIFFERENCE: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// A coarser level from the one below.
+/// The stage that computes a coarser level from the one below.
 pub const REDUCE: Pass =
     Pass { name: "reduce", binds: &["fine", "coarse"], needed: is_banded, ..Pass::USUAL };
 
-/// What a level and the coarser ones add.
+/// The stage that computes what a level and all coarser ones add.
 pub const COLLAPSE: Pass = Pass {
     name: "collapse",
     binds: &["fine", "coarse", "coarse_change", "change"],
@@ -30,22 +30,22 @@ pub const COLLAPSE: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// Whether frames of a scene are blended by bands.
+/// True if frames of a scene are blended by bands.
 pub(in crate::sim) fn is_banded(scene: &Scene) -> bool {
     scene.shows_volume() && scene.fusion.as_ref().is_some_and(|f| f.blend == Blend::Multiband)
 }
 
 /// A level of the pyramid.
-struct Level {
+struct PyramidLevel {
     /// Difference and weights per pixel, three floats.
     sums: Buffer,
-    /// What this level and the coarser ones add to the acquired image.
+    /// The sum that this level and the coarser ones add to the acquired image.
     change: Buffer,
 }
 
-/// The levels, the finest first, once they are wanted.
+/// The levels, finest first; empty until they are needed.
 #[derive(Default)]
-pub(in crate::sim) struct Pyramid(Vec<Level>);
+pub(in crate::sim) struct Pyramid(Vec<PyramidLevel>);
 
 impl Pyramid {
     /// Makes room for `levels` levels above the finest, of images of up to `pixels` pixels, whatever
@@ -62,19 +62,20 @@ impl Pyramid {
             let new = |name: &str, each: u64| {
                 device.buffer(name, (each * pixels).max(16), BufferKind::Storage)
             };
-            self.0.push(Level { sums: new("band sums", 12)?, change: new("band change", 4)? });
+            self.0
+                .push(PyramidLevel { sums: new("band sums", 12)?, change: new("band change", 4)? });
         }
         Ok(())
     }
 
-    /// What is added to each pixel of the acquired image.
+    /// The values added to the pixels of the acquired image.
     pub(in crate::sim) fn change(&self) -> &Buffer {
         &self.0[0].change
     }
 }
 
 impl Passes {
-    /// Fills [`Pyramid::change`], over `top` levels above the finest.
+    /// Computes [`Pyramid::change`] over `top` levels above the finest.
     pub(in crate::sim) fn bands(
         &self,
         cmd: &mut Commands<'_>,
@@ -97,7 +98,7 @@ impl Passes {
         cmd.scope(COLLAPSE.name);
         for level in (0..=top).rev() {
             let [width, height] = size_at(size, level);
-            // The coarsest level reads nothing above itself.
+            // The coarsest level does not read a coarser one; any buffer is bound in its place.
             let coarsest = level == top;
             let (here, above) = (&levels[level], &levels[(level + 1).min(top)]);
             let given = [

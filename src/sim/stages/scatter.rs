@@ -27,8 +27,8 @@ pub const SCATTER: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// Work groups per scanline, part of its segments, and window of its samples. Lists of many paths are
-/// shared among groups: each clears and flushes its own window.
+/// Work groups per scanline, part of its segments, and window of its samples. Long lists of segments are
+/// divided among groups; each group clears and writes its own window.
 fn extent(frame: &Frame) -> Extent {
     let paths = frame.segment_capacity / per_path(frame);
     let parts = paths.div_ceil(8).clamp(1, 16);

@@ -5,7 +5,7 @@ use super::super::pass::{Array, Extent, Pass, Sizes, Variants, per_line};
 use crate::output::npy::Element::Float;
 use crate::scene::Scene;
 
-/// What is transmitted along each line.
+/// The stage that computes the transmitted level along each line.
 pub const SHADOW: Pass = Pass {
     name: "shadow",
     variants: Variants::Tracer,
@@ -29,7 +29,7 @@ pub const SHADOW: Pass = Pass {
     ..Pass::USUAL
 };
 
-/// The prescan behind it.
+/// The stage that darkens the prescan behind the anatomy.
 pub const DARKEN: Pass = Pass {
     name: "darken",
     binds: &["frame", "pieces", "prescan", "shaded"],

@@ -1,4 +1,4 @@
-//! `tint`: which pixels are acquired and which are simulated, as the mixed image once more, coloured.
+//! `tint`: the mixed image with the acquired pixels coloured.
 
 use super::super::pass::{Array, Pass, Sizes, per_pixel};
 use super::super::passes::Passes;
@@ -13,17 +13,17 @@ pub const TINT: Pass = Pass {
     makes: &[Array::new("tinted", Word, 1, Sizes::pixels)],
     extent: Some(per_pixel),
     then: Stage::Transfer,
-    // By nothing in the scene: it is asked for.
+    // Nothing in a scene needs it; `Simulator::tint_on` asks for it.
     needed: |_| false,
     ..Pass::USUAL
 };
 
-/// How acquired pixels are coloured.
+/// The colour of acquired pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tint {
     /// Red, green and blue.
     pub colour: [u8; 3],
-    /// Of the colour over a pixel that is all acquired, 0..=1; mixed ones by their share.
+    /// Opacity of the colour over a pixel that is all acquired, 0..=1; mixed pixels get their share of it.
     pub opacity: f32,
 }
 
@@ -46,18 +46,18 @@ impl Passes {
 }
 
 impl Simulator {
-    /// Colours the acquired pixels of the next frames in an image of their size beside the one of
-    /// [`Self::show_on`], which does not change; stops that where there is none. Frames that show no
-    /// acquired volume leave it as it is.
+    /// Colours the acquired pixels of the next frames in an image of their size, beside the one of
+    /// [`Self::show_on`], which does not change; none stops it. Frames that show no acquired volume leave the
+    /// image unchanged.
     pub fn tint_on(&mut self, tinted: Option<(Image, Tint)>) {
         self.tinted_on = tinted;
     }
 
-    /// The last frame with its acquired pixels coloured, RGBA bytes row by row; none where it was not
-    /// asked for or showed no acquired volume.
+    /// The last frame with its acquired pixels coloured, RGBA bytes row by row; none if this was not
+    /// asked for or the frame showed no acquired volume.
     ///
     /// # Errors
-    /// What Vulkan says.
+    /// A Vulkan error.
     pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
         let asked = self.fused && self.tinted_on.is_some() && self.passes.buffers.has("tinted");
         asked.then(|| self.read("tinted")).transpose()

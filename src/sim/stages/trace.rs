@@ -44,7 +44,7 @@ const ANY: Pass = Pass {
         Array::new("surface_echoes", Integer, 2, Sizes::samples).zeroed(),
         Array::of::<Segment>("segments", Word, |s| s.lines() * u64::from(s.frame.segment_capacity)),
         Array::new("segment_count", Word, 1, Sizes::lines).zeroed(),
-        // Of main paths, and not needed any more when `beam` fills the other.
+        // Interactions of main paths. `beam` fills `lateral`, whose memory they use, when they are no longer needed.
         Array::of::<Interaction>("interactions", Word, |s| s.interactions).within("lateral"),
         Array::new("interaction_count", Word, 1, |s| s.main_paths),
     ],

@@ -1,7 +1,7 @@
-//! A trial of a device's ray query: it has to find what our own hierarchy finds, on a scene's own rays.
+//! A trial of a device's ray query: on a scene's own rays it must find what our own hierarchy finds.
 //!
-//! Drivers and hardware differ, and nothing later would notice: a surface that is found twice leaves the
-//! path in the wrong tissue to its end.
+//! Drivers and hardware differ, and nothing later would detect a mistake: a surface found twice puts the
+//! path into the wrong tissue up to its end.
 
 use std::sync::Arc;
 
@@ -17,38 +17,38 @@ use crate::sim::layout::{NONE, Ray, RayHit};
 use crate::sim::shaders::Library;
 use crate::sim::world::{Kernels, World};
 
-/// Rays followed at the same time, one per line where there are as many.
+/// Rays followed at the same time: one per line, if there are as many lines.
 const RAYS: u32 = 1344;
-/// Surfaces that each meets at most, one behind the other.
-const BOUNCES: usize = 8;
-/// Surfaces closer together than this, mm, may change places: both tracers round.
-const MARGIN: f32 = 1e-3;
-/// Of ten thousand rays so many may differ: one that grazes an edge may pass it on either side.
-const DIFFERENT: usize = 3;
-/// How far a new ray begins from the surface that it leaves, over the largest coordinate (glsl/path.glsl).
+/// Most surfaces that each ray meets, one behind the other.
+const SURFACES_PER_RAY: usize = 8;
+/// Distance below which two surfaces may be found in either order, mm, as both tracers round.
+const ORDER_MARGIN: f32 = 1e-3;
+/// Differing rays allowed in ten thousand: a ray that grazes an edge may pass it on either side.
+const MOST_DIFFERENT: usize = 3;
+/// Distance from a surface at which the next ray begins, relative to the largest coordinate (glsl/path.glsl).
 const CLEARANCE: f32 = 4e-6;
 
-/// Rays that were compared, and how many met another surface.
+/// The result of a trial.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Trial {
-    /// All of them.
+    /// Number of rays compared.
     pub rays: usize,
-    /// Those for which the tracers disagree.
+    /// Number of rays for which the tracers disagree.
     pub different: usize,
 }
 
 impl Trial {
-    /// Follows rays of the scene's probe from surface to surface with both tracers: straight on and
-    /// mirrored, from where a ray has met a surface, which is where tracers find it again.
+    /// Follows rays of the scene's probe from surface to surface with both tracers, in turn straight on and
+    /// mirrored. New rays begin at the surface found last, where a tracer may find the same surface again.
     ///
     /// # Errors
-    /// What the device refuses; a scene that the ray query does not serve.
+    /// A device error; a scene that the ray query cannot serve.
     pub fn run(device: &Arc<Device>, library: &Library, scene: &Scene) -> Result<Self, SimError> {
-        let own = Bench::new(device, library, scene, Tracer::Bvh)?;
-        let query = Bench::new(device, library, scene, Tracer::RayQuery)?;
+        let own = TrialWorld::new(device, library, scene, Tracer::Bvh)?;
+        let query = TrialWorld::new(device, library, scene, Tracer::RayQuery)?;
         let mut trial = Self::default();
         let mut rays = first_rays(scene);
-        for _ in 0..BOUNCES {
+        for _ in 0..SURFACES_PER_RAY {
             let (mine, theirs) = (own.trace(device, &rays)?, query.trace(device, &rays)?);
             let different = |(a, b): &(&RayHit, &RayHit)| !agree(a, b);
             trial.different += mine.iter().zip(&theirs).filter(different).count();
@@ -61,13 +61,13 @@ impl Trial {
         Ok(trial)
     }
 
-    /// Whether the ray query may be used.
+    /// True if the ray query may be used.
     pub fn passed(&self) -> bool {
-        10_000 * self.different <= DIFFERENT * self.rays
+        10_000 * self.different <= MOST_DIFFERENT * self.rays
     }
 }
 
-/// The same number for the same kernels and geometry: a trial of them needs no repetition.
+/// A number that is equal for equal kernels and geometry; their trial need not be repeated.
 pub(super) fn id(library: &Library, scene: &Scene) -> u64 {
     let crc = crc::Crc::<u64>::new(&crc::CRC_64_XZ);
     let mut digest = crc.digest();
@@ -82,13 +82,13 @@ pub(super) fn id(library: &Library, scene: &Scene) -> u64 {
     digest.finalize()
 }
 
-/// One tracer with the scene.
-struct Bench {
+/// The scene with one of the tracers.
+struct TrialWorld {
     kernel: Kernel,
     world: World,
 }
 
-impl Bench {
+impl TrialWorld {
     fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -98,7 +98,7 @@ impl Bench {
         let stem = format!("rays_{}", tracer.suffix());
         let kernel = Kernel::new(device, &stem, library.words(&stem), &[])?;
         let kernels = Arc::new(Kernels::new(device, library)?);
-        // Rays do not ask where tissue has gone.
+        // Rays do not use displacement fields.
         let fields = Fields::none(scene);
         let apart = vec![false; scene.instances.len()];
         let world =
@@ -124,19 +124,19 @@ impl Bench {
     }
 }
 
-/// Both met nothing, or the same surface at the same place, or two that lie there together.
+/// True if both met nothing, or the same surface at the same place, or two surfaces at that place.
 fn agree(a: &RayHit, b: &RayHit) -> bool {
     match (a.instance, b.instance) {
         (NONE, NONE) => true,
         (NONE, _) | (_, NONE) => false,
-        _ => (a.t - b.t).abs() <= MARGIN,
+        _ => (a.t - b.t).abs() <= ORDER_MARGIN,
     }
 }
 
 fn first_rays(scene: &Scene) -> Vec<Ray> {
     let (probe, place) = (&scene.probe, &scene.world_from_probe);
     let lines = probe.scanlines * probe.elevation_layers;
-    // Evenly from all of them where there are more.
+    // If there are more lines than rays, lines are taken at equal steps.
     let line = |i: u32| (u64::from(i) * u64::from(lines) / u64::from(lines.min(RAYS))) as u32;
     (0..lines.min(RAYS))
         .map(|i| {
@@ -164,7 +164,7 @@ fn ray(origin: [f32; 3], direction: DVec3, t_min: f32) -> Ray {
     }
 }
 
-/// From each surface straight on, or mirrored by it, in turn.
+/// The rays that continue from each surface: straight on and mirrored in turn.
 fn next_rays(rays: &[Ray], hits: &[RayHit]) -> Vec<Ray> {
     let hit = |(_, hit): &(&Ray, &RayHit)| hit.instance != NONE;
     (rays.iter().zip(hits).filter(hit).enumerate())

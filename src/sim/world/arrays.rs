@@ -15,26 +15,26 @@ use crate::sim::tracer::Tracer;
 /// A box in object space, mm: smallest and largest corner.
 pub(super) type Bounds = [[f32; 3]; 2];
 
-/// Where the geometry of a mesh, or of an instance that changes, lies in the arrays.
+/// The place in the arrays of the geometry of a mesh, or of an instance that changes its shape.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Place {
     pub(super) first_vertex: u32,
     pub(super) first_triangle: u32,
-    /// As many as the array has of it.
+    /// Number of triangles in the array.
     pub(super) triangles: u32,
-    /// Of the compute tracer's tree; NONE: it has none.
+    /// Root node of the compute tracer's tree; NONE: it has none.
     pub(super) root: u32,
     pub(super) bounds: Bounds,
-    /// Index in the mesh of each triangle, in the order of the array, several times of those that were
-    /// cut; none where it is the mesh's.
+    /// Index in the mesh of each triangle, in the order of the array; triangles that were cut occur several
+    /// times. None where the order is that of the mesh.
     pub(super) order: Option<Vec<u32>>,
     /// In the mesh's unit: over how much of it the first of its averaged normals is taken, which is
     /// [`FINEST`] where the mesh is placed first.
     pub(super) finest: f64,
     /// Of an instance that changes its shape: how often the device has made it.
     pub(super) version: u64,
-    /// Of what instances share: where in the triangles, in words, the list begins of whose each is;
-    /// 0: they are of one.
+    /// For a structure that instances share: the place in the triangles, in words, of the list that names the
+    /// instance of each triangle; 0: all triangles belong to one instance.
     pub(super) owners: u32,
 }
 
@@ -44,17 +44,17 @@ pub(super) type Averages = [u32; smoothed::LEVELS];
 /// What of a mesh has to stay on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Need {
-    /// Nothing: it is uploaded when it is shown.
+    /// Nothing: the mesh is uploaded when it is shown.
     Nothing,
     /// Vertices and normals.
     Vertices,
-    /// Triangles as well.
+    /// Vertices, normals and triangles.
     Geometry,
-    /// And a structure that rays walk.
+    /// Geometry and a structure that rays traverse.
     Structure,
 }
 
-/// What each mesh of a scene has to have on the device; the triangles of `sets` lie with these.
+/// The part of each mesh of a scene that must stay on the device; the triangles of `sets` lie with their sets.
 pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
     let mut needs = vec![Need::Nothing; scene.meshes.len()];
     for (i, instance) in scene.instances.iter().enumerate() {
@@ -113,30 +113,30 @@ pub struct Arrays {
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,
-    /// How tissue deforms.
+    /// Displacement fields of deforming tissue.
     pub fields: Fields,
     pub(super) places: Vec<Place>,
-    /// Per instance that changes its shape on the device: room for the largest of its keyframes.
+    /// For each instance that changes its shape on the device, room for the largest of its keyframes.
     pub(super) regions: Vec<Option<Place>>,
-    /// Which instances share a structure.
+    /// The instances that share a structure.
     pub(super) sets: Sets,
 }
 
-/// One structure of a set before it has its place.
+/// A structure of a set before its place in the arrays is known.
 struct Joint {
     /// Indices into the vertices, in the order of the array.
     triangles: Vec<[u32; 3]>,
-    /// Of each the instance, and its index in that one's mesh.
+    /// For each triangle the instance, and the index in that instance's mesh.
     from: Vec<(u16, u32)>,
     tree: Option<MeshBvh>,
 }
 
 impl Arrays {
-    /// What `tracer` needs of `scene`, whose tissue deforms by `fields`, with trees built by `splits`.
-    /// Instances that change their shape on the device have room, but nothing in it.
+    /// The arrays that `tracer` needs for `scene`, whose tissue deforms by `fields`, with trees built as `splits`
+    /// says. Instances that change their shape on the device have room, but nothing in it.
     ///
     /// # Errors
-    /// When the hierarchy is deeper than the compute tracer walks.
+    /// An error when the hierarchy is deeper than the compute tracer can walk.
     ///
     /// # Panics
     /// When a mesh has not one normal per vertex.
@@ -149,7 +149,7 @@ impl Arrays {
         Self::with_sets(scene, tracer, splits, fields, Sets::new(scene, &[]))
     }
 
-    /// As [`Self::new`], with the instances of `sets` sharing structures.
+    /// Like [`Self::new`]; the instances of `sets` share structures.
     fn with_sets(
         scene: &Scene,
         tracer: Tracer,
@@ -212,8 +212,8 @@ impl Arrays {
         Ok(arrays)
     }
 
-    /// As [`Self::new`] without those that are `apart` ([`Sets::new`]); no triangle is cut where a buffer
-    /// would have more than `most` bytes for it.
+    /// Like [`Self::new`], without sharing for the instances that are `apart` ([`Sets::new`]). No triangle is cut
+    /// if a buffer would then have more than `most` bytes.
     pub(super) fn within(
         most: u64,
         scene: &Scene,
@@ -230,14 +230,14 @@ impl Arrays {
         }
     }
 
-    /// Bytes of the largest of the buffers that cut triangles make larger.
+    /// Bytes of the largest buffer among those that cut triangles make larger.
     fn largest_buffer(&self) -> u64 {
         let nodes = self.bvh.as_ref().map_or(0, |bvh| size_of_val(&bvh.nodes[..]));
         nodes.max(size_of_val(&self.triangles[..])) as u64
     }
 
-    /// Appends the structures of the sets; whose their triangles are, one list after the other, each
-    /// of an even length.
+    /// Appends the structures of the sets. Returns the lists that name the instance of each of their triangles, one
+    /// after the other, each of an even length.
     fn join(&mut self, scene: &Scene, tracer: Tracer, splits: Splits) -> Vec<u16> {
         let shapes = |set: &Set| {
             let keyframes = scene.instances[set.members[0]].keyframes.meshes.len();
@@ -299,7 +299,7 @@ impl Arrays {
         Joint { triangles, from, tree }
     }
 
-    /// Appends the sets' lists behind all triangles.
+    /// Appends the lists of the sets behind all triangles.
     fn put_owners(&mut self, owners: &[u16]) {
         let first = 3 * self.triangles.len() as u32;
         for set in &mut self.sets.all {
@@ -368,7 +368,7 @@ impl Arrays {
     }
 }
 
-/// The mesh's triangles in `order`, with indices that count from `first_vertex`.
+/// The triangles of the mesh in `order`, with indices that start at `first_vertex`.
 pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> Vec<[u32; 3]> {
     let moved = |triangle: &[u32; 3]| triangle.map(|v| v + first_vertex);
     match order {
@@ -377,7 +377,7 @@ pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> 
     }
 }
 
-/// Entries as the compute tracer's top level takes them.
+/// Entries in the form that the compute tracer's top level needs.
 pub(super) fn placed(entries: &[entry::Entry]) -> Vec<Placed> {
     let place = |e: &entry::Entry| Placed {
         instance: e.instance,
@@ -394,7 +394,7 @@ mod tests {
 
     use super::*;
 
-    /// A device whose largest buffer has no room for cut triangles gets whole ones.
+    /// Triangles are not cut on a device whose largest buffer has no room for them.
     #[test]
     fn triangles_are_cut_where_they_fit() {
         let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/limbs.toml");

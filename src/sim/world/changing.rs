@@ -13,7 +13,7 @@ use crate::sim::bvh::MeshBvh;
 use crate::sim::fields::Fields;
 use crate::sim::tracer::Tracer;
 
-/// What is made of an instance: a mesh of the scene, or keyframes with their weights.
+/// The shape of an instance: a mesh of the scene, or keyframes with their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Shape {
     Mesh(usize),
@@ -36,7 +36,7 @@ struct Body {
     blas: Option<DynamicBlas>,
 }
 
-/// All of them.
+/// All instances that change their shape.
 pub(super) struct Changing {
     bodies: Vec<Option<Body>>,
     structures: Vec<Option<Blas>>,
@@ -71,12 +71,12 @@ impl Changing {
         Ok(Self { refit, bodies, structures, averages })
     }
 
-    /// Takes other kernels.
+    /// Replaces the kernels.
     pub(super) fn reload(&mut self, kernels: &Arc<Kernels>) {
         self.refit.kernels = Arc::clone(kernels);
     }
 
-    /// The ray query's structures, per instance.
+    /// The ray query's structures, one per instance.
     pub(super) fn structures(&self) -> &[Option<Blas>] {
         &self.structures
     }
@@ -87,8 +87,8 @@ impl Changing {
         bodies.map(DynamicBlas::bytes).sum::<u64>() + self.refit.bytes()
     }
 
-    /// Records how every shown instance of `scene` that is not what it was gets its shape; `regions`
-    /// then say what they hold. Returns whether anything was recorded.
+    /// Records the computation of the shape of every shown instance of `scene` that has changed; `regions`
+    /// then describe these shapes. Returns true if anything was recorded.
     #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
     pub(super) fn record(
         &mut self,
@@ -172,7 +172,8 @@ fn body(
     Ok(Body { made: None, blas: blas.transpose()? })
 }
 
-/// Box around the present shape. Weighted boxes hold the weighted vertices: interval arithmetic.
+/// Box around the present shape. A weighted sum of boxes contains the weighted sum of vertices (interval
+/// arithmetic).
 fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
     let Shape::Blend(blend) = Shape::of(instance) else {
         return places[instance.mesh].bounds;
@@ -244,7 +245,7 @@ pub(super) fn put_triangles(
     commands.write(&geometry.triangles, at, bytemuck::cast_slice(triangles))
 }
 
-/// Records a tree into the region's room among the nodes.
+/// Records the copy of a tree into the region's room among the nodes.
 pub(super) fn put_tree(
     commands: &mut Commands<'_>,
     tree: &MeshBvh,

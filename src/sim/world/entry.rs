@@ -1,4 +1,4 @@
-//! What the top level holds, and which of it an instance's row points at.
+//! Entries of the top level, and the entry to which an instance's row points.
 
 use glam::DAffine3;
 
@@ -9,35 +9,35 @@ use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
 use crate::sim::placement::{matrix_rows, rigid, stretch};
 
-/// Mask bit of everything that does not go by mask.
+/// Mask bit of every entry that is not selected by its mask.
 const ALWAYS: u8 = 1;
-/// Bits left for keyframes that do.
+/// Mask bits left for keyframes that are selected by their mask.
 const MASKS: usize = 7;
 
-/// What stands at a place of the top level.
+/// The geometry of an entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Geometry {
     /// A mesh of the scene.
     Mesh(usize),
-    /// What the device made last of an instance that changes its shape.
+    /// The latest shape that the device computed for an instance that changes its shape.
     Changing {
-        /// How often it was made.
+        /// How many times it was computed.
         version: u64,
     },
-    /// Whichever keyframe the instance's row names.
+    /// The keyframe that the instance's row names.
     Union,
-    /// What the instance shares with others, of which it is the first.
+    /// The structure that the instance shares with others; the instance is the first of them.
     Joined {
         /// Number of the set.
         set: usize,
         /// Number of its structure.
         shape: usize,
-        /// Whether some that share it are not shown.
+        /// True if some of the instances that share it are not shown.
         partial: bool,
     },
 }
 
-/// A place of the top level. Equal entries need no new top level.
+/// A placed geometry in the top level. If all entries are equal to the last ones, the top level is still valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Entry {
     pub(super) instance: u32,
@@ -58,7 +58,7 @@ pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
     [corner(0, f32::min), corner(1, f32::max)]
 }
 
-/// Most entries that the scene can have, whatever it shows.
+/// Most entries that the scene can have at any time.
 pub(super) fn capacity(scene: &Scene) -> usize {
     let most = |i: &Instance| match i.keyframes.strategy {
         Strategy::Mask => i.keyframes.meshes.len().max(1),
@@ -67,7 +67,7 @@ pub(super) fn capacity(scene: &Scene) -> usize {
     scene.instances.iter().map(most).sum()
 }
 
-/// Entries of the scene as it stands: what has triangles and is shown, and what is only passed by.
+/// Entries of the scene as it is now: everything shown that has triangles, and everything that rays only pass.
 /// `regions` are those of the instances that change their shape, and `sets` of those that share one.
 pub(super) fn entries(
     scene: &Scene,
@@ -130,7 +130,7 @@ pub(super) fn entries(
     entries
 }
 
-/// Rows of the scene's instances. `slots` says where each entry lies in the top level.
+/// Rows of the scene's instances. `slots` has the place of each entry in the top level.
 pub(super) fn rows(
     scene: &Scene,
     places: &[Place],
@@ -182,21 +182,21 @@ pub(super) fn rows(
     rows
 }
 
-/// Whether `entry` is the one of its instance that is seen.
+/// True if `entry` is the one of its instance that is visible.
 fn shows(instance: &Instance, entry: &Entry) -> bool {
     !matches!(entry.geometry, Geometry::Mesh(mesh) if mesh != instance.mesh)
 }
 
-/// What rays of a ray query are told.
+/// The selection of entries for rays of a ray query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Mask {
     /// Bits of the entries that are shown.
     pub(super) bits: u32,
-    /// Whether some that are not shown share them.
+    /// True if some entries that are not shown have the same bits.
     pub(super) ambiguous: bool,
 }
 
-/// The mask under which every entry that is shown is met.
+/// The mask with which rays meet every entry that is shown.
 pub(super) fn mask(scene: &Scene, entries: &[Entry]) -> Mask {
     let seen = |entry: &&Entry| {
         if let Geometry::Joined { partial, .. } = entry.geometry {
@@ -205,13 +205,14 @@ pub(super) fn mask(scene: &Scene, entries: &[Entry]) -> Mask {
         let instance = &scene.instances[entry.instance as usize];
         instance.shown && shows(instance, entry)
     };
-    // What instances share is always entered, whichever of them is shown.
+    // Shared structures have the bit ALWAYS: rays enter them whichever instance is shown.
     let bits = entries.iter().filter(seen).fold(ALWAYS, |bits, e| bits | e.mask);
     let hidden = entries.iter().filter(|e| !seen(e));
     Mask { bits: bits.into(), ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0) }
 }
 
-/// Whether the top level can follow from `old` to `new` by a refit, as the instances that changed ask.
+/// True if the top level can be changed from `old` to `new` by a refit, as the strategies of the changed
+/// instances ask.
 pub(super) fn may_refit(scene: &Scene, old: &[Entry], new: &[Entry]) -> bool {
     let wants = |entry: &Entry| {
         let instance = &scene.instances[entry.instance as usize];

@@ -1,8 +1,8 @@
-//! Instances that share one structure: what stays together is walked once, not once each.
+//! Instances that share one structure: instances that stay together are traversed once, not once each.
 //!
 //! Nested organs overlap, and a ray enters the structure of each that is around it. Instances whose
-//! places never differ share the object space, so that one structure over the triangles of all of them
-//! needs no other vertices, and rays meet the same triangles at the same distances.
+//! relative placement never changes share the object space. One structure over the triangles of all of them
+//! then needs no other vertices, and rays meet the same triangles at the same distances.
 
 use std::collections::BTreeMap;
 
@@ -12,15 +12,15 @@ use super::arrays::{Bounds, Place};
 use super::entry::union;
 use crate::scene::{Instance, Scene, Strategy};
 
-/// Instances numbered from here on have structures of their own: a triangle's owner takes 16 bits.
-const OWNERS: usize = 1 << 16;
+/// Most instances that can share: a triangle's owner has 16 bits, so later instances have structures of their own.
+const MOST_OWNERS: usize = 1 << 16;
 
 /// Instances that share their structures.
 #[derive(Clone, Debug)]
 pub(super) struct Set {
     /// Indices into [`Scene::instances`], ascending; two at least.
     pub(super) members: Vec<usize>,
-    /// Their structure at each keyframe, or the only one.
+    /// Their structure at each keyframe; only one for a constant shape.
     pub(super) shapes: Vec<Place>,
 }
 
@@ -32,7 +32,7 @@ impl Set {
         keyframe.copied().unwrap_or(instance.mesh)
     }
 
-    /// The number of the present structure.
+    /// The number of the structure that is shown now.
     pub(super) fn shape(&self, scene: &Scene) -> usize {
         present(&scene.instances[self.members[0]])
     }
@@ -44,7 +44,7 @@ impl Set {
         boxes.reduce(union).expect("a set has members")
     }
 
-    /// Whether all members are where, and in the shape that, the others are.
+    /// True if all members have the placement and the keyframe of the first one.
     fn holds(&self, scene: &Scene) -> bool {
         let first = &scene.instances[self.members[0]];
         let with_first = |&i: &usize| {
@@ -66,14 +66,14 @@ fn present(instance: &Instance) -> usize {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sets {
     pub(super) all: Vec<Set>,
-    /// Per instance the set that it is in.
+    /// For each instance the set to which it belongs.
     of: Vec<Option<usize>>,
 }
 
 impl Sets {
-    /// The sets of `scene`, without structures yet: instances with the same placement that nothing
+    /// The sets of `scene`, without structures yet. A set has instances with the same placement that nothing
     /// moves apart, whose shapes are constant or keyframes exchanged together by selectors, and whose
-    /// meshes no other instance shows, so that no triangle is stored twice. `apart` are those that
+    /// meshes no other instance shows, so that no triangle is stored twice. `apart` are the instances that
     /// have been moved on their own before.
     pub(super) fn new(scene: &Scene, apart: &[bool]) -> Self {
         let mut uses = vec![0_u32; scene.meshes.len()];
@@ -84,7 +84,7 @@ impl Sets {
         }
         let carriers = scene.graph.carriers(scene.instances.len());
         let mut alike: BTreeMap<Vec<u64>, Vec<usize>> = BTreeMap::new();
-        for (i, instance) in scene.instances.iter().enumerate().take(OWNERS) {
+        for (i, instance) in scene.instances.iter().enumerate().take(MOST_OWNERS) {
             let keyframes = &instance.keyframes;
             let own = shapes(instance)
                 .iter()
@@ -120,18 +120,18 @@ impl Sets {
         sets
     }
 
-    /// The set that an instance is in.
+    /// The set to which an instance belongs.
     pub(super) fn of(&self, instance: usize) -> Option<(usize, &Set)> {
         let set = self.of[instance]?;
         Some((set, &self.all[set]))
     }
 
-    /// Whether all members of every set are together still.
+    /// True if the members of every set are still together.
     pub(super) fn hold(&self, scene: &Scene) -> bool {
         self.all.iter().all(|set| set.holds(scene))
     }
 
-    /// Marks those in `apart` that have left most of their set.
+    /// Marks in `apart` the instances that are no longer where most of their set is.
     pub(super) fn mark_apart(&self, scene: &Scene, apart: &mut [bool]) {
         for set in self.all.iter().filter(|set| !set.holds(scene)) {
             let state = |i: usize| {

@@ -1,4 +1,4 @@
-//! Shapes of one topology: vertices moved on the device, and the tree's boxes after them.
+//! Shapes of one topology: the device moves their vertices and updates the boxes of the tree.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,27 +15,27 @@ use crate::sim::fields::Fields;
 use crate::sim::layout::{Interpolation, PACKED, RefitLevel, SUM, UNIT};
 use crate::sim::tracer::Tracer;
 
-/// A refitted tree whose rays would cost this many times what they cost in a new one is built anew
-/// (choice; a build costs some ten refits).
+/// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
+/// ten refits).
 const DEGRADED: f64 = 1.5;
 
-/// A tree made for one keyframe, which serves those near it.
+/// A tree built for one keyframe; it also serves keyframes near it.
 struct Base {
     tree: MeshBvh,
-    /// Ranges in the list of node numbers.
+    /// Ranges in the list of node numbers, one per level.
     levels: Vec<RefitLevel>,
 }
 
 /// An instance whose keyframes share their triangles.
 struct Body {
     bases: BTreeMap<usize, Base>,
-    /// Which base serves each keyframe.
+    /// For each keyframe the base that serves it.
     serving: Vec<usize>,
-    /// The base that the region holds.
+    /// The base whose tree is in the region now.
     held: Option<usize>,
 }
 
-/// What the compute tracer's refit works on.
+/// The buffers for refitting on the compute tracer.
 struct Boxes {
     boxes: Buffer,
     order: Buffer,
@@ -48,7 +48,7 @@ pub(super) struct Refit {
 }
 
 impl Refit {
-    /// Trees of all keyframes that need one of their own, and the kernels; nothing in a scene that
+    /// Trees of all keyframes that need one of their own, and the kernels; empty for a scene that
     /// refits nothing.
     pub(super) fn new(
         device: &Arc<Device>,
@@ -85,7 +85,7 @@ impl Refit {
     }
 
     /// Records the triangles and the tree of the base that serves instance `index` now, unless the
-    /// region holds them. Returns whether it did not, so that a structure has to be built from new.
+    /// region has them already. Returns true if it had not: a structure must then be built, not refitted.
     pub(super) fn shape(
         &mut self,
         commands: &mut Commands<'_>,
@@ -165,7 +165,7 @@ impl Refit {
                 )?;
             }
             commands.barrier(Stage::Compute, Stage::Compute);
-            ranges.push(&body.bases[&body.held.expect("shape came first")].levels);
+            ranges.push(&body.bases[&body.held.expect("the base was chosen by `shape`")].levels);
         }
         let (Some(refit), Some((_, nodes))) = (&self.boxes, top.bvh()) else {
             return Ok(());
@@ -190,7 +190,7 @@ impl Refit {
     }
 }
 
-/// Number of the keyframe that the instance is, or is nearest to.
+/// Number of the keyframe that the instance shows or is nearest to.
 fn keyframe(instance: &Instance) -> usize {
     let keyframes = &instance.keyframes;
     let is = |mesh: &usize| *mesh == instance.mesh;

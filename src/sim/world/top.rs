@@ -1,4 +1,4 @@
-//! The top level of either tracer: made over the entries of a scene, anew only when they change.
+//! The top level of either tracer: built over the entries of a scene, again only when they change.
 
 use std::sync::Arc;
 
@@ -14,22 +14,22 @@ use crate::scene::Scene;
 use crate::sim::bvh::SceneBvh;
 use crate::sim::placement::matrix_rows;
 
-/// What the tracer walks.
+/// The structures that the tracer walks.
 enum Structure {
     Bvh {
         bvh: SceneBvh,
         nodes: Buffer,
     },
-    /// No structure for a mesh that needs none of its own.
+    /// Structures of the ray query; none for a mesh that needs none of its own.
     Query {
         meshes: Vec<Option<Blas>>,
-        /// By set and shape.
+        /// Structures that instances share, by set and shape.
         joined: Vec<Vec<Blas>>,
         tlas: Tlas,
     },
 }
 
-/// The top level with everything below it that stays as it is.
+/// The top level, and everything below it that does not change.
 pub(super) struct Top {
     structure: Structure,
     entries: Option<Vec<Entry>>,
@@ -37,7 +37,7 @@ pub(super) struct Top {
 }
 
 impl Top {
-    /// Uploads the compute tracer's trees, or builds those of the ray query.
+    /// Uploads the trees of the compute tracer, or builds the structures of the ray query.
     pub(super) fn new(
         device: &Arc<Device>,
         scene: &Scene,
@@ -62,8 +62,8 @@ impl Top {
         Ok(Self { structure, entries: None, slots: Vec::new() })
     }
 
-    /// Records the top level over `entries`, if they are not those of the last call. `changing` holds
-    /// the structures of instances that change their shape, for the ray query. Returns whether
+    /// Records the top level over `entries`, if they differ from those of the last call. `changing` has
+    /// the ray query's structures of instances that change their shape. Returns true if
     /// anything was recorded.
     pub(super) fn place(
         &mut self,
@@ -116,7 +116,7 @@ impl Top {
         self.entries.as_deref().unwrap_or_default()
     }
 
-    /// Where each entry lies, as rows say it.
+    /// The place of each entry, in the form that rows need.
     pub(super) fn slots(&self) -> &[u32] {
         &self.slots
     }
@@ -169,7 +169,7 @@ fn build_meshes(
     Ok(all().map(|mesh| walked(&mesh).then(|| built.next()).flatten()).collect())
 }
 
-/// Structures of sets, whose triangles lie as they do in the arrays: member after member.
+/// Builds the structures of sets. Their triangles lie as in the arrays: member after member.
 fn build_joined(
     device: &Arc<Device>,
     scene: &Scene,

@@ -54,7 +54,7 @@ fn answers_are_read_as_they_were_saved() {
 }
 
 #[test]
-fn what_is_not_answered_is_counted() {
+fn unanswered_questions_are_counted() {
     let mut content = content();
     content["cases"][0] = json!({ "image": null, "agreement": null, "remark": "blurred" });
     content["cases"][1]["agreement"] = Value::Null;
@@ -66,7 +66,7 @@ fn what_is_not_answered_is_counted() {
 }
 
 #[test]
-fn what_a_form_does_not_save_is_refused() {
+fn files_that_no_form_saves_are_refused() {
     let key = small();
     let sound = file(&key, &content());
     let outer = |name: &str, value: Value| {

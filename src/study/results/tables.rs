@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use super::{Part, Results};
+use super::{Results, ResultsPart};
 
 /// Content of a table's cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,11 +66,11 @@ impl Results {
     /// One row per background of each part.
     fn by_background(
         &self,
-        values: impl Fn(&super::Rated) -> Vec<Cell>,
+        values: impl Fn(&super::BackgroundRatings) -> Vec<Cell>,
     ) -> Vec<([String; 2], Vec<Cell>)> {
-        let rows = |part: &Part| {
+        let rows = |part: &ResultsPart| {
             let scenario = part.scenario.clone().unwrap_or_else(|| ALL.to_owned());
-            let row = |rated: &super::Rated| {
+            let row = |rated: &super::BackgroundRatings| {
                 let names = [scenario.clone(), rated.background.clone()];
                 (names, values(rated))
             };
@@ -165,7 +165,7 @@ impl Results {
     }
 
     fn pairs(&self) -> Table {
-        let row = |pair: &super::Pair| {
+        let row = |pair: &super::BackgroundPair| {
             let [a, b] = &pair.backgrounds;
             let values = vec![
                 Cell::Count(pair.before[0]),

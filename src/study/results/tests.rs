@@ -46,9 +46,9 @@ fn tables_are_those_worked_out_by_hand() {
         ("none", vec![0, 1, 2], [0, 0, 0, 2, 1]),
     ];
     assert_eq!(found, by_hand);
-    let mean: Vec<f64> = total.rated.iter().map(Rated::mean_rank).collect();
+    let mean: Vec<f64> = total.rated.iter().map(BackgroundRatings::mean_rank).collect();
     assert_eq!(mean, [1.0, 7.0 / 3.0, 8.0 / 3.0]);
-    let medians: Vec<f64> = total.rated.iter().map(Rated::median_agreement).collect();
+    let medians: Vec<f64> = total.rated.iter().map(BackgroundRatings::median_agreement).collect();
     assert_eq!(medians, [4.0, 3.0, 4.0]);
     // Rank sums 3, 7, 8 of 3 blocks: 12 / (3 3 4) (9 + 1 + 4) = 14 / 3; Siegel's table N: p = 0.194.
     let test = results.friedman.expect("three blocks");

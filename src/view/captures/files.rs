@@ -180,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_folder_that_cannot_be_is_said() {
+    fn a_folder_that_cannot_be_made_is_reported() {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("file");
         std::fs::write(&file, "").unwrap();

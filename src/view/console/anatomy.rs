@@ -32,7 +32,7 @@ pub(super) fn tissues(ui: &mut Ui, settings: &mut Settings, loaded: &Settings, c
     let Some(tissue) = settings.tissues.get_mut(*chosen) else {
         return;
     };
-    group(ui, Tissue::TABLE, tissue, &mut |_, _, _| false);
+    group(ui, Tissue::TABLE, tissue);
     ui.label(format!("Impedance {:.3} MRayl", tissue.impedance()))
         .on_hover_text("Density times speed of sound");
     ui.collapsing("Sources", |ui| ui.small(&tissue.source));
@@ -62,6 +62,6 @@ pub(super) fn surfaces(
         [("Met from outside", "mesh", outside), ("Met from within", "mesh.inside", inside)]
     {
         ui.label(name);
-        group(ui, path, side, &mut |_, _, _| false);
+        group(ui, path, side);
     }
 }

@@ -29,7 +29,17 @@ pub(super) fn grid(ui: &mut Ui, id: &str, add: impl FnOnce(&mut Ui)) {
 pub(super) type Special<'s, T> = &'s mut dyn FnMut(&mut Ui, &Facts, &mut T) -> bool;
 
 /// Draws the controls of all settings of a group, its sections one below the other. `path` is its table.
-pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T, special: Special<'_, T>) {
+pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T) {
+    group_with(ui, path, settings, &mut |_, _, _| false);
+}
+
+/// As [`group`], with settings that `special` draws.
+pub(super) fn group_with<T: Group>(
+    ui: &mut Ui,
+    path: &str,
+    settings: &mut T,
+    special: Special<'_, T>,
+) {
     section(ui, path, settings, "", special);
     let mut shown = vec![""];
     for row in T::rows() {
@@ -85,7 +95,7 @@ fn control<T>(ui: &mut Ui, path: &str, row: &Row<T>, settings: &mut T) {
             Value::Whole(number) => count(ui, path, facts, number),
             Value::Switch(on) => drop(explained(ui.checkbox(on, ""), path, facts)),
             Value::Word(word) => choice(ui, path, facts, word),
-            Value::List(_) | Value::Absent => {}
+            Value::List(_) | Value::Text(_) | Value::Texts(_) | Value::Absent => {}
         });
         ui.end_row();
     }

@@ -12,7 +12,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
     let Some(fusion) = &mut model.settings.fusion else {
         return;
     };
-    group(ui, Fusion::TABLE, fusion, &mut |_, _, _| false);
+    group(ui, Fusion::TABLE, fusion);
     let mut real = model.real;
     ui.checkbox(&mut real.shown, "Which pixels are real").on_hover_text(
         "Colours what of the image comes from the acquired volume; mixed pixels by their share \

@@ -2,13 +2,13 @@
 
 use egui::{Slider, SliderClamping, Ui};
 
-use super::controls::{explained, group};
+use super::controls::{explained, group_with};
 use crate::settings::{Group, Imaging};
 use crate::view::model::Settings;
 
 pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
     let depth = settings.probe.depth;
-    group(ui, Imaging::TABLE, &mut settings.imaging, &mut |ui, facts, imaging| {
+    group_with(ui, Imaging::TABLE, &mut settings.imaging, &mut |ui, facts, imaging| {
         if facts.key != "tgc_sliders" {
             return false;
         }

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use egui::{DragValue, RichText, TextEdit, Ui};
 
 use super::controls::grid;
-use crate::igtl::{OPEN, Tracked};
+use crate::igtl::{OPEN, TrackerState};
 use crate::view::inputs::Inputs;
 use crate::view::link::Report;
 use crate::view::model::{Model, Source, age};
@@ -67,9 +67,11 @@ fn tracker(ui: &mut Ui, report: Option<&Report>) {
     };
     let since = |arrived: Instant| age(arrived.elapsed()).0;
     match &report.tracked {
-        Tracked::Never => ui.label("no pose has arrived"),
-        Tracked::Live(pose) => ui.label(format!("{}, {} poses", pose.device.text(), pose.number)),
-        Tracked::Lost(pose) => {
+        TrackerState::Never => ui.label("no pose has arrived"),
+        TrackerState::Live(pose) => {
+            ui.label(format!("{}, {} poses", pose.device.text(), pose.number))
+        }
+        TrackerState::Lost(pose) => {
             let text = format!("{} lost, {} ago", pose.device.text(), since(pose.arrived));
             ui.label(RichText::new(text).color(style::WARN))
         }

@@ -9,7 +9,7 @@ use crate::view::model::Settings;
 pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
     let frequency = settings.probe.frequency;
     grid(ui, "preset", |ui| presets(ui, &mut settings.probe));
-    group(ui, Probe::TABLE, &mut settings.probe, &mut |_, _, _| false);
+    group(ui, Probe::TABLE, &mut settings.probe);
     settings.follow_frequency(frequency);
 }
 

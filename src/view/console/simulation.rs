@@ -24,9 +24,9 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings, state: &State, lattice:
         }
     });
     grid(ui, "tracer", |ui| tracer(ui, &mut settings.tracer, state.ray_query));
-    group(ui, Live::TABLE, &mut settings.live, &mut |_, _, _| false);
+    group(ui, Live::TABLE, &mut settings.live);
     let before = settings.simulation.density_scale;
-    group(ui, Simulation::TABLE, &mut settings.simulation, &mut |_, _, _| false);
+    group(ui, Simulation::TABLE, &mut settings.simulation);
     let density = settings.simulation.density_scale;
     if density != before {
         settings.simulation.density_scale = before;

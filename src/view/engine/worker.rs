@@ -261,7 +261,7 @@ impl Worker {
                 return Some(Job::View3d { moving });
             }
             if due {
-                let again = || running.expect("due without an order").again(Instant::now());
+                let again = || running.expect("an order, or a running one").again(Instant::now());
                 return Some(Job::Image(state.order.take().unwrap_or_else(again)));
             }
             let rest = finer.map(|_| live::REST - quiet);

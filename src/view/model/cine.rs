@@ -272,7 +272,7 @@ mod tests {
     const MANY: Limit = Limit { frames: 256, bytes: 1 << 20 };
 
     #[test]
-    fn the_oldest_give_way() {
+    fn the_oldest_frames_are_dropped_first() {
         let few = Limit { frames: 3, ..MANY };
         let (cine, _) = filled(few, 5);
         assert_eq!(cine.iter().copied().collect::<Vec<_>>(), [2, 3, 4]);
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_looked_at_stays_and_the_newest_is_followed() {
+    fn a_chosen_frame_stays_shown_and_the_newest_is_followed() {
         let few = Limit { frames: 4, ..MANY };
         let (mut cine, now) = filled(few, 4);
         assert_eq!(cine.shown(), Some(&3));

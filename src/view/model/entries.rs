@@ -146,8 +146,7 @@ fn fusion_changes(from: &Fusion, to: &Fusion, origins: &Origins) -> Vec<Entry> {
 /// Entries of the `table` that places something and keeps its proportions.
 fn moved(table: &str, from: &DAffine3, to: &DAffine3) -> Vec<Entry> {
     let entries = |place| Placement::of(place, Transformation::Similarity).entries(table);
-    let pairs = entries(from).into_iter().zip(entries(to));
-    pairs.filter(|(from, to)| from != to).map(|(_, entry)| entry).collect()
+    file::differing(entries(from), entries(to))
 }
 
 /// Entries of changed tissues. A tissue based on another states what the other no longer gives as before.

@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_was_seen_is_drawn() {
+    fn the_strip_shows_only_recorded_columns() {
         let mut strip = Strip::new(3);
         assert!(strip.raster(1.0, 1.0, 10).iter().all(|&l| l == 0));
         strip.add(0.55, &probe(), SECTOR, &bright_at(25.0));

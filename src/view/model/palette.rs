@@ -5,7 +5,7 @@
 pub enum Show {
     /// The surface is left out.
     Hidden,
-    /// As glass: outlines remain.
+    /// Transparent: only outlines are visible.
     SeeThrough,
     /// The surface hides everything behind it.
     Solid,

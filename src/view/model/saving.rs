@@ -6,7 +6,7 @@ use std::time::Instant;
 use glam::DAffine3;
 
 use super::{Model, Settings, entries};
-use crate::scene::file::{Entry, load_preset, save};
+use crate::scene::file::{Entry, load_settings, save};
 use crate::scene::{Origins, SceneError};
 
 /// The scene file of a session.
@@ -96,20 +96,8 @@ impl Model {
     /// # Errors
     /// The file cannot be used. Then nothing has changed.
     pub fn load_settings(&mut self, path: &Path, now: Instant) -> Result<(), SceneError> {
-        let frequency = self.settings.probe.frequency;
-        let preset = load_preset(path, frequency)?;
         let before = self.settings.clone();
-        let settings = &mut self.settings;
-        if let Some(probe) = preset.probe {
-            settings.probe = probe;
-            settings.follow_frequency(frequency);
-        }
-        if let Some(simulation) = preset.simulation {
-            settings.simulation = simulation;
-        }
-        if let Some(imaging) = preset.imaging {
-            settings.imaging = imaging;
-        }
+        load_settings(path, &mut self.settings)?;
         self.history.end_gesture();
         self.note(&before, now);
         self.history.end_gesture();

@@ -1,23 +1,18 @@
 //! The settings of the console: everything of a scene except its geometry.
 
+use std::ops::{Deref, DerefMut};
+
 use glam::DAffine3;
 
-use crate::probe::Probe;
-use crate::scene::{
-    Acquired, Display, Fusion, Imaging, Live, Scene, Simulation, Strategy, Surface, Tissue,
-};
-use crate::settings::Group;
+use crate::scene::{Acquired, Display, Fusion, Live, Scene, Strategy, Surface, Tissue};
+use crate::settings;
 use crate::sim::Tracer;
 
 /// Settings of a scene that change while it is imaged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// Transducer and its geometry.
-    pub probe: Probe,
-    /// Path tracing and scatterers.
-    pub simulation: Simulation,
-    /// Image formation.
-    pub imaging: Imaging,
+    /// How it is imaged; fields of these settings to who only reads or sets them.
+    pub imaged: settings::Settings,
     /// The acoustic table.
     pub tissues: Vec<Tissue>,
     /// Echo properties of each placed mesh, from outside and from inside.
@@ -36,6 +31,20 @@ pub struct Settings {
     pub tracer: Tracer,
 }
 
+impl Deref for Settings {
+    type Target = settings::Settings;
+
+    fn deref(&self) -> &settings::Settings {
+        &self.imaged
+    }
+}
+
+impl DerefMut for Settings {
+    fn deref_mut(&mut self) -> &mut settings::Settings {
+        &mut self.imaged
+    }
+}
+
 impl Settings {
     /// The settings of a scene.
     pub fn of(scene: &Scene, tracer: Tracer) -> Self {
@@ -43,9 +52,7 @@ impl Settings {
             (!i.keyframes.meshes.is_empty()).then_some(i.keyframes.strategy)
         };
         Self {
-            probe: scene.probe.clone(),
-            simulation: scene.simulation.clone(),
-            imaging: scene.imaging.clone(),
+            imaged: scene.settings.clone(),
             tissues: scene.tissues.clone(),
             surfaces: scene.instances.iter().map(|i| i.surface).collect(),
             strategies: scene.instances.iter().map(strategy).collect(),
@@ -57,29 +64,9 @@ impl Settings {
         }
     }
 
-    /// Scales the lattice with the wavelength, as in scene files: else speckle would lose its scatterers.
-    /// `before` is the frequency that the cell suited, MHz.
-    pub fn follow_frequency(&mut self, before: f64) {
-        let frequency = self.probe.frequency;
-        if frequency != before {
-            let crowding = self.simulation.crowding();
-            let cell = self.simulation.cell * crowding * before / frequency;
-            self.simulation.cell = Simulation::clamped("cell", cell) / crowding;
-        }
-    }
-
-    /// Sets [`Simulation::density_scale`]; cells shrink where there would be too few of them.
-    pub fn set_density_scale(&mut self, scale: f64) {
-        self.simulation.cell *= self.simulation.crowding();
-        self.simulation.density_scale = scale;
-        self.simulation.cell /= self.simulation.crowding();
-    }
-
     /// Puts the settings into the scene that they came from.
     pub fn apply(&self, scene: &mut Scene) {
-        scene.probe.clone_from(&self.probe);
-        scene.simulation.clone_from(&self.simulation);
-        scene.imaging.clone_from(&self.imaging);
+        scene.settings.clone_from(&self.imaged);
         scene.tissues.clone_from(&self.tissues);
         scene.fusion.clone_from(&self.fusion);
         if let (Some(volume), Some(display)) = (&mut scene.volume, &self.volume) {

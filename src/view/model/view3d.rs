@@ -6,7 +6,7 @@ use super::camera::Camera;
 use super::palette::{self, Show};
 use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
-use crate::sim::view3d::Sight;
+use crate::sim::view3d::CameraView;
 
 /// Opacity of a see-through surface, looked at squarely.
 const GLASS: f32 = 0.17;
@@ -98,10 +98,10 @@ impl View3d {
     }
 
     /// The simulation's input for the picture: `size` in pixels.
-    pub fn sight(&self, size: [u32; 2]) -> Sight {
+    pub fn sight(&self, size: [u32; 2]) -> CameraView {
         let camera = &self.camera;
         let pitch = camera.pitch(DVec2::from(size.map(f64::from)));
-        Sight {
+        CameraView {
             size,
             eye: camera.eye(),
             forward: camera.forward(),
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_around_is_glass_and_hiding_comes_back() {
+    fn enclosing_tissues_are_transparent_and_hiding_is_undone() {
         let mut view3d = View3d::new(&scene());
         let shows: Vec<Show> = view3d.shown.iter().map(|s| s.show).collect();
         assert_eq!(shows, [Show::SeeThrough, Show::Hidden, Show::Solid, Show::Solid]);

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_mixed_stays_together_and_in_order() {
+    fn events_of_one_kind_stay_together_and_in_order() {
         let events = vec![Event::Copy, moved(1.0), Event::Cut, moved(2.0)];
         let made = passes(input(events.clone()));
         assert_eq!(made.len(), 1);

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use super::{Open, gestures};
-use crate::gpu::{GpuError, Interface, Painted, Placed, Shot};
+use crate::gpu::{GpuError, InterfaceFrame, Painted, PlacedImage, Screenshot};
 use crate::view::engine::Frame;
 use crate::view::layout::{self, Places};
 use crate::view::statistics::{Sample, Times};
@@ -20,7 +20,7 @@ impl Open {
         &mut self,
         times: &mut Times,
         shot: bool,
-    ) -> Result<Option<Shot>, GpuError> {
+    ) -> Result<Option<Screenshot>, GpuError> {
         let began = Instant::now();
         let input = self.input.take_egui_input(&self.window);
         let context = self.input.egui_ctx().clone();
@@ -50,11 +50,11 @@ impl Open {
             (image, places.image.as_ref().map(|place| place.rect)),
             (view3d, places.view3d.map(|place| place.rect)),
         ];
-        let placed: Vec<Placed> = (rects.into_iter())
+        let placed: Vec<PlacedImage> = (rects.into_iter())
             .filter_map(|(image, rect)| {
                 let r = rect? * scale;
                 let to = [r.left(), r.top(), r.right(), r.bottom()];
-                Some(Placed { image: image?, to })
+                Some(PlacedImage { image: image?, to })
             })
             .collect();
         let size = self.window.inner_size();
@@ -65,7 +65,7 @@ impl Open {
             false => frame.grade.is_full(),
         };
         let shot = shot && shown.as_ref().is_some_and(settled) && looked == self.look.as_ref();
-        let interface = Interface {
+        let interface = InterfaceFrame {
             pixels_per_point: scale,
             primitives: &primitives,
             textures: std::mem::take(&mut output.textures_delta),

@@ -129,7 +129,7 @@ mod tests {
     use crate::scene::Strategy;
 
     #[test]
-    fn what_follows_is_named_once() {
+    fn each_strategy_is_named_once() {
         assert_eq!(strategies(&[None, None]), "placement alone");
         let all = [None, Some(Strategy::Refit), Some(Strategy::Mask), Some(Strategy::Refit)];
         assert_eq!(strategies(&all), "refit, mask");

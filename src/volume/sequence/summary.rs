@@ -23,7 +23,7 @@ impl Summary {
     /// Reads the header of a file (.mha, .mhd); none where it is no sequence.
     ///
     /// # Errors
-    /// Where the header is wrong.
+    /// A wrong header.
     pub fn read(path: &Path) -> Result<Option<Self>, VolumeError> {
         let (fields, data) = meta::fields(path)?;
         if !frames::in_header(&fields) {

@@ -286,7 +286,7 @@ fn planted_mistakes_in_time_are_refused() {
 /// Eight bits become four bytes where values are scaled: 2 GB of them are refused before anything is
 /// read.
 #[test]
-fn what_would_be_held_counts_too() {
+fn memory_that_a_series_would_need_counts_too() {
     let folder = Folder::new();
     let mut file = nifti_4d(false, 0.05, 10);
     for (at, value) in [(42, 1024i16), (44, 1024), (46, 100), (48, 20), (70, 2), (72, 8)] {

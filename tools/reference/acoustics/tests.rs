@@ -1,5 +1,6 @@
 use super::super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, gaussian, path_random, unit};
 use super::*;
+use insonify::statistics::standard_errors;
 
 /// (speed mm/us, impedance MRayl).
 const FLUIDS: [Fluid; 6] = [
@@ -114,14 +115,6 @@ fn directions_stay_unit_and_in_the_plane_of_incidence() {
             assert!(t.dot(d.cross(m)).abs() < 1e-12);
         }
     }
-}
-
-/// Distance of the mean of `samples` from `expected`, in standard errors.
-fn standard_errors(samples: &[f64], expected: f64) -> f64 {
-    let n = samples.len() as f64;
-    let mean = samples.iter().sum::<f64>() / n;
-    let variance = samples.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / (n - 1.0);
-    (mean - expected).abs() / (variance / n).sqrt().max(1e-15)
 }
 
 fn cosines(roughness: f64) -> Vec<f64> {

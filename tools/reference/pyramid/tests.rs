@@ -3,14 +3,14 @@ use super::*;
 /// Odd, even, prime, a row, a pixel.
 const SIZES: [[usize; 2]; 5] = [[64, 48], [37, 29], [61, 1], [5, 83], [1, 1]];
 
-/// Greys without any smoothness.
+/// Grey levels without any smoothness.
 fn grey(x: usize, y: usize, seed: u32) -> f64 {
     let n = (x as u32).wrapping_mul(0x9e37_79b9) ^ (y as u32).wrapping_mul(0x85eb_ca6b) ^ seed;
     let n = (n ^ (n >> 15)).wrapping_mul(0x2c1b_3c6d);
     f64::from(n >> 16) / 65535.0
 }
 
-/// The finest level of the difference `d`, simulated where `inside` (0..1), seen where `sector`.
+/// The finest level of the difference `d`, simulated to the share `inside` (0..1), visible in `sector`.
 fn level(
     size: [usize; 2],
     d: impl Fn(usize, usize) -> f64,
@@ -28,7 +28,7 @@ fn level(
     Level { size, sums }
 }
 
-/// A sector's fan, and half of it.
+/// A sector like a fan, and half of it.
 fn fan(x: usize, y: usize) -> bool {
     (x as f64 - 20.0).abs() < 3.0 + 0.6 * y as f64
 }
@@ -65,7 +65,7 @@ fn equal_images_stay_and_a_mask_of_one_kind_shows_its_image() {
     }
 }
 
-/// Mean and variance of where a mask of one dimension rises, pixels.
+/// Mass, mean and variance of the places at which a mask of one dimension rises, pixels.
 fn ramp_moments(values: impl Fn(usize) -> f64, count: usize) -> [f64; 3] {
     let rises = (1..count).map(|i| (i as f64 - 0.5, values(i) - values(i - 1)));
     let mass: f64 = rises.clone().map(|r| r.1).sum();
@@ -74,8 +74,8 @@ fn ramp_moments(values: impl Fn(usize) -> f64, count: usize) -> [f64; 3] {
     [mass, mean, square]
 }
 
-// Of the generating kernel's sum over every second pixel, moments up to the third do not depend on
-// which: it is a fourth power of (1 + z). So each level adds 4^l to the variance, on the way down and
+// The generating kernel's sums over every second pixel have moments up to the third that do not depend on
+// the choice of pixels, as it is a fourth power of (1 + z). So each level adds 4^l to the variance, on the way down and
 // again on the way up, wherever the border lies among the coarse pixels.
 #[test]
 fn constant_images_meet_along_a_ramp_of_known_width() {
@@ -101,7 +101,7 @@ fn constant_images_meet_along_a_ramp_of_known_width() {
 #[test]
 fn nothing_bleeds_in_from_beside_the_sector_or_from_beside_the_mask() {
     for size in SIZES {
-        // Beside sector and mask stands what would show at once.
+        // Values beside sector and mask that would show at once.
         let wild = |x, y| {
             if fan(x, y) && half(x, y) > 0.0 { 0.25 } else { 1e6 }
         };

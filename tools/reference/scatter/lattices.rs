@@ -8,7 +8,7 @@ use crate::reference::lattice::{Level, level_power, wanted_level};
 use crate::reference::texture::factor;
 use insonify::sim::layout::{LATTICE_LEVELS, LEAST_GROWTH, SCATTER_BIN, SCATTER_PIECE};
 
-/// How a lattice is walked under a beam: axis `a` along it, `b` across, `c` through the slab of the layer.
+/// The enumeration of a lattice under a beam: axis `a` along it, `b` across, `c` through the slab of the layer.
 struct Walk {
     a: usize,
     b: usize,
@@ -16,9 +16,9 @@ struct Walk {
     /// Per mm of `a` and `b`, within the slab's middle plane: distance along the beam, and across.
     along: DVec2,
     across: DVec2,
-    /// What `c` falls by per mm of `a` and `b` within that plane.
+    /// Decrease of `c` per mm of `a` and `b` within that plane.
     tilt: DVec2,
-    /// How far across lies what is 1 mm above that plane, along `c`.
+    /// Shift across, mm, of a point 1 mm above that plane along `c`.
     slant: f64,
 }
 
@@ -53,14 +53,14 @@ impl Walk {
     }
 }
 
-/// Indices whose cells, of edge `h`, have their middles in `low <= x < high`.
+/// Indices of the cells, of edge `h`, whose centres lie in `low <= x < high`.
 fn cells([low, high]: [f64; 2], h: f64) -> std::ops::Range<i64> {
     let first = |x: f64| (x / h - 0.5).ceil() as i64;
     first(low)..first(high)
 }
 
 impl Tube<'_> {
-    /// All lattices that sound somewhere along the tube.
+    /// Echoes of all lattices in use somewhere along the tube.
     pub(super) fn lattices(&self, loudest: &Loudest, out: &mut Accumulator) {
         for number in 0..=LATTICE_LEVELS {
             let level = Level::new(self.tissue, self.world.frame.cell, number);
@@ -78,8 +78,8 @@ impl Tube<'_> {
         drowned.map_or(0.0, |d| level_power(wanted_level(self.tissue, wanted, d), number))
     }
 
-    /// Plane by plane. A cell counts when its middle lies within the beam's width, taken where the axis
-    /// crosses the plane's middle, and within the layer's slab; its scatterer, when it lies within the
+    /// Echoes of one lattice, plane by plane. A cell counts if its centre lies within the beam's width, taken where
+    /// the axis crosses the plane's middle, and within the layer's slab; its scatterer, if it lies within the
     /// segment's ends.
     fn planes(&self, number: u32, level: &Level, loudest: &Loudest, out: &mut Accumulator) {
         if self.bins(out).is_empty() {
@@ -92,7 +92,7 @@ impl Tube<'_> {
         let o = self.origin;
         let drift = walk.across.x / walk.across.y;
         let step = walk.along.x - walk.along.y * drift;
-        // More than any cell's scatterer can be ahead of or behind the crossing of its plane.
+        // Larger than the distance of any cell's scatterer from the crossing of its plane.
         let widest = (self.world.rows.iter()).fold(0.0, |w, r| f64::max(w, self.half_width(r)));
         let margin = 2.0 * h + 2.0 * widest + 2.0 * reach;
         let ends = [-margin, self.segment.length + margin].map(|x| o[a] + x / step);
@@ -139,8 +139,8 @@ impl Tube<'_> {
         }
     }
 
-    /// Deformed tissue, piece by piece: every scatterer that lies within the beam's width, the layer's slab
-    /// and the piece, from wherever in the reference shape the field can bring it there.
+    /// Echoes of one lattice in deformed tissue, piece by piece: every scatterer that lies within the beam's width, the
+    /// layer's slab and the piece, from wherever in the reference shape the field can bring it there.
     fn pieces(
         &self,
         deformed: Deformed,
@@ -155,7 +155,7 @@ impl Tube<'_> {
             for piece in 0..SCATTER_BIN / SCATTER_PIECE {
                 let begin = bin * SCATTER_BIN + piece * SCATTER_PIECE;
                 let ends = [begin, begin + SCATTER_PIECE].map(|k| self.distance(f64::from(k)));
-                // Before the first sample and behind the last there is no other piece.
+                // The first and the last piece also have what lies before the first and behind the last sample.
                 let first = if begin == 0 { f64::NEG_INFINITY } else { ends[0] };
                 let last = if begin + SCATTER_PIECE >= self.world.frame.samples {
                     f64::INFINITY
@@ -178,7 +178,7 @@ impl Tube<'_> {
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
                 let reference = deformed.field.reference(middle);
-                // Squeezed tissue echoes as before, though its scatterers lie closer.
+                // Squeezed tissue keeps its echo level though its scatterers are closer together.
                 let least = f64::from(LEAST_GROWTH);
                 let growth = deformed.field.growth(reference);
                 let texture =

@@ -7,11 +7,11 @@ use crate::reference::Accumulator;
 use crate::reference::accumulator::NEAREST;
 use crate::reference::texture::{factor, voxel};
 
-/// Points are seen this many lateral sigmas off the axis.
+/// Distance from the axis, in lateral sigmas, within which points are received.
 const POINT_CUT: f64 = 4.0;
 
 impl Tube<'_> {
-    /// One sample of the voxel grid per axial sample.
+    /// Echoes in voxel mode: one sample of the voxel grid per axial sample.
     pub(super) fn voxels(&self, out: &mut Accumulator) {
         let frame = self.world.frame;
         let (h, pitch) = (f64::from(frame.cell), f64::from(frame.sample_pitch));
@@ -41,7 +41,7 @@ impl Tube<'_> {
         }
     }
 
-    /// Point targets within the beam and between the ends.
+    /// Echoes of the point targets within the beam and between the ends.
     pub(super) fn points(&self, out: &mut Accumulator) {
         let frame = self.world.frame;
         let pitch = f64::from(frame.slice_thickness) / f64::from(frame.layers);

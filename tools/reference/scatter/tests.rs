@@ -241,8 +241,8 @@ fn voxels_are_one_sample_each_and_as_bright_as_their_presence() {
     assert!((got / expected - 1.0).abs() < 0.2, "{got} {expected}");
 }
 
-// As bright as the finest lattice, whichever level is asked for, in the middle of a level and where one takes
-// over. A coarse lattice has fewer scatterers under the beam: up to 8 in 24 lattices of 200 samples, 6 %.
+// Every level is as bright as the finest lattice, in the middle of a level and in the cross-fade to the
+// next. A coarse lattice has fewer scatterers under the beam: up to 8 in 24 lattices of 200 samples, 6 %.
 #[test]
 fn every_level_is_as_bright_as_the_finest() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
@@ -266,9 +266,9 @@ fn every_level_is_as_bright_as_the_finest() {
     }
 }
 
-// Where a second path is 20 dB louder, the first one needs a hundredth of its scatterers: its level stays.
+// If a second path is 20 dB louder, the first one needs a hundredth of its scatterers; its level stays the same.
 #[test]
-fn what_is_drowned_is_as_bright_with_fewer_scatterers() {
+fn masked_tissue_is_as_bright_with_fewer_scatterers() {
     let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0), tissue(1.5, 1.5, 0.0)]);
     for row in &mut fixture.rows {
         row.shape[3] = 0.0;

@@ -23,7 +23,7 @@ fn layers(tissues: Vec<Tissue>, tops: &[f64]) -> Fixture {
     fixture
 }
 
-/// Skin to fat to muscle to liver with attenuation as Np/mm of one-way intensity.
+/// Skin, fat, muscle and liver, with attenuation as Np/mm of one-way intensity.
 fn wall() -> (Fixture, Vec<Tissue>, [f64; 3]) {
     let tissues = vec![
         tissue(1.610, 1.775, 0.020),
@@ -216,7 +216,7 @@ fn shared_faces_are_one_interface() {
     assert!((echo(&fixture, &out, 10.0) - 0.5).abs() < 1e-9, "(3 - 1) / (3 + 1)");
 }
 
-/// A wall at 40 mm turned by `angle` about y, and the run's segments behind or off it.
+/// A wall at 40 mm turned by `angle` about y.
 fn tilted(angle: f64, before: Tissue, behind: Tissue) -> Fixture {
     let mut fixture = Fixture::new(vec![before, behind]);
     let at =
@@ -300,7 +300,7 @@ fn faint_branches_are_followed_by_chance_and_keep_level_and_power() {
     assert!((mean / 0.25 - 1.0).abs() < bound, "{mean}");
     // Planted: louder by the whole chance, as echoes in phase are; not louder at all.
     assert!(power(2.0) > 1.0 + bound && power(0.5) < 1.0 - bound);
-    // However faint: one of 32.
+    // The faintest branches are followed on one of 32 lines.
     fixture.frame.branch_floor = 1e9;
     let rare = run(&fixture).segments.iter().flatten().filter(upwards).count();
     assert!((rare as f64 / (lines / 32.0) - 1.0).abs() < 4.0 * (31.0 / lines).sqrt(), "{rare}");
@@ -348,6 +348,6 @@ fn thick_surfaces_keep_their_energy_whatever_the_number_of_paths() {
         let e = energy(paths, 0);
         assert!((e - 1.0).abs() < 0.1, "{paths}: {e}");
     }
-    // The paper's way loses it, and the same bound notices.
+    // The paper's coherence loses energy, and the same bound notices.
     assert!(energy(16, FLAG_COHERENT) < 0.9);
 }

@@ -37,7 +37,7 @@ fn settings(pairs: &[(&str, &str)]) -> Vec<Entry> {
 }
 
 #[test]
-fn only_what_is_set_changes() {
+fn only_set_keys_change() {
     let case = Case::new();
     std::fs::write(case.path(), COMMENTED).expect("written");
     let set = settings(&[
@@ -80,7 +80,7 @@ fn tables_in_any_spelling_are_found() {
 }
 
 #[test]
-fn what_is_taken_away_takes_nothing_else_along() {
+fn removing_a_key_removes_nothing_else() {
     let case = Case::new();
     std::fs::write(case.path(), COMMENTED).expect("written");
     let gone = |path: &str| (path.to_owned(), None);

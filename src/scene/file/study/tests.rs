@@ -1,4 +1,4 @@
-//! Plans: what is read, where mistakes are, poses that entries repeat.
+//! Tests of plans: reading, places of mistakes, and poses that an entry repeats exactly.
 
 use glam::{DAffine3, DVec3};
 

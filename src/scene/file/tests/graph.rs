@@ -45,7 +45,7 @@ fn named<'s>(scene: &'s Scene, name: &str) -> &'s Instance {
 
 #[test]
 fn nodes_nest_in_any_order_of_the_file() {
-    // The child before its parents; the parent's shift comes after the child's.
+    // The child is described before its parents; the parent's shift is applied after the child's.
     let text = mesh("m", "parent = \"inner\"\nfile = \"cube.obj\"\ntranslate = [1, 0, 0]")
         + "[[transform]]\nname = \"inner\"\nparent = \"g\"\nrotate = { axis = [0, 0, 1], angle = \"90 deg\" }\n\
            [[group]]\nname = \"g\"\nparent = \"outer\"\n\

@@ -128,7 +128,7 @@ fn mistakes_of_animations_are_placed() {
         "only .gltf and .glb files have animations",
         "keyframes",
     );
-    f(&format!("{cube}animation = false"), 5, 13, "leave `animation` out", "");
+    f(&format!("{cube}animation = false"), 5, 13, "animation: leave it out", "");
     f(
         "shape = { sphere = { radius = 5 } }\nanimation = \"walk\"",
         5,

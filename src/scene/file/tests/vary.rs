@@ -39,18 +39,16 @@ fn every_parameter_stands_below_and_above_its_own_value_and_nothing_else_differs
         }
         for variant in &variants {
             let mut changed = scene.clone();
-            variant.apply(&mut changed);
+            changed.settings.clone_from(&variant.settings);
             assert_eq!(variant.parameter.value(&changed), Some(variant.value));
             for other in Parameter::suggested().filter(|p| *p != variant.parameter) {
                 assert_eq!(other.value(&changed), other.value(&scene), "{variant:?}");
             }
-            // What --set makes of the entry that is named.
+            // The scene that `--set` gives with the entry of the variant.
             let (path, value) = &variant.setting;
             let set = [set, &[(path.as_str(), value.as_str())]].concat();
             let (loaded, _) = case.load(SCENE, &set).expect("sound");
-            assert_eq!(loaded.probe, changed.probe, "{variant:?}");
-            assert_eq!(loaded.simulation, changed.simulation, "{variant:?}");
-            assert_eq!(loaded.imaging, changed.imaging, "{variant:?}");
+            assert_eq!(loaded.settings, changed.settings, "{variant:?}");
         }
     }
 }
@@ -74,9 +72,9 @@ fn the_file_says_which_values_and_empty_lists_leave_out() {
     ];
     assert_eq!(found, expected.map(|(key, value)| (key.to_owned(), value)));
     assert_eq!(variants[3].setting.1, "[3,0.8,1.1]");
-    assert_eq!(variants[3].imaging.psf_scale, [3.0, 0.8, 1.1]);
+    assert_eq!(variants[3].settings.imaging.psf_scale, [3.0, 0.8, 1.1]);
     // The lattice follows the wavelength.
-    assert_eq!(variants[1].simulation.cell, 1.05 / 6.5);
+    assert_eq!(variants[1].settings.simulation.cell, 1.05 / 6.5);
 }
 
 #[test]
@@ -98,10 +96,10 @@ fn values_out_of_range_are_refused_with_their_key() {
     ] {
         let text = format!("{SCENE}[vary]\n{entry}\n");
         case.fails(&text, (line, column), cause, remedy);
-        // What the table was called.
+        // The table's former name.
         case.fails(&text.replace("[vary]", "[sweep]"), (line, column), cause, remedy);
     }
-    // An override is at fault where it is one.
+    // A mistake in an override is reported there.
     let error = case.load(SCENE, &[("vary.gain", "[500]")]).map(|_| ()).expect_err("out of range");
     assert!(error.to_string().starts_with("--set:1:"), "{error}");
 }
@@ -111,7 +109,7 @@ fn more_scatterers_take_a_finer_lattice_and_fewer_are_thinned_out() {
     let case = Case::new();
     let at = |scale: &str| {
         let set = [("simulation.density_scale", scale)];
-        case.load(SCENE, &set).expect("sound").0.simulation
+        case.load(SCENE, &set).expect("sound").0.settings.simulation
     };
     let (own, thin, dense) = (at("1"), at("0.25"), at("8"));
     assert_eq!((own.thinning(), thin.thinning()), (1.0, 0.25));

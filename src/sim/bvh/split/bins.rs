@@ -1,17 +1,17 @@
-//! Places between which a node may be divided, and the cheapest of them by the surface-area heuristic.
+//! Candidate divisions of a node, and the cheapest of them by the surface-area heuristic.
 
 use glam::Vec3A;
 use obvhs::aabb::Aabb;
 
-/// Most places along each axis.
+/// Most bins along each axis.
 pub(super) const BINS: usize = 32;
 
-/// Where a node may be divided: `bin` of [`BINS`] along `axis` is the first of the right child's.
+/// A division of a node: bin `bin` of at most [`BINS`] along `axis` is the first of the right child.
 #[derive(Clone, Copy)]
 pub(super) struct Division {
     pub(super) axis: usize,
     pub(super) bin: usize,
-    /// Surface of each child times its parts.
+    /// The cost: the sum over both children of surface times number of parts.
     pub(super) cost: f32,
     pub(super) children: [Side; 2],
 }
@@ -42,7 +42,7 @@ impl Side {
     }
 }
 
-/// Slices of equal thickness along an axis of a box.
+/// Bins: slices of equal thickness along an axis of a box.
 pub(super) struct Bins {
     axis: usize,
     count: usize,
@@ -51,7 +51,7 @@ pub(super) struct Bins {
 }
 
 impl Bins {
-    /// For a node of so many parts: few of them need few places.
+    /// The bins for a node of `parts` parts: few parts need few bins.
     pub(super) fn new(bounds: &Aabb, axis: usize, parts: usize) -> Self {
         Self {
             axis,
@@ -61,19 +61,19 @@ impl Bins {
         }
     }
 
-    /// The slice of a point in the box; the first one where the box is flat.
+    /// The bin of a point in the box; 0 where the box is flat.
     pub(super) fn of(&self, point: Vec3A) -> usize {
         let slice = (point[self.axis] - self.low) * (self.count as f32 / self.extent);
         (slice as usize).min(self.count - 1)
     }
 
-    /// Where slice `bin` begins.
+    /// The coordinate at which slice `bin` begins.
     pub(super) fn plane(&self, bin: usize) -> f32 {
         self.low + self.extent * (bin as f32 / self.count as f32)
     }
 
-    /// The best place between two slices: `entering` has boxes and parts that begin in each slice,
-    /// `leaving` how many parts end there. Both children together have at most `most`.
+    /// The cheapest division between two bins. `entering` has box and number of the parts that begin in each bin,
+    /// `leaving` the number that end there. Both children together may have at most `most` parts.
     pub(super) fn best(
         &self,
         entering: &[Side],

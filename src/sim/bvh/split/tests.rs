@@ -1,9 +1,9 @@
-//! What lies in the leaves of trees whose triangles are cut.
+//! Tests of trees whose triangles are cut: the leaves must cover every triangle.
 
 use super::*;
 use crate::scene::{Mesh, shapes};
 
-/// Long thin triangles across each other, which no box fits, over a surface of small ones.
+/// Long thin triangles across each other, which fill little of their boxes, over a surface of small ones.
 fn straw() -> Mesh {
     let mut mesh = shapes::sphere(6.0, 1);
     for i in 0..200 {
@@ -17,7 +17,7 @@ fn straw() -> Mesh {
     mesh
 }
 
-/// Boxes of the leaves that hold each triangle.
+/// For each triangle, the boxes of the leaves that hold it.
 fn leaves(tree: &Bvh2, triangles: usize) -> Vec<Vec<Aabb>> {
     let mut leaves = vec![Vec::new(); triangles];
     for node in tree.nodes.iter().filter(|node| node.is_leaf()) {
@@ -27,7 +27,7 @@ fn leaves(tree: &Bvh2, triangles: usize) -> Vec<Vec<Aabb>> {
     leaves
 }
 
-/// Points of triangles that none of the triangle's leaves holds.
+/// The number of points on triangles that are in none of the triangle's leaves.
 fn uncovered(tree: &Bvh2, mesh: &Mesh) -> usize {
     const STEPS: i32 = 40;
     let leaves = leaves(tree, mesh.triangles.len());
@@ -47,7 +47,7 @@ fn uncovered(tree: &Bvh2, mesh: &Mesh) -> usize {
     missed
 }
 
-/// Levels of a tree all of whose boxes hold those below them.
+/// The depth of a tree; fails unless each box contains those below it.
 fn depth(tree: &Bvh2, node: usize) -> usize {
     let node = &tree.nodes[node];
     if node.is_leaf() {
@@ -95,7 +95,7 @@ fn every_part_of_a_triangle_lies_in_a_leaf_that_holds_it() {
     }
 }
 
-/// Surface of the nodes over that of the root, leaves as often as others.
+/// Surface area of all nodes, leaves included, relative to that of the root.
 fn cost(tree: &Bvh2) -> f32 {
     let areas = tree.nodes.iter().map(|node| node.aabb().half_area());
     areas.sum::<f32>() / tree.nodes[0].aabb().half_area()
@@ -106,8 +106,8 @@ fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     let mesh = straw();
     let whole =
         Builder { positions: &mesh.positions, triangles: &mesh.triangles, least_overlap: 0.0 };
-    let parts: Vec<Part> = (0..mesh.triangles.len())
-        .map(|t| Part {
+    let parts: Vec<TrianglePart> = (0..mesh.triangles.len())
+        .map(|t| TrianglePart {
             bounds: Aabb::from_points(
                 &mesh.triangles[t].map(|v| mesh.positions[v as usize].into()),
             ),
@@ -120,11 +120,11 @@ fn cuts_make_straws_cheap_and_their_number_is_bounded() {
     let (with, without) = (cost(&built), cost(&objects));
     println!("surface of all nodes: {with} with cuts, {without} without");
     assert!(with < 0.9 * without, "{with} with cuts, {without} without");
-    let most = mesh.triangles.len() as f64 * (1.0 + MOST_MORE);
+    let most = mesh.triangles.len() as f64 * (1.0 + MOST_DUPLICATES);
     assert!(built.primitive_indices.len() as f64 <= most);
 }
 
-/// Nothing that triangles may be hangs the builder, makes a deep tree, or is lost.
+/// Degenerate triangles do not hang the builder, do not make a deep tree, and none is lost.
 #[test]
 fn odd_triangles_are_built_over() {
     let copies = |corners: [[f32; 3]; 3], count: u32| Mesh {
@@ -157,8 +157,8 @@ fn odd_triangles_are_built_over() {
         let built = tree_of(&mesh);
         let held = leaves(&built, mesh.triangles.len());
         assert!(held.iter().all(|leaves| !leaves.is_empty()), "{name}");
-        assert!(depth(&built, 0) <= DEEPEST + 14, "{name}: {}", depth(&built, 0));
-        let most = mesh.triangles.len() as f64 * (1.0 + MOST_MORE);
+        assert!(depth(&built, 0) <= MOST_LEVELS + 14, "{name}: {}", depth(&built, 0));
+        let most = mesh.triangles.len() as f64 * (1.0 + MOST_DUPLICATES);
         assert!(built.primitive_indices.len() as f64 <= most, "{name}");
         if !name.starts_with("far") {
             assert_eq!(uncovered(&built, &mesh), 0, "{name}");
@@ -167,11 +167,11 @@ fn odd_triangles_are_built_over() {
     assert!(tree(&[], &[]).nodes.is_empty());
 }
 
-/// Threads do not decide what is cut.
+/// The tree does not depend on the number of threads.
 #[test]
 fn the_same_triangles_are_the_same_tree() {
     let mesh = shapes::ellipsoid([3.0, 9.0, 27.0], 5);
-    assert!(mesh.triangles.len() > 2 * WORTH_A_THREAD);
+    assert!(mesh.triangles.len() > 2 * PARALLEL_PARTS);
     let boxes = |tree: &Bvh2| -> Vec<[[f32; 3]; 2]> {
         let nodes = tree.nodes.iter().map(|node| node.aabb());
         nodes.map(|b| [b.min.into(), b.max.into()]).collect()

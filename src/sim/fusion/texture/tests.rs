@@ -20,7 +20,7 @@ fn blocks_keep_to_the_limit_and_the_budget() {
     assert_eq!(block(&volume([101, 50, 20]), 100, 300_000), [2, 1, 1]);
     assert_eq!(block(&volume([100, 50, 20]), 100, 199_999), [2, 1, 1]);
     assert_eq!(block(&volume([100, 50, 20]), 100, 50_000), [2, 2, 1]);
-    // Twice as much over time is as coarse as half the budget.
+    // Two times of a volume share the budget: each has half of it.
     let mut twice = volume([100, 50, 20]);
     twice.volumes.push(Arc::new(Voxels::U16(Vec::new())));
     assert_eq!(block(&twice, 100, 400_000), [1, 1, 1]);

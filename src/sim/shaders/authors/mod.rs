@@ -1,5 +1,5 @@
 //! From GLSL to checked SPIR-V, for authors of kernels (feature `compile`): a user's program holds
-//! the compiled modules alone. Names nothing outside this folder, so that `tests/spirv.rs` can
+//! the compiled modules alone. This folder uses nothing outside it, so that `tests/spirv.rs` can
 //! include it where the feature, and with it the compiler, is missing.
 
 #[cfg(feature = "compile")]
@@ -10,8 +10,8 @@ pub mod validate;
 
 use std::path::PathBuf;
 
-/// What goes wrong between GLSL and usable SPIR-V; all of these are mistakes in a kernel's source
-/// or files that cannot be read.
+/// The errors between GLSL and usable SPIR-V; all are mistakes in a kernel's source, or files that cannot be
+/// read.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file or folder that cannot be read or written.
@@ -19,7 +19,7 @@ pub enum Error {
     File {
         /// The file.
         path: PathBuf,
-        /// What the system says.
+        /// The system's message.
         cause: std::io::Error,
     },
     /// A directive in a kernel that is malformed, or an include that does not exist.

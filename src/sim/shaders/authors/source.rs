@@ -1,4 +1,4 @@
-//! Kernels as source: variants, includes, flags and the hash of it all. Needs no compiler, so that
+//! Kernels as source: variants, includes, flags and the hash of all of these. Needs no compiler, so that
 //! a stale `spirv/` is noticed everywhere.
 //!
 //! A kernel's first line may be a directive:
@@ -30,7 +30,7 @@ pub struct Variant {
 }
 
 impl Variant {
-    /// Uses `GL_EXT_ray_query`: needs SPIR-V 1.4, and naga cannot read it.
+    /// True if it uses `GL_EXT_ray_query`: this needs SPIR-V 1.4, and naga cannot read it.
     pub fn ray_query(&self) -> bool {
         self.defines.iter().any(|d| d == RAY_QUERY)
     }
@@ -51,7 +51,7 @@ impl Variant {
     }
 }
 
-/// Every module that the kernels in `dir` (`*.comp`) give, sorted by stem.
+/// All modules that the kernels in `dir` (`*.comp`) give, sorted by stem.
 pub fn variants(dir: &Path) -> Result<Vec<Variant>, Error> {
     let mut variants = Vec::new();
     for entry in fs::read_dir(dir).map_err(|e| file_error(dir, e))? {
@@ -147,7 +147,7 @@ pub fn files(dir: &Path, file: &str) -> Result<BTreeMap<String, String>, Error> 
     Ok(found)
 }
 
-/// Hash of everything that decides a module's bytes: sources, includes, flags and `compiler`.
+/// Hash of everything on which a module's bytes depend: sources, includes, flags and `compiler`.
 pub fn hash(dir: &Path, variant: &Variant, compiler: &str) -> Result<String, Error> {
     let mut text = format!("{compiler}\n{}\n", variant.flags());
     for (name, content) in files(dir, &variant.file)? {
@@ -156,7 +156,7 @@ pub fn hash(dir: &Path, variant: &Variant, compiler: &str) -> Result<String, Err
     Ok(fnv1a(text.as_bytes()))
 }
 
-/// FNV-1a, 64 bits, hexadecimal: notices change; nobody attacks it.
+/// FNV-1a, 64 bits, hexadecimal. It detects changes; it does not protect against attacks.
 /// <https://www.rfc-editor.org/rfc/rfc9923>
 pub fn fnv1a(bytes: &[u8]) -> String {
     let hash = bytes.iter().fold(0xcbf2_9ce4_8422_2325_u64, |hash, &byte| {

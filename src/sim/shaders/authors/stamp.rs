@@ -1,4 +1,4 @@
-//! `spirv/stamp.json`: from what each module was compiled, and which bytes came out.
+//! `spirv/stamp.json`: hashes of the sources of each module, and of the resulting bytes.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -19,10 +19,10 @@ const REMEDY: &str =
 /// Hashes of one module.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Entry {
-    /// Sources, includes, flags and compiler.
+pub struct ModuleHashes {
+    /// Hash of sources, includes, flags and compiler.
     pub source: String,
-    /// Bytes of the module.
+    /// Hash of the module's bytes.
     pub spirv: String,
 }
 
@@ -38,22 +38,22 @@ pub fn compiler(lock: &str) -> String {
 }
 
 /// The stamp's text, one module a line so that git merges it.
-pub fn text(entries: &BTreeMap<String, Entry>) -> String {
+pub fn text(entries: &BTreeMap<String, ModuleHashes>) -> String {
     let lines: Vec<_> = entries
         .iter()
-        .map(|(stem, Entry { source, spirv })| {
+        .map(|(stem, ModuleHashes { source, spirv })| {
             format!("  \"{stem}\": {{ \"source\": \"{source}\", \"spirv\": \"{spirv}\" }}")
         })
         .collect();
     format!("{{\n{}\n}}\n", lines.join(",\n"))
 }
 
-/// Everything in which the modules in `spirv` differ from what `glsl` compiled by `compiler` would
-/// give, each with its remedy; empty when all is fresh.
+/// The differences between the modules in `spirv` and what `glsl` compiled by `compiler` would
+/// give, each with its remedy; empty if all modules are current.
 pub fn differences(glsl: &Path, spirv: &Path, compiler: &str) -> Result<Vec<String>, Error> {
     let path = spirv.join(FILE);
     let text = fs::read_to_string(&path).map_err(|e| file_error(&path, e))?;
-    let mut stamped: BTreeMap<String, Entry> = match serde_json::from_str(&text) {
+    let mut stamped: BTreeMap<String, ModuleHashes> = match serde_json::from_str(&text) {
         Ok(stamped) => stamped,
         Err(error) => return Ok(vec![format!("{}: {error}; {REMEDY}", path.display())]),
     };

@@ -172,7 +172,7 @@ fn volume_and_model_move_against_each_other_and_undo_takes_it_back() {
 }
 
 #[test]
-fn what_is_set_is_what_the_file_says_afterwards() {
+fn the_saved_file_has_the_settings() {
     let now = Instant::now();
     let mut model = model(now);
     let before = model.settings.clone();

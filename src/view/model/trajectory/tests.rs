@@ -150,7 +150,7 @@ fn a_replay_by_the_scenes_time_goes_as_fast_as_that_and_stands_with_it() {
 }
 
 #[test]
-fn what_a_file_leaves_out_is_that_of_the_scene() {
+fn columns_that_a_file_lacks_are_those_of_the_scene() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("way.csv");
     std::fs::write(&path, "time_s,qw,qx,qy,qz\n0,1,0,0,0\n1,0,0,0,1\n").expect("written");

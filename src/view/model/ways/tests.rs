@@ -78,7 +78,7 @@ fn a_tracker_that_lies_still_leaves_the_replay_alone() {
 }
 
 #[test]
-fn what_moves_the_probe_is_in_the_recording() {
+fn the_recording_names_the_device_that_moves_the_probe() {
     let began = Instant::now();
     let mut model = model(began);
     model.record(began);
