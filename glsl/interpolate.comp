@@ -13,7 +13,7 @@ const uint PACKED = 2u;
 layout(push_constant) uniform Push {
     uint count;        // vectors
     uint target;       // first vector written; overlaps no source that is read, or is that source
-    uint kind;         // SUM, UNIT: results are brought to length 1, PACKED: so are they, and all are packed
+    uint kind;         // SUM; UNIT: results have length 1; PACKED: they too, and all vectors are packed
     uint stride;       // words from one vector to the next: 3, or 4 of which the last stays as it is; packed 1
     uvec4 sources;     // first vector of each keyframe
     vec4 weights;      // a keyframe of weight 0 is not read
@@ -36,7 +36,7 @@ void main() {
     vec3 v = part(push.sources.x, push.weights.x, i) + part(push.sources.y, push.weights.y, i)
         + part(push.sources.z, push.weights.z, i) + part(push.sources.w, push.weights.w, i);
     if (push.kind == UNIT) {
-        // The square of a short vector may be too small for a float.
+        // Scaled first: the square of a short vector may be too small for a float.
         float size = max(max(abs(v.x), abs(v.y)), abs(v.z));
         if (size > 0.0) v = normalize(v / size);
     }

@@ -58,6 +58,7 @@ void main() {
         uint at = 2u * (line * frame.samples + k);
         labels[at] = instance;
         labels[at + 1u] = frame.background;
+        if (passed == 0u && frame.couplant != NONE) labels[at + 1u] = instances[frame.couplant].tissue;
         if (instance != NONE) labels[at + 1u] = instances[instance].tissue;
     }
 }

@@ -42,9 +42,11 @@ bool is_heard(inout Media media) {
     return false;
 }
 
-// Entering pushes; leaving removes the last occurrence. False when the stack is full.
+// Entering pushes; leaving removes the last occurrence. False when the stack is full. The couplant ends at the first
+// surface: behind the body is no gel.
 bool cross_interface(inout Media media, uint instance, bool entering) {
     if (entering) {
+        if (media.count == 1u && media.ids[0] == frame.couplant) media.count = 0u;
         if (media.count >= MAX_STACK) return false;
         media.ids[media.count] = instance;
         media.count += 1u;

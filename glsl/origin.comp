@@ -104,6 +104,10 @@ void enclose(inout Media media) {
         media.count += 1u;
         last = open_order[best];
     }
+    if (media.count == 0u && frame.couplant != NONE) {
+        media.ids[0] = frame.couplant;
+        media.count = 1u;
+    }
 }
 
 void write_start(uint line, inout Media media, float travelled, float weight, uint interactions) {

@@ -42,7 +42,7 @@ const uint FLAG_VOXEL = 32u;        // paper-like voxel grid instead of the latt
 const uint FLAG_FOOTPRINT = 64u;    // reflectances of curved surfaces averaged over the beam
 const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
-const uint FLAG_MASKED = 512u;      // only what a masking instance encloses is heard
+const uint FLAG_MASKED = 512u;      // only what a masking instance encloses gives echoes
 const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
 const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
@@ -71,7 +71,8 @@ const uint KIND_CONVEX = 0u;
 const uint KIND_LINEAR = 1u;
 const uint KIND_PHASED = 2u;
 
-// One per frame. Rows of 3x4 matrices are vec4 (rotation row, translation).
+// One per frame. Rows of 3x4 matrices are vec4 (rotation row, translation). `couplant` is the instance, without
+// surfaces, that fills the gap between the face and the body; NONE: the background does.
 struct Frame {
     vec4 world_from_probe[3];
     vec4 probe_from_world[3];
@@ -90,7 +91,7 @@ struct Frame {
     float emission_lobe;                                                      // exponent of the cosine; 0: none
     uint ray_mask;                                                            // ray query: bits of the entries that are shown
     float branch_floor;                                                       // amplitude below which branches are followed by chance
-    float unused0; float unused1; float unused2;
+    uint couplant; float unused0; float unused1;
 };
 
 // A scanline in probe space: its start (mm, without elevation) and its
@@ -122,8 +123,8 @@ struct Instance {
     vec4 low; vec4 high;               // object-space bounds of what is shown; w unused
     uint field;                        // offset of its displacement field, in vectors; NONE: none
     uint masks;                        // 1: it is part of the fusion's mask
-    uint owners;                       // word of triangles[] where the list begins of whose they are; 0: all its own
-    float finest;                      // mm: over how much of the surface the first of `smoothed` normals is averaged
+    uint owners;                       // offset in triangles[], words, of the list of each triangle's instance; 0: all its own
+    float finest;                      // mm: standard deviation of the finest average in `smoothed`
 };
 
 // Per axial sample k, at depth k * sample_pitch.
@@ -141,7 +142,7 @@ struct Row {
     float incoherent_gain;                        // keeps the energy of incoherent surface echoes through the averages
     float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
     float black;                                  // one-way weight times echogenicity that shows as black, log2
-    float sigma_wavefront;                        // mm: deviation across the wavefront that a surface refracts there
+    float sigma_wavefront;                        // mm: standard deviation across the refracting wavefront
     float unused0; float unused1;
 };
 

@@ -61,7 +61,7 @@ vec3 surface_shading_normal(Hit hit) {
     return surface_to_world(hit.instance, n);
 }
 
-// How fast the normal turns along the direction `along` (world, any length): radians per mm, unsigned. `corners`: normals
+// Rotation of the normal along the direction `along` (world, any length): radians per mm, unsigned. `corners`: normals
 // of the triangle's corners, object space, any length.
 float surface_curvature(Hit hit, vec3 along, vec3 corners[3]) {
     uint i = triangles[3u * hit.primitive];

@@ -1,11 +1,11 @@
-// How a surface turns the wavefront of a beam: by its mean slope over the wavefront's width.
+// Refraction of a beam's wavefront at a surface: by the mean slope over the wavefront's width.
 //
 // The includer declares frame, rows[], instances[], vertices[], normals[], triangles[] and smoothed[], and includes
 // surface.glsl and path.glsl.
 
 #include "octahedron.glsl"
 
-// A surface where a path meets it. Normals are unit, and turned against the path as far as the triangle's is.
+// Normals of a surface where a path meets it: of length 1, with the sign for which the triangle's is against the path.
 struct Slope {
     vec3 geometric;     // of the triangle
     vec3 shading;       // interpolated from the vertices
@@ -64,10 +64,10 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
         float lateral = rows[row].sigma_lateral;
         float cos_i = -dot(path.direction, slope.refracting);
-        // In the plane of incidence; along the image where there is none.
+        // In the plane of incidence; at normal incidence along the image.
         vec3 along = path.direction + cos_i * slope.refracting + 0.01 * path.lateral;
         float curved = surface_curvature(hit, along, n) * sqrt(lateral * lateral + spread);
-        // What was averaged away.
+        // The slope that was averaged away, as roughness.
         float rough = dot(normalize(along), slope.shading - slope.refracting);
         slope.width = sqrt(curved * curved + rough * rough);
     }
@@ -84,9 +84,9 @@ float reflectance_at(Slope slope, vec3 direction, Medium t1, Medium t2) {
 bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
     vec3 d = path.direction;
     if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
-        // Seen edge on or from behind, as the side of a bump is, the mean surface turns nothing.
+        // Where the mean surface is edge on or seen from behind, as at the side of a bump, nothing is refracted.
         if (dot(d, n) < 0.0 && !refraction(path.direction, n, c1, c2, d)) return false;
-        // What the triangle would let back out runs along it.
+        // A path that would leave through the triangle again runs along it.
         float rise = dot(d, n_geometric) + LEAST_DESCENT;
         d = normalize(d - max(rise, 0.0) * n_geometric);
     } else if (!refraction(path.direction, n, c1, c2, d) || dot(d, n_geometric) >= 0.0) {

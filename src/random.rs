@@ -1,4 +1,4 @@
-//! Counter-based random numbers: pcg4d and pcg3d (Jarzynski and Olano, JCGT 9(3), 2020).
+//! Counter-based random numbers: pcg4d (Jarzynski and Olano, JCGT 9(3), 2020).
 
 use std::f64::consts::TAU;
 
@@ -6,20 +6,6 @@ use std::f64::consts::TAU;
 pub fn pcg4d(v: [u32; 4]) -> [u32; 4] {
     let mix = |v: &mut [u32; 4]| {
         for [to, a, b] in [[0, 1, 3], [1, 2, 0], [2, 0, 1], [3, 1, 2]] {
-            v[to] = v[to].wrapping_add(v[a].wrapping_mul(v[b]));
-        }
-    };
-    let mut v = v.map(|x| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
-    mix(&mut v);
-    v = v.map(|x| x ^ (x >> 16));
-    mix(&mut v);
-    v
-}
-
-/// Three words hashed into three (same source).
-pub fn pcg3d(v: [u32; 3]) -> [u32; 3] {
-    let mix = |v: &mut [u32; 3]| {
-        for [to, a, b] in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
             v[to] = v[to].wrapping_add(v[a].wrapping_mul(v[b]));
         }
     };

@@ -146,7 +146,7 @@ pub struct Scene {
     pub graph: Graph,
     /// Point targets.
     pub wires: Vec<Wire>,
-    /// How it is imaged; the scene's own fields to who only reads or sets them.
+    /// Settings of probe, simulation and imaging. They can be read and set as fields of the scene itself.
     pub settings: Settings,
     /// World from probe space (x lateral, y elevation, z depth), rigid, mm.
     pub world_from_probe: DAffine3,

@@ -32,13 +32,13 @@ use std::time::{Duration, Instant};
 use crate::gpu::{Abandon, AdapterKind, Device, FrameTimings, Frames, GpuError, Image};
 use crate::scene::{Scene, Surface, Tissue, Wire};
 use crate::settings::{Machine, Settings};
-use batches::Room;
+use batches::FrameBudget;
 use buffers::Buffers;
 use bvh::Splits;
-use contact::Touch;
-use fusion::{Fused, Tint};
+use contact::SkinContact;
+use fusion::{FusionResources, Tint};
 pub use memory::Memory;
-use passes::{Kernels, Passes, frame_constants};
+use passes::{PassKernels, Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
@@ -75,7 +75,7 @@ pub struct Simulator {
     coincident: bool,
     sources: Sources,
     tables: Tables,
-    shelf: Shelf,
+    table_cache: TableCache,
     counting: bool,
     /// True if the last frame was mixed with an acquired volume.
     fused: bool,
@@ -90,9 +90,9 @@ pub struct Simulator {
 
 /// Tables of settings used before, kept because settings come back: live quality changes between levels.
 #[derive(Default)]
-struct Shelf(Vec<(Sources, Tables)>);
+struct TableCache(Vec<(Sources, Tables)>);
 
-impl Shelf {
+impl TableCache {
     /// Most tables kept: more than there are levels of quality.
     const MOST: usize = 12;
 
@@ -154,21 +154,21 @@ impl Simulator {
         tracer: Tracer,
         splits: Splits,
     ) -> Result<Self, SimError> {
-        let shapers = Arc::new(world::Kernels::new(device, library)?);
+        let shapers = Arc::new(world::ShapeKernels::new(device, library)?);
         let world = World::with_splits(device, &shapers, scene, tracer, splits)?;
         let coincident = scene.coincident_triangles() > 0;
-        let room = Room::of(device);
-        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &room);
+        let budget = FrameBudget::of(device);
+        let (frame, batches) = frame_constants(scene, &world, coincident, 0, &budget);
         let tables = Tables::new(scene);
         let buffers = Buffers::new(device, scene, batches.sizes(&frame, &tables))?;
-        let fusion = Fused::new(device, scene, None)?;
+        let fusion = FusionResources::new(device, scene, None)?;
         let simulator = Self {
             device: Arc::clone(device),
             frames: Frames::new(device, "frame")?,
             coincident,
             sources: Sources::of(scene),
             tables,
-            shelf: Shelf::default(),
+            table_cache: TableCache::default(),
             counting: false,
             fused: false,
             shown_on: None,
@@ -177,7 +177,7 @@ impl Simulator {
             read_out: ReadOut::default(),
             update_time: Duration::ZERO,
             passes: Passes {
-                kernels: Kernels::new(device, library, scene, &world, false)?,
+                kernels: PassKernels::new(device, library, scene, &world, false)?,
                 buffers,
                 fusion,
                 skins: contact::Skins::default(),
@@ -256,11 +256,11 @@ impl Simulator {
         if sources != self.sources {
             // The tables carry scales and levels that belong to the frame's constants.
             self.frames.wait()?;
-            let tables = self.shelf.take(&sources);
+            let tables = self.table_cache.take(&sources);
             let tables = tables.unwrap_or_else(|| Tables::new(scene));
             let left = std::mem::replace(&mut self.tables, tables);
             let before = std::mem::replace(&mut self.sources, sources);
-            self.shelf.put(before, left);
+            self.table_cache.put(before, left);
             self.upload_tables()?;
         }
         if self.passes.world.serves(scene) {
@@ -283,7 +283,7 @@ impl Simulator {
     /// A kernel that the device refuses; the simulator keeps the ones that it had.
     pub fn reload(&mut self, library: &Library) -> Result<(), SimError> {
         self.frames.wait()?;
-        let shapers = world::Kernels::new(&self.device, library)?;
+        let shapers = world::ShapeKernels::new(&self.device, library)?;
         let world = &self.passes.world;
         let kernels = &self.passes.kernels;
         self.passes.kernels = kernels.again(&self.device, library, world, self.counting)?;
@@ -313,14 +313,17 @@ impl Simulator {
     }
 
     /// The contact of the probe with the skin in the last frame; none where the scene asks for no contact.
-    pub fn contact(&self) -> Option<Touch> {
+    pub fn contact(&self) -> Option<SkinContact> {
         self.passes.touch
     }
 
     /// The device memory that the scene takes.
     pub fn memory(&self) -> Memory {
         let fusion = self.passes.fusion.as_ref();
-        Memory { volume: fusion.map_or(0, Fused::volume_bytes), ..self.passes.world.memory() }
+        Memory {
+            volume: fusion.map_or(0, FusionResources::volume_bytes),
+            ..self.passes.world.memory()
+        }
     }
 
     /// Waits for the frames in flight and returns their timings, oldest first.
@@ -363,6 +366,6 @@ impl Simulator {
 
     /// A warning for the user about how the scene was uploaded, if there is one.
     pub fn warning(&self) -> Option<&str> {
-        self.passes.fusion.as_ref().and_then(Fused::warning)
+        self.passes.fusion.as_ref().and_then(FusionResources::warning)
     }
 }

@@ -40,7 +40,7 @@ fn scene(text: &str) -> Scene {
 fn rocked(angle: f64, gel: f64) -> Scene {
     let (sin, cos) = angle.sin_cos();
     let mut scene = scene(&format!(
-        "[contact]\nmesh = [\"skin\"]\ngel = {gel}\n\
+        "[contact]\nmesh = [\"skin\"]\ngel = {gel}\ncouplant = \"liver\"\n\
          [[mesh]]\nname = \"skin\"\ntissue = \"liver\"\ntranslate = [0, 0, 50]\n\
          shape = {{ box = {{ size = [400, 300, 100] }} }}\n\
          [probe.pose]\nposition = [{}, 0, {}]\ndirection = [{sin}, 0, {cos}]\nlateral = [{cos}, 0, {}]\n",
@@ -217,6 +217,60 @@ fn lifted_off_there_is_nothing_but_noise() {
         assert_eq!(dark, noise, "{tracer}");
         lifted.world_from_probe.translation.z = -2.9;
         assert_ne!(touch(&lifted).0, noise, "{tracer}: held to the skin it hears");
+    }
+}
+
+/// A probe 5 mm above a slab of 20 mm of liver, all of its elements coupled through gel.
+fn above_a_slab(background: &str, couplant: &str) -> Scene {
+    let text = format!(
+        "[contact]\nmesh = [\"slab\"]\ngel = 6\ncouplant = \"{couplant}\"\n\
+         [[mesh]]\nname = \"slab\"\ntissue = \"liver\"\ntranslate = [0, 0, 15]\n\
+         shape = {{ box = {{ size = [200, 200, 20] }} }}\n"
+    );
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join("scene.toml");
+    let bench = BENCH.replace("\"liver\"", &format!("\"{background}\""));
+    std::fs::write(&file, bench + &text).expect("written");
+    Scene::load(&file, &[]).expect("a scene").0
+}
+
+#[test]
+fn the_gap_is_filled_by_the_couplant_and_behind_the_body_is_the_background() {
+    let device = test_device();
+    for tracer in TRACERS {
+        let heard = |background: &str, couplant: &str| {
+            let scene = above_a_slab(background, couplant);
+            let pitch = scene.probe.sample_pitch();
+            // Magnitudes of a line in the middle, and where a depth is within them.
+            let line = lines(&device, &scene, tracer).swap_remove(48);
+            let samples: Vec<f64> =
+                line.chunks(2).map(|v| f64::from(v[0]).hypot(f64::from(v[1]))).collect();
+            move |from: f64, to: f64| {
+                let at = |z: f64| (z / pitch) as usize;
+                samples[at(from)..at(to)].to_vec()
+            }
+        };
+        let loudest = |samples: Vec<f64>| samples.into_iter().fold(0.0, f64::max);
+        let (air, gel) = (heard("air", "gel"), heard("gel", "gel"));
+        // The same up to the far side, 5 mm of gel and 20 mm of liver away: 24.86 mm at 1540 m/s.
+        assert_eq!(air(0.0, 24.0), gel(0.0, 24.0), "{tracer}");
+        assert_eq!(loudest(air(1.0, 4.0)), 0.0, "{tracer}: gel is anechoic");
+        assert!(loudest(air(8.0, 20.0)) > 0.0, "{tracer}: liver is heard");
+        // From there air sends back all, gel 5 %.
+        let side = |heard: &dyn Fn(f64, f64) -> Vec<f64>| loudest(heard(24.5, 25.2));
+        let scene = above_a_slab("air", "gel");
+        let impedance =
+            |name: &str| scene.tissues.iter().find(|t| t.name == name).expect("used").impedance();
+        let reflected = |name: &str| {
+            let (a, b) = (impedance("liver"), impedance(name));
+            ((b - a) / (b + a)).abs()
+        };
+        let found = 20.0 * (side(&air) / side(&gel)).log10();
+        let expected = 20.0 * (reflected("air") / reflected("gel")).log10();
+        assert!((found - expected).abs() < 1.0, "{tracer}: {found} {expected}");
+        // Planted: the gap is of what is around.
+        let silent = heard("air", "air");
+        assert!(loudest(silent(8.0, 20.0)) < 1e-3 * loudest(air(8.0, 20.0)), "{tracer}");
     }
 }
 

@@ -161,6 +161,7 @@ impl Job {
     /// The job of a stage, from the inputs that it reads; its other bindings get the size that the frame needs.
     pub fn of(pass: &Pass, given: Vec<Input>, push: Vec<u8>) -> Self {
         let mut job = Self { inputs: given, push };
+        job.inputs.retain(|input| pass.binds.contains(&input.name));
         for name in pass.binds {
             if job.inputs.iter().all(|input| input.name != *name) {
                 let array = stages::array(name).expect("an array of the frame");

@@ -35,10 +35,10 @@ pub mod scatter;
 pub mod segment;
 pub mod shadow;
 pub mod stack;
+pub mod straight;
 pub mod texture;
 pub mod trace;
 mod wavefront;
-pub mod way;
 pub mod world;
 
 pub use accumulator::Accumulator;

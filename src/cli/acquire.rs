@@ -8,6 +8,7 @@ use insonify::acquire::{self, Station, Sweep};
 use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::file;
+use insonify::settings::units::{ANGLE, DURATION, LENGTH};
 use insonify::sim::shaders::Library;
 use insonify::volume::{Reconstruction, Sequence, Settings, write_meta};
 use miette::{Context, IntoDiagnostic, Result, miette};
@@ -80,9 +81,9 @@ fn way(text: &str) -> Result<Way, String> {
         true => Ok(value),
         false => Err(format!("`{extent}` is too far")),
     };
-    let turn = || bounded(file::radians(extent)?, std::f64::consts::TAU);
+    let turn = || bounded(ANGLE.finite(extent)?, std::f64::consts::TAU);
     Ok(Way::Sweep(match kind {
-        "linear" => Sweep::Linear(bounded(file::millimetres(extent)?, 1e4)?),
+        "linear" => Sweep::Linear(bounded(LENGTH.finite(extent)?, 1e4)?),
         "tilt" => Sweep::Tilt(turn()?),
         "rotate" => Sweep::Rotate(turn()?),
         _ => return Err(format!("`{kind}` is no sweep: linear, tilt and rotate are")),
@@ -98,7 +99,7 @@ fn rate(text: &str) -> Result<f64, String> {
 }
 
 fn period(text: &str) -> Result<f64, String> {
-    let value = file::seconds(text)?;
+    let value = DURATION.finite(text)?;
     match (1e-6..=86_400.0).contains(&value) {
         true => Ok(value),
         false => Err("it must lie between 0.000001 and 86400 s".to_owned()),

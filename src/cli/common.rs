@@ -70,7 +70,7 @@ pub enum QualityChoice {
 
 /// A time on the command line, s.
 pub fn seconds(text: &str) -> Result<f64, String> {
-    insonify::scene::file::seconds(text)
+    insonify::settings::units::DURATION.finite(text)
 }
 
 impl Common {

@@ -42,7 +42,7 @@ pub(crate) struct SubmissionSlot {
     new_kernels: Vec<u64>,
     /// Asked between two pieces, if there is one.
     pub(crate) abandon: Option<Abandon>,
-    lane: QueueUser,
+    user: QueueUser,
     /// All command buffers; one more is made as soon as there are as many pieces.
     buffers: Vec<vk::CommandBuffer>,
     /// A fence for each piece except the last.
@@ -61,7 +61,7 @@ pub(crate) struct SubmissionSlot {
 }
 
 impl SubmissionSlot {
-    pub(crate) fn new(device: &Arc<Device>, name: &str, lane: QueueUser) -> Result<Self, GpuError> {
+    pub(crate) fn new(device: &Arc<Device>, name: &str, user: QueueUser) -> Result<Self, GpuError> {
         let timer = Timer::new(device, name)?;
         let mut slot = Self {
             device: device.clone(),
@@ -73,7 +73,7 @@ impl SubmissionSlot {
             began: None,
             new_kernels: Vec::new(),
             abandon: None,
-            lane,
+            user,
             buffers: Vec::new(),
             piece_fences: Vec::new(),
             handed: 0,
@@ -87,7 +87,7 @@ impl SubmissionSlot {
         };
         let what = || during(format!("creating the command buffer of '{name}'"));
         let info = vk::CommandPoolCreateInfo::default()
-            .queue_family_index(device.queues.family(lane))
+            .queue_family_index(device.queues.family(user))
             .flags(vk::CommandPoolCreateFlags::TRANSIENT);
         // SAFETY: the family is the device's own; `Drop` destroys the pool.
         slot.pool = unsafe { device.raw.create_command_pool(&info, None) }.map_err(what())?;
@@ -169,7 +169,7 @@ impl SubmissionSlot {
         unsafe {
             raw.end_command_buffer(self.commands)?;
             raw.reset_fences(&[fence])?;
-            let queue = self.device.queues.lock(self.lane);
+            let queue = self.device.queues.lock(self.user);
             raw.queue_submit(*queue, &[submit], fence)?;
         }
         self.handed += 1;
@@ -222,7 +222,7 @@ impl SubmissionSlot {
             raw.end_command_buffer(self.commands)
                 .and_then(|()| raw.reset_fences(&[self.fence]))
                 .and_then(|()| {
-                    let queue = self.device.queues.lock(self.lane);
+                    let queue = self.device.queues.lock(self.user);
                     raw.queue_submit(*queue, &[submit], self.fence)
                 })
         };

@@ -20,7 +20,7 @@ pub(crate) struct QueueIndex {
     pub(crate) index: u32,
 }
 
-/// The queue of each lane; both may be the same.
+/// The queue of each user; both may be the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct QueuePlan {
     pub(crate) work: QueueIndex,
@@ -76,7 +76,7 @@ fn find(
 }
 
 /// The queues of a plan. No ownership has to move between two families: images are shared by both, and
-/// buffers belong to one lane.
+/// buffers belong to one user.
 pub(crate) struct Queues {
     plan: QueuePlan,
     work: Mutex<vk::Queue>,
@@ -99,19 +99,19 @@ impl Queues {
         }
     }
 
-    /// Locks the queue of `lane` against other threads. A handle stays usable after a panic elsewhere, so
+    /// Locks the queue of `user` against other threads. A handle stays usable after a panic elsewhere, so
     /// poisoning is ignored.
-    pub(crate) fn lock(&self, lane: QueueUser) -> MutexGuard<'_, vk::Queue> {
-        let queue = match (lane, &self.window) {
+    pub(crate) fn lock(&self, user: QueueUser) -> MutexGuard<'_, vk::Queue> {
+        let queue = match (user, &self.window) {
             (QueueUser::Window, Some(window)) => window,
             _ => &self.work,
         };
         queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The family of a lane's queue.
-    pub(crate) fn family(&self, lane: QueueUser) -> u32 {
-        match lane {
+    /// The family of a user's queue.
+    pub(crate) fn family(&self, user: QueueUser) -> u32 {
+        match user {
             QueueUser::Work => self.plan.work.family,
             QueueUser::Window => self.plan.window.family,
         }
@@ -119,7 +119,7 @@ impl Queues {
 
     /// The families that use the same images, if there are two.
     pub(crate) fn sharing(&self) -> Option<[u32; 2]> {
-        let [work, window] = [QueueUser::Work, QueueUser::Window].map(|lane| self.family(lane));
+        let [work, window] = [QueueUser::Work, QueueUser::Window].map(|user| self.family(user));
         (work != window).then_some([work, window])
     }
 

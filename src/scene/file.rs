@@ -39,7 +39,7 @@ pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
-use crate::settings::{Settings, units};
+use crate::settings::Settings;
 use document::{Document, Source};
 use schema::Title;
 
@@ -115,8 +115,13 @@ impl Scene {
             &anatomy.meshes,
             &anatomy.instances,
         )?;
-        let contact =
-            contact::build(&document, file.contact.as_ref(), &anatomy.meshes, &anatomy.instances)?;
+        let contact = contact::build(
+            &document,
+            file.contact.as_ref(),
+            &anatomy.meshes,
+            &anatomy.instances,
+            &mut tissues,
+        )?;
         let tracker = tracker::build(&document, &file.tracker.stated)?;
         let live = file.live.stated.get("");
         warnings.extend(tissues.unused());
@@ -147,7 +152,7 @@ impl Scene {
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
-        let variants = vary::variants(&document, &file.vary, &scene, suggested)?;
+        let variants = vary::variants(&document, &file.vary.stated, &scene, suggested)?;
         Ok((scene, variants, warnings))
     }
 }
@@ -158,48 +163,6 @@ pub fn volume_of(path: &Path) -> Vec<PathBuf> {
     let file = Source::read(path, &[]).and_then(|source| source.document()?.parse());
     let table = file.ok().and_then(|file| file.volume);
     table.map_or_else(Vec::new, |table| fusion::files(&table.stated))
-}
-
-/// Parses a time as in scene files and on the command line: seconds, or with a unit. Returns s, finite.
-///
-/// # Errors
-/// The fault of the text, in words.
-pub fn seconds(text: &str) -> Result<f64, String> {
-    let value = match text.trim().parse::<f64>() {
-        Ok(value) => value,
-        Err(_) => units::DURATION.parse(text)?,
-    };
-    match value.is_finite() {
-        true => Ok(value),
-        false => Err(format!("{value} s is no time")),
-    }
-}
-
-/// Parses a length as in scene files and on the command line: mm, or with a unit. Returns mm, finite.
-///
-/// # Errors
-/// The fault of the text, in words.
-pub fn millimetres(text: &str) -> Result<f64, String> {
-    let value = match text.trim().parse::<f64>() {
-        Ok(value) => value,
-        Err(_) => units::LENGTH.parse(text)?,
-    };
-    match value.is_finite() {
-        true => Ok(value),
-        false => Err(format!("{value} mm is no length")),
-    }
-}
-
-/// Parses an angle as in scene files and on the command line, with its unit. Returns radians, finite.
-///
-/// # Errors
-/// The fault of the text, in words.
-pub fn radians(text: &str) -> Result<f64, String> {
-    let value = units::ANGLE.parse(text)?;
-    match value.is_finite() {
-        true => Ok(value),
-        false => Err(format!("{value} rad is no angle")),
-    }
 }
 
 /// Fails on a picture wider than can be written or sent.
@@ -216,28 +179,6 @@ fn presentable(document: &Document<'_>, settings: &Settings) -> Result<(), Scene
         "at most {WIDEST} fit: give a smaller image_height, a deeper image or a narrower probe"
     );
     Err(document.fail("imaging.image_height", message, remedy))
-}
-
-/// Fails at `path` unless `value` is in the closed range; NaN is in no range.
-fn within(
-    document: &Document<'_>,
-    path: &str,
-    value: f64,
-    least: f64,
-    most: f64,
-    unit: &str,
-) -> Result<(), SceneError> {
-    if (least..=most).contains(&value) {
-        return Ok(());
-    }
-    let key = path.rsplit('.').next().unwrap_or(path);
-    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
-    let (message, remedy) = if most.is_infinite() {
-        (format!("{key} is {value}{unit}"), format!("it must be at least {least}{unit}"))
-    } else {
-        (format!("{key} is {value}{unit}"), format!("it must lie between {least} and {most}{unit}"))
-    };
-    Err(document.fail(path, message, remedy))
 }
 
 #[cfg(test)]

@@ -1,12 +1,12 @@
 //! Normals averaged over an area about each vertex: the surface as a wide beam refracts at it.
 //!
-//! What refracts is no ray but a wavefront, and it turns by the mean slope of the surface over its width. The mean of
-//! the unit normals over an area has just that slope, of a plane exactly and wherever normals are weighted by area. Bumps
+//! A beam refracts as a wavefront, not as a ray: by the mean slope of the surface over its width. The mean of the
+//! unit normals over an area has just that slope, of a plane exactly and wherever normals are weighted by area. Bumps
 //! smaller than the width cancel; a plane, a sphere and a cylinder keep their normals, as they lie alike around every
-//! point. The average is diffusion along the surface (backward Euler steps on linear finite elements, from one scale to
-//! the next), so that it does not depend on the triangulation and never leaves a connected patch: what lies near only
-//! through space, as the other vessel of a bundle, has no part in it. Nor has what lies behind an edge sharper than
-//! [`CREASE`].
+//! point. The average is diffusion along the surface (backward Euler steps on linear finite elements, from one scale
+//! to the next), so that it does not depend on the triangulation and never leaves a connected patch: a surface that
+//! is near only through space, as the next vessel of a bundle, has no part in it. Neither has a surface behind an
+//! edge sharper than [`CREASE`].
 
 use glam::DVec3;
 
@@ -18,7 +18,7 @@ mod elements;
 
 use elements::Elements;
 
-/// Scales per vertex, each twice the one before.
+/// Number of scales per vertex; each is twice the one before.
 pub const LEVELS: usize = 4;
 
 /// The finest of them, mm of the world where a mesh is placed first. Below it the vertices' own normals are mixed in.
@@ -28,16 +28,16 @@ pub const FINEST: f64 = 2.0;
 /// was smoothed at all are flatter.
 const CREASE: f32 = 80.0;
 
-/// Lengths of a mean of unit normals at which its direction begins to count, and counts in full. Where the two sides
-/// of a thin sheet are averaged they cancel, and the rest points anywhere.
+/// Lengths of a mean of unit normals from which its direction begins to count, and counts in full. If the two sides
+/// of a thin sheet are averaged, they cancel, and the direction of the rest is arbitrary.
 const LENGTH: [f64; 2] = [0.15, 0.35];
 
-/// Cosines of the angle to the next finer mean, likewise.
+/// Cosines of the angle to the next finer mean from which the direction begins to count, and counts in full.
 const AGREEMENT: [f64; 2] = [0.0, 0.5];
 
-/// Of each vertex the normal averaged with standard deviations of 1, 2, 4 and 8 times `finest` (in the mesh's unit) along
-/// the surface: unit, outward, [`pack`]ed. Where a mean has no direction it is the next finer one, in the end the
-/// vertex's own normal.
+/// For each vertex the normals averaged with standard deviations of 1, 2, 4 and 8 times `finest` (in the mesh's unit)
+/// along the surface: unit, outward, [`pack`]ed. Where a mean has no direction it is the next finer one, in the end
+/// the vertex's own normal.
 pub fn smoothed(mesh: &Mesh, finest: f64) -> Vec<[u32; LEVELS]> {
     let soup = Soup {
         positions: mesh.positions.clone(),
@@ -99,7 +99,7 @@ fn rise([from, to]: [f64; 2], x: f64) -> f64 {
 }
 
 /// A unit vector as two signed 16-bit parts of a projection onto an octahedron (Meyer et al. 2010), x in the lower
-/// half; within 5e-5 rad. The zero vector becomes some other.
+/// half; within 5e-5 rad. The zero vector becomes an arbitrary unit vector.
 pub fn pack(v: DVec3) -> u32 {
     let size = v.abs().element_sum();
     let p = if size > 0.0 { v / size } else { DVec3::Z };

@@ -35,7 +35,7 @@ const SUGGESTED: [(&str, &str, Around); 11] = [
 #[derive(Clone, Copy, Debug)]
 pub struct Parameter {
     table: &'static str,
-    facts: &'static Facts,
+    pub(super) facts: &'static Facts,
     /// Index of the number in a list.
     part: Option<usize>,
 }
@@ -103,9 +103,9 @@ impl Parameter {
     }
 
     /// Form of its values.
-    pub fn form(&self) -> Form {
-        match self.facts.form {
-            Form::Numbers(_) | Form::Whole => Form::Number,
+    pub(super) fn form(&self) -> &'static Form {
+        match &self.facts.form {
+            Form::Numbers(_) | Form::Whole => &Form::Number,
             form => form,
         }
     }

@@ -3,9 +3,8 @@
 use std::fmt;
 
 use serde::Deserialize;
-use serde::de::value::SeqAccessDeserializer;
 use serde::de::{
-    DeserializeSeed, Deserializer, EnumAccess, Error, SeqAccess, Unexpected, VariantAccess, Visitor,
+    DeserializeSeed, Deserializer, EnumAccess, Error, SeqAccess, VariantAccess, Visitor,
 };
 
 use super::units::Measure;
@@ -19,41 +18,24 @@ pub trait Field {
     fn set(&mut self, value: &Value);
 }
 
-impl Field for f64 {
-    fn get(&self) -> Value {
-        Value::Number(*self)
-    }
+/// Fields that hold what a value of one kind holds.
+macro_rules! fields {
+    ($($type:ty as $kind:ident),+) => {
+        $(impl Field for $type {
+            fn get(&self) -> Value {
+                Value::$kind(self.clone())
+            }
 
-    fn set(&mut self, value: &Value) {
-        if let Value::Number(number) = value {
-            *self = *number;
-        }
-    }
+            fn set(&mut self, value: &Value) {
+                if let Value::$kind(own) = value {
+                    self.clone_from(own);
+                }
+            }
+        })+
+    };
 }
 
-impl Field for u32 {
-    fn get(&self) -> Value {
-        Value::Whole(*self)
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Whole(count) = value {
-            *self = *count;
-        }
-    }
-}
-
-impl Field for bool {
-    fn get(&self) -> Value {
-        Value::Switch(*self)
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Switch(on) = value {
-            *self = *on;
-        }
-    }
-}
+fields!(f64 as Number, u32 as Whole, bool as Switch, &'static str as Word, String as Text);
 
 impl<const N: usize> Field for [f64; N] {
     fn get(&self) -> Value {
@@ -82,30 +64,6 @@ impl Field for i32 {
     fn set(&mut self, value: &Value) {
         if let Value::Number(number) = value {
             *self = *number as i32;
-        }
-    }
-}
-
-impl Field for &'static str {
-    fn get(&self) -> Value {
-        Value::Word(self)
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Word(word) = value {
-            *self = word;
-        }
-    }
-}
-
-impl Field for String {
-    fn get(&self) -> Value {
-        Value::Text(self.clone())
-    }
-
-    fn set(&mut self, value: &Value) {
-        if let Value::Text(text) = value {
-            self.clone_from(text);
         }
     }
 }
@@ -161,15 +119,14 @@ impl<'de> DeserializeSeed<'de> for &Form {
                 let three = Several { count: 3, measure: None };
                 Value::List(deserializer.deserialize_seq(three)?)
             }
+            Form::Several(form) => Value::List(deserializer.deserialize_seq(Each(form))?),
             Form::Integer => Value::Number(f64::from(i32::deserialize(deserializer)?)),
             Form::Text => Value::Text(String::deserialize(deserializer)?),
             Form::Texts => Value::Texts(Vec::deserialize(deserializer)?),
-            Form::Factors => deserializer
-                .deserialize_any(Either("a number or 3 numbers: along x, y and z", *self))?,
-            Form::OneOrSeveral => {
-                deserializer.deserialize_any(Either("text or list of texts", *self))?
+            Form::Factors | Form::OneOrSeveral | Form::TextOrTrue => {
+                let given = toml::Value::deserialize(deserializer)?;
+                self.either(&given).map_err(D::Error::custom)?
             }
-            Form::TextOrTrue => deserializer.deserialize_any(Either("text or true", *self))?,
         })
     }
 }
@@ -204,53 +161,54 @@ impl<'de> DeserializeSeed<'de> for OneOf {
     }
 }
 
-/// Reader of a form of several kinds, with the words for what it expects.
-struct Either(&'static str, Form);
+/// Reader of any count of values of a form.
+struct Each(&'static Form);
 
-impl<'de> Visitor<'de> for Either {
-    type Value = Value;
+impl<'de> Visitor<'de> for Each {
+    type Value = Vec<f64>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.0)
+        f.write_str("a sequence")
     }
 
-    fn visit_f64<E: Error>(self, factor: f64) -> Result<Value, E> {
-        match self.1 {
-            Form::Factors => Ok(Value::Number(factor)),
-            _ => Err(E::invalid_type(Unexpected::Float(factor), &self)),
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<f64>, A::Error> {
+        let mut out = Vec::new();
+        while let Some(value) = list.next_element_seed(self.0)? {
+            out.extend(match value {
+                Value::Number(number) => Some(number),
+                _ => None,
+            });
         }
+        Ok(out)
     }
+}
 
-    fn visit_i64<E: Error>(self, factor: i64) -> Result<Value, E> {
-        match self.1 {
-            Form::Factors => Ok(Value::Number(factor as f64)),
-            _ => Err(E::invalid_type(Unexpected::Signed(factor), &self)),
-        }
-    }
-
-    fn visit_str<E: Error>(self, text: &str) -> Result<Value, E> {
-        match self.1 {
-            Form::Factors => Err(E::invalid_type(Unexpected::Str(text), &self)),
-            _ => Ok(Value::Text(text.to_owned())),
-        }
-    }
-
-    fn visit_bool<E: Error>(self, yes: bool) -> Result<Value, E> {
-        match (self.1, yes) {
-            (Form::TextOrTrue, true) => Ok(Value::Switch(true)),
-            (Form::TextOrTrue, false) => Err(E::custom("leave it out where there is none")),
-            _ => Err(E::invalid_type(Unexpected::Bool(yes), &self)),
-        }
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, list: A) -> Result<Value, A::Error> {
-        match self.1 {
-            Form::Factors => Several { count: 3, measure: None }.visit_seq(list).map(Value::List),
-            Form::OneOrSeveral => {
-                Vec::deserialize(SeqAccessDeserializer::new(list)).map(Value::Texts)
+impl Form {
+    /// The value of a form of several kinds; or what it takes, if `given` is nothing of that.
+    fn either(&self, given: &toml::Value) -> Result<Value, String> {
+        let number = |v: &toml::Value| v.as_float().or(v.as_integer().map(|whole| whole as f64));
+        let text = |v: &toml::Value| v.as_str().map(str::to_owned);
+        let list = given.as_array();
+        let (value, takes) = match self {
+            Self::Factors => {
+                let three = list.filter(|list| list.len() == 3);
+                let three = three.and_then(|list| list.iter().map(number).collect());
+                let value = number(given).map(Value::Number).or(three.map(Value::List));
+                (value, "a number or 3 numbers: along x, y and z")
             }
-            _ => Err(A::Error::invalid_type(Unexpected::Seq, &self)),
-        }
+            Self::OneOrSeveral => {
+                let several = list.and_then(|list| list.iter().map(text).collect());
+                (
+                    text(given).map(Value::Text).or(several.map(Value::Texts)),
+                    "text or list of texts",
+                )
+            }
+            _ => {
+                let yes = given.as_bool().filter(|yes| *yes);
+                (text(given).map(Value::Text).or(yes.map(Value::Switch)), "text or true")
+            }
+        };
+        value.ok_or_else(|| format!("invalid {} {given}, expected {takes}", given.type_str()))
     }
 }
 

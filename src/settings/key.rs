@@ -56,10 +56,12 @@ pub enum Form {
     OneOrSeveral,
     /// A text, or `true`.
     TextOrTrue,
+    /// Any count of values of this form, which are numbers: a [`Value::List`].
+    Several(&'static Form),
 }
 
 impl Form {
-    /// Whether it takes quantities of this measure.
+    /// True for quantities of this measure.
     pub fn measures(&self, measure: &Measure) -> bool {
         matches!(self, Self::Quantity(own) if *own == measure)
     }
@@ -206,7 +208,7 @@ impl Facts {
         Self::new(Form::Quantities(measure, count), least, most)
     }
 
-    /// What takes this form, without limits.
+    /// A value of this form, without limits.
     pub const fn of(form: Form) -> Self {
         Self::new(form, f64::NEG_INFINITY, f64::INFINITY)
     }

@@ -44,7 +44,7 @@ words! {
 }
 
 words! {
-    /// What turns a path at a surface.
+    /// The slope by which a path refracts at a surface.
     pub enum Refraction {
         /// The mean slope over the width of the wavefront that forms the image behind it.
         Beam = "beam",
@@ -54,7 +54,7 @@ words! {
 }
 
 words! {
-    /// Where scatterers come from.
+    /// The model of the scatterers.
     pub enum ScatterMode {
         /// One point scatterer per cell of a lattice fixed to the tissue.
         Lattice = "lattice",

@@ -106,6 +106,19 @@ impl Measure {
         Ok(value * factor)
     }
 
+    /// Parses a finite quantity as on the command line: a plain number where scene files take one, or with a unit.
+    ///
+    /// # Errors
+    /// The fault of the text, in words.
+    pub fn finite(&self, text: &str) -> Result<f64, String> {
+        let plain = text.trim().parse().ok().filter(|_| self.plain);
+        let value = plain.map_or_else(|| self.parse(text), Ok)?;
+        match value.is_finite() {
+            true => Ok(value),
+            false => Err(format!("{value} {} is no {}", self.unit(), self.name)),
+        }
+    }
+
     fn plain<E: Error>(&self, value: f64) -> Result<f64, E> {
         // Zero is zero in every unit.
         if !self.plain && value != 0.0 {

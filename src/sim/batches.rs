@@ -11,15 +11,15 @@ const SEGMENT_BUDGET: u64 = 96 << 20;
 
 /// The memory and threads of a device that a frame may use.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Room {
+pub(super) struct FrameBudget {
     /// Bytes for segments.
     pub(super) segments: u64,
     /// Threads that the device runs at once, approximately.
     pub(super) at_once: u32,
 }
 
-impl Room {
-    /// The room on a device where no buffers have been made yet.
+impl FrameBudget {
+    /// The budget on a device where no buffers have been made yet.
     pub(super) fn of(device: &Device) -> Self {
         Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once() }
     }
@@ -37,21 +37,25 @@ pub(super) struct Batches {
 }
 
 impl Batches {
-    /// The largest batches for whose segments `room` has memory.
-    pub(super) fn new(frame: &layout::Frame, room: &Room) -> Self {
+    /// The largest batches for whose segments `budget` has memory.
+    pub(super) fn new(frame: &layout::Frame, budget: &FrameBudget) -> Self {
         let per_path = per_path(frame);
         let line_bytes = u64::from(lines(frame)) * size_of::<layout::Segment>() as u64;
-        let affordable = u32::try_from(room.segments / line_bytes.max(1)).unwrap_or(u32::MAX);
+        let affordable = u32::try_from(budget.segments / line_bytes.max(1)).unwrap_or(u32::MAX);
         if one_speaks_for_all(frame) {
             return Self {
                 capacity: per_path.min(affordable.max(1)),
                 paths: frame.paths,
-                rounds: Rounds::new(frame, frame.paths, room.at_once),
+                rounds: Rounds::new(frame, frame.paths, budget.at_once),
             };
         }
         let most = (affordable / per_path).min(rounds::most_paths(frame));
         let paths = most.clamp(1, frame.paths);
-        Self { capacity: paths * per_path, paths, rounds: Rounds::new(frame, paths, room.at_once) }
+        Self {
+            capacity: paths * per_path,
+            paths,
+            rounds: Rounds::new(frame, paths, budget.at_once),
+        }
     }
 
     /// The numbers from which buffer sizes follow, for a frame divided into these batches.

@@ -176,7 +176,7 @@ fn place(mut node: CwBvhNode, first_node: u32, first_primitive: u32) -> Node {
 
 /// One placed mesh (or several that share a structure) in the top level.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct BvhInstance {
     /// Index of the instance. An instance may be placed several times; rays enter only the place that
     /// `slot` in its row names.
     pub instance: u32,
@@ -257,7 +257,7 @@ impl SceneBvh {
     ///
     /// # Errors
     /// An error when the kernel's stack could overflow.
-    pub fn place(&mut self, placed: &[Placed], refit: bool) -> Result<&[Node], BvhError> {
+    pub fn place(&mut self, placed: &[BvhInstance], refit: bool) -> Result<&[Node], BvhError> {
         assert!(placed.len() <= self.capacity, "more places than reserved");
         let boxes: Vec<Aabb> =
             placed.iter().map(|p| world_box(p.bounds, &p.world_from_object)).collect();

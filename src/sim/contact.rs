@@ -18,7 +18,7 @@ const ROWS: u32 = 7;
 
 /// The contact of a probe with the skin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
+pub struct SkinContact {
     /// Share of the face that is coupled, 0 to 1.
     pub share: f64,
     /// Indentation: the distance by which the face is pushed in beyond the undeformed skin, mm. The mean over
@@ -30,7 +30,7 @@ pub struct Touch {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coupling {
     /// The face as a whole.
-    pub touch: Touch,
+    pub touch: SkinContact,
     /// Share of each element that is coupled, from the first scanline's on.
     pub elements: Vec<f64>,
 }
@@ -61,7 +61,7 @@ impl Coupling {
         let elements: Vec<f64> = coupled.iter().map(|&n| f64::from(n) / points).collect();
         let count = elements.len().max(1) as f64;
         Some(Self {
-            touch: Touch {
+            touch: SkinContact {
                 share: elements.iter().sum::<f64>() / count,
                 depth: depth / (count * points),
             },

@@ -18,7 +18,7 @@ mod steps;
 mod texture;
 
 /// All that only frames with fusion need, except its buffers.
-pub(super) struct Fused {
+pub(super) struct FusionResources {
     /// The volume. It is kept when buffers are made larger.
     texture: Arc<VolumeTexture>,
     /// The time of the volume that the frame shows.
@@ -28,7 +28,7 @@ pub(super) struct Fused {
     banded: bool,
 }
 
-impl Fused {
+impl FusionResources {
     /// Uploads the scene's volume, unless `before` has it; returns none for a scene without a volume.
     pub(super) fn new(
         device: &Arc<Device>,

@@ -176,7 +176,7 @@ shared! {
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
-        branch_floor: f32, unused0: f32, unused1: f32, unused2: f32,
+        branch_floor: f32, couplant: u32, unused0: f32, unused1: f32,
     }
     /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }
@@ -253,15 +253,15 @@ shared! {
     }
 }
 
-/// What `interpolate` makes of the weighted sum of vectors: nothing.
+/// `interpolate` writes the weighted sum of vectors as it is.
 pub const SUM: u32 = 0;
-/// A vector of length 1, as normals are.
+/// `interpolate` scales the sum to length 1, as of normals.
 pub const UNIT: u32 = 1;
-/// Vectors are of length 1, each a word ([`crate::scene::smoothed::pack`]).
+/// `interpolate` reads and writes vectors of length 1, each in a word ([`crate::scene::smoothed::pack`]).
 pub const PACKED: u32 = 2;
 
-/// Push constants of `interpolate`: how vectors between keyframes are made. All places are counted
-/// in vectors from the beginning of the buffer.
+/// Push constants of `interpolate`: a weighted sum of vectors of keyframes. All places are counted in vectors
+/// from the beginning of the buffer.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Interpolation {

@@ -4,10 +4,10 @@ use std::cmp::Reverse;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use super::batches::{Batches, Room};
+use super::batches::{Batches, FrameBudget};
 use super::buffers::Buffers;
-use super::contact::{self, Coupling, Skins, Touch};
-use super::fusion::Fused;
+use super::contact::{self, Coupling, SkinContact, Skins};
+use super::fusion::FusionResources;
 use super::pass::{Extent, Pass, Variants};
 use super::shaders::Library;
 use super::stages::{self, CONVERT, DARKEN, FUSE, MASK, SHADOW, TRACE};
@@ -18,13 +18,13 @@ use crate::settings::Blend;
 
 /// The kernels, buffers and geometry on which the stages work.
 pub(super) struct Passes {
-    pub(super) kernels: Kernels,
+    pub(super) kernels: PassKernels,
     pub(super) buffers: Buffers,
     /// None where the scene has no acquired volume.
-    pub(super) fusion: Option<Fused>,
+    pub(super) fusion: Option<FusionResources>,
     pub(super) skins: Skins,
     /// The contact of the probe with the skin in the last frame.
-    pub(super) touch: Option<Touch>,
+    pub(super) touch: Option<SkinContact>,
     pub(super) world: World,
     pub(super) frame: layout::Frame,
     /// Constants of the frame whose picture is complete.
@@ -45,11 +45,12 @@ impl Passes {
         let began = Instant::now();
         self.world.update(cmd, scene)?;
         // A frame of fewer lines than the buffers were made for must not want more segments.
-        let room = Room {
+        let budget = FrameBudget {
             segments: self.buffers["segments"].size(),
             at_once: self.batches.rounds.at_once,
         };
-        (self.frame, self.batches) = frame_constants(scene, &self.world, coincident, index, &room);
+        (self.frame, self.batches) =
+            frame_constants(scene, &self.world, coincident, index, &budget);
         self.buffers.add(cmd.device(), stages::needed(scene))?;
         cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
@@ -177,7 +178,7 @@ impl Passes {
 }
 
 /// The kernels of the passes that frames of a scene may run.
-pub(super) struct Kernels(Vec<PassKernel>);
+pub(super) struct PassKernels(Vec<PassKernel>);
 
 struct PassKernel {
     pass: &'static Pass,
@@ -186,7 +187,7 @@ struct PassKernel {
     needed: bool,
 }
 
-impl Kernels {
+impl PassKernels {
     pub(super) fn new(
         device: &Arc<Device>,
         library: &Library,
@@ -252,7 +253,7 @@ pub(super) fn frame_constants(
     world: &World,
     coincident: bool,
     index: u32,
-    room: &Room,
+    budget: &FrameBudget,
 ) -> (layout::Frame, Batches) {
     let mut frame = tables::frame(scene, index);
     if coincident {
@@ -263,7 +264,7 @@ pub(super) fn frame_constants(
     if ambiguous {
         frame.flags |= layout::FLAG_SLOTS;
     }
-    let batches = Batches::new(&frame, room);
+    let batches = Batches::new(&frame, budget);
     frame.segment_capacity = batches.capacity;
     (frame, batches)
 }

@@ -14,7 +14,7 @@ pub fn stretch(matrix: &DAffine3) -> f64 {
     matrix.matrix3.determinant().abs().cbrt()
 }
 
-/// The rigid transform next to `matrix`: the proper rotation of its polar decomposition, and its
+/// The rigid transform nearest to `matrix`: the proper rotation of its polar decomposition, and its
 /// translation. A mirrored placement has the rotation of its negative, so that the result depends
 /// continuously on the matrix and keeps distances and handedness.
 ///

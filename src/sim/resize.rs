@@ -1,9 +1,9 @@
 //! Frames larger than the simulator was made for, and the image in which they are shown.
 
-use super::batches::Room;
+use super::batches::FrameBudget;
 use super::buffers::Buffers;
 use super::passes::frame_constants;
-use super::{Fused, SimError, Simulator, Sources, Tables};
+use super::{FusionResources, SimError, Simulator, Sources, Tables};
 use crate::gpu::Image;
 use crate::scene::Scene;
 
@@ -16,8 +16,8 @@ impl Simulator {
     /// Device out of memory, a buffer over the device's limit; the simulator then stays as it was.
     pub fn fit(&mut self, scene: &Scene) -> Result<bool, SimError> {
         let world = &self.passes.world;
-        let room = Room::of(&self.device);
-        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, &room);
+        let budget = FrameBudget::of(&self.device);
+        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, &budget);
         let tables = Tables::new(scene);
         let sizes = batches.sizes(&frame, &tables);
         if self.passes.buffers.hold(&sizes) {
@@ -25,7 +25,7 @@ impl Simulator {
         }
         self.frames.wait()?;
         let buffers = Buffers::new(&self.device, scene, sizes)?;
-        let fusion = Fused::new(&self.device, scene, self.passes.fusion.as_ref())?;
+        let fusion = FusionResources::new(&self.device, scene, self.passes.fusion.as_ref())?;
         let passes = &mut self.passes;
         (passes.buffers, passes.fusion) = (buffers, fusion);
         (passes.frame, passes.batches) = (frame, batches);

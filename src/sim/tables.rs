@@ -86,6 +86,7 @@ pub fn frame(scene: &Scene, frame_index: u32) -> layout::Frame {
         volume_scale: volume_scale as f32,
         background: scene.background as u32,
         instances: scene.instances.len() as u32,
+        couplant: scene.contact.as_ref().map_or(layout::NONE, |_| scene.instances.len() as u32),
         points: scene.wires.iter().map(|wire| wire.steps() + 1).sum(),
         face_height: probe.elevation_height as f32,
         axial_sigma: calibration.axial_sigma as f32,

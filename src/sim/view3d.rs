@@ -149,7 +149,7 @@ impl Simulator {
         image: &Image,
     ) -> Result<FrameTimings, SimError> {
         let passes = &self.passes;
-        assert_eq!(sight.looks.len(), passes.world.rows().len(), "looks");
+        assert_eq!(sight.looks.len(), passes.world.instances(), "looks");
         let mut viewer3d = match self.viewer3d.take() {
             Some(made) => made,
             None => Viewer3d::new(&self.device, library, passes.world.tracer(), sight)?,

@@ -17,12 +17,12 @@ use super::shaders::Library;
 use super::tracer::Tracer;
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::{Keyframes, Scene, Strategy};
-pub use arrays::Arrays;
-use arrays::Place;
-use changing::Changing;
-use entry::Mask;
-use joined::Sets;
-use top::Top;
+pub use arrays::GeometryArrays;
+use arrays::GeometryRange;
+use changing::ChangingInstances;
+use entry::RayMask;
+use joined::SharingSets;
+use top::TopLevel;
 
 /// The error of an anatomy that cannot be put on the device.
 #[derive(Debug, thiserror::Error)]
@@ -45,30 +45,30 @@ pub enum WorldError {
 pub struct World {
     tracer: Tracer,
     splits: Splits,
-    geometry: Geometry,
+    geometry: GeometryBuffers,
     fields: Fields,
-    places: Vec<Place>,
+    places: Vec<GeometryRange>,
     /// For each instance that changes its shape on the device, the room for it.
-    regions: Vec<Option<Place>>,
-    sets: Sets,
+    regions: Vec<Option<GeometryRange>>,
+    sets: SharingSets,
     /// For each instance, true if it has left the instances with which it shared a structure.
     apart: Vec<bool>,
-    changing: Changing,
-    top: Top,
+    changing: ChangingInstances,
+    top: TopLevel,
     rows: Vec<layout::Instance>,
-    mask: Mask,
+    mask: RayMask,
     /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
-    kernels: Arc<Kernels>,
+    kernels: Arc<ShapeKernels>,
 }
 
 /// The kernels that compute shapes.
-pub struct Kernels {
+pub struct ShapeKernels {
     interpolate: Kernel,
     refit: Kernel,
 }
 
-impl Kernels {
+impl ShapeKernels {
     /// # Errors
     /// A kernel that the device refuses.
     pub fn new(device: &Arc<Device>, library: &Library) -> Result<Self, GpuError> {
@@ -78,7 +78,7 @@ impl Kernels {
 }
 
 /// The buffers that all kernels of both tracers bind.
-struct Geometry {
+struct GeometryBuffers {
     instances: Buffer,
     vertices: Buffer,
     vertex_count: u32,
@@ -96,7 +96,7 @@ impl World {
     /// When the scene exceeds the device's limits or memory, or the tracer cannot serve it.
     pub fn new(
         device: &Arc<Device>,
-        kernels: &Arc<Kernels>,
+        kernels: &Arc<ShapeKernels>,
         scene: &Scene,
         tracer: Tracer,
     ) -> Result<Self, WorldError> {
@@ -110,7 +110,7 @@ impl World {
     /// Those of [`Self::new`].
     pub fn with_splits(
         device: &Arc<Device>,
-        kernels: &Arc<Kernels>,
+        kernels: &Arc<ShapeKernels>,
         scene: &Scene,
         tracer: Tracer,
         splits: Splits,
@@ -123,7 +123,7 @@ impl World {
     /// Like [`Self::with_splits`], with displacement fields that exist already.
     pub(super) fn with_fields(
         device: &Arc<Device>,
-        kernels: &Arc<Kernels>,
+        kernels: &Arc<ShapeKernels>,
         scene: &Scene,
         tracer: Tracer,
         splits: Splits,
@@ -144,8 +144,8 @@ impl World {
             }
         }
         let most = device.limits().max_storage_buffer_bytes;
-        let arrays = Arrays::within(most, scene, tracer, splits, fields, &apart)?;
-        let geometry = Geometry {
+        let arrays = GeometryArrays::within(most, scene, tracer, splits, fields, &apart)?;
+        let geometry = GeometryBuffers {
             instances: upload(device, "instances", bytemuck::cast_slice(&arrays.instances))?,
             vertices: upload(device, "vertices", bytemuck::cast_slice(&arrays.vertices))?,
             vertex_count: arrays.vertices.len() as u32,
@@ -157,7 +157,7 @@ impl World {
         let mut world = Self {
             tracer,
             splits,
-            changing: Changing::new(
+            changing: ChangingInstances::new(
                 device,
                 kernels,
                 scene,
@@ -166,7 +166,7 @@ impl World {
                 &arrays.regions,
                 arrays.uploaded,
             )?,
-            top: Top::new(device, scene, &arrays.sets, arrays.bvh)?,
+            top: TopLevel::new(device, scene, &arrays.sets, arrays.bvh)?,
             geometry,
             fields: arrays.fields,
             places: arrays.places,
@@ -174,7 +174,7 @@ impl World {
             sets: arrays.sets,
             apart,
             rows: arrays.instances,
-            mask: Mask::default(),
+            mask: RayMask::default(),
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             kernels: Arc::clone(kernels),
         };
@@ -219,7 +219,7 @@ impl World {
     }
 
     /// Takes other kernels from the next update on, after the frames in flight.
-    pub fn reload(&mut self, kernels: Kernels) {
+    pub fn reload(&mut self, kernels: ShapeKernels) {
         self.kernels = Arc::new(kernels);
         self.changing.reload(&self.kernels);
     }
@@ -237,7 +237,7 @@ impl World {
     ) -> Result<bool, WorldError> {
         assert_eq!(
             scene.instances.len(),
-            self.rows.len(),
+            self.instances(),
             "instances were added or removed after the upload"
         );
         let reshaped = self.changing.record(
@@ -331,7 +331,12 @@ impl World {
         (self.mask.bits, self.mask.ambiguous)
     }
 
-    /// The rows as they are on the device.
+    /// The number of the scene's instances.
+    pub fn instances(&self) -> usize {
+        self.made_for.len()
+    }
+
+    /// The rows as they are on the device; behind those of the scene's instances the couplant's, where there is one.
     pub fn rows(&self) -> &[layout::Instance] {
         &self.rows
     }

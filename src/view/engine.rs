@@ -16,7 +16,7 @@ use crate::gpu::{Device, FrameTimings, Image, MemoryUse};
 use crate::live::Grade;
 use crate::probe::Probe;
 use crate::scene::Scene;
-use crate::sim::contact::Touch;
+use crate::sim::contact::SkinContact;
 use crate::sim::shaders::Library;
 use crate::sim::{Memory, SimError};
 use worker::Worker;
@@ -76,7 +76,7 @@ pub struct Frame {
     /// World from probe.
     pub pose: DAffine3,
     /// Contact of the probe with the skin; none where the scene asks for no contact.
-    pub contact: Option<Touch>,
+    pub contact: Option<SkinContact>,
     /// Time of the scene, s.
     pub seconds: f64,
     /// Quality of the picture.

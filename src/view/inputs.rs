@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use super::files::said;
 use super::link::{Bell, Link, Report};
-use super::model::{Kept, Model, Ways, age};
+use super::model::{Model, StoredTrajectory, TrajectoryState, age};
 use super::pads::{Pads, Word};
 use super::{Listen, ViewError};
 use crate::igtl::{PORT, TrackerState};
@@ -106,16 +106,16 @@ impl Inputs {
     }
 
     /// Writes the recorded trajectory into its file.
-    pub(super) fn save(&mut self, ways: &mut Ways) {
-        let Some(kept) = &mut ways.kept else { return };
-        let Some(recording) = &kept.unsaved else {
+    pub(super) fn save(&mut self, trajectory: &mut TrajectoryState) {
+        let Some(stored) = &mut trajectory.stored else { return };
+        let Some(recording) = &stored.unsaved else {
             return;
         };
         let written = std::fs::write(&self.path, recording.text());
         self.problem = match written {
             Ok(()) => {
-                kept.unsaved = None;
-                kept.name = name(Path::new(&self.path));
+                stored.unsaved = None;
+                stored.name = name(Path::new(&self.path));
                 None
             }
             Err(error) => Some(format!(
@@ -126,11 +126,11 @@ impl Inputs {
     }
 
     /// Reads a trajectory from its file.
-    pub(super) fn load(&mut self, ways: &mut Ways) {
+    pub(super) fn load(&mut self, trajectory: &mut TrajectoryState) {
         let path = Path::new(&self.path);
         self.problem = match load_trajectory(path) {
             Ok(track) => {
-                ways.kept = Some(Kept::loaded(track, name(path)));
+                trajectory.stored = Some(StoredTrajectory::loaded(track, name(path)));
                 None
             }
             Err(error) => Some(said(&error)),

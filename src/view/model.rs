@@ -21,8 +21,8 @@ pub mod sheet;
 pub mod sidecar;
 pub mod skin;
 pub mod trajectory;
+mod trajectory_state;
 mod view3d;
-mod ways;
 
 use std::time::Instant;
 
@@ -44,8 +44,8 @@ use registration::Registration;
 pub use saving::File;
 pub use settings::Settings;
 use trajectory::Replay;
+pub use trajectory_state::{StoredTrajectory, TrajectoryState};
 pub use view3d::{Shown, View3d};
-pub use ways::{Kept, Ways};
 
 use super::engine::{Frame, Pixels};
 use crate::scene::Scene;
@@ -63,7 +63,7 @@ pub struct Model {
     /// The device that has the probe.
     pub devices: Devices,
     /// The trajectory that is recorded or replayed.
-    pub ways: Ways,
+    pub trajectory: TrajectoryState,
     /// Time of the scene.
     pub clock: Clock,
     /// True while the image and the clock stand still.
@@ -164,7 +164,7 @@ impl Model {
             settings,
             pose: scene.world_from_probe,
             devices: Devices::default(),
-            ways: Ways::default(),
+            trajectory: TrajectoryState::default(),
             clock: Clock::new(seconds, animated, now),
             frozen: false,
             animated,
@@ -232,7 +232,7 @@ impl Model {
         self.frozen = frozen;
         self.follow(now);
         self.clock.hold(frozen, now);
-        if let Some(replay) = &mut self.ways.replay {
+        if let Some(replay) = &mut self.trajectory.replay {
             replay.hold(frozen, now);
         }
         self.touch(now);
@@ -313,7 +313,7 @@ impl Model {
             tint: self.real.tint(),
             pose: self.pose,
             clock: self.clock,
-            replay: self.ways.replay.clone(),
+            replay: self.trajectory.replay.clone(),
             reads_back: self.mmode.is_some(),
             revision: self.revision,
             at: self.changed,

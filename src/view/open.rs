@@ -14,7 +14,7 @@ use super::files::Files;
 use super::inputs::{self, Inputs};
 use super::link::{Bell, Link};
 use super::look::{Look, Pictured};
-use super::model::{File, Kept};
+use super::model::{File, StoredTrajectory};
 use super::opening::{self, Opened, Opening};
 use super::session::{self, Session, Wake};
 use super::state::State;
@@ -120,7 +120,7 @@ impl Open {
         let suited = opening::suited(scene, file, options, &device, options.seconds, now);
         let Opened { scene, mut model } = suited.map_err(ViewError::Refused)?;
         if let Some((track, file)) = plan.options.trajectory.take() {
-            model.await_replay(Kept::loaded(track, inputs::name(&file)), now);
+            model.await_replay(StoredTrajectory::loaded(track, inputs::name(&file)), now);
         }
         plan.scene = scene;
         let machine = sim::machine(&device);

@@ -4,10 +4,10 @@ use insonify::probe::Probe;
 use insonify::scene::Scene;
 use insonify::sim::Simulator;
 
-/// Least share of what is dark without refraction.
+/// Least dark share of a vessel, relative to that without refraction.
 pub const LEAST: f64 = 0.9;
 
-/// Of each sample the log image, averaged over 3 scanlines and 1.5 mm of depth.
+/// The log image at each sample, averaged over 3 scanlines and 1.5 mm of depth.
 pub fn smoothed(levels: &[f32], probe: &Probe) -> Vec<f64> {
     let samples = probe.samples as usize;
     let reach = (0.75 / probe.sample_pitch()).round() as usize;
@@ -35,7 +35,7 @@ pub fn smoothed(levels: &[f32], probe: &Probe) -> Vec<f64> {
         .collect()
 }
 
-/// Whether each sample is 8 dB or more below the mean of those that are not in a lumen and within 4 mm of its depth.
+/// True for each sample that is 8 dB or more below the mean of the samples outside lumina within 4 mm of its depth.
 pub fn dark(levels: &[f32], lumen: &[bool], scene: &Scene) -> Vec<bool> {
     let samples = scene.probe.samples as usize;
     let means = smoothed(levels, &scene.probe);

@@ -20,7 +20,7 @@ const VESSELS: [[f64; 3]; 5] =
     [[-16.0, 36.0, 3.5], [-7.0, 52.0, 4.0], [0.0, 30.0, 3.0], [8.0, 46.0, 4.0], [17.0, 34.0, 3.5]];
 /// Deviation of the bumps, mm, and between which wavelengths they lie.
 const BUMPS: [[f64; 3]; 4] = [[0.3, 2.0, 3.0], [0.6, 3.0, 5.0], [1.2, 5.0, 8.0], [2.0, 7.0, 10.0]];
-/// Poses of each.
+/// Poses of each surface.
 const POSES: usize = 5;
 
 /// The block below fat, with vessels.
@@ -68,7 +68,7 @@ fn places(probe: &Probe) -> Vec<DVec3> {
     rays.flat_map(along).collect()
 }
 
-/// Middles of what is dark about each vessel that lies well within the image, mm in the image plane.
+/// Middle of the dark samples around each vessel that lies well within the image, mm in the image plane.
 fn middles(dark: &[bool], places: &[DVec3], scene: &Scene) -> Vec<Option<DVec2>> {
     let probe_from_world = scene.world_from_probe.inverse();
     let direction = probe_from_world.transform_vector3(DVec3::Y);
@@ -87,7 +87,7 @@ fn middles(dark: &[bool], places: &[DVec3], scene: &Scene) -> Vec<Option<DVec2>>
     VESSELS.iter().map(middle).collect()
 }
 
-/// Whether each of the `places` lies in a vessel.
+/// True for each of the `places` that lies in a vessel.
 fn in_vessels(places: &[DVec3], scene: &Scene) -> Vec<bool> {
     let inside = |p: &DVec3| {
         let p = scene.world_from_probe.transform_point3(*p);
@@ -96,8 +96,8 @@ fn in_vessels(places: &[DVec3], scene: &Scene) -> Vec<bool> {
     places.iter().map(inside).collect()
 }
 
-/// What of the vessels is dark over what is without refraction, pose by pose; and how far their middles lie from where
-/// the smooth surface puts them: mean of the shifts, and their root mean square, mm.
+/// Dark share of the vessels relative to that without refraction, for each pose; and the distances of their middles
+/// from where the smooth surface puts them: mean of the shifts, and their root mean square, mm.
 struct Seen {
     ratios: Vec<f64>,
     shift: DVec2,

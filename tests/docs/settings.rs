@@ -50,6 +50,7 @@ fn type_of(form: Form) -> String {
         Form::Texts => "list of texts".to_owned(),
         Form::OneOrSeveral => "text or list of texts".to_owned(),
         Form::TextOrTrue => "text or true".to_owned(),
+        Form::Several(_) => "list".to_owned(),
     }
 }
 
@@ -75,7 +76,7 @@ fn range_of(facts: &Facts) -> String {
 fn keys(document: &str) -> Vec<Line> {
     let mut out = Vec::new();
     for (table, keys) in reference() {
-        for Key { path, facts, default } in keys {
+        for Key { path, facts, default, .. } in keys {
             let mut place = (table.to_owned(), path.as_str());
             if let Some((inner, key)) = path.split_once('.')
                 && heading(document, &format!("{table}.{inner}")).is_some()

@@ -10,7 +10,7 @@ use insonify::sim::bvh::Splits;
 use insonify::sim::layout::NONE;
 use insonify::sim::shaders::Library;
 use insonify::sim::tracer::Tracer;
-use insonify::sim::world::{Kernels, World};
+use insonify::sim::world::{ShapeKernels, World};
 
 use super::compare::Found;
 use super::rays::Ray;
@@ -88,7 +88,7 @@ impl Rig {
             Tracer::RayQuery => "rays_query",
         };
         let kernel = Kernel::new(device, stem, Library::embedded().words(stem), &[]).unwrap();
-        let kernels = Arc::new(Kernels::new(device, &Library::embedded()).unwrap());
+        let kernels = Arc::new(ShapeKernels::new(device, &Library::embedded()).unwrap());
         let world = World::with_splits(device, &kernels, scene, tracer, splits).unwrap();
         Self {
             kernel,

@@ -2,6 +2,7 @@
 
 use glam::DAffine3;
 
+use super::worlds;
 use super::{Case, Input, Size};
 use crate::reference::geometry;
 use insonify::sim::layout::{FLAG_COINCIDENT, Frame, KIND_CONVEX, KIND_LINEAR, KIND_PHASED, Row};
@@ -107,6 +108,7 @@ pub fn frame(case: Case, size: Size) -> Frame {
         inverse_reference: 1.0,
         inverse_range: 1.0 / 60.0,
         frame_index: 5,
+        couplant: worlds::couplant(case),
         image_width: 1,
         image_height: 1,
         pixel_pitch: 0.25,

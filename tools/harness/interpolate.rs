@@ -50,7 +50,7 @@ fn job(case: Case, size: Size) -> Job {
         sources: [0, count, 2 * count, 3 * count],
         // Catmull-Rom's at a quarter of the interval.
         weights: [-0.070_312_5, 0.867_187_5, 0.226_562_5, -0.023_437_5],
-        // Displacements have a float to spare.
+        // Displacements have a fourth float, which is unused.
         stride: match case {
             Case::Random | Case::One => 4,
             Case::Odd => 1,

@@ -40,10 +40,8 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     for (i, found) in got.iter().enumerate() {
         let line = &lines[i / frame.samples as usize];
         let distance = f64::from(i as u32 % frame.samples) * f64::from(frame.sample_pitch);
-        let label = |distance: f64| match line.at(distance) {
-            Some(instance) => [instance, world.instances[instance as usize].tissue],
-            None => [NONE, frame.background],
-        };
+        let label =
+            |distance: f64| [line.at(distance).unwrap_or(NONE), line.tissue(&world, distance)];
         let either = line.crossings.iter().any(|c| (c.t - distance).abs() < EDGE);
         near += usize::from(either);
         let beside = [distance - EDGE, distance + EDGE].map(label);

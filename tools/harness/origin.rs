@@ -4,7 +4,7 @@ use super::inputs::{frame, scanlines};
 use super::worlds;
 use super::{Case, Check, Input, Job, Size, Subject};
 use crate::reference::origin;
-use crate::reference::way::Start;
+use crate::reference::straight::Start;
 use insonify::sim::layout::{Counters, FLAG_COINCIDENT, FLAG_MASKED, START_WORDS};
 use insonify::sim::placement;
 use insonify::sim::stages;

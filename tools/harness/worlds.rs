@@ -8,7 +8,7 @@ use super::{Case, Input, Job};
 use crate::reference::Owned;
 use insonify::scene::smoothed::smoothed;
 use insonify::scene::{Mesh, shapes};
-use insonify::sim::bvh::{MeshBvh, Placed, SceneBvh};
+use insonify::sim::bvh::{BvhInstance, MeshBvh, SceneBvh};
 use insonify::sim::fields::{HEADER, padded};
 use insonify::sim::layout::{Frame, Instance, NONE, Surface, Tissue};
 use insonify::sim::placement;
@@ -43,6 +43,22 @@ impl Builder {
             field: NONE,
             ..Instance::default()
         });
+    }
+
+    /// Adds the row that stands for the couplant, in front of everything; its index.
+    fn fill(&mut self, tissue: u32) -> u32 {
+        let identity = placement::matrix_rows(&DAffine3::IDENTITY);
+        self.instances.push(Instance {
+            world_from_object: identity,
+            object_from_world: identity,
+            texture_from_world: identity,
+            tissue,
+            priority: -i32::MAX,
+            slot: NONE,
+            field: NONE,
+            ..Instance::default()
+        });
+        self.instances.len() as u32 - 1
     }
 
     /// Makes instance `index` part of the fusion's mask.
@@ -94,8 +110,8 @@ impl Builder {
         }
         let (mut nodes, roots) = SceneBvh::of(&trees, &firsts, self.placements.len());
         let places = self.placements.iter().zip(0..);
-        let placed: Vec<Placed> = places
-            .map(|(&(mesh, world_from_object), instance)| Placed {
+        let placed: Vec<BvhInstance> = places
+            .map(|(&(mesh, world_from_object), instance)| BvhInstance {
                 instance,
                 bounds: trees[mesh].bounds,
                 world_from_object,
@@ -168,6 +184,15 @@ pub fn surfaces() -> Vec<Surface> {
     ]
 }
 
+/// The couplant of [`world`]: an instance where all lines start outside, else NONE.
+pub fn couplant(case: Case) -> u32 {
+    match case {
+        Case::One => 1,
+        Case::Modes => 3,
+        _ => NONE,
+    }
+}
+
 /// A world in front of a probe that looks along z. Its poses are random, so that no ray of a case
 /// is likely to run through an edge or along a surface.
 pub fn world(case: Case) -> Builder {
@@ -206,6 +231,9 @@ pub fn world(case: Case) -> Builder {
             let mirrored = DAffine3::from_scale(DVec3::new(-1.4, 0.8, 1.1));
             builder.again(2, pose(16.0, 2.0, 47.0) * mirrored, 3, 2);
         }
+    }
+    if couplant(case) != NONE {
+        assert_eq!(builder.fill(1), couplant(case), "behind the others");
     }
     builder
 }

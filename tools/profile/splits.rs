@@ -7,7 +7,7 @@ use std::time::Instant;
 use insonify::scene::{Scene, Strategy};
 use insonify::sim::bvh::Splits;
 use insonify::sim::fields::Fields;
-use insonify::sim::world::Arrays;
+use insonify::sim::world::GeometryArrays;
 use insonify::sim::{Simulator, Tracer};
 use miette::{IntoDiagnostic, Result};
 use serde_json::{Value, json};
@@ -103,7 +103,8 @@ fn measured(
     };
     let fields = Fields::build(&scene);
     let begun = Instant::now();
-    let arrays = Arrays::new(&scene, Tracer::Bvh, builder.splits(), fields).into_diagnostic()?;
+    let arrays =
+        GeometryArrays::new(&scene, Tracer::Bvh, builder.splits(), fields).into_diagnostic()?;
     let build = begun.elapsed().as_secs_f64() * 1e3;
     let nodes = arrays.bvh.map_or(0, |bvh| bvh.nodes.len());
     let stored = arrays.triangles.len();

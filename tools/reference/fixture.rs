@@ -48,6 +48,7 @@ impl Fixture {
         };
         Self {
             frame: Frame {
+                couplant: NONE,
                 world_from_probe: identity,
                 probe_from_world: identity,
                 kind: 1,

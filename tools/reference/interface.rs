@@ -33,18 +33,18 @@ pub(super) struct Micro {
 pub(super) struct Interface {
     /// Normal of the triangle.
     pub(super) geometric: DVec3,
-    /// Averaged over the wavefront: the one that refracts.
+    /// Normal averaged over the wavefront, by which the path refracts.
     pub(super) refracting: DVec3,
-    /// None when no attempt was acceptable: no echo, no reflected path.
+    /// The micro-normal; none if no attempt was acceptable: then there is no echo and no reflected path.
     pub(super) micro: Option<Micro>,
     /// Fluids before and behind.
     pub(super) fluids: [Fluid; 2],
-    /// Intensity reflectance R at the refracting normal, where the surface curves or is rough its mean
-    /// over the beam; 1 at total reflection.
+    /// Intensity reflectance R at the refracting normal; where the surface is curved or rough, its mean
+    /// over the beam. 1 at total reflection.
     pub(super) reflectance: f64,
-    /// Whether something gets through beside a totally reflected middle of the beam.
+    /// True if a part of the beam is transmitted though its middle is totally reflected.
     pub(super) curved: bool,
-    /// Deviation of the reflected direction over the beam, rad.
+    /// Standard deviation of the reflected direction over the beam, rad.
     pub(super) turn: f64,
     pub(super) roughness: f64,
     surface: Surface,
@@ -135,7 +135,7 @@ impl Interface {
         direction.or(self.curved.then_some(path.direction))
     }
 
-    /// Deposits what returns along the path: the part in phase at the surface, the rest displaced
+    /// Deposits the echo that returns along the path: the part in phase at the surface, the rest displaced
     /// by the thickness with a phase that belongs to the surface.
     pub(super) fn echo(&self, world: &World, path: &Path, out: &mut Accumulator) {
         let Some(micro) = self.micro else { return };

@@ -2,6 +2,7 @@
 
 use super::mask::middle;
 use super::world::{Crossing, World};
+use insonify::sim::layout::NONE;
 
 /// The crossings of a scanline and the instances around it.
 #[derive(Clone, Debug)]
@@ -15,7 +16,18 @@ pub struct Labels {
 impl Labels {
     /// The instance at a distance, mm; none in the background.
     pub fn at(&self, distance: f64) -> Option<u32> {
-        self.around[self.crossings.iter().take_while(|c| c.t <= distance).count()]
+        self.around[self.passed(distance)]
+    }
+
+    /// The tissue at a distance, mm.
+    pub fn tissue(&self, world: &World, distance: f64) -> u32 {
+        let gap = self.passed(distance) == 0 && world.frame.couplant != NONE;
+        let instance = self.at(distance).or(gap.then_some(world.frame.couplant));
+        instance.map_or(world.frame.background, |i| world.instances[i as usize].tissue)
+    }
+
+    fn passed(&self, distance: f64) -> usize {
+        self.crossings.iter().take_while(|c| c.t <= distance).count()
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::geometry::world_line;
 use super::stack::Stack;
-use super::way::Start;
+use super::straight::Start;
 use super::world::{Crossing, World};
-use insonify::sim::layout::{MAX_STACK, START_WORDS};
+use insonify::sim::layout::{MAX_STACK, NONE, START_WORDS};
 
 /// Most crossings that are followed.
 const CROSSINGS: usize = 64;
@@ -21,6 +21,9 @@ pub fn origin(world: &World) -> (Vec<Start>, u32) {
             let mut media = enclosing(&crossings);
             overflow += u32::from(media.len() > MAX_STACK);
             media.truncate(MAX_STACK);
+            if media.is_empty() && world.frame.couplant != NONE {
+                media.push(world.frame.couplant);
+            }
             let (start, full) = world.start(Stack(media), &crossings);
             overflow += full;
             starts.push(start);

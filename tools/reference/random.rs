@@ -1,6 +1,6 @@
 //! Random numbers of the paths; over the paths they may be a Sobol sequence.
 
-pub use insonify::random::{gaussian, pcg3d, pcg4d, unit};
+pub use insonify::random::{gaussian, pcg4d, unit};
 use insonify::sim::layout::{FLAG_SOBOL, Frame};
 
 /// Purpose: micro-normal of an interaction; the attempt 0..=7 is added.
@@ -11,6 +11,20 @@ pub const PURPOSE_THICKNESS: u32 = 16;
 pub const PURPOSE_CHOICE: u32 = 17;
 /// Purpose: lateral displacement of a path's origin.
 pub const PURPOSE_JITTER: u32 = 18;
+
+/// Three words hashed into three (pcg3d: Jarzynski and Olano, JCGT 9(3), 2020).
+pub fn pcg3d(v: [u32; 3]) -> [u32; 3] {
+    let mix = |v: &mut [u32; 3]| {
+        for [to, a, b] in [[0, 1, 2], [1, 2, 0], [2, 0, 1]] {
+            v[to] = v[to].wrapping_add(v[a].wrapping_mul(v[b]));
+        }
+    };
+    let mut v = v.map(|x| x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
+    mix(&mut v);
+    v = v.map(|x| x ^ (x >> 16));
+    mix(&mut v);
+    v
+}
 
 /// The words of path `path` at `bounce` for one purpose.
 pub fn path_random(path: u32, bounce: u32, purpose: u32, seed: u32) -> [u32; 4] {

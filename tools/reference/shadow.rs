@@ -4,7 +4,7 @@
 use super::geometry::world_line;
 use super::interface::{self, Interface};
 use super::path::{Path, Role, step};
-use super::way::{Start, Toggled};
+use super::straight::{Start, Toggled};
 use super::world::World;
 use insonify::sim::layout::MAX_PIECES;
 

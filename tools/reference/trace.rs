@@ -7,7 +7,7 @@ use super::interface::{self, Interface};
 use super::path::{PURPOSE_SURVIVAL, Path, Role, reflect, step, widen};
 use super::random::{PURPOSE_CHOICE, PURPOSE_JITTER, draw, gaussian, unit};
 use super::stack::Stack;
-use super::way::{Start, Toggled};
+use super::straight::{Start, Toggled};
 use super::world::{World, affine};
 use super::{Accumulator, Segment, acoustics};
 use insonify::sim::layout::{

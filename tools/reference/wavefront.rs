@@ -1,4 +1,4 @@
-//! How a surface turns the wavefront of a beam: by its mean slope over the wavefront's width.
+//! Refraction of a beam's wavefront at a surface: by the mean slope over the wavefront's width.
 
 use glam::DVec3;
 
@@ -13,11 +13,11 @@ use insonify::sim::layout::{
 /// the triangle's is.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Slope {
-    /// Of the triangle.
+    /// Normal of the triangle.
     pub(super) geometric: DVec3,
-    /// Interpolated.
+    /// Normal interpolated from the vertices.
     pub(super) shading: DVec3,
-    /// Averaged over the wavefront; in geometric acoustics that of `shading`.
+    /// Normal averaged over the wavefront; in geometric acoustics equal to `shading`.
     pub(super) refracting: DVec3,
     /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
     pub(super) width: f64,
@@ -93,9 +93,9 @@ pub(super) fn turned(
         let beyond = through(n).filter(|d| d.dot(geometric) < 0.0);
         return beyond.or_else(|| through(geometric));
     }
-    // Seen edge on or from behind, as the side of a bump is, the mean surface turns nothing.
+    // Where the mean surface is edge on or seen from behind, as at the side of a bump, nothing is refracted.
     let beyond = if d.dot(n) < 0.0 { through(n)? } else { d };
-    // What the triangle would let back out runs along it.
+    // A path that would leave through the triangle again runs along it.
     let rise = (beyond.dot(geometric) + f64::from(LEAST_DESCENT)).max(0.0);
     Some((beyond - rise * geometric).normalize())
 }

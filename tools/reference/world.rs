@@ -191,8 +191,8 @@ impl World<'_> {
         (affine(&instance.object_from_world).matrix3.transpose() * mean).normalize_or_zero()
     }
 
-    /// How fast a normal turns that is `normals` at the corners of the triangle (object space), along the direction
-    /// `along` (world, any length), rad/mm.
+    /// Rotation of the normal interpolated from `normals` at the corners of the triangle (object space), along the
+    /// direction `along` (world, any length), rad/mm.
     pub fn curvature(&self, crossing: &Crossing, normals: [DVec3; 3], along: DVec3) -> f64 {
         let instance = &self.instances[crossing.instance as usize];
         let to_world = affine(&instance.world_from_object).matrix3;

@@ -4,6 +4,7 @@ use super::document::Document;
 use super::error::SceneError;
 use super::fusion::closed_mesh;
 use super::table::Table;
+use super::tissues::Tissues;
 use crate::scene::{Contact, Instance, Mesh};
 use crate::settings::units::LENGTH;
 use crate::settings::{Form, group};
@@ -25,6 +26,9 @@ group! {
         /// few millimetres, a stand-off pad 5 to 20. The meshes are rigid: where real skin would yield and lie around a
         /// curved face, what it would yield belongs to the gap.
         gel: f64 = GEL, Facts::quantity(&LENGTH, 0.0, THICKEST);
+        /// Tissue of the gap, from the face to the first surface: a gel, water, or a stand-off pad. Behind the body the
+        /// scene's `background` goes on.
+        couplant: String = "gel".to_owned(), Facts::of(Form::Text);
     }
 }
 
@@ -33,11 +37,12 @@ pub(super) fn build(
     table: Option<&Table<ContactKeys>>,
     meshes: &[Mesh],
     instances: &[Instance],
+    tissues: &mut Tissues<'_>,
 ) -> Result<Option<Contact>, SceneError> {
     let Some(table) = table else {
         return Ok(None);
     };
-    let ContactKeys { mesh, gel } = table.stated.get("");
+    let ContactKeys { mesh, gel, couplant } = table.stated.get("");
     if mesh.is_empty() {
         return Err(document.fail(
             "contact.mesh",
@@ -50,5 +55,6 @@ pub(super) fn build(
         closed_mesh(document, &path, name, "the skin", meshes, instances)
     });
     let skin = skin.collect::<Result<_, _>>()?;
-    Ok(Some(Contact { skin, gel }))
+    let couplant = tissues.index("contact.couplant", &couplant)?;
+    Ok(Some(Contact { skin, gel, couplant }))
 }

@@ -11,7 +11,7 @@ use toml_edit::Key;
 
 use super::error::{SceneError, advice};
 use super::schema::File;
-use crate::settings::suggest;
+use crate::settings::{Facts, Value, suggest};
 
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
@@ -200,6 +200,14 @@ impl Document<'_> {
         self.source.error(self.span_of(path), message.into(), Some(remedy.into()))
     }
 
+    /// Fails at the value of a dotted path, whose key has these facts, if `value` is out of its range.
+    pub fn within(&self, path: &str, facts: &Facts, value: &Value) -> Result<(), SceneError> {
+        match facts.fault(value) {
+            Some((message, remedy)) => Err(self.fail(path, message, remedy)),
+            None => Ok(()),
+        }
+    }
+
     /// True if the top-level `table` has a key other than `but`.
     pub fn says_of(&self, table: &str, but: &str) -> bool {
         let table = self.root.get(table).and_then(|v| v.get_ref().as_table());
@@ -267,7 +275,8 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
     Some(value)
 }
 
-type Misfit = (String, String);
+/// The fault of a setting, and the remedy.
+pub(super) type Misfit = (String, String);
 
 /// The parts of a path as the command line and the program itself write it. Names with dots stand in quotes, as in
 /// TOML; others need none, and may hold what a bare key of TOML may not.
@@ -318,16 +327,7 @@ fn into_value<'s>(
             return Err((format!("`{name}` has no parts"), "set it as a whole".to_owned()));
         }
     };
-    let names: Vec<String> = array.iter().filter_map(name_of).collect();
-    let by_name = array.iter().position(|v| name_of(v).as_deref() == Some(rest[0]));
-    let index = by_name.or_else(|| rest[0].parse().ok().filter(|&i: &usize| i < array.len()));
-    let Some(index) = index else {
-        let remedy = match names.is_empty() {
-            true => format!("`{name}` has {} elements, counted from 0", array.len()),
-            false => suggest::among(rest[0], names.iter().map(String::as_str)),
-        };
-        return Err((format!("there is no {name} `{}`", rest[0]), remedy));
-    };
+    let index = element(name, rest[0], &array.iter().map(name_of).collect::<Vec<_>>())?;
     let element = &mut array.as_mut()[index];
     match rest {
         [_] => {
@@ -336,6 +336,19 @@ fn into_value<'s>(
         }
         _ => into_value(element.get_mut(), rest[0], &rest[1..], value, key_span),
     }
+}
+
+/// The index of the element that a part of a path means: by name, or counted from 0.
+pub(super) fn element(list: &str, wanted: &str, names: &[Option<String>]) -> Result<usize, Misfit> {
+    let by_name = names.iter().position(|n| n.as_deref() == Some(wanted));
+    let counted = || wanted.parse().ok().filter(|&i: &usize| i < names.len());
+    by_name.or_else(counted).ok_or_else(|| {
+        let remedy = match names.iter().any(Option::is_some) {
+            true => suggest::among(wanted, names.iter().flatten().map(String::as_str)),
+            false => format!("`{list}` has {} elements, counted from 0", names.len()),
+        };
+        (format!("there is no {list} `{wanted}`"), remedy)
+    })
 }
 
 fn name_of(value: &Spanned<DeValue<'_>>) -> Option<String> {

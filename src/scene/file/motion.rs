@@ -6,10 +6,10 @@ use super::document::Document;
 use super::error::SceneError;
 use super::placing::{AXIS, PLACE, TURN};
 use super::table::Stated;
-use super::{trajectory, within};
+use super::trajectory;
 use crate::scene::animation::{Clock, Curve, Fetal, Loop, Motion, Trs, Turn};
 use crate::settings::units::{DURATION, RATE};
-use crate::settings::{Facts, Form, group, words};
+use crate::settings::{Facts, Form, Value, group, words};
 
 /// Shortest and longest period, s: a microsecond, which no frame resolves, to a day.
 pub(super) const PERIODS: (f64, f64) = (1e-6, 86_400.0);
@@ -19,7 +19,7 @@ pub(super) const SQUEEZE: (f64, f64) = (0.4, 2.5);
 /// Updates per second: from one a day to more than any frame rate.
 pub(super) const UPDATES: Facts = Facts::quantity(&RATE, 1e-5, 1e6);
 /// The time in which all is shown once.
-pub(super) const PERIOD: Facts = Facts::quantity(&DURATION, PERIODS.0, PERIODS.1);
+pub(super) const PERIOD: Facts = Facts::quantity(&DURATION, PERIODS.0, PERIODS.1).key("period");
 /// Longest mean of a burst of movements or of a pause, s.
 const LONGEST: f64 = 3600.0;
 
@@ -42,7 +42,7 @@ words! {
     pub enum Between {
         /// Straight, and rotations along the great circle.
         Linear = "linear",
-        /// As in the row before.
+        /// The values of the row before.
         Step = "step",
     }
 }
@@ -130,7 +130,7 @@ pub(super) fn lasting(
     (start, end): (f64, f64),
 ) -> Result<f64, SceneError> {
     let period = if end > start { end - start } else { 1.0 };
-    within(document, &format!("{path}.period"), period, PERIODS.0, PERIODS.1, "s")?;
+    document.within(&format!("{path}.period"), &PERIOD, &Value::Number(period))?;
     Ok(period)
 }
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-/// What a scene of any kind is simulated with.
+/// Settings for every scene.
 const SIMULATION: [(&str, &str); 7] = [
     ("simulation.sampling", "plain"),
     ("simulation.coherence", "coherent"),

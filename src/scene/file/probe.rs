@@ -5,7 +5,6 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::document::Document;
 use super::error::SceneError;
 use super::table::Stated;
-use super::within;
 use crate::probe::Probe;
 use crate::settings::units::LENGTH;
 use crate::settings::{Form, Group, Value, group, suggest};
@@ -60,7 +59,7 @@ fn arrange(document: &Document<'_>, stated: &Stated, out: &mut Probe) -> Result<
     }
     for key in KEYS {
         let path = format!("probe.{key}");
-        let given = stated.number(key);
+        let given = stated.value(key);
         match (absent(out, key), given) {
             (true, Some(_)) => {
                 return Err(document.fail(
@@ -79,13 +78,13 @@ fn arrange(document: &Document<'_>, stated: &Stated, out: &mut Probe) -> Result<
             _ => {}
         }
     }
-    match stated.number("field_of_view") {
-        Some(view) => {
-            let [least, _] = Probe::range("field_of_view");
-            within(document, "probe.field_of_view", view, least, out.kind.widest(), "rad")
-        }
-        None => Ok(()),
-    }
+    let (Some(view), Some(row)) = (stated.value("field_of_view"), Probe::row("field_of_view"))
+    else {
+        return Ok(());
+    };
+    let mut facts = row.facts;
+    facts.range[1] = out.kind.widest();
+    document.within("probe.field_of_view", &facts, view)
 }
 
 /// World from probe, by the table `pose` of the table at `path`.

@@ -6,15 +6,11 @@ use std::path::{Component, Path, PathBuf};
 use toml_edit::visit_mut::{VisitMut, visit_table_like_kv_mut};
 use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value};
 
-use super::document::{Source, segments};
+use super::document::{Misfit, Source, element, segments};
 use super::error::SceneError;
 use super::tissues::Tissues;
 use super::{probe, settings};
 use crate::output::files;
-use crate::settings::suggest;
-
-/// The fault of a setting, and the remedy.
-type Misfit = (String, String);
 
 /// A setting to be written: its path, as [`crate::scene::Scene::load`] takes it, and its value, or none if
 /// the key is to be removed. Names with dots are quoted, as in TOML: `mesh."a.b".roughness`.
@@ -176,19 +172,6 @@ fn into_value(
 fn whole(name: &str) -> Misfit {
     let cause = format!("`{name}` has no such part");
     (cause, "set it as a whole".to_owned())
-}
-
-/// The index of the element that a part of a path means: by name, or counted from 0.
-fn element(list: &str, wanted: &str, names: &[Option<String>]) -> Result<usize, Misfit> {
-    let by_name = names.iter().position(|n| n.as_deref() == Some(wanted));
-    let counted = || wanted.parse().ok().filter(|&i: &usize| i < names.len());
-    by_name.or_else(counted).ok_or_else(|| {
-        let remedy = match names.iter().any(Option::is_some) {
-            true => suggest::among(wanted, names.iter().flatten().map(String::as_str)),
-            false => format!("`{list}` has {} elements, counted from 0", names.len()),
-        };
-        (format!("there is no {list} `{wanted}`"), remedy)
-    })
 }
 
 fn name_of(table: &dyn TableLike) -> Option<String> {

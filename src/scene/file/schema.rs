@@ -20,7 +20,7 @@ use super::shelf::{MeshKeys, ShapeKeys};
 use super::table::{Key, Keys, Table, defaults, keys};
 use super::tissues::TissueKeys;
 use super::tracker::{MatrixKey, TrackerKeys};
-use super::vary::VaryTable;
+use super::vary::VaryKeys;
 use crate::settings::{
     Display, Form, Fusion, Imaging, Live, Probe, Simulation, Surface, Tissue, group,
 };
@@ -57,7 +57,7 @@ pub struct File {
     #[serde(default)]
     pub live: Table<Live>,
     #[serde(default, alias = "sweep")]
-    pub vary: VaryTable,
+    pub vary: Table<VaryKeys>,
     #[serde(default)]
     pub group: Vec<Table<NodeKeys>>,
     #[serde(default)]

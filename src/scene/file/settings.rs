@@ -8,8 +8,8 @@ use super::probe;
 use super::schema::File;
 use crate::settings::{Settings, Simulation};
 
-/// What the tables `probe`, `simulation` and `imaging` of `file` say. Defaults of `simulation` that follow the
-/// frequency are those of a probe of `frequency` MHz, or of the file's where it is none.
+/// The settings stated in the tables `probe`, `simulation` and `imaging` of `file`. Defaults of `simulation` that
+/// follow the frequency are those of a probe of `frequency` MHz, or without it of the file's probe.
 pub(super) fn settings(
     document: &Document<'_>,
     file: &File,
@@ -28,7 +28,7 @@ pub(super) fn settings(
 /// frequency are those of the present probe.
 ///
 /// # Errors
-/// As those of [`crate::scene::Scene::load`]; a file without any of the three. `settings` are then as they were.
+/// Those of [`crate::scene::Scene::load`]; a file without any of the three tables. `settings` are then unchanged.
 pub fn load_settings(path: &Path, settings: &mut Settings) -> Result<(), SceneError> {
     let source = Source::read(path, &[])?;
     let document = source.document()?;

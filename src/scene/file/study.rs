@@ -12,9 +12,8 @@ use super::placing::{Placed, placement};
 use super::probe::{self, look, pose};
 use super::table::{Key, Keys, Table, defaults};
 use super::trajectory;
-use super::within;
 use crate::scene::Scene;
-use crate::settings::{Form, Surroundings, Words, group};
+use crate::settings::{Facts, Form, Surroundings, Value, Words, group};
 
 /// Most cases of a study; the paper has 27, for which an assessor needs a day.
 const MAX_CASES: usize = 999;
@@ -22,6 +21,8 @@ const MAX_CASES: usize = 999;
 const MAX_WORDS: usize = 4000;
 /// Default height of an image, pixels; the paper's 621 images take about 50 MB.
 const HEIGHT: u32 = 320;
+/// Heights of an image that a plan may give.
+const HEIGHTS: Facts = Facts::whole(1, 4096).counted("pixels").key("image_height");
 
 /// The plan of a study: its images and questions.
 pub struct Plan {
@@ -181,7 +182,7 @@ impl Plan {
         check.texts(&table)?;
         check.backgrounds(&table.backgrounds)?;
         let height = table.image_height.unwrap_or(HEIGHT);
-        within(&document, "image_height", f64::from(height), 1.0, 4096.0, "pixels")?;
+        document.within("image_height", &HEIGHTS, &Value::Whole(height))?;
         check.names("scenario", table.scenario.iter().map(|s| &*s.name))?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let mut scenarios = Vec::new();

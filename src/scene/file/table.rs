@@ -1,6 +1,6 @@
 //! Tables of scene files, read by the rows of their keys.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::marker::PhantomData;
 
@@ -27,6 +27,8 @@ pub struct Key {
     pub path: String,
     /// All facts about it.
     pub facts: &'static Facts,
+    /// The form of its values.
+    pub form: Form,
     /// Its default, as the reference writes it.
     pub default: String,
 }
@@ -40,6 +42,7 @@ pub(super) fn keys<T: Group>(
     T::rows().iter().map(move |Row { facts, .. }| Key {
         path: format!("{below}{}", facts.key),
         facts,
+        form: facts.form,
         default: match default {
             "" => facts.default.unwrap_or_default().to_owned(),
             words => words.to_owned(),
@@ -47,7 +50,7 @@ pub(super) fn keys<T: Group>(
     })
 }
 
-/// As [`keys`], of a group with defaults.
+/// The keys of a group with defaults, like [`keys`].
 pub(super) fn defaults<T: Group + Default>(below: &'static str) -> impl Iterator<Item = Key> {
     let value = |row: &Row<T>| match (row.facts.default, (row.get)(&T::default())) {
         (None, Value::Text(text)) => format!("`{text}`"),
@@ -74,8 +77,8 @@ pub struct Table<K> {
 /// Values of the keys that a table states.
 #[derive(Debug, Default)]
 pub struct Stated {
-    /// By the key's place in the table.
-    values: BTreeMap<String, Value>,
+    /// Each with its key's place in the table, in the order of the file.
+    values: Vec<(String, Value)>,
     /// The tables in it.
     tables: BTreeSet<String>,
 }
@@ -96,9 +99,8 @@ impl<K: Keys> Table<K> {
     /// Fails at the first value out of its range; `path` is the table's.
     pub fn check(&self, document: &Document<'_>, path: &str) -> Result<(), SceneError> {
         for key in K::keys() {
-            let value = self.stated.value(&key.path);
-            if let Some((message, remedy)) = value.and_then(|value| key.facts.fault(value)) {
-                return Err(document.fail(&format!("{path}.{}", key.path), message, remedy));
+            if let Some(value) = self.stated.value(&key.path) {
+                document.within(&format!("{path}.{}", key.path), key.facts, value)?;
             }
         }
         Ok(())
@@ -108,12 +110,17 @@ impl<K: Keys> Table<K> {
 impl Stated {
     /// The value of a key; none if the table does not state it.
     pub fn value(&self, key: &str) -> Option<&Value> {
-        self.values.get(key)
+        self.values.iter().find(|(name, _)| name == key).map(|(_, value)| value)
+    }
+
+    /// The keys that the table states, in its order.
+    pub fn keys(&self) -> impl Iterator<Item = &str> {
+        self.values.iter().map(|(key, _)| key.as_str())
     }
 
     /// Returns whether the table has the key, or a table of this name.
     pub fn has(&self, key: &str) -> bool {
-        self.values.contains_key(key) || self.tables.contains(key)
+        self.value(key).is_some() || self.tables.contains(key)
     }
 
     /// The number at a key; none if the table does not state it.
@@ -135,7 +142,7 @@ impl Stated {
     /// Writes the settings that the table `below` states into `out`.
     pub fn put<T: Group>(&self, below: &str, out: &mut T) {
         for row in T::rows() {
-            if let Some(value) = self.values.get(&format!("{below}{}", row.facts.key)) {
+            if let Some(value) = self.value(&format!("{below}{}", row.facts.key)) {
                 (row.set)(out, value);
             }
         }
@@ -194,8 +201,8 @@ impl<'de> Visitor<'de> for Reader<'_> {
             let path = format!("{}{name}", self.below);
             match self.keys.iter().find(|key| key.path == path) {
                 Some(key) => {
-                    let value = map.next_value_seed(&key.facts.form)?;
-                    self.stated.values.insert(path, value);
+                    let value = map.next_value_seed(&key.form)?;
+                    self.stated.values.push((path, value));
                 }
                 None => {
                     let below = format!("{path}.");

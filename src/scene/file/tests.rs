@@ -2,6 +2,7 @@ pub(super) mod graph;
 mod mistakes;
 mod vary;
 
+use crate::settings::units::DURATION;
 use std::path::PathBuf;
 
 use super::*;
@@ -254,10 +255,10 @@ fn coincident_triangles_are_counted_and_named() {
 #[test]
 fn times_may_have_a_unit() {
     for (text, value) in [("0.4", 0.4), ("400 ms", 0.4), ("-1s", -1.0)] {
-        assert_eq!(seconds(text), Ok(value));
+        assert_eq!(DURATION.finite(text), Ok(value));
     }
-    for (text, cause) in [("4 mm", "`s`, `ms`"), ("soon", "1.5 s"), ("inf", "no time")] {
-        let said = seconds(text).expect_err(text);
+    for (text, cause) in [("4 mm", "`s`, `ms`"), ("soon", "1.5 s"), ("inf", "no duration")] {
+        let said = DURATION.finite(text).expect_err(text);
         assert!(said.contains(cause), "{said}");
     }
 }

@@ -64,7 +64,7 @@ pub(super) fn build(document: &Document<'_>, stated: &Stated) -> Result<Tracker,
     })
 }
 
-/// What the table `name` says: either the matrix, or rotation and shift.
+/// The transform in the table `name`: either the matrix, or rotation and shift.
 fn transform(document: &Document<'_>, stated: &Stated, name: &str) -> Result<DAffine3, SceneError> {
     let below = format!("{name}.");
     let Some(rows) = stated.get::<MatrixKey>(&below).matrix else {

@@ -254,27 +254,22 @@ impl Table<'_> {
             }
         }
         let refused = |e: TrackError| self.refused(&e, time, rotations);
-        let times = || time.values.clone();
-        let mut track = Track::default();
-        if let Some([x, y, z]) = positions {
-            let values = (0..rows).map(|i| DVec3::new(x.values[i], y.values[i], z.values[i]));
-            let channel = Channel::new(times(), values.collect(), curve);
-            track.translation = Some(channel.map_err(refused)?);
-        }
-        if let Some(q) = rotations {
+        let vectors = |of: [&Column; 3]| {
+            let values = (0..rows).map(|i| DVec3::from(of.map(|c| c.values[i])));
+            Channel::new(time.values.clone(), values.collect(), curve).map_err(refused)
+        };
+        let quaternions = |of: [&Column; 4]| {
             let values = (0..rows).map(|i| {
-                let [w, x, y, z] = q.map(|c| c.values[i]);
+                let [w, x, y, z] = of.map(|c| c.values[i]);
                 DQuat::from_xyzw(x, y, z, w)
             });
-            let channel = Channel::rotations(times(), values.collect(), curve);
-            track.rotation = Some(channel.map_err(refused)?);
-        }
-        if let Some([x, y, z]) = factors {
-            let values = (0..rows).map(|i| DVec3::new(x.values[i], y.values[i], z.values[i]));
-            let channel = Channel::new(times(), values.collect(), curve);
-            track.scale = Some(channel.map_err(refused)?);
-        }
-        Ok(track)
+            Channel::rotations(time.values.clone(), values.collect(), curve).map_err(refused)
+        };
+        Ok(Track {
+            translation: positions.map(vectors).transpose()?,
+            rotation: rotations.map(quaternions).transpose()?,
+            scale: factors.map(vectors).transpose()?,
+        })
     }
 
     /// The error for samples that a channel refuses, at their row.

@@ -1,95 +1,25 @@
 //! The table `vary`.
 
-use std::fmt;
-
-use serde::Deserialize;
-use serde::de::{DeserializeSeed, Deserializer, Error, MapAccess, SeqAccess, Visitor};
-
 use super::document::Document;
 use super::error::SceneError;
 use super::settings;
-use super::table::unknown;
+use super::table::{Key, Keys, Stated};
 use crate::scene::Scene;
 use crate::scene::vary::{Parameter, Variant};
 use crate::settings::{Form, Value};
 
-/// Values of parameters, in the order of the file.
-#[derive(Debug, Default)]
-pub(super) struct VaryTable(Vec<(Parameter, Vec<f64>)>);
+/// The parameters, each with a list of values.
+pub enum VaryKeys {}
 
-impl<'de> Deserialize<'de> for VaryTable {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        struct AsTable;
+impl Keys for VaryKeys {
+    const TABLE: &'static str = "vary";
 
-        impl<'de> Visitor<'de> for AsTable {
-            type Value = VaryTable;
-
-            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str("a table of parameters, each with a list of values")
-            }
-
-            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<VaryTable, A::Error> {
-                let mut out = Vec::new();
-                while let Some(parameter) = map.next_key_seed(Key)? {
-                    out.push((parameter, map.next_value_seed(Values(parameter.form()))?));
-                }
-                Ok(VaryTable(out))
-            }
-        }
-
-        deserializer.deserialize_map(AsTable)
-    }
-}
-
-/// Reads the key of a parameter.
-struct Key;
-
-impl Visitor<'_> for Key {
-    type Value = Parameter;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("the key of a number among probe, simulation and imaging")
-    }
-
-    fn visit_str<E: Error>(self, text: &str) -> Result<Parameter, E> {
-        Parameter::of(text).ok_or_else(|| unknown(text, Parameter::all().map(|p| p.key())))
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for Key {
-    type Value = Parameter;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Parameter, D::Error> {
-        deserializer.deserialize_identifier(self)
-    }
-}
-
-/// Reads a list of values of this form.
-struct Values(Form);
-
-impl<'de> Visitor<'de> for Values {
-    type Value = Vec<f64>;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("a sequence")
-    }
-
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Vec<f64>, A::Error> {
-        let mut out = Vec::new();
-        while let Some(value) = list.next_element_seed(&self.0)? {
-            if let Value::Number(number) = value {
-                out.push(number);
-            }
-        }
-        Ok(out)
-    }
-}
-
-impl<'de> DeserializeSeed<'de> for Values {
-    type Value = Vec<f64>;
-
-    fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<Vec<f64>, D::Error> {
-        deserializer.deserialize_seq(self)
+    fn keys() -> Vec<Key> {
+        let key = |p: Parameter| {
+            let form = Form::Several(p.form());
+            Key { path: p.key(), facts: p.facts, form, default: String::new() }
+        };
+        Parameter::all().map(key).collect()
     }
 }
 
@@ -97,21 +27,25 @@ impl<'de> DeserializeSeed<'de> for Values {
 /// that are suggested; then those of the other parameters that it states.
 pub(super) fn variants(
     document: &Document<'_>,
-    table: &VaryTable,
+    stated: &Stated,
     scene: &Scene,
     suggested: bool,
 ) -> Result<Vec<Variant>, SceneError> {
-    let stated = |parameter: &Parameter| table.0.iter().find(|(other, _)| other == parameter);
+    let values = |parameter: &Parameter| match stated.value(&parameter.key()) {
+        Some(Value::List(values)) => Some(values.clone()),
+        _ => None,
+    };
     let mut all: Vec<(Parameter, Vec<f64>)> = Vec::new();
     for parameter in Parameter::suggested() {
         let around = || {
             let own = parameter.value(scene).filter(|_| suggested);
             own.and_then(|own| parameter.around(own)).map_or_else(Vec::new, Vec::from)
         };
-        let values = stated(&parameter).map_or_else(around, |(_, values)| values.clone());
-        all.push((parameter, values));
+        all.push((parameter, values(&parameter).unwrap_or_else(around)));
     }
-    all.extend(table.0.iter().filter(|(p, _)| !Parameter::suggested().any(|s| s == *p)).cloned());
+    let others = stated.keys().filter_map(Parameter::of);
+    let others = others.filter(|p| !Parameter::suggested().any(|s| s == *p));
+    all.extend(others.filter_map(|p| Some((p, values(&p)?))));
     let mut out = Vec::new();
     for (parameter, values) in all {
         for (i, value) in values.into_iter().enumerate() {

@@ -1,5 +1,7 @@
 //! Diffusion on a triangulated surface: linear finite elements, lumped masses.
 
+use std::cmp::Ordering;
+
 use glam::DVec3;
 
 /// Residual, relative to the first, at which a step is good enough: what is left turns normals by less than a
@@ -16,7 +18,7 @@ pub(super) struct Elements {
     mass: Vec<f64>,
     /// Stiffness of each node with itself.
     own: Vec<f64>,
-    /// Where the links of each node begin; one more for the end.
+    /// Start of the links of each node; one more entry for the end.
     first: Vec<u32>,
     /// Neighbour and stiffness.
     links: Vec<(u32, f64)>,
@@ -66,7 +68,7 @@ impl Elements {
         Self { corners, mass, own, first, links }
     }
 
-    /// Means over the area about each node of what each corner of the triangles has.
+    /// Means over the area around each node of the values at the corners of the triangles.
     pub(super) fn means(&self, at_corners: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
         let mut sums = vec![DVec3::ZERO; self.mass.len()];
         for (&(node, share), value) in self.corners.iter().zip(at_corners) {
@@ -93,8 +95,8 @@ impl Elements {
         let mut norm = inner(&residual, &direction);
         let enough = norm * RESIDUAL * RESIDUAL;
         for _ in 0..ITERATIONS {
-            // Also where a triangle is no number.
-            if !(norm > enough) {
+            // Also where a corner is no number: then there is no order.
+            if norm.partial_cmp(&enough).is_none_or(Ordering::is_le) {
                 break;
             }
             self.apply(&direction, time, &mut image);

@@ -101,7 +101,7 @@ fn ripples_decay_with_their_scale() {
     }
 }
 
-/// As means over the area they have the mean slope, also of steep bumps.
+/// The means over the area have the mean slope, also of steep bumps.
 #[test]
 fn steep_bumps_leave_the_slope_that_they_stand_on() {
     let bumps = |x: f64, y: f64| 0.5 * (1.7 * x).sin() * (1.9 * y + 0.4).cos();

@@ -79,8 +79,8 @@ fn trees_of_two_meshes_share_one_buffer() {
     assert!(seen[..50].iter().all(|&n| n == 0) && seen[50..].iter().all(|&n| n == 1));
 }
 
-fn places(trees: &[(usize, f64)], of: &[MeshBvh]) -> Vec<Placed> {
-    let placed = trees.iter().enumerate().map(|(i, &(tree, x))| Placed {
+fn places(trees: &[(usize, f64)], of: &[MeshBvh]) -> Vec<BvhInstance> {
+    let placed = trees.iter().enumerate().map(|(i, &(tree, x))| BvhInstance {
         instance: 10 + i as u32,
         bounds: of[tree].bounds,
         world_from_object: DAffine3::from_translation(DVec3::new(x, 0.0, 0.0)),

@@ -132,7 +132,7 @@ impl MeshTree {
 impl Skin {
     /// Stretches of the line `origin + t direction` (world, mm) that lie in the body, in order; layers
     /// that touch are one.
-    fn stretches(&self, origin: DVec3, direction: DVec3) -> Vec<Chord> {
+    fn chords(&self, origin: DVec3, direction: DVec3) -> Vec<Chord> {
         let mut crossings: Vec<Crossing> = Vec::new();
         for body in &self.bodies {
             let object = &body.object_from_world;
@@ -145,7 +145,7 @@ impl Skin {
             }));
         }
         crossings.sort_by(|a, b| a.t.total_cmp(&b.t));
-        let mut stretches: Vec<Chord> = Vec::new();
+        let mut chords: Vec<Chord> = Vec::new();
         let (mut depth, mut begin, mut normal) = (0i32, 0.0, DVec3::ZERO);
         for crossing in crossings {
             let before = depth;
@@ -154,28 +154,28 @@ impl Skin {
                 (begin, normal) = (crossing.t, crossing.normal);
             } else if before == 1 && depth == 0 {
                 let end = crossing.t;
-                match stretches.last_mut().filter(|s| begin - s.end < TOUCHING) {
+                match chords.last_mut().filter(|s| begin - s.end < TOUCHING) {
                     Some(last) => last.end = end,
-                    None => stretches.push(Chord { begin, end, normal }),
+                    None => chords.push(Chord { begin, end, normal }),
                 }
             }
         }
-        stretches
+        chords
     }
 
     /// The first point at which a ray (world, mm; `direction` a unit vector) enters the body from outside, and
     /// the outward normal of the triangle there.
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<(DVec3, DVec3)> {
-        let stretches = self.stretches(origin, direction);
-        let first = stretches.into_iter().find(|s| s.begin >= 0.0)?;
+        let chords = self.chords(origin, direction);
+        let first = chords.into_iter().find(|s| s.begin >= 0.0)?;
         Some((origin + first.begin * direction, first.normal.normalize()))
     }
 
     /// Distance from a point (world, mm) along a unit `direction` to the skin, mm; negative for a point in the
     /// body: the distance back to where the line entered it. None if there is no body ahead.
     pub fn gap(&self, point: DVec3, direction: DVec3) -> Option<f64> {
-        let stretches = self.stretches(point, direction);
-        let ahead = stretches.into_iter().find(|s| s.end >= 0.0);
+        let chords = self.chords(point, direction);
+        let ahead = chords.into_iter().find(|s| s.end >= 0.0);
         ahead.map(|s| s.begin)
     }
 }

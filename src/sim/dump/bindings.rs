@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::super::bvh::Splits;
 use super::super::fields::Fields;
-use super::super::world::Arrays;
+use super::super::world::GeometryArrays;
 use super::super::{SimError, Simulator, Tracer, layout, stages};
 use super::DumpError;
 use crate::output::npy::{self, Element};
@@ -20,7 +20,7 @@ use crate::scene::Scene;
 /// instances with the same triangle.
 pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Result<(), DumpError> {
     let still = scene.still();
-    let arrays = Arrays::new(&still, Tracer::Bvh, Splits::Object, Fields::build(&still));
+    let arrays = GeometryArrays::new(&still, Tracer::Bvh, Splits::Object, Fields::build(&still));
     let arrays = arrays.map_err(|e| SimError::World(e.into()))?;
     let nodes = &arrays.bvh.expect("made for the compute tracer").nodes;
     // A still scene has no displacements; the rows on the device have the fields of this frame.

@@ -24,7 +24,7 @@ pub static INPUTS: [Array; 9] = [
     Array::of::<Counters>("counters", Word, |_| 1).zeroed(),
 ];
 
-/// The anatomy, which [`super::super::World`] holds.
+/// The anatomy, held by [`super::super::World`].
 pub static ANATOMY: [Array; 7] = [
     Array::anatomy("instances", Word, size_of::<Instance>() / 4),
     Array::anatomy("vertices", Float, 3),

@@ -15,7 +15,7 @@ use crate::sim::bvh::Splits;
 use crate::sim::fields::Fields;
 use crate::sim::layout::{NONE, Ray, RayHit};
 use crate::sim::shaders::Library;
-use crate::sim::world::{Kernels, World};
+use crate::sim::world::{ShapeKernels, World};
 
 /// Rays followed at the same time: one per line, if there are as many lines.
 const RAYS: u32 = 1344;
@@ -97,7 +97,7 @@ impl TrialWorld {
     ) -> Result<Self, SimError> {
         let stem = format!("rays_{}", tracer.suffix());
         let kernel = Kernel::new(device, &stem, library.words(&stem), &[])?;
-        let kernels = Arc::new(Kernels::new(device, library)?);
+        let kernels = Arc::new(ShapeKernels::new(device, library)?);
         // Rays do not use displacement fields.
         let fields = Fields::none(scene);
         let apart = vec![false; scene.instances.len()];

@@ -3,10 +3,10 @@
 use rayon::prelude::*;
 
 use super::entry;
-use super::joined::{Set, Sets};
+use super::joined::{SharingSet, SharingSets};
 use crate::scene::smoothed::{self, FINEST, smoothed};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
-use crate::sim::bvh::{BvhError, MeshBvh, Placed, SceneBvh, Splits};
+use crate::sim::bvh::{BvhError, BvhInstance, MeshBvh, SceneBvh, Splits};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
 use crate::sim::placement::stretch;
@@ -17,7 +17,7 @@ pub(super) type Bounds = [[f32; 3]; 2];
 
 /// The place in the arrays of the geometry of a mesh, or of an instance that changes its shape.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Place {
+pub(super) struct GeometryRange {
     pub(super) first_vertex: u32,
     pub(super) first_triangle: u32,
     /// Number of triangles in the array.
@@ -28,10 +28,10 @@ pub(super) struct Place {
     /// Index in the mesh of each triangle, in the order of the array; triangles that were cut occur several
     /// times. None where the order is that of the mesh.
     pub(super) order: Option<Vec<u32>>,
-    /// In the mesh's unit: over how much of it the first of its averaged normals is taken, which is
+    /// Standard deviation of the finest of the averaged normals, in the mesh's unit: that of
     /// [`FINEST`] where the mesh is placed first.
     pub(super) finest: f64,
-    /// Of an instance that changes its shape: how often the device has made it.
+    /// For an instance that changes its shape: how many times the device has computed it.
     pub(super) version: u64,
     /// For a structure that instances share: the place in the triangles, in words, of the list that names the
     /// instance of each triangle; 0: all triangles belong to one instance.
@@ -41,9 +41,9 @@ pub(super) struct Place {
 /// Of one vertex the normals averaged over the surface about it ([`smoothed()`]).
 pub(super) type Averages = [u32; smoothed::LEVELS];
 
-/// What of a mesh has to stay on the device.
+/// The part of a mesh that has to stay on the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) enum Need {
+pub(super) enum Residency {
     /// Nothing: the mesh is uploaded when it is shown.
     Nothing,
     /// Vertices and normals.
@@ -55,19 +55,19 @@ pub(super) enum Need {
 }
 
 /// The part of each mesh of a scene that must stay on the device; the triangles of `sets` lie with their sets.
-pub(super) fn needs(scene: &Scene, sets: &Sets) -> Vec<Need> {
-    let mut needs = vec![Need::Nothing; scene.meshes.len()];
+pub(super) fn needs(scene: &Scene, sets: &SharingSets) -> Vec<Residency> {
+    let mut needs = vec![Residency::Nothing; scene.meshes.len()];
     for (i, instance) in scene.instances.iter().enumerate() {
         let keyframes = &instance.keyframes;
         let need = match keyframes.strategy {
-            _ if sets.of(i).is_some() => Need::Vertices,
-            _ if keyframes.meshes.is_empty() => Need::Structure,
+            _ if sets.of(i).is_some() => Residency::Vertices,
+            _ if keyframes.meshes.is_empty() => Residency::Structure,
             Strategy::Exchange | Strategy::Update | Strategy::Mask | Strategy::Selector => {
-                Need::Structure
+                Residency::Structure
             }
-            Strategy::Cached => Need::Geometry,
-            Strategy::Refit | Strategy::Interpolate => Need::Vertices,
-            Strategy::Rebuild => Need::Nothing,
+            Strategy::Cached => Residency::Geometry,
+            Strategy::Refit | Strategy::Interpolate => Residency::Vertices,
+            Strategy::Rebuild => Residency::Nothing,
         };
         for &mesh in keyframes.meshes.iter().chain([&instance.mesh]) {
             needs[mesh] = needs[mesh].max(need);
@@ -88,7 +88,7 @@ fn finest(scene: &Scene) -> Vec<f64> {
     finest.into_iter().map(|f| f.unwrap_or(FINEST)).collect()
 }
 
-/// Whether the instance's structure changes while the program runs.
+/// True if the instance's structure changes while the program runs.
 pub(super) fn is_dynamic(instance: &Instance) -> bool {
     use Strategy::{Cached, Interpolate, Rebuild, Refit};
     let changing = [Rebuild, Cached, Refit, Interpolate].contains(&instance.keyframes.strategy);
@@ -97,33 +97,33 @@ pub(super) fn is_dynamic(instance: &Instance) -> bool {
 
 /// Geometry of all meshes, and the instances. For the compute tracer triangles lie in the order of
 /// its leaves, for the ray query in that of the meshes, so that nothing is built to sort them.
-pub struct Arrays {
+pub struct GeometryArrays {
     /// One row per instance of the scene.
     pub instances: Vec<layout::Instance>,
     /// Vertex positions, object space, mm.
     pub vertices: Vec<[f32; 3]>,
     /// Unit outward shading normals, one per vertex.
     pub normals: Vec<[f32; 3]>,
-    /// The same averaged over the surface about each vertex ([`smoothed()`]).
+    /// For each vertex the normals averaged over the surface around it ([`smoothed()`]).
     pub smoothed: Vec<[u32; smoothed::LEVELS]>,
-    /// Those of the meshes that have no vertices here, by mesh.
+    /// Averaged normals of the meshes that have no vertices here, by mesh.
     pub(super) uploaded: Vec<Vec<Averages>>,
-    /// Indices into the vertices; behind them, two to a word, whose the triangles are that instances
-    /// share.
+    /// Indices into the vertices; after them, two per word, the instances to which the triangles of shared
+    /// structures belong.
     pub triangles: Vec<[u32; 3]>,
     /// The compute tracer's hierarchy.
     pub bvh: Option<SceneBvh>,
     /// Displacement fields of deforming tissue.
     pub fields: Fields,
-    pub(super) places: Vec<Place>,
+    pub(super) places: Vec<GeometryRange>,
     /// For each instance that changes its shape on the device, room for the largest of its keyframes.
-    pub(super) regions: Vec<Option<Place>>,
+    pub(super) regions: Vec<Option<GeometryRange>>,
     /// The instances that share a structure.
-    pub(super) sets: Sets,
+    pub(super) sets: SharingSets,
 }
 
 /// A structure of a set before its place in the arrays is known.
-struct Joint {
+struct UnplacedStructure {
     /// Indices into the vertices, in the order of the array.
     triangles: Vec<[u32; 3]>,
     /// For each triangle the instance, and the index in that instance's mesh.
@@ -131,7 +131,7 @@ struct Joint {
     tree: Option<MeshBvh>,
 }
 
-impl Arrays {
+impl GeometryArrays {
     /// The arrays that `tracer` needs for `scene`, whose tissue deforms by `fields`, with trees built as `splits`
     /// says. Instances that change their shape on the device have room, but nothing in it.
     ///
@@ -146,7 +146,7 @@ impl Arrays {
         splits: Splits,
         fields: Fields,
     ) -> Result<Self, BvhError> {
-        Self::with_sets(scene, tracer, splits, fields, Sets::new(scene, &[]))
+        Self::with_sets(scene, tracer, splits, fields, SharingSets::new(scene, &[]))
     }
 
     /// Like [`Self::new`]; the instances of `sets` share structures.
@@ -155,7 +155,7 @@ impl Arrays {
         tracer: Tracer,
         splits: Splits,
         fields: Fields,
-        sets: Sets,
+        sets: SharingSets,
     ) -> Result<Self, BvhError> {
         let mut arrays = Self {
             instances: Vec::new(),
@@ -176,15 +176,15 @@ impl Arrays {
             scene.meshes.par_iter().zip(&finest).map(|(mesh, &f)| smoothed(mesh, f)).collect();
         let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
             .map(|(mesh, need)| {
-                let walked = tracer == Tracer::Bvh && *need == Need::Structure;
+                let walked = tracer == Tracer::Bvh && *need == Residency::Structure;
                 walked.then(|| MeshBvh::over(&mesh.positions, &mesh.triangles, splits))
             })
             .collect();
         let made = trees.into_iter().zip(averages).zip(finest);
         for ((mesh, ((tree, averages), finest)), need) in scene.meshes.iter().zip(made).zip(needs) {
             let place = arrays.add(mesh, tree, need);
-            arrays.places.push(Place { finest, ..place });
-            if need >= Need::Vertices {
+            arrays.places.push(GeometryRange { finest, ..place });
+            if need >= Residency::Vertices {
                 arrays.smoothed.extend(averages);
                 arrays.uploaded.push(Vec::new());
             } else {
@@ -212,7 +212,7 @@ impl Arrays {
         Ok(arrays)
     }
 
-    /// Like [`Self::new`], without sharing for the instances that are `apart` ([`Sets::new`]). No triangle is cut
+    /// Like [`Self::new`], without sharing for the instances that are `apart` ([`SharingSets::new`]). No triangle is cut
     /// if a buffer would then have more than `most` bytes.
     pub(super) fn within(
         most: u64,
@@ -222,7 +222,7 @@ impl Arrays {
         fields: Fields,
         apart: &[bool],
     ) -> Result<Self, BvhError> {
-        let sets = || Sets::new(scene, apart);
+        let sets = || SharingSets::new(scene, apart);
         let arrays = Self::with_sets(scene, tracer, splits, fields, sets())?;
         match splits == Splits::Spatial && arrays.largest_buffer() > most {
             true => Self::with_sets(scene, tracer, Splits::Object, arrays.fields, sets()),
@@ -239,7 +239,7 @@ impl Arrays {
     /// Appends the structures of the sets. Returns the lists that name the instance of each of their triangles, one
     /// after the other, each of an even length.
     fn join(&mut self, scene: &Scene, tracer: Tracer, splits: Splits) -> Vec<u16> {
-        let shapes = |set: &Set| {
+        let shapes = |set: &SharingSet| {
             let keyframes = scene.instances[set.members[0]].keyframes.meshes.len();
             keyframes.max(1)
         };
@@ -247,20 +247,20 @@ impl Arrays {
         let wanted: Vec<_> = all
             .flat_map(|(number, set)| (0..shapes(set)).map(move |shape| (number, shape)))
             .collect();
-        let joints: Vec<Joint> = (wanted.par_iter())
+        let joints: Vec<UnplacedStructure> = (wanted.par_iter())
             .map(|&(set, shape)| self.joint(scene, tracer, splits, &self.sets.all[set], shape))
             .collect();
         let mut owners = Vec::new();
         for (&(set, shape), joint) in wanted.iter().zip(joints) {
             let set = &mut self.sets.all[set];
-            let mut place = Place {
+            let mut place = GeometryRange {
                 first_triangle: self.triangles.len() as u32,
                 triangles: joint.triangles.len() as u32,
                 root: NONE,
                 bounds: set.bounds(scene, &self.places, shape),
                 order: Some(joint.from.iter().map(|from| from.1).collect()),
                 owners: owners.len() as u32 / 2,
-                ..Place::default()
+                ..GeometryRange::default()
             };
             if let (Some(bvh), Some(tree)) = (&mut self.bvh, &joint.tree) {
                 place.root = bvh.add(tree, place.first_triangle);
@@ -278,12 +278,12 @@ impl Arrays {
         scene: &Scene,
         tracer: Tracer,
         splits: Splits,
-        set: &Set,
+        set: &SharingSet,
         shape: usize,
-    ) -> Joint {
+    ) -> UnplacedStructure {
         let (mut triangles, mut from) = (Vec::new(), Vec::new());
         for &member in &set.members {
-            let mesh = Set::mesh(scene, member, shape);
+            let mesh = SharingSet::mesh(scene, member, shape);
             let first_vertex = self.places[mesh].first_vertex;
             triangles.extend(ordered(&scene.meshes[mesh], None, first_vertex));
             let count = scene.meshes[mesh].triangles.len() as u32;
@@ -296,7 +296,7 @@ impl Arrays {
             triangles = order().map(|t| triangles[t]).collect();
             from = order().map(|t| from[t]).collect();
         }
-        Joint { triangles, from, tree }
+        UnplacedStructure { triangles, from, tree }
     }
 
     /// Appends the lists of the sets behind all triangles.
@@ -315,26 +315,26 @@ impl Arrays {
         self.triangles.extend(rows.map(|i| [word(i), word(i + 1), word(i + 2)]));
     }
 
-    fn add(&mut self, mesh: &Mesh, tree: Option<MeshBvh>, need: Need) -> Place {
+    fn add(&mut self, mesh: &Mesh, tree: Option<MeshBvh>, need: Residency) -> GeometryRange {
         assert_eq!(
             mesh.normals.len(),
             mesh.positions.len(),
             "one normal per vertex: `{}`",
             mesh.name
         );
-        let mut place = Place {
+        let mut place = GeometryRange {
             first_vertex: self.vertices.len() as u32,
             first_triangle: self.triangles.len() as u32,
             triangles: mesh.triangles.len() as u32,
             root: NONE,
             bounds: mesh.bounds(),
-            ..Place::default()
+            ..GeometryRange::default()
         };
-        if need >= Need::Vertices {
+        if need >= Residency::Vertices {
             self.vertices.extend_from_slice(&mesh.positions);
             self.normals.extend_from_slice(&mesh.normals);
         }
-        if need >= Need::Geometry {
+        if need >= Residency::Geometry {
             let order = tree.as_ref().map(|tree| &tree.triangle_order[..]);
             let triangles = ordered(mesh, order, place.first_vertex);
             place.triangles = triangles.len() as u32;
@@ -348,15 +348,15 @@ impl Arrays {
     }
 
     /// Room for any keyframe of `instance`.
-    fn reserve(&mut self, scene: &Scene, instance: &Instance) -> Place {
+    fn reserve(&mut self, scene: &Scene, instance: &Instance) -> GeometryRange {
         let meshes = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]);
         let most = |size: fn(&Mesh) -> usize| meshes.clone().map(size).max().unwrap_or(0);
         let (vertices, triangles) = (most(|m| m.positions.len()), most(|m| m.triangles.len()));
-        let place = Place {
+        let place = GeometryRange {
             first_vertex: self.vertices.len() as u32,
             first_triangle: self.triangles.len() as u32,
             root: self.bvh.as_mut().map_or(NONE, |bvh| bvh.reserve(triangles)),
-            ..Place::default()
+            ..GeometryRange::default()
         };
         let own_vertices = instance.keyframes.strategy != Strategy::Cached;
         let grown = self.vertices.len() + if own_vertices { vertices } else { 0 };
@@ -378,12 +378,12 @@ pub(super) fn ordered(mesh: &Mesh, order: Option<&[u32]>, first_vertex: u32) -> 
 }
 
 /// Entries in the form that the compute tracer's top level needs.
-pub(super) fn placed(entries: &[entry::Entry]) -> Vec<Placed> {
-    let place = |e: &entry::Entry| Placed {
+pub(super) fn placed(entries: &[entry::TopLevelEntry]) -> Vec<BvhInstance> {
+    let place = |e: &entry::TopLevelEntry| BvhInstance {
         instance: e.instance,
         bounds: e.bounds,
         world_from_object: e.world_from_object,
-        partial: matches!(e.geometry, entry::Geometry::Joined { partial: true, .. }),
+        partial: matches!(e.geometry, entry::EntryGeometry::Joined { partial: true, .. }),
     };
     entries.iter().map(place).collect()
 }
@@ -401,7 +401,7 @@ mod tests {
         let (scene, _) = Scene::load(&file, &[]).unwrap();
         let within = |most, splits| {
             let fields = Fields::none(&scene);
-            Arrays::within(most, &scene, Tracer::Bvh, splits, fields, &[]).unwrap()
+            GeometryArrays::within(most, &scene, Tracer::Bvh, splits, fields, &[]).unwrap()
         };
         let whole = within(u64::MAX, Splits::Object);
         let cut = within(u64::MAX, Splits::Spatial);

@@ -3,10 +3,10 @@
 
 use std::sync::Arc;
 
-use super::arrays::{Averages, Bounds, Place, ordered};
+use super::arrays::{Averages, Bounds, GeometryRange, ordered};
 use super::refit::Refit;
-use super::top::Top;
-use super::{Geometry, Kernels, WorldError};
+use super::top::TopLevel;
+use super::{GeometryBuffers, ShapeKernels, WorldError};
 use crate::gpu::{Blas, Commands, Device, DynamicBlas, DynamicSource, GpuError, Stage};
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::bvh::MeshBvh;
@@ -15,12 +15,12 @@ use crate::sim::tracer::Tracer;
 
 /// The shape of an instance: a mesh of the scene, or keyframes with their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Shape {
+enum InstanceShape {
     Mesh(usize),
     Blend([(usize, f64); 4]),
 }
 
-impl Shape {
+impl InstanceShape {
     fn of(instance: &Instance) -> Self {
         match instance.keyframes.strategy {
             Strategy::Interpolate => Self::Blend(instance.keyframes.blend),
@@ -30,30 +30,30 @@ impl Shape {
 }
 
 /// One instance that changes its shape.
-struct Body {
-    made: Option<Shape>,
+struct ChangingInstance {
+    made: Option<InstanceShape>,
     /// The ray query's structure.
     blas: Option<DynamicBlas>,
 }
 
 /// All instances that change their shape.
-pub(super) struct Changing {
-    bodies: Vec<Option<Body>>,
+pub(super) struct ChangingInstances {
+    bodies: Vec<Option<ChangingInstance>>,
     structures: Vec<Option<Blas>>,
     refit: Refit,
     /// Averaged normals of the meshes that are uploaded when they are shown.
     averages: Vec<Vec<Averages>>,
 }
 
-impl Changing {
+impl ChangingInstances {
     /// Structures and kernels for the instances that have a region; `geometry` has the room.
     pub(super) fn new(
         device: &Arc<Device>,
-        kernels: &Arc<Kernels>,
+        kernels: &Arc<ShapeKernels>,
         scene: &Scene,
         tracer: Tracer,
-        geometry: &Geometry,
-        regions: &[Option<Place>],
+        geometry: &GeometryBuffers,
+        regions: &[Option<GeometryRange>],
         averages: Vec<Vec<Averages>>,
     ) -> Result<Self, GpuError> {
         let mut bodies = Vec::new();
@@ -72,7 +72,7 @@ impl Changing {
     }
 
     /// Replaces the kernels.
-    pub(super) fn reload(&mut self, kernels: &Arc<Kernels>) {
+    pub(super) fn reload(&mut self, kernels: &Arc<ShapeKernels>) {
         self.refit.kernels = Arc::clone(kernels);
     }
 
@@ -94,18 +94,18 @@ impl Changing {
         &mut self,
         commands: &mut Commands<'_>,
         scene: &Scene,
-        geometry: &Geometry,
+        geometry: &GeometryBuffers,
         fields: &Fields,
-        places: &[Place],
-        regions: &mut [Option<Place>],
-        top: &mut Top,
+        places: &[GeometryRange],
+        regions: &mut [Option<GeometryRange>],
+        top: &mut TopLevel,
     ) -> Result<bool, WorldError> {
         let mut due = Vec::new();
         for (i, instance) in scene.instances.iter().enumerate() {
             let (Some(body), Some(region)) = (&mut self.bodies[i], &mut regions[i]) else {
                 continue;
             };
-            let shape = Shape::of(instance);
+            let shape = InstanceShape::of(instance);
             if !instance.shown || body.made == Some(shape) {
                 continue;
             }
@@ -157,8 +157,8 @@ fn body(
     scene: &Scene,
     tracer: Tracer,
     instance: &Instance,
-    geometry: &Geometry,
-) -> Result<Body, GpuError> {
+    geometry: &GeometryBuffers,
+) -> Result<ChangingInstance, GpuError> {
     let meshes = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]);
     let triangles = meshes.map(|m| m.triangles.len()).max().unwrap_or(0);
     let query = tracer == Tracer::RayQuery && triangles > 0;
@@ -169,13 +169,13 @@ fn body(
         DynamicBlas::new(device, &instance.name, triangles as u32, count, fast_trace)
     };
     let blas = query.then(new);
-    Ok(Body { made: None, blas: blas.transpose()? })
+    Ok(ChangingInstance { made: None, blas: blas.transpose()? })
 }
 
 /// Box around the present shape. A weighted sum of boxes contains the weighted sum of vertices (interval
 /// arithmetic).
-fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
-    let Shape::Blend(blend) = Shape::of(instance) else {
+fn bounds(instance: &Instance, places: &[GeometryRange]) -> Bounds {
+    let InstanceShape::Blend(blend) = InstanceShape::of(instance) else {
         return places[instance.mesh].bounds;
     };
     let mut sum = [[0.0_f64; 3]; 2];
@@ -195,17 +195,17 @@ fn bounds(instance: &Instance, places: &[Place]) -> Bounds {
     [grown(0, -1.0), grown(1, 1.0)]
 }
 
-/// Records what `rebuild` and `cached` send to the device.
+/// Records what the strategies `rebuild` and `cached` send to the device.
 #[allow(clippy::too_many_arguments, reason = "the parts of one world")]
 fn upload(
     commands: &mut Commands<'_>,
     scene: &Scene,
     instance: &Instance,
-    place: &Place,
+    place: &GeometryRange,
     averages: &[Averages],
-    geometry: &Geometry,
-    region: &mut Place,
-    top: &mut Top,
+    geometry: &GeometryBuffers,
+    region: &mut GeometryRange,
+    top: &mut TopLevel,
 ) -> Result<(), GpuError> {
     let mesh = &scene.meshes[instance.mesh];
     let cached = instance.keyframes.strategy == Strategy::Cached;
@@ -237,8 +237,8 @@ fn upload(
 
 pub(super) fn put_triangles(
     commands: &mut Commands<'_>,
-    geometry: &Geometry,
-    region: &Place,
+    geometry: &GeometryBuffers,
+    region: &GeometryRange,
     triangles: &[[u32; 3]],
 ) -> Result<(), GpuError> {
     let at = 12 * u64::from(region.first_triangle);
@@ -249,8 +249,8 @@ pub(super) fn put_triangles(
 pub(super) fn put_tree(
     commands: &mut Commands<'_>,
     tree: &MeshBvh,
-    region: &Place,
-    top: &mut Top,
+    region: &GeometryRange,
+    top: &mut TopLevel,
 ) -> Result<(), GpuError> {
     let Some((bvh, nodes)) = top.bvh() else {
         return Ok(());

@@ -2,21 +2,21 @@
 
 use glam::DAffine3;
 
-use super::arrays::{Bounds, Place, is_dynamic};
-use super::joined::Sets;
+use super::arrays::{Bounds, GeometryRange, is_dynamic};
+use super::joined::SharingSets;
 use crate::scene::{Instance, Scene, Strategy};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
 use crate::sim::placement::{matrix_rows, rigid, stretch};
 
 /// Mask bit of every entry that is not selected by its mask.
-const ALWAYS: u8 = 1;
+const UNSELECTED_BIT: u8 = 1;
 /// Mask bits left for keyframes that are selected by their mask.
-const MASKS: usize = 7;
+const SELECTING_BITS: usize = 7;
 
 /// The geometry of an entry.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Geometry {
+pub(super) enum EntryGeometry {
     /// A mesh of the scene.
     Mesh(usize),
     /// The latest shape that the device computed for an instance that changes its shape.
@@ -39,16 +39,16 @@ pub(super) enum Geometry {
 
 /// A placed geometry in the top level. If all entries are equal to the last ones, the top level is still valid.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Entry {
+pub(super) struct TopLevelEntry {
     pub(super) instance: u32,
-    pub(super) geometry: Geometry,
+    pub(super) geometry: EntryGeometry,
     pub(super) bounds: Bounds,
     pub(super) world_from_object: DAffine3,
     pub(super) mask: u8,
 }
 
 fn by_mask(number: usize) -> u8 {
-    1 << (1 + number % MASKS)
+    1 << (1 + number % SELECTING_BITS)
 }
 
 pub(super) fn union(a: Bounds, b: Bounds) -> Bounds {
@@ -71,14 +71,14 @@ pub(super) fn capacity(scene: &Scene) -> usize {
 /// `regions` are those of the instances that change their shape, and `sets` of those that share one.
 pub(super) fn entries(
     scene: &Scene,
-    places: &[Place],
-    regions: &[Option<Place>],
-    sets: &Sets,
-) -> Vec<Entry> {
+    places: &[GeometryRange],
+    regions: &[Option<GeometryRange>],
+    sets: &SharingSets,
+) -> Vec<TopLevelEntry> {
     let mut entries = Vec::new();
     for (i, instance) in scene.instances.iter().enumerate() {
         let keyframes = &instance.keyframes;
-        let entry = |geometry, bounds, mask| Entry {
+        let entry = |geometry, bounds, mask| TopLevelEntry {
             instance: i as u32,
             geometry,
             bounds,
@@ -90,19 +90,23 @@ pub(super) fn entries(
             let hidden = hidden.count();
             if set.members[0] == i && hidden < set.members.len() {
                 let shape = set.shape(scene);
-                let geometry = Geometry::Joined { set: number, shape, partial: hidden > 0 };
-                entries.push(entry(geometry, set.shapes[shape].bounds, ALWAYS));
+                let geometry = EntryGeometry::Joined { set: number, shape, partial: hidden > 0 };
+                entries.push(entry(geometry, set.shapes[shape].bounds, UNSELECTED_BIT));
             }
             continue;
         }
         let mesh = |mesh: usize, mask| {
             let place = &places[mesh];
-            (place.triangles > 0).then(|| entry(Geometry::Mesh(mesh), place.bounds, mask))
+            (place.triangles > 0).then(|| entry(EntryGeometry::Mesh(mesh), place.bounds, mask))
         };
         match (keyframes.strategy, &regions[i]) {
             (_, Some(region)) if instance.shown && region.triangles > 0 => {
                 let version = region.version;
-                entries.push(entry(Geometry::Changing { version }, region.bounds, ALWAYS));
+                entries.push(entry(
+                    EntryGeometry::Changing { version },
+                    region.bounds,
+                    UNSELECTED_BIT,
+                ));
             }
             (_, Some(_)) => {}
             (Strategy::Mask, None) if keyframes.meshes.is_empty() => {
@@ -121,23 +125,38 @@ pub(super) fn entries(
                 };
                 let solid = all.iter().map(|&m| &places[m]).filter(|p| p.triangles > 0);
                 let bounds = solid.map(|p| p.bounds).reduce(union);
-                entries.extend(bounds.map(|b| entry(Geometry::Union, b, ALWAYS)));
+                entries.extend(bounds.map(|b| entry(EntryGeometry::Union, b, UNSELECTED_BIT)));
             }
-            _ if instance.shown => entries.extend(mesh(instance.mesh, ALWAYS)),
+            _ if instance.shown => entries.extend(mesh(instance.mesh, UNSELECTED_BIT)),
             _ => {}
         }
     }
     entries
 }
 
-/// Rows of the scene's instances. `slots` has the place of each entry in the top level.
+/// The row that stands for what is between face and body, in front of everything in the background.
+fn couplant(tissue: usize) -> layout::Instance {
+    let identity = matrix_rows(&DAffine3::IDENTITY);
+    layout::Instance {
+        world_from_object: identity,
+        object_from_world: identity,
+        texture_from_world: identity,
+        tissue: tissue as u32,
+        priority: -i32::MAX,
+        slot: NONE,
+        field: NONE,
+        ..layout::Instance::default()
+    }
+}
+
+/// Rows of the scene's instances, and of the couplant where the scene has contact. `slots` has the place of each entry in the top level.
 pub(super) fn rows(
     scene: &Scene,
-    places: &[Place],
-    regions: &[Option<Place>],
-    sets: &Sets,
+    places: &[GeometryRange],
+    regions: &[Option<GeometryRange>],
+    sets: &SharingSets,
     fields: &Fields,
-    entries: &[Entry],
+    entries: &[TopLevelEntry],
     slots: &[u32],
 ) -> Vec<layout::Instance> {
     let mut rows: Vec<_> = (scene.instances.iter().zip(regions).enumerate())
@@ -168,7 +187,7 @@ pub(super) fn rows(
         })
         .collect();
     for (entry, &slot) in entries.iter().zip(slots) {
-        if let Geometry::Joined { set, .. } = entry.geometry {
+        if let EntryGeometry::Joined { set, .. } = entry.geometry {
             for &i in &sets.all[set].members {
                 rows[i].slot = if scene.instances[i].shown { slot } else { NONE };
             }
@@ -179,17 +198,18 @@ pub(super) fn rows(
             rows[entry.instance as usize].slot = slot;
         }
     }
+    rows.extend(scene.contact.as_ref().map(|contact| couplant(contact.couplant)));
     rows
 }
 
 /// True if `entry` is the one of its instance that is visible.
-fn shows(instance: &Instance, entry: &Entry) -> bool {
-    !matches!(entry.geometry, Geometry::Mesh(mesh) if mesh != instance.mesh)
+fn shows(instance: &Instance, entry: &TopLevelEntry) -> bool {
+    !matches!(entry.geometry, EntryGeometry::Mesh(mesh) if mesh != instance.mesh)
 }
 
 /// The selection of entries for rays of a ray query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Mask {
+pub(super) struct RayMask {
     /// Bits of the entries that are shown.
     pub(super) bits: u32,
     /// True if some entries that are not shown have the same bits.
@@ -197,24 +217,24 @@ pub(super) struct Mask {
 }
 
 /// The mask with which rays meet every entry that is shown.
-pub(super) fn mask(scene: &Scene, entries: &[Entry]) -> Mask {
-    let seen = |entry: &&Entry| {
-        if let Geometry::Joined { partial, .. } = entry.geometry {
+pub(super) fn mask(scene: &Scene, entries: &[TopLevelEntry]) -> RayMask {
+    let seen = |entry: &&TopLevelEntry| {
+        if let EntryGeometry::Joined { partial, .. } = entry.geometry {
             return !partial;
         }
         let instance = &scene.instances[entry.instance as usize];
         instance.shown && shows(instance, entry)
     };
-    // Shared structures have the bit ALWAYS: rays enter them whichever instance is shown.
-    let bits = entries.iter().filter(seen).fold(ALWAYS, |bits, e| bits | e.mask);
+    // Shared structures have the bit UNSELECTED_BIT: rays enter them whichever instance is shown.
+    let bits = entries.iter().filter(seen).fold(UNSELECTED_BIT, |bits, e| bits | e.mask);
     let hidden = entries.iter().filter(|e| !seen(e));
-    Mask { bits: bits.into(), ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0) }
+    RayMask { bits: bits.into(), ambiguous: hidden.into_iter().any(|e| e.mask & bits != 0) }
 }
 
 /// True if the top level can be changed from `old` to `new` by a refit, as the strategies of the changed
 /// instances ask.
-pub(super) fn may_refit(scene: &Scene, old: &[Entry], new: &[Entry]) -> bool {
-    let wants = |entry: &Entry| {
+pub(super) fn may_refit(scene: &Scene, old: &[TopLevelEntry], new: &[TopLevelEntry]) -> bool {
+    let wants = |entry: &TopLevelEntry| {
         let instance = &scene.instances[entry.instance as usize];
         instance.keyframes.strategy == Strategy::Update && !is_dynamic(instance)
     };

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 
 use glam::DAffine3;
 
-use super::arrays::{Bounds, Place};
+use super::arrays::{Bounds, GeometryRange};
 use super::entry::union;
 use crate::scene::{Instance, Scene, Strategy};
 
@@ -17,14 +17,14 @@ const MOST_OWNERS: usize = 1 << 16;
 
 /// Instances that share their structures.
 #[derive(Clone, Debug)]
-pub(super) struct Set {
+pub(super) struct SharingSet {
     /// Indices into [`Scene::instances`], ascending; two at least.
     pub(super) members: Vec<usize>,
     /// Their structure at each keyframe; only one for a constant shape.
-    pub(super) shapes: Vec<Place>,
+    pub(super) shapes: Vec<GeometryRange>,
 }
 
-impl Set {
+impl SharingSet {
     /// The mesh that member `instance` shows in structure `shape`.
     pub(super) fn mesh(scene: &Scene, instance: usize, shape: usize) -> usize {
         let instance = &scene.instances[instance];
@@ -38,7 +38,7 @@ impl Set {
     }
 
     /// Box around all members at `shape`, whose meshes lie at `places`.
-    pub(super) fn bounds(&self, scene: &Scene, places: &[Place], shape: usize) -> Bounds {
+    pub(super) fn bounds(&self, scene: &Scene, places: &[GeometryRange], shape: usize) -> Bounds {
         let boxes = self.members.iter();
         let boxes = boxes.map(|&i| places[Self::mesh(scene, i, shape)].bounds);
         boxes.reduce(union).expect("a set has members")
@@ -64,13 +64,13 @@ fn present(instance: &Instance) -> usize {
 
 /// All sets of a scene.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Sets {
-    pub(super) all: Vec<Set>,
+pub(super) struct SharingSets {
+    pub(super) all: Vec<SharingSet>,
     /// For each instance the set to which it belongs.
     of: Vec<Option<usize>>,
 }
 
-impl Sets {
+impl SharingSets {
     /// The sets of `scene`, without structures yet. A set has instances with the same placement that nothing
     /// moves apart, whose shapes are constant or keyframes exchanged together by selectors, and whose
     /// meshes no other instance shows, so that no triangle is stored twice. `apart` are the instances that
@@ -115,13 +115,13 @@ impl Sets {
             for &i in &members {
                 sets.of[i] = Some(sets.all.len());
             }
-            sets.all.push(Set { members, shapes: Vec::new() });
+            sets.all.push(SharingSet { members, shapes: Vec::new() });
         }
         sets
     }
 
     /// The set to which an instance belongs.
-    pub(super) fn of(&self, instance: usize) -> Option<(usize, &Set)> {
+    pub(super) fn of(&self, instance: usize) -> Option<(usize, &SharingSet)> {
         let set = self.of[instance]?;
         Some((set, &self.all[set]))
     }

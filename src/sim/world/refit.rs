@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::arrays::{Place, ordered};
+use super::arrays::{GeometryRange, ordered};
 use super::changing::{put_tree, put_triangles};
-use super::top::Top;
-use super::{Geometry, Kernels, WorldError};
+use super::top::TopLevel;
+use super::{GeometryBuffers, ShapeKernels, WorldError};
 use crate::gpu::{Binding, Buffer, BufferKind, Commands, Device, GpuError, Stage};
 use crate::scene::smoothed::LEVELS;
 use crate::scene::{Instance, Scene, Strategy};
@@ -17,18 +17,18 @@ use crate::sim::tracer::Tracer;
 
 /// Relative cost of rays from which on a tree is built again instead of refitted (choice; a build costs some
 /// ten refits).
-const DEGRADED: f64 = 1.5;
+const REBUILD_COST: f64 = 1.5;
 
 /// A tree built for one keyframe; it also serves keyframes near it.
-struct Base {
+struct BaseTree {
     tree: MeshBvh,
     /// Ranges in the list of node numbers, one per level.
     levels: Vec<RefitLevel>,
 }
 
 /// An instance whose keyframes share their triangles.
-struct Body {
-    bases: BTreeMap<usize, Base>,
+struct RefitInstance {
+    bases: BTreeMap<usize, BaseTree>,
     /// For each keyframe the base that serves it.
     serving: Vec<usize>,
     /// The base whose tree is in the region now.
@@ -36,15 +36,15 @@ struct Body {
 }
 
 /// The buffers for refitting on the compute tracer.
-struct Boxes {
+struct RefitBuffers {
     boxes: Buffer,
     order: Buffer,
 }
 
 pub(super) struct Refit {
-    bodies: Vec<Option<Body>>,
-    pub(super) kernels: Arc<Kernels>,
-    boxes: Option<Boxes>,
+    bodies: Vec<Option<RefitInstance>>,
+    pub(super) kernels: Arc<ShapeKernels>,
+    boxes: Option<RefitBuffers>,
 }
 
 impl Refit {
@@ -52,10 +52,10 @@ impl Refit {
     /// refits nothing.
     pub(super) fn new(
         device: &Arc<Device>,
-        kernels: &Arc<Kernels>,
+        kernels: &Arc<ShapeKernels>,
         scene: &Scene,
         tracer: Tracer,
-        regions: &[Option<Place>],
+        regions: &[Option<GeometryRange>],
     ) -> Result<Self, GpuError> {
         let mut order = Vec::new();
         let mut bodies = Vec::new();
@@ -70,7 +70,7 @@ impl Refit {
             true => None,
             false => {
                 let bytes = 24 * (u64::from(last_node) + 1);
-                Some(Boxes {
+                Some(RefitBuffers {
                     boxes: device.buffer("boxes", bytes, BufferKind::Storage)?,
                     order: super::upload(device, "refit order", bytemuck::cast_slice(&order))?,
                 })
@@ -91,9 +91,9 @@ impl Refit {
         commands: &mut Commands<'_>,
         scene: &Scene,
         index: usize,
-        geometry: &Geometry,
-        region: &mut Place,
-        top: &mut Top,
+        geometry: &GeometryBuffers,
+        region: &mut GeometryRange,
+        top: &mut TopLevel,
     ) -> Result<bool, WorldError> {
         let instance = &scene.instances[index];
         let body = self.bodies[index].as_mut().expect("made for this strategy");
@@ -120,12 +120,12 @@ impl Refit {
         &self,
         commands: &mut Commands<'_>,
         scene: &Scene,
-        places: &[Place],
-        regions: &[Option<Place>],
-        geometry: &Geometry,
+        places: &[GeometryRange],
+        regions: &[Option<GeometryRange>],
+        geometry: &GeometryBuffers,
         fields: &Fields,
         due: &[(usize, bool)],
-        top: &mut Top,
+        top: &mut TopLevel,
     ) -> Result<(), GpuError> {
         // All shapes lie in one buffer: a barrier between two dispatches that write it.
         let mut ranges: Vec<&[RefitLevel]> = Vec::new();
@@ -200,12 +200,12 @@ fn keyframe(instance: &Instance) -> usize {
     }
 }
 
-/// How `each` vectors of every vertex are made.
+/// Push constants that interpolate `each` vectors of every vertex.
 fn interpolation(
     scene: &Scene,
     instance: &Instance,
-    places: &[Place],
-    region: &Place,
+    places: &[GeometryRange],
+    region: &GeometryRange,
     kind: u32,
     each: u32,
 ) -> Interpolation {
@@ -229,17 +229,17 @@ fn interpolation(
 fn body(
     scene: &Scene,
     instance: &Instance,
-    region: &Place,
+    region: &GeometryRange,
     tracer: Tracer,
     order: &mut Vec<u32>,
-) -> Body {
+) -> RefitInstance {
     let meshes: Vec<_> = instance.keyframes.meshes.iter().map(|&m| &scene.meshes[m]).collect();
-    let mut bases: BTreeMap<usize, Base> = BTreeMap::new();
+    let mut bases: BTreeMap<usize, BaseTree> = BTreeMap::new();
     let mut serving = Vec::new();
     for (k, mesh) in meshes.iter().enumerate() {
-        let fits = |(&b, base): (&usize, &Base)| {
+        let fits = |(&b, base): (&usize, &BaseTree)| {
             let cost = base.tree.degradation(meshes[b], &mesh.positions);
-            (cost <= DEGRADED).then_some((b, cost))
+            (cost <= REBUILD_COST).then_some((b, cost))
         };
         let best = bases.iter().filter_map(fits).min_by(|a, b| a.1.total_cmp(&b.1));
         serving.push(best.map_or(k, |(b, _)| b));
@@ -247,10 +247,15 @@ fn body(
             bases.insert(k, base(mesh, region, tracer, order));
         }
     }
-    Body { bases, serving, held: None }
+    RefitInstance { bases, serving, held: None }
 }
 
-fn base(mesh: &crate::scene::Mesh, region: &Place, tracer: Tracer, order: &mut Vec<u32>) -> Base {
+fn base(
+    mesh: &crate::scene::Mesh,
+    region: &GeometryRange,
+    tracer: Tracer,
+    order: &mut Vec<u32>,
+) -> BaseTree {
     let tree = MeshBvh::build(mesh);
     let mut ranges = Vec::new();
     if tracer == Tracer::Bvh {
@@ -261,5 +266,5 @@ fn base(mesh: &crate::scene::Mesh, region: &Place, tracer: Tracer, order: &mut V
         }
         order.extend(all.order);
     }
-    Base { tree, levels: ranges }
+    BaseTree { tree, levels: ranges }
 }

@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use super::WorldError;
-use super::arrays::{Need, needs, ordered, placed};
-use super::entry::{self, Entry, Geometry};
-use super::joined::{Set, Sets};
+use super::arrays::{Residency, needs, ordered, placed};
+use super::entry::{self, EntryGeometry, TopLevelEntry};
+use super::joined::{SharingSet, SharingSets};
 use crate::gpu::{
     Binding, Blas, BlasInput, BlasOptions, Buffer, Commands, Device, GpuError, Stage, Tlas,
     TlasInstance,
@@ -15,7 +15,7 @@ use crate::sim::bvh::SceneBvh;
 use crate::sim::placement::matrix_rows;
 
 /// The structures that the tracer walks.
-enum Structure {
+enum TracerStructure {
     Bvh {
         bvh: SceneBvh,
         nodes: Buffer,
@@ -30,29 +30,29 @@ enum Structure {
 }
 
 /// The top level, and everything below it that does not change.
-pub(super) struct Top {
-    structure: Structure,
-    entries: Option<Vec<Entry>>,
+pub(super) struct TopLevel {
+    structure: TracerStructure,
+    entries: Option<Vec<TopLevelEntry>>,
     slots: Vec<u32>,
 }
 
-impl Top {
+impl TopLevel {
     /// Uploads the trees of the compute tracer, or builds the structures of the ray query.
     pub(super) fn new(
         device: &Arc<Device>,
         scene: &Scene,
-        sets: &Sets,
+        sets: &SharingSets,
         bvh: Option<SceneBvh>,
     ) -> Result<Self, GpuError> {
         let structure = match bvh {
             Some(mut bvh) => {
                 let nodes = super::upload(device, "nodes", bytemuck::cast_slice(&bvh.nodes))?;
                 bvh.forget_meshes();
-                Structure::Bvh { bvh, nodes }
+                TracerStructure::Bvh { bvh, nodes }
             }
             None => {
                 let capacity = entry::capacity(scene).max(1) as u32;
-                Structure::Query {
+                TracerStructure::Query {
                     meshes: build_meshes(device, scene, sets)?,
                     joined: build_joined(device, scene, sets)?,
                     tlas: Tlas::new(device, "anatomy", capacity)?,
@@ -69,7 +69,7 @@ impl Top {
         &mut self,
         commands: &mut Commands<'_>,
         scene: &Scene,
-        entries: Vec<Entry>,
+        entries: Vec<TopLevelEntry>,
         changing: &[Option<Blas>],
     ) -> Result<bool, WorldError> {
         if self.entries.as_ref() == Some(&entries) {
@@ -78,20 +78,22 @@ impl Top {
         let old = self.entries.as_deref().unwrap_or_default();
         let refit = self.entries.is_some() && entry::may_refit(scene, old, &entries);
         match &mut self.structure {
-            Structure::Bvh { bvh, nodes } => {
+            TracerStructure::Bvh { bvh, nodes } => {
                 let changed = bvh.place(&placed(&entries), refit)?;
                 commands.write(nodes, 0, bytemuck::cast_slice(changed))?;
                 self.slots = bvh.slots.clone();
             }
-            Structure::Query { meshes, joined, tlas } => {
+            TracerStructure::Query { meshes, joined, tlas } => {
                 let instances: Vec<_> = entries
                     .iter()
                     .map(|entry| TlasInstance {
                         blas: match entry.geometry {
-                            Geometry::Mesh(mesh) => meshes[mesh].as_ref(),
-                            Geometry::Changing { .. } => changing[entry.instance as usize].as_ref(),
-                            Geometry::Joined { set, shape, .. } => Some(&joined[set][shape]),
-                            Geometry::Union => unreachable!("refused with the ray query"),
+                            EntryGeometry::Mesh(mesh) => meshes[mesh].as_ref(),
+                            EntryGeometry::Changing { .. } => {
+                                changing[entry.instance as usize].as_ref()
+                            }
+                            EntryGeometry::Joined { set, shape, .. } => Some(&joined[set][shape]),
+                            EntryGeometry::Union => unreachable!("refused with the ray query"),
                         }
                         .expect("entries have triangles, and these a structure"),
                         transform: matrix_rows(&entry.world_from_object),
@@ -112,7 +114,7 @@ impl Top {
     }
 
     /// Entries of the last [`Self::place`].
-    pub(super) fn entries(&self) -> &[Entry] {
+    pub(super) fn entries(&self) -> &[TopLevelEntry] {
         self.entries.as_deref().unwrap_or_default()
     }
 
@@ -124,23 +126,23 @@ impl Top {
     /// The compute tracer's hierarchy and its buffer.
     pub(super) fn bvh(&mut self) -> Option<(&mut SceneBvh, &Buffer)> {
         match &mut self.structure {
-            Structure::Bvh { bvh, nodes } => Some((bvh, nodes)),
-            Structure::Query { .. } => None,
+            TracerStructure::Bvh { bvh, nodes } => Some((bvh, nodes)),
+            TracerStructure::Query { .. } => None,
         }
     }
 
     pub(super) fn binding(&self) -> Binding<'_> {
         match &self.structure {
-            Structure::Bvh { nodes, .. } => Binding::Buffer(nodes),
-            Structure::Query { tlas, .. } => Binding::Tlas(tlas),
+            TracerStructure::Bvh { nodes, .. } => Binding::Buffer(nodes),
+            TracerStructure::Query { tlas, .. } => Binding::Tlas(tlas),
         }
     }
 
     /// Device memory, bytes.
     pub(super) fn bytes(&self) -> u64 {
         match &self.structure {
-            Structure::Bvh { nodes, .. } => nodes.size(),
-            Structure::Query { meshes, joined, tlas } => {
+            TracerStructure::Bvh { nodes, .. } => nodes.size(),
+            TracerStructure::Query { meshes, joined, tlas } => {
                 let all = meshes.iter().flatten().chain(joined.iter().flatten());
                 tlas.bytes() + all.map(Blas::bytes).sum::<u64>()
             }
@@ -151,11 +153,11 @@ impl Top {
 fn build_meshes(
     device: &Arc<Device>,
     scene: &Scene,
-    sets: &Sets,
+    sets: &SharingSets,
 ) -> Result<Vec<Option<Blas>>, GpuError> {
     let all = || scene.meshes.iter().zip(needs(scene, sets));
-    let walked = |(mesh, need): &(&crate::scene::Mesh, Need)| {
-        *need == Need::Structure && !mesh.triangles.is_empty()
+    let walked = |(mesh, need): &(&crate::scene::Mesh, Residency)| {
+        *need == Residency::Structure && !mesh.triangles.is_empty()
     };
     let inputs: Vec<BlasInput<'_>> = all()
         .filter(walked)
@@ -173,7 +175,7 @@ fn build_meshes(
 fn build_joined(
     device: &Arc<Device>,
     scene: &Scene,
-    sets: &Sets,
+    sets: &SharingSets,
 ) -> Result<Vec<Vec<Blas>>, GpuError> {
     let mut built = Vec::new();
     for set in &sets.all {
@@ -181,7 +183,7 @@ fn build_joined(
         for shape in 0..set.shapes.len() {
             let (mut positions, mut triangles) = (Vec::new(), Vec::new());
             for &member in &set.members {
-                let mesh = &scene.meshes[Set::mesh(scene, member, shape)];
+                let mesh = &scene.meshes[SharingSet::mesh(scene, member, shape)];
                 triangles.extend(ordered(mesh, None, positions.len() as u32));
                 positions.extend_from_slice(&mesh.positions);
             }

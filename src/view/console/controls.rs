@@ -33,7 +33,7 @@ pub(super) fn group<T: Group>(ui: &mut Ui, path: &str, settings: &mut T) {
     group_with(ui, path, settings, &mut |_, _, _| false);
 }
 
-/// As [`group`], with settings that `special` draws.
+/// Like [`group`]; settings that need more than a row are drawn by `special`.
 pub(super) fn group_with<T: Group>(
     ui: &mut Ui,
     path: &str,

@@ -113,8 +113,8 @@ fn network(ui: &mut Ui, inputs: &mut Inputs) {
 
 /// The state of the trajectory as a text.
 fn replay(model: &Model, now: Instant) -> String {
-    let ways = &model.ways;
-    match (&ways.recorder, &ways.replay, &ways.kept) {
+    let trajectory = &model.trajectory;
+    match (&trajectory.recorder, &trajectory.replay, &trajectory.stored) {
         (Some(recorder), _, _) => {
             let (seconds, rows) = (recorder.seconds(now), recorder.rows());
             format!("recording: {seconds:.1} s, {rows} poses")
@@ -123,9 +123,9 @@ fn replay(model: &Model, now: Instant) -> String {
             let at = replay.position(&model.clock, now);
             format!("{at:.1} of {:.1} s", replay.length())
         }
-        (_, _, Some(kept)) => {
-            let unsaved = if kept.unsaved.is_some() { ", not saved" } else { "" };
-            format!("{:.1} s, {}{unsaved}", kept.seconds(), kept.name)
+        (_, _, Some(stored)) => {
+            let unsaved = if stored.unsaved.is_some() { ", not saved" } else { "" };
+            format!("{:.1} s, {}{unsaved}", stored.seconds(), stored.name)
         }
         _ => "nothing recorded".to_owned(),
     }
@@ -134,7 +134,7 @@ fn replay(model: &Model, now: Instant) -> String {
 /// Draws the controls for recording and replay.
 fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.horizontal(|ui| {
-        let is_recording = model.ways.recorder.is_some();
+        let is_recording = model.trajectory.recorder.is_some();
         let word = if is_recording { "Stop recording" } else { "Record" };
         let tip = "Record where the probe goes, whatever moves it (R)";
         if ui.button(word).on_hover_text(tip).clicked() {
@@ -144,20 +144,20 @@ fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
             // The seconds count on while nothing else is drawn.
             ui.ctx().request_repaint_after(Duration::from_millis(500));
         }
-        let is_replaying = model.ways.replay.is_some();
+        let is_replaying = model.trajectory.replay.is_some();
         let word = if is_replaying { "Stop replay" } else { "Replay" };
         let tip = "Let the probe go along the trajectory; whatever else moves it takes it (Ctrl+R)";
         let button = egui::Button::new(word);
-        let enabled = is_replaying || model.ways.kept.is_some() && !is_recording;
+        let enabled = is_replaying || model.trajectory.stored.is_some() && !is_recording;
         if ui.add_enabled(enabled, button).on_hover_text(tip).clicked() {
             model.replay(now);
         }
         let tip = "Begin again at its end; for the next replay";
-        ui.checkbox(&mut model.ways.looped, "loop").on_hover_text(tip);
+        ui.checkbox(&mut model.trajectory.looped, "loop").on_hover_text(tip);
     });
     let tip = "As fast as the scene's time passes, from the time at which the recording began; else at \
                the recorded pace. For the next replay";
-    let choice = egui::Checkbox::new(&mut model.ways.with_scene, "with the scene's time");
+    let choice = egui::Checkbox::new(&mut model.trajectory.with_scene, "with the scene's time");
     ui.add_enabled(model.animated, choice).on_hover_text(tip);
 }
 
@@ -167,15 +167,15 @@ fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs) {
         let field = TextEdit::singleline(&mut inputs.path).desired_width(180.0);
         ui.add(field)
             .on_hover_text("Trajectory file (.csv): time_s, x_mm, y_mm, z_mm, qw, qx, qy, qz");
-        let unsaved = model.ways.kept.as_ref().is_some_and(|k| k.unsaved.is_some());
+        let unsaved = model.trajectory.stored.as_ref().is_some_and(|k| k.unsaved.is_some());
         let replaces = std::path::Path::new(&inputs.path).exists();
         let word = if replaces && unsaved { "Replace" } else { "Save" };
         let button = ui.add_enabled(unsaved, egui::Button::new(word));
         if button.on_hover_text("Write what was recorded").clicked() {
-            inputs.save(&mut model.ways);
+            inputs.save(&mut model.trajectory);
         }
         if ui.button("Load").on_hover_text("Read a trajectory").clicked() {
-            inputs.load(&mut model.ways);
+            inputs.load(&mut model.trajectory);
         }
     });
     if let Some(problem) = &inputs.problem {

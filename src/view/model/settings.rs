@@ -11,7 +11,7 @@ use crate::sim::Tracer;
 /// Settings of a scene that change while it is imaged.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// How it is imaged; fields of these settings to who only reads or sets them.
+    /// Settings of probe, simulation and imaging. They can be read and set as fields of these settings.
     pub imaged: settings::Settings,
     /// The acoustic table.
     pub tissues: Vec<Tissue>,

@@ -128,7 +128,7 @@ fn mistakes_of_animations_are_placed() {
         "only .gltf and .glb files have animations",
         "keyframes",
     );
-    f(&format!("{cube}animation = false"), 5, 13, "animation: leave it out", "");
+    f(&format!("{cube}animation = false"), 5, 13, "expected text or true", "");
     f(
         "shape = { sphere = { radius = 5 } }\nanimation = \"walk\"",
         5,
@@ -203,7 +203,12 @@ fn mistakes_of_motions_are_placed() {
         "scale is 0.2",
         "between 0.4 and 2.5",
     );
-    f("kind = \"sine\", period = 1, scale = [1, 1]", "[1, 1]", "invalid length 2", "");
+    f(
+        "kind = \"sine\", period = 1, scale = [1, 1]",
+        "[1, 1]",
+        "expected a number or 3 numbers",
+        "",
+    );
     f(
         "kind = \"orbit\", period = 1, rotate = { axis = [0, 0, 1], angle = \"1 rad\" }, scale = 2",
         "2",

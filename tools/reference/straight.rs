@@ -59,9 +59,13 @@ impl World<'_> {
         for c in &here {
             if !c.entry {
                 after.leave(c.instance);
-            } else if !after.enter(c.instance) {
-                overflow += 1;
+                continue;
             }
+            // The couplant ends at the first surface.
+            if after.0 == [self.frame.couplant] {
+                after.0.clear();
+            }
+            overflow += u32::from(!after.enter(c.instance));
         }
         Toggled {
             hit: here[0],

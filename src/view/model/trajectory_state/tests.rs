@@ -42,7 +42,7 @@ fn a_replay_goes_where_was_recorded_and_leaves_the_probe_at_its_end() {
     assert_eq!(model.devices.holder(), Some(Source::Replay));
     let revision = model.revision();
     model.follow(after(began, 3100));
-    assert!(model.ways.replay.is_none());
+    assert!(model.trajectory.replay.is_none());
     assert!((slid(&model, &model.pose) - 20.0).abs() < 1e-9);
     assert_eq!(model.revision(), revision, "the simulation has seen to it by itself");
 }
@@ -53,14 +53,14 @@ fn a_key_takes_the_probe_where_the_replay_has_brought_it() {
     let mut model = recorded(began);
     model.replay(after(began, 2000));
     model.move_probe(Axis::Lateral, 2.0, after(began, 2500));
-    assert!(model.ways.replay.is_none());
+    assert!(model.trajectory.replay.is_none());
     assert!((slid(&model, &model.pose) - 12.0).abs() < 1e-9);
     assert_eq!(model.devices.holder(), Some(Source::Keyboard));
     // Put to the place where it already is, the probe stops there too.
     model.replay(after(began, 3000));
     let revision = model.revision();
     model.place_probe(Source::Pointer, model.order().pose(after(began, 3500)), after(began, 3500));
-    assert!(model.ways.replay.is_none() && model.revision() > revision);
+    assert!(model.trajectory.replay.is_none() && model.revision() > revision);
 }
 
 #[test]
@@ -71,9 +71,9 @@ fn a_tracker_that_lies_still_leaves_the_replay_alone() {
     model.track("Probe", tool(0.0), after(began, 1600));
     model.replay(after(began, 2000));
     model.track("Probe", tool(1.5), after(began, 2200));
-    assert!(model.ways.replay.is_some());
+    assert!(model.trajectory.replay.is_some());
     model.track("Probe", tool(3.0), after(began, 2300));
-    assert!(model.ways.replay.is_none());
+    assert!(model.trajectory.replay.is_none());
     assert_eq!(model.pose, tool(3.0));
 }
 
@@ -86,8 +86,8 @@ fn the_recording_names_the_device_that_moves_the_probe() {
     model.track("Stylus", DAffine3::IDENTITY, after(began, 60));
     model.move_probe(Axis::Depth, 1.0, after(began, 90));
     model.record(after(began, 120));
-    let kept = model.ways.kept.as_ref().expect("recorded");
-    let text = kept.unsaved.as_ref().expect("not saved").text();
+    let stored = model.trajectory.stored.as_ref().expect("recorded");
+    let text = stored.unsaved.as_ref().expect("not saved").text();
     let names: Vec<&str> = text.lines().filter_map(|l| l.strip_prefix("# ")).collect();
     assert_eq!(names[2..], ["keyboard", "Stylus", "keyboard"], "{text}");
 }
@@ -100,21 +100,21 @@ fn a_replay_by_the_scenes_time_begins_when_the_recording_did() {
     model.record(began);
     model.move_probe(Axis::Lateral, 5.0, after(began, 50));
     model.record(after(began, 500));
-    model.ways.with_scene = true;
+    model.trajectory.with_scene = true;
     model.replay(after(began, 3000));
     assert!((model.clock.at(after(began, 3000)) - 7.0).abs() < 1e-9);
     // It stands still with the scene, and goes on with it.
     model.clock.play(false, after(began, 3100));
     model.follow(after(began, 9000));
-    assert!(model.ways.replay.is_some());
+    assert!(model.trajectory.replay.is_some());
 }
 
 #[test]
 fn a_replay_waits_for_the_first_picture() {
     let began = Instant::now();
     let mut model = recorded(began);
-    let kept = model.ways.kept.take().expect("recorded");
-    model.await_replay(kept, after(began, 2000));
+    let stored = model.trajectory.stored.take().expect("recorded");
+    model.await_replay(stored, after(began, 2000));
     model.follow(after(began, 6000));
     assert!(slid(&model, &model.pose).abs() < 1e-9);
     model.begin_replay(after(began, 7000));

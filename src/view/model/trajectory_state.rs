@@ -11,11 +11,11 @@ use crate::scene::animation::Track;
 
 /// The trajectory of a session, and its state.
 #[derive(Clone, Debug, Default)]
-pub struct Ways {
+pub struct TrajectoryState {
     /// A recording under way.
     pub recorder: Option<Recorder>,
     /// The last trajectory recorded or loaded.
-    pub kept: Option<Kept>,
+    pub stored: Option<StoredTrajectory>,
     /// The replay that the probe follows.
     pub replay: Option<Replay>,
     /// True where the replay begins again after its end.
@@ -26,7 +26,7 @@ pub struct Ways {
 
 /// A trajectory to replay.
 #[derive(Clone, Debug)]
-pub struct Kept {
+pub struct StoredTrajectory {
     /// The probe's pose over time.
     pub track: Arc<Track>,
     /// The recording that is not saved yet.
@@ -37,7 +37,7 @@ pub struct Kept {
     scene_seconds: Option<f64>,
 }
 
-impl Kept {
+impl StoredTrajectory {
     /// A trajectory from a file.
     pub fn loaded(track: Track, name: String) -> Self {
         Self { track: Arc::new(track), unsaved: None, name, scene_seconds: None }
@@ -54,11 +54,11 @@ impl Model {
     /// Begins a recording, or ends it.
     pub fn record(&mut self, now: Instant) {
         let scene = self.clock.at(now);
-        match self.ways.recorder.take() {
-            None => self.ways.recorder = Some(Recorder::new(self.pose, scene, now)),
+        match self.trajectory.recorder.take() {
+            None => self.trajectory.recorder = Some(Recorder::new(self.pose, scene, now)),
             Some(recorder) => {
                 let recording = recorder.finish(now);
-                self.ways.kept = Some(Kept {
+                self.trajectory.stored = Some(StoredTrajectory {
                     track: Arc::new(recording.track()),
                     scene_seconds: Some(recording.scene_seconds()),
                     name: "recorded".to_owned(),
@@ -71,38 +71,38 @@ impl Model {
     /// Starts the replay from its beginning, or stops it. A replay that follows the scene's time
     /// sets that to the time at which the recording began.
     pub fn replay(&mut self, now: Instant) {
-        if self.ways.replay.is_some() {
+        if self.trajectory.replay.is_some() {
             self.stop(now);
             return self.touch(now);
         }
-        let Some(kept) = &self.ways.kept else { return };
-        let start = self.animated && self.ways.with_scene;
-        let start = start.then(|| kept.scene_seconds.unwrap_or_else(|| self.clock.at(now)));
+        let Some(stored) = &self.trajectory.stored else { return };
+        let start = self.animated && self.trajectory.with_scene;
+        let start = start.then(|| stored.scene_seconds.unwrap_or_else(|| self.clock.at(now)));
         if let Some(seconds) = start {
             self.clock.seek(seconds, now);
             self.clock.play(true, now);
         }
-        let (track, looped) = (kept.track.clone(), self.ways.looped);
+        let (track, looped) = (stored.track.clone(), self.trajectory.looped);
         let mut replay = Replay::new(track, &self.home, start, looped, now);
         replay.hold(self.frozen, now);
-        self.ways.replay = Some(replay);
+        self.trajectory.replay = Some(replay);
         self.devices.take(Source::Replay);
         self.follow(now);
         self.touch(now);
     }
 
     /// Puts the probe to the start of a trajectory and waits; [`Self::begin_replay`] starts it.
-    pub fn await_replay(&mut self, kept: Kept, now: Instant) {
-        self.ways.kept = Some(kept);
+    pub fn await_replay(&mut self, stored: StoredTrajectory, now: Instant) {
+        self.trajectory.stored = Some(stored);
         self.replay(now);
-        if let Some(replay) = &mut self.ways.replay {
+        if let Some(replay) = &mut self.trajectory.replay {
             replay.hold(true, now);
         }
     }
 
     /// Starts a waiting replay: there is a picture to look at.
     pub fn begin_replay(&mut self, now: Instant) {
-        if let Some(replay) = &mut self.ways.replay
+        if let Some(replay) = &mut self.trajectory.replay
             && !self.frozen
         {
             replay.hold(false, now);
@@ -114,24 +114,24 @@ impl Model {
     /// Returns whether there was a replay.
     pub(super) fn stop(&mut self, now: Instant) -> bool {
         self.follow(now);
-        self.ways.replay.take().is_some()
+        self.trajectory.replay.take().is_some()
     }
 
     /// Moves the model's pose to the replay's. The simulation follows the replay by itself.
     pub fn follow(&mut self, now: Instant) {
-        if let Some(replay) = &self.ways.replay {
+        if let Some(replay) = &self.trajectory.replay {
             self.pose = replay.pose(&self.clock, now);
             let is_over = replay.is_over(&self.clock, now);
             self.write("replay", self.pose, now);
             if is_over {
-                self.ways.replay = None;
+                self.trajectory.replay = None;
             }
         }
     }
 
     /// Notes a movement of the probe by `device` in the recording, if there is one.
     pub(super) fn write(&mut self, device: &str, pose: DAffine3, now: Instant) {
-        if let Some(recorder) = &mut self.ways.recorder {
+        if let Some(recorder) = &mut self.trajectory.recorder {
             recorder.note(device, pose, now);
             if recorder.is_full() {
                 self.record(now);
