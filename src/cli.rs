@@ -9,6 +9,7 @@ mod acquire;
 mod check;
 mod common;
 mod images;
+mod import;
 mod info;
 mod matching;
 mod order;
@@ -35,6 +36,8 @@ enum Command {
     Acquire(Box<acquire::Acquire>),
     /// Check a scene, a mesh or a volume and say what it holds; exits 1 on errors
     Check(check::Check),
+    /// Make a scene from a segmentation or from meshes
+    Import(Box<import::Import>),
     /// List the Vulkan devices and what each lacks
     Info(info::Info),
     /// Fit gain, TGC, dynamic range and speckle size to the acquired volume around the mask
@@ -63,6 +66,7 @@ pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
+        Command::Import(args) => import::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
         Command::Match(args) => matching::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Reconstruct(args) => reconstruct::run(&args).map(|()| ExitCode::SUCCESS),
@@ -77,15 +81,15 @@ pub fn run() -> ExitCode {
         Ok(code) => match output::failure() {
             None => code,
             Some(cause) => {
-                eprintln!(
+                output::note(format!(
                     "standard output could not be written: {cause}\n\
                      Files are complete, lines are missing: run it again where there is room for them."
-                );
+                ));
                 ExitCode::FAILURE
             }
         },
         Err(report) => {
-            eprintln!("{report:?}");
+            output::note(format!("{report:?}"));
             ExitCode::FAILURE
         }
     }

@@ -9,6 +9,7 @@
 pub mod acquire;
 pub mod gpu;
 pub mod igtl;
+pub mod import;
 pub mod issue;
 pub mod live;
 pub mod matching;

@@ -1,6 +1,7 @@
-//! Output of the program: lines to standard output, whose reader may leave at any time, and files. Independent
-//! of their content.
+//! Output of the program: lines to standard output and standard error, whose readers may leave at any time, and
+//! files. Independent of their content.
 
+pub mod dicom;
 pub mod files;
 pub mod movie;
 pub mod npy;
@@ -8,7 +9,7 @@ pub mod plot;
 pub mod sheet;
 
 use std::fmt::Display;
-use std::io::{ErrorKind, Write, stdout};
+use std::io::{ErrorKind, Write, stderr, stdout};
 use std::sync::OnceLock;
 
 /// The first error that kept a line from standard output, if there was one.
@@ -23,6 +24,17 @@ pub fn line(text: impl Display) {
     {
         FAILURE.get_or_init(|| error.to_string());
     }
+}
+
+/// Writes a line to standard error. Where nobody reads it, or it cannot be written, it is dropped: there is nowhere
+/// left to say so, and the work and the exit code are wanted all the same.
+pub fn note(text: impl Display) {
+    let _ = writeln!(stderr(), "{text}");
+}
+
+/// The same without the end of the line, for progress that is written over.
+pub fn progress(text: impl Display) {
+    let _ = write!(stderr(), "{text}");
 }
 
 /// Returns the reason for which lines are missing in standard output, if some are.

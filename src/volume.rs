@@ -30,14 +30,15 @@ mod tests;
 mod voxels;
 mod write;
 
+pub use dicom::segmentation::{DicomSegment, Segmentation};
 pub use error::{Place, VolumeError};
 pub use grid::Frame;
 pub use reconstruct::{
     Compounding, Config, Fan, Filling, Interpolation, Lattice, ReconstructError, Reconstruction,
-    Settings, Transforms, reconstruct,
+    Settings, Transforms, frames_of_pose, reconstruct,
 };
 pub use sequence::frames::matrix as transform;
-pub use sequence::{Pose, Sequence, Summary, TrackedFrame};
+pub use sequence::{Pose, Sequence, Summary, TrackedFrame, track};
 pub use voxels::{Statistics, VoxelType, Voxels};
 pub use write::write_meta;
 
@@ -96,6 +97,9 @@ const SHEAR: f64 = 1e-3;
 const EXTENSIONS: [&str; 8] =
     [".mha", ".mhd", ".nrrd", ".nhdr", ".nii", ".nii.gz", ".dcm", ".dicom"];
 
+/// The same in a message.
+pub const KINDS: &str = ".mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz or .dcm";
+
 /// Returns whether a file is a volume by its extension, readable or not.
 pub fn is_volume(path: &Path) -> bool {
     let name = path.to_string_lossy().to_ascii_lowercase();
@@ -124,7 +128,7 @@ impl Volume {
             Err(VolumeError::file(
                 path,
                 "is no volume by its extension",
-                "give a .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz or .dcm file",
+                &format!("give a file of the kinds {KINDS}"),
             ))
         }
     }

@@ -6,6 +6,7 @@ mod limited;
 mod shared_data;
 
 use std::collections::BTreeMap;
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
@@ -14,7 +15,7 @@ use shared_data::shared_data;
 
 /// Files that look like meshes, readable or not, in a fixed order.
 fn meshes(folder: &Path) -> Vec<PathBuf> {
-    let kinds = ["obj", "stl", "gltf", "glb", "ply", "off"];
+    let kinds = ["obj", "stl", "gltf", "glb", "ply", "off", "vtk", "vtp", "3mf"];
     files(folder, |path| {
         let extension = path.extension().and_then(|e| e.to_str());
         kinds.contains(&extension.unwrap_or_default().to_ascii_lowercase().as_str())
@@ -107,6 +108,134 @@ fn files_that_the_gltf_validator_refuses_are_not_loaded_silently() {
     println!("{refused} files with errors of the validator, {} silent", silent.len());
     assert!(refused > 200, "the corpus is there");
     assert!(silent.is_empty(), "{}", silent.join("\n"));
+}
+
+/// What an independent reader (trimesh) finds in PLY, OFF and STL files: triangles and boxes.
+#[test]
+fn meshes_are_read_as_trimesh_reads_them() {
+    let Some(data) = shared_data() else { return };
+    let facts = std::fs::read_to_string(data.join("corpus-trimesh/facts-mesh.tsv"));
+    let facts = facts.expect("the facts");
+    let (mut compared, mut wrong) = (BTreeMap::new(), Vec::new());
+    for line in facts.lines() {
+        let Some((name, facts)) = line.split_once('\t') else { continue };
+        let path = data.join("corpus-trimesh").join(name);
+        let kind = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_lowercase();
+        if !["ply", "off", "stl"].contains(&kind.as_str()) {
+            continue;
+        }
+        let Some(wanted) = trimesh(facts) else { continue };
+        let millimetres = insonify::scene::mesh::Units(1.0);
+        let options =
+            insonify::scene::mesh::Options { units: Some(millimetres), ..Default::default() };
+        let found = insonify::scene::mesh::inspect(&path, &options).facts;
+        *compared.entry(kind).or_insert(0) += 1;
+        if let Some(difference) = unlike(&wanted, &found) {
+            wrong.push(format!("{name}: {difference}\n{facts}\n{found:?}"));
+        }
+    }
+    println!("compared: {compared:?}");
+    assert!(compared.get("ply").is_some_and(|n| *n >= 10), "{compared:?}");
+    assert!(compared.contains_key("off") && compared.contains_key("stl"), "{compared:?}");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+/// Triangles and box that trimesh states: `F=12 bbox=[0, 0, 0]..[1, 1, 1] degen=0`.
+struct Trimesh {
+    triangles: usize,
+    corners: [Vec<f64>; 2],
+}
+
+fn trimesh(facts: &str) -> Option<Trimesh> {
+    let number = |key: &str| facts.split_once(key)?.1.split_whitespace().next()?.parse().ok();
+    let triangles: usize = number(" F=")?;
+    let degenerate: usize = number("degen=")?;
+    let (_, rest) = facts.split_once("bbox=[")?;
+    let (low, rest) = rest.split_once("]..[")?;
+    let (high, _) = rest.split_once(']')?;
+    let corner = |text: &str| text.split(", ").map(|v| v.parse().ok()).collect::<Option<Vec<_>>>();
+    Some(Trimesh { triangles: triangles - degenerate, corners: [corner(low)?, corner(high)?] })
+}
+
+/// The difference between what trimesh states, in four digits, and what was found. Doubled triangles, which it does
+/// not count, may be fewer.
+fn unlike(wanted: &Trimesh, found: &insonify::scene::check::Facts) -> Option<String> {
+    if found.triangles > wanted.triangles || found.triangles * 20 < wanted.triangles * 19 {
+        return Some(format!("{} triangles of {}", found.triangles, wanted.triangles));
+    }
+    let corners = wanted.corners.iter().zip([found.min, found.max]);
+    let size = found.size();
+    let off =
+        corners.flat_map(|(w, f)| w.iter().zip(f).map(|(w, f)| (w - f).abs()).collect::<Vec<_>>());
+    let off = off.fold(0.0, f64::max);
+    (off > 0.01 * size + 0.006).then(|| format!("a corner is {off} away"))
+}
+
+#[test]
+fn planted_differences_to_trimesh_are_noticed() {
+    let wanted = trimesh("V=8 F=12 bbox=[0, 0, 0]..[1, 2, 3] degen=0 vol=6").expect("facts");
+    let facts = |triangles, z| insonify::scene::check::Facts {
+        triangles,
+        max: [1.0, 2.0, z],
+        ..Default::default()
+    };
+    assert_eq!(unlike(&wanted, &facts(12, 3.0)), None);
+    for found in [facts(11, 3.0), facts(13, 3.0), facts(12, 3.1), facts(0, 3.0)] {
+        assert!(unlike(&wanted, &found).is_some());
+    }
+}
+
+/// The same organs as OBJ and as legacy VTK.
+#[test]
+fn organs_are_alike_in_both_formats() {
+    use insonify::scene::mesh::{self, Options};
+    let Some(data) = shared_data() else { return };
+    let folder = data.join("liver-scikit-surgery");
+    let vtk = files(&folder.join("orig"), |path| path.extension().is_some_and(|e| e == "vtk"));
+    let mut compared = 0;
+    for path in vtk {
+        let found = mesh::inspect(&path, &Options::default());
+        assert!(found.mesh.is_some(), "{}: {:?}", path.display(), found.issues);
+        let name = path.file_stem().expect("a name");
+        let obj = folder.join("obj").join(name).with_extension("obj");
+        if !obj.is_file() {
+            continue;
+        }
+        compared += 1;
+        let other = mesh::inspect(&obj, &Options::default());
+        let (a, b) = (&found.facts, &other.facts);
+        println!("{}: {a:?}\n{b:?}", path.display());
+        assert_eq!(a.triangles, b.triangles, "{}", path.display());
+        let volumes = a.volume.unwrap_or_default() - b.volume.unwrap_or_default();
+        assert!(volumes.abs() < 1e-3 * a.volume.unwrap_or(1.0), "{}: {volumes}", path.display());
+        let far = (0..3).map(|i| (a.min[i] - b.min[i]).abs().max((a.max[i] - b.max[i]).abs()));
+        assert!(far.fold(0.0, f64::max) < 1e-3, "{}", path.display());
+    }
+    assert!(compared > 5, "{compared}");
+}
+
+/// Files with which the program once failed in one way or another.
+#[test]
+fn files_of_defects_are_right_or_refused_with_a_reason() {
+    let Some(data) = shared_data() else { return };
+    let defects = data.join("../defects");
+    let wanted = |path: &Path| path.extension().is_some_and(|e| e != "md");
+    let paths = if defects.is_dir() { files(&defects, wanted) } else { Vec::new() };
+    if paths.is_empty() {
+        shared_data::skip::skip(shared_data::skip::Lacking::Data, "no files of defects");
+    }
+    let wrong = |path: &PathBuf| {
+        let outcome = check(path);
+        let fault = match path.extension().and_then(|e| e.to_str()) {
+            Some("stl") if outcome.code != Some(0) => Some("a sound STL is refused".to_owned()),
+            // What a scene is told is of the meshes that it names.
+            Some("toml") => (!matches!(outcome.code, Some(0 | 1))).then(|| "no end".to_owned()),
+            _ => verdict(path, &outcome),
+        };
+        fault.map(|fault| format!("{}: {fault}\n{}", path.display(), outcome.text))
+    };
+    let wrong: Vec<_> = paths.iter().filter_map(wrong).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
 /// The comparison of the tests above rejects what it should.
@@ -233,6 +362,78 @@ fn damaged_files_never_panic() {
     glb.extend((json.len() as u32).to_le_bytes());
     glb.extend(b"JSON");
     glb.extend(json);
+    let ply = |format: &str| {
+        format!(
+            "ply\nformat {format} 1.0\ncomment c\nelement vertex 3\nproperty float x\nproperty float y\n\
+             property double z\nproperty list uchar short w\nelement face 1\n\
+             property list uchar int vertex_indices\nend_header\n"
+        )
+    };
+    let text_ply = ply("ascii") + "0 0 0 0\n9 0 0 1 7\n0 9 0 0\n4 0 1 2 0\n";
+    let mut binary_ply = ply("binary_big_endian").into_bytes();
+    for [x, y, w] in [[0.0, 0.0, 0.0], [9.0, 0.0, 1.0], [0.0, 9.0, 0.0f32]] {
+        binary_ply.extend([x, y].iter().flat_map(|v| v.to_be_bytes()));
+        binary_ply.extend([0; 8]);
+        binary_ply.push(w as u8);
+        binary_ply.extend(vec![0; 2 * w as usize]);
+    }
+    binary_ply.extend([3, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2]);
+    let off = "COFF\n# c\n4 2 0\n0 0 0 1 1 1 1\n9 0 0\n0 9 0\n0 0 9\n4 0 1 2 3\n3 0 2 1 0.5\n";
+    let vtk = "# vtk DataFile Version 4.2\nt\nASCII\nDATASET POLYDATA\nFIELD FieldData 2\na 1 2 int\n\
+        1 2\nb 1 1 string\nc d\nPOINTS 4 float\n0 0 0 9 0 0 0 9 0 0 0 9\nPOLYGONS 2 9\n4 0 1 2 3\n\
+        3 0 2 1\nTRIANGLE_STRIPS 1 5\n4 0 1 2 3\nPOINT_DATA 4\n";
+    let mut vtk5 =
+        b"# vtk DataFile Version 5.1\nt\nBINARY\nDATASET POLYDATA\nFIELD F 1\nb 1 1 string\n\
+        \xc1cPOINTS 3 float\n"
+            .to_vec();
+    let corners = [0.0f32, 0.0, 0.0, 9.0, 0.0, 0.0, 0.0, 9.0, 0.0];
+    vtk5.extend(corners.iter().flat_map(|v| v.to_be_bytes()));
+    vtk5.extend(b"\nMETADATA\nINFORMATION 0\n\nPOLYGONS 2 3\nOFFSETS vtktypeint64\n");
+    vtk5.extend([0i64, 3].iter().flat_map(|v| v.to_be_bytes()));
+    vtk5.extend(b"\nCONNECTIVITY vtktypeint64\n");
+    vtk5.extend([0i64, 1, 2].iter().flat_map(|v| v.to_be_bytes()));
+    let array = |kind: &str, name: &str, rest: &str| {
+        format!("<DataArray type=\"{kind}\" Name=\"{name}\" {rest}</DataArray>")
+    };
+    let vtp = |points: &str, more: &str| {
+        format!(
+            "<VTKFile type=\"PolyData\" byte_order=\"LittleEndian\" {more}><PolyData><Piece \
+             NumberOfPoints=\"3\" NumberOfStrips=\"0\" NumberOfPolys=\"1\"><Points>{}</Points><Polys>{}{}\
+             </Polys></Piece></PolyData>",
+            array("Float32", "Points", points),
+            array("Int32", "connectivity", "format=\"ascii\">0 1 2"),
+            array("Int32", "offsets", "format=\"binary\">BAAAAAMAAAA=")
+        )
+    };
+    let inline = vtp("format=\"ascii\">0 0 0 9 0 0 0 9 0", "") + "</VTKFile>";
+    let mut appended =
+        vtp("format=\"appended\" offset=\"0\">", "compressor=\"vtkZLibDataCompressor\"");
+    // Not packed itself, the offsets' array is refused; so it is text here.
+    appended = appended.replace("format=\"binary\">BAAAAAMAAAA=", "format=\"ascii\">3");
+    let mut appended = (appended + "<AppendedData encoding=\"raw\">_").into_bytes();
+    let mut packer = flate2::write::ZlibEncoder::new(Vec::new(), flate2::Compression::default());
+    let bytes: Vec<u8> = corners.iter().flat_map(|v| v.to_le_bytes()).collect();
+    packer.write_all(&bytes).expect("memory");
+    let packed = packer.finish().expect("memory");
+    let head = [1, 36, 0, packed.len() as u32];
+    appended.extend(head.iter().flat_map(|v| v.to_le_bytes()));
+    appended.extend(packed);
+    appended.extend(b"</AppendedData></VTKFile>");
+    let threemf = |model: &[u8]| {
+        // Stored, so that what is damaged is the model as often as the archive.
+        let mut zip = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+        let method = zip::CompressionMethod::Stored;
+        let options = zip::write::SimpleFileOptions::default().compression_method(method);
+        zip.start_file("3D/3dmodel.model", options).expect("memory");
+        zip.write_all(model).expect("memory");
+        zip.finish().expect("memory").into_inner()
+    };
+    let model = "<model unit=\"inch\"><resources><object id=\"1\"><mesh><vertices><vertex x=\"0\" \
+        y=\"0\" z=\"0\"/><vertex x=\"9\" y=\"0\" z=\"0\"/><vertex x=\"0\" y=\"9\" z=\"0\"/></vertices>\
+        <triangles><triangle v1=\"0\" v2=\"1\" v3=\"2\"/></triangles></mesh></object><object id=\"2\">\
+        <components><component objectid=\"1\" transform=\"1 0 0 0 1 0 0 0 1 5 0 0\"/></components>\
+        </object></resources><build><item objectid=\"2\"/></build></model>";
+    let archive = threemf(model.as_bytes());
     let mut state = 1u64;
     let mut random = move |below: usize| {
         // Knuth's MMIX generator.
@@ -245,9 +446,28 @@ fn damaged_files_never_panic() {
         ("b.stl", &binary),
         ("a.gltf", gltf.as_bytes()),
         ("a.glb", &glb),
+        ("a.ply", text_ply.as_bytes()),
+        ("b.ply", &binary_ply),
+        ("a.off", off.as_bytes()),
+        ("a.vtk", vtk.as_bytes()),
+        ("b.vtk", &vtk5),
+        ("a.vtp", inline.as_bytes()),
+        ("b.vtp", &appended),
+        ("a.3mf", &archive),
+        // The model inside, in a sound archive.
+        ("b.3mf", model.as_bytes()),
         ("a.toml", scene.as_bytes()),
     ] {
         let path = folder.path().join(name);
+        let whole = match name {
+            "b.3mf" => archive.clone(),
+            _ => sound.to_vec(),
+        };
+        std::fs::write(&path, whole).expect("written");
+        let read = |path: &Path| mesh::inspect(path, &mesh::Options::default());
+        // The others are not whole themselves.
+        let whole = [".ply", ".off", ".vtk", ".vtp", ".3mf"].iter().any(|end| name.ends_with(end));
+        assert!(!whole || read(&path).facts.triangles > 0, "{name}: {:?}", read(&path).issues);
         let mut refused = 0;
         for _ in 0..1500 {
             let mut bytes = sound.to_vec();
@@ -262,6 +482,9 @@ fn damaged_files_never_panic() {
                         bytes.splice(at..at, copy);
                     }
                 }
+            }
+            if name == "b.3mf" {
+                bytes = threemf(&bytes);
             }
             std::fs::write(&path, &bytes).expect("written");
             refused += usize::from(match name {

@@ -5,14 +5,15 @@ use std::process::ExitCode;
 
 use clap::Args;
 use insonify::output;
-use insonify::scene::check;
+use insonify::scene::{Issue, check};
+use insonify::sim::calibration::Work;
 use insonify::volume::{self, Format, Summary, Volume};
 
 /// Arguments of `insonify check`.
 #[derive(Debug, Args)]
 pub struct Check {
-    /// A scene (.toml), a mesh (.obj, .gltf, .glb, .stl) or a volume or sequence (.mha, .mhd,
-    /// .nrrd, .nhdr, .nii, .nii.gz, .dcm)
+    /// A scene (.toml), a mesh (.obj, .stl, .ply, .vtk, .vtp, .off, .3mf, .gltf, .glb) or a volume or
+    /// sequence (.mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .dcm)
     file: PathBuf,
 }
 
@@ -22,7 +23,11 @@ impl Check {
         if volume::is_volume(&self.file) {
             return self.volume();
         }
-        let report = check::report(&self.file);
+        let mut report = check::report(&self.file);
+        if let Some(Work { too_much, message, remedy }) = report.scene.as_ref().and_then(Work::of) {
+            let make = if too_much { Issue::error } else { Issue::warning };
+            report.issues.push(make(&self.file, 1, message, remedy.to_owned()));
+        }
         output::line(&report);
         let passed = report.passed();
         match report.error {

@@ -5,15 +5,17 @@ use std::path::Path;
 use std::sync::Arc;
 use std::time::Instant;
 
-use miette::{IntoDiagnostic, Result, miette};
+use miette::{IntoDiagnostic, Report, Result, miette};
 
-use insonify::gpu::{Device, DeviceOptions, cache_folder};
+use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
+use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::file::{self, override_of};
 use insonify::settings::{Quality, Simulation};
+use insonify::sim::calibration::Work;
 use insonify::sim::layout::Counters;
 use insonify::sim::shaders::Library;
-use insonify::sim::{self, Simulator, Tracer};
+use insonify::sim::{self, SimError, Simulator, Tracer};
 
 /// Arguments of every command that simulates.
 #[derive(Clone, Debug, clap::Args)]
@@ -118,7 +120,7 @@ impl Common {
         }
         let (tracer, why) = Tracer::choose(wanted, device, &Library::embedded(), scene);
         if let Some(why) = why {
-            eprintln!("{why}");
+            output::note(why);
         }
         Ok(tracer)
     }
@@ -137,7 +139,7 @@ impl Common {
     pub fn scene(&self, path: &Path) -> Result<Scene> {
         let (scene, warnings) = Scene::load(path, &self.overrides(path))?;
         for warning in &warnings {
-            eprintln!("{warning}");
+            output::note(warning);
         }
         Ok(scene)
     }
@@ -183,11 +185,32 @@ pub fn simulator(
     scene: &Scene,
     tracer: Tracer,
 ) -> Result<Simulator> {
-    let simulator = Simulator::new(device, library, scene, tracer).into_diagnostic()?;
+    if let Some(Work { too_much, message, remedy }) = Work::of(scene) {
+        if too_much {
+            return Err(miette!(help = remedy, "{message}"));
+        }
+        output::note(format!("warning: {message}; {remedy}"));
+    }
+    let simulator = match Simulator::new(device, library, scene, tracer) {
+        Err(SimError::Gpu(error @ GpuError::TooLarge { .. })) => return Err(too_large(&error)),
+        made => made.into_diagnostic()?,
+    };
     if let Some(warning) = simulator.warning() {
-        eprintln!("warning: {warning}");
+        output::note(format!("warning: {warning}"));
     }
     Ok(simulator)
+}
+
+/// The error of a device for which a scene is too large, with what to lower.
+fn too_large(error: &GpuError) -> Report {
+    let help = match error {
+        GpuError::TooLarge { name, .. } if name == "pixels" => "lower imaging.image_height",
+        _ => {
+            "choose another device; or lower probe.scanlines, probe.samples and \
+             simulation.max_interactions, or reduce the meshes"
+        }
+    };
+    miette!(help = help, "{error}")
 }
 
 /// Sets the counts of `quality` for this device, except those that the user set by hand.
@@ -275,14 +298,17 @@ impl Progress {
             self.next = gone + 0.1;
             let left = gone / f64::from(count.max(1)) * f64::from(self.count.saturating_sub(count));
             // The end of a longer line before it is erased (ECMA-48, EL).
-            eprint!("\r{count}/{} {}, {left:.0} s left\x1b[K", self.count, self.noun);
+            output::progress(format!(
+                "\r{count}/{} {}, {left:.0} s left\x1b[K",
+                self.count, self.noun
+            ));
         }
     }
 
     /// Ends the display: all items are done.
     pub fn finish(self) {
         if self.next > QUIET {
-            eprint!("\r\x1b[K");
+            output::progress("\r\x1b[K");
         }
     }
 }

@@ -86,10 +86,10 @@ pub fn run(args: &Match) -> Result<()> {
     };
     let told = |round: usize, imaging: &Imaging| {
         let [axial, lateral, _] = imaging.psf_scale;
-        eprintln!(
+        output::note(format!(
             "round {round}: gain {:.1} dB, dynamic range {:.1} dB, psf_scale {axial} {lateral}",
             imaging.gain, imaging.dynamic_range
-        );
+        ));
     };
     let made = matching::fit(&mut simulator, &mut scene, &options, told);
     let made = made.map_err(|error| match error {
@@ -101,13 +101,13 @@ pub fn run(args: &Match) -> Result<()> {
     args.common.validated(&device)?;
     table::print(&scene.probe, &made);
     for note in &made.notes {
-        eprintln!("warning: {note}");
+        output::note(format!("warning: {note}"));
     }
     if !made.settled {
-        eprintln!(
+        output::note(format!(
             "warning: not settled after {} rounds; match again, or fit less with --fit",
             made.rounds
-        );
+        ));
     }
     write(args, &made)
 }

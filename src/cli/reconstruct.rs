@@ -120,7 +120,7 @@ fn clip(text: &str) -> Result<[i32; 4], String> {
 pub fn run(args: &Reconstruct) -> Result<()> {
     let (sequence, warnings) = Sequence::load(&args.sequence)?;
     for warning in &warnings {
-        eprintln!("{warning}");
+        output::note(warning);
     }
     let config = args.config.as_deref().map(Config::load).transpose()?;
     let mut config = config.unwrap_or_else(|| Config {

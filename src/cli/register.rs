@@ -25,8 +25,8 @@ mod told;
 pub struct Register {
     /// Scene file (.toml) with [volume].
     scene: PathBuf,
-    /// The model's surface: the name of a mesh of the scene, or a mesh file in its world (.obj, .stl,
-    /// .gltf, .glb). May be given several times.
+    /// The model's surface: the name of a mesh of the scene, or a mesh file in its world. May be given
+    /// several times.
     #[arg(long, value_name = "MESH", requires = "segmented")]
     surface: Vec<String>,
     /// Points of the same surface in the volume's frame, mm: .csv with the columns x, y, z, or the
@@ -144,7 +144,7 @@ struct Registered {
 pub fn run(args: &Register) -> Result<()> {
     let (mut scene, found) = Scene::load(&args.scene, &[])?;
     for warning in &found {
-        eprintln!("{warning}");
+        output::note(warning);
     }
     scene.set_time(args.time);
     let volume = scene.volume.take().ok_or_else(|| {
@@ -272,7 +272,7 @@ fn write(args: &Register, entries: &[Entry], target: &Target, made: &Registered)
         (None, true) => &args.scene,
         (None, false) => {
             if !args.dry_run {
-                eprintln!("nothing is written: give -o FILE or --in-place");
+                output::note("nothing is written: give -o FILE or --in-place");
             }
             return Ok(());
         }

@@ -12,7 +12,9 @@ use super::images::Images;
 use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
 use insonify::output;
+use insonify::output::dicom::{About, Loop};
 use insonify::output::movie::Movie;
+use insonify::probe::Kind;
 use insonify::scene::{Scene, file};
 use insonify::settings::ScatterMode;
 use insonify::sim::calibration::Calibration;
@@ -32,7 +34,8 @@ pub struct Render {
     scene: PathBuf,
     /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here]. With several
     /// frames NAME.png becomes NAME.0000.png, NAME.0001.png, ...; `{}` or `%04d` in the name says
-    /// where the number goes. NAME.gif is an animation of all frames, played again and again.
+    /// where the number goes. NAME.gif is an animation of all frames, played again and again. NAME.dcm is a loop in
+    /// DICOM, with the size of a pixel.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Frames to simulate; each is written, timings are over all. --dump takes the last. [default: 1;
@@ -98,7 +101,7 @@ pub fn run(args: &Render) -> Result<()> {
 
     let counters = simulator.counters().into_diagnostic()?;
     for lost in common::lost(&counters) {
-        eprintln!("warning: {lost}");
+        output::note(format!("warning: {lost}"));
     }
     let contact = simulator.contact();
     let steps = match args.steps {
@@ -201,10 +204,10 @@ fn reload(simulator: &mut Simulator, library: &mut Library) {
     match library.poll() {
         Ok(stems) if stems.is_empty() => {}
         Ok(stems) => match simulator.reload(library) {
-            Ok(()) => eprintln!("reloaded {}", stems.join(", ")),
-            Err(error) => eprintln!("warning: {error}; the last kernels stay"),
+            Ok(()) => output::note(format!("reloaded {}", stems.join(", "))),
+            Err(error) => output::note(format!("warning: {error}; the last kernels stay")),
         },
-        Err(error) => eprintln!("warning: {error}; the last kernels stay"),
+        Err(error) => output::note(format!("warning: {error}; the last kernels stay")),
     }
 }
 
@@ -276,6 +279,7 @@ fn simulate(
         true => Some(Movie::new(output).into_diagnostic()?),
         false => None,
     };
+    let mut film = Loop::is_meant(output).then(|| Loop::new(output, about(scene, simulator)));
     let images = Images::new(output, frames);
     let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
@@ -292,25 +296,48 @@ fn simulate(
         }
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
-        match &mut movie {
-            Some(movie) => {
+        match (&mut movie, &mut film) {
+            (Some(movie), _) => {
                 let end = f64::from(index + 1) / shown;
                 movie.add(width, height, &rgba, end).into_diagnostic()?;
             }
-            None => dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?,
+            (None, Some(film)) => film.add(width, height, &rgba).into_diagnostic()?,
+            (None, None) => {
+                dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?
+            }
         }
         progress.done(index + 1);
     }
     for mask in unseen {
-        eprintln!("warning: {}", common::unseen(scene, mask));
+        output::note(format!("warning: {}", common::unseen(scene, mask)));
     }
     timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();
-    match movie {
-        Some(_) => output::line(output.display()),
-        None => output::line(&images),
+    let one_file = movie.is_some() || film.is_some();
+    if let Some(film) = film {
+        film.finish(1e3 / shown).into_diagnostic()?;
+    }
+    match one_file {
+        true => output::line(output.display()),
+        false => output::line(&images),
     }
     Ok(timings)
+}
+
+/// What a loop in DICOM says beside its frames.
+fn about(scene: &Scene, simulator: &Simulator) -> About {
+    let frame = simulator.constants();
+    About {
+        name: scene.name.clone(),
+        pitch: f64::from(frame.pixel_pitch),
+        corner: [frame.image_left, frame.image_top].map(f64::from),
+        frequency: scene.probe.frequency,
+        transducer: match scene.probe.kind {
+            Kind::Convex { .. } => "CURVED LINEAR",
+            Kind::Linear { .. } => "LINEAR",
+            Kind::Phased { .. } => "SECTOR_PHASED",
+        },
+    }
 }
 
 fn default_output(scene: &Path) -> PathBuf {

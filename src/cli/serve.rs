@@ -70,7 +70,7 @@ pub fn run(args: &Serve) -> Result<()> {
     let server = Server::bind(address, settings)
         .map_err(|error| miette!(help = error.remedy(), "{error}"))?;
     if !args.igtl_bind.is_loopback() {
-        eprintln!("warning: {}", igtl::OPEN);
+        output::note(format!("warning: {}", igtl::OPEN));
     }
     output::line(format!("listening at {} (OpenIGTLink)", server.address()));
     simulate(&mut simulator, &mut scene, &device, &server, args)?;
@@ -170,7 +170,7 @@ impl Told {
             }
         };
         if tracker != self.tracker {
-            eprintln!("{tracker}");
+            output::note(&tracker);
             self.tracker = tracker;
         }
         if self.at.is_some_and(|at| at.elapsed() < TOLD) {
@@ -179,14 +179,14 @@ impl Told {
         self.at = Some(Instant::now());
         let status = server.status();
         if status.clients != self.status.clients {
-            eprintln!("clients: {}", status.clients);
+            output::note(format!("clients: {}", status.clients));
         }
         if status.refused != self.status.refused {
-            eprintln!("clients refused, because there is no room: {}", status.refused);
+            output::note(format!("clients refused, because there is no room: {}", status.refused));
         }
         if status.errors != self.status.errors {
             let last = status.last_error.as_deref().unwrap_or_default();
-            eprintln!("errors: {}, the last: {last}", status.errors);
+            output::note(format!("errors: {}, the last: {last}", status.errors));
         }
         self.status = status;
     }

@@ -74,7 +74,7 @@ pub fn run(args: &Vary) -> Result<()> {
     let (mut scene, variants, warnings) =
         Scene::load_variants(&args.scene, &common.overrides(&args.scene))?;
     for warning in &warnings {
-        eprintln!("{warning}");
+        output::note(warning);
     }
     if args.show != Show::Parameters && scene.volume.is_none() {
         return Err(miette!(
@@ -89,7 +89,7 @@ pub fn run(args: &Vary) -> Result<()> {
     let tracer = common.tracer(&device, &scene)?;
     common.settle(&mut scene, &device);
     for mask in scene.masks_off_the_image() {
-        eprintln!("warning: {}", common::unseen(&scene, mask));
+        output::note(format!("warning: {}", common::unseen(&scene, mask)));
     }
     let simulator = common::simulator(&device, &Library::embedded(), &scene, tracer)?;
     let mut studio = Studio::new(simulator);

@@ -73,9 +73,7 @@ pub enum GpuError {
         reason: String,
     },
     /// A buffer or image is larger than the device takes.
-    #[error(
-        "'{name}' of {what} exceeds the device's {limit_name} of {limit}; lower the quality, or choose another device"
-    )]
+    #[error("'{name}' of {what} exceeds the device's {limit_name} of {limit}")]
     TooLarge {
         /// Name of the object.
         name: String,

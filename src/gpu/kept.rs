@@ -84,10 +84,10 @@ impl PipelineStore {
             Some(Ok(Some(content))) => (known, data) = content,
             Some(Err(problem)) => {
                 let file = file.as_ref().map(|f| f.display().to_string());
-                eprintln!(
+                crate::output::note(format!(
                     "{}: {problem}; its kernels are compiled again",
                     file.unwrap_or_default()
-                );
+                ));
             }
             Some(Ok(None)) | None => {}
         }
@@ -138,7 +138,7 @@ impl PipelineStore {
         thread::spawn(move || {
             let late = wait.recv_timeout(PATIENCE) == Err(RecvTimeoutError::Timeout);
             if late && !told.swap(true, Ordering::Relaxed) {
-                eprintln!("compiling kernels for {device}, the first time only");
+                crate::output::note(format!("compiling kernels for {device}, the first time only"));
             }
         });
         Some(WaitNotice { _done: done })
@@ -156,7 +156,10 @@ impl PipelineStore {
         // SAFETY: the cache is alive and synchronises itself.
         let data = unsafe { self.raw.get_pipeline_cache_data(self.cache) }.unwrap_or_default();
         if let Err(error) = write(file, &encode(&known, &data)) {
-            eprintln!("compiled kernels are not kept: {}: {error}", file.display());
+            crate::output::note(format!(
+                "compiled kernels are not kept: {}: {error}",
+                file.display()
+            ));
         }
     }
 

@@ -2,12 +2,16 @@
 
 use std::path::Path;
 
+use glam::DVec3;
+
 use super::mesh::{Soup, Units};
 use super::topology::{self, Edges};
+use super::{Instance, Scene};
 use crate::issue::Issue;
 
 mod coincident;
 mod fusion;
+mod gas;
 mod nodes;
 mod report;
 
@@ -15,7 +19,7 @@ pub use report::{Report, report};
 
 /// A mesh file should measure between these in its largest direction, mm: from a small cyst to
 /// a tall person. Outside them the unit is wrong far more often than not.
-const SENSIBLE_SIZE: (f64, f64) = (1.0, 2000.0);
+pub const SENSIBLE_SIZE: (f64, f64) = (1.0, 2000.0);
 
 /// Measures of a mesh after repair, mm.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -30,9 +34,11 @@ pub struct Facts {
     pub max: [f64; 3],
     /// Enclosed volume, millilitres; none while the mesh is open.
     pub volume: Option<f64>,
-    /// Edges of a single triangle.
+    /// Edges at which it does not close ([`Edges::open`]).
     pub open_edges: usize,
-    /// Edges of more than two triangles.
+    /// Those of them that have several triangles: an inner wall ends there, or the surface has one side only.
+    pub inner_edges: usize,
+    /// Other edges of more than two triangles.
     pub non_manifold_edges: usize,
 }
 
@@ -62,16 +68,30 @@ pub(super) fn examine(
     }
     let facts = measure(soup);
     issues.extend(size(path, facts.size() * enlarged, units));
-    if facts.open_edges > 0 {
-        let loops = topology::boundary_loops(soup).len();
+    let open = facts.open_edges - facts.inner_edges;
+    if open > 0 {
+        let loops = topology::boundary_loops(soup);
         issues.push(Issue::warning(
             path,
-            facts.open_edges,
+            open,
             format!(
-                "{} open edges in {loops} loops: the mesh encloses nothing there, tissue leaks out",
-                facts.open_edges
+                "{open} open edges in {} loops: the mesh encloses nothing there, tissue leaks out",
+                loops.len()
             ),
             "close it in the modeller or set cap_openings = true",
+        ));
+        issues.extend(inward(path, soup, &loops, &facts));
+    }
+    if facts.inner_edges > 0 {
+        issues.push(Issue::warning(
+            path,
+            facts.inner_edges,
+            format!(
+                "{} edges at which an inner wall ends: on one of its sides the mesh is not closed, \
+                 tissue leaks out",
+                facts.inner_edges
+            ),
+            "remove the wall in the modeller, or make a mesh of each body and give them priorities",
         ));
     }
     if facts.non_manifold_edges > 0 {
@@ -123,6 +143,24 @@ pub(super) fn examine_shape(
     issues
 }
 
+/// Share of its box that a capped mesh has to enclose for its sign to mean anything: an open sheet has none.
+const ENCLOSED: f64 = 0.05;
+
+/// The warning about an open mesh that faces inward.
+fn inward(path: &Path, soup: &Soup, loops: &[Vec<u32>], facts: &Facts) -> Option<Issue> {
+    let room: f64 = (0..3).map(|axis| facts.max[axis] - facts.min[axis]).product();
+    let faces_inward = topology::capped_volume(soup, loops) < -ENCLOSED * room;
+    faces_inward.then(|| {
+        Issue::warning(
+            path,
+            facts.triangles,
+            "is inside out: were its openings closed, its volume would be negative; rays take its \
+             inside for the outside",
+            "flip the normals in the modeller, or set cap_openings = true, which turns it",
+        )
+    })
+}
+
 fn bad(p: &[f32; 3]) -> bool {
     p.iter().any(|v| !v.is_finite())
 }
@@ -153,13 +191,13 @@ fn measure(soup: &Soup) -> Facts {
             facts.max[axis] = facts.max[axis].max(f64::from(v));
         }
     }
-    for group in Edges::of(soup).groups() {
-        match group.len() {
-            1 => facts.open_edges += 1,
-            2 => {}
-            _ => facts.non_manifold_edges += 1,
-        }
+    let edges = Edges::of(soup);
+    for group in edges.open() {
+        facts.open_edges += 1;
+        facts.inner_edges += usize::from(group.len() > 1);
     }
+    let several = edges.groups().filter(|group| group.len() > 2).count();
+    facts.non_manifold_edges = several - edges.open().filter(|group| group.len() > 2).count();
     if facts.open_edges == 0 {
         facts.volume = Some(topology::volume(soup) / 1000.0);
     }
@@ -167,9 +205,23 @@ fn measure(soup: &Soup) -> Facts {
 }
 
 impl Facts {
+    /// Returns whether the box holds a point, mm.
+    fn holds(&self, point: DVec3) -> bool {
+        let point = point.to_array();
+        (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&point[axis]))
+    }
+
     /// Largest edge of the bounding box, mm.
     pub fn size(&self) -> f64 {
         (0..3).map(|axis| self.max[axis] - self.min[axis]).fold(0.0, f64::max)
+    }
+}
+
+/// A length in few digits, however long it is.
+fn shown(length: f64) -> String {
+    match (1e-3..1e7).contains(&length) || length == 0.0 {
+        true => format!("{length:.4}"),
+        false => format!("{length:.3e}"),
     }
 }
 
@@ -187,11 +239,33 @@ fn size(path: &Path, size: f64, units: Units) -> Option<Issue> {
         .min_by(|a, b| away(a.1).total_cmp(&away(b.1)));
     let remedy = match guess {
         Some((name, mm)) => {
-            format!("state its unit: units = \"{name}\" makes it {:.4} mm", size / units.0 * mm)
+            let large = shown(size / units.0 * mm);
+            format!(
+                "state its unit in the scene: units = \"{name}\" in its [[mesh]] makes it {large} mm"
+            )
         }
         None => "scale it in the modeller".to_owned(),
     };
-    Some(Issue::error(path, 1, format!("is {size:.4} mm large, which no anatomy is"), remedy))
+    Some(Issue::error(path, 1, format!("is {} mm large, which no anatomy is", shown(size)), remedy))
+}
+
+/// Returns whether an instance encloses a point: winding number by the solid angles of all triangles (van Oosterom
+/// and Strackee 1983), one inside a closed outward mesh and zero outside, with one half as the limit.
+fn encloses(scene: &Scene, instance: &Instance, point: DVec3) -> bool {
+    let local = instance.world_from_object.inverse().transform_point3(point);
+    let mesh = &scene.meshes[instance.mesh];
+    let half_angles: f64 = mesh
+        .triangles
+        .iter()
+        .map(|t| {
+            let [a, b, c] =
+                t.map(|i| DVec3::from(mesh.positions[i as usize].map(f64::from)) - local);
+            let (la, lb, lc) = (a.length(), b.length(), c.length());
+            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            a.dot(b.cross(c)).atan2(below)
+        })
+        .sum();
+    half_angles / std::f64::consts::TAU > 0.5
 }
 
 #[cfg(test)]
@@ -230,7 +304,45 @@ mod tests {
         let mut fin = scaled(100.0);
         fin.positions.push([50.0, 50.0, 200.0]);
         fin.triangles.push([0, 1, 8]);
-        assert!(messages(fin).iter().any(|m| m.contains("1 non-manifold")));
+        let told = messages(fin);
+        assert!(
+            told[0].contains("2 open edges") && told[1].contains("1 edges at which"),
+            "{told:?}"
+        );
+
+        // Two cubes that touch along an edge are closed.
+        let mut pair = scaled(100.0);
+        let corner = |p: &[f32; 3]| [p[0] - 100.0, p[1] - 100.0, p[2]];
+        pair.positions.extend(scaled(100.0).positions.iter().map(corner));
+        // Vertices 3 and 7 of the second lie where 0 and 4 of the first do.
+        let place = |v: u32| match v {
+            3 => 0,
+            7 => 4,
+            _ => v + 8,
+        };
+        let second: Vec<_> = pair.triangles.iter().map(|t| t.map(place)).collect();
+        pair.triangles.extend(second);
+        let (facts, _) = examine(Path::new("x"), &mut pair.clone(), Units(1.0), 1.0);
+        assert_eq!(facts.volume, Some(2000.0));
+        assert!(messages(pair)[0].contains("1 non-manifold"));
+
+        // A wall inside.
+        let mut wall = scaled(100.0);
+        wall.triangles.extend([[0, 1, 7], [0, 7, 6]]);
+        let (facts, issues) = examine(Path::new("x"), &mut wall, Units(1.0), 1.0);
+        assert_eq!((facts.volume, facts.open_edges, facts.inner_edges), (None, 4, 4));
+        assert!(issues[0].message.contains("4 edges at which an inner wall ends"), "{issues:?}");
+
+        let mut cup = scaled(100.0);
+        cup.triangles.truncate(10);
+        for t in &mut cup.triangles {
+            t.swap(0, 1);
+        }
+        assert!(messages(cup.clone()).iter().any(|m| m.contains("is inside out")));
+        for t in &mut cup.triangles {
+            t.swap(0, 1);
+        }
+        assert!(!messages(cup).iter().any(|m| m.contains("is inside out")));
 
         let mut nan = scaled(100.0);
         nan.positions[3][1] = f32::NAN;
@@ -243,7 +355,7 @@ mod tests {
     fn a_tiny_liver_is_refused_with_its_likely_unit() {
         let found = messages(scaled(0.17));
         assert!(found[0].starts_with("error"), "{found:?}");
-        assert!(found[0].contains("units = \"m\" makes it 170"), "{found:?}");
+        assert!(found[0].contains("units = \"m\" in its [[mesh]] makes it 170"), "{found:?}");
         assert!(messages(scaled(170_000.0))[0].contains("units = \"um\""));
     }
 }

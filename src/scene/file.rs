@@ -152,6 +152,7 @@ impl Scene {
         anatomy::countable(&document, &scene.wires)?;
         scene.set_time(0.0);
         warnings.extend(scene.coincidences(path));
+        warnings.extend(scene.lines_in_gas(path));
         let variants = vary::variants(&document, &file.vary.stated, &scene, suggested)?;
         Ok((scene, variants, warnings))
     }

@@ -120,11 +120,7 @@ pub fn open_edges(mesh: &Mesh) -> usize {
         triangles: mesh.triangles.clone(),
         ..Soup::default()
     });
-    let open = |group: &&[super::topology::Edge]| {
-        let forward = group.iter().filter(|e| e.forward).count();
-        2 * forward != group.len()
-    };
-    Edges::of(&soup).groups().filter(open).count()
+    Edges::of(&soup).open().count()
 }
 
 impl Scene {

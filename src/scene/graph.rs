@@ -175,12 +175,21 @@ impl Graph {
         rests
     }
 
-    /// Conditions for an instance to be shown: selectors, by node, and the choice of each.
-    pub(super) fn conditions(&self, instance: usize) -> Vec<(usize, usize)> {
-        let is_it =
-            |n: &Node| matches!(n.kind, NodeKind::Mesh { instance: i, .. } if i == instance);
+    /// The node of each of `count` instances; none for those that are not in the graph.
+    pub(super) fn nodes_of(&self, count: usize) -> Vec<Option<usize>> {
+        let mut out = vec![None; count];
+        for (number, node) in self.nodes.iter().enumerate() {
+            if let NodeKind::Mesh { instance, .. } = node.kind {
+                out[instance] = Some(number);
+            }
+        }
+        out
+    }
+
+    /// Conditions for a node to be shown: selectors, by node, and the choice of each.
+    pub(super) fn conditions(&self, node: Option<usize>) -> Vec<(usize, usize)> {
         let mut out = Vec::new();
-        let mut at = self.nodes.iter().position(is_it);
+        let mut at = node;
         while let Some(node) = at.map(|i| &self.nodes[i]) {
             out.extend(node.parent.zip(node.alternative));
             at = node.parent;
@@ -215,12 +224,9 @@ impl Graph {
         out
     }
 
-    /// The selector, by node, that switches an instance's keyframes.
-    pub(super) fn switch_of(&self, instance: usize) -> Option<usize> {
-        let is_it =
-            |n: &Node| matches!(n.kind, NodeKind::Mesh { instance: i, .. } if i == instance);
-        let node = self.nodes.iter().find(|n| is_it(n))?;
-        let parent = node.parent?;
+    /// The selector, by node, that switches the keyframes of a mesh's node.
+    pub(super) fn switch_of(&self, node: Option<usize>) -> Option<usize> {
+        let parent = self.nodes[node?].parent?;
         matches!(self.nodes[parent].kind, NodeKind::Selector(_)).then_some(parent)
     }
 }

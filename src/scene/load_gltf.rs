@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DMat4;
 
-use super::mesh::{self, Choice, Parts, Soup};
+use super::mesh::{self, Choice, Parts, Soup, Units};
 use crate::issue::Issue;
 
 mod accessor;
@@ -27,6 +27,9 @@ pub(super) use animated::{AnimatedParts, Part, read_animated};
 use choice::Chosen;
 use surface::{Surface, Surfaces};
 use typed::Typed;
+
+/// The unit of lengths.
+pub(super) const METRES: Units = Units(1000.0);
 
 /// Most commas of the JSON part: each value of the parsed tree takes some 50 bytes of memory.
 const MAX_VALUES: usize = 4_000_000;
@@ -95,13 +98,17 @@ impl File<'_> {
     fn remarks(&self, visited: &[bool]) -> Vec<Issue> {
         let unseen =
             self.gltf.nodes().filter(|n| n.mesh().is_some() && !visited[n.index()]).count();
-        let remark = |count: usize, message: &str| {
+        let remark = |count: usize, message: &str, remedy: &str| {
             let message = format!("{message} ({count})");
-            (count > 0).then(|| Issue::warning(self.path, count, message, ""))
+            (count > 0).then(|| Issue::warning(self.path, count, message, remedy))
         };
+        let mut loose = vec![true; self.gltf.meshes().len()];
+        self.gltf.nodes().filter_map(|n| n.mesh()).for_each(|mesh| loose[mesh.index()] = false);
+        let loose = loose.into_iter().filter(|loose| *loose).count();
         let both = [
-            remark(self.without_data, "primitives without stored positions are ignored"),
-            remark(unseen, "nodes with meshes outside the default scene are ignored"),
+            remark(loose, "meshes that no node places are ignored", "add nodes that name them"),
+            remark(self.without_data, "primitives without stored positions are ignored", ""),
+            remark(unseen, "nodes with meshes outside the default scene are ignored", ""),
         ];
         both.into_iter().flatten().collect()
     }
@@ -132,7 +139,7 @@ pub(super) fn read(path: &Path, bytes: &[u8], node: Option<&str>) -> Result<Part
     }
     let mut issues = walk.surfaces.issues;
     issues.extend(file.remarks(&walk.visited));
-    Ok(Parts { parts: walk.parts, issues })
+    Ok(Parts { parts: walk.parts, issues, units: Some(METRES), ..Parts::default() })
 }
 
 /// Names of a file's animations; none where it cannot be read.

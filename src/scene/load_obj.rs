@@ -1,11 +1,18 @@
 //! Wavefront OBJ: positions and faces. Materials, normals and texture coordinates are not read.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
 use crate::issue::Issue;
 
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
+    // Lines may end as on old Macintoshes.
+    let lines: Cow<'_, [u8]> = match bytes.contains(&b'\n') {
+        true => bytes.into(),
+        false => bytes.iter().map(|&b| if b == b'\r' { b'\n' } else { b }).collect(),
+    };
+    let bytes = &*lines;
     let issues = scan(path, bytes);
     if issues.iter().any(Issue::is_error) {
         return Err(issues);
@@ -32,7 +39,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
         positions: model.mesh.positions.as_chunks().0.to_vec(),
         triangles: model.mesh.indices.as_chunks().0.to_vec(),
     });
-    Ok(Parts { parts: parts.collect(), issues })
+    Ok(Parts { parts: parts.collect(), issues, ..Parts::default() })
 }
 
 /// The lines of text that carry geometry or names, each face reduced to its position indices: the rest cannot
@@ -136,7 +143,11 @@ fn scan(path: &Path, bytes: &[u8]) -> Vec<Issue> {
         pending.clear();
     }
     if vertices > MAX_ELEMENTS || faces > MAX_ELEMENTS {
-        tally.note("vertices or triangles are too many", true, 1);
+        let message = format!(
+            "{} vertices or triangles are too many: the limit is {MAX_ELEMENTS}",
+            vertices.max(faces)
+        );
+        return vec![Issue::error(path, 1, message, "reduce the mesh")];
     }
     let issues = tally.0.into_iter().map(|(what, stops, line, count)| {
         let message = format!("{what} ({count} times, first in line {line})");

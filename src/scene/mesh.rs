@@ -2,7 +2,8 @@
 
 use std::path::Path;
 
-use super::{Mesh, check, load_gltf, load_obj, load_stl};
+use super::formats::{self, off, ply, stl, threemf, vtk, vtp};
+use super::{Mesh, check, load_gltf, load_obj};
 use crate::issue::Issue;
 
 mod animated;
@@ -14,7 +15,7 @@ pub use animated::{
 };
 pub(super) use keyframes::bounded;
 pub use keyframes::{MAX_SHAPES, load_keyframes};
-pub(super) use recipe::weld;
+pub use recipe::weld;
 
 use recipe::Recipe;
 
@@ -67,9 +68,9 @@ impl Units {
 /// Options for reading a mesh file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Options {
-    /// Unit; without it mm, and metres for glTF, which defines its unit.
+    /// Unit; without it the one that the format defines (glTF: metres) or the file states (3MF), else mm.
     pub units: Option<Units>,
-    /// Only this glTF node with its children, or this OBJ object or group.
+    /// Only this glTF node with its children, this OBJ object or group, this STL solid or 3MF object.
     pub node: Option<String>,
     /// True where boundary loops are closed by fans to their centres.
     pub cap_openings: bool,
@@ -95,6 +96,10 @@ pub struct Inspected {
 pub(super) struct Parts {
     pub parts: Vec<Soup>,
     pub issues: Vec<Issue>,
+    /// The unit, where format or file say it.
+    pub units: Option<Units>,
+    /// True where the file states, by means of its format, that its frame is RAS.
+    pub ras: bool,
 }
 
 /// Reads and checks a mesh file; positions end in mm.
@@ -127,22 +132,9 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
     found
 }
 
-/// All chosen triangles of a file, mm, as stored. None if it could not be read; the reason is then among
-/// the issues.
+/// All chosen triangles of a file, mm. None if it could not be read; the reason is then among the issues.
 fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(Soup, Units)> {
-    let kind = Kind::of(path);
-    let read = read_bounded(path).and_then(|bytes| match kind {
-        Some(Kind::Obj) => load_obj::read(path, &bytes),
-        Some(Kind::Stl) => load_stl::read(path, &bytes),
-        Some(Kind::Gltf) => load_gltf::read(path, &bytes, options.node.as_deref()),
-        None => Err(vec![Issue::error(
-            path,
-            1,
-            "not a mesh format that can be read",
-            "convert it to .obj, .gltf, .glb or .stl",
-        )]),
-    });
-    let Parts { parts, issues } = match read {
+    let Parts { parts, issues, units, .. } = match read_parts(path, options) {
         Ok(parts) => parts,
         Err(issues) => {
             found.issues = issues;
@@ -152,8 +144,9 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
     found.issues = issues;
     found.parts = parts.iter().map(|p| p.name.clone()).collect();
 
-    let parts = match (&options.node, kind) {
-        (Some(node), Some(Kind::Obj | Kind::Stl)) => {
+    let parts = match &options.node {
+        // A node of a tree was chosen while that was read.
+        Some(node) if Kind::of(path) != Some(Kind::Gltf) => {
             let chosen: Vec<_> = parts.into_iter().filter(|p| p.name == *node).collect();
             if chosen.is_empty() {
                 found.issues.push(no_such_node(path, node, &found.parts));
@@ -163,9 +156,44 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
         }
         _ => parts,
     };
-    let default_units = if kind == Some(Kind::Gltf) { 1000.0 } else { 1.0 };
-    let units = options.units.unwrap_or(Units(default_units));
+    let units = options.units.or(units).unwrap_or(Units(1.0));
     Some((merge(parts, units), units))
+}
+
+/// The parts of a mesh file, in its unit and in LPS where it states its frame. The extension says its format, unless
+/// the file begins as one of another does.
+fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
+    let bytes = read_bounded(path)?;
+    let (named, found) = (Kind::of(path), Kind::by_content(&bytes));
+    let kind = found.or(named);
+    if let Some(issue) = formats::utf16(path, &bytes).filter(|_| kind.is_some_and(Kind::is_text)) {
+        return Err(vec![issue]);
+    }
+    let mut out = match kind {
+        Some(Kind::Obj) => load_obj::read(path, &bytes),
+        Some(Kind::Gltf) => load_gltf::read(path, &bytes, options.node.as_deref()),
+        Some(Kind::Stl) => stl::read(path, &bytes),
+        Some(Kind::Ply) => ply::read(path, &bytes),
+        Some(Kind::Vtk) => vtk::read(path, &bytes),
+        Some(Kind::Vtp) => vtp::read(path, &bytes),
+        Some(Kind::Off) => off::read(path, &bytes),
+        Some(Kind::Threemf) => threemf::read(path, &bytes),
+        None => {
+            let remedy = format!("convert it to {EXTENSIONS}");
+            Err(vec![Issue::error(path, 1, "not a mesh format that can be read", remedy)])
+        }
+    }?;
+    if let Some(found) = found.filter(|_| found != named) {
+        let message = format!("is read as {found:?}, as which it begins, whatever its name says");
+        out.issues.push(Issue::warning(path, 1, message, "give it the extension of its format"));
+    }
+    if out.ras || kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes) {
+        let positions = out.parts.iter_mut().flat_map(|part| &mut part.positions);
+        positions.for_each(|[x, y, _]| (*x, *y) = (-*x, -*y));
+        let message = "states that its frame is RAS: turned into LPS, in which volumes are";
+        out.issues.push(Issue::warning(path, 1, message, ""));
+    }
+    Ok(out)
 }
 
 /// Message for a node that a file does not have.
@@ -174,11 +202,19 @@ pub(super) fn no_such_node(path: &Path, node: &str, names: &[String]) -> Issue {
     Issue::error(path, 1, format!("no node or object `{node}` with triangles"), remedy)
 }
 
+/// Extensions of readable files, for messages.
+pub(super) const EXTENSIONS: &str = ".obj, .stl, .ply, .vtk, .vtp, .off, .3mf, .gltf or .glb";
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Kind {
     Obj,
     Gltf,
     Stl,
+    Ply,
+    Vtk,
+    Vtp,
+    Off,
+    Threemf,
 }
 
 impl Kind {
@@ -188,7 +224,36 @@ impl Kind {
             "obj" => Some(Self::Obj),
             "gltf" | "glb" => Some(Self::Gltf),
             "stl" => Some(Self::Stl),
+            "ply" => Some(Self::Ply),
+            "vtk" => Some(Self::Vtk),
+            "vtp" => Some(Self::Vtp),
+            "off" => Some(Self::Off),
+            "3mf" => Some(Self::Threemf),
             _ => None,
+        }
+    }
+
+    /// The format of a file that begins as no file of another does.
+    fn by_content(bytes: &[u8]) -> Option<Self> {
+        let begins = |word: &[u8]| bytes.starts_with(word);
+        let head = &bytes[..bytes.len().min(512)];
+        match () {
+            () if begins(b"ply\n") || begins(b"ply\r") => Some(Self::Ply),
+            () if begins(b"# vtk DataFile Version") => Some(Self::Vtk),
+            () if begins(b"PK\x03\x04") => Some(Self::Threemf),
+            () if begins(b"<") && head.windows(8).any(|word| word == b"<VTKFile") => {
+                Some(Self::Vtp)
+            }
+            () => None,
+        }
+    }
+
+    /// Returns whether its files are text, or begin with text.
+    fn is_text(self) -> bool {
+        match self {
+            Self::Obj | Self::Stl | Self::Ply | Self::Vtk | Self::Off => true,
+            // XML states its encoding; the others are binary, or JSON.
+            Self::Vtp | Self::Gltf | Self::Threemf => false,
         }
     }
 }
@@ -230,4 +295,60 @@ fn merge(parts: Vec<Soup>, units: Units) -> Soup {
         all.triangles.extend(shifted);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn inspected(name: &str, content: &str, options: &Options) -> Inspected {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).expect("written");
+        inspect(&path, options)
+    }
+
+    const OFF: &str = "OFF\n3 1 3\n0 0 0\n90 0 0\n0 60 7\n3 0 1 2\n";
+
+    #[test]
+    fn a_stated_frame_is_turned_into_lps() {
+        let obj = "v 0 0 0\nv 90 0 0\nv 0 60 7\nf 1 2 3\n";
+        let ras = format!("# 3D Slicer output. SPACE=RAS\n{obj}");
+        let found = inspected("a.obj", &ras, &Options::default());
+        assert_eq!((found.facts.min, found.facts.max), ([-90.0, -60.0, 0.0], [0.0, 0.0, 7.0]));
+        assert!(found.issues.iter().any(|i| i.message.contains("RAS")), "{:?}", found.issues);
+        let found = inspected("a.obj", &ras.replace("RAS", "LPS"), &Options::default());
+        assert_eq!(found.facts.max, [90.0, 60.0, 7.0]);
+        assert!(!found.issues.iter().any(|i| i.message.contains("RAS")), "{:?}", found.issues);
+    }
+
+    #[test]
+    fn units_and_nodes_are_chosen_for_every_format() {
+        let cm = Options { units: Units::named("cm"), ..Options::default() };
+        assert_eq!(inspected("a.OFF", OFF, &cm).facts.max, [900.0, 600.0, 70.0]);
+        let solid = |name: &str, x: u32| {
+            format!(
+                "solid {name}\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex {x} 0 0\n\
+                 vertex 0 9 0\nendloop\nendfacet\nendsolid\n"
+            )
+        };
+        let two = solid("a", 30) + &solid("b c", 50);
+        let node = |node: &str| Options { node: Some(node.to_owned()), ..Options::default() };
+        assert_eq!(inspected("a.stl", &two, &Options::default()).facts.triangles, 2);
+        assert_eq!(inspected("a.stl", &two, &node("a")).facts.max[0], 30.0);
+        assert_eq!(inspected("a.stl", &two, &node("b c")).facts.max[0], 50.0);
+        let missing = inspected("a.stl", &two, &node("b"));
+        assert!(
+            missing.issues[0].message.contains("no node or object `b`"),
+            "{:?}",
+            missing.issues
+        );
+        let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n0 0 0 90 0 0\n\
+                   0 60 7\nPOLYGONS 1 4\n3 0 1 2\n";
+        let misnamed = inspected("a.stl", vtk, &Options::default());
+        assert_eq!(misnamed.facts.triangles, 1);
+        assert!(misnamed.issues[0].message.contains("is read as Vtk"), "{:?}", misnamed.issues);
+        let unknown = inspected("a.dae", OFF, &cm);
+        assert!(unknown.issues[0].remedy.contains(".3mf"), "{:?}", unknown.issues);
+    }
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 use super::mesh::Soup;
 use crate::issue::Issue;
 
+mod cavities;
 mod winding;
 
 pub use winding::orient;
@@ -52,6 +53,12 @@ impl Edges {
         self.0.chunk_by(|a, b| (a.low, a.high) == (b.low, b.high))
     }
 
+    /// Groups at which the surface does not close: as many triangles would have to run one way as the other. So an
+    /// edge of three triangles, where an inner wall ends, is as open as that of one.
+    pub fn open(&self) -> impl Iterator<Item = &[Edge]> {
+        self.groups().filter(|group| 2 * group.iter().filter(|e| e.forward).count() != group.len())
+    }
+
     /// Edges of exactly two triangles that run in opposite directions.
     pub fn manifold(&self) -> impl Iterator<Item = [&Edge; 2]> {
         self.groups().filter_map(|group| match group {
@@ -77,6 +84,13 @@ pub fn volume(soup: &Soup) -> f64 {
     let origin = DVec3::from(first.map(f64::from));
     let sum: f64 = soup.triangles.iter().map(|&t| six_volumes(soup, t, origin)).sum();
     sum / 6.0
+}
+
+/// The volume of a soup whose boundary loops were closed by fans to their centres.
+pub fn capped_volume(soup: &Soup, loops: &[Vec<u32>]) -> f64 {
+    let mut capped = soup.clone();
+    close(&mut capped, loops);
+    volume(&capped)
 }
 
 /// Removes triangles that no ray can hit and those that would count one crossing twice. `others` are further
@@ -163,14 +177,7 @@ pub fn centre(positions: &[[f32; 3]], ring: &[u32]) -> [f32; 3] {
 /// the last vertices, in this order.
 pub fn cap(path: &Path, soup: &mut Soup) -> (Vec<Vec<u32>>, Vec<Issue>) {
     let loops = boundary_loops(soup);
-    for ring in &loops {
-        let hub = soup.positions.len() as u32;
-        soup.positions.push(centre(&soup.positions, ring));
-        for (k, &a) in ring.iter().enumerate() {
-            let b = ring[(k + 1) % ring.len()];
-            soup.triangles.push([b, a, hub]);
-        }
-    }
+    close(soup, &loops);
     if loops.is_empty() {
         return (loops, Vec::new());
     }
@@ -182,6 +189,17 @@ pub fn cap(path: &Path, soup: &mut Soup) -> (Vec<Vec<u32>>, Vec<Issue>) {
     )];
     issues.extend(orient(path, soup));
     (loops, issues)
+}
+
+fn close(soup: &mut Soup, loops: &[Vec<u32>]) {
+    for ring in loops {
+        let hub = soup.positions.len() as u32;
+        soup.positions.push(centre(&soup.positions, ring));
+        for (k, &a) in ring.iter().enumerate() {
+            let b = ring[(k + 1) % ring.len()];
+            soup.triangles.push([b, a, hub]);
+        }
+    }
 }
 
 #[cfg(test)]
@@ -240,6 +258,12 @@ pub(super) mod tests {
         soup.triangles.extend(second.triangles.iter().map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]));
         let issues = orient(Path::new("x"), &mut soup);
         assert!(issues[0].message.contains("1 of 2 closed bodies"), "{issues:?}");
+        // Within the first it is a cavity, and as it should be.
+        let mut hollow = cube();
+        hollow.positions.extend(second.positions.iter().map(|p| p.map(|v| v * 0.5 + 0.25)));
+        hollow.triangles.extend(second.triangles.iter().map(|t| [t[1] + 8, t[0] + 8, t[2] + 8]));
+        assert!(orient(Path::new("x"), &mut hollow).is_empty());
+        assert_eq!(volume(&hollow), 0.875);
     }
 
     #[test]

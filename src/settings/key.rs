@@ -368,7 +368,7 @@ impl Facts {
             true => format!("it must be at least {least}{unit}"),
             false => format!("it must lie between {least} and {most}{unit}"),
         };
-        Some((format!("{} is {number}{unit}", self.name()), remedy))
+        Some((format!("{} is {}{unit}", self.name(), plain(number)), remedy))
     }
 }
 

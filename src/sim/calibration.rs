@@ -3,6 +3,9 @@
 //! Everything is relative to a perfect flat mirror, which deposits 1 and shows envelope 1.
 
 mod headroom;
+mod work;
+
+pub use work::Work;
 
 use std::f64::consts::{LN_10, PI, TAU};
 
@@ -224,9 +227,9 @@ impl<'a> Calibration<'a> {
         rho * (1.0 + square).powi(2) / (square * square + 6.0 * square + 3.0)
     }
 
-    /// Scatterers of `tissue` in a resolution cell at depth `z`, where no louder tissue masks it and only one
-    /// lattice is in use.
-    pub fn scatterers_at(&self, tissue: &Tissue, z: f64) -> f64 {
+    /// Octaves by which the volume of the cells of `tissue` at depth `z` exceeds that of the finest, where nothing
+    /// drowns it.
+    fn lattice_octaves(&self, tissue: &Tissue, z: f64) -> f64 {
         let density = self.scatterer_density(tissue);
         let steps = f64::from(LEVELS_PER_OCTAVE);
         let octaves = match self.lattice_level(z) {
@@ -234,7 +237,13 @@ impl<'a> Calibration<'a> {
             // A sparse tissue has coarser cells, as long as there are eight for each of its scatterers.
             thinned => thinned.max(-(8.0 * density).log2()).max(0.0),
         };
-        let volume = ((steps * octaves).floor() / steps).exp2();
+        (steps * octaves).floor() / steps
+    }
+
+    /// Scatterers of `tissue` in a resolution cell at depth `z`, where nothing drowns it and one lattice sounds alone.
+    pub fn scatterers_at(&self, tissue: &Tissue, z: f64) -> f64 {
+        let density = self.scatterer_density(tissue);
+        let volume = self.lattice_octaves(tissue, z).exp2();
         let cells = self.resolution_cell(z) / self.scene.simulation.cell.powi(3);
         cells * density.min(1.0 / volume)
     }

@@ -63,7 +63,7 @@ impl Opening {
         Some(match loaded {
             Ok((scene, warnings)) => {
                 for warning in &warnings {
-                    eprintln!("{warning}");
+                    crate::output::note(warning);
                 }
                 let file = File::new(self.path.clone(), self.overrides.clone(), &scene);
                 suited(scene, file, options, device, 0.0, now).map_err(|e| e.to_string())

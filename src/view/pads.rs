@@ -144,7 +144,7 @@ impl Listener {
 
     /// Reports once why there are no pads.
     fn give_up(&self, why: &str) {
-        eprintln!("note: {why}");
+        crate::output::note(format!("note: {why}"));
         lock(&self.word).problem = Some(why.to_owned());
         self.bell.ring();
     }

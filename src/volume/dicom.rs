@@ -14,6 +14,7 @@ mod file;
 mod geometry;
 mod image;
 mod pixels;
+pub(super) mod segmentation;
 
 const SAVE: &str = "export it again, or convert it to .nrrd, .mha or .nii.gz";
 
@@ -93,9 +94,12 @@ pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
     Ok((volume, warnings))
 }
 
+/// Most bytes of the voxels: the file is in memory beside them.
+const MAX_VOXELS: u64 = MAX_BYTES / 2;
+
 /// Size in bytes of so many frames once read; none where that is more than the limit.
 fn bytes_of(image: &Image, frames: usize) -> Option<u64> {
     let factors = [image.rows, image.columns, frames, image.samples, image.kind.bytes()];
     let product = factors.iter().try_fold(1u64, |p, &n| p.checked_mul(n as u64));
-    product.filter(|&p| p <= MAX_BYTES)
+    product.filter(|&p| p <= MAX_VOXELS)
 }

@@ -4,13 +4,25 @@ use std::path::Path;
 
 use super::error::VolumeError;
 use super::grid::Grid;
-use super::layout::Layout;
-use super::source::{Coding, MAX_BYTES, Payload};
+use super::layout::{Axis, Layout};
+use super::source::{Coding, MAX_BYTES, Payload, Skip};
 use super::voxels::{self, VoxelType, Voxels};
 use super::{Format, Statistics, Volume, Warning};
 
 /// Most volumes over time: twice the largest count of an axis in NIfTI-1. Each takes memory beside its voxels.
 const MAX_VOLUMES: usize = 1 << 16;
+/// Bytes that are read before they are decoded.
+const BLOCK: usize = 1 << 20;
+
+/// The voxels of a file.
+#[derive(Default)]
+struct Decoded {
+    volumes: Vec<Voxels>,
+    /// Values that lost digits.
+    rounded: usize,
+    /// True where data follow the voxels.
+    more: bool,
+}
 
 /// A header that has been read and checked by itself.
 pub(super) struct Header {
@@ -39,28 +51,14 @@ impl Header {
             VolumeError::file(path, cause, "correct the direction or export it again")
         })?;
         let total = self.bytes(path)?;
-        let (bytes, more) = if self.payload.coding == Coding::Text {
-            self.big_endian = false;
-            voxels::parse_text(&self.payload, self.kind, total / self.kind.bytes() as u64)?
-        } else {
-            self.payload.read(total)?
+        let Decoded { mut volumes, rounded, more } = match self.is_streamed() {
+            true => self.stream(total)?,
+            false => self.decode(total)?,
         };
         if more {
             let message = "data go on after the declared voxels; the rest is ignored";
             self.warn(path, 1, message, "compare the sizes in the header");
         }
-        let mut rounded = 0;
-        let mut volumes = Vec::with_capacity(self.layout.volumes);
-        for number in 0..self.layout.volumes {
-            let (voxels, lost) =
-                Voxels::decode(&bytes, self.kind, self.big_endian, &self.layout, number);
-            rounded += lost;
-            volumes.push(match self.scale {
-                Some((slope, intercept)) => voxels.scaled(slope, intercept),
-                None => voxels,
-            });
-        }
-        drop(bytes);
         if rounded > 0 {
             let message = format!("{rounded} values are rounded to 24 bits");
             self.warn(path, rounded, message, "");
@@ -90,6 +88,75 @@ impl Header {
         Ok((volume, self.warnings))
     }
 
+    /// Returns whether voxels are decoded while they are read, so that nothing else is in memory.
+    fn is_streamed(&self) -> bool {
+        let payload = &self.payload;
+        let forward = payload.skip != Skip::AllButLast || payload.coding == Coding::Raw;
+        forward && payload.coding != Coding::Text && self.layout.is_in_order()
+    }
+
+    /// Type of the voxels in memory.
+    fn held(&self) -> VoxelType {
+        match self.scale {
+            Some(_) => VoxelType::F32,
+            None => self.kind,
+        }
+    }
+
+    fn scaled(&self, voxels: Voxels) -> Voxels {
+        match self.scale {
+            Some((slope, intercept)) => voxels.scaled(slope, intercept),
+            None => voxels,
+        }
+    }
+
+    /// Decodes the voxels block by block as they are read.
+    fn stream(&self, total: u64) -> Result<Decoded, VolumeError> {
+        let mut stream = self.payload.stream(total)?;
+        let mut out = Decoded::default();
+        let each = self.kind.bytes() * self.layout.channels;
+        let most = (BLOCK / each).max(1);
+        let (mut block, mut done) = (Vec::new(), 0);
+        for _ in 0..self.layout.volumes {
+            let mut left: usize = self.layout.size.iter().product();
+            let mut voxels =
+                Voxels::with_room(self.held(), left).map_err(|_| self.payload.too_large(total))?;
+            while left > 0 {
+                let count = left.min(most);
+                block.resize(count * each, 0);
+                self.payload.fill(&mut stream, &mut block, done, total)?;
+                done += block.len() as u64;
+                left -= count;
+                let values = [(Axis::Values, self.layout.channels), (Axis::Space, count)];
+                let layout = Layout::new(values);
+                let (part, lost) = Voxels::decode(&block, self.kind, self.big_endian, &layout, 0);
+                out.rounded += lost;
+                voxels.append(self.scaled(part));
+            }
+            out.volumes.push(voxels);
+        }
+        out.more = self.payload.goes_on(&mut stream, total)?;
+        Ok(out)
+    }
+
+    /// Reads all bytes, then decodes them.
+    fn decode(&self, total: u64) -> Result<Decoded, VolumeError> {
+        let text = self.payload.coding == Coding::Text;
+        let (bytes, more) = match text {
+            true => voxels::parse_text(&self.payload, self.kind, total / self.kind.bytes() as u64)?,
+            false => self.payload.read(total)?,
+        };
+        let mut out = Decoded { more, ..Decoded::default() };
+        for number in 0..self.layout.volumes {
+            // Numbers in text have become little-endian values.
+            let big = self.big_endian && !text;
+            let (voxels, lost) = Voxels::decode(&bytes, self.kind, big, &self.layout, number);
+            out.rounded += lost;
+            out.volumes.push(self.scaled(voxels));
+        }
+        Ok(out)
+    }
+
     /// Size in bytes of all values in the file; an error where that, or the size in memory, is too large.
     fn bytes(&self, path: &Path) -> Result<u64, VolumeError> {
         let layout = &self.layout;
@@ -100,18 +167,17 @@ impl Header {
                 "correct the sizes in the header, or leave out some",
             ));
         }
-        let held = match self.scale {
-            Some(_) => VoxelType::F32,
-            None => self.kind,
-        };
-        let fits = |count: Option<u64>, each: usize| {
-            let bytes = count.and_then(|count| count.checked_mul(each as u64));
-            bytes.filter(|&bytes| bytes <= MAX_BYTES)
-        };
-        let all = layout.voxels();
-        let all = all.and_then(|voxels| voxels.checked_mul(layout.volumes as u64));
-        let total = fits(layout.values(), self.kind.bytes());
-        total.filter(|_| fits(all, held.held_bytes()).is_some()).ok_or_else(|| {
+        let bytes = |count: Option<u64>, each: usize| count?.checked_mul(each as u64);
+        let all = layout.voxels().and_then(|n| n.checked_mul(layout.volumes as u64));
+        let held = bytes(all, self.held().held_bytes());
+        let total = bytes(layout.values(), self.kind.bytes());
+        // What is not streamed is in memory twice.
+        let peak = held.zip(total).and_then(|(held, total)| match self.is_streamed() {
+            true => Some(held.max(total)),
+            false => held.checked_add(total),
+        });
+        let total = total.filter(|_| peak.is_some_and(|peak| peak <= MAX_BYTES));
+        total.ok_or_else(|| {
             let [x, y, z] = layout.size;
             VolumeError::file(
                 path,

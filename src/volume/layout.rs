@@ -45,6 +45,20 @@ impl Layout {
         out
     }
 
+    /// Returns whether the file's order is that of the voxels: values of a voxel beside each other, the first axis
+    /// fastest, one volume after another.
+    pub fn is_in_order(&self) -> bool {
+        let [x, y, z] = self.size;
+        let mut step = self.channels;
+        let axes =
+            [(x, self.steps[0]), (y, self.steps[1]), (z, self.steps[2]), (self.volumes, self.pace)];
+        axes.into_iter().all(|(count, own)| {
+            let fits = count == 1 || own == step;
+            step = step.saturating_mul(count);
+            fits
+        })
+    }
+
     /// Number of voxels of one volume; none beyond the number range.
     pub fn voxels(&self) -> Option<u64> {
         product(&self.size)

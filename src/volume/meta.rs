@@ -9,7 +9,7 @@ use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
 use super::sequence::{self, frames};
-use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
+use super::source::{self, Coding, Line, Lines, Payload, Skip};
 use super::voxels::VoxelType;
 use super::{Format, Warning};
 
@@ -117,30 +117,25 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
 
 /// Fields up to the one with the place of the voxels, and the byte after it.
 pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
-    let bytes = source::prefix(path, MAX_HEADER)?;
+    let mut lines = Lines::of(path)?;
     let mut list = Vec::new();
-    let mut at = 0;
-    for (line, text) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
-        at += text.len() as u64;
-        let text = String::from_utf8_lossy(text);
+    while let Some(Line { number, text, end }) = lines.next()? {
         if text.trim().is_empty() {
             continue;
         }
         let Some((key, value)) = text.split_once('=') else {
             return Err(VolumeError::line(
                 path,
-                line + 1,
+                number,
                 "is not of the form `Key = value`",
                 "give a MetaImage; its header ends with ElementDataFile",
             ));
         };
-        list.push(Field {
-            line: line + 1,
-            key: key.trim().to_owned(),
-            value: value.trim().to_owned(),
-        });
-        if key.trim() == "ElementDataFile" {
-            return Ok((Fields { path, list }, at));
+        let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
+        let last = key == "ElementDataFile";
+        list.push(Field { line: number, key, value });
+        if last {
+            return Ok((Fields { path, list }, end));
         }
     }
     Err(VolumeError::file(

@@ -100,7 +100,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
         out.warn(path, 1, message, "export it with its unit");
     }
     if dims.len() == 2 {
-        out.warn(path, 1, "is a plane: one slice", "reconstruct a volume from it");
+        out.warn(path, 1, "is a plane: one slice", "give a volume of several slices");
     }
     Ok(out)
 }

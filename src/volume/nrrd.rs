@@ -9,7 +9,7 @@ use super::fields::{Field, Fields};
 use super::grid::Frame;
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
-use super::source::{self, Coding, MAX_HEADER, Payload, Skip};
+use super::source::{self, Coding, Line, Lines, Payload, Skip};
 use super::voxels::VoxelType;
 
 mod space;
@@ -54,8 +54,7 @@ const KNOWN: [&str; 32] = [
 ];
 
 pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
-    let bytes = source::prefix(path, MAX_HEADER)?;
-    let (fields, pairs, data) = fields(path, &bytes)?;
+    let (fields, pairs, data) = fields(path)?;
     let dimension = fields.need("dimension")?;
     let n: usize = fields.number(dimension)?;
     if !(1..=MAX_AXES).contains(&n) {
@@ -110,10 +109,12 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     out.warnings.extend(unused(path, &ignored));
     if stacked {
         let message = "is a sequence of planes: its frames are stacked, 1 mm apart";
-        out.warn(path, 1, message, "reconstruct a volume from it");
+        let remedy =
+            "save it as .igs.mha (3D Slicer does); `insonify reconstruct` makes a volume of that";
+        out.warn(path, 1, message, remedy);
     } else if count == 2 {
         let message = "is a plane: one slice of 1 mm";
-        out.warn(path, 1, message, "reconstruct a volume from it");
+        out.warn(path, 1, message, "give a volume of several slices");
     }
     if frame == Frame::Unstated {
         let message = "no anatomical frame is stated; LPS is assumed";
@@ -123,13 +124,13 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
 }
 
 /// Fields, the keys of key/value pairs, and the byte after the empty line that ends the header.
-fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, Vec<String>, u64), VolumeError> {
+fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), VolumeError> {
+    let mut lines = Lines::of(path)?;
     let (mut list, mut pairs, mut at) = (Vec::new(), Vec::new(), 0);
-    for (line, text) in bytes.split_inclusive(|&b| b == b'\n').enumerate() {
-        at += text.len() as u64;
-        let text = String::from_utf8_lossy(text);
+    while let Some(Line { number, text, end }) = lines.next()? {
+        at = end;
         let text = text.trim_end();
-        if line == 0 {
+        if number == 1 {
             let version = text.strip_prefix("NRRD").filter(|v| v.len() == 4);
             if version.and_then(|v| v.parse::<u32>().ok()).is_none_or(|v| v > 5) {
                 return Err(VolumeError::line(
@@ -140,7 +141,7 @@ fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, Vec<String>, 
                 ));
             }
         } else if text.is_empty() {
-            return Ok((Fields { path, list }, pairs, at));
+            break;
         } else if text.starts_with('#') {
             // A comment.
         } else if let Some((key, value)) = text.split_once(':') {
@@ -149,25 +150,18 @@ fn fields<'p>(path: &'p Path, bytes: &[u8]) -> Result<(Fields<'p>, Vec<String>, 
                 continue;
             }
             list.push(Field {
-                line: line + 1,
+                line: number,
                 key: key.trim().to_owned(),
                 value: value.trim().to_owned(),
             });
         } else {
             return Err(VolumeError::line(
                 path,
-                line + 1,
+                number,
                 "is neither `field: value` nor `key:=value`, and no empty line ended the header",
                 "export or copy the file again",
             ));
         }
-    }
-    if bytes.len() as u64 == MAX_HEADER {
-        return Err(VolumeError::file(
-            path,
-            format!("the header is longer than {MAX_HEADER} bytes"),
-            "export the file again",
-        ));
     }
     Ok((Fields { path, list }, pairs, at))
 }

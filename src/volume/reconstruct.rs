@@ -19,7 +19,7 @@ mod poses;
 pub use config::Config;
 pub use fan::Fan;
 pub use grid::Lattice;
-pub use poses::Transforms;
+pub use poses::{Transforms, names as frames_of_pose};
 
 /// The reason why nothing can be reconstructed.
 #[derive(Debug, Error, Diagnostic)]

@@ -9,9 +9,11 @@ use super::{Voxels, Warning, meta};
 
 pub(super) mod frames;
 mod summary;
+mod track;
 
 pub use frames::{Pose, TrackedFrame};
 pub use summary::Summary;
+pub use track::track;
 
 /// Frames of one size with the tracked poses of each.
 #[derive(Clone, Debug, PartialEq)]
@@ -47,6 +49,14 @@ impl Sequence {
     /// # Errors
     /// Those of a volume; malformed entries of frames; a frame that is a volume itself.
     pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
+        if !["mha", "mhd"].contains(&extension.to_ascii_lowercase().as_str()) {
+            return Err(VolumeError::file(
+                path,
+                "is no MetaImage by its extension, in which tracked sequences are read",
+                "save it as .igs.mha (3D Slicer and PLUS do)",
+            ));
+        }
         let (fields, data) = meta::fields(path)?;
         let mut header = meta::of_fields(&fields, data)?;
         let axes: usize = fields.number(fields.need("NDims")?)?;

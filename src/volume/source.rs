@@ -15,8 +15,11 @@ pub(super) const MAX_BYTES: u64 = 4 << 30;
 /// Most bytes for one byte of DEFLATE: a match of 258 bytes costs two bits
 /// (zlib technical details, "Maximum Compression Factor").
 pub(super) const MAX_RATIO: u64 = 1032;
-/// Longest text header, bytes. Tracked sequences of some hundred frames reach 1 MB.
-pub(super) const MAX_HEADER: u64 = 8 << 20;
+/// Longest text header, bytes. PLUS writes 650 to 880 bytes for each frame of a tracked sequence: three quarters of
+/// an hour at 30 Hz.
+pub(super) const MAX_HEADER: u64 = 64 << 20;
+/// Most lines of a text header: some ten for each of as many frames. Each takes memory beside its text.
+const MAX_LINES: usize = 1 << 20;
 /// Most bytes before compressed data that are skipped by counting from the end.
 const MAX_LEAD: u64 = 1 << 20;
 
@@ -88,6 +91,57 @@ pub(super) fn prefix(path: &Path, limit: u64) -> Result<Vec<u8>, VolumeError> {
         .read_to_end(&mut bytes)
         .map_err(|e| VolumeError::file(path, format!("cannot be read: {e}"), AGAIN))?;
     Ok(bytes)
+}
+
+/// The lines of a text header, read as far as they are asked for.
+pub(super) struct Lines<'p> {
+    path: &'p Path,
+    rest: BufReader<io::Take<File>>,
+    /// Lines and bytes so far.
+    number: usize,
+    at: u64,
+}
+
+/// A line of a text header.
+pub(super) struct Line {
+    /// Number, from 1.
+    pub number: usize,
+    /// Its text, with the end of the line.
+    pub text: String,
+    /// The byte of the file after it.
+    pub end: u64,
+}
+
+impl<'p> Lines<'p> {
+    pub fn of(path: &'p Path) -> Result<Self, VolumeError> {
+        let (file, _) = open(path)?;
+        Ok(Self { path, rest: BufReader::new(file.take(MAX_HEADER)), number: 0, at: 0 })
+    }
+
+    /// The next line; none at the end of the file.
+    ///
+    /// # Errors
+    /// The file cannot be read, or the header is too long.
+    pub fn next(&mut self) -> Result<Option<Line>, VolumeError> {
+        let fail = |cause: String, remedy: &str| Err(VolumeError::file(self.path, cause, remedy));
+        let mut bytes = Vec::new();
+        if let Err(e) = self.rest.read_until(b'\n', &mut bytes) {
+            return fail(format!("cannot be read: {e}"), AGAIN);
+        }
+        self.at += bytes.len() as u64;
+        self.number += 1;
+        let long = self.at == MAX_HEADER && !bytes.ends_with(b"\n");
+        if long || self.number > MAX_LINES {
+            let cause = format!(
+                "the header does not end within {} MB and {MAX_LINES} lines",
+                MAX_HEADER >> 20
+            );
+            return fail(cause, "split the sequence, or export the file again");
+        }
+        let text = String::from_utf8_lossy(&bytes).into_owned();
+        let line = Line { number: self.number, text, end: self.at };
+        Ok((!bytes.is_empty()).then_some(line))
+    }
 }
 
 /// The data file that a header names: in the folder of the header or below it.
@@ -197,13 +251,7 @@ impl Payload {
         let from_end = self.skip == Skip::AllButLast && self.coding != Coding::Raw;
         let keep = if from_end { total + MAX_LEAD + 1 } else { total };
         let mut out = Vec::new();
-        out.try_reserve_exact(total as usize).map_err(|_| {
-            VolumeError::file(
-                &self.file,
-                format!("{total} bytes of voxels do not fit into memory"),
-                "crop or resample the volume",
-            )
-        })?;
+        out.try_reserve_exact(total as usize).map_err(|_| self.too_large(total))?;
         let count = stream.by_ref().take(keep).read_to_end(&mut out);
         count.map_err(|e| self.broken(out.len() as u64, total, &e))?;
         let read = out.len() as u64;
@@ -225,9 +273,46 @@ impl Payload {
         if read < total {
             return Err(self.short(read, read, total));
         }
+        let more = self.goes_on(&mut stream, total)?;
+        Ok((out, more))
+    }
+
+    /// Fills `block` from the stream, of which `done` of `total` bytes have been read.
+    pub fn fill(
+        &self,
+        stream: &mut dyn Read,
+        block: &mut [u8],
+        done: u64,
+        total: u64,
+    ) -> Result<(), VolumeError> {
+        let mut held = 0;
+        while held < block.len() {
+            match stream.read(&mut block[held..]) {
+                Ok(0) => {
+                    let at = done + held as u64;
+                    return Err(self.short(at, at, total));
+                }
+                Ok(count) => held += count,
+                Err(e) if e.kind() == ErrorKind::Interrupted => {}
+                Err(e) => return Err(self.broken(done + held as u64, total, &e)),
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether a stream goes on after its `total` bytes.
+    pub fn goes_on(&self, stream: &mut dyn Read, total: u64) -> Result<bool, VolumeError> {
         let more = stream.read(&mut [0]);
-        let more = more.map_err(|e| self.broken(total, total, &e))?;
-        Ok((out, more > 0))
+        Ok(more.map_err(|e| self.broken(total, total, &e))? > 0)
+    }
+
+    /// The error for voxels for which there is no room.
+    pub fn too_large(&self, total: u64) -> VolumeError {
+        VolumeError::file(
+            &self.file,
+            format!("{total} bytes of voxels do not fit into memory"),
+            "crop or resample the volume",
+        )
     }
 
     fn short(&self, at: u64, held: u64, total: u64) -> VolumeError {

@@ -1,5 +1,6 @@
 //! Voxel types and values.
 
+use std::collections::TryReserveError;
 use std::io::{BufReader, Read};
 
 use super::error::VolumeError;
@@ -133,6 +134,36 @@ impl Voxels {
     pub(super) fn scaled(&self, slope: f64, intercept: f64) -> Self {
         let scale = |x: f64| (slope * x + intercept) as f32;
         Self::F32(values!(self, v => v.iter().map(|&x| scale(f64::from(x))).collect()))
+    }
+
+    /// No voxels yet, of a type as [`Self::decode`] makes it, with room for `count`.
+    pub(super) fn with_room(kind: VoxelType, count: usize) -> Result<Self, TryReserveError> {
+        let mut out = match kind {
+            VoxelType::U8 => Self::U8(Vec::new()),
+            VoxelType::I8 => Self::I8(Vec::new()),
+            VoxelType::U16 => Self::U16(Vec::new()),
+            VoxelType::I16 => Self::I16(Vec::new()),
+            VoxelType::U32 | VoxelType::I32 | VoxelType::F32 | VoxelType::F64 => {
+                Self::F32(Vec::new())
+            }
+        };
+        values!(&mut out, v => v.try_reserve_exact(count))?;
+        Ok(out)
+    }
+
+    /// Appends voxels of the same type.
+    ///
+    /// # Panics
+    /// When they are of another.
+    pub(super) fn append(&mut self, more: Self) {
+        match (self, more) {
+            (Self::U8(v), Self::U8(more)) => v.extend(more),
+            (Self::I8(v), Self::I8(more)) => v.extend(more),
+            (Self::U16(v), Self::U16(more)) => v.extend(more),
+            (Self::I16(v), Self::I16(more)) => v.extend(more),
+            (Self::F32(v), Self::F32(more)) => v.extend(more),
+            (own, other) => panic!("{:?} after {:?}", other.kind(), own.kind()),
+        }
     }
 
     /// One of the volumes in these bytes, and the number of rounded values.

@@ -1,7 +1,7 @@
 //! Data of others that some tests read and that do not ship.
 
 #[path = "skip.rs"]
-mod skip;
+pub mod skip;
 
 use std::path::{Path, PathBuf};
 

@@ -81,6 +81,21 @@ fn each_row_uses_rows_above_it_so_that_there_is_no_circle() {
     }
 }
 
+/// `eprintln!` panics where nobody reads standard error any more; `output::note` does not.
+#[test]
+fn standard_error_is_written_by_one_module() {
+    let mut todo = vec![root().join("src")];
+    while let Some(path) = todo.pop() {
+        if path.is_dir() {
+            let entries = fs::read_dir(&path).expect("a folder");
+            todo.extend(entries.map(|entry| entry.expect("an entry").path()));
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            let text = fs::read_to_string(&path).expect("a source");
+            assert!(!text.contains("eprint"), "{}: write `output::note`", path.display());
+        }
+    }
+}
+
 #[test]
 fn a_planted_use_is_found_however_it_is_written() {
     let table = vec![("low".to_owned(), vec!["ground".to_owned(), "high::floor".to_owned()])];

@@ -3,12 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
+use insonify::output;
 use insonify::register::landmarks::Landmark;
 use insonify::register::surface::{Triangle, TriangleSurface, samples};
 use insonify::register::{RegisterError, points};
 use insonify::scene::graph::{Placed, is_even};
 use insonify::scene::{Acquired, Mesh, Scene, mesh};
 use insonify::settings::suggest;
+use insonify::volume::Frame;
 use miette::{Report, Result, miette};
 
 use super::Register;
@@ -24,7 +26,10 @@ pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     };
     let mesh = mesh_file(file)?;
     let said = points::frame_of_mesh(file)?;
-    let signs = points::agreed(file, said, args.frame())?.lps_signs();
+    let frame = points::agreed(file, said, args.frame())?;
+    // A file that states its frame was read into LPS.
+    let read = if said == Frame::Unstated { frame } else { Frame::Lps };
+    let signs = read.lps_signs();
     let triangles = placed(&mesh, &DAffine3::from_scale(signs));
     Ok(Some(samples(&triangles, args.samples as usize)))
 }
@@ -167,7 +172,7 @@ fn mesh_file(path: &Path) -> Result<Mesh> {
         Report::from(RegisterError { file: Some(path.to_owned()), line: 0, cause: message, remedy })
     })?;
     for issue in issues {
-        eprintln!("{issue}");
+        output::note(issue);
     }
     Ok(mesh)
 }

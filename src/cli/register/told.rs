@@ -56,7 +56,7 @@ fn distances(fit: &Fit) -> String {
 /// Prints the warnings on standard error.
 pub fn warn(warnings: &[String]) {
     for warning in warnings {
-        eprintln!("warning: {warning}");
+        output::note(format!("warning: {warning}"));
     }
 }
 

@@ -45,11 +45,11 @@ pub fn run(args: &Answers) -> Result<()> {
         let name = this.assessor.name.trim();
         let namesake = answers[..i].iter().find(|a| a.assessor.name.trim() == name);
         if let (false, Some(other)) = (name.is_empty(), namesake) {
-            eprintln!(
+            output::note(format!(
                 "warning: {} and {} are two forms of `{name}`, and count as two assessors",
                 other.file.display(),
                 this.file.display()
-            );
+            ));
         }
     }
     let results = Results::new(&key, &answers);

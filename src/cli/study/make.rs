@@ -79,7 +79,7 @@ fn load(plan: &Plan, common: &Common) -> Result<Vec<Loaded>> {
     for (i, scenario) in plan.scenarios.iter().enumerate() {
         let (scene, variants, warnings) = Scene::load_variants(&scenario.scene, &common.overrides)?;
         for warning in &warnings {
-            eprintln!("{warning}");
+            output::note(warning);
         }
         check_backgrounds(plan, i, &scene)?;
         loaded.push(Loaded { scene, variants });
@@ -177,12 +177,12 @@ impl Maker<'_> {
     fn warn_of_masks(&self, case: &Case, scene: &Scene) {
         let scenario = &self.plan.scenarios[case.scenario];
         for mask in scene.masks_off_the_image() {
-            eprintln!(
+            output::note(format!(
                 "warning: {}, {}: {}",
                 scenario.name,
                 scenario.slices[case.slice].name,
                 common::unseen(scene, mask)
-            );
+            ));
         }
     }
 }
@@ -257,9 +257,9 @@ fn write(plan: &Plan, cases: &[Case], mut rows: Vec<Row>, folder: &Folder) -> Re
     folder.write(&file, html.as_bytes())?;
     let size = html.len() as f64 / f64::from(1 << 20);
     if html.len() > LARGE {
-        eprintln!(
+        output::note(format!(
             "warning: the form has {size:.0} MB; image_height in the plan makes smaller images"
-        );
+        ));
     }
     output::line(format!(
         "{}: {} cases, {} images, {size:.1} MB",

@@ -1,6 +1,7 @@
 //! The images of a contact sheet, all from one simulator.
 
 use image::{GrayImage, Luma};
+use insonify::output;
 use insonify::scene::Scene;
 use insonify::scene::vary::{Parameter, Variant, short};
 use insonify::settings::{Blend, Surroundings, Words};
@@ -260,7 +261,7 @@ impl Studio {
         let (width, height, rgba) = self.simulator.pixels().into_diagnostic()?;
         let counters = self.simulator.counters().into_diagnostic()?;
         for lost in common::lost(&counters) {
-            eprintln!("warning: {name}: {lost}");
+            output::note(format!("warning: {name}: {lost}"));
         }
         Ok(Frame { width, height, rgba })
     }

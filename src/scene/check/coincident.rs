@@ -38,23 +38,25 @@ impl Scene {
         self.coincident_pairs().values().sum()
     }
 
-    /// One warning for each pair of instances that share triangles.
+    /// One warning for each pair of instances of equal priority that share triangles: which tissue is there then hangs on
+    /// the order of crossing them. Of different priorities the higher decides, as for two organs that touch.
     pub(crate) fn coincidences(&self, file: &Path) -> Vec<Issue> {
         let mut pairs: Vec<_> = self.coincident_pairs().into_iter().collect();
         pairs.sort_unstable();
         let name = |i: usize| &self.instances[i].name;
+        let tie = |pair: &[usize; 2]| {
+            let [a, b] = pair.map(|i| self.instances[i].priority);
+            a == b
+        };
         pairs
             .into_iter()
+            .filter(|(pair, _)| tie(pair))
             .map(|([a, b], count)| {
-                let tie = self.instances[a].priority == self.instances[b].priority;
                 Issue::warning(
                     file,
                     count,
                     format!("coincident interfaces: {count} triangles of `{}` and `{}` are the same", name(a), name(b)),
-                    match tie {
-                        true => "give the meshes different priorities, so that the order of crossing them does not matter",
-                        false => "the mesh of higher priority decides the tissue",
-                    },
+                    "give the meshes different priorities, so that the order of crossing them does not matter",
                 )
             })
             .collect()
@@ -63,9 +65,10 @@ impl Scene {
     /// All shapes of all instances.
     fn poses(&self) -> Vec<Pose<'_>> {
         let mut out = Vec::new();
+        let nodes = self.graph.nodes_of(self.instances.len());
         for (i, instance) in self.instances.iter().enumerate() {
-            let conditions = self.graph.conditions(i);
-            let switch = self.graph.switch_of(i);
+            let conditions = self.graph.conditions(nodes[i]);
+            let switch = self.graph.switch_of(nodes[i]);
             let shapes = match instance.keyframes.meshes.as_slice() {
                 [] => std::slice::from_ref(&instance.mesh),
                 all => all,
@@ -172,8 +175,13 @@ mod tests {
         assert_eq!(load(&alternatives).0.coincident_triangles(), 0);
         let hidden = alternatives.replace("file = \"a.obj\"", "file = \"b.obj\"");
         let beside = hidden + &mesh("z", "file = \"b.obj\"");
-        let (scene, said) = load(&beside);
+        let (scene, _) = load(&beside);
         assert!(!scene.instances[1].shown);
+        // Different priorities decide.
+        let decided = beside.clone() + "priority = 1\n";
+        let (scene, silent) = load(&decided);
+        assert_eq!((scene.coincident_triangles(), silent.len()), (12, 0));
+        let (scene, said) = load(&beside);
         // Each triangle of z has a twin in x and one in y; it counts once.
         assert_eq!(scene.coincident_triangles(), 12);
         assert_eq!(said.len(), 1, "{said:?}");

@@ -1,13 +1,15 @@
 //! The report of `insonify check`: a scene or a mesh, with all its faults.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Facts, fusion, nodes};
+use super::{Facts, encloses, fusion, nodes};
 use crate::scene::mesh::{self, Animated, AnimatedNode, Choice, Inspected, Options, Placement};
 use crate::scene::{Instance, Issue, Scene, SceneError, Severity};
+use crate::volume;
 
 /// Distance from a surface at which the tissue around it is looked up, mm: clear of surfaces
 /// that coincide with it, inside the thinnest wall.
@@ -22,6 +24,8 @@ pub struct Report {
     pub issues: Vec<Issue>,
     /// The mistake that stopped the loading of a scene.
     pub error: Option<SceneError>,
+    /// The scene, where it could be loaded.
+    pub scene: Option<Scene>,
 }
 
 impl Report {
@@ -59,7 +63,11 @@ pub fn report(path: &Path) -> Report {
         _ => refuse(
             path,
             "neither a scene nor a mesh nor a volume by its extension",
-            "give a .toml, .obj, .gltf, .glb, .stl, .mha, .mhd, .nrrd, .nhdr, .nii or .nii.gz file",
+            &format!(
+                "give a scene (.toml), a mesh ({}) or a volume ({})",
+                mesh::EXTENSIONS,
+                volume::KINDS
+            ),
         ),
     }
 }
@@ -79,7 +87,7 @@ fn mesh_file(path: &Path) -> Report {
             lines.push(format!("  parts: {}", named.join(", ")));
         }
     }
-    let mut report = Report { lines, issues, error: None };
+    let mut report = Report { lines, issues, ..Report::default() };
     animations(path, &mut report);
     report
 }
@@ -159,21 +167,20 @@ fn scene(path: &Path) -> Report {
         ),
     ];
     lines.extend(nodes::describe(&scene));
-    for instance in &scene.instances {
-        let (facts, inside_point) = world_facts(&scene, instance);
-        let outside = tissue_around(&scene, instance, inside_point);
-        lines.push(format!("{}: {}", instance.name, describe(&facts)));
+    let facts: Vec<_> = scene.instances.iter().map(|i| world_facts(&scene, i)).collect();
+    let outside = tissues_around(&scene, &facts);
+    for ((instance, (facts, _)), outside) in scene.instances.iter().zip(&facts).zip(outside) {
+        lines.push(format!("{}: {}", instance.name, describe(facts)));
         lines.push(format!(
             "  encloses {}, priority {}; outside it {outside}",
             scene.tissues[instance.tissue].name, instance.priority
         ));
     }
-    let facts = |mask: usize| world_facts(&scene, &scene.instances[mask]).0;
-    let (fused, idle) = fusion::describe(path, &scene, facts);
+    let (fused, idle) = fusion::describe(path, &scene, |mask| facts[mask].0.clone());
     lines.extend(fused);
     issues.extend(idle);
     lines.push(format!("coincident triangles: {}", scene.coincident_triangles()));
-    Report { lines, issues, error: None }
+    Report { lines, issues, error: None, scene: Some(scene) }
 }
 
 /// Facts in world space, and a point just outside the surface.
@@ -197,36 +204,51 @@ fn world_facts(scene: &Scene, instance: &Instance) -> (Facts, DVec3) {
     (super::measure(&soup), outside)
 }
 
-/// Tissue at a point beside an instance, without that instance: of the enclosing mesh of highest
-/// priority, or the background. At other places of the surface it may be another.
-fn tissue_around<'s>(scene: &'s Scene, instance: &Instance, point: DVec3) -> &'s str {
-    let around = scene
-        .instances
-        .iter()
-        .filter(|other| other.shown && other.name != instance.name)
-        .filter(|other| encloses(scene, other, point))
-        .max_by_key(|other| other.priority);
-    let tissue = around.map_or(scene.background, |other| other.tissue);
-    &scene.tissues[tissue].name
-}
-
-/// Returns whether an instance encloses a point: winding number by the solid angles of all triangles (van Oosterom
-/// and Strackee 1983), one inside a closed outward mesh and zero outside, with one half as the limit.
-fn encloses(scene: &Scene, instance: &Instance, point: DVec3) -> bool {
-    let local = instance.world_from_object.inverse().transform_point3(point);
-    let mesh = &scene.meshes[instance.mesh];
-    let half_angles: f64 = mesh
-        .triangles
-        .iter()
-        .map(|t| {
-            let [a, b, c] =
-                t.map(|i| DVec3::from(mesh.positions[i as usize].map(f64::from)) - local);
-            let (la, lb, lc) = (a.length(), b.length(), c.length());
-            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-            a.dot(b.cross(c)).atan2(below)
-        })
-        .sum();
-    half_angles / std::f64::consts::TAU > 0.5
+/// Tissue at the point beside each instance, without that instance: of the enclosing mesh of highest priority, or the
+/// background. At other places of the surface it may be another.
+fn tissues_around<'s>(scene: &'s Scene, facts: &[(Facts, DVec3)]) -> Vec<&'s str> {
+    // Along x, boxes begin and end, and points lie in those that have begun and not ended: each point is held
+    // against few instances, however many there are.
+    #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+    enum Event {
+        Begin,
+        Point,
+        End,
+    }
+    let mut events = Vec::with_capacity(3 * facts.len());
+    for (i, (facts, point)) in facts.iter().enumerate() {
+        events.extend([
+            (facts.min[0], Event::Begin, i),
+            (point.x, Event::Point, i),
+            (facts.max[0], Event::End, i),
+        ]);
+    }
+    events.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut within = BTreeSet::new();
+    let mut out = vec![scene.tissues[scene.background].name.as_str(); facts.len()];
+    for (_, event, i) in events {
+        match event {
+            Event::Begin => {
+                within.insert(i);
+            }
+            Event::End => {
+                within.remove(&i);
+            }
+            Event::Point => {
+                let (instance, point) = (&scene.instances[i], facts[i].1);
+                let others = within.iter().map(|&other: &usize| (&scene.instances[other], other));
+                let around = others
+                    .filter(|(other, _)| other.shown && other.name != instance.name)
+                    .filter(|(_, other)| facts[*other].0.holds(point))
+                    .filter(|(other, _)| encloses(scene, other, point))
+                    .max_by_key(|(other, _)| other.priority);
+                if let Some((other, _)) = around {
+                    out[i] = &scene.tissues[other.tissue].name;
+                }
+            }
+        }
+    }
+    out
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Placed meshes and wires of a scene file.
 
+use std::collections::HashSet;
 use std::ops::Range;
 
 use glam::DAffine3;
@@ -7,9 +8,9 @@ use glam::DAffine3;
 use super::document::Document;
 use super::error::SceneError;
 use super::nodes::NodeKeys;
-use super::placing::{PLACE, placement};
+use super::placing::{PLACE, placed};
 use super::playing::{self, Following, Played, Playing};
-use super::shelf::{MeshKeys, Shelf};
+use super::shelf::{self, MeshKeys, Shelf};
 use super::table::Table;
 use super::tissues::Tissues;
 use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Wire};
@@ -74,13 +75,15 @@ pub(super) fn meshes(
     tissues: &mut Tissues<'_>,
     warnings: &mut Vec<Issue>,
 ) -> Result<Anatomy, SceneError> {
+    shelf::countable(document, tables)?;
     let mut shelf = Shelf::default();
     let mut out = Anatomy::default();
+    let mut names = HashSet::new();
     for (i, Table { stated, .. }) in tables.iter().enumerate() {
         let path = format!("mesh.{i}");
         let NodeKeys { name, .. } = stated.get("");
         let keys: MeshKeys = stated.get("");
-        if out.instances.iter().any(|other| other.name == name) {
+        if names.contains(&name) {
             return Err(document.fail(
                 &format!("{path}.name"),
                 format!("there are two meshes named `{name}`"),
@@ -94,12 +97,14 @@ pub(super) fn meshes(
             Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
             None => vec![shelf.shapes(document, (stated, &name), &path, warnings)?],
         };
-        let rest = placement(stated, "");
+        shelf.bounded(document, &path)?;
+        let rest = placed(document, &path, stated)?;
         stated.put("", &mut outside);
         let mut inside = outside;
         stated.put("inside.", &mut inside);
         let first = out.instances.len();
         for shapes in shapes {
+            names.insert(shapes.name.clone());
             out.instances.push(Instance {
                 name: shapes.name,
                 mesh: shapes.mesh,

@@ -16,6 +16,9 @@ use crate::settings::{Facts, Value, suggest};
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
 const MAX_TEXT: u64 = 4 << 20;
 
+/// Tables of which a file may have several.
+const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
+
 /// The text of a scene file and of the overrides.
 pub(super) struct Source {
     pub path: PathBuf,
@@ -44,14 +47,30 @@ pub(super) struct Document<'s> {
 impl Source {
     /// Reads the file and stores the overrides.
     pub fn read(path: &Path, overrides: &[(String, String)]) -> Result<Self, SceneError> {
-        let fail =
-            |cause: String| SceneError::file(path, cause, "check the path of the scene file");
-        let info = std::fs::metadata(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
-        if info.len() > MAX_TEXT || !info.is_file() {
-            return Err(fail("is not a scene file".to_owned()));
+        let fail = |cause: String, remedy| SceneError::file(path, cause, remedy);
+        let check = "check the path of the scene file";
+        let unreadable = |e: std::io::Error| fail(format!("cannot be read: {e}"), check);
+        let info = std::fs::metadata(path).map_err(unreadable)?;
+        if info.is_dir() {
+            return Err(fail("is a folder".to_owned(), "name a scene file (.toml) in it"));
         }
-        let text =
-            std::fs::read_to_string(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
+        if !info.is_file() {
+            return Err(fail("is a pipe or a device, not a file".to_owned(), check));
+        }
+        if info.len() > MAX_TEXT {
+            let cause =
+                format!("is {} MB; a scene file may have {}", info.len() >> 20, MAX_TEXT >> 20);
+            let remedy = "name a scene file (.toml); meshes and volumes lie in files of their own";
+            return Err(fail(cause, remedy));
+        }
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let text = String::from_utf8(bytes).map_err(|e| {
+            let at = e.utf8_error().valid_up_to();
+            let line = e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() + 1;
+            let utf16 = matches!(e.as_bytes(), [0xff, 0xfe, ..] | [0xfe, 0xff, ..]);
+            let kind = if utf16 { "is text in UTF-16" } else { "is not text in UTF-8" };
+            fail(format!("{kind}: line {line}, byte {at}"), "save it as UTF-8 in a text editor")
+        })?;
         let source = Self { path: path.to_owned(), text, overrides: Vec::new() };
         Ok(source.with(overrides))
     }
@@ -110,7 +129,20 @@ impl Source {
     fn table<'s>(&self, text: &'s str) -> Result<DeTable<'s>, SceneError> {
         let table = DeTable::parse(text).map_err(|e| {
             let span = e.span().unwrap_or(0..0);
-            self.error(span, e.message().to_owned(), None)
+            // The parser takes any bare word for a number that is wrong.
+            let word = text.get(span.start..).unwrap_or_default();
+            let len = word.find(|c: char| !c.is_ascii_alphabetic()).unwrap_or(word.len());
+            let (message, remedy) = match &word[..len] {
+                word if e.message().starts_with("invalid float") && !word.is_empty() => (
+                    format!("`{word}` is no value"),
+                    Some(
+                        "put text in quotes; leave the key out where nothing is to be set"
+                            .to_owned(),
+                    ),
+                ),
+                _ => (e.message().to_owned(), None),
+            };
+            self.error(span, message, remedy)
         })?;
         Ok(table.into_inner())
     }
@@ -305,6 +337,10 @@ fn insert<'s>(
         return Ok(());
     }
     if !table.contains_key(*first) {
+        if LISTS.contains(first) {
+            let message = format!("there is no {first} `{}`: the file has no [[{first}]]", rest[0]);
+            return Err((message, format!("add a [[{first}]] to the file")));
+        }
         let empty = DeValue::Table(DeTable::new());
         let key = Spanned::new(key_span.clone(), Cow::Borrowed(*first));
         table.insert(key, Spanned::new(key_span.clone(), empty));

@@ -9,7 +9,7 @@ use super::document::Document;
 use super::error::SceneError;
 use super::motion::{self, PERIOD};
 use super::nodes::{Entry, Kind, depths, entries, parents};
-use super::placing::placement;
+use super::placing::placed;
 use super::playing::Following;
 use super::schema::File;
 use super::table::Stated;
@@ -264,7 +264,7 @@ impl Family<'_> {
             Kind::Transform(i) => {
                 let stated = &self.file.transform[i].stated;
                 NodeKind::Transform {
-                    rest: placement(stated, ""),
+                    rest: placed(self.document, &self.entries[e].path, stated)?,
                     motion: motion::motion(self.document, stated, &self.entries[e].path)?,
                 }
             }

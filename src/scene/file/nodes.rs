@@ -100,6 +100,9 @@ pub(super) fn parents(
     entries.iter().map(one).collect()
 }
 
+/// Most nodes above each other. Anatomy needs ten, skeletons some more.
+const DEEPEST: usize = 100;
+
 /// For each entry the number of its ancestors.
 pub(super) fn depths(
     document: &Document<'_>,
@@ -133,5 +136,13 @@ pub(super) fn depths(
             depths[e] = Some(depth);
         }
     }
-    Ok(depths.into_iter().map(|d| d.expect("all visited")).collect())
+    let depths: Vec<_> = depths.into_iter().map(|d| d.expect("all visited")).collect();
+    match depths.iter().position(|&depth| depth > DEEPEST) {
+        Some(e) => Err(document.fail(
+            &format!("{}.parent", entries[e].path),
+            format!("`{}` has more than {DEEPEST} nodes above it", entries[e].name),
+            "leave out groups and transforms on the way that do nothing",
+        )),
+        None => Ok(depths),
+    }
 }

@@ -1,7 +1,9 @@
 //! Placements: shift, rotation and scale of meshes, transforms and motions.
 
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+use super::document::Document;
+use super::error::SceneError;
 use super::table::Stated;
 use crate::settings::units::{ANGLE, LENGTH};
 use crate::settings::{Facts, Form, group};
@@ -41,6 +43,84 @@ group! {
         /// Shift. Applied last.
         translate: [f64; 3] = [0.0; 3], PLACE;
     }
+}
+
+group! {
+    /// A placement as a matrix.
+    pub struct Affine in "" {
+        /// Instead of `scale`, `rotate` and `translate`: 4 x 4, row by row; the shift, in mm, is the fourth column.
+        matrix: Option<[f64; 16]> = None,
+            Facts::of(Form::Numbers(16)).limits("not flat, not mirroring, without the other keys");
+    }
+}
+
+/// Farthest shift along an axis, mm, as of the keys that say it alone.
+const FAR: f64 = 1e5;
+/// Volume of the box that the unit vectors become, over the product of their lengths, at and below which a matrix is
+/// flat for single precision.
+const FLAT: f64 = 1e-6;
+
+/// World from object, as the table at `path` says it: its matrix, or its parts.
+///
+/// # Errors
+/// A matrix beside parts, or one that mirrors, is flat, scales too much or leads too far.
+pub(super) fn placed(
+    document: &Document<'_>,
+    path: &str,
+    stated: &Stated,
+) -> Result<DAffine3, SceneError> {
+    let Some(rows) = stated.get::<Affine>("").matrix else { return Ok(placement(stated, "")) };
+    let path = format!("{path}.matrix");
+    let placement = affine(document, &path, rows, (stated, ""))?;
+    let (m, shifts) = (placement.matrix3, placement.translation.to_array());
+    let lengths = [m.x_axis, m.y_axis, m.z_axis].map(DVec3::length);
+    let volume = m.determinant() / lengths.iter().product::<f64>();
+    let [least, most] = SCALES;
+    let (cause, remedy) = match lengths.iter().find(|size| !(least..=most).contains(*size)) {
+        Some(size) => (
+            format!("a column of this matrix is {size} long, by which it scales"),
+            format!("it must lie between {least} and {most}"),
+        ),
+        None if volume < 0.0 => (
+            "this matrix mirrors, which turns tissues inside out".to_owned(),
+            "mirror the mesh in the modeller; from RAS to LPS two axes change sign, not one"
+                .to_owned(),
+        ),
+        None if volume <= FLAT => (
+            "this matrix is flat: it has no inverse".to_owned(),
+            "write it row by row; the shift is the fourth column, mm".to_owned(),
+        ),
+        None => match shifts.iter().find(|shift| !(-FAR..=FAR).contains(*shift)) {
+            Some(shift) => (
+                format!("this matrix shifts by {shift} mm"),
+                format!("it must lie between -{FAR} and {FAR} mm"),
+            ),
+            None => return Ok(placement),
+        },
+    };
+    Err(document.fail(&path, cause, remedy))
+}
+
+/// The matrix of four rows at `path`; the other keys that place may not stand in the table `below` with it.
+pub(super) fn affine(
+    document: &Document<'_>,
+    path: &str,
+    rows: [f64; 16],
+    (stated, below): (&Stated, &str),
+) -> Result<DAffine3, SceneError> {
+    let fail = |why: &str, remedy| Err(document.fail(path, why, remedy));
+    if ["scale", "rotate", "translate"].iter().any(|key| stated.has(&format!("{below}{key}"))) {
+        return fail("both a matrix and a shift, rotation or scale are given", "give one of them");
+    }
+    if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
+        return fail(
+            "the last row is not 0 0 0 1",
+            "write the matrix row by row; the shift is the fourth column, mm",
+        );
+    }
+    let column = |i: usize| DVec3::new(rows[i], rows[4 + i], rows[8 + i]);
+    let matrix = DMat3::from_cols(column(0), column(1), column(2));
+    Ok(DAffine3::from_mat3_translation(matrix, column(3)))
 }
 
 /// World from object, as the table `below` says it: scale, then rotate, then translate.

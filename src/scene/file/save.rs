@@ -8,6 +8,7 @@ use toml_edit::{DocumentMut, InlineTable, Item, KeyMut, Table, TableLike, Value}
 
 use super::document::{Misfit, Source, element, segments};
 use super::error::SceneError;
+use super::placing::placed;
 use super::tissues::Tissues;
 use super::{probe, settings};
 use crate::output::files;
@@ -86,6 +87,12 @@ fn check(source: &Source) -> Result<(), SceneError> {
     let file = document.parse()?;
     settings::settings(&document, &file, None)?;
     probe::pose(&document, "probe", &file.probe.stated)?;
+    for (i, table) in file.transform.iter().enumerate() {
+        placed(&document, &format!("transform.{i}"), &table.stated)?;
+    }
+    for (i, table) in file.mesh.iter().enumerate() {
+        placed(&document, &format!("mesh.{i}"), &table.stated)?;
+    }
     Tissues::new(&document, &file.tissues).map(|_| ())
 }
 

@@ -13,7 +13,7 @@ use super::fusion::{MaskKeys, VolumeKeys};
 use super::graph::SelectorKeys;
 use super::motion::{Cycle, MotionKeys, Updates};
 use super::nodes::NodeKeys;
-use super::placing::{Placed, Size, Stretch};
+use super::placing::{Affine, Placed, Size, Stretch};
 use super::playing::Following;
 use super::probe::{Pose, PresetKey};
 use super::shelf::{MeshKeys, ShapeKeys};
@@ -94,10 +94,10 @@ tables! {
     Probe, "probe": defaults::<PresetKey>(""), keys::<Probe>("", "preset"), defaults::<Pose>("pose.");
     MeshKeys, "mesh": defaults::<NodeKeys>(""), defaults::<MeshKeys>(""), defaults::<Cycle>(""),
         defaults::<Updates>(""), defaults::<Following>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
-        keys::<Surface>("", ""), keys::<Surface>("inside.", "as outside"), defaults::<ShapeKeys>("shape.");
+        defaults::<Affine>(""), keys::<Surface>("", ""), keys::<Surface>("inside.", "as outside"), defaults::<ShapeKeys>("shape.");
     NodeKeys, "group": defaults::<NodeKeys>("");
     MotionKeys, "transform": defaults::<NodeKeys>(""), defaults::<Stretch>(""), defaults::<Placed>(""),
-        defaults::<MotionKeys>("motion."), defaults::<Cycle>("motion."), defaults::<Updates>("motion.");
+        defaults::<Affine>(""), defaults::<MotionKeys>("motion."), defaults::<Cycle>("motion."), defaults::<Updates>("motion.");
     SelectorKeys, "selector": defaults::<NodeKeys>(""), defaults::<SelectorKeys>(""), defaults::<Cycle>(""),
         defaults::<Updates>(""), defaults::<Following>("");
     WireKeys, "wire": defaults::<WireKeys>("");

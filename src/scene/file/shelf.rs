@@ -1,11 +1,12 @@
 //! Shapes of a scene file: mesh files, keyframes, and built-in shapes. A file that several instances name
 //! is read once.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use super::document::Document;
 use super::error::SceneError;
-use super::table::Stated;
+use super::table::{Stated, Table};
 use crate::scene::mesh::{self, Options, Units};
 use crate::scene::{Issue, Mesh, shapes};
 use crate::settings::units::LENGTH;
@@ -30,16 +31,17 @@ group! {
         tissue: String = String::new(), Facts::of(Form::Text).required();
         /// Who wins where meshes overlap: the highest.
         priority: i32 = 0, Facts::of(Form::Integer).limits("32 bits, signed");
-        /// `.obj`, `.gltf`, `.glb` or `.stl`; the path is relative to the scene file.
+        /// A mesh file of one of the formats below; the path is relative to the scene file.
         file: Option<String> = None, Facts::of(Form::Text);
         /// Instead of `file`: the shapes that it takes one after the other. The parent must be a selector.
         keyframes: Option<Vec<String>> = None, Facts::of(Form::Texts).limits("up to 1000 files");
         /// Animation of a `.gltf` or `.glb` file: its name, or `true` for the first one. See below.
         animation: Option<String> = None, Facts::of(Form::TextOrTrue).by_default("none");
-        /// Only this glTF node with its children, or this OBJ object or group. Files only.
+        /// Only this glTF node with its children, this OBJ object or group, this solid of an STL, or this object of a
+        /// 3MF. Files only.
         node: Option<String> = None, Facts::of(Form::Text).by_default("everything");
         /// Unit of the numbers in the file. Files only.
-        units: Option<&'static str> = None, Facts::one_of(&Units::WORDS).by_default("mm; metres in glTF");
+        units: Option<&'static str> = None, Facts::one_of(&Units::WORDS).by_default("the file's, else mm");
         /// Close holes by fans to their centres. Files only.
         cap_openings: bool = false, Facts::switch();
     }
@@ -76,19 +78,14 @@ group! {
 pub(super) struct Shelf {
     /// All meshes.
     pub meshes: Vec<Mesh>,
-    read: Vec<Read>,
-}
-
-/// Files that have been read.
-struct Read {
-    files: Files,
-    options: Options,
-    /// Their indices among the meshes.
-    meshes: Vec<usize>,
+    /// Triangles of all of them.
+    triangles: usize,
+    /// For files that have been read: with which options, and their indices among the meshes.
+    read: HashMap<Files, Vec<(Options, Vec<usize>)>>,
 }
 
 /// The files from which a mesh is read.
-#[derive(Clone, PartialEq)]
+#[derive(Clone, PartialEq, Eq, Hash)]
 enum Files {
     One(PathBuf),
     /// Keyframes are read together: vertices must keep their numbers.
@@ -151,16 +148,17 @@ impl Shelf {
             }
         };
         let options = options(&keys);
-        let known = self.read.iter().find(|r| r.files == files && r.options == options);
-        let meshes = match known {
-            Some(read) => read.meshes.clone(),
+        let mut known = self.read.get(&files).into_iter().flatten();
+        let meshes = match known.find(|known| known.0 == options) {
+            Some((_, meshes)) => meshes.clone(),
             None => {
                 let (found, issues) = load(&files, &options)
                     .map_err(|issues| Self::unread(document, &issues, name, path, given))?;
                 warnings.extend(issues.into_iter().map(|w| w.of(name)));
                 let found = found.into_iter().map(|mesh| self.add(name, mesh));
                 let meshes: Vec<_> = found.collect();
-                self.read.push(Read { files: files.clone(), options, meshes: meshes.clone() });
+                let known = self.read.entry(files.clone()).or_default();
+                known.push((options, meshes.clone()));
                 meshes
             }
         };
@@ -198,9 +196,51 @@ impl Shelf {
 
     /// Stores a mesh and returns its number.
     pub fn add(&mut self, name: &str, mesh: Mesh) -> usize {
+        self.triangles += mesh.triangles.len();
         self.meshes.push(Mesh { name: name.to_owned(), ..mesh });
         self.meshes.len() - 1
     }
+
+    /// Fails at the mesh table at `path` if the meshes so far have too many triangles.
+    pub fn bounded(&self, document: &Document<'_>, path: &str) -> Result<(), SceneError> {
+        affordable(document, path, self.triangles)
+    }
+}
+
+/// Most triangles of all meshes of a scene, keyframes included: some 4 GB while structures are made.
+const MAX_TRIANGLES: usize = 16_000_000;
+
+/// Fails at the mesh table at `path`, with which the scene has so many triangles, if they are too many.
+fn affordable(document: &Document<'_>, path: &str, triangles: usize) -> Result<(), SceneError> {
+    if triangles <= MAX_TRIANGLES {
+        return Ok(());
+    }
+    Err(document.fail(
+        path,
+        format!("with this mesh the scene has {triangles} triangles; it may have {MAX_TRIANGLES}"),
+        "lower `subdivisions` of shapes, reduce meshes in the modeller, or name fewer keyframes",
+    ))
+}
+
+/// Fails if built-in shapes alone have too many triangles: before one of them is made.
+pub(super) fn countable(
+    document: &Document<'_>,
+    tables: &[Table<MeshKeys>],
+) -> Result<(), SceneError> {
+    let mut sum = 0usize;
+    for (i, Table { stated, .. }) in tables.iter().enumerate() {
+        let s: ShapeKeys = stated.get("shape.");
+        let has = |kind: &str| stated.has(&format!("shape.{kind}"));
+        let divided = |divisions: u32| 20usize << (2 * divisions.min(shapes::MAX_SUBDIVISIONS));
+        sum = sum.saturating_add(match () {
+            () if has("sphere") => divided(s.ball_divisions),
+            () if has("ellipsoid") => divided(s.divisions),
+            () if has("cylinder") => 4 * s.segments as usize,
+            () => 12 * usize::from(has("box") || has("plane")),
+        });
+        affordable(document, &format!("mesh.{i}"), sum)?;
+    }
+    Ok(())
 }
 
 fn load(files: &Files, options: &Options) -> Result<(Vec<Mesh>, Vec<Issue>), Vec<Issue>> {

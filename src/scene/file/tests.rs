@@ -115,6 +115,49 @@ fn a_whole_scene_is_understood() {
     assert!((scene.wires[0].amplitude - 0.1).abs() < 1e-12);
 }
 
+/// A matrix says what scale, rotation and shift say, of meshes and of transforms.
+#[test]
+fn a_matrix_places_as_its_parts_do() {
+    let case = Case::new();
+    let scene = |of_node: &str, of_mesh: &str| {
+        format!(
+            "[[transform]]\nname = \"t\"\n{of_node}\n[[mesh]]\nname = \"a\"\nfile = \"cube.obj\"\n\
+             tissue = \"liver\"\nparent = \"t\"\n{of_mesh}\n"
+        )
+    };
+    let parts = "scale = [1, 2, 3]\nrotate = { axis = [0, 0, 1], angle = \"90 deg\" }\n\
+        translate = [5, \"2 cm\", 7]";
+    let matrix = "matrix = [0, -2, 0, 5, 1, 0, 0, 20, 0, 0, 3, 7, 0, 0, 0, 1]";
+    let placed = |text: &str| {
+        let (scene, _) = case.load(text, &[]).expect("sound");
+        scene.instances[0].world_from_object
+    };
+    let wanted = placed(&scene(parts, parts));
+    for (node, mesh) in [(matrix, parts), (parts, matrix), (matrix, matrix)] {
+        let found = placed(&scene(node, mesh));
+        assert!(found.abs_diff_eq(wanted, 1e-9), "{found} {wanted}");
+    }
+    let mirror = "matrix = [-1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
+    let flat = "matrix = [1, 1, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]";
+    for (text, cause, remedy) in [
+        (format!("{matrix}\ntranslate = [1, 2, 3]"), "both a matrix", "give one"),
+        (matrix.replace("0, 1]", "1, 1]"), "the last row is not 0 0 0 1", "row by row"),
+        (matrix.replace("-2", "-2e7"), "2e7 long|20000000 long", "between"),
+        (matrix.replace("20", "2e9"), "matrix shifts by 2000000000 mm", "between"),
+        (mirror.to_owned(), "mirrors", "two axes change sign"),
+        (flat.to_owned(), "is flat", "row by row"),
+        (matrix.replace("-2", "nan"), "NaN", "between"),
+    ] {
+        for (text, table) in [(scene(&text, ""), "transform"), (scene("", &text), "mesh")] {
+            let error = case.load(&text, &[]).map(|_| ()).expect_err(cause);
+            assert!(cause.split('|').any(|c| error.message.contains(c)), "{table}: {error}");
+            let told = error.remedy.as_deref().unwrap_or_default();
+            assert!(told.contains(remedy), "{table}: {told}");
+            assert!(error.line > 0, "{error}");
+        }
+    }
+}
+
 /// Paths as the program writes them: names with dots in quotes, other names without, even those that TOML would quote.
 #[test]
 fn overrides_name_what_has_dots_in_its_name() {

@@ -130,8 +130,13 @@ fn resolve(
         Some(base) if base != name && tables.contains_key(base) => {
             Some(resolve(document, tables, base, chain)?)
         }
-        Some(base) => Some(Tissue::shipped(base).ok_or_else(|| {
-            unknown(document, &based_on, base, tables.keys().map(String::as_str))
+        Some(base) => Some(Tissue::shipped(base).ok_or_else(|| match base == name {
+            true => document.fail(
+                &based_on,
+                format!("`{name}` is based on itself, and no shipped tissue has this name"),
+                "base it on another tissue, or give all its values and leave `based_on` out",
+            ),
+            false => unknown(document, &based_on, base, tables.keys().map(String::as_str)),
         })?),
         None => Tissue::shipped(name),
     };

@@ -1,10 +1,10 @@
 //! The table `tracker`.
 
-use glam::{DAffine3, DMat3, DVec3};
+use glam::DAffine3;
 
 use super::document::Document;
 use super::error::SceneError;
-use super::placing::placement;
+use super::placing::{affine, placement};
 use super::table::Stated;
 use crate::scene::tracker::{Axes, Tracker, rigid};
 use crate::settings::units::DURATION;
@@ -70,29 +70,11 @@ fn transform(document: &Document<'_>, stated: &Stated, name: &str) -> Result<DAf
     let Some(rows) = stated.get::<MatrixKey>(&below).matrix else {
         return Ok(placement(stated, &below));
     };
-    let fail =
-        |why: String, remedy| Err(document.fail(&format!("tracker.{below}matrix"), why, remedy));
-    if ["translate", "rotate"].iter().any(|key| stated.has(&format!("{below}{key}"))) {
-        return fail(
-            "both a matrix and a rotation or shift are given".to_owned(),
-            "give one of them",
-        );
-    }
-    if rows[12..] != [0.0, 0.0, 0.0, 1.0] {
-        return fail(
-            "the last row is not 0 0 0 1".to_owned(),
-            "write the matrix row by row; the shift is the fourth column, mm",
-        );
-    }
-    let column = |i: usize| DVec3::new(rows[i], rows[4 + i], rows[8 + i]);
-    let matrix = DAffine3::from_mat3_translation(
-        DMat3::from_cols(column(0), column(1), column(2)),
-        column(3),
-    );
-    rigid(matrix).or_else(|why| {
-        fail(
-            format!("this is no rigid transform: {why}"),
-            "write rotation and shift in mm, without scale, row by row",
-        )
+    let path = format!("tracker.{below}matrix");
+    let matrix = affine(document, &path, rows, (stated, &below))?;
+    rigid(matrix).map_err(|why| {
+        let message = format!("this is no rigid transform: {why}");
+        let remedy = "write rotation and shift in mm, without scale, row by row";
+        document.fail(&path, message, remedy)
     })
 }

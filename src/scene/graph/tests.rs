@@ -102,8 +102,9 @@ fn a_hidden_alternative_hides_all_below_and_clocks_go_on() {
         let shown: Vec<_> = scene.instances.iter().map(|i| i.shown).collect();
         assert_eq!(shown, expected, "{t}");
     }
-    assert_eq!(scene.graph.conditions(1), [(3, 1), (0, 0)]);
-    assert_eq!(scene.graph.conditions(3), []);
+    let nodes = scene.graph.nodes_of(scene.instances.len());
+    assert_eq!(scene.graph.conditions(nodes[1]), [(3, 1), (0, 0)]);
+    assert_eq!(scene.graph.conditions(nodes[3]), []);
 }
 
 #[test]
@@ -130,7 +131,7 @@ fn keyframes_follow_the_selector_by_their_strategy() {
     // Past the middle the other keyframe is the nearer one.
     scene.set_time(0.55);
     assert_eq!((scene.instances[0].mesh, scene.instances[1].mesh), (6, 3));
-    assert_eq!(scene.graph.switch_of(1), Some(0));
+    assert_eq!(scene.graph.switch_of(scene.graph.nodes_of(scene.instances.len())[1]), Some(0));
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The bytes behind a glTF file: the binary chunk, files beside it, data URIs.
 
-use std::path::Path;
+use std::io::Read as _;
+use std::path::{Component, Path};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
@@ -63,7 +64,7 @@ fn one(
             .to_vec(),
         Source::Uri(uri) => match uri.strip_prefix("data:") {
             Some(data) => embedded(data)?,
-            None => beside(path, uri)?,
+            None => beside(path, uri, buffer.length())?,
         },
     };
     if bytes.len() < buffer.length() {
@@ -83,13 +84,16 @@ fn embedded(data: &str) -> Result<Vec<u8>, (String, &'static str)> {
     STANDARD.decode(text).map_err(|e| unread(format!("its data URI is not in base64: {e}")))
 }
 
-/// Bytes of a file beside the glTF file. Refuses addresses that leave this machine or name something huge.
-fn beside(path: &Path, uri: &str) -> Result<Vec<u8>, (String, &'static str)> {
+/// Bytes of a file in the folder of the glTF file or below it. The address is decoded before it is looked at; one
+/// that leaves the folder, or names anything but a file, is refused. At most the declared `length` is read.
+fn beside(path: &Path, uri: &str, length: usize) -> Result<Vec<u8>, (String, &'static str)> {
     let elsewhere = "keep the file beside the .gltf";
-    let unread =
-        |cause: String| (format!("cannot be read: {cause}"), "restore the file that it names");
+    let unread = |cause: String| {
+        (format!("`{uri}` cannot be read: {cause}"), "restore the file that it names")
+    };
     let name = percent_decode_str(uri).decode_utf8().map_err(|e| unread(e.to_string()))?;
-    if uri.contains(':') || name.starts_with('/') {
+    let inside = |c: Component| matches!(c, Component::Normal(_) | Component::CurDir);
+    if name.is_empty() || name.contains(':') || !Path::new(&*name).components().all(inside) {
         return Err((format!("is at `{uri}`, which is not beside the file"), elsewhere));
     }
     let file = path.parent().unwrap_or(Path::new("")).join(&*name);
@@ -97,8 +101,8 @@ fn beside(path: &Path, uri: &str) -> Result<Vec<u8>, (String, &'static str)> {
     if !info.is_file() {
         return Err((format!("`{uri}` is not a file"), elsewhere));
     }
-    if info.len() > MAX_FILE {
-        return Err((format!("`{uri}` is too large"), elsewhere));
-    }
-    std::fs::read(&file).map_err(|e| unread(e.to_string()))
+    let mut bytes = Vec::new();
+    let opened = std::fs::File::open(&file).map_err(|e| unread(e.to_string()))?;
+    opened.take(length as u64).read_to_end(&mut bytes).map_err(|e| unread(e.to_string()))?;
+    Ok(bytes)
 }

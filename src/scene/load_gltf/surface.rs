@@ -54,7 +54,7 @@ impl<'a> Surfaces<'a> {
             return Err(Issue::error(
                 self.reader.path,
                 self.elements,
-                "has too many vertices or triangles",
+                format!("has more than {MAX_ELEMENTS} vertices or triangles, which are too many"),
                 "reduce the mesh",
             ));
         }

@@ -72,12 +72,41 @@ fn planted_faults_are_errors() {
         ("data:", "http://somewhere/", "not beside"),
         ("data:application", "missing", "cannot be read"),
         ("data:application/octet-stream;base64,", "%2Fdev/zero", "not beside"),
+        ("data:application/octet-stream;base64,", "..%2F", "not beside"),
+        ("data:application/octet-stream;base64,", "a/%2e%2E/", "not beside"),
+        ("data:application/octet-stream;base64,", "file%3A", "not beside"),
     ] {
         let broken = sound.replace(from, to);
         assert_ne!(broken, sound);
         let issues = load(&broken).err().unwrap_or_default();
         let all: String = issues.iter().map(ToString::to_string).collect();
         assert!(all.contains(cause), "{cause}: {all}");
+    }
+}
+
+/// Whatever a file's address names, no more is read than it declares, and a pipe is not waited for.
+#[test]
+fn buffers_are_files_in_the_folder_read_as_far_as_declared() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("a.gltf");
+    let read = |uri: &str| read(&path, file(r#"{"mesh":0}"#, 4, uri).as_bytes(), None);
+    let bytes: Vec<u8> = [0.0f32, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0]
+        .iter()
+        .flat_map(|v| v.to_le_bytes())
+        .collect();
+    std::fs::create_dir(folder.path().join("in")).expect("made");
+    for name in ["a b.bin", "in/b.bin"] {
+        std::fs::write(folder.path().join(name), &bytes).expect("written");
+    }
+    assert!(read("a%20b.bin").is_ok() && read("./in/b.bin").is_ok());
+    // Sparse, larger than memory, and too large for a file that is read whole.
+    let huge = std::fs::File::create(folder.path().join("huge.bin")).expect("made");
+    huge.set_len(1 << 40).expect("sized");
+    assert!(read("huge.bin").is_ok());
+    let pipe = std::process::Command::new("mkfifo").arg(folder.path().join("pipe.bin")).status();
+    if pipe.is_ok_and(|status| status.success()) {
+        let issues = read("pipe%2Ebin").expect_err("a pipe");
+        assert!(issues[0].message.contains("is not a file"), "{issues:?}");
     }
 }
 

@@ -39,12 +39,14 @@ pub(super) struct Findings<'a> {
     /// True if animations are read, too.
     animated: bool,
     list: Vec<Finding>,
+    /// True where no other fault means anything.
+    ended: bool,
 }
 
 /// Checks types, ranges and references of every property, then the rules between them. `animated`:
 /// whether animations and skins are read, so that faults there stop the loading, too.
 pub(super) fn validate(root: &Map<String, Value>, animated: bool) -> Vec<Finding> {
-    let mut findings = Findings { root, animated, list: Vec::new() };
+    let mut findings = Findings { root, animated, list: Vec::new(), ended: false };
     findings.object(root, ROOT, "");
     rules::check(&mut findings);
     findings.list
@@ -96,7 +98,19 @@ impl<'a> Findings<'a> {
         }
     }
 
+    /// Drops all faults but the last, of which this is the remedy.
+    pub fn only_last(&mut self, remedy: &'static str) {
+        self.list.drain(..self.list.len().saturating_sub(1));
+        if let Some(last) = self.list.last_mut() {
+            last.remedy = remedy;
+        }
+        self.ended = true;
+    }
+
     fn add(&mut self, pointer: &str, message: String, severity: Severity) {
+        if self.ended {
+            return;
+        }
         self.list.push(Finding {
             pointer: pointer.to_owned(),
             message,

@@ -5,7 +5,7 @@ use std::path::Path;
 use glam::DAffine3;
 
 use super::keyframes::shapes;
-use super::{Kind, Options, Units, read_bounded};
+use super::{Kind, Options, read_bounded};
 use crate::issue::Issue;
 use crate::scene::Mesh;
 use crate::scene::animation::{Track, Trs};
@@ -137,7 +137,7 @@ pub fn load_animated(
         let remedy = "list the shapes as keyframes, or convert them to .glb";
         return Err(vec![Issue::error(path, 1, cause, remedy)]);
     }
-    let units = options.units.unwrap_or(Units(1000.0));
+    let units = options.units.unwrap_or(load_gltf::METRES);
     let most = options.keyframes.unwrap_or(KEYFRAMES);
     let bytes = read_bounded(path)?;
     let node = options.node.as_deref();

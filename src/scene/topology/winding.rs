@@ -4,7 +4,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::{Edges, six_volumes, volume};
+use super::{Edges, cavities, six_volumes, volume};
 use crate::issue::Issue;
 use crate::scene::mesh::Soup;
 
@@ -12,7 +12,8 @@ use crate::scene::mesh::Soup;
 /// closed mesh of negative volume.
 pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
     let mut issues = Vec::new();
-    let Agreement { turned, contradictions, bodies, inward } = agree(soup);
+    let Agreement { turned, contradictions, body_of, inward } = agree(soup);
+    let bodies = inward.len();
     if turned > 0 {
         issues.push(Issue::warning(
             path,
@@ -31,7 +32,7 @@ pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
             "make the surface enclose a volume",
         ));
     }
-    if volume(soup) < 0.0 && Edges::of(soup).groups().all(|g| g.len() > 1) {
+    if volume(soup) < 0.0 && Edges::of(soup).open().next().is_none() {
         for t in &mut soup.triangles {
             t.swap(1, 2);
         }
@@ -41,13 +42,18 @@ pub fn orient(path: &Path, soup: &mut Soup) -> Vec<Issue> {
             "inside out (its volume is negative): all triangles were turned",
             "flip the normals in the modeller",
         ));
-    } else if inward > 0 && inward < bodies {
-        issues.push(Issue::warning(
-            path,
-            inward,
-            format!("{inward} of {bodies} closed bodies face inwards: cavities, or inside out"),
-            "flip them in the modeller unless they are cavities",
-        ));
+    } else if inward.contains(&true) && inward.contains(&false) {
+        let wrong = cavities::inside_out(soup, &body_of, &inward);
+        if wrong > 0 {
+            issues.push(Issue::warning(
+                path,
+                wrong,
+                format!(
+                    "{wrong} of {bodies} closed bodies face inwards and lie in no other: inside out"
+                ),
+                "flip them in the modeller",
+            ));
+        }
     }
     issues
 }
@@ -59,9 +65,9 @@ struct Agreement {
     turned: usize,
     /// Edges whose triangles cannot agree.
     contradictions: usize,
-    /// Number of closed pieces, and of those with a negative volume.
-    bodies: usize,
-    inward: usize,
+    /// Closed piece of each triangle, `u32::MAX` for none, and whether each piece has a negative volume.
+    body_of: Vec<u32>,
+    inward: Vec<bool>,
 }
 
 /// Flood fill over edges of two triangles; turns the minority of each piece.
@@ -79,7 +85,7 @@ fn agree(soup: &mut Soup) -> Agreement {
         }
     }
     let mut turn: Vec<Option<bool>> = vec![None; count];
-    let mut found = Agreement::default();
+    let mut found = Agreement { body_of: vec![u32::MAX; count], ..Agreement::default() };
     for start in 0..count {
         if turn[start].is_some() {
             continue;
@@ -113,8 +119,9 @@ fn agree(soup: &mut Soup) -> Agreement {
             six += six_volumes(soup, soup.triangles[t], origin);
         }
         if piece.iter().all(|&t| used[t] == 3) {
-            found.bodies += 1;
-            found.inward += usize::from(six < 0.0);
+            let body = found.inward.len() as u32;
+            piece.iter().for_each(|&t| found.body_of[t] = body);
+            found.inward.push(six < 0.0);
         }
     }
     // Each conflicting edge is met from both of its triangles.

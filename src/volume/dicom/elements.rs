@@ -18,7 +18,12 @@ pub(super) const POSITION_PATIENT: Tag = (0x0020, 0x9113);
 pub(super) const ORIENTATION_PATIENT: Tag = (0x0020, 0x9116);
 pub(super) const MEASURES: Tag = (0x0028, 0x9110);
 pub(super) const VALUES: Tag = (0x0028, 0x9145);
-const SEQUENCES: [Tag; 8] = [
+/// Of segmentations.
+pub(super) const SEGMENTS: Tag = (0x0062, 0x0002);
+pub(super) const CATEGORY: Tag = (0x0062, 0x0003);
+pub(super) const IDENTIFICATION: Tag = (0x0062, 0x000a);
+pub(super) const TYPE: Tag = (0x0062, 0x000f);
+const SEQUENCES: [Tag; 12] = [
     SHARED,
     PER_FRAME,
     POSITION_VOLUME,
@@ -27,14 +32,19 @@ const SEQUENCES: [Tag; 8] = [
     ORIENTATION_PATIENT,
     MEASURES,
     VALUES,
+    SEGMENTS,
+    CATEGORY,
+    IDENTIFICATION,
+    TYPE,
 ];
 pub(super) const PIXELS: Tag = (0x7fe0, 0x0010);
 pub(super) const FLOAT_PIXELS: Tag = (0x7fe0, 0x0008);
 /// Groups and elements of values that are kept.
-const KEPT: [Tag; 24] = [
+const KEPT: [Tag; 28] = [
     (0x0002, 0x0010),
     (0x0008, 0x0016),
     (0x0008, 0x0060),
+    (0x0008, 0x0104),
     (0x0018, 0x0050),
     (0x0018, 0x1063),
     (0x0020, 0x0032),
@@ -54,6 +64,9 @@ const KEPT: [Tag; 24] = [
     (0x0028, 0x0103),
     (0x0028, 0x1052),
     (0x0028, 0x1053),
+    (0x0062, 0x0004),
+    (0x0062, 0x0005),
+    (0x0062, 0x000b),
     PIXELS,
     FLOAT_PIXELS,
 ];

@@ -12,6 +12,8 @@ use crate::volume::error::VolumeError;
 
 /// The preamble and the four letters after it.
 const START: usize = 132;
+/// Largest file, bytes, and most bytes of its elements once inflated: they are in memory beside the voxels.
+const MAX_FILE: u64 = MAX_BYTES / 2;
 /// Most bytes into which a byte of a deflated file may unpack. Images reach ten, not more.
 const MAX_INFLATION: u64 = 64;
 
@@ -66,11 +68,18 @@ fn name(uid: &str) -> &'static str {
 }
 
 pub(super) fn read(path: &Path) -> Result<Dicom<'_>, VolumeError> {
-    let bytes = source::prefix(path, MAX_BYTES)?;
-    if bytes.get(START - 4..START) != Some(b"DICM") {
+    let start = source::prefix(path, START as u64)?;
+    if start.get(START - 4..) != Some(b"DICM") {
         let message = "is no DICOM file: the letters DICM are not at byte 128";
         return Err(VolumeError::file(path, message, SAVE));
     }
+    let (_, len) = source::open(path)?;
+    if len > MAX_FILE {
+        let message = format!("is {} MB, the limit is {} MB", len >> 20, MAX_FILE >> 20);
+        let remedy = "crop or resample the volume, or convert it to .nrrd, .mha or .nii.gz";
+        return Err(VolumeError::file(path, message, remedy));
+    }
+    let bytes = source::prefix(path, MAX_FILE)?;
     let mistake = |(at, cause): (usize, String)| VolumeError::byte(path, at as u64, cause, SAVE);
     let mut parser = Parser { bytes: &bytes, at: START, syntax: Transfer::Explicit.elements() };
     // Group 2 alone is written with types in every file.
@@ -101,7 +110,7 @@ fn root(bytes: &[u8], at: usize, syntax: Transfer) -> Result<Item, (usize, Strin
 }
 
 fn inflate(path: &Path, packed: &[u8]) -> Result<Vec<u8>, VolumeError> {
-    let most = (packed.len() as u64).saturating_mul(MAX_INFLATION).min(MAX_BYTES);
+    let most = (packed.len() as u64).saturating_mul(MAX_INFLATION).min(MAX_FILE);
     let mut out = Vec::new();
     let mut stream = DeflateDecoder::new(packed).take(most + 1);
     stream.read_to_end(&mut out).map_err(|e| {

@@ -4,13 +4,14 @@ use glam::DVec3;
 
 use super::elements::{self, Item, first};
 use super::image::Image;
+use super::segmentation::Places;
 use super::{Dicom, VolumeError};
 use crate::volume::grid::{Frame, Grid};
 
 /// Largest deviation of a plane from its place, as a part of the distance between planes.
 const UNEVEN: f64 = 0.01;
 /// Planes closer than this are the same, mm: a thousandth of the finest ultrasound voxel.
-const SAME: f64 = 1e-4;
+pub(super) const SAME: f64 = 1e-4;
 
 /// The planes that make the volume.
 pub(super) struct Planes {
@@ -66,6 +67,31 @@ pub(super) fn planes(dicom: &Dicom, image: &Image) -> Result<Planes, VolumeError
     }
     let (spacing, thickness) = measures(dicom, frames.first(), shared)?;
     assemble(dicom, &planes, spacing, thickness)
+}
+
+/// The places of frames whose pixels have none of a volume's order: those of a segmentation.
+pub(super) fn places(dicom: &Dicom, frames: &[Item]) -> Result<Places, VolumeError> {
+    let shared = first(&dicom.root, elements::SHARED);
+    let mut planes = Vec::with_capacity(frames.len());
+    for own in frames {
+        let groups: Vec<_> = std::iter::once(own).chain(shared).collect();
+        let plane = plane(dicom, &groups).filter(|p| p.origin.is_finite());
+        planes.push(plane.ok_or_else(|| {
+            dicom.error("a frame has no position and orientation of its plane", super::SAVE)
+        })?);
+    }
+    let Some(lead) = planes.first() else {
+        return Err(dicom.error("has no frames", super::SAVE));
+    };
+    let normal = lead.x.cross(lead.y).normalize_or_zero();
+    let apart = |p: &Plane| !(p.x.distance(lead.x) < 1e-3 && p.y.distance(lead.y) < 1e-3);
+    if normal == DVec3::ZERO || planes.iter().any(apart) {
+        let message = "its planes are not parallel, or have no normal";
+        return Err(dicom.error(message, super::SAVE));
+    }
+    let ([x, y], thickness) = measures(dicom, frames.first(), shared)?;
+    let origins = planes.iter().map(|p| p.origin).collect();
+    Ok(Places { origins, x: lead.x * x, y: lead.y * y, normal, thickness })
 }
 
 fn unplaced(dicom: &Dicom, image: &Image) -> VolumeError {

@@ -1,7 +1,7 @@
 //! The pixel format of a DICOM file.
 
 use super::elements::{FLOAT_PIXELS, VALUES, first};
-use super::{Dicom, SAVE, VolumeError, VoxelType, bytes_of};
+use super::{Dicom, MAX_VOXELS, SAVE, VolumeError, VoxelType, bytes_of};
 
 /// Meaning of a pixel's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,8 +107,9 @@ impl Image {
             return Err(dicom.error(format!("{columns} x {rows} pixels are no image"), SAVE));
         }
         if bytes_of(&image, frames).is_none() {
+            let most = MAX_VOXELS >> 30;
             let message =
-                format!("{frames} frames of {columns} x {rows} pixels are more than 4 GB");
+                format!("{frames} frames of {columns} x {rows} pixels are more than {most} GB");
             return Err(dicom.error(message, "crop it, or save fewer frames"));
         }
         Ok(image)

@@ -23,14 +23,23 @@ pub(super) fn decode(
     frames: &[usize],
 ) -> Result<Voxels, VolumeError> {
     let tag = if image.kind == VoxelType::F32 { FLOAT_PIXELS } else { PIXELS };
-    let bytes = match dicom.root.get(&tag) {
-        Some(Value::Bytes(range)) => native(dicom, image, range.clone(), frames)?,
-        Some(Value::Fragments(fragments)) => packed(dicom, image, fragments, frames)?,
-        _ => return Err(dicom.lacks("PixelData", tag)),
-    };
     let big = dicom.syntax == Transfer::Big;
-    let layout = Layout::new([(Axis::Space, bytes.len() / image.kind.bytes())]);
-    let (voxels, _) = Voxels::decode(&bytes, image.kind, big, &layout, 0);
+    let mut voxels: Option<Voxels> = None;
+    // A frame at a time: what is packed and what is not are never in memory together.
+    let mut each = |bytes: &[u8]| {
+        let layout = Layout::new([(Axis::Space, bytes.len() / image.kind.bytes())]);
+        let (frame, _) = Voxels::decode(bytes, image.kind, big, &layout, 0);
+        match &mut voxels {
+            Some(voxels) => voxels.append(frame),
+            None => voxels = Some(frame),
+        }
+    };
+    match dicom.root.get(&tag) {
+        Some(Value::Bytes(range)) => native(dicom, image, range.clone(), frames, &mut each)?,
+        Some(Value::Fragments(fragments)) => packed(dicom, image, fragments, frames, &mut each)?,
+        _ => return Err(dicom.lacks("PixelData", tag)),
+    }
+    let voxels = voxels.ok_or_else(|| dicom.lacks("PixelData", tag))?;
     Ok(trim(voxels, image.bits))
 }
 
@@ -58,7 +67,8 @@ fn native(
     image: &Image,
     range: Range<usize>,
     frames: &[usize],
-) -> Result<Vec<u8>, VolumeError> {
+    each: &mut impl FnMut(&[u8]),
+) -> Result<(), VolumeError> {
     let samples = if image.color == Color::Ybr422 { 2 } else { image.samples };
     let frame = image.rows * image.columns * samples * image.kind.bytes();
     // 8-bit values in big-endian words would be swapped in pairs; nobody has written them since 2006.
@@ -73,9 +83,11 @@ fn native(
     let mut out = Vec::new();
     for &index in frames {
         let start = range.start + index * frame;
+        out.clear();
         grey(image, &dicom.bytes[start..start + frame], &mut out);
+        each(&out);
     }
-    Ok(out)
+    Ok(())
 }
 
 /// Appends the brightness of every pixel; red, green and blue are weighted as in BT.601 (PS3.3,
@@ -107,7 +119,8 @@ fn packed(
     image: &Image,
     fragments: &[Range<usize>],
     frames: &[usize],
-) -> Result<Vec<u8>, VolumeError> {
+    each: &mut impl FnMut(&[u8]),
+) -> Result<(), VolumeError> {
     // The table of offsets comes first. A frame may be cut into several fragments; then the table has
     // their starts, which only files of old video recorders need.
     let data = fragments.get(1..).unwrap_or_default();
@@ -128,13 +141,15 @@ fn packed(
             let cause = format!("{} bytes cannot hold {size} bytes of pixels", bytes.len());
             return Err(wrong(cause));
         }
+        out.clear();
         match dicom.syntax {
             Transfer::Jpeg => jpeg(image, bytes, &mut out).map_err(wrong)?,
             Transfer::Rle => rle(image, bytes, &mut out).map_err(wrong)?,
             _ => return Err(wrong("compressed pixels in a file that is not".to_owned())),
         }
+        each(&out);
     }
-    Ok(out)
+    Ok(())
 }
 
 /// Appends a frame of JPEG. The decoder gives grey or red, green and blue, whatever the file states.

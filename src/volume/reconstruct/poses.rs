@@ -39,7 +39,7 @@ impl Transforms {
         image: &str,
         reference: &str,
     ) -> Result<Vec<Option<DAffine3>>, ReconstructError> {
-        let ways = sequence.frames.iter().map(|f| self.way(&f.poses, image, reference));
+        let ways = sequence.frames.iter().map(|f| self.between(&f.poses, image, reference));
         let ways: Vec<_> = ways.collect();
         if ways.iter().any(Option::is_some) {
             return Ok(ways.into_iter().map(Option::flatten).collect());
@@ -59,8 +59,9 @@ impl Transforms {
         ))
     }
 
-    /// The transform between two frames; none where nothing connects them, none within where a pose is not OK.
-    fn way(
+    /// The transform from one frame to another along the fewest steps, by the poses of a moment and those that always hold;
+    /// none where nothing connects them, none within where a pose is not OK.
+    pub fn between(
         &self,
         poses: &BTreeMap<String, Pose>,
         image: &str,
@@ -101,7 +102,7 @@ impl Transforms {
 }
 
 /// The two frames in a name like `ProbeToTracker`, if they can be told apart.
-pub(super) fn names(name: &str) -> Option<(&str, &str)> {
+pub fn names(name: &str) -> Option<(&str, &str)> {
     let mut at = name.match_indices("To").filter(|&(i, _)| {
         let next = name[i + 2..].chars().next();
         i > 0 && next.is_some_and(|c| !c.is_ascii_lowercase())

@@ -1,0 +1,59 @@
+//! Segmentations and meshes of others made into scenes.
+//!
+//! A label map (`labels`, with `names` from the file) becomes one closed surface per label, with the same faces on both
+//! sides of a border: `composed` parts what touches along an edge, `nets` makes all surfaces at once, `relax` smooths
+//! them, `surface` takes one out; `map` is the whole way. A folder of meshes goes through `folder`, compared with each other
+//! by `raster`. `table` says which tissue a structure is made of, `hull`
+//! makes up a skin where there is none, `pose` finds a place on it from which an organ is seen, `draft` writes the
+//! scene. Configurations of PLUS (`plus`) become scenes by `device_set`, poses of sequences rows of a `trajectory`. Knows no
+//! Vulkan.
+
+use glam::DVec3;
+
+use crate::scene::mesh::Units;
+use crate::volume::Frame;
+
+pub mod composed;
+pub mod device_set;
+mod draft;
+mod error;
+pub mod folder;
+pub mod grid;
+mod hull;
+mod labels;
+pub mod map;
+mod names;
+pub mod nets;
+mod plus;
+mod pose;
+pub mod raster;
+pub mod relax;
+pub mod surface;
+pub mod table;
+#[cfg(test)]
+mod tests;
+pub mod trajectory;
+
+pub use draft::{Draft, Part, way};
+pub use error::ImportError;
+pub use labels::LabelMap;
+pub use pose::View;
+
+/// What the user says about an import.
+#[derive(Clone, Debug)]
+pub struct Options {
+    /// Which tissue a structure is made of.
+    pub table: table::Table,
+    /// Distance of voxels to resample to, mm.
+    pub spacing: Option<DVec3>,
+    /// Organ that the probe looks at.
+    pub look_at: Option<String>,
+    /// Tissue of what is inside the skin and no structure of its own.
+    pub around: String,
+    /// Unit of mesh files, where they are in another than their format's.
+    pub units: Option<Units>,
+    /// Frame of mesh files that do not state theirs; LPS without it.
+    pub frame: Option<Frame>,
+    /// Replaces a scene that is there.
+    pub force: bool,
+}

@@ -1,0 +1,298 @@
+//! The scene that an import makes: a text with comments, for a person to read and change.
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::error::ImportError;
+use super::pose::View;
+use crate::output::files;
+use crate::scene::check::SENSIBLE_SIZE;
+use crate::scene::mesh::Soup;
+use crate::scene::topology;
+
+/// Name of the scene file in its folder.
+pub const SCENE: &str = "scene.toml";
+/// Folder of the meshes beside it.
+const MESHES: &str = "meshes";
+/// Name of the skin's mesh.
+pub const SKIN: &str = "skin";
+
+/// One mesh of the scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Part {
+    /// Name in the scene.
+    pub name: String,
+    /// File, relative to the scene's.
+    pub file: String,
+    /// Tissue.
+    pub tissue: String,
+    /// Who wins where surfaces lie on or in each other: before [`rank`] by the table, then one for each.
+    pub priority: i32,
+    /// Where it comes from.
+    pub origin: String,
+    /// What there is to say about the tissue.
+    pub note: String,
+    /// False where no table knows the name.
+    pub known: bool,
+    /// Triangles.
+    pub triangles: usize,
+    /// Enclosed volume, ml.
+    pub volume: f64,
+}
+
+/// A scene in the making.
+#[derive(Clone, Debug)]
+pub struct Draft {
+    /// Folder to be written.
+    pub folder: PathBuf,
+    /// What was imported.
+    pub source: PathBuf,
+    /// What is to be said about its frame.
+    pub frame: String,
+    /// Structures, then the skin where there is one.
+    pub parts: Vec<Part>,
+    /// Structures that are no mesh of the scene, and why.
+    pub left_out: Vec<String>,
+    /// What the skin is made of and where it comes from.
+    pub skin: Option<String>,
+    /// Where the probe is, and the name of the organ that it looks at.
+    pub view: Option<(View, String)>,
+}
+
+impl Draft {
+    /// Makes the folder of the scene.
+    ///
+    /// # Errors
+    /// There is a scene in it already, unless `force`; it cannot be made.
+    pub fn begin(folder: &Path, source: &Path, force: bool) -> Result<Self, ImportError> {
+        let scene = folder.join(SCENE);
+        if scene.exists() && !force {
+            let message = "is there already";
+            let remedy = "name another folder, or give --force to replace it";
+            return Err(ImportError::file(&scene, message, remedy));
+        }
+        std::fs::create_dir_all(folder.join(MESHES)).map_err(|e| unwritten(folder, &e))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            source: source.to_owned(),
+            frame: String::new(),
+            parts: Vec::new(),
+            left_out: Vec::new(),
+            skin: None,
+            view: None,
+        })
+    }
+
+    /// Writes a surface and adds it as a mesh whose name is like this one. Returns the name; none for one of a size that no
+    /// scene takes, which is left out.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn add(&mut self, part: Part, surface: &Soup) -> Result<Option<String>, ImportError> {
+        let size = extent(surface);
+        if !(SENSIBLE_SIZE.0..=SENSIBLE_SIZE.1).contains(&size) {
+            self.left_out.push(format!("{}: {size:.3} mm large", part.name));
+            return Ok(None);
+        }
+        let name = self.free(&part.name, |p| &p.name, |name, n| format!("{name} {n}"));
+        let plain: String = name
+            .chars()
+            .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
+            .take(80)
+            .collect();
+        let file = self.free(
+            &format!("{MESHES}/{plain}.obj"),
+            |p| &p.file,
+            |_, n| format!("{MESHES}/{plain}-{n}.obj"),
+        );
+        let path = self.folder.join(&file);
+        files::replace(&path, obj(surface).as_bytes()).map_err(|e| unwritten(&path, &e))?;
+        let volume = topology::volume(surface) / 1000.0;
+        let triangles = surface.triangles.len();
+        self.parts.push(Part { name: name.clone(), file, triangles, volume, ..part });
+        Ok(Some(name))
+    }
+
+    /// `wanted`, or what `next` makes of it and a number, so that no part has it.
+    fn free(
+        &self,
+        wanted: &str,
+        of: impl Fn(&Part) -> &String,
+        next: impl Fn(&str, usize) -> String,
+    ) -> String {
+        let taken = |name: &str| self.parts.iter().any(|p| of(p) == name);
+        let mut name = wanted.to_owned();
+        for n in 2.. {
+            if !taken(&name) {
+                break;
+            }
+            name = next(wanted, n);
+        }
+        name
+    }
+
+    /// Gives every part a priority of its own: by the table's, of equals the smaller volume above the larger.
+    pub fn rank(&mut self) {
+        self.parts.sort_by(|a, b| a.priority.cmp(&b.priority).then(b.volume.total_cmp(&a.volume)));
+        for (n, part) in self.parts.iter_mut().enumerate() {
+            part.priority = n as i32;
+        }
+    }
+
+    /// Writes the scene file, and returns where it is.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub fn finish(&self) -> Result<PathBuf, ImportError> {
+        let path = self.folder.join(SCENE);
+        files::replace(&path, self.text().as_bytes()).map_err(|e| unwritten(&path, &e))?;
+        Ok(path)
+    }
+
+    /// The scene file.
+    fn text(&self) -> String {
+        let mut out = String::new();
+        let name = self.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        // Writing to a string cannot fail.
+        let _ = self.write(&mut out, &name);
+        out
+    }
+
+    fn write(&self, out: &mut String, name: &str) -> std::fmt::Result {
+        writeln!(out, "# Made by `insonify import` from {name}.")?;
+        writeln!(
+            out,
+            "#\n# World, mm: x to the patient's left, y to the back, z to the head (LPS)."
+        )?;
+        writeln!(out, "# {}", self.frame)?;
+        writeln!(out, "name = {}", quoted(name))?;
+        writeln!(out, "# Around the skin.")?;
+        writeln!(out, "background = \"gel\"\n")?;
+        if let Some((view, organ)) = &self.view {
+            self.probe(out, view, organ)?;
+        }
+        if let Some(skin) = &self.skin {
+            writeln!(out, "# The skin: {skin}")?;
+            writeln!(
+                out,
+                "# It is rigid: gel fills what real skin would yield to the curved face."
+            )?;
+            writeln!(out, "[contact]\nmesh = [\"{SKIN}\"]\ngel = \"9 mm\"\n")?;
+        }
+        let unknown: Vec<_> = self.parts.iter().filter(|p| !p.known).collect();
+        if !unknown.is_empty() {
+            writeln!(
+                out,
+                "# No table knows these names; their tissue is a guess, to be corrected here or with --labels:"
+            )?;
+            for part in unknown {
+                writeln!(out, "#   {}: {}", part.name, part.tissue)?;
+            }
+            writeln!(out)?;
+        }
+        self.meshes(out)
+    }
+
+    /// The meshes of the scene file.
+    pub(super) fn meshes(&self, out: &mut String) -> std::fmt::Result {
+        for structure in &self.left_out {
+            writeln!(out, "# Left out: {structure}, which no scene takes.")?;
+        }
+        writeln!(
+            out,
+            "# In rising priority: where two lie on or in each other, the later one wins."
+        )?;
+        for part in &self.parts {
+            writeln!(
+                out,
+                "# {}: {} triangles, {:.1} ml",
+                part.origin, part.triangles, part.volume
+            )?;
+            writeln!(out, "[[mesh]]")?;
+            writeln!(out, "name = {}", quoted(&part.name))?;
+            writeln!(out, "file = {}", quoted(&part.file))?;
+            writeln!(out, "units = \"mm\"")?;
+            let note =
+                if part.note.is_empty() { String::new() } else { format!("  # {}", part.note) };
+            writeln!(out, "tissue = \"{}\"{note}", part.tissue)?;
+            writeln!(out, "priority = {}\n", part.priority)?;
+        }
+        Ok(())
+    }
+
+    fn probe(&self, out: &mut String, view: &View, organ: &str) -> std::fmt::Result {
+        let volume = self.parts.iter().find(|p| p.name == organ).map_or(0.0, |p| p.volume);
+        // The organ as a ball, and a bit of what is behind it.
+        let radius = (volume.abs() * 750.0 / std::f64::consts::PI).cbrt();
+        let depth = ((view.distance + 1.2 * radius + 10.0) / 10.0).round() * 10.0;
+        let (preset, most) = if depth <= 45.0 { ("linear", 45.0) } else { ("abdominal", 240.0) };
+        writeln!(out, "# It looks at `{organ}`, {:.0} mm deep; {}.", view.distance, way(view))?;
+        writeln!(
+            out,
+            "[probe]\npreset = \"{preset}\"\ndepth = \"{} mm\"",
+            depth.clamp(30.0, most)
+        )?;
+        writeln!(out, "focus = \"{:.0} mm\"\n", view.distance.clamp(10.0, most))?;
+        writeln!(out, "[probe.pose]")?;
+        writeln!(out, "position = {}", vector(view.position, 2))?;
+        writeln!(out, "direction = {}", vector(view.direction, 5))?;
+        writeln!(out, "lateral = {}\n", vector(view.lateral, 5))
+    }
+}
+
+/// Largest edge of a surface's box, mm.
+fn extent(surface: &Soup) -> f64 {
+    let edge = |axis: usize| {
+        let values = surface.positions.iter().map(|p| f64::from(p[axis]));
+        let (low, high) =
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+        high - low
+    };
+    (0..3).map(edge).fold(0.0, f64::max)
+}
+
+/// The way of a view in words.
+pub fn way(view: &View) -> String {
+    let shaded = if view.shaded > 0.0 {
+        format!(", on {:.0} % of those beside it", 100.0 * view.shaded)
+    } else {
+        String::new()
+    };
+    match view.blocked {
+        0.0 => format!("no bone and no gas on the way{shaded}"),
+        mm => {
+            format!("{mm:.0} mm of bone or gas on the way: no place on the skin is without{shaded}")
+        }
+    }
+}
+
+/// A vector as TOML has it.
+pub(super) fn vector(v: glam::DVec3, digits: usize) -> String {
+    // Turns -0 into 0.
+    let v = v.to_array().map(|x| format!("{:.digits$}", x + 0.0));
+    format!("[{}]", v.join(", "))
+}
+
+/// A text as TOML has it.
+pub(super) fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+fn unwritten(path: &Path, error: &std::io::Error) -> ImportError {
+    let message = format!("cannot be written: {error}");
+    ImportError::file(path, message, "check the folder and the room in it")
+}
+
+/// A surface as text, from which every coordinate is read back to the last bit: what two surfaces share stays the same.
+fn obj(surface: &Soup) -> String {
+    let mut out = String::from("# mm, SPACE=LPS\n");
+    for [x, y, z] in &surface.positions {
+        // Writing to a string cannot fail.
+        let _ = writeln!(out, "v {x} {y} {z}");
+    }
+    for triangle in &surface.triangles {
+        let [a, b, c] = triangle.map(|i| i + 1);
+        let _ = writeln!(out, "f {a} {b} {c}");
+    }
+    out
+}

@@ -1,0 +1,77 @@
+//! Folders of meshes.
+
+use glam::DVec3;
+use insonify::scene::{Scene, shapes};
+
+use crate::obj;
+use crate::program::insonify;
+use crate::shared_data::shared_data;
+
+fn priority(scene: &Scene, name: &str) -> i32 {
+    let found = scene.instances.iter().find(|i| i.name == name);
+    found.unwrap_or_else(|| panic!("no mesh {name}")).priority
+}
+
+#[test]
+fn a_folder_of_meshes_becomes_a_scene() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let folder = folder.path();
+    let organs = folder.join("organs");
+    std::fs::create_dir(&organs).expect("made");
+    let write =
+        |name: &str, text: String| std::fs::write(organs.join(name), text).expect("written");
+    let ball = |radius| shapes::sphere(radius, 3);
+    // In RAS: the liver is on the patient's right, which is +x there.
+    write("Liver.obj", obj(&ball(50.0), DVec3::new(40.0, 10.0, 0.0)));
+    write("portal_vein.obj", obj(&ball(9.0), DVec3::new(40.0, 10.0, 30.0)));
+    // A clot in the vein: by its name below vessels, by where it is above.
+    write("clot.obj", obj(&ball(4.0), DVec3::new(40.0, 10.0, 32.0)));
+    write("rib_right_7.obj", obj(&ball(7.0), DVec3::new(40.0, 75.0, 0.0)));
+    write("readme.txt", "not a mesh".to_owned());
+    let args = ["import", "organs", "-o", "out", "--frame", "ras", "--look-at", "liver"];
+    let (done, said) = insonify(folder, &args);
+    assert!(done, "{said}");
+    assert!(said.contains("1 structures had no tissue and were given muscle: clot"), "{said}");
+    let (passed, said) = insonify(folder, &["check", "out/scene.toml"]);
+    assert!(passed && said.contains("0 errors, 0 warnings"), "{said}");
+    let (scene, _) = Scene::load(&folder.join("out/scene.toml"), &[]).expect("sound");
+    let ranks =
+        ["skin", "Liver", "portal_vein", "clot", "rib_right_7"].map(|n| priority(&scene, n));
+    assert!(ranks.is_sorted() && ranks[3] < ranks[4], "{ranks:?}");
+    let liver = scene.instances.iter().find(|i| i.name == "Liver").expect("a liver");
+    let mesh = &scene.meshes[liver.mesh];
+    let left = mesh.positions.iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
+    assert!((left + 90.0).abs() < 0.1, "{left}");
+    // The skin is made up 15 mm around all of it.
+    let skin = scene.instances.iter().find(|i| i.name == "skin").expect("a skin");
+    let front =
+        scene.meshes[skin.mesh].positions.iter().map(|p| p[1]).fold(f32::INFINITY, f32::min);
+    assert!((-99.0..-95.0).contains(&front), "{front}");
+
+    std::fs::write(organs.join("bad.obj"), "v 0 0 0\nv 1 0 0\nf 1 2 9\n").expect("written");
+    let (done, said) = insonify(folder, &["import", "organs", "-o", "b"]);
+    assert!(!done && said.contains("bad.obj") && said.contains("do not exist yet"), "{said}");
+    std::fs::create_dir(folder.join("empty")).expect("made");
+    let (done, said) = insonify(folder, &["import", "empty", "-o", "b"]);
+    assert!(!done && said.contains("holds no mesh"), "{said}");
+}
+
+#[test]
+fn a_patients_organs_become_a_scene() {
+    let Some(data) = shared_data() else { return };
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let source = data.join("liver-scikit-surgery/obj");
+    let source = source.to_str().expect("a plain path");
+    let (done, said) = insonify(folder.path(), &["import", source, "-o", "out"]);
+    assert!(done, "{said}");
+    assert!(said.contains("the probe looks at liver"), "{said}");
+    let (scene, _) = Scene::load(&folder.path().join("out/scene.toml"), &[]).expect("sound");
+    for vessel in ["hepatic_veins", "portal_vein", "arteries"] {
+        assert!(priority(&scene, vessel) > priority(&scene, "liver"), "{vessel}");
+    }
+    for lump in ["liver_tumours", "liver_cysts"] {
+        assert!(priority(&scene, lump) > priority(&scene, "portal_vein"), "{lump}");
+    }
+    let (passed, said) = insonify(folder.path(), &["check", "out/scene.toml"]);
+    assert!(passed && said.contains("0 errors"), "{said}");
+}
