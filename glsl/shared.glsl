@@ -44,6 +44,7 @@ const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
 const uint FLAG_MASKED = 512u;      // only what a masking instance encloses gives echoes
 const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
+const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
 
 const uint BLEND_LINEAR = 0u;

@@ -13,6 +13,19 @@ struct Slope {
     float width;        // deviation of the sine of incidence over the beam
 };
 
+// Normals of the triangle's corners as the vertices have them, averaged over x times the finest scale of their averages;
+// between two scales they are mixed, below the finest with the vertices' own.
+void average(inout vec3 n[3], vec3 own[3], uvec4 averages[3], float x) {
+    uint level = uint(x >= 1.0) + uint(x >= 2.0) + uint(x >= 4.0);
+    float below = mix(0.0, float(1u << level) * 0.5, level > 0u);
+    float share = min((x - below) / max(below, 1.0), 1.0);
+    [[dont_unroll]] for (uint i = 0u; i < 3u; ++i) {
+        vec3 coarse = unpack_direction(averages[i][level]);
+        vec3 fine = mix(unpack_direction(averages[i][max(level, 1u) - 1u]), own[i], bvec3(level == 0u));
+        n[i] = mix(fine, coarse, share);
+    }
+}
+
 // `row` is that of the path's time; `spread` the variance that the path has across, mm^2.
 Slope slope_at(Met here, Path path, uint row, float spread) {
     Hit hit = here.hit;
@@ -25,24 +38,27 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
     bool turned = !(dot(path.direction, slope.shading) < 0.0);
     slope.shading = mix(slope.shading, slope.geometric, bvec3(turned));
 
-    bool wide = (frame.flags & FLAG_WAVEFRONT) != 0u;
-    float sigma = rows[row].sigma_wavefront;
-    // In units of the finest average; from there on they are twice as wide each.
-    float x = mix(0.0, sqrt(sigma * sigma + spread) / instances[hit.instance].finest, wide);
-    uint level = uint(x >= 1.0) + uint(x >= 2.0) + uint(x >= 4.0);
-    float below = mix(0.0, float(1u << level) * 0.5, level > 0u);
-    float share = min((x - below) / max(below, 1.0), 1.0);
-    vec3 n[3];
+    vec3 own[3], n[3];
+    uvec4 averages[3];
     [[dont_unroll]] for (uint i = 0u; i < 3u; ++i) {
         uint vertex = triangles[3u * hit.primitive + i];
-        uvec4 averages = smoothed[vertex];
-        vec3 own = vec3(normals[3u * vertex], normals[3u * vertex + 1u], normals[3u * vertex + 2u]);
-        vec3 coarse = unpack_direction(averages[level]);
-        vec3 fine = mix(unpack_direction(averages[max(level, 1u) - 1u]), own, bvec3(level == 0u));
-        n[i] = mix(fine, coarse, share);
+        averages[i] = smoothed[vertex];
+        own[i] = vec3(normals[3u * vertex], normals[3u * vertex + 1u], normals[3u * vertex + 2u]);
+        n[i] = own[i];
     }
-    vec3 mean = side * surface_to_world(hit.instance, (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2]);
-    slope.refracting = mix(slope.shading, mean, bvec3(wide));
+    slope.refracting = slope.shading;
+    if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
+        float sigma = rows[row].sigma_wavefront;
+        float x = sqrt(sigma * sigma + spread) / instances[hit.instance].finest;
+        // What the wavefront covers of the surface is longer the more it is inclined, which the first turn tells.
+        float inclined = 1.0;
+        [[dont_unroll]] for (uint i = 0u; i < 2u; ++i) {
+            average(n, own, averages, x / inclined);
+            slope.refracting = side * surface_to_world(hit.instance,
+                (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2]);
+            inclined = max(-dot(path.direction, slope.refracting), LEAST_FACING);
+        }
+    }
 
     slope.width = 0.0;
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {

@@ -21,6 +21,9 @@ use elements::Elements;
 /// Number of scales per vertex; each is twice the one before.
 pub const LEVELS: usize = 4;
 
+/// The finest of them, mm of the world where a mesh is placed first. Below it the vertices' own normals are mixed in.
+pub const FINEST: f64 = 2.0;
+
 /// Dihedral angle from which on two sides refract apart, degrees: a box's sides do, the steps of a segmentation that
 /// was smoothed at all are flatter.
 const CREASE: f32 = 80.0;

@@ -131,6 +131,8 @@ constants! {
     pub const FLAG_MASKED: u32 = 512;
     /// Surfaces refract by their mean slope over the wavefront's width.
     pub const FLAG_WAVEFRONT: u32 = 1024;
+    /// Cosine to a surface below which what the wavefront covers of it grows no more.
+    pub const LEAST_FACING: f32 = 0.125;
     /// A path goes down below a surface that it has met by this part of its way at least.
     pub const LEAST_DESCENT: f32 = 1e-3;
 

@@ -3,7 +3,7 @@
 use super::world::{Geometry, World, affine};
 use super::{origin, trace};
 use insonify::scene::Mesh;
-use insonify::scene::smoothed::smoothed;
+use insonify::scene::smoothed::{FINEST, smoothed};
 use insonify::sim::layout::{Frame, Instance, Row, Surface, Tissue};
 
 /// The arrays that a [`World`] borrows, in the device's layout and units.
@@ -34,7 +34,7 @@ pub struct Owned {
 }
 
 impl Owned {
-    /// Appends a mesh and `instance`, which gets its range of triangles, and 1 mm for its finest average.
+    /// Appends a mesh and `instance`, which gets its range of triangles, and averages as the device has them.
     pub fn place(
         &mut self,
         positions: &[[f32; 3]],
@@ -46,7 +46,7 @@ impl Owned {
         self.instances.push(Instance {
             first_triangle: self.triangles.len() as u32,
             triangles: triangles.len() as u32,
-            finest: 1.0,
+            finest: FINEST as f32,
             ..instance
         });
         let mesh = Mesh {
@@ -56,7 +56,7 @@ impl Owned {
             ..Mesh::default()
         };
         let stretch = affine(&instance.world_from_object).matrix3.determinant().abs().cbrt();
-        self.smoothed.extend(smoothed(&mesh, stretch.recip()));
+        self.smoothed.extend(smoothed(&mesh, FINEST / stretch));
         self.positions.extend_from_slice(positions);
         self.normals.extend_from_slice(normals);
         let moved = triangles.iter().map(|t| t.map(|v| v + base));

@@ -5,7 +5,9 @@ use glam::DVec3;
 use super::acoustics::{Fluid, refract};
 use super::path::Path;
 use super::world::{Crossing, World};
-use insonify::sim::layout::{FLAG_FOOTPRINT, FLAG_WAVEFRONT, Frame, LEAST_DESCENT, Row};
+use insonify::sim::layout::{
+    FLAG_FOOTPRINT, FLAG_WAVEFRONT, Frame, LEAST_DESCENT, LEAST_FACING, Row,
+};
 
 /// A surface where a path meets it. Normals are unit and turned against the path, that of the wavefront as far as
 /// the triangle's is.
@@ -56,9 +58,15 @@ impl World<'_> {
         let shading = if side * shading.dot(d) < 0.0 { side * shading } else { geometric };
         let spread = path.spread[0];
         let wide = self.frame.flags & FLAG_WAVEFRONT != 0;
-        let width = f64::from(row.sigma_wavefront).hypot(spread.sqrt());
-        let corners = self.averaged(hit, if wide { width } else { 0.0 });
-        let refracting = if wide { side * self.between(hit, corners) } else { shading };
+        let (mut corners, mut refracting) = (self.corner_normals(hit), shading);
+        if wide {
+            let width = f64::from(row.sigma_wavefront).hypot(spread.sqrt());
+            let upright = side * self.between(hit, self.averaged(hit, width));
+            // What the wavefront covers of the surface is longer the more it is inclined.
+            let facing = (-d.dot(upright)).max(f64::from(LEAST_FACING));
+            corners = self.averaged(hit, width / facing);
+            refracting = side * self.between(hit, corners);
+        }
         let mut width = 0.0;
         if self.frame.flags & FLAG_FOOTPRINT != 0 {
             // In the plane of incidence; along the image where there is none.

@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::entry;
 use super::joined::{SharingSet, SharingSets};
-use crate::scene::smoothed::{self, smoothed};
+use crate::scene::smoothed::{self, FINEST, smoothed};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
 use crate::sim::bvh::{BvhError, BvhInstance, MeshBvh, SceneBvh, Splits};
 use crate::sim::fields::Fields;
@@ -37,9 +37,6 @@ pub(super) struct GeometryRange {
     /// instance of each triangle; 0: all triangles belong to one instance.
     pub(super) owners: u32,
 }
-
-/// Deviation over which the first of the averaged normals is taken, mm of the world.
-const FINEST: f64 = 1.0;
 
 /// Of one vertex the normals averaged over the surface about it ([`smoothed()`]).
 pub(super) type Averages = [u32; smoothed::LEVELS];
