@@ -21,7 +21,8 @@ use elements::Elements;
 /// Number of scales per vertex; each is twice the one before.
 pub const LEVELS: usize = 4;
 
-/// The finest of them, mm of the world where a mesh is placed first. Below it the vertices' own normals are mixed in.
+/// The finest of them, mm of the world where a mesh is placed first, to within a factor of two for what is scaled.
+/// Below it the vertices' own normals are mixed in.
 pub const FINEST: f64 = 2.0;
 
 /// Dihedral angle from which on two sides refract apart, degrees: a box's sides do, the steps of a segmentation that

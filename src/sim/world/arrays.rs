@@ -76,11 +76,12 @@ pub(super) fn needs(scene: &Scene, sets: &SharingSets) -> Vec<Residency> {
     needs
 }
 
-/// [`FINEST`] in the unit of each mesh of the scene.
+/// [`FINEST`] in the unit of each mesh of the scene. It follows the scale by powers of two: so a scale that changes
+/// by less while the program runs makes the picture of a scene that had it from the start.
 fn finest(scene: &Scene) -> Vec<f64> {
     let mut finest = vec![None; scene.meshes.len()];
     for instance in &scene.instances {
-        let own = FINEST / stretch(&instance.world_from_object);
+        let own = FINEST / stretch(&instance.world_from_object).log2().floor().exp2();
         for &mesh in instance.keyframes.meshes.iter().chain([&instance.mesh]) {
             finest[mesh].get_or_insert(own);
         }
