@@ -7,6 +7,7 @@ mod skip;
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::OnceLock;
 
 use insonify::output::dicom::{About, Loop};
 use insonify::scene::Scene;
@@ -14,8 +15,18 @@ use program::insonify;
 use serde_json::Value;
 use skip::{Lacking, skip};
 
-/// A Python that has pydicom, in a folder of the build; none where it cannot be had.
+/// A Python that has pydicom, in a folder of the build; none where it cannot be had. Made once, whoever asks first.
 fn python() -> Option<PathBuf> {
+    static MADE: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let made = MADE.get_or_init(make).clone();
+    if made.is_none() {
+        // From the network, like data.
+        skip(Lacking::Data, "no pydicom");
+    }
+    made
+}
+
+fn make() -> Option<PathBuf> {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pydicom");
     let python = folder.join("bin/python");
     let runs = |command: &mut Command| command.output().is_ok_and(|out| out.status.success());
@@ -24,7 +35,6 @@ fn python() -> Option<PathBuf> {
         let made = runs(Command::new("python3").args(["-m", "venv"]).arg(&folder));
         let install = ["-m", "pip", "install", "--quiet", "pydicom==3.0.1", "numpy"];
         if !(made && runs(Command::new(&python).args(install)) && ready()) {
-            skip(Lacking::Tool, "no pydicom");
             return None;
         }
     }

@@ -166,7 +166,7 @@ pub fn run(args: &Import) -> Result<()> {
     }
     let (draft, issues) = done?;
     for issue in issues {
-        eprintln!("{issue}");
+        output::note(issue);
     }
     let path = draft.finish()?;
     report(&draft);
@@ -183,7 +183,7 @@ fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
     poses.extend(args.transform.iter().map(|(name, t)| (name.clone(), Pose::ok(*t))));
     let scene = import::device_set::import(source, folder, &poses, args.force)?;
     for issue in &scene.issues {
-        eprintln!("{issue}");
+        output::note(issue);
     }
     let path = scene.finish()?;
     for structure in &scene.draft.left_out {
