@@ -24,7 +24,7 @@ fn mistakes_name_line_cause_and_remedy() {
     let list = |files: &str| format!("file = [{files}]\n");
     for (text, at, cause, remedy) in [
         (list(""), 0, "has 0 files", "name 1 to 1000"),
-        (list("7"), 0, "expected a string", ""),
+        (list("7"), 0, "expected text or list of texts", ""),
         ("file = 7\n".to_owned(), 0, "expected text or list of texts", ""),
         (list("\"t0.mha\", \"none.mha\""), 0, "cannot be read", "check the name"),
         (
