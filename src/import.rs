@@ -39,10 +39,10 @@ pub use error::ImportError;
 pub use labels::LabelMap;
 pub use pose::View;
 
-/// What the user says about an import.
+/// The options of an import.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Which tissue a structure is made of.
+    /// The tissue of each structure.
     pub table: table::Table,
     /// Distance of voxels to resample to, mm.
     pub spacing: Option<DVec3>,

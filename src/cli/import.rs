@@ -31,7 +31,7 @@ pub struct Import {
     /// rows come before those that ship.
     #[arg(long, value_name = "FILE")]
     labels: Option<PathBuf>,
-    /// What the values mean where neither the file nor --labels says it
+    /// Meaning of the values where neither the file nor --labels gives it
     #[arg(long, value_enum)]
     classes: Option<Classes>,
     /// Structure that the probe looks at: its name, or a part of it [default: the largest organ]

@@ -324,7 +324,7 @@ fn simulate(
     Ok(timings)
 }
 
-/// What a loop in DICOM says beside its frames.
+/// The facts that a loop in DICOM states beside its frames.
 fn about(scene: &Scene, simulator: &Simulator) -> About {
     let frame = simulator.constants();
     About {

@@ -9,7 +9,7 @@ use super::grid::Grid;
 const PLANES: [[usize; 2]; 3] = [[0, 1], [1, 2], [2, 0]];
 
 /// Changes labels until no four voxels in a square have one label across one diagonal and others across the other.
-/// What changes gets the label of fewer voxels of the two, so that it ends, and thin parts grow together instead of
+/// A voxel that changes gets that of the two labels which has fewer voxels, so that it ends, and thin parts grow together instead of
 /// falling apart. Returns the number of changed voxels.
 pub fn separate(grid: &mut Grid) -> u64 {
     let counts = grid.counts();
@@ -95,7 +95,7 @@ fn inside(grid: &Grid, p: [isize; 3]) -> bool {
     (0..3).all(|a| (0..grid.size[a] as isize).contains(&p[a]))
 }
 
-/// How many more of the 26 voxels around have the new label than the old one.
+/// The number of the 26 voxels around with the new label, less those with the old one.
 fn support(grid: &Grid, [i, j, k]: [isize; 3], new: u8, old: u8) -> i32 {
     let mut out = 0;
     for n in 0..27 {

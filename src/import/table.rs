@@ -1,4 +1,4 @@
-//! Which tissue a structure is made of, by its name or by the value of its label.
+//! The tissue of a structure, by its name or by the value of its label.
 
 use std::io::Read;
 use std::path::Path;

@@ -4,7 +4,7 @@
 use std::fmt;
 use std::path::Path;
 
-use super::mesh::MAX_ELEMENTS;
+use super::mesh::{MAX_ELEMENTS, Parts, Soup};
 use crate::issue::Issue;
 
 pub(super) mod off;
@@ -85,6 +85,15 @@ const STATED_WITHIN: usize = 1024;
 pub(super) fn states_ras(bytes: &[u8]) -> bool {
     let head = &bytes[..bytes.len().min(STATED_WITHIN)];
     head.windows(9).any(|word| word == b"SPACE=RAS")
+}
+
+/// The one surface of a file, or the findings that keep it from being read.
+fn surface(path: &Path, parsed: Result<(Soup, Faces), Fault>) -> Result<Parts, Vec<Issue>> {
+    let (soup, faces) = parsed.map_err(|fault| fault.issues(path))?;
+    let issues = faces.warning(path).into_iter().collect();
+    let vertices = soup.positions.len();
+    let triangles = faces.over(vertices).map_err(|fault| fault.issues(path))?;
+    Ok(Parts { parts: vec![Soup { triangles, ..soup }], issues, ..Parts::default() })
 }
 
 /// Triangles from polygons and strips, within the limits.

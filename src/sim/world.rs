@@ -51,6 +51,8 @@ pub struct World {
     /// For each instance that changes its shape on the device, the room for it.
     regions: Vec<Option<GeometryRange>>,
     sets: SharingSets,
+    /// True if the normals that refract beams have been computed.
+    averaged: bool,
     /// For each instance, true if it has left the instances with which it shared a structure.
     apart: Vec<bool>,
     changing: ChangingInstances,
@@ -172,6 +174,7 @@ impl World {
             places: arrays.places,
             regions: arrays.regions,
             sets: arrays.sets,
+            averaged: arrays::averages(scene),
             apart,
             rows: arrays.instances,
             mask: RayMask::default(),
@@ -187,12 +190,13 @@ impl World {
     }
 
     /// True if [`Self::update`] can show `scene`: keyframes and strategies are those of [`Self::new`],
-    /// and the instances that share a structure have stayed together.
+    /// the instances that share a structure have stayed together, and averaged normals are there if it needs them.
     pub fn serves(&self, scene: &Scene) -> bool {
         let same = |made: &Keyframes, now: &Keyframes| {
             made.deforms_as(now) && made.strategy == now.strategy
         };
-        self.agrees(scene, same) && self.sets.hold(scene)
+        let refracts = self.averaged || !arrays::averages(scene);
+        refracts && self.agrees(scene, same) && self.sets.hold(scene)
     }
 
     fn agrees(&self, scene: &Scene, same: impl Fn(&Keyframes, &Keyframes) -> bool) -> bool {

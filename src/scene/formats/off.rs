@@ -4,16 +4,12 @@
 use std::path::Path;
 
 use super::scalar::whole;
-use super::{EXPORT_AGAIN, Faces, Fault, REDUCE, index};
+use super::{EXPORT_AGAIN, Faces, Fault, REDUCE, index, surface};
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 
 pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
-    let (soup, faces) = parse(bytes).map_err(|fault| fault.issues(path))?;
-    let issues = faces.warning(path).into_iter().collect();
-    let vertices = soup.positions.len();
-    let triangles = faces.over(vertices).map_err(|fault| fault.issues(path))?;
-    Ok(Parts { parts: vec![Soup { triangles, ..soup }], issues, ..Parts::default() })
+    surface(path, parse(bytes))
 }
 
 /// The lines with content, each with its number, without comments.

@@ -4,7 +4,7 @@
 use std::path::Path;
 
 use super::scalar::whole;
-use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, Scalar, Words, index};
+use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, Scalar, Words, index, surface};
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 
@@ -12,11 +12,7 @@ use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 const MAX_LINES: usize = 10_000;
 
 pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
-    let (soup, faces) = parse(bytes).map_err(|fault| fault.issues(path))?;
-    let issues = faces.warning(path).into_iter().collect();
-    let vertices = soup.positions.len();
-    let triangles = faces.over(vertices).map_err(|fault| fault.issues(path))?;
-    Ok(Parts { parts: vec![Soup { triangles, ..soup }], issues, ..Parts::default() })
+    surface(path, parse(bytes))
 }
 
 /// A property of an element: one number, or a list with its length before it.

@@ -5,7 +5,7 @@
 use std::path::Path;
 
 use super::scalar::whole;
-use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, MAX_VALUES, Scalar, Words, index};
+use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, MAX_VALUES, Scalar, Words, index, surface};
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 
@@ -14,11 +14,7 @@ pub(super) const SURFACE: &str =
     "extract its surface (in ParaView: Extract Surface), and save that as polydata";
 
 pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
-    let (soup, faces) = parse(bytes).map_err(|fault| fault.issues(path))?;
-    let issues = faces.warning(path).into_iter().collect();
-    let vertices = soup.positions.len();
-    let triangles = faces.over(vertices).map_err(|fault| fault.issues(path))?;
-    Ok(Parts { parts: vec![Soup { triangles, ..soup }], issues, ..Parts::default() })
+    surface(path, parse(bytes))
 }
 
 struct File<'b> {

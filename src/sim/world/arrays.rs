@@ -6,6 +6,7 @@ use super::entry;
 use super::joined::{SharingSet, SharingSets};
 use crate::scene::smoothed::{self, FINEST, smoothed};
 use crate::scene::{Instance, Mesh, Scene, Strategy};
+use crate::settings::Refraction;
 use crate::sim::bvh::{BvhError, BvhInstance, MeshBvh, SceneBvh, Splits};
 use crate::sim::fields::Fields;
 use crate::sim::layout::{self, NONE};
@@ -74,6 +75,11 @@ pub(super) fn needs(scene: &Scene, sets: &SharingSets) -> Vec<Residency> {
         }
     }
     needs
+}
+
+/// True if the scene's surfaces refract by averaged normals, which take long to compute.
+pub(super) fn averages(scene: &Scene) -> bool {
+    scene.simulation.refraction == Refraction::Beam
 }
 
 /// [`FINEST`] in the unit of each mesh of the scene. It follows the scale by powers of two: so a scale that changes
@@ -173,8 +179,13 @@ impl GeometryArrays {
         };
         let needs = needs(scene, &arrays.sets);
         let finest = finest(scene);
-        let averages: Vec<Vec<Averages>> =
-            scene.meshes.par_iter().zip(&finest).map(|(mesh, &f)| smoothed(mesh, f)).collect();
+        let averages: Vec<Vec<Averages>> = (scene.meshes.par_iter().zip(&finest))
+            .map(|(mesh, &finest)| match averages(scene) {
+                true => smoothed(mesh, finest),
+                // Room for them: kernels read them and make no use of them.
+                false => vec![[0; smoothed::LEVELS]; mesh.positions.len()],
+            })
+            .collect();
         let trees: Vec<Option<MeshBvh>> = (scene.meshes.par_iter().zip(&needs))
             .map(|(mesh, need)| {
                 let walked = tracer == Tracer::Bvh && *need == Residency::Structure;
