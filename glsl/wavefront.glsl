@@ -26,10 +26,9 @@ void average(inout vec4 n[3], vec3 own[3], uvec4 averages[3], float x) {
     }
 }
 
-// Mean slope, as a normal, of what a wavefront along d meets where the surface's normals average to n. At a coherence of
-// 1 it is n, or nothing turns the wavefront where n is seen from behind. Below that the area reaches around a rim: what
-// faces d less what is turned away is the mean's part along d. As much of the wavefront as is turned away passes the
-// body by, and keeps its direction.
+// Mean slope, as a normal, of what a wavefront along d meets where the surface's normals average to n with a coherence
+// below 1: the area reaches around a rim. What faces d less what is turned away is the mean's part along d. As much of
+// the wavefront as is turned away passes the body by, and keeps its direction.
 vec3 partly_turned(vec3 n, float coherence, vec3 d) {
     float facing = -dot(n, d);
     vec3 across = coherence * (n + facing * d);
@@ -72,7 +71,9 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
             slope.refracting = side * surface_to_world(hit.instance, mean.xyz);
             inclined = max(-dot(path.direction, slope.refracting), LEAST_FACING);
         }
-        slope.refracting = partly_turned(slope.refracting, coherence, path.direction);
+        // Rounding alone makes less than 1 of coherences that are 1 at all corners.
+        vec3 turned = partly_turned(slope.refracting, coherence, path.direction);
+        slope.refracting = mix(turned, slope.refracting, bvec3(coherence > 0.99999));
     }
 
     slope.width = 0.0;

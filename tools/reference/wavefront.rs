@@ -32,10 +32,9 @@ pub(super) fn unpacked(word: u32) -> (DVec3, f64) {
     (DVec3::new(x + fold(x), y + fold(y), z).normalize(), f64::from(word >> 26) / 63.0)
 }
 
-/// Mean slope, as a normal, of what a wavefront along `d` meets where the surface's normals average to `n`. At a
-/// `coherence` of 1 it is `n`, or nothing turns the wavefront where `n` is seen from behind. Below that the area reaches
-/// around a rim: what faces `d` less what is turned away is the mean's part along `d`. As much of the wavefront as is
-/// turned away passes the body by, and keeps its direction.
+/// Mean slope, as a normal, of what a wavefront along `d` meets where the surface's normals average to `n` with a
+/// `coherence` below 1: the area reaches around a rim. What faces `d` less what is turned away is the mean's part
+/// along `d`. As much of the wavefront as is turned away passes the body by, and keeps its direction.
 fn partly_turned(n: DVec3, coherence: f64, d: DVec3) -> DVec3 {
     let facing = -n.dot(d);
     let across = coherence * (n + facing * d);
@@ -84,7 +83,9 @@ impl World<'_> {
             refracting = side * self.between(hit, corners);
             let [u, v] = hit.uv;
             let coherence = (1.0 - u - v) * coherences[0] + u * coherences[1] + v * coherences[2];
-            refracting = partly_turned(refracting, coherence, d);
+            if coherence <= 0.99999 {
+                refracting = partly_turned(refracting, coherence, d);
+            }
         }
         let mut width = 0.0;
         if self.frame.flags & FLAG_FOOTPRINT != 0 {
