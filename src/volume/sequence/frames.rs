@@ -6,7 +6,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::volume::error::VolumeError;
 use crate::volume::fields::{Field, Fields};
-use crate::volume::write::{Header, number};
+use crate::volume::write::number;
 
 /// Beginning of the keys of frames.
 pub(in crate::volume) const PREFIX: &str = "Seq_Frame";
@@ -57,9 +57,11 @@ impl TrackedFrame {
         self.image != Some(false)
     }
 
-    pub(super) fn write(&self, index: usize, header: &mut Header) {
+    /// Keys and values of frame `index` in a header.
+    pub(super) fn entries(&self, index: usize) -> Vec<(String, String)> {
+        let mut out = Vec::new();
         let mut entry = |name: &str, value: &str| {
-            header.entry(&format!("{PREFIX}{index:04}_{name}"), value);
+            out.push((format!("{PREFIX}{index:04}_{name}"), value.to_owned()));
         };
         for (name, pose) in &self.poses {
             let (m, t) = (pose.transform.matrix3, pose.transform.translation);
@@ -81,6 +83,7 @@ impl TrackedFrame {
         if let Some(image) = self.image {
             entry(IMAGE_STATUS, if image { "OK" } else { "INVALID" });
         }
+        out
     }
 }
 
