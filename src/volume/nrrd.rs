@@ -106,7 +106,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     };
     let strange = fields.list.iter().map(|f| f.key.as_str());
     let strange = strange.filter(|key| !KNOWN.iter().any(|k| k.eq_ignore_ascii_case(key)));
-    let tracked = pairs.iter().any(|f| f.key.starts_with(frames::PREFIX));
+    let tracked = planes::is_tracked(&pairs);
     let of_frames = |key: &str| key.starts_with(frames::PREFIX) || planes::is_known(key);
     let pairs = pairs.iter().map(|f| f.key.as_str());
     let pairs = pairs.filter(|key| !(tracked && of_frames(key)));

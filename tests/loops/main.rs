@@ -5,8 +5,8 @@
 mod program;
 mod python;
 mod sequences;
-#[path = "../common/skip.rs"]
-mod skip;
+#[path = "../common/shared_data.rs"]
+mod shared_data;
 mod volumes;
 
 use std::path::Path;

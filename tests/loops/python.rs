@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
-use crate::skip::{Lacking, skip};
+use crate::shared_data::skip::{Lacking, skip};
 
 /// A Python that has pydicom, in a folder of the build; none where it cannot be had. Made once, whoever asks first.
 pub fn python() -> Option<PathBuf> {

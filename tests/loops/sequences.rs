@@ -10,6 +10,7 @@ use insonify::volume::{Sequence, Voxels, track, transform};
 
 use crate::QUICK;
 use crate::program::insonify;
+use crate::shared_data::shared_data;
 
 /// A way through all directions, its times unevenly apart.
 const WAY: &str = "time_s,x_mm,y_mm,z_mm,qw,qx,qy,qz\n2,12.3456789,-30,250,0.5,0.5,0.5,0.5\n\
@@ -191,6 +192,29 @@ fn frames_whose_time_stands_still_have_times_of_their_own() {
     }
 }
 
+/// PLUS's own sweep, which it keeps in both formats.
+#[test]
+fn plus_says_the_same_in_both_formats() {
+    let Some(data) = shared_data() else { return };
+    let load = |name: &str| {
+        let path = data.join("us-plus/TestImages").join(name);
+        let (read, warnings) = Sequence::load(&path).expect("readable");
+        assert!(warnings.is_empty(), "{name}: {warnings:?}");
+        read
+    };
+    let meta = load("NwirePhantomFreehand.igs.mha");
+    let nrrd = load("NwirePhantomFreehand.igs.nrrd");
+    assert_eq!((meta.size, &meta.pixels), (nrrd.size, &nrrd.pixels));
+    assert_eq!((&meta.orientation, meta.spacing), (&nrrd.orientation, nrrd.spacing));
+    assert_eq!(meta.frames.len(), 97);
+    for (a, b) in meta.frames.iter().zip(&nrrd.frames) {
+        assert_eq!((a.timestamp, a.image, &a.poses), (b.timestamp, b.image, &b.poses));
+    }
+    // One frame alone, without a list.
+    let single = load("NrrdSample.igs.nrrd");
+    assert_eq!((single.size, single.frames.len()), ([256, 256], 1));
+}
+
 #[test]
 fn both_formats_of_a_sweep_make_the_same_volume() {
     let (folder, scene) = folder();
@@ -218,6 +242,7 @@ fn what_cannot_be_written_is_said_before_the_work() {
         (&["-o", "none/a.seq.mha"][..], "its folder does not exist"),
         (&["-o", "none/a.seq.nrrd"], "its folder does not exist"),
         (&["-o", "none/a.dcm"], "its folder does not exist"),
+        (&["-o", "a.seq.mhd"], "frames with poses are in one file"),
         (&["-o", "a.seq.mha", "--frames", "100000"], "are more than 2 GiB"),
     ] {
         let (done, said) = insonify(folder.path(), &[&["render", &scene], more].concat());

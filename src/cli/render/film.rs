@@ -40,8 +40,15 @@ enum Reel {
 /// Refuses a file that could not be written in the end.
 ///
 /// # Errors
-/// Its folder does not exist.
+/// Its folder does not exist; a header with its pixels elsewhere.
 pub fn check(output: &Path) -> Result<()> {
+    if ends(output, ["mhd", "nhdr"]) {
+        return Err(miette!(
+            help = "end the name in .mha or .nrrd",
+            "{} is not written: frames with poses are in one file",
+            output.display()
+        ));
+    }
     match dicom::is_meant(output) || is_sequence(output) {
         true => common::in_folder(output),
         false => Ok(()),
@@ -50,8 +57,12 @@ pub fn check(output: &Path) -> Result<()> {
 
 /// Returns whether `path` names frames with poses, by its extension.
 fn is_sequence(path: &Path) -> bool {
+    ends(path, ["mha", "nrrd"])
+}
+
+fn ends(path: &Path, with: [&str; 2]) -> bool {
     let extension = path.extension().unwrap_or_default();
-    ["mha", "nrrd"].iter().any(|e| extension.eq_ignore_ascii_case(e))
+    with.iter().any(|e| extension.eq_ignore_ascii_case(e))
 }
 
 impl Film {

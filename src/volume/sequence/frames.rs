@@ -13,6 +13,8 @@ pub(in crate::volume) const PREFIX: &str = "Seq_Frame";
 const TRANSFORM: &str = "Transform";
 const STATUS: &str = "TransformStatus";
 const IMAGE_STATUS: &str = "ImageStatus";
+/// The same as PLUS names it in NRRD.
+const PLUS_STATUS: &str = "Status";
 const TIMESTAMP: &str = "Timestamp";
 
 /// A measured transform, and whether it is valid.
@@ -134,7 +136,7 @@ pub(super) fn parse(
                 return Err(fields.error(field, "is no time", "write seconds"));
             }
             frame.timestamp = Some(time);
-        } else if name == IMAGE_STATUS {
+        } else if [IMAGE_STATUS, PLUS_STATUS].contains(&name) {
             frame.image = Some(field.value == "OK");
         } else {
             frame.fields.push((name.to_owned(), field.value.clone()));

@@ -9,6 +9,7 @@ use flate2::Compression;
 use flate2::write::GzEncoder;
 use glam::{DAffine3, DVec3};
 
+use super::frames::PREFIX;
 use super::{KEYS, ORIENTATION, Sequence};
 use crate::volume::error::VolumeError;
 use crate::volume::fields::{Field, Fields};
@@ -44,29 +45,34 @@ pub(super) fn is_form(key: &str) -> bool {
         || (key.starts_with("axis ") && key.contains(" index "))
 }
 
+/// Returns whether pairs of a header describe frames.
+pub(in crate::volume) fn is_tracked(pairs: &[Field]) -> bool {
+    pairs.iter().any(|f| f.key.starts_with(PREFIX))
+}
+
+fn words(field: &Field) -> impl Iterator<Item = &str> {
+    field.value.split_whitespace()
+}
+
 /// Pairs of a header as fields, and what it says of the pixels, its frames as slices.
 pub(super) fn header(path: &Path) -> Result<(Fields<'_>, Header), VolumeError> {
     let (fields, pairs, _) = nrrd::fields(path)?;
     let mut header = nrrd::header(path)?;
-    let kinds = fields.find(&["kinds"]);
-    let listed = kinds.filter(|f| f.value.split_whitespace().any(|k| k == "list" || k == "time"));
-    let Some(kinds) = listed else {
-        return Err(VolumeError::file(
-            path,
-            "is a volume, not a sequence: none of its axes is of kind `list`",
-            "give a sequence of planes",
-        ));
-    };
-    // Planes of two axes are slices already.
-    let solid = kinds.value.split_whitespace().filter(|k| ["domain", "space"].contains(k)).count();
     let layout = &mut header.layout;
-    match (layout.volumes > 1 || solid > 2, layout.size[2]) {
-        (true, 1) => layout.stack(),
-        (true, _) => {
-            let remedy = "give a sequence of planes";
-            return Err(fields.error(kinds, "each frame is a volume", remedy));
+    let remedy = "give a sequence of planes";
+    let kinds = fields.find(&["kinds"]);
+    if let Some(kinds) = kinds.filter(|f| words(f).any(|k| k == "list" || k == "time")) {
+        // Planes of two axes are slices already.
+        let solid = words(kinds).filter(|k| ["domain", "space"].contains(k)).count();
+        match (layout.volumes > 1 || solid > 2, layout.size[2]) {
+            (true, 1) => layout.stack(),
+            (true, _) => return Err(fields.error(kinds, "each frame is a volume", remedy)),
+            (false, _) => {}
         }
-        (false, _) => {}
+    } else if layout.size[2] > 1 || !is_tracked(&pairs) {
+        // PLUS writes a frame alone without a list.
+        let message = "is a volume, not a sequence: none of its axes is of kind `list`";
+        return Err(VolumeError::file(path, message, remedy));
     }
     // They are about volumes.
     header.warnings.clear();

@@ -27,7 +27,7 @@ impl Summary {
     pub fn read(path: &Path) -> Result<Option<Self>, VolumeError> {
         let (fields, header) = if nrrd::is_meant(path) {
             let (_, list, _) = volume::nrrd::fields(path)?;
-            if !list.iter().any(|f| f.key.starts_with(frames::PREFIX)) {
+            if !nrrd::is_tracked(&list) {
                 return Ok(None);
             }
             nrrd::header(path)?

@@ -119,7 +119,6 @@ fn lists_of_planes_are_sequences_and_other_lists_are_not() {
     for (from, to, cause) in [
         ("5 4 1 3", "5 2 2 3", "each frame is a volume"),
         ("5 4 1 3", "5 2 6 1", "each frame is a volume"),
-        ("domain list", "domain ???", "is a volume, not a sequence"),
         ("5 4 1 3", "5 4 1 2", "there are 2 frames"),
         ("5 4 1 3", "5 4 1 4", "is cut off"),
         ("5 4 1 3", "5 4 1 18446744073709551615", "are more than"),
@@ -129,6 +128,9 @@ fn lists_of_planes_are_sequences_and_other_lists_are_not() {
         let error = load(header.replacen(from, to, 1)).expect_err(cause);
         assert!(error.to_string().contains(cause), "{error}, not {cause}");
     }
+    let solid = header.replace("5 4 1 3", "5 4 3 1").replace("domain list", "domain ???");
+    let error = load(solid).expect_err("no list").to_string();
+    assert!(error.contains("is a volume, not a sequence"), "{error}");
     // The last eight bytes are a sum and a length.
     for len in (0..whole.len() - 8).step_by(7) {
         let cut = folder.write("c.nrrd", &whole[..len]);
