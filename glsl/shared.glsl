@@ -46,7 +46,7 @@ const uint FLAG_MASKED = 512u;      // only what a masking instance encloses giv
 const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
 const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
-const float BENDING_STEP = 0.1;           // mm: how far from the axis the bending of a wavefront is found
+const float BENDING_STEP = 0.1;     // mm: how far from the axis the bending of a wavefront is found
 const float MOST_WIDENED = 8.0;     // growth of a beam's variance across behind a lens, over its own
 
 const uint BLEND_LINEAR = 0u;

@@ -1,9 +1,9 @@
 //! A block with a bumpy top in a background, and how scenes with it are made.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_PI_2, TAU};
 use std::path::Path;
 
-use glam::{DAffine3, DVec2};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
 use insonify::probe::Probe;
 use insonify::scene::mesh::Soup;
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Simulation, Surface, Tissue};
@@ -109,6 +109,11 @@ pub fn layers(probe: Probe, around: Tissue, inside: Tissue, block: Mesh) -> Scen
     scene.tissues.extend([inside.clone(), Tissue { echogenicity: f64::NEG_INFINITY, ..inside }]);
     place(&mut scene, block, 1, DAffine3::IDENTITY);
     scene
+}
+
+/// Placement of a cylinder along y through a place (x, z).
+pub fn along_y([x, z]: [f64; 2]) -> DAffine3 {
+    DAffine3::from_rotation_translation(DQuat::from_rotation_x(FRAC_PI_2), DVec3::new(x, 0.0, z))
 }
 
 /// Adds a mesh that echoes nothing; a later tissue wins where two overlap.

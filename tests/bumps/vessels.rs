@@ -1,7 +1,5 @@
 //! Vessels in a phantom behind bumps of 0.3 to 2 mm.
 
-use std::f64::consts::FRAC_PI_2;
-
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use insonify::gpu::test_device;
 use insonify::probe::{Kind, Probe};
@@ -11,7 +9,7 @@ use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 
 use crate::lumen::{LEAST, dark, levels, share, unrefracted};
-use crate::phantom::{Random, block, bumps, layers, place, tissue, with};
+use crate::phantom::{Random, along_y, block, bumps, layers, place, tissue, with};
 
 /// Depth of the bumpy surface, mm.
 const TOP: f64 = 15.0;
@@ -38,9 +36,7 @@ fn phantom(block: Mesh) -> Scene {
     };
     let mut scene = layers(probe, tissue(1.49, 1.5, 0.0), tissue(1.58, 1.65, 0.0), block);
     for [x, z, radius] in VESSELS {
-        let along_y = DQuat::from_rotation_x(FRAC_PI_2);
-        let at = DAffine3::from_rotation_translation(along_y, DVec3::new(x, 0.0, z));
-        place(&mut scene, shapes::cylinder(radius, 66.0, 48), 2, at);
+        place(&mut scene, shapes::cylinder(radius, 66.0, 48), 2, along_y([x, z]));
     }
     scene
 }

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Wires behind a bumpy layer in a full-wave simulation (2-D), as a linear array images them.
+"""Wires behind a bumpy layer in a full-wave simulation (2-D), without and with a cyst before them, as a linear array
+images them.
 
 Writes place, width and level of each wire as JSON, with what made them, to hold ours against (tests/bumps/full_wave.rs). The wave
 equation is solved by the k-space pseudospectral scheme of k-Wave (Treeby and Cox 2010), in single precision, which
@@ -11,13 +12,14 @@ simulation has them.
     venv/bin/pip install numpy scipy
     venv/bin/python tools/oracle/bumps.py tests/bumps/full_wave.json
 
-About a minute per simulation, 12 of them. Units: mm, us, MHz.
+About a minute per simulation, 24 of them. Units: mm, us, MHz.
 """
 
 import json
 import platform
 import sys
 from importlib.metadata import version
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,6 +33,7 @@ LAYERS = [(1.490, 1.0), (1.580, 1.0)]  # speed, density: fat and below
 TOP = 12.0
 WIRES = [(-5.0, 26.0), (0.0, 34.0), (5.0, 40.0)]
 RMS = [0.0, 0.15, 0.3, 0.6]
+CYST = {"at": (1.5, 24.5), "radius": 4.0, "speed": 1.520, "density": 1.0}
 GRID, STEP, END = 0.125, 0.025, 34.0
 HALF, DEPTH = 21.5, 42.0
 LAYER = 20  # absorbing cells around
@@ -82,7 +85,7 @@ def propagated(speed, density, at, sent):
     return got
 
 
-def face(wire, rms, bumps):
+def face(wire, rms, bumps, cyst):
     """Spectra at the face per angular frequency and place, over that of the source."""
     x = np.arange(-HALF, HALF + GRID / 2, GRID)
     z = np.arange(0, DEPTH, GRID)
@@ -92,6 +95,11 @@ def face(wire, rms, bumps):
     (c1, rho1), (c2, rho2) = LAYERS
     speed = 1 / (1 / c1 + share * (1 / c2 - 1 / c1))
     density = rho1 + share * (rho2 - rho1)
+    if cyst:
+        from_middle = np.hypot(x[None, :] - CYST["at"][0], z[:, None] - CYST["at"][1])
+        share = np.clip((CYST["radius"] - from_middle) / GRID + 0.5, 0, 1)
+        speed = 1 / (1 / speed + share * (1 / CYST["speed"] - 1 / speed))
+        density += share * (CYST["density"] - density)
     steps = round(END / STEP)
     t = np.arange(steps) * STEP
     sigma = 0.13
@@ -162,15 +170,15 @@ def main():
         "focus": FOCUS,
         "layers": [{"speed": c, "density": rho} for c, rho in LAYERS],
         "top": TOP,
+        "cyst": CYST,
         "waves": bumps,
         "wires": [],
     }
-    for rms in RMS:
-        for wire in WIRES:
-            row = {"rms": rms, "at": wire, **measured(wire, *face(wire, rms, bumps))}
-            out["wires"].append(row)
-            print(row, flush=True)
-            Path(sys.argv[1]).write_text(json.dumps(out, indent=1) + "\n")
+    for cyst, rms, wire in product([False, True], RMS, WIRES):
+        row = {"cyst": cyst, "rms": rms, "at": wire, **measured(wire, *face(wire, rms, bumps, cyst))}
+        out["wires"].append(row)
+        print(row, flush=True)
+        Path(sys.argv[1]).write_text(json.dumps(out, indent=1) + "\n")
 
 
 main()
