@@ -1,8 +1,8 @@
-//! Segmentations and meshes of others made into scenes.
+//! Import of segmentations and meshes: scenes made of them.
 //!
 //! A label map (`labels`, with `names` from the file) becomes one closed surface per label, with the same faces on both
 //! sides of a border: `composed` parts what touches along an edge, `nets` makes all surfaces at once, `relax` smooths
-//! them, `surface` takes one out; `map` is the whole way. A folder of meshes goes through `folder`, compared with each other
+//! them, `surface` takes one out; `map` does all of this. A folder of meshes goes through `folder`, compared with each other
 //! by `raster`. `table` says which tissue a structure is made of, `hull`
 //! makes up a skin where there is none, `pose` finds a place on it from which an organ is seen, `draft` writes the
 //! scene. Configurations of PLUS (`plus`) become scenes by `device_set`, poses of sequences rows of a `trajectory`. Knows no
@@ -48,7 +48,7 @@ pub struct Options {
     pub spacing: Option<DVec3>,
     /// Organ that the probe looks at.
     pub look_at: Option<String>,
-    /// Tissue of what is inside the skin and no structure of its own.
+    /// Tissue of the space inside the skin that belongs to no structure.
     pub around: String,
     /// Unit of mesh files, where they are in another than their format's.
     pub units: Option<Units>,

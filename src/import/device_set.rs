@@ -15,7 +15,7 @@ use crate::scene::Issue;
 use crate::scene::mesh::{self, Soup};
 use crate::volume::Pose;
 
-/// What PLUS's simulator has by default, which counts as 0 dB: 0.65 dB/(cm MHz), of which a tenth is scattered back.
+/// Backscatter that counts as 0 dB, the default of PLUS's simulator: a tenth of 0.65 dB/(cm MHz).
 const USUAL: f64 = 0.65 * 0.1;
 
 /// PLUS's frame of the marker on the probe.
@@ -28,7 +28,7 @@ pub struct PlusScene {
     pub draft: Draft,
     /// The scene file.
     pub text: String,
-    /// What is to be said of the meshes, and of bodies that are left out.
+    /// Findings on the meshes, and on bodies that are left out.
     pub issues: Vec<Issue>,
 }
 

@@ -26,11 +26,12 @@ pub struct Part {
     pub file: String,
     /// Tissue.
     pub tissue: String,
-    /// Who wins where surfaces lie on or in each other: before [`rank`] by the table, then one for each.
+    /// Priority where surfaces lie on or in each other, the higher wins: before [`rank`] the table's, after it a number
+    /// of its own for each part.
     pub priority: i32,
-    /// Where it comes from.
+    /// Origin of the mesh, in words.
     pub origin: String,
-    /// What there is to say about the tissue.
+    /// Note on the tissue.
     pub note: String,
     /// False where no table knows the name.
     pub known: bool,
@@ -45,17 +46,17 @@ pub struct Part {
 pub struct Draft {
     /// Folder to be written.
     pub folder: PathBuf,
-    /// What was imported.
+    /// File or folder that was imported.
     pub source: PathBuf,
-    /// What is to be said about its frame.
+    /// Statement of its frame, in words.
     pub frame: String,
     /// Structures, then the skin where there is one.
     pub parts: Vec<Part>,
     /// Structures that are no mesh of the scene, and why.
     pub left_out: Vec<String>,
-    /// What the skin is made of and where it comes from.
+    /// Tissue and origin of the skin, in words.
     pub skin: Option<String>,
-    /// Where the probe is, and the name of the organ that it looks at.
+    /// Place of the probe, and the name of the organ that it looks at.
     pub view: Option<(View, String)>,
 }
 

@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::volume::VolumeError;
 
-/// A mistake in what is imported. Nothing is written.
+/// A mistake in the imported data. Nothing is written.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{}{message}", self.place())]
 #[diagnostic(help("{remedy}"))]

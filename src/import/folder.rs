@@ -20,7 +20,7 @@ const MOST: usize = Grid::MOST as usize;
 /// Distance of voxels in which meshes are compared, mm, and most of them along an axis.
 const COARSE: f64 = 2.0;
 const MOST_VOXELS: f64 = 200.0;
-/// What a skin that is made up stands off, mm.
+/// Distance of an invented skin from the organs, mm.
 const MARGIN: f64 = 15.0;
 /// Share of a mesh inside another from which on it counts as a part of it.
 const WITHIN: f64 = 0.9;
@@ -64,7 +64,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     }
 }
 
-/// Makes a scene of the meshes of a folder. Also returns what is to be said about them.
+/// Makes a scene of the meshes of a folder. Also returns findings on them.
 ///
 /// # Errors
 /// A mesh that cannot be read, or an organ to look at that is not there.
@@ -83,7 +83,7 @@ pub fn import(
         organs.push(organ);
         issues.extend(found);
     }
-    // What is in front of what, by voxels; the inner of two lies above the outer.
+    // The order of the meshes in the voxels: the inner of two lies above the outer.
     organs.sort_by(|a, b| {
         a.entry.priority.cmp(&b.entry.priority).then(b.volume.total_cmp(&a.volume))
     });

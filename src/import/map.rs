@@ -22,10 +22,10 @@ const MAX_FACES: u64 = 12_000_000;
 const MANY: usize = 20;
 /// Distance of voxels in which the place of the probe is sought, mm: a rib is three of them thick.
 const COARSE: f64 = 3.0;
-/// What a skin that is made up stands off, mm: some skin, fat and muscle.
+/// Distance of an invented skin from the organs, mm: some skin, fat and muscle.
 const MARGIN: f64 = 15.0;
 
-/// What is told of a stage: what is counted, how many are done, of how many.
+/// Reports the progress of a stage: name of the items, number done, number in all.
 pub type Progress<'p> = &'p mut dyn FnMut(&str, usize, usize);
 
 /// Makes a scene of a label map in `folder`.
@@ -269,7 +269,7 @@ pub fn choose(
     })
 }
 
-/// Whether a place of the skin is where the volume ends and the body goes on.
+/// Returns true for a place of the skin where the volume ends and the body goes on.
 fn cut(grid: &Grid, outline: bool) -> impl Fn(DVec3) -> bool {
     let back: DAffine3 = grid.world_from_voxel.inverse();
     let size = DVec3::from(grid.size.map(|n| n as f64));

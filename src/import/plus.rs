@@ -1,6 +1,6 @@
 //! Configurations of PLUS (`PlusDeviceSet_*.xml`): its simulator's bodies and transducer, and its transforms.
 //!
-//! What the words mean there: vtkPlusUsSimulatorAlgo, PlusSpatialModel, vtkPlusUsScanConvertLinear and
+//! Sources of the meanings: vtkPlusUsSimulatorAlgo, PlusSpatialModel, vtkPlusUsScanConvertLinear and
 //! -Curvilinear of github.com/PlusToolkit/PlusLib. A model of higher number in the file covers those before it; one
 //! without a file is everywhere. Scanlines lie in the plane of the image, whose pixels `ImageTo...` takes to mm:
 //! the size of a pixel there and `OutputImageSpacingMmPerPixel`, by which the transducer is laid out in pixels, may differ.
@@ -18,7 +18,7 @@ use crate::volume::{Pose, Transforms, transform};
 /// Longest configuration, bytes.
 const MAX_CONFIG: u64 = 4 << 20;
 
-/// What a configuration has for a scene.
+/// Content of a configuration that a scene needs.
 #[derive(Clone, Debug)]
 pub struct DeviceSet {
     /// Name of the device set, where it has one.
@@ -52,7 +52,7 @@ pub struct Model {
     pub speed: f64,
     /// One-way attenuation at 1 MHz, dB/cm.
     pub attenuation: f64,
-    /// Share of what is absorbed that comes back.
+    /// Backscattered share of the absorbed energy.
     pub backscatter: f64,
 }
 
@@ -169,7 +169,7 @@ impl DeviceSet {
     /// The transform from a frame to the reference, by these poses and what always holds.
     ///
     /// # Errors
-    /// What is missing, in words.
+    /// The missing parts, in words.
     pub fn reference_from(
         &self,
         frame: &str,

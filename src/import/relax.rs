@@ -28,7 +28,7 @@ const PUSHES: usize = 8;
 /// Steps that `done` of [`relax`] is told.
 pub const STEPS: usize = 2 * ROUNDS + PUSHES;
 
-/// Smooths a net; `volumes` is how many voxels each label has to enclose.
+/// Smooths a net; `volumes` are the numbers of voxels that the labels have to enclose.
 pub fn relax(net: &mut Net, volumes: &[u64; 256], reach: f32, mut done: impl FnMut(usize)) {
     let mut motions: Vec<Motion> = vec![([0.0; 3], 0.0); net.vertices.len()];
     for round in 0..ROUNDS {
@@ -111,7 +111,7 @@ fn inflate(net: &mut Net, motions: &mut [Motion], volumes: &[u64; 256], reach: f
     let measures = measure(net);
     let depth = |label: u8| {
         let (volume, area) = measures[usize::from(label)];
-        // What is outside all labels has no volume of its own.
+        // The outside of all labels has no volume.
         if label == 0 || area == 0.0 {
             return 0.0;
         }

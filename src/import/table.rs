@@ -22,7 +22,7 @@ const UNKNOWN_PRIORITY: i32 = 20;
 /// Priority of outlines of the body.
 pub const OUTLINE: i32 = 0;
 
-/// One row; what it leaves open is none.
+/// One row; values that it leaves out are none.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     value: Option<u32>,
@@ -41,18 +41,18 @@ pub struct Table {
     shipped: Vec<Row>,
 }
 
-/// What a table says of a structure.
+/// The statement of a table on a structure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// Its name: the user's for its value, else the file's.
     pub name: String,
     /// Its tissue.
     pub tissue: String,
-    /// Who wins where surfaces lie on or in each other: the higher.
+    /// Priority where surfaces lie on or in each other: the higher wins.
     pub priority: i32,
     /// False where no row knows it: the tissue is then [`UNKNOWN`].
     pub known: bool,
-    /// What there is to say about the choice.
+    /// Note on the choice.
     pub note: String,
 }
 
@@ -103,7 +103,7 @@ impl Table {
         Some(&row.name)
     }
 
-    /// What is known of a structure by the value of its label and by its names, the first of which is its own. A row of
+    /// The entry of a structure, by the value of its label and by its names, the first of which is its own. A row of
     /// the user for the value counts before rows for names, and those of the user before those that ship.
     pub fn look_up(&self, value: Option<u32>, names: &[&str]) -> Entry {
         let by_value = value.and_then(|v| self.own.iter().find(|r| r.value == Some(v)));

@@ -30,7 +30,7 @@ const REDUCE: &str = "reduce the mesh";
 /// The reason why a file cannot be read.
 #[derive(Debug)]
 struct Fault {
-    /// Line of text, from 1; 0 where that says nothing.
+    /// Line of text, from 1; 0 where it does not apply.
     line: usize,
     cause: String,
     remedy: &'static str,
@@ -140,7 +140,7 @@ impl Faces {
         }
     }
 
-    /// The warning about faces that are none.
+    /// The warning about faces with fewer than three corners.
     fn warning(&self, path: &Path) -> Option<Issue> {
         let message = format!("faces with fewer than three corners are ignored ({})", self.short);
         (self.short > 0).then(|| Issue::warning(path, self.short, message, ""))
@@ -152,7 +152,7 @@ fn no_vertex(index: impl fmt::Display, vertices: usize) -> Fault {
     Fault::new(cause, EXPORT_AGAIN)
 }
 
-/// A vertex index; what is none of 32 bits names no vertex.
+/// A vertex index; a number that does not fit into 32 bits names no vertex.
 fn index(value: i64) -> Result<u32, Fault> {
     u32::try_from(value).map_err(|_| {
         Fault::new(format!("a face names vertex {value}, which cannot be"), EXPORT_AGAIN)

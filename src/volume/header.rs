@@ -171,7 +171,7 @@ impl Header {
         let all = layout.voxels().and_then(|n| n.checked_mul(layout.volumes as u64));
         let held = bytes(all, self.held().held_bytes());
         let total = bytes(layout.values(), self.kind.bytes());
-        // What is not streamed is in memory twice.
+        // Values that are not streamed are in memory twice.
         let peak = held.zip(total).and_then(|(held, total)| match self.is_streamed() {
             true => Some(held.max(total)),
             false => held.checked_add(total),

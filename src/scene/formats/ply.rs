@@ -38,7 +38,7 @@ impl Element {
     }
 }
 
-/// What follows the header.
+/// The content after the header.
 enum Body<'b> {
     Text(Words<'b>),
     Binary { words: Words<'b>, big: bool },

@@ -1,4 +1,4 @@
-//! STL, binary and text, with all solids of a text. Normals are not read: the order of the corners says them.
+//! STL, binary and text, with all solids of a text. Normals are not read: they follow from the order of the corners.
 //!
 //! Text is read as other programs read it: upper or lower case, any white space, names of any bytes or none, any
 //! words for a normal.

@@ -18,7 +18,7 @@ use crate::scene::mesh::{MAX_ELEMENTS, MAX_FILE, Parts, Soup, Units};
 const MAX_FILES: usize = 10_000;
 /// Most objects that components place, one in another.
 const MAX_PLACED: u64 = 100_000;
-/// Where the model is, unless the archive says otherwise.
+/// Path of the model in the archive, unless the archive names another.
 const MODEL: &str = "3D/3dmodel.model";
 
 pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
@@ -44,14 +44,14 @@ struct Component {
 #[derive(Default)]
 struct Object {
     name: String,
-    /// True where it only supports others.
+    /// True for a support structure.
     support: bool,
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     components: Vec<Component>,
 }
 
-/// What the models of a package hold.
+/// The objects of all models of a package.
 struct Models {
     /// Objects, each after those that it consists of.
     objects: Vec<Object>,

@@ -74,7 +74,7 @@ fn parse(bytes: &[u8]) -> Result<(Soup, Faces), Fault> {
                 file.words.line_left();
                 while !file.words.line_left().is_empty() {}
             }
-            // What follows says something of points and cells that are known.
+            // The rest are attributes of points and cells that have been read.
             b"POINT_DATA" | b"CELL_DATA" => break,
             other => {
                 let shown: String = String::from_utf8_lossy(other).chars().take(40).collect();

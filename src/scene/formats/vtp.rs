@@ -35,7 +35,7 @@ struct Surface {
     ras: bool,
 }
 
-/// How the file writes numbers in binary.
+/// Binary encoding of numbers in the file.
 #[derive(Clone, Copy)]
 struct Form {
     big: bool,
@@ -44,7 +44,7 @@ struct Form {
     packed: bool,
 }
 
-/// Where the numbers of an array are.
+/// Place of an array's numbers.
 enum Place<'b> {
     Text(&'b [u8]),
     Base64(&'b [u8]),
@@ -69,7 +69,7 @@ struct Piece<'b> {
     cells: [[Option<Array<'b>>; 2]; 2],
 }
 
-/// What follows the elements.
+/// The data after the elements.
 #[derive(Default)]
 struct Appended<'b> {
     bytes: &'b [u8],

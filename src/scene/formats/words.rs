@@ -23,7 +23,7 @@ impl<'b> Words<'b> {
         self.line
     }
 
-    /// What has not been read.
+    /// The bytes not yet read.
     pub fn rest(&self) -> &'b [u8] {
         &self.bytes[self.at..]
     }
@@ -51,7 +51,7 @@ impl<'b> Words<'b> {
         self.clone().next()
     }
 
-    /// What is left of the line, without space around it; its end (line feed, carriage return or both) is skipped.
+    /// The rest of the line, without space around it; its end (line feed, carriage return or both) is skipped.
     pub fn line_left(&mut self) -> &'b [u8] {
         let rest = self.rest();
         let len = rest.iter().position(|b| b"\r\n".contains(b)).unwrap_or(rest.len());

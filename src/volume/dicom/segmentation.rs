@@ -199,7 +199,7 @@ fn spaced(
     Ok((low, step, count as usize + 1))
 }
 
-/// Where frames lie.
+/// Positions of the frames.
 pub(super) struct Places {
     /// First pixels.
     pub origins: Vec<DVec3>,

@@ -9,7 +9,7 @@ fn load(bytes: impl AsRef<[u8]>) -> Result<Parts, Vec<Issue>> {
     read(Path::new("x.vtp"), bytes.as_ref())
 }
 
-/// How a test writes its numbers.
+/// Encoding of a test's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     Text,

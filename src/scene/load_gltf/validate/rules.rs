@@ -56,7 +56,7 @@ fn version(findings: &mut Findings<'_>) {
         }
         Some((v, Some(_))) => {
             findings.fault("/asset/version", format!("is {v}; glTF 2.0 can be read"));
-            // What else differs from 2.0 is no fault of such a file.
+            // Other differences from 2.0 are no faults in a file of another version.
             findings.only_last("export it as glTF 2.0, or convert it (gltf-pipeline does)");
         }
         Some((v, None)) => findings.fault("/asset/version", format!("is `{v}`, not a version")),
