@@ -2,10 +2,11 @@
 //! pictures for its clients.
 
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DAffine3;
+use parking_lot::Mutex;
 use winit::event_loop::EventLoopProxy;
 
 use super::session::Wake;
@@ -58,11 +59,6 @@ pub(super) struct Report {
 pub(super) struct Link(Arc<Mutex<Option<Server>>>);
 
 impl Link {
-    /// Locks the server. It stays whole whatever its users do, so poisoning is ignored.
-    fn lock(&self) -> MutexGuard<'_, Option<Server>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Starts a server in place of the one before; port 0 takes any that is free.
     pub(super) fn open(
         &self,
@@ -70,7 +66,7 @@ impl Link {
         tracker: Tracker,
         bell: Bell,
     ) -> Result<SocketAddr, IgtlError> {
-        let mut server = self.lock();
+        let mut server = self.0.lock();
         // The old one first: it may hold the port.
         *server = None;
         let (at, settings) = (SocketAddr::new(address, port), ServerSettings::new(tracker));
@@ -80,19 +76,19 @@ impl Link {
 
     /// Goes on with another scene's tracker.
     pub(super) fn calibrate(&self, tracker: Tracker) {
-        if let Some(server) = &*self.lock() {
+        if let Some(server) = &*self.0.lock() {
             server.calibrate(tracker);
         }
     }
 
     /// Ends all connections.
     pub(super) fn close(&self) {
-        *self.lock() = None;
+        *self.0.lock() = None;
     }
 
     /// State of the server; none without one.
     pub(super) fn report(&self) -> Option<Report> {
-        self.lock().as_ref().map(|server| Report {
+        self.0.lock().as_ref().map(|server| Report {
             address: server.address(),
             status: server.status(),
             tracked: server.pose(),
@@ -135,7 +131,7 @@ impl Broadcast {
         let Some((image, constants, pose)) = &self.last else {
             return Ok(());
         };
-        let clients = match &*self.link.lock() {
+        let clients = match &*self.link.0.lock() {
             Some(server) => {
                 // Valid until there is a client, or until the next picture is published.
                 server.outdate();
@@ -150,7 +146,7 @@ impl Broadcast {
             Some(rgba) => Picture::new(constants, rgba),
             None => Picture::new(constants, &self.device.read_back_image(image)?),
         };
-        if let Some(server) = &*self.link.lock() {
+        if let Some(server) = &*self.link.0.lock() {
             server.publish(picture, pose);
         }
         Ok(())
