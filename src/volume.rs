@@ -23,6 +23,7 @@ mod nrrd;
 mod reconstruct;
 mod report;
 mod sequence;
+mod scalar;
 mod series;
 mod source;
 #[cfg(test)]
@@ -37,9 +38,10 @@ pub use reconstruct::{
     Compounding, Config, Fan, Filling, Interpolation, Lattice, ReconstructError, Reconstruction,
     Settings, Transforms, frames_of_pose, reconstruct,
 };
+pub use scalar::Scalar;
 pub use sequence::frames::matrix as transform;
 pub use sequence::{Pose, Sequence, Summary, TrackedFrame, track};
-pub use voxels::{Statistics, VoxelType, Voxels};
+pub use voxels::{Statistics, Voxels};
 pub use write::write_meta;
 
 /// Format of a volume file.
@@ -75,7 +77,7 @@ pub struct Volume {
     /// Frame that its file is written in.
     pub frame: Frame,
     /// Type of the values in its file.
-    pub stored_as: VoxelType,
+    pub stored_as: Scalar,
     /// Voxels along each axis, all at least 1.
     pub size: [usize; 3],
     /// Voxel indices (integers at voxel centres) to LPS, mm.

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::error::VolumeError;
 use super::source::{self, MAX_BYTES};
-use super::{Format, Frame, Volume, VoxelType, Warning};
+use super::{Format, Frame, Scalar, Volume, Warning};
+use crate::issue::FileError;
 use elements::{Elements, Item, Tag};
 use image::Image;
 

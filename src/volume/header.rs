@@ -4,9 +4,10 @@ use std::path::Path;
 
 use super::error::VolumeError;
 use super::grid::Grid;
+use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
 use super::source::{Coding, MAX_BYTES, Payload, Skip};
-use super::voxels::{self, VoxelType, Voxels};
+use super::voxels::{self, Voxels};
 use super::{Format, Statistics, Volume, Warning};
 
 /// Most volumes over time: twice the largest count of an axis in NIfTI-1. Each takes memory beside its voxels.
@@ -27,7 +28,7 @@ struct Decoded {
 /// A header that has been read and checked by itself.
 pub(super) struct Header {
     pub format: Format,
-    pub kind: VoxelType,
+    pub kind: Scalar,
     pub big_endian: bool,
     pub layout: Layout,
     /// Time from one volume to the next, s, where stated.
@@ -96,9 +97,9 @@ impl Header {
     }
 
     /// Type of the voxels in memory.
-    fn held(&self) -> VoxelType {
+    fn held(&self) -> Scalar {
         match self.scale {
-            Some(_) => VoxelType::F32,
+            Some(_) => Scalar::F32,
             None => self.kind,
         }
     }

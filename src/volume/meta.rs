@@ -7,10 +7,10 @@ use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
+use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
 use super::sequence::{self, frames};
 use super::source::{self, Coding, Line, Lines, Payload, Skip};
-use super::voxels::VoxelType;
 use super::{Format, Warning};
 
 /// Most axes that are read. MetaIO takes ten.
@@ -149,26 +149,27 @@ fn truth(field: &Field) -> bool {
     ["true", "1", "t", "y", "yes"].contains(&field.value.to_ascii_lowercase().as_str())
 }
 
-fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
-    let field = fields.need("ElementType")?;
+/// Types that are read, by their names; those that are written come first.
+pub(super) const TYPES: [(&str, Scalar); 10] = [
+    ("MET_UCHAR", Scalar::U8),
+    ("MET_CHAR", Scalar::I8),
+    ("MET_USHORT", Scalar::U16),
+    ("MET_SHORT", Scalar::I16),
+    ("MET_UINT", Scalar::U32),
+    ("MET_INT", Scalar::I32),
+    ("MET_FLOAT", Scalar::F32),
+    ("MET_DOUBLE", Scalar::F64),
     // In MetaIO a LONG has 32 bits in files.
-    Ok(match field.value.trim_end_matches("_ARRAY") {
-        "MET_UCHAR" => VoxelType::U8,
-        "MET_CHAR" => VoxelType::I8,
-        "MET_USHORT" => VoxelType::U16,
-        "MET_SHORT" => VoxelType::I16,
-        "MET_UINT" | "MET_ULONG" => VoxelType::U32,
-        "MET_INT" | "MET_LONG" => VoxelType::I32,
-        "MET_FLOAT" => VoxelType::F32,
-        "MET_DOUBLE" => VoxelType::F64,
-        _ => {
-            return Err(fields.error(
-                field,
-                "this type cannot be read",
-                "save it as MET_UCHAR, MET_SHORT or MET_FLOAT",
-            ));
-        }
-    })
+    ("MET_ULONG", Scalar::U32),
+    ("MET_LONG", Scalar::I32),
+];
+
+fn kind(fields: &Fields) -> Result<Scalar, FileError> {
+    let field = fields.need("ElementType")?;
+    let name = field.value.trim_end_matches("_ARRAY");
+    let found = TYPES.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind);
+    let remedy = "save it as MET_UCHAR, MET_SHORT or MET_FLOAT";
+    found.ok_or_else(|| fields.error(field, "this type cannot be read", remedy))
 }
 
 fn unit(fields: &Fields) -> Result<f64, VolumeError> {

@@ -9,9 +9,10 @@ use super::Format;
 use super::error::VolumeError;
 use super::grid::{Frame, Grid};
 use super::header::Header;
+use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
 use super::source::{Coding, Payload, Skip};
-use super::voxels::VoxelType;
+use crate::issue::FileError;
 
 /// Bytes of a header.
 const LENGTH: u64 = 348;
@@ -154,19 +155,19 @@ fn dims(raw: &Raw) -> Result<Vec<usize>, VolumeError> {
 }
 
 /// Type and number of values per voxel.
-fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
+fn kind(raw: &Raw) -> Result<(Scalar, usize), FileError> {
     let code = raw.i16(70);
     let (kind, channels) = match code {
-        2 => (VoxelType::U8, 1),
-        4 => (VoxelType::I16, 1),
-        8 => (VoxelType::I32, 1),
-        16 => (VoxelType::F32, 1),
-        64 => (VoxelType::F64, 1),
-        128 => (VoxelType::U8, 3),
-        256 => (VoxelType::I8, 1),
-        512 => (VoxelType::U16, 1),
-        768 => (VoxelType::U32, 1),
-        2304 => (VoxelType::U8, 4),
+        2 => (Scalar::U8, 1),
+        4 => (Scalar::I16, 1),
+        8 => (Scalar::I32, 1),
+        16 => (Scalar::F32, 1),
+        64 => (Scalar::F64, 1),
+        128 => (Scalar::U8, 3),
+        256 => (Scalar::I8, 1),
+        512 => (Scalar::U16, 1),
+        768 => (Scalar::U32, 1),
+        2304 => (Scalar::U8, 4),
         _ => {
             let message = format!("datatype {code} cannot be read");
             return Err(raw.error(70, message, "save it as 8- or 16-bit integers or as floats"));

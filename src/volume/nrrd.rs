@@ -8,9 +8,10 @@ use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::Frame;
 use super::header::{Header, unused};
+use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
 use super::source::{self, Coding, Line, Lines, Payload, Skip};
-use super::voxels::VoxelType;
+use crate::issue::FileError;
 
 mod space;
 
@@ -166,21 +167,19 @@ fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), VolumeError> {
     Ok((Fields { path, list }, pairs, at))
 }
 
-fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
+fn kind(fields: &Fields) -> Result<Scalar, FileError> {
     let field = fields.need("type")?;
     Ok(match field.value.to_ascii_lowercase().as_str() {
-        "signed char" | "int8" | "int8_t" => VoxelType::I8,
-        "uchar" | "unsigned char" | "uint8" | "uint8_t" => VoxelType::U8,
+        "signed char" | "int8" | "int8_t" => Scalar::I8,
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => Scalar::U8,
         "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
-            VoxelType::I16
+            Scalar::I16
         }
-        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
-            VoxelType::U16
-        }
-        "int" | "signed int" | "int32" | "int32_t" => VoxelType::I32,
-        "uint" | "unsigned int" | "uint32" | "uint32_t" => VoxelType::U32,
-        "float" => VoxelType::F32,
-        "double" => VoxelType::F64,
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Scalar::U16,
+        "int" | "signed int" | "int32" | "int32_t" => Scalar::I32,
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => Scalar::U32,
+        "float" => Scalar::F32,
+        "double" => Scalar::F64,
         _ => {
             return Err(fields.error(
                 field,

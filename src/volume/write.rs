@@ -9,8 +9,8 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use glam::DMat3;
 
-use super::error::VolumeError;
-use super::{Volume, VoxelType, Voxels};
+use super::{Volume, Voxels, meta};
+use crate::issue::FileError;
 
 /// A header under construction.
 pub(super) struct Header(String);
@@ -28,16 +28,8 @@ pub(super) fn number(value: f64) -> String {
 impl Header {
     /// A header with the entries that depend on the voxels alone.
     pub fn new(voxels: &Voxels, axes: usize) -> Self {
-        let kind = match voxels.kind() {
-            VoxelType::U8 => "MET_UCHAR",
-            VoxelType::I8 => "MET_CHAR",
-            VoxelType::U16 => "MET_USHORT",
-            VoxelType::I16 => "MET_SHORT",
-            VoxelType::U32 => "MET_UINT",
-            VoxelType::I32 => "MET_INT",
-            VoxelType::F32 => "MET_FLOAT",
-            VoxelType::F64 => "MET_DOUBLE",
-        };
+        let kind = meta::TYPES.iter().find(|(_, kind)| *kind == voxels.kind());
+        let (kind, _) = kind.expect("volumes are held in types that MetaImage has");
         let mut out = Self(String::new());
         out.entry("ObjectType", "Image");
         out.entry("NDims", axes.to_string());

@@ -9,6 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use quick_xml::events::{BytesStart, Event};
 use zip::ZipArchive;
 
+use super::words::shown;
 use super::xml::{self, attribute, number};
 use super::{COPY_AGAIN, EXPORT_AGAIN, Fault, no_vertex};
 use crate::issue::Issue;
@@ -289,8 +290,7 @@ fn unit(model: &BytesStart<'_>) -> Result<f64, Fault> {
         "foot" => 304.8,
         "meter" => 1000.0,
         other => {
-            let other: String = other.chars().take(40).collect();
-            return Err(Fault::new(format!("`{other}` is no unit of 3MF"), EXPORT_AGAIN));
+            return Err(Fault::new(format!("`{}` is no unit of 3MF", shown(other)), EXPORT_AGAIN));
         }
     })
 }
@@ -301,8 +301,7 @@ fn transform(text: &str) -> Result<DAffine3, Fault> {
     let values = values.ok().filter(|v| v.iter().all(|v| v.is_finite()));
     let rows: Option<[f64; 12]> = values.and_then(|v| v.try_into().ok());
     let m = rows.ok_or_else(|| {
-        let text: String = text.chars().take(80).collect();
-        Fault::new(format!("`{text}` is no transform of 12 numbers"), EXPORT_AGAIN)
+        Fault::new(format!("`{}` is no transform of 12 numbers", shown(text)), EXPORT_AGAIN)
     })?;
     let row = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
     let matrix = DMat3::from_cols(row(0), row(3), row(6));

@@ -11,6 +11,7 @@ use flate2::read::ZlibDecoder;
 use quick_xml::events::{BytesStart, Event};
 
 use super::vtk::{Cells, SURFACE, offset_cells};
+use super::words::shown;
 use super::xml::{self, attribute, number};
 use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, MAX_VALUES, Scalar, Words};
 use crate::issue::Issue;
@@ -153,16 +154,15 @@ fn file(element: &BytesStart<'_>) -> Result<Form, Fault> {
     let value = |name: &str| Ok::<_, Fault>(attribute(element, name)?.unwrap_or_default());
     let kind = value("type")?;
     if kind != "PolyData" {
-        let kind: String = kind.chars().take(40).collect();
-        let cause = format!("holds data of type `{kind}`, and only PolyData is read");
+        let cause = format!("holds data of type `{}`, and only PolyData is read", shown(&*kind));
         return Err(Fault::new(cause, SURFACE));
     }
     let packed = match &*value("compressor")? {
         "" => false,
         "vtkZLibDataCompressor" => true,
         other => {
-            let other: String = other.chars().take(40).collect();
-            let cause = format!("is packed by `{other}`, and only vtkZLibDataCompressor is read");
+            let cause =
+                format!("is packed by `{}`, and only vtkZLibDataCompressor is read", shown(other));
             return Err(Fault::new(cause, "save it with zlib, or uncompressed"));
         }
     };

@@ -82,6 +82,10 @@ impl<'b> Words<'b> {
 
 /// The fault of a word that is no number.
 pub(super) fn no_number(word: &[u8], what: &str) -> Fault {
-    let shown: String = String::from_utf8_lossy(word).chars().take(40).collect();
-    Fault::new(format!("`{shown}` is no number that fits: {what}"), EXPORT_AGAIN)
+    Fault::new(format!("`{}` is no number that fits: {what}", shown(word)), EXPORT_AGAIN)
+}
+
+/// The beginning of a text, for a message.
+pub(super) fn shown(text: impl AsRef<[u8]>) -> String {
+    String::from_utf8_lossy(text.as_ref()).chars().take(60).collect()
 }

@@ -10,19 +10,15 @@ use super::file::Transfer;
 use super::image::{Color, Image};
 use super::{Dicom, SAVE, VolumeError, bytes_of, source};
 use crate::volume::layout::{Axis, Layout};
-use crate::volume::voxels::{VoxelType, Voxels};
+use crate::volume::{Scalar, Voxels};
 
 /// Most bytes of pixels for a compressed byte, with a margin: a run of 128 is two bytes, a JPEG block of 64
 /// values two bits.
 const MAX_RATIO: usize = source::MAX_RATIO as usize;
 
 /// The voxels of these frames, one after another.
-pub(super) fn decode(
-    dicom: &Dicom,
-    image: &Image,
-    frames: &[usize],
-) -> Result<Voxels, VolumeError> {
-    let tag = if image.kind == VoxelType::F32 { FLOAT_PIXELS } else { PIXELS };
+pub(super) fn decode(dicom: &Dicom, image: &Image, frames: &[usize]) -> Result<Voxels, FileError> {
+    let tag = if image.kind == Scalar::F32 { FLOAT_PIXELS } else { PIXELS };
     let big = dicom.syntax == Transfer::Big;
     let mut voxels: Option<Voxels> = None;
     // A frame at a time: what is packed and what is not are never in memory together.
