@@ -9,13 +9,13 @@ use std::collections::BTreeMap;
 use glam::{DAffine3, DMat3, DVec3};
 use thiserror::Error;
 
+use crate::issue::FileError;
 use crate::probe::Kind;
 use crate::scene::Scene;
 use crate::sim::layout::Frame;
 use crate::sim::{SimError, Simulator};
 use crate::volume::{
-    Fan, Pose, ReconstructError, Reconstruction, Sequence, Settings, TrackedFrame, Voxels,
-    reconstruct,
+    Fan, Pose, Reconstruction, Sequence, Settings, TrackedFrame, Voxels, reconstruct,
 };
 
 mod sweep;
@@ -150,10 +150,7 @@ pub fn acquire(
 ///
 /// # Panics
 /// When the sequence lacks the poses that [`acquire`] writes.
-pub fn volume(
-    sequence: &Sequence,
-    mut settings: Settings,
-) -> Result<Reconstruction, ReconstructError> {
+pub fn volume(sequence: &Sequence, mut settings: Settings) -> Result<Reconstruction, FileError> {
     let pose = |frame: &TrackedFrame, name: &str| frame.poses[name].transform;
     let middle = &sequence.frames[sequence.frames.len() / 2];
     let world_from_middle = pose(middle, TRACKED);

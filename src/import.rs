@@ -16,7 +16,6 @@ use crate::volume::Frame;
 pub mod composed;
 pub mod device_set;
 mod draft;
-mod error;
 pub mod folder;
 pub mod grid;
 mod hull;
@@ -35,7 +34,6 @@ mod tests;
 pub mod trajectory;
 
 pub use draft::{Draft, Part, way};
-pub use error::ImportError;
 pub use labels::LabelMap;
 pub use pose::View;
 

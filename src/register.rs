@@ -7,7 +7,6 @@
 
 use glam::DAffine3;
 
-mod error;
 pub mod icp;
 pub mod landmarks;
 pub mod placement;
@@ -15,7 +14,6 @@ pub mod points;
 pub mod surface;
 mod symmetric;
 
-pub use error::RegisterError;
 pub use icp::{Fit, Residuals};
 pub use placement::Placement;
 pub use surface::TriangleSurface;

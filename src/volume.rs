@@ -8,11 +8,11 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
+use crate::issue::FileError;
 /// A finding on a volume that could be loaded.
 pub use crate::issue::Warning;
 
 mod dicom;
-mod error;
 mod fields;
 mod grid;
 mod header;
@@ -20,10 +20,11 @@ mod layout;
 mod meta;
 mod nifti;
 mod nrrd;
+pub mod plus;
 mod reconstruct;
 mod report;
-mod sequence;
 mod scalar;
+mod sequence;
 mod series;
 mod source;
 #[cfg(test)]
@@ -32,11 +33,10 @@ mod voxels;
 mod write;
 
 pub use dicom::segmentation::{DicomSegment, Segmentation};
-pub use error::{Place, VolumeError};
 pub use grid::Frame;
 pub use reconstruct::{
-    Compounding, Config, Fan, Filling, Interpolation, Lattice, ReconstructError, Reconstruction,
-    Settings, Transforms, frames_of_pose, reconstruct,
+    Compounding, Config, Fan, Filling, Interpolation, Lattice, Reconstruction, Settings,
+    Transforms, frames_of_pose, reconstruct,
 };
 pub use scalar::Scalar;
 pub use sequence::frames::matrix as transform;
@@ -115,7 +115,7 @@ impl Volume {
     ///
     /// # Errors
     /// A file, or a data file that it names, that is missing, cut off or wrong.
-    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), FileError> {
         let name = path.to_string_lossy().to_ascii_lowercase();
         let is = |ends: &[&str]| ends.iter().any(|e| name.ends_with(e));
         if is(&[".mha", ".mhd"]) {
@@ -127,7 +127,7 @@ impl Volume {
         } else if is(&[".dcm", ".dicom"]) {
             dicom::load(path)
         } else {
-            Err(VolumeError::file(
+            Err(FileError::file(
                 path,
                 "is no volume by its extension",
                 &format!("give a file of the kinds {KINDS}"),

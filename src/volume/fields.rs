@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::str::FromStr;
 
-use super::error::VolumeError;
+use crate::issue::FileError;
 
 /// One key and its value.
 pub(super) struct Field {
@@ -30,9 +30,9 @@ impl Fields<'_> {
     }
 
     /// The field of this key; an error where it is missing.
-    pub fn need(&self, key: &str) -> Result<&Field, VolumeError> {
+    pub fn need(&self, key: &str) -> Result<&Field, FileError> {
         self.find(&[key]).ok_or_else(|| {
-            VolumeError::file(
+            FileError::file(
                 self.path,
                 format!("the header lacks `{key}`"),
                 "add it or export the volume again",
@@ -41,14 +41,14 @@ impl Fields<'_> {
     }
 
     /// An error on the line of a field; the message follows its key and value.
-    pub fn error(&self, field: &Field, message: &str, remedy: &str) -> VolumeError {
+    pub fn error(&self, field: &Field, message: &str, remedy: &str) -> FileError {
         let value: String = field.value.chars().take(60).collect();
         let message = format!("`{}` is `{value}`: {message}", field.key);
-        VolumeError::line(self.path, field.line, message, remedy)
+        FileError::line(self.path, field.line, message, remedy)
     }
 
     /// The value as exactly `count` numbers.
-    pub fn numbers<T: FromStr>(&self, field: &Field, count: usize) -> Result<Vec<T>, VolumeError> {
+    pub fn numbers<T: FromStr>(&self, field: &Field, count: usize) -> Result<Vec<T>, FileError> {
         let words: Vec<_> = field.value.split_whitespace().collect();
         if words.len() != count {
             return Err(self.error(
@@ -66,12 +66,12 @@ impl Fields<'_> {
     }
 
     /// The value as one number.
-    pub fn number<T: FromStr>(&self, field: &Field) -> Result<T, VolumeError> {
+    pub fn number<T: FromStr>(&self, field: &Field) -> Result<T, FileError> {
         Ok(self.numbers(field, 1)?.remove(0))
     }
 
     /// Sizes along the axes, none of them zero.
-    pub fn sizes(&self, field: &Field, count: usize) -> Result<Vec<usize>, VolumeError> {
+    pub fn sizes(&self, field: &Field, count: usize) -> Result<Vec<usize>, FileError> {
         let sizes = self.numbers(field, count)?;
         if sizes.contains(&0) {
             return Err(self.error(
@@ -84,7 +84,7 @@ impl Fields<'_> {
     }
 
     /// Spacings along the axes, mm or the file's unit: finite and above zero.
-    pub fn spacings(&self, field: &Field, count: usize) -> Result<Vec<f64>, VolumeError> {
+    pub fn spacings(&self, field: &Field, count: usize) -> Result<Vec<f64>, FileError> {
         let spacings: Vec<f64> = self.numbers(field, count)?;
         if spacings.iter().all(|s| s.is_finite() && *s > 0.0) {
             return Ok(spacings);

@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::grid::Grid;
-use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::source::{Coding, MAX_BYTES, Payload, Skip};
 use super::voxels::{self, Voxels};
 use super::{Format, Statistics, Volume, Warning};
+use crate::issue::FileError;
 
 /// Most volumes over time: twice the largest count of an axis in NIfTI-1. Each takes memory beside its voxels.
 const MAX_VOLUMES: usize = 1 << 16;
@@ -47,9 +47,9 @@ impl Header {
     }
 
     /// Reads the voxels of all volumes; of several values per voxel the first.
-    pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
+    pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), FileError> {
         let world_from_voxel = self.grid.world_from_voxel().map_err(|cause| {
-            VolumeError::file(path, cause, "correct the direction or export it again")
+            FileError::file(path, cause, "correct the direction or export it again")
         })?;
         let total = self.bytes(path)?;
         let Decoded { mut volumes, rounded, more } = match self.is_streamed() {
@@ -112,7 +112,7 @@ impl Header {
     }
 
     /// Decodes the voxels block by block as they are read.
-    fn stream(&self, total: u64) -> Result<Decoded, VolumeError> {
+    fn stream(&self, total: u64) -> Result<Decoded, FileError> {
         let mut stream = self.payload.stream(total)?;
         let mut out = Decoded::default();
         let each = self.kind.bytes() * self.layout.channels;
@@ -141,7 +141,7 @@ impl Header {
     }
 
     /// Reads all bytes, then decodes them.
-    fn decode(&self, total: u64) -> Result<Decoded, VolumeError> {
+    fn decode(&self, total: u64) -> Result<Decoded, FileError> {
         let text = self.payload.coding == Coding::Text;
         let (bytes, more) = match text {
             true => voxels::parse_text(&self.payload, self.kind, total / self.kind.bytes() as u64)?,
@@ -159,10 +159,10 @@ impl Header {
     }
 
     /// Size in bytes of all values in the file; an error where that, or the size in memory, is too large.
-    fn bytes(&self, path: &Path) -> Result<u64, VolumeError> {
+    fn bytes(&self, path: &Path) -> Result<u64, FileError> {
         let layout = &self.layout;
         if layout.volumes > MAX_VOLUMES {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 format!("{} volumes over time are more than {MAX_VOLUMES}", layout.volumes),
                 "correct the sizes in the header, or leave out some",
@@ -180,7 +180,7 @@ impl Header {
         let total = total.filter(|_| peak.is_some_and(|peak| peak <= MAX_BYTES));
         total.ok_or_else(|| {
             let [x, y, z] = layout.size;
-            VolumeError::file(
+            FileError::file(
                 path,
                 format!(
                     "{x} x {y} x {z} voxels of {} values, {} times, are more than {} GB",

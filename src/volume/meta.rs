@@ -3,15 +3,15 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
-use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::sequence::{self, frames};
 use super::source::{self, Coding, Line, Lines, Payload, Skip};
 use super::{Format, Warning};
+use crate::issue::FileError;
 
 /// Most axes that are read. MetaIO takes ten.
 const MAX_AXES: usize = 10;
@@ -53,7 +53,7 @@ const KNOWN: [&str; 29] = [
     "TransformType",
 ];
 
-pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let (fields, data) = fields(path)?;
     let mut out = of_fields(&fields, data)?;
     let keys = unused_keys(&fields);
@@ -67,7 +67,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
 }
 
 /// The header made of these fields; the voxels follow byte `data` if they are in the same file.
-pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeError> {
+pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, FileError> {
     if let Some(object) = fields.find(&["ObjectType"])
         && !object.value.eq_ignore_ascii_case("Image")
     {
@@ -116,7 +116,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
 }
 
 /// Fields up to the one with the place of the voxels, and the byte after it.
-pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
+pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), FileError> {
     let mut lines = Lines::of(path)?;
     let mut list = Vec::new();
     while let Some(Line { number, text, end }) = lines.next()? {
@@ -124,7 +124,7 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
             continue;
         }
         let Some((key, value)) = text.split_once('=') else {
-            return Err(VolumeError::line(
+            return Err(FileError::line(
                 path,
                 number,
                 "is not of the form `Key = value`",
@@ -138,7 +138,7 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
             return Ok((Fields { path, list }, end));
         }
     }
-    Err(VolumeError::file(
+    Err(FileError::file(
         path,
         "the header does not end: ElementDataFile is missing",
         "export or copy it again",
@@ -172,7 +172,7 @@ fn kind(fields: &Fields) -> Result<Scalar, FileError> {
     found.ok_or_else(|| fields.error(field, "this type cannot be read", remedy))
 }
 
-fn unit(fields: &Fields) -> Result<f64, VolumeError> {
+fn unit(fields: &Fields) -> Result<f64, FileError> {
     let Some(field) = fields.find(&["DistanceUnits"]) else {
         return Ok(1.0);
     };
@@ -184,7 +184,7 @@ fn unit(fields: &Fields) -> Result<f64, VolumeError> {
     }
 }
 
-fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
+fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
     let place = fields.need("ElementDataFile")?;
     let local = place.value.eq_ignore_ascii_case("LOCAL");
     if place.value.starts_with("LIST") || place.value.contains('%') {

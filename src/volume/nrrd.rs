@@ -4,12 +4,11 @@
 use std::path::Path;
 
 use super::Format;
-use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::Frame;
 use super::header::{Header, unused};
-use super::scalar::Scalar;
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::source::{self, Coding, Line, Lines, Payload, Skip};
 use crate::issue::FileError;
 
@@ -54,7 +53,7 @@ const KNOWN: [&str; 32] = [
     "centerings",
 ];
 
-pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let (fields, pairs, data) = fields(path)?;
     let dimension = fields.need("dimension")?;
     let n: usize = fields.number(dimension)?;
@@ -86,7 +85,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
         },
         None if kind.bytes() == 1 || payload.coding == Coding::Text => false,
         None => {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "the header lacks `endian`",
                 "add `endian: little` or `endian: big`",
@@ -125,7 +124,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
 }
 
 /// Fields, the keys of key/value pairs, and the byte after the empty line that ends the header.
-fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), VolumeError> {
+fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), FileError> {
     let mut lines = Lines::of(path)?;
     let (mut list, mut pairs, mut at) = (Vec::new(), Vec::new(), 0);
     while let Some(Line { number, text, end }) = lines.next()? {
@@ -134,7 +133,7 @@ fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), VolumeError> {
         if number == 1 {
             let version = text.strip_prefix("NRRD").filter(|v| v.len() == 4);
             if version.and_then(|v| v.parse::<u32>().ok()).is_none_or(|v| v > 5) {
-                return Err(VolumeError::line(
+                return Err(FileError::line(
                     path,
                     1,
                     "does not begin with NRRD and a version up to 0005",
@@ -156,7 +155,7 @@ fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), VolumeError> {
                 value: value.trim().to_owned(),
             });
         } else {
-            return Err(VolumeError::line(
+            return Err(FileError::line(
                 path,
                 number,
                 "is neither `field: value` nor `key:=value`, and no empty line ended the header",
@@ -190,7 +189,7 @@ fn kind(fields: &Fields) -> Result<Scalar, FileError> {
     })
 }
 
-fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
+fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
     let encoding = fields.need("encoding")?;
     let coding = match encoding.value.to_ascii_lowercase().as_str() {
         "raw" => Coding::Raw,

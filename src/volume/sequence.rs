@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::reconstruct::fan;
 use super::{Voxels, Warning, meta};
+use crate::issue::FileError;
 
 pub(super) mod frames;
 mod summary;
@@ -48,10 +48,10 @@ impl Sequence {
     ///
     /// # Errors
     /// Those of a volume; malformed entries of frames; a frame that is a volume itself.
-    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), FileError> {
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         if !["mha", "mhd"].contains(&extension.to_ascii_lowercase().as_str()) {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "is no MetaImage by its extension, in which tracked sequences are read",
                 "save it as .igs.mha (3D Slicer and PLUS do)",
@@ -111,7 +111,7 @@ impl Sequence {
     ///
     /// # Panics
     /// When the pixels are not those of so many frames, or an entry would break the header.
-    pub fn write(&self, path: &Path) -> Result<(), VolumeError> {
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
         let [width, height] = self.size;
         let count = self.frames.len();
         assert_eq!(self.pixels.len(), width * height * count, "pixels");

@@ -3,9 +3,8 @@
 use std::collections::TryReserveError;
 use std::io::{BufReader, Read};
 
-use super::error::VolumeError;
-use super::scalar::Scalar;
 use super::layout::Layout;
+use super::scalar::Scalar;
 use super::source::Payload;
 use crate::issue::FileError;
 
@@ -213,14 +212,14 @@ pub(super) fn parse_text(
     payload: &Payload,
     kind: Scalar,
     total: u64,
-) -> Result<(Vec<u8>, bool), VolumeError> {
+) -> Result<(Vec<u8>, bool), FileError> {
     let mut bytes = BufReader::new(payload.stream(total)?).bytes();
     let (mut out, mut count, mut at) = (Vec::new(), 0, payload.offset);
     let mut word = String::new();
     loop {
         let byte = bytes.next().transpose();
         let byte = byte.map_err(|e| {
-            VolumeError::byte(&payload.file, at, format!("cannot be read: {e}"), "copy it again")
+            FileError::byte(&payload.file, at, format!("cannot be read: {e}"), "copy it again")
         })?;
         at += 1;
         let separator = byte.is_none_or(|b| b.is_ascii_whitespace() || b == b',');
@@ -242,7 +241,7 @@ pub(super) fn parse_text(
         }
     }
     if count < total {
-        return Err(VolumeError::byte(
+        return Err(FileError::byte(
             &payload.file,
             at,
             format!("is cut off: {count} of {total} numbers are there"),

@@ -56,9 +56,9 @@ impl Header {
         mut self,
         path: &Path,
         volumes: impl IntoIterator<Item = &'v Voxels>,
-    ) -> Result<(), VolumeError> {
+    ) -> Result<(), FileError> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("mha")) {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "is not written: only MetaImage in one file is",
                 "end the name in .mha",
@@ -77,7 +77,7 @@ impl Header {
             file.write_all(&data)
         };
         write().map_err(|e| {
-            VolumeError::file(
+            FileError::file(
                 path,
                 format!("cannot be written: {e}"),
                 "check the folder, its permissions and its free space",
@@ -94,7 +94,7 @@ impl Header {
 ///
 /// # Panics
 /// When several volumes have no interval, which the file has to state.
-pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
+pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), FileError> {
     let [x, y, z] = volume.size;
     assert_eq!(volume.voxels.len(), x * y * z, "voxels");
     let mut size = vec![x, y, z];

@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
+use insonify::issue::FileError;
 use insonify::output;
 use insonify::register::landmarks::Landmark;
+use insonify::register::points;
 use insonify::register::surface::{Triangle, TriangleSurface, samples};
-use insonify::register::{RegisterError, points};
 use insonify::scene::graph::{Placed, is_even};
 use insonify::scene::{Acquired, Mesh, Scene, mesh};
 use insonify::settings::suggest;
@@ -169,7 +170,7 @@ fn mesh_file(path: &Path) -> Result<Mesh> {
     let (mesh, issues) = mesh::load(path, &mesh::Options::default()).map_err(|issues| {
         let first = issues.into_iter().find(insonify::scene::Issue::is_error);
         let (message, remedy) = first.map_or_else(Default::default, |i| (i.message, i.remedy));
-        Report::from(RegisterError { file: Some(path.to_owned()), line: 0, cause: message, remedy })
+        Report::from(FileError::file(path, message, remedy))
     })?;
     for issue in issues {
         output::note(issue);

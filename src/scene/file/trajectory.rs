@@ -9,6 +9,7 @@ use toml::Spanned;
 
 use super::error::SceneError;
 use super::motion::SQUEEZE;
+use crate::issue;
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
 use crate::settings::suggest;
 
@@ -38,15 +39,7 @@ struct Table<'t> {
 
 /// Text of the file at `path`, or the reason why it cannot be read.
 pub(super) fn text(path: &Path) -> Result<String, String> {
-    let info = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
-    if !info.is_file() {
-        return Err("is not a regular file".to_owned());
-    }
-    if info.len() > MAX_TEXT {
-        let (size, most) = (info.len() >> 20, MAX_TEXT >> 20);
-        return Err(format!("is {size} MB, the limit is {most} MB"));
-    }
-    std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"))
+    issue::read_text(path, MAX_TEXT, "").map_err(|e| e.message)
 }
 
 /// The samples of the probe's trajectory in the file at `path`, linear between them: TOML by its extension, else

@@ -40,7 +40,7 @@ impl Image {
         self.color != Color::Grey
     }
 
-    pub fn of(dicom: &Dicom) -> Result<Self, VolumeError> {
+    pub fn of(dicom: &Dicom) -> Result<Self, FileError> {
         let elements = dicom.elements();
         let root = &dicom.root;
         let number = |element: u16, name: &str| {
@@ -117,7 +117,7 @@ impl Image {
     }
 }
 
-fn scale(dicom: &Dicom) -> Result<Option<(f64, f64)>, VolumeError> {
+fn scale(dicom: &Dicom) -> Result<Option<(f64, f64)>, FileError> {
     let shared = first(&dicom.root, super::elements::SHARED);
     let item = shared.and_then(|s| first(s, VALUES)).unwrap_or(&dicom.root);
     let elements = dicom.elements();

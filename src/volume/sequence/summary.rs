@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::frames;
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::meta;
 
 /// Frames, poses and times of a sequence.
@@ -24,7 +24,7 @@ impl Summary {
     ///
     /// # Errors
     /// A wrong header.
-    pub fn read(path: &Path) -> Result<Option<Self>, VolumeError> {
+    pub fn read(path: &Path) -> Result<Option<Self>, FileError> {
         let (fields, data) = meta::fields(path)?;
         if !frames::in_header(&fields) {
             return Ok(None);

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::frames::{self, TrackedFrame};
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::fields::{Field, Fields};
 use crate::volume::meta;
 use crate::volume::source::{self, MAX_HEADER};
@@ -13,7 +13,7 @@ use crate::volume::source::{self, MAX_HEADER};
 ///
 /// # Errors
 /// A header that cannot be read, or describes no frame.
-pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, VolumeError> {
+pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, FileError> {
     let name = path.to_string_lossy().to_ascii_lowercase();
     let fields = match name.ends_with(".nrrd") || name.ends_with(".nhdr") {
         true => pairs(path)?,
@@ -21,7 +21,7 @@ pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, VolumeError> {
     };
     let found = frames::parse(&fields, usize::MAX)?;
     if found.is_empty() {
-        return Err(VolumeError::file(
+        return Err(FileError::file(
             path,
             "describes no frame of a tracked sequence",
             "give a file with entries such as Seq_Frame0000_ProbeToTrackerTransform",
@@ -31,7 +31,7 @@ pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, VolumeError> {
 }
 
 /// The key/value pairs of a NRRD header as fields.
-fn pairs(path: &Path) -> Result<Fields<'_>, VolumeError> {
+fn pairs(path: &Path) -> Result<Fields<'_>, FileError> {
     let bytes = source::prefix(path, MAX_HEADER)?;
     let lines = bytes.split(|&b| b == b'\n').map(String::from_utf8_lossy);
     let mut list = Vec::new();
