@@ -19,7 +19,7 @@ pub use placement::Placement;
 pub use surface::TriangleSurface;
 
 /// Degrees of freedom of a registration. Neither mirrors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Transformation {
     /// Rotation and shift.
     Rigid,

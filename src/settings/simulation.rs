@@ -183,13 +183,13 @@ group! {
 }
 
 /// A preset of quality: the work per frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Quality {
-    /// Fast, for trying things out.
+    /// A first look. Software driver: 2 paths, 5 scatterers per resolution cell. GPU: 8 paths, 8 scatterers.
     Draft,
-    /// The best that the machine computes in reasonable time.
+    /// Software driver: 8 paths, 8 scatterers per resolution cell. GPU: 32 paths, 16 scatterers.
     Standard,
-    /// A proof, on any machine: many paths, a fine lattice, the whole slice.
+    /// A proof, on any device: 128 paths, lattice cells 2/3 as long, no scatterer left out.
     Reference,
 }
 

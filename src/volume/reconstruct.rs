@@ -21,7 +21,7 @@ pub use grid::Lattice;
 pub use poses::{Transforms, names as frames_of_pose};
 
 /// Distribution of a pixel over voxels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Interpolation {
     /// To the voxel at its place.
     Nearest,
@@ -30,7 +30,7 @@ pub enum Interpolation {
 }
 
 /// Value of a voxel that several pixels reach.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Compounding {
     /// Their mean, by the weights of the interpolation.
     Mean,
