@@ -9,7 +9,7 @@ use egui::{
 use super::captures::Format;
 use super::engine::Frame;
 use super::model::{Cine, Model};
-use super::style;
+use super::style::{self, button};
 use super::tools::Tools;
 
 /// Height of the bar, points.
@@ -46,13 +46,13 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
         true => ("⏸", "Stop the loop (Enter)"),
         false => ("▶", "Play the loop (Enter)"),
     };
-    if ui.button(word).on_hover_text(tip).clicked() {
+    if button(ui, word, tip) {
         cine.play(!cine.is_playing(), now);
     }
-    if ui.button("<").on_hover_text("One image back (,)").clicked() {
+    if button(ui, "<", "One image back (,)") {
         cine.step(-1);
     }
-    if ui.button(">").on_hover_text("One image on (.)").clicked() {
+    if button(ui, ">", "One image on (.)") {
         cine.step(1);
     }
     let is_wide = ui.available_width() > WIDE;
@@ -61,12 +61,10 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
             choose(ui, format);
             speed(ui, cine, now);
             let here = cine.cursor();
-            let tip = "The loop that plays and is saved ends with this image";
-            if ui.button("End").on_hover_text(tip).clicked() {
+            if button(ui, "End", "The loop that plays and is saved ends with this image") {
                 cine.mark_last(here);
             }
-            let tip = "The loop that plays and is saved begins with this image";
-            if ui.button("Start").on_hover_text(tip).clicked() {
+            if button(ui, "Start", "The loop that plays and is saved begins with this image") {
                 cine.mark_first(here);
             }
         }

@@ -4,7 +4,7 @@ use std::panic::PanicHookInfo;
 use std::sync::Arc;
 use std::thread;
 
-use egui::{Align2, Label, RichText, ScrollArea, Ui};
+use egui::{Label, RichText, ScrollArea, Ui};
 use parking_lot::Mutex;
 
 use super::model::Model;
@@ -127,24 +127,20 @@ pub(super) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State) {
     if deaths.is_empty() {
         return;
     }
-    egui::Window::new("The program has a bug")
-        .anchor(Align2::CENTER_TOP, [0.0, 64.0])
-        .resizable(false)
-        .collapsible(false)
-        .show(ctx, |ui| {
-            ui.set_width(WIDTH);
-            ui.horizontal(|ui| buttons(ui, model, state));
-            ui.label(
-                "Please report it: the copied text names version, device, scene and what was said.",
-            );
-            ScrollArea::vertical().max_height(HEIGHT).show(ui, |ui| {
-                for death in &deaths {
-                    let text = format!("The thread '{}' died: {}", death.thread, death.said);
-                    ui.add(Label::new(RichText::new(text).color(style::WARN)).wrap());
-                    ui.label(death.remedy(state.stopped));
-                }
-            });
+    style::window("The program has a bug", 64.0).show(ctx, |ui| {
+        ui.set_width(WIDTH);
+        ui.horizontal(|ui| buttons(ui, model, state));
+        ui.label(
+            "Please report it: the copied text names version, device, scene and what was said.",
+        );
+        ScrollArea::vertical().max_height(HEIGHT).show(ui, |ui| {
+            for death in &deaths {
+                let text = format!("The thread '{}' died: {}", death.thread, death.said);
+                ui.add(Label::new(RichText::new(text).color(style::WARN)).wrap());
+                ui.label(death.remedy(state.stopped));
+            }
         });
+    });
 }
 
 fn buttons(ui: &mut Ui, model: &mut Model, state: &mut State) {

@@ -10,7 +10,7 @@ use parking_lot::Mutex;
 use winit::event_loop::EventLoopProxy;
 
 use super::session::Wake;
-use crate::gpu::{Device, GpuError, Image};
+use crate::gpu::{GpuError, Image};
 use crate::igtl::{IgtlError, Picture, Server, ServerSettings, Status, TrackerState};
 use crate::scene::Tracker;
 use crate::sim::layout;
@@ -99,13 +99,12 @@ impl Link {
 /// The last picture of the simulation, for clients.
 pub(super) struct Broadcast {
     link: Link,
-    device: Arc<Device>,
     last: Option<(Image, layout::Frame, DAffine3)>,
 }
 
 impl Broadcast {
-    pub(super) fn new(link: Link, device: &Arc<Device>) -> Self {
-        Self { link, device: device.clone(), last: None }
+    pub(super) fn new(link: Link) -> Self {
+        Self { link, last: None }
     }
 
     /// Offers a finished picture, with its pixels where they have been read, its constants and its pose.
@@ -120,14 +119,9 @@ impl Broadcast {
         self.send(rgba)
     }
 
-    /// Offers the last picture again, for a client that has just come.
-    pub(super) fn again(&self) -> Result<(), GpuError> {
-        self.send(None)
-    }
-
-    /// Sends the last picture. It is copied to the host only where there is a client; the server decides
-    /// which client takes it and when.
-    fn send(&self, rgba: Option<&[u8]>) -> Result<(), GpuError> {
+    /// Sends the last picture, also for a client that has just come. It is copied to the host only where there is a
+    /// client; the server decides which client takes it and when.
+    pub(super) fn send(&self, rgba: Option<&[u8]>) -> Result<(), GpuError> {
         let Some((image, constants, pose)) = &self.last else {
             return Ok(());
         };
@@ -144,7 +138,7 @@ impl Broadcast {
         }
         let picture = match rgba {
             Some(rgba) => Picture::new(constants, rgba),
-            None => Picture::new(constants, &self.device.read_back_image(image)?),
+            None => Picture::new(constants, &image.read_back()?),
         };
         if let Some(server) = &*self.link.0.lock() {
             server.publish(picture, pose);

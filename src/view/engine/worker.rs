@@ -76,7 +76,7 @@ impl Worker {
         Self {
             shared,
             ring: Ring::new(device, "B-mode"),
-            broadcast: Broadcast::new(link, device),
+            broadcast: Broadcast::new(link),
             pictures: Ring::new(device, "view3d"),
             device: device.clone(),
             library,
@@ -222,7 +222,7 @@ impl Worker {
             if std::mem::take(&mut state.resend) {
                 drop(state);
                 // An error of the device will be told by the next frame.
-                let _ = self.broadcast.again();
+                let _ = self.broadcast.send(None);
                 state = self.shared.state.lock();
                 continue;
             }
