@@ -9,21 +9,32 @@
 struct Slope {
     vec3 geometric;     // of the triangle
     vec3 shading;       // interpolated from the vertices
-    vec3 refracting;    // averaged over the wavefront; in geometric acoustics that of `shading`
+    vec3 refracting;    // of the mean slope over the wavefront; in geometric acoustics that of `shading`
     float width;        // deviation of the sine of incidence over the beam
 };
 
-// Normals of the triangle's corners as the vertices have them, averaged over x times the finest scale of their averages;
-// between two scales they are mixed, below the finest with the vertices' own.
-void average(inout vec3 n[3], vec3 own[3], uvec4 averages[3], float x) {
+// Normals of the triangle's corners, with their coherence, as the vertices have them averaged over x times the finest
+// scale of their averages; between two scales they are mixed, below the finest with the vertices' own.
+void average(inout vec4 n[3], vec3 own[3], uvec4 averages[3], float x) {
     uint level = uint(x >= 1.0) + uint(x >= 2.0) + uint(x >= 4.0);
     float below = mix(0.0, float(1u << level) * 0.5, level > 0u);
     float share = min((x - below) / max(below, 1.0), 1.0);
     [[dont_unroll]] for (uint i = 0u; i < 3u; ++i) {
-        vec3 coarse = unpack_direction(averages[i][level]);
-        vec3 fine = mix(unpack_direction(averages[i][max(level, 1u) - 1u]), own[i], bvec3(level == 0u));
+        vec4 coarse = unpack_mean(averages[i][level]);
+        vec4 fine = mix(unpack_mean(averages[i][max(level, 1u) - 1u]), vec4(own[i], 1.0), bvec4(level == 0u));
         n[i] = mix(fine, coarse, share);
     }
+}
+
+// Mean slope, as a normal, of what a wavefront along d meets where the surface's normals average to n with a coherence
+// below 1: the area reaches around a rim. What faces d less what is turned away is the mean's part along d. As much of
+// the wavefront as is turned away passes the body by, and keeps its direction.
+vec3 partly_turned(vec3 n, float coherence, vec3 d) {
+    float facing = -dot(n, d);
+    vec3 across = coherence * (n + facing * d);
+    float whole = sqrt(max(1.0 - dot(across, across), 1e-6));
+    float met = max(whole + coherence * facing, 0.0) / 2.0;
+    return normalize(met * across - whole * whole * d);
 }
 
 // `row` is that of the path's time; `spread` the variance that the path has across, mm^2.
@@ -38,26 +49,31 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
     bool turned = !(dot(path.direction, slope.shading) < 0.0);
     slope.shading = mix(slope.shading, slope.geometric, bvec3(turned));
 
-    vec3 own[3], n[3];
+    vec3 own[3];
+    vec4 n[3];
     uvec4 averages[3];
     [[dont_unroll]] for (uint i = 0u; i < 3u; ++i) {
         uint vertex = triangles[3u * hit.primitive + i];
         averages[i] = smoothed[vertex];
         own[i] = vec3(normals[3u * vertex], normals[3u * vertex + 1u], normals[3u * vertex + 2u]);
-        n[i] = own[i];
+        n[i] = vec4(own[i], 1.0);
     }
     slope.refracting = slope.shading;
     if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
         float sigma = rows[row].sigma_wavefront;
         float x = sqrt(sigma * sigma + spread) / instances[hit.instance].finest;
         // What the wavefront covers of the surface is longer the more it is inclined, which the first turn tells.
-        float inclined = 1.0;
+        float inclined = 1.0, coherence = 1.0;
         [[dont_unroll]] for (uint i = 0u; i < 2u; ++i) {
             average(n, own, averages, x / inclined);
-            slope.refracting = side * surface_to_world(hit.instance,
-                (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2]);
+            vec4 mean = (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2];
+            coherence = mean.w;
+            slope.refracting = side * surface_to_world(hit.instance, mean.xyz);
             inclined = max(-dot(path.direction, slope.refracting), LEAST_FACING);
         }
+        // Rounding alone makes less than 1 of coherences that are 1 at all corners.
+        vec3 turned = partly_turned(slope.refracting, coherence, path.direction);
+        slope.refracting = mix(turned, slope.refracting, bvec3(coherence > 0.99999));
     }
 
     slope.width = 0.0;
@@ -66,7 +82,8 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
         float cos_i = -dot(path.direction, slope.refracting);
         // In the plane of incidence; at normal incidence along the image.
         vec3 along = path.direction + cos_i * slope.refracting + 0.01 * path.lateral;
-        float curved = surface_curvature(hit, along, n) * sqrt(lateral * lateral + spread);
+        vec3 corners[3] = { n[0].xyz, n[1].xyz, n[2].xyz };
+        float curved = surface_curvature(hit, along, corners) * sqrt(lateral * lateral + spread);
         // The slope that was averaged away, as roughness.
         float rough = dot(normalize(along), slope.shading - slope.refracting);
         slope.width = sqrt(curved * curved + rough * rough);
@@ -84,7 +101,7 @@ float reflectance_at(Slope slope, vec3 direction, Medium t1, Medium t2) {
 bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2) {
     vec3 d = path.direction;
     if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
-        // Where the mean surface is edge on or seen from behind, as at the side of a bump, nothing is refracted.
+        // Seen from behind, as a facet at the side of a bump may be, nothing is refracted.
         if (dot(d, n) < 0.0 && !refraction(path.direction, n, c1, c2, d)) return false;
         // A path that would leave through the triangle again runs along it.
         float rise = dot(d, n_geometric) + LEAST_DESCENT;

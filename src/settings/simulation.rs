@@ -114,10 +114,10 @@ group! {
         /// acoustics.
         beam_footprint: bool = true,
             Facts::switch().under("Paths").label("Footprint");
-        /// `"ray"`: a surface refracts by its slope where the ray meets it, geometric acoustics. `"beam"`: by its mean
-        /// slope over the width of the wavefront that forms the image behind it, as wide as the aperture near the face,
-        /// so that bumps smaller than that do not steer: for segmented anatomy. At thin edges it may tear what is smooth.
-        refraction: Refraction = Refraction::Ray,
+        /// `"beam"`: a surface refracts by its mean slope over the width of the wavefront that forms the image behind it,
+        /// as wide as the aperture near the face, so that bumps and edges smaller than that do not steer. `"ray"`: by
+        /// its slope where the ray meets it, geometric acoustics.
+        refraction: Refraction = Refraction::Beam,
             Facts::word::<Refraction>().under("Paths").label("Refraction");
         /// Standard deviation of the paths' lateral start about the scanline.
         origin_jitter: f64 = 0.0,

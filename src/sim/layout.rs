@@ -257,7 +257,8 @@ shared! {
 pub const SUM: u32 = 0;
 /// `interpolate` scales the sum to length 1, as of normals.
 pub const UNIT: u32 = 1;
-/// `interpolate` reads and writes vectors of length 1, each in a word ([`crate::scene::smoothed::pack`]).
+/// `interpolate` reads and writes vectors of length 1 with their coherence, each in a word
+/// ([`crate::scene::smoothed::pack`]).
 pub const PACKED: u32 = 2;
 
 /// Push constants of `interpolate`: a weighted sum of vectors of keyframes. All places are counted in vectors

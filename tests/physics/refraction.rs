@@ -4,6 +4,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 use glam::{DAffine3, DVec3};
 use insonify::scene::{Instance, Keyframes, Mesh, Scene, Tissue};
+use insonify::settings::Refraction;
 use insonify_tools::reference::Segment;
 
 use crate::check::{Bench, Check, Curve, Outcome, Physics, Picture, Plot};
@@ -60,10 +61,11 @@ fn cylinder(lines: u32, [from, to]: [f64; 2], around: Tissue, inside: Tissue) ->
     scene
 }
 
-/// A scene for rays only: a point far away makes paths leave segments in silence.
+/// A scene for rays only, of geometric acoustics: a point far away makes paths leave segments in silence.
 pub fn rays(lines: u32, between: [f64; 2], inside: f64) -> Scene {
     let (a, b) = (silent(AROUND, 1.6, 0.0), silent(inside, 1.55, 0.0));
     let mut scene = cylinder(lines, between, a, b);
+    scene.simulation.refraction = Refraction::Ray;
     scene.probe.samples = 64;
     add_point(&mut scene, [0.0, 500.0, 10.0], 1.0);
     scene

@@ -3,6 +3,7 @@
 use super::inputs::Random;
 use super::{Case, Check, Extent, Input, Job, Size, Subject};
 use crate::reference::interpolate;
+use glam::DVec4;
 use insonify::scene::smoothed::pack;
 use insonify::sim::layout::{Interpolation, PACKED, SUM, UNIT};
 
@@ -11,7 +12,7 @@ pub const SUBJECT: Subject = Subject {
     pass: None,
     tolerance: "5e-7 of the sum of the magnitudes that are added (four products and three sums, each \
                 rounded by 6e-8), over the length that a unit vector had, and 5e-7 for its root and \
-                quotient; packed directions within 6e-5, what their words round",
+                quotient; packed directions within 5e-4 and coherences within 0.009, what their words round",
     job,
     size: |job, _| {
         let push = push(job);
@@ -64,7 +65,10 @@ fn job(case: Case, size: Size) -> Job {
         Case::Odd => {
             let mut random = Random(32);
             values = (0..5 * count)
-                .map(|_| f32::from_bits(pack([(); 3].map(|()| random.within(-1.0, 1.0)).into())))
+                .map(|_| {
+                    let direction = [(); 3].map(|()| random.within(-1.0, 1.0));
+                    f32::from_bits(pack(direction.into(), random.within(0.0, 1.0)))
+                })
                 .collect();
             push.kind = PACKED;
             push.sources = [1, count, 1 << 28, u32::MAX];
@@ -95,10 +99,10 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let before: Vec<f32> = job.get("values");
     let after: Vec<f32> = job.after(outputs, "values");
     let expected = interpolate::interpolate(&push, &before);
-    let expected: Vec<f64> = expected.iter().flat_map(|v| v.to_array()).collect();
     if push.kind == PACKED {
         return packed(&push, &before, &after, &expected);
     }
+    let expected: Vec<f64> = expected.iter().flat_map(|v| v.truncate().to_array()).collect();
     let stride = push.stride as usize;
     let first = stride * push.target as usize;
     let written: Vec<usize> =
@@ -117,7 +121,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
         if push.kind == SUM {
             return 5e-7 * magnitude(i);
         }
-        let length = sums[i / 3].length().max(f64::MIN_POSITIVE);
+        let length = sums[i / 3].truncate().length().max(f64::MIN_POSITIVE);
         let vector = 3 * (i / 3);
         let all = (vector..vector + 3).map(magnitude).sum::<f64>();
         5e-7 * (1.0 + all / length)
@@ -134,19 +138,22 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     ]
 }
 
-/// The same of packed vectors: their words round directions to 5e-5 rad.
-fn packed(push: &Interpolation, before: &[f32], after: &[f32], expected: &[f64]) -> Vec<Check> {
+/// The same of packed vectors, as the twin unpacks them: their words round directions to 5e-4 rad, coherences to 1/126.
+fn packed(push: &Interpolation, before: &[f32], after: &[f32], expected: &[DVec4]) -> Vec<Check> {
     let target = push.target as usize;
     let end = target + push.count as usize;
-    // Unpacked by the twin.
     let alone = Interpolation { sources: [push.target; 4], weights: [1.0, 0.0, 0.0, 0.0], ..*push };
-    let made: Vec<f32> = (interpolate::interpolate(&alone, after).iter())
-        .flat_map(|v| v.as_vec3().to_array())
-        .collect();
+    let made = interpolate::interpolate(&alone, after);
+    let directions = |means: &[DVec4]| -> Vec<f64> {
+        means.iter().flat_map(|v| v.truncate().to_array()).collect()
+    };
+    let coherences = |means: &[DVec4]| -> Vec<f64> { means.iter().map(|v| v.w).collect() };
+    let single = |values: Vec<f64>| -> Vec<f32> { values.into_iter().map(|v| v as f32).collect() };
     let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<u32>>();
     let rest = |values: &[f32]| [bits(&values[..target]), bits(&values[end..])];
     vec![
-        Check::close("directions", &made, expected, |_| 6e-5),
+        Check::close("directions", &single(directions(&made)), &directions(expected), |_| 5e-4),
+        Check::close("coherences", &single(coherences(&made)), &coherences(expected), |_| 0.009),
         Check::equal("everything else", &rest(after), &rest(before)),
     ]
 }

@@ -17,36 +17,50 @@ pub(super) struct Slope {
     pub(super) geometric: DVec3,
     /// Normal interpolated from the vertices.
     pub(super) shading: DVec3,
-    /// Normal averaged over the wavefront; in geometric acoustics equal to `shading`.
+    /// Normal of the mean slope over the wavefront; in geometric acoustics equal to `shading`.
     pub(super) refracting: DVec3,
     /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
     pub(super) width: f64,
 }
 
-/// A unit vector from its projection onto an octahedron.
-pub(super) fn unpacked(word: u32) -> DVec3 {
-    let part = |half: u32| (f64::from(half as u16 as i16) / 32_767.0).max(-1.0);
-    let (x, y) = (part(word & 0xffff), part(word >> 16));
+/// A unit vector from its projection onto an octahedron, and its coherence.
+pub(super) fn unpacked(word: u32) -> (DVec3, f64) {
+    let part = |from: u32| (f64::from((word << (19 - from)) as i32 >> 19) / 4095.0).max(-1.0);
+    let (x, y) = (part(0), part(13));
     let z = 1.0 - x.abs() - y.abs();
     let fold = |a: f64| if a >= 0.0 { z.min(0.0) } else { -z.min(0.0) };
-    DVec3::new(x + fold(x), y + fold(y), z).normalize()
+    (DVec3::new(x + fold(x), y + fold(y), z).normalize(), f64::from(word >> 26) / 63.0)
+}
+
+/// Mean slope, as a normal, of what a wavefront along `d` meets where the surface's normals average to `n` with a
+/// `coherence` below 1: the area reaches around a rim. What faces `d` less what is turned away is the mean's part
+/// along `d`. As much of the wavefront as is turned away passes the body by, and keeps its direction.
+fn partly_turned(n: DVec3, coherence: f64, d: DVec3) -> DVec3 {
+    let facing = -n.dot(d);
+    let across = coherence * (n + facing * d);
+    let whole = (1.0 - across.length_squared()).max(1e-6).sqrt();
+    let met = (whole + coherence * facing).max(0.0) / 2.0;
+    (met * across - whole * whole * d).normalize()
 }
 
 impl World<'_> {
-    /// Normals at the corners of the triangle, averaged over a deviation of `width` mm; object space, any length.
-    /// Between two scales they are mixed, below the finest with the vertices' own.
-    fn averaged(&self, crossing: &Crossing, width: f64) -> [DVec3; 3] {
+    /// Normals at the corners of the triangle, averaged over a deviation of `width` mm; object space, any length; and
+    /// their coherences. Between two scales they are mixed, below the finest with the vertices' own.
+    fn averaged(&self, crossing: &Crossing, width: f64) -> ([DVec3; 3], [f64; 3]) {
         let own = self.corner_normals(crossing);
         let finest = f64::from(self.instances[crossing.instance as usize].finest);
         let corners = self.geometry.triangles[crossing.triangle];
-        std::array::from_fn(|i| {
+        let at = |i: usize| {
             let averages = self.geometry.smoothed[corners[i] as usize].map(unpacked);
             let scales = [0.0, finest, 2.0 * finest, 4.0 * finest, 8.0 * finest];
-            let normals = [own[i], averages[0], averages[1], averages[2], averages[3]];
+            let means = [(own[i], 1.0), averages[0], averages[1], averages[2], averages[3]];
             let above = scales[1..4].iter().take_while(|&&s| width >= s).count();
-            let share = (width - scales[above]) / (scales[above + 1] - scales[above]);
-            normals[above].lerp(normals[above + 1], share.min(1.0))
-        })
+            let share = ((width - scales[above]) / (scales[above + 1] - scales[above])).min(1.0);
+            let [(fine, a), (coarse, b)] = [means[above], means[above + 1]];
+            (fine.lerp(coarse, share), a + share * (b - a))
+        };
+        let corners = [at(0), at(1), at(2)];
+        (corners.map(|(n, _)| n), corners.map(|(_, coherence)| coherence))
     }
 
     /// The slope at `hit`, where `path` has arrived; `row` is that of its time.
@@ -61,11 +75,17 @@ impl World<'_> {
         let (mut corners, mut refracting) = (self.corner_normals(hit), shading);
         if wide {
             let width = f64::from(row.sigma_wavefront).hypot(spread.sqrt());
-            let upright = side * self.between(hit, self.averaged(hit, width));
+            let upright = side * self.between(hit, self.averaged(hit, width).0);
             // What the wavefront covers of the surface is longer the more it is inclined.
             let facing = (-d.dot(upright)).max(f64::from(LEAST_FACING));
-            corners = self.averaged(hit, width / facing);
+            let coherences;
+            (corners, coherences) = self.averaged(hit, width / facing);
             refracting = side * self.between(hit, corners);
+            let [u, v] = hit.uv;
+            let coherence = (1.0 - u - v) * coherences[0] + u * coherences[1] + v * coherences[2];
+            if coherence <= 0.99999 {
+                refracting = partly_turned(refracting, coherence, d);
+            }
         }
         let mut width = 0.0;
         if self.frame.flags & FLAG_FOOTPRINT != 0 {
@@ -93,9 +113,107 @@ pub(super) fn turned(
         let beyond = through(n).filter(|d| d.dot(geometric) < 0.0);
         return beyond.or_else(|| through(geometric));
     }
-    // Where the mean surface is edge on or seen from behind, as at the side of a bump, nothing is refracted.
+    // Seen from behind, as a facet at the side of a bump may be, nothing is refracted.
     let beyond = if d.dot(n) < 0.0 { through(n)? } else { d };
     // A path that would leave through the triangle again runs along it.
     let rise = (beyond.dot(geometric) + f64::from(LEAST_DESCENT)).max(0.0);
     Some((beyond - rise * geometric).normalize())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use insonify::scene::Mesh;
+    use insonify::scene::smoothed::smoothed;
+
+    /// Width of the edge's strip and reach of the plate behind it, mm.
+    const REACH: f64 = 30.0;
+
+    /// The edge of a plate 2 `radius` thick, rounded, along y at x = 0; and the columns' places along its profile,
+    /// from the middle of the rim, on the upper side negative.
+    fn plate(radius: f64) -> (Mesh, Vec<f64>) {
+        let step = 0.5;
+        let (end, rows) = (REACH + PI / 2.0 * radius, (2.0 * REACH / step) as u32);
+        let columns = (2.0 * end / step) as u32;
+        let arcs: Vec<f64> = (0..=columns).map(|i| f64::from(i) * step - end).collect();
+        let mut mesh = Mesh::default();
+        for (i, &arc) in arcs.iter().enumerate() {
+            let angle = (arc / radius).clamp(-PI / 2.0, PI / 2.0);
+            let flat = arc.abs() - PI / 2.0 * radius;
+            let normal = DVec3::new(angle.cos(), 0.0, angle.sin());
+            for j in 0..=rows {
+                let y = f64::from(j) * step - REACH;
+                let p = radius * (normal - DVec3::X) - flat.max(0.0) * DVec3::X + y * DVec3::Y;
+                mesh.positions.push(p.as_vec3().to_array());
+                mesh.normals.push(normal.as_vec3().to_array());
+                let (a, b) = (i as u32 * (rows + 1) + j, (i as u32 + 1) * (rows + 1) + j);
+                if i as u32 != columns && j != rows {
+                    mesh.triangles.extend([[a, b, b + 1], [a, b + 1, a + 1]]);
+                }
+            }
+        }
+        (mesh, arcs)
+    }
+
+    /// Mean slope of the plate's upper side over a Gaussian window about x, of which a part lies beyond the rim.
+    fn slope_of_plate(radius: f64, deviation: f64, x: f64) -> f64 {
+        let height = |x: f64| {
+            let over = (x + radius).clamp(0.0, radius);
+            (radius * radius - over * over).sqrt()
+        };
+        let window = |k: i32| {
+            let u = f64::from(k) * deviation / 200.0;
+            ((-u * u / (2.0 * deviation * deviation)).exp(), x + u, deviation / 200.0)
+        };
+        let all: Vec<(f64, f64, f64)> = (-1000..1000).map(window).collect();
+        let total: f64 = all.iter().map(|(w, _, _)| w).sum();
+        let falls = |&(w, at, step): &(f64, f64, f64)| {
+            w * (height(at - step / 2.0) - height(at + step / 2.0)) / step
+        };
+        all.iter().map(falls).sum::<f64>() / total
+    }
+
+    /// A beam wider than the edge of an organ is thick turns by what it meets of it, right up to the rim, where
+    /// the mean of the normals alone stands across the beam.
+    #[test]
+    fn a_beam_over_a_rim_turns_by_what_it_meets() {
+        let deviation = 4.0;
+        for radius in [1.0, 2.0, 3.0] {
+            let (mesh, arcs) = plate(radius);
+            let words = smoothed(&mesh, deviation / 4.0);
+            let mut worst = [0f64; 2];
+            let rows = mesh.positions.len() / arcs.len();
+            for (column, arc) in arcs.iter().enumerate().filter(|(_, arc)| **arc < 0.0) {
+                let middle = column * rows + rows / 2;
+                let (n, coherence) = unpacked(words[middle][2]);
+                if *arc < -REACH / 1.5 {
+                    continue;
+                }
+                let x = f64::from(mesh.positions[middle][0]);
+                let expected = slope_of_plate(radius, deviation, x);
+                for (worst, coherence) in worst.iter_mut().zip([coherence, 1.0]) {
+                    let turned = partly_turned(n, coherence, DVec3::Z);
+                    let slope = -turned.x / turned.z;
+                    *worst = worst.max((slope - expected).abs());
+                }
+            }
+            println!("radius {radius}: off by {worst:.3?}");
+            assert!(worst[0] < 0.25, "{radius}: {}", worst[0]);
+            assert!(worst[1] > 1.0, "{radius}: the mean normal alone does as well");
+        }
+    }
+
+    #[test]
+    fn surfaces_that_cover_the_beam_turn_it_whole() {
+        for i in 1..90 {
+            let angle = f64::from(i).to_radians();
+            let n = DVec3::new(angle.sin(), 0.0, angle.cos());
+            assert!(partly_turned(n, 1.0, -DVec3::Z).angle_between(n) < 1e-7, "{i}");
+            let behind = partly_turned(-n, 1.0, -DVec3::Z);
+            assert!(behind.angle_between(DVec3::Z) < 1e-7, "seen from behind");
+        }
+        assert_eq!(partly_turned(DVec3::X, 0.0, -DVec3::Z), DVec3::Z, "none of the beam");
+    }
 }

@@ -2,7 +2,7 @@
 
 use std::cmp::Ordering;
 
-use glam::DVec3;
+use glam::{DVec3, DVec4};
 
 /// Residual, relative to the first, at which a step is good enough: what is left turns normals by less than a
 /// thousandth of what the step does.
@@ -68,29 +68,29 @@ impl Elements {
         Self { corners, mass, own, first, links }
     }
 
-    /// Means over the area around each node of the values at the corners of the triangles.
-    pub(super) fn means(&self, at_corners: impl Iterator<Item = DVec3>) -> Vec<DVec3> {
-        let mut sums = vec![DVec3::ZERO; self.mass.len()];
+    /// Means over the area around each node of the vectors at the corners of the triangles; the fourth part is 0.
+    pub(super) fn means(&self, at_corners: impl Iterator<Item = DVec3>) -> Vec<DVec4> {
+        let mut sums = vec![DVec4::ZERO; self.mass.len()];
         for (&(node, share), value) in self.corners.iter().zip(at_corners) {
-            sums[node as usize] += share * value;
+            sums[node as usize] += (share * value).extend(0.0);
         }
         let means = sums.iter().zip(&self.mass);
-        means.map(|(&sum, &mass)| if mass > 0.0 { sum / mass } else { DVec3::ZERO }).collect()
+        means.map(|(&sum, &mass)| if mass > 0.0 { sum / mass } else { DVec4::ZERO }).collect()
     }
 
     /// `values` after a backward Euler step of `time` (half the growth of the variance along each direction).
-    pub(super) fn diffused(&self, mut values: Vec<DVec3>, time: f64) -> Vec<DVec3> {
-        let inner = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
+    pub(super) fn diffused(&self, mut values: Vec<DVec4>, time: f64) -> Vec<DVec4> {
+        let inner = |a: &[DVec4], b: &[DVec4]| a.iter().zip(b).map(|(a, b)| a.dot(*b)).sum::<f64>();
         let diagonal: Vec<f64> =
             self.mass.iter().zip(&self.own).map(|(mass, own)| mass + time * own).collect();
-        let precondition = |r: &[DVec3]| -> Vec<DVec3> {
+        let precondition = |r: &[DVec4]| -> Vec<DVec4> {
             let pairs = r.iter().zip(&diagonal);
-            pairs.map(|(&r, &d)| if d > 0.0 { r / d } else { DVec3::ZERO }).collect()
+            pairs.map(|(&r, &d)| if d > 0.0 { r / d } else { DVec4::ZERO }).collect()
         };
-        let mut image = vec![DVec3::ZERO; values.len()];
+        let mut image = vec![DVec4::ZERO; values.len()];
         self.apply(&values, time, &mut image);
         let loads = values.iter().zip(&self.mass).map(|(&v, &mass)| mass * v);
-        let mut residual: Vec<DVec3> = loads.zip(&image).map(|(load, &i)| load - i).collect();
+        let mut residual: Vec<DVec4> = loads.zip(&image).map(|(load, &i)| load - i).collect();
         let mut direction = precondition(&residual);
         let mut norm = inner(&residual, &direction);
         let enough = norm * RESIDUAL * RESIDUAL;
@@ -117,10 +117,10 @@ impl Elements {
     }
 
     /// Masses and `time` times the stiffnesses, applied to `u`.
-    fn apply(&self, u: &[DVec3], time: f64, out: &mut [DVec3]) {
+    fn apply(&self, u: &[DVec4], time: f64, out: &mut [DVec4]) {
         for (i, out) in out.iter_mut().enumerate() {
             let links = &self.links[self.first[i] as usize..self.first[i + 1] as usize];
-            let around: DVec3 = links.iter().map(|&(j, stiffness)| stiffness * u[j as usize]).sum();
+            let around: DVec4 = links.iter().map(|&(j, stiffness)| stiffness * u[j as usize]).sum();
             *out = self.mass[i] * u[i] + time * (self.own[i] * u[i] + around);
         }
     }

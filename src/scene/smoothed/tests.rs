@@ -1,13 +1,18 @@
 use super::*;
 use crate::scene::shapes;
 
-/// The projection back, for these tests.
-fn unpacked(word: u32) -> DVec3 {
-    let part = |half: u32| f64::from(half as u16 as i16) / 32_767.0;
-    let (x, y) = (part(word & 0xffff), part(word >> 16));
+/// Direction and coherence back, for these tests.
+fn mean(word: u32) -> (DVec3, f64) {
+    let part = |from: u32| f64::from((word << (19 - from)) as i32 >> 19) / 4095.0;
+    let (x, y) = (part(0), part(13));
     let z = 1.0 - x.abs() - y.abs();
     let t = (-z).max(0.0);
-    DVec3::new(x - t.copysign(x), y - t.copysign(y), z).normalize()
+    let v = DVec3::new(x - t.copysign(x), y - t.copysign(y), z).normalize();
+    (v, f64::from(word >> 26) / 63.0)
+}
+
+fn unpacked(word: u32) -> DVec3 {
+    mean(word).0
 }
 
 /// Largest angle between the averaged and the mesh's own normals where `wanted`, by level.
@@ -44,14 +49,17 @@ fn terrain(edge: f64, height: impl Fn(f64, f64) -> f64) -> Mesh {
 }
 
 #[test]
-fn directions_survive_packing() {
+fn means_survive_packing() {
     for i in 0..2000 {
         let [a, b] = [f64::from(i) * 0.377, f64::from(i) * 0.7131];
         let v = DVec3::new(a.sin() * b.cos(), a.sin() * b.sin(), a.cos());
-        assert!(unpacked(pack(v)).angle_between(v) < 6e-5, "{v}");
+        let coherence = f64::from(i) / 1999.0;
+        let (direction, kept) = mean(pack(v, coherence));
+        assert!(direction.angle_between(v) < 5e-4, "{v}");
+        assert!((kept - coherence).abs() < 0.008, "{coherence}");
     }
     for v in DVec3::AXES.iter().flat_map(|&v| [v, -v]) {
-        assert_eq!(unpacked(pack(v)), v, "exact");
+        assert_eq!(mean(pack(v, 1.5)), (v, 1.0), "exact");
     }
 }
 
@@ -106,25 +114,34 @@ fn ripples_decay_with_their_scale() {
 fn steep_bumps_leave_the_slope_that_they_stand_on() {
     let bumps = |x: f64, y: f64| 0.5 * (1.7 * x).sin() * (1.9 * y + 0.4).cos();
     let mesh = terrain(0.4, |x, y| 0.2 * x + bumps(x, y));
-    let mean = DVec3::new(-0.2, 0.0, 1.0).normalize();
+    let slope = DVec3::new(-0.2, 0.0, 1.0).normalize();
     for (words, p) in smoothed(&mesh, 1.0).iter().zip(&mesh.positions) {
         if p[0].abs() < 15.0 && p[1].abs() < 15.0 {
-            let off = unpacked(words[3]).angle_between(mean);
+            let off = unpacked(words[3]).angle_between(slope);
             assert!(off < 0.01, "{off} of slopes up to 0.9");
+            assert_eq!(words.map(|word| mean(word).1), [1.0; LEVELS]);
         }
     }
 }
 
-/// The two sides of a sheet do not cancel into nonsense, and its rim stays its own.
+/// The two sides of a sheet do not cancel into nonsense: where the sheet covers the beam it counts whole, at its rim
+/// not at all.
 #[test]
 fn a_thin_sheet_keeps_its_sides() {
     let sheet = shapes::ellipsoid([30.0, 30.0, 0.5], 5);
-    let [.., coarse] = worst(&sheet, 1.0, |p| p.x.hypot(p.y) < 24.0);
-    assert!(coarse < 0.08, "{coarse}");
-    for (words, normal) in smoothed(&sheet, 1.0).iter().zip(&sheet.normals) {
-        for &word in words {
-            assert!(unpacked(word).dot(DVec3::from(normal.map(f64::from))) > 0.2);
-        }
+    let radius = |p: DVec3| p.x.hypot(p.y);
+    // Two and a half deviations from the rim.
+    for (level, reach) in [(0, 27.0), (1, 25.0), (2, 20.0), (3, 10.0)] {
+        let angle = worst(&sheet, 1.0, |p| radius(p) < reach)[level];
+        assert!(angle < 0.08, "{level}: {angle}");
+    }
+    let means = smoothed(&sheet, 1.0);
+    for (words, p) in means.iter().zip(&sheet.positions) {
+        let radius = radius(DVec3::from(p.map(f64::from)));
+        let [finest, .., coarse] = words.map(|word| mean(word).1);
+        assert_eq!(finest, 1.0);
+        assert!(radius > 10.0 || coarse == 1.0, "{radius}: {coarse}");
+        assert!(radius < 29.5 || coarse < 0.2, "{radius}: {coarse}");
     }
 }
 
