@@ -68,7 +68,7 @@ group! {
 group! {
     /// Motion of a transform.
     pub struct MotionKeys in "transform.motion" {
-        /// What it is.
+        /// Kind of the motion.
         kind: Kind = Kind::Sine, Facts::word::<Kind>().required();
         /// Time of one oscillation or turn. Sine and orbit.
         period: Option<f64> = None, PERIOD.by_default("required");

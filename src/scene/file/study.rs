@@ -155,7 +155,7 @@ group! {
     pub struct SliceKeys in "scenario.slice" {
         /// Name in key and tables.
         name: String = String::new(), Facts::of(Form::Text).required();
-        /// What the assessor reads where its images are ranked.
+        /// Title for the assessor where its images are ranked.
         title: String = String::new(), Facts::of(Form::Text);
     }
 }

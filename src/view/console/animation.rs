@@ -57,7 +57,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
                     s => shares || !s.needs_shared_topology(),
                 };
                 words(ui, &format!("strategy {index}"), strategy, possible)
-                    .on_hover_text("How the device follows");
+                    .on_hover_text("Way in which the device follows the shapes");
                 let names: Vec<_> = meshes().map(|mesh| mesh.name.as_str()).collect();
                 ui.add(Label::new(names.join(", ")).truncate());
             });
