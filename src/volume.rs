@@ -130,7 +130,7 @@ impl Volume {
             Err(FileError::file(
                 path,
                 "is no volume by its extension",
-                &format!("give a file of the kinds {KINDS}"),
+                format!("give a file of the kinds {KINDS}"),
             ))
         }
     }
