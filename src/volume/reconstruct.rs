@@ -34,9 +34,9 @@ pub enum Interpolation {
 pub enum Compounding {
     /// Their mean, by the weights of the interpolation.
     Mean,
-    /// The largest. With `Linear` only pixels of a weight of at least 1/8 count.
+    /// The largest. With `linear` only pixels of a weight of at least 1/8 count.
     Maximum,
-    /// The one of the latest frame. With `Linear` as for the largest.
+    /// The one of the latest frame. With `linear` as for the largest.
     Latest,
 }
 
