@@ -1,8 +1,9 @@
 //! Keys and values of a text header, each with the number of its text line.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
+use super::source::{self, Skip};
 use crate::issue::FileError;
 
 /// One key and its value.
@@ -68,6 +69,28 @@ impl Fields<'_> {
     /// The value as one number.
     pub fn number<T: FromStr>(&self, field: &Field) -> Result<T, FileError> {
         Ok(self.numbers(field, 1)?.remove(0))
+    }
+
+    /// Bytes before the voxels, stated at one of these keys; with `from_end`, -1 means all but those of the voxels.
+    pub fn skip(&self, keys: &[&str], from_end: bool) -> Result<Skip, FileError> {
+        let Some(field) = self.find(keys) else { return Ok(Skip::Bytes(0)) };
+        match self.number(field)? {
+            -1i64 if from_end => Ok(Skip::AllButLast),
+            bytes => u64::try_from(bytes).map(Skip::Bytes).map_err(|_| {
+                self.error(field, "no number of bytes", "write -1 or the bytes to skip")
+            }),
+        }
+    }
+
+    /// The file with the voxels that a field names.
+    pub fn detached(&self, field: &Field) -> Result<PathBuf, FileError> {
+        if field.value.starts_with("LIST") || field.value.contains('%') {
+            let message = "volumes in several files, such as one file per slice, cannot be read";
+            return Err(self.error(field, message, "save the volume to one file"));
+        }
+        source::detached(self.path, &field.value).map_err(|cause| {
+            self.error(field, &cause, "put the data beside the header and name it there")
+        })
     }
 
     /// Sizes along the axes, none of them zero.

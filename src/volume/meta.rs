@@ -9,7 +9,7 @@ use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
 use super::scalar::Scalar;
 use super::sequence::{self, frames};
-use super::source::{self, Coding, Line, Lines, Payload, Skip};
+use super::source::{Coding, Line, Lines, Payload, Skip};
 use super::{Format, Warning};
 use crate::issue::FileError;
 
@@ -187,32 +187,13 @@ fn unit(fields: &Fields) -> Result<f64, FileError> {
 fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
     let place = fields.need("ElementDataFile")?;
     let local = place.value.eq_ignore_ascii_case("LOCAL");
-    if place.value.starts_with("LIST") || place.value.contains('%') {
-        return Err(fields.error(
-            place,
-            "volumes in one file per slice cannot be read",
-            "save the volume to one file",
-        ));
-    }
-    let file = if local {
-        fields.path.to_owned()
-    } else {
-        source::detached(fields.path, &place.value).map_err(|cause| {
-            fields.error(place, &cause, "put the data beside the header and name it there")
-        })?
+    let (file, offset) = match local {
+        true => (fields.path.to_owned(), after_header),
+        false => (fields.detached(place)?, 0),
     };
-    let skip = match fields.find(&["HeaderSize"]) {
-        None => Skip::Bytes(0),
-        Some(field) => match fields.number(field)? {
-            -1i64 => Skip::AllButLast,
-            bytes => Skip::Bytes(u64::try_from(bytes).map_err(|_| {
-                fields.error(field, "no number of bytes", "write -1 or the bytes to skip")
-            })?),
-        },
-    };
+    let skip = fields.skip(&["HeaderSize"], true)?;
     let compressed = fields.find(&["CompressedData"]).is_some_and(truth);
     let text = fields.find(&["BinaryData"]).is_some_and(|f| !truth(f));
-    let offset = if local { after_header } else { 0 };
     Ok(Payload {
         file,
         offset,

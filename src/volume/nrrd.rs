@@ -9,7 +9,7 @@ use super::grid::Frame;
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
 use super::scalar::Scalar;
-use super::source::{self, Coding, Line, Lines, Payload, Skip};
+use super::source::{Coding, Line, Lines, Payload};
 use crate::issue::FileError;
 
 mod space;
@@ -209,30 +209,10 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
         Some(field) => fields.number(field)?,
         None => 0,
     };
-    let skip = match fields.find(&["byte skip", "byteskip"]) {
-        None => Skip::Bytes(0),
-        Some(field) => match fields.number(field)? {
-            -1i64 if coding != Coding::Text => Skip::AllButLast,
-            bytes => Skip::Bytes(u64::try_from(bytes).map_err(|_| {
-                fields.error(field, "no number of bytes", "write -1 or the bytes to skip")
-            })?),
-        },
-    };
+    let skip = fields.skip(&["byte skip", "byteskip"], coding != Coding::Text)?;
     let (file, offset) = match fields.find(&["data file", "datafile"]) {
         None => (fields.path.to_owned(), after_header),
-        Some(field) if field.value.starts_with("LIST") || field.value.contains('%') => {
-            return Err(fields.error(
-                field,
-                "volumes in several files cannot be read",
-                "save the volume to one file",
-            ));
-        }
-        Some(field) => {
-            let file = source::detached(fields.path, &field.value).map_err(|cause| {
-                fields.error(field, &cause, "put the data beside the header and name it there")
-            })?;
-            (file, 0)
-        }
+        Some(field) => (fields.detached(field)?, 0),
     };
     Ok(Payload { file, offset, lines, skip, coding })
 }
