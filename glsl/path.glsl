@@ -11,6 +11,7 @@ struct Path {
     float probability;  // of the stochastic choices made so far
     float time;         // one way, us
     vec3 spread;        // lateral variance a + 2 b x + c x^2 after rough reflections
+    vec3 lens;          // lateral offset a + b x + c x^2 of what comes one deviation beside the axis
     uint interactions; uint reflections; uint crossings;
     uint left_instance; uint left_primitive; // the triangle that it starts on; NONE: none
     float survival;     // probability with which it was followed; its weight is divided by it
@@ -47,6 +48,7 @@ void start(uint line, uint n, out Path path, inout Media media) {
         path.lateral = normalize(path.lateral - dot(path.lateral, path.direction) * path.direction);
         path.spread.z = 1.0 / (frame.emission_lobe + 2.0);
     }
+    path.lens = vec3(0.0);
     path.handedness = 1.0;
     path.t_min = 0.0;
     path.share = 1.0 / float(frame.paths);
@@ -95,12 +97,14 @@ void reflect_path(inout Path path, vec3 m, float roughness, float turn) {
     path.spread.z += min(turn * turn, 1.0);
 }
 
-// Moves the path along its segment: attenuation, time, widening after rough reflections.
+// Moves the path along its segment: attenuation, time, widening.
 void advance(inout Path path, float t, Medium medium, vec3 position) {
     path.weight *= exp(-medium.absorption * t);
     path.time += t / medium.speed;
     path.spread.x += t * (2.0 * path.spread.y + t * path.spread.z);
     path.spread.y += t * path.spread.z;
+    path.lens.x += t * (path.lens.y + t * path.lens.z);
+    path.lens.y += 2.0 * t * path.lens.z;
     path.origin = position;
     path.t_min = clearance(position);
 }

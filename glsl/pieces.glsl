@@ -17,7 +17,7 @@ uvec2 hear(Stretch s, vec3 rel, float strength, int number, vec2 x, float drowne
     float kappa = kappa_at(s, along);
     uint row = row_at(kappa);
     float across = dot(rel, s.e_l);
-    vec4 shape = rows[row].shape;
+    vec4 shape = shape_at(s, row);
     if (abs(across) > half_width(s, shape)) return uvec2(0u);
     float power = level_power(wanted_level(s.tissue, shape.w, drowned), number);
     if (!(power > 0.0)) return uvec2(0u);

@@ -66,6 +66,7 @@ struct Stretch {
     vec3 o; vec3 d; vec3 e_l; vec3 e_e;
     float extent; float time; float weight;
     vec3 spread; float share;
+    vec3 lens;
     float speed; float absorption;
     vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
     float layer_y;       // elevation of the line's layer, mm
@@ -87,6 +88,7 @@ Stretch world_stretch(uint at) {
     s.e_e = segments[at].handedness * cross(s.d, s.e_l);
     s.spread = w.xyz;
     s.share = w.w;
+    s.lens = segments[at].lens.xyz;
     s.tissue = segments[at].tissue;
     s.instance = segments[at].instance;
     s.speed = tissues[s.tissue].speed;
@@ -123,7 +125,8 @@ uint row_at(float kappa) { return sample_at(kappa); }
 bool is_finite(Stretch s) {
     return abs(s.extent) < 1e18 && abs(s.time) < 1e18 && abs(s.weight) < 1e18 && abs(s.share) < 1e18
         && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)))
-        && all(lessThan(abs(s.e_l), vec3(2.0))) && all(lessThan(abs(s.spread), vec3(1e18)));
+        && all(lessThan(abs(s.e_l), vec3(2.0))) && all(lessThan(abs(s.spread), vec3(1e18)))
+        && all(lessThan(abs(s.lens), vec3(1e18)));
 }
 
 bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
@@ -139,6 +142,20 @@ float thinning(Stretch s, float x, vec4 shape) {
     vec2 widened = 1.0 + variance * INVERSE_FALL * shape.xy;
     float cells = sqrt(widened.x * widened.y);
     return beam * min(1.0, sqrt(s.share / cells));
+}
+
+// 1 / sigma^2 across over that of an even wavefront, at distance x: transmitted and received beam each are wider by the
+// lens, the product of both by half its square. `fall` is 1 / sigma^2 of the row.
+float narrowing(Stretch s, float x, float fall) {
+    float off = s.lens.x + x * (s.lens.y + x * s.lens.z);
+    return 1.0 / (1.0 + min(0.5 * off * off * fall, MOST_WIDENED));
+}
+
+// The beam's shape at a row: as it is behind even surfaces, wider and as much fainter behind those that bend the wavefront.
+vec4 shape_at(Stretch s, uint row) {
+    vec4 shape = rows[row].shape;
+    float narrow = narrowing(s, distance_at(s, float(row) + 0.5), INVERSE_FALL * shape.x);
+    return vec4(shape.x * narrow, shape.y, shape.z + 0.5 * log2(narrow), shape.w);
 }
 
 // Level of its speckle at distance x: one-way weight times echogenicity, log2.
@@ -243,7 +260,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         float da = (float(i) + 0.5) * h - rest[walk.a];
         float ahead = walk.step * da;         // distance from the middle to where the axis crosses the plane
         uint row = row_at(kappa_middle + ahead * per_mm);
-        vec4 shape = rows[row].shape;
+        vec4 shape = shape_at(s, row);
         float wanted = wanted_level(s.tissue, shape.w, drowned);
         float power = level_power(wanted, number);
         float width = half_width(s, shape);
@@ -253,7 +270,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
         // Over the plane the beam's shape and the gain vary as a parabola through samples on both sides.
         uint below = row - min(row, span), above = min(row + span, frame.samples - 1u);
         float run = per_mm / max(float(above - below), 1.0);
-        vec3 here = shape.xyz, shape_below = rows[below].shape.xyz, shape_above = rows[above].shape.xyz;
+        vec3 here = shape.xyz, shape_below = shape_at(s, below).xyz, shape_above = shape_at(s, above).xyz;
         vec3 slope = (shape_above - shape_below) * run;
         vec3 bend = (shape_above + shape_below - 2.0 * here) * mix(0.0, 2.0 * run * run, above - below == 2u * span);
         // The values of a row belong to the middle of its sample.
@@ -300,7 +317,7 @@ uvec3 march_planes(Stretch s, int number, vec2 x, float drowned) {
 
 // Half the beam's width at the wider end of a piece.
 float end_width(Stretch s, vec2 x) {
-    return max(half_width(s, rows[row_at(kappa_at(s, x.x))].shape), half_width(s, rows[row_at(kappa_at(s, x.y))].shape));
+    return max(half_width(s, shape_at(s, row_at(kappa_at(s, x.x)))), half_width(s, shape_at(s, row_at(kappa_at(s, x.y)))));
 }
 
 // Largest distance along the beam between a cell's scatterer and the crossing of its plane.
@@ -408,10 +425,11 @@ uint march_point(Stretch s, vec4 point) {
     float at = frame.speed * time / frame.sample_pitch;
     uint row = row_at(at);
     float sigma_l = rows[row].sigma_lateral, sigma_e = rows[row].sigma_elevation;
-    float l = rho_l / sigma_l;
+    float narrow = narrowing(s, x, 1.0 / (sigma_l * sigma_l));
+    float l = rho_l * sqrt(narrow) / sigma_l;
     if (abs(l) > 4.0) return 0u;
     float e = (s.layer_y + rho_e) / sigma_e;
-    vec2 q = s.weight * point.w * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, rows[row].shape)
+    vec2 q = s.weight * point.w * sqrt(narrow) * exp(-0.5 * (l * l + e * e) - s.absorption * x) * thinning(s, x, rows[row].shape)
         * frame.volume_scale * carrier(time);
     vec4 shares = deposit_shares(at - floor(at));
     int slot = int(clamp(floor(at), -1e6, 1e9)) - 1 - int(window_begin);
@@ -433,7 +451,14 @@ bool passes_sphere(Stretch s, vec4 sphere) {
     if (!(x >= -r && x < s.extent + r && kappa.y >= 0.0 && kappa.x <= float(SCATTER_WINDOW)
         && abs(dot(rel, s.e_e)) <= (0.5 + POINT_SHIFT) * frame.slice_thickness / float(frame.layers) + r)) return false;
     uvec2 ends = uvec2(row_at(kappa_at(s, x - r)), row_at(kappa_at(s, x + r)));
-    float width = 4.0 * max(rows[ends.x].sigma_lateral, rows[ends.y].sigma_lateral);
+    // An offset by a lens is largest at an end of the part, or at its turning point.
+    float turn = clamp(-0.5 * s.lens.y / mix(s.lens.z, 1.0, s.lens.z == 0.0), max(x - r, 0.0), min(x + r, s.extent));
+    vec3 at = vec3(max(x - r, 0.0), min(x + r, s.extent), turn);
+    vec3 off = s.lens.x + at * (s.lens.y + at * s.lens.z);
+    float most = max(max(abs(off.x), abs(off.y)), abs(off.z));
+    vec2 sigma = vec2(rows[ends.x].sigma_lateral, rows[ends.y].sigma_lateral);
+    sigma *= sqrt(1.0 + min(0.5 * most * most / (sigma * sigma), MOST_WIDENED));
+    float width = 4.0 * max(sigma.x, sigma.y);
     return abs(dot(rel, s.e_l)) <= width + r;
 }
 

@@ -63,6 +63,7 @@ void middle(uint line, out Path path, inout Media media) {
     path.lateral = world_vector(lateral);
     path.origin = world_point(o) + path.time * frame.speed * path.direction;
     path.spread = vec3(0.0);
+    path.lens = vec3(0.0);
 }
 
 // Transmits the path; returns the reflected part of its intensity, 1 if nothing is transmitted.

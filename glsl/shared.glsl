@@ -46,6 +46,8 @@ const uint FLAG_MASKED = 512u;      // only what a masking instance encloses giv
 const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
 const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
+const float BENDING_STEP = 0.1;           // mm: how far from the axis the bending of a wavefront is found
+const float MOST_WIDENED = 8.0;     // growth of a beam's variance across behind a lens, over its own
 
 const uint BLEND_LINEAR = 0u;
 const uint BLEND_SMOOTH = 1u;
@@ -143,7 +145,8 @@ struct Row {
     float receive_reach;                          // half the receive aperture, in elements: as many as scanlines
     float black;                                  // one-way weight times echogenicity that shows as black, log2
     float sigma_wavefront;                        // mm: standard deviation across the refracting wavefront
-    float unused0; float unused1;
+    float aperture;                               // sine of the angle under which one deviation of it converges
+    float unused;
 };
 
 // A straight part of a path inside one medium.
@@ -152,6 +155,8 @@ struct Segment {
     vec4 direction_time;   // unit; one-way time at the origin, us
     vec4 lateral_weight;   // unit lateral axis e_l carried along the path; weight at the origin
     vec4 spread;           // lateral variance a + 2 b x + c x^2 (mm^2) after rough reflections; path share
+    vec4 lens;             // lateral offset a + b x + c x^2 (mm) of what comes one deviation beside the beam's axis, by
+                           // surfaces that bend its wavefront; w unused
     uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
 };
 
@@ -163,6 +168,7 @@ struct Interaction {
     vec4 geometric_turn;   // normal turned against the path; standard deviation of the reflected direction over the beam
     vec4 shading;          // likewise; w unused
     vec4 spread;           // w unused
+    vec4 lens;             // likewise
     uint path; uint instance; uint surface;
     uint before; uint behind;                        // tissues
     uint interactions; uint crossings;               // of the path up to here, with this one

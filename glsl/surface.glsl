@@ -61,9 +61,9 @@ vec3 surface_shading_normal(Hit hit) {
     return surface_to_world(hit.instance, n);
 }
 
-// Rotation of the normal along the direction `along` (world, any length): radians per mm, unsigned. `corners`: normals
-// of the triangle's corners, object space, any length.
-float surface_curvature(Hit hit, vec3 along, vec3 corners[3]) {
+// Change of the normal over the way `along` (world, mm). `corners`: normals of the triangle's corners, object space,
+// any length.
+vec3 surface_turning(Hit hit, vec3 along, vec3 corners[3]) {
     uint i = triangles[3u * hit.primitive];
     uint j = triangles[3u * hit.primitive + 1u];
     uint k = triangles[3u * hit.primitive + 2u];
@@ -80,10 +80,16 @@ float surface_curvature(Hit hit, vec3 along, vec3 corners[3]) {
     vec3 n_v = surface_to_world(hit.instance, corners[2]) - n;
     vec3 across = cross(u, v);
     float area2 = dot(across, across);
-    float size = dot(along, along);
-    if (!(area2 > 0.0) || !(size > 0.0)) return 0.0;
+    if (!(area2 > 0.0)) return vec3(0.0);
     // `along`, projected into the triangle, in coordinates of its edges.
     float a = dot(cross(along, v), across) / area2;
     float b = dot(cross(u, along), across) / area2;
-    return abs(dot(a * n_u + b * n_v, along)) / size;
+    return a * n_u + b * n_v;
+}
+
+// Rotation of the normal along the direction `along` (world, any length): radians per mm, unsigned. `corners` as above.
+float surface_curvature(Hit hit, vec3 along, vec3 corners[3]) {
+    float size = dot(along, along);
+    if (!(size > 0.0)) return 0.0;
+    return abs(dot(surface_turning(hit, along, corners), along)) / size;
 }

@@ -140,6 +140,7 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
     segments[at].direction_time = vec4(path.direction, path.time);
     segments[at].lateral_weight = vec4(path.lateral, weight);
     segments[at].spread = vec4(path.spread, share);
+    segments[at].lens = vec4(path.lens, 0.0);
     segments[at].tissue = tissue;
     segments[at].instance = instance;
     segments[at].line = line;
@@ -157,6 +158,7 @@ float off_axis(uint line, vec3 position) {
 struct Interface {
     vec3 geometric; vec3 shading;
     vec3 refracting;                // averaged over the wavefront
+    vec3 turning;                   // its change per mm across
     float reflectance;
     float turn;                     // deviation of the reflected direction over the beam
     bool curved;                    // over the beam: something gets through beside a totally reflected middle
@@ -217,6 +219,7 @@ void meet(out Interface at, Met here, bool entering, inout Path path, uint befor
     at.geometric = slope.geometric;
     at.shading = slope.shading;
     at.refracting = slope.refracting;
+    at.turning = slope.turning;
     at.reflectance = reflectance_at(slope, path.direction, medium_of(before), medium_of(behind));
     at.turn = 2.0 * slope.width / max(-dot(path.direction, slope.refracting), 1e-3);
     at.curved = slope.width > 0.0;
@@ -229,6 +232,7 @@ void write_down(uint slot, inout Path path, uint n, inout Interface at) {
     interactions[slot].geometric_turn = vec4(at.geometric, at.turn);
     interactions[slot].shading = vec4(at.shading, 0.0);
     interactions[slot].spread = vec4(path.spread, 0.0);
+    interactions[slot].lens = vec4(path.lens, 0.0);
     interactions[slot].path = n;
     interactions[slot].instance = at.instance;
     interactions[slot].surface = at.surface;
@@ -248,6 +252,7 @@ void recall(uint slot, out Path path, out Interface at) {
     path.time = interactions[slot].direction_time.w;
     path.lateral = interactions[slot].lateral_reflectance.xyz;
     path.spread = interactions[slot].spread.xyz;
+    path.lens = interactions[slot].lens.xyz;
     path.interactions = interactions[slot].interactions;
     path.crossings = interactions[slot].crossings;
     path.t_min = clearance(path.origin);
@@ -263,6 +268,7 @@ void recall(uint slot, out Path path, out Interface at) {
     at.turn = interactions[slot].geometric_turn.w;
     at.shading = interactions[slot].shading.xyz;
     at.refracting = at.shading; // nothing goes through here
+    at.turning = vec3(0.0);
     at.reflectance = interactions[slot].lateral_reflectance.w;
     at.curved = false;
     at.instance = interactions[slot].instance;
@@ -363,7 +369,9 @@ void toggle(Met here, Met other, vec3 direction, uint copies) {
 // Refracts the path at normal n into the next medium; under total reflection its weight becomes 0.
 void transmit(inout Path path, inout Interface at, vec3 n) {
     // If the middle of the beam is totally reflected but the rest is not, the path goes straight on.
-    bool through = transmit_path(path, n, at.geometric, tissues[at.before].speed, tissues[at.behind].speed) || at.curved;
+    float c1 = tissues[at.before].speed, c2 = tissues[at.behind].speed;
+    path.lens.z += rows[row_of(path.time)].aperture * bending(path.direction, path.lateral, n, at.turning, c1, c2);
+    bool through = transmit_path(path, n, at.geometric, c1, c2) || at.curved;
     if (role == ROLE_MAIN) {
         path.weight *= mix(0.0, 1.0 - at.reflectance, through && at.reflectance < 1.0);
     } else if (!through) {

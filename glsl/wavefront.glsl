@@ -10,6 +10,7 @@ struct Slope {
     vec3 geometric;     // of the triangle
     vec3 shading;       // interpolated from the vertices
     vec3 refracting;    // of the mean slope over the wavefront; in geometric acoustics that of `shading`
+    vec3 turning;       // change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics
     float width;        // deviation of the sine of incidence over the beam
 };
 
@@ -59,11 +60,13 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
         n[i] = vec4(own[i], 1.0);
     }
     slope.refracting = slope.shading;
-    if ((frame.flags & FLAG_WAVEFRONT) != 0u) {
+    bool wide = (frame.flags & FLAG_WAVEFRONT) != 0u;
+    float coherence = 1.0;
+    if (wide) {
         float sigma = rows[row].sigma_wavefront;
         float x = sqrt(sigma * sigma + spread) / instances[hit.instance].finest;
         // What the wavefront covers of the surface is longer the more it is inclined, which the first turn tells.
-        float inclined = 1.0, coherence = 1.0;
+        float inclined = 1.0;
         [[dont_unroll]] for (uint i = 0u; i < 2u; ++i) {
             average(n, own, averages, x / inclined);
             vec4 mean = (1.0 - hit.u - hit.v) * n[0] + hit.u * n[1] + hit.v * n[2];
@@ -76,13 +79,15 @@ Slope slope_at(Met here, Path path, uint row, float spread) {
         slope.refracting = mix(turned, slope.refracting, bvec3(coherence > 0.99999));
     }
 
+    vec3 corners[3] = { n[0].xyz, n[1].xyz, n[2].xyz };
+    slope.turning = vec3(0.0);
+    if (wide) slope.turning = side * coherence * surface_turning(hit, path.lateral, corners);
     slope.width = 0.0;
     if ((frame.flags & FLAG_FOOTPRINT) != 0u) {
         float lateral = rows[row].sigma_lateral;
         float cos_i = -dot(path.direction, slope.refracting);
         // In the plane of incidence; at normal incidence along the image.
         vec3 along = path.direction + cos_i * slope.refracting + 0.01 * path.lateral;
-        vec3 corners[3] = { n[0].xyz, n[1].xyz, n[2].xyz };
         float curved = surface_curvature(hit, along, corners) * sqrt(lateral * lateral + spread);
         // The slope that was averaged away, as roughness.
         float rough = dot(normalize(along), slope.shading - slope.refracting);
@@ -112,4 +117,13 @@ bool transmit_path(inout Path path, vec3 n, vec3 n_geometric, float c1, float c2
     path.lateral = normalize(path.lateral - dot(path.lateral, d) * d);
     path.direction = d;
     return true;
+}
+
+// Curvature that a surface of normal n, which turns by `turning` per mm across, gives to the wavefront of a path: change
+// of the refracted direction per mm across, rad.
+float bending(vec3 direction, vec3 lateral, vec3 n, vec3 turning, float c1, float c2) {
+    vec3 middle, beside;
+    bool through = turning != vec3(0.0) && refraction(direction, n, c1, c2, middle)
+        && refraction(direction, normalize(n + BENDING_STEP * turning), c1, c2, beside);
+    return mix(0.0, dot(beside - middle, lateral) / BENDING_STEP, through);
 }

@@ -330,7 +330,7 @@ fn the_command_writes_a_sequence_and_the_volume_that_it_makes() {
     for (args, cause) in [
         (&["--sweep", "linear:6mm"][..], "--output"),
         (&["--sweep", "tilt:6", "-o", "c.mha"], "has no unit"),
-        (&["--sweep", "linear:6mm", "-o", "c.nrrd"], "end the name in .mha"),
+        (&["--sweep", "linear:6mm", "-o", "c.nhdr"], "end the name in .mha or .nrrd"),
         (&["--sweep", "linear:6mm", "-o", "none/c.mha"], "its folder does not exist"),
         (&["--sweep", "none.csv", "-o", "c.mha"], "check the path"),
         (&["--sweep", "linear:6mm", "-o", "c.mha", "--spacing", "1"], "--volume"),

@@ -6,15 +6,18 @@ use clap::Args;
 use glam::DVec3;
 use insonify::acquire::{self, Station, Sweep};
 use insonify::output;
+use insonify::output::dicom;
 use insonify::scene::Scene;
 use insonify::scene::file;
 use insonify::settings::units::{ANGLE, DURATION, LENGTH};
 use insonify::sim::shaders::Library;
-use insonify::volume::{Reconstruction, Sequence, Settings, write_meta};
+use insonify::volume::{Format, Reconstruction, Sequence, Settings, write_meta};
 use miette::{Context, IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common, Progress};
 use super::reconstruct::{spacing, tell};
+
+mod planes;
 
 /// Arguments of `insonify acquire`.
 #[derive(Debug, Args)]
@@ -30,10 +33,11 @@ pub struct Acquire {
     /// Frames to take, evenly spaced [default: 41; of a file one for each of its rows].
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     frames: Option<u32>,
-    /// Tracked frames to write (.mha), as PLUS and 3D Slicer read them.
+    /// Tracked frames to write (.mha, .nrrd), as PLUS and 3D Slicer read them.
     #[arg(short, long, required_unless_present = "volume")]
     output: Option<PathBuf>,
-    /// Volume to reconstruct from them (.mha), along the axes of the probe at its middle frame.
+    /// Volume to reconstruct from them (.mha; .dcm: an Enhanced US Volume), along the axes of the probe at its middle
+    /// frame.
     #[arg(long, value_name = "FILE")]
     volume: Option<PathBuf>,
     /// Volumes to reconstruct over time, evenly over --period: each from a sweep of its own, while the
@@ -107,24 +111,38 @@ fn period(text: &str) -> Result<f64, String> {
 }
 
 /// Refuses names that cannot be written, before minutes of work for them.
-fn writable(path: &Path) -> Result<()> {
-    let extension = path.extension().and_then(|e| e.to_str());
-    if !extension.is_some_and(|e| e.eq_ignore_ascii_case("mha")) {
+fn writable(args: &Acquire) -> Result<()> {
+    let ends = |path: &Path, kinds: &[&str]| {
+        let extension = path.extension().unwrap_or_default();
+        kinds.iter().any(|kind| extension.eq_ignore_ascii_case(kind))
+    };
+    if let Some(path) = args.output.as_deref().filter(|path| !ends(path, &["mha", "nrrd"])) {
         return Err(miette!(
-            help = "end the name in .mha",
-            "{} is not written: only MetaImage in one file is",
+            help = match dicom::is_meant(path) {
+                true => "write a volume by --volume NAME.dcm; end this name in .mha or .nrrd",
+                false => "end the name in .mha or .nrrd",
+            },
+            "{} is not written: tracked frames are MetaImage or NRRD in one file",
             path.display()
         ));
     }
-    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
-    match folder.is_none_or(Path::is_dir) {
-        true => Ok(()),
-        false => Err(miette!(
-            help = "make the folder first",
-            "{} is not written: its folder does not exist",
+    if let Some(path) = args.volume.as_deref().filter(|path| !ends(path, &["mha", "dcm"])) {
+        return Err(miette!(
+            help = "end the name in .mha or .dcm",
+            "{} is not written: a volume is MetaImage in one file or DICOM",
             path.display()
-        )),
+        ));
     }
+    if let (Some(path), Some(_)) = (&args.volume, args.volumes)
+        && dicom::is_meant(path)
+    {
+        return Err(miette!(
+            help = "end the name in .mha",
+            "{} is not written: volumes over time are MetaImage",
+            path.display()
+        ));
+    }
+    args.output.iter().chain(&args.volume).try_for_each(|path| common::in_folder(path))
 }
 
 /// Runs the command.
@@ -132,9 +150,7 @@ fn writable(path: &Path) -> Result<()> {
 /// # Errors
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Acquire) -> Result<()> {
-    for path in args.output.iter().chain(&args.volume) {
-        writable(path)?;
-    }
+    writable(args)?;
     let mut scene = args.common.scene(&args.scene)?;
     let stations = stations(args, &scene)?;
     let mut made: Vec<Reconstruction> = Vec::new();
@@ -165,7 +181,13 @@ pub fn run(args: &Acquire) -> Result<()> {
         if let (Some(count), Some(period)) = (args.volumes, args.period) {
             first.volume = first.volume.followed_by(later, period / f64::from(count));
         }
-        write_meta(path, &first.volume)?;
+        match dicom::is_meant(path) {
+            true => {
+                planes::of(&first.volume, &scene, &stations).write(path).into_diagnostic()?;
+                first.volume.format = Format::Dicom;
+            }
+            false => write_meta(path, &first.volume)?,
+        }
         tell(path, &first, stations.len());
     }
     Ok(())

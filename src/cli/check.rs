@@ -43,7 +43,7 @@ impl Check {
         })?;
         output::line(self.file.display());
         output::line(&volume);
-        if volume.format == Format::MetaImage
+        if matches!(volume.format, Format::MetaImage | Format::Nrrd)
             && let Some(sequence) = Summary::read(&self.file)?
         {
             output::line(sequence);

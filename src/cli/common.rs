@@ -9,6 +9,8 @@ use miette::{IntoDiagnostic, Report, Result, miette};
 
 use insonify::gpu::{Device, DeviceOptions, GpuError, cache_folder};
 use insonify::output;
+use insonify::output::dicom::Transducer;
+use insonify::probe::{Kind, Probe};
 use insonify::scene::Scene;
 use insonify::scene::file::{self, override_of};
 use insonify::settings::{Quality, Simulation};
@@ -165,6 +167,31 @@ impl Common {
 /// Writes each of these to standard error.
 pub fn notes<T: std::fmt::Display>(all: impl IntoIterator<Item = T>) {
     all.into_iter().for_each(output::note);
+}
+
+/// Refuses a file whose folder does not exist, before minutes of work for it.
+///
+/// # Errors
+/// There is no such folder.
+pub fn in_folder(path: &Path) -> Result<()> {
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    match folder.is_none_or(Path::is_dir) {
+        true => Ok(()),
+        false => Err(miette!(
+            help = "make the folder first",
+            "{} is not written: its folder does not exist",
+            path.display()
+        )),
+    }
+}
+
+/// Shape of the probe in the terms of DICOM.
+pub fn transducer(probe: &Probe) -> Transducer {
+    match probe.kind {
+        Kind::Convex { .. } => Transducer::Curved,
+        Kind::Linear { .. } => Transducer::Linear,
+        Kind::Phased { .. } => Transducer::Phased,
+    }
 }
 
 /// Uploads a scene, and reports on standard error which parts of it the device had to change.

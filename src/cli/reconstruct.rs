@@ -16,7 +16,7 @@ use super::common::notes;
 /// Arguments of `insonify reconstruct`. What is given here goes before the configuration.
 #[derive(Debug, Args)]
 pub struct Reconstruct {
-    /// Tracked frames (.mha, .mhd), as PLUS and 3D Slicer write them.
+    /// Tracked frames (.mha, .mhd, .nrrd, .nhdr), as PLUS and 3D Slicer write them.
     sequence: PathBuf,
     /// Configuration of PLUS (PlusDeviceSet_*.xml): its CoordinateDefinitions and
     /// VolumeReconstruction.

@@ -8,13 +8,9 @@ use miette::{Context, IntoDiagnostic, Result, miette};
 use serde_json::{Map, Value, json};
 
 use super::common::{self, Common, Progress};
-use super::images::Images;
 use insonify::acquire::{self, Station};
 use insonify::gpu::FrameTimings;
 use insonify::output;
-use insonify::output::dicom::{About, Loop};
-use insonify::output::movie::Movie;
-use insonify::probe::Kind;
 use insonify::scene::{Scene, file};
 use insonify::settings::ScatterMode;
 use insonify::sim::calibration::Calibration;
@@ -23,6 +19,10 @@ use insonify::sim::facts;
 use insonify::sim::shaders::Library;
 use insonify::sim::{Simulator, Tracer};
 use insonify::statistics::Statistics;
+
+mod film;
+
+use film::Film;
 
 /// Frames per second of an animation whose scene time stands still.
 const SHOWN: f64 = 10.0;
@@ -35,7 +35,8 @@ pub struct Render {
     /// Image to write (PNG, 8-bit grey) [default: the scene's name with .png, here]. With several
     /// frames NAME.png becomes NAME.0000.png, NAME.0001.png, ...; `{}` or `%04d` in the name says
     /// where the number goes. NAME.gif is an animation of all frames, played again and again. NAME.dcm is a loop in
-    /// DICOM, with the size of a pixel.
+    /// DICOM, with the size of a pixel. NAME.seq.mha and NAME.seq.nrrd are loops with the probe's pose at each frame,
+    /// for 3D Slicer and PLUS.
     #[arg(short, long)]
     output: Option<PathBuf>,
     /// Frames to simulate; each is written, timings are over all. --dump takes the last. [default: 1;
@@ -83,6 +84,8 @@ fn rate(text: &str) -> Result<f64, String> {
 /// # Errors
 /// Every mistake of the user and every error of the device, reported once.
 pub fn run(args: &Render) -> Result<()> {
+    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
+    film::check(&output)?;
     let mut scene = args.common.scene(&args.scene)?;
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device, &scene)?;
@@ -93,7 +96,6 @@ pub fn run(args: &Render) -> Result<()> {
     let mut simulator = common::simulator(&device, &library, &scene, tracer)?;
     let build_ms = loaded.elapsed().as_secs_f64() * 1e3;
 
-    let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
     let timings = simulate(&mut simulator, &mut library, &mut scene, args, &output)?;
     if let Some(dir) = &args.dump {
         dump::frame(&mut simulator, &scene, dir).into_diagnostic()?;
@@ -275,12 +277,7 @@ fn simulate(
     let moments = moments(args, scene)?;
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
     let shown = args.fps.or_else(|| pace(args, &moments)).unwrap_or(SHOWN);
-    let mut movie = match Movie::is_meant(output) {
-        true => Some(Movie::new(output).into_diagnostic()?),
-        false => None,
-    };
-    let mut film = Loop::is_meant(output).then(|| Loop::new(output, about(scene, simulator)));
-    let images = Images::new(output, frames);
+    let mut film = Film::new(output, simulator, scene, &moments, shown)?;
     let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
@@ -295,17 +292,7 @@ fn simulate(
             unseen.retain(|mask| still.contains(mask));
         }
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
-        let (width, height, rgba) = simulator.pixels().into_diagnostic()?;
-        match (&mut movie, &mut film) {
-            (Some(movie), _) => {
-                let end = f64::from(index + 1) / shown;
-                movie.add(width, height, &rgba, end).into_diagnostic()?;
-            }
-            (None, Some(film)) => film.add(width, height, &rgba).into_diagnostic()?,
-            (None, None) => {
-                dump::png(&images.path(index), width, height, &rgba).into_diagnostic()?
-            }
-        }
+        film.add(index, simulator, scene)?;
         progress.done(index + 1);
     }
     for mask in unseen {
@@ -313,31 +300,8 @@ fn simulate(
     }
     timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();
-    let one_file = movie.is_some() || film.is_some();
-    if let Some(film) = film {
-        film.finish(1e3 / shown).into_diagnostic()?;
-    }
-    match one_file {
-        true => output::line(output.display()),
-        false => output::line(&images),
-    }
+    film.finish(output)?;
     Ok(timings)
-}
-
-/// The facts that a loop in DICOM states beside its frames.
-fn about(scene: &Scene, simulator: &Simulator) -> About {
-    let frame = simulator.constants();
-    About {
-        name: scene.name.clone(),
-        pitch: f64::from(frame.pixel_pitch),
-        corner: [frame.image_left, frame.image_top].map(f64::from),
-        frequency: scene.probe.frequency,
-        transducer: match scene.probe.kind {
-            Kind::Convex { .. } => "CURVED LINEAR",
-            Kind::Linear { .. } => "LINEAR",
-            Kind::Phased { .. } => "SECTOR_PHASED",
-        },
-    }
 }
 
 fn default_output(scene: &Path) -> PathBuf {

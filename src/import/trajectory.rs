@@ -108,7 +108,7 @@ pub fn import(
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{last:.6},{:.4},{:.4},{:.4},{:.8},{:.8},{:.8},{:.8}",
+            "{last:.6},{:.7},{:.7},{:.7},{:.9},{:.9},{:.9},{:.9}",
             p.x, p.y, p.z, q.w, q.x, q.y, q.z
         );
     }

@@ -25,17 +25,33 @@ impl Probe {
     pub fn sigma_lateral(&self, z: f64) -> f64 {
         let lambda = self.wavelength();
         let tx = fixed_focus(lambda, self.f_number_transmit, self.focus, z);
-        let rx = APODISED * lambda * self.f_number_receive.max(z / self.aperture);
+        let rx = APODISED * lambda * self.f_number(z);
         (tx.powi(-2) + rx.powi(-2)).sqrt().recip()
     }
 
-    /// Sigma across the wavefront at depth `z` that converges on what the image shows halfway between there and its
-    /// bottom, mm: over this width a surface at `z` refracts. As wide as the receive aperture near the face, as narrow
+    /// Sigma across the wavefront at depth `z` that converges on what the image shows two thirds of the way
+    /// to its bottom, mm: over this width a surface at `z` refracts. As wide as the receive aperture near the face, as narrow
     /// as a focus at the bottom. A Gaussian aperture whose focus is as wide as that of [`Self::sigma_lateral`].
     pub fn sigma_wavefront(&self, z: f64) -> f64 {
-        let target = 0.5 * (z + self.depth.max(z));
-        let f_number = self.f_number_receive.max(target / self.aperture);
-        fixed_focus(self.wavelength(), f_number, target, z)
+        let target = self.target(z);
+        fixed_focus(self.wavelength(), self.f_number(target), target, z)
+    }
+
+    /// Sine of the angle between the axis and what comes from one deviation beside it on the wavefront of
+    /// [`Self::sigma_wavefront`].
+    pub fn wavefront_aperture(&self, z: f64) -> f64 {
+        (std::f64::consts::TAU * APODISED * self.f_number(self.target(z))).recip()
+    }
+
+    /// Depth for which a surface at `z` refracts, mm: two thirds of the way to the image's bottom, the mean depth of what
+    /// lies below, weighted by the distance, with which its displacement grows.
+    fn target(&self, z: f64) -> f64 {
+        (z + 2.0 * self.depth.max(z)) / 3.0
+    }
+
+    /// F-number of the receive aperture for depth `z`.
+    fn f_number(&self, z: f64) -> f64 {
+        self.f_number_receive.max(z / self.aperture)
     }
 
     /// Elevational two-way sigma at depth `z`, mm: the lens focuses transmit and receive alike.

@@ -135,6 +135,10 @@ constants! {
     pub const LEAST_FACING: f32 = 0.125;
     /// A path goes down below a surface that it has met by this part of its way at least.
     pub const LEAST_DESCENT: f32 = 1e-3;
+    /// Distance from the axis at which the bending of a wavefront is found, mm.
+    pub const BENDING_STEP: f32 = 0.1;
+    /// Growth of a beam's variance across behind a lens, over its own, that is not exceeded.
+    pub const MOST_WIDENED: f32 = 8.0;
 
     /// The anatomy in front of the image plane is cut away.
     pub const VIEW3D_CUT: u32 = 1;
@@ -208,7 +212,7 @@ shared! {
         volume_gain: f32, point_gain: f32, surface_gain: f32,
         volume_undo: f32, surface_undo: f32, lateral_lines: f32,
         tgc: f32, compensation: f32, incoherent_gain: f32, receive_reach: f32,
-        black: f32, sigma_wavefront: f32, unused0: f32, unused1: f32,
+        black: f32, sigma_wavefront: f32, aperture: f32, unused: f32,
     }
     /// A straight part of a path inside one medium.
     struct Segment {
@@ -216,6 +220,7 @@ shared! {
         direction_time: [f32; 4],
         lateral_weight: [f32; 4],
         spread: [f32; 4],
+        lens: [f32; 4],
         tissue: u32, instance: u32, line: u32, handedness: f32,
     }
     /// The state of a main path on arrival at a surface, before any random choice.
@@ -226,6 +231,7 @@ shared! {
         geometric_turn: [f32; 4],
         shading: [f32; 4],
         spread: [f32; 4],
+        lens: [f32; 4],
         path: u32, instance: u32, surface: u32,
         before: u32, behind: u32,
         interactions: u32, crossings: u32,

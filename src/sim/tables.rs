@@ -196,6 +196,7 @@ pub fn rows(scene: &Scene) -> Vec<layout::Row> {
                 receive_reach: reach(scene, scene.probe.receive_aperture(z)) as f32,
                 black: calibration.black(z).max(f64::from(layout::ALL_LEVELS)) as f32,
                 sigma_wavefront: scene.probe.sigma_wavefront(z) as f32,
+                aperture: scene.probe.wavefront_aperture(z) as f32,
                 ..layout::Row::default()
             }
         })

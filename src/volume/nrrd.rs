@@ -9,6 +9,7 @@ use super::grid::Frame;
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
 use super::scalar::Scalar;
+use super::sequence::{frames, nrrd as planes};
 use super::source::{Coding, Line, Lines, Payload};
 use crate::issue::FileError;
 
@@ -105,9 +106,17 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     };
     let strange = fields.list.iter().map(|f| f.key.as_str());
     let strange = strange.filter(|key| !KNOWN.iter().any(|k| k.eq_ignore_ascii_case(key)));
-    let ignored: Vec<_> = strange.chain(pairs.iter().map(String::as_str)).collect();
+    let tracked = planes::is_tracked(&pairs);
+    let of_frames = |key: &str| key.starts_with(frames::PREFIX) || planes::is_known(key);
+    let pairs = pairs.iter().map(|f| f.key.as_str());
+    let pairs = pairs.filter(|key| !(tracked && of_frames(key)));
+    let ignored: Vec<_> = strange.chain(pairs).collect();
     out.warnings.extend(unused(path, &ignored));
-    if stacked {
+    if tracked {
+        let message = "is a tracked sequence: the poses of its frames are ignored";
+        let remedy = "`insonify reconstruct` makes a volume from frames and poses";
+        out.warn(path, 1, message, remedy);
+    } else if stacked {
         let message = "is a sequence of planes: its frames are stacked, 1 mm apart";
         let remedy =
             "save it as .igs.mha (3D Slicer does); `insonify reconstruct` makes a volume of that";
@@ -123,8 +132,8 @@ pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     Ok(out)
 }
 
-/// Fields, the keys of key/value pairs, and the byte after the empty line that ends the header.
-fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), FileError> {
+/// Fields, key/value pairs, and the byte after the empty line that ends the header.
+pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), FileError> {
     let mut lines = Lines::of(path)?;
     let (mut list, mut pairs, mut at) = (Vec::new(), Vec::new(), 0);
     while let Some(Line { number, text, end }) = lines.next()? {
@@ -145,15 +154,12 @@ fn fields(path: &Path) -> Result<(Fields<'_>, Vec<String>, u64), FileError> {
         } else if text.starts_with('#') {
             // A comment.
         } else if let Some((key, value)) = text.split_once(':') {
-            if value.starts_with('=') {
-                pairs.push(key.to_owned());
-                continue;
-            }
-            list.push(Field {
-                line: number,
-                key: key.trim().to_owned(),
-                value: value.trim().to_owned(),
-            });
+            let (into, value) = match value.strip_prefix('=') {
+                Some(value) => (&mut pairs, value),
+                None => (&mut list, value),
+            };
+            let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
+            into.push(Field { line: number, key, value });
         } else {
             return Err(FileError::line(
                 path,

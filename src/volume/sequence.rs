@@ -1,13 +1,16 @@
-//! Tracked sequences: frames with poses and timestamps in one MetaImage, as PLUS and 3D Slicer
+//! Tracked sequences: frames with poses and timestamps in one MetaImage or NRRD, as PLUS and 3D Slicer
 //! write them (PLUS user manual, "Sequence metafile").
 
 use std::path::Path;
 
+use super::fields::{Field, Fields};
+use super::header::Header;
 use super::reconstruct::fan;
 use super::{Voxels, Warning, meta};
 use crate::issue::FileError;
 
 pub(super) mod frames;
+pub(super) mod nrrd;
 mod summary;
 mod track;
 
@@ -43,24 +46,32 @@ pub(super) const KEYS: [&str; 6] = {
 };
 
 impl Sequence {
-    /// Reads a sequence (.mha, .mhd). Of several values per pixel the first is read. A frame whose
+    /// Reads a sequence (.mha, .mhd, .nrrd, .nhdr). Of several values per pixel the first is read. A frame whose
     /// header has no entries for it has no poses.
     ///
     /// # Errors
     /// Those of a volume; malformed entries of frames; a frame that is a volume itself.
     pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), FileError> {
+        if nrrd::is_meant(path) {
+            let (pairs, header) = nrrd::header(path)?;
+            let orientation = nrrd::orientation(&pairs).map(|f| f.value.clone());
+            let strange = |f: &&Field| !f.key.starts_with(frames::PREFIX) && !nrrd::is_form(&f.key);
+            let others = pairs.list.iter().filter(strange);
+            let others = others.map(|f| (f.key.clone(), f.value.clone())).collect();
+            return Self::assemble(path, header, &pairs, orientation, others);
+        }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         if !["mha", "mhd"].contains(&extension.to_ascii_lowercase().as_str()) {
             return Err(FileError::file(
                 path,
-                "is no MetaImage by its extension, in which tracked sequences are read",
+                "is neither MetaImage nor NRRD by its extension, in which tracked sequences are read",
                 "save it as .igs.mha (3D Slicer and PLUS do)",
             ));
         }
         let (fields, data) = meta::fields(path)?;
         let mut header = meta::of_fields(&fields, data)?;
         let axes: usize = fields.number(fields.need("NDims")?)?;
-        let [width, height, depth] = header.layout.size;
+        let depth = header.layout.size[2];
         if axes > 3 {
             // PLUS can write frames as volumes of one slice; the fourth axis is then time.
             if depth > 1 {
@@ -78,19 +89,33 @@ impl Sequence {
                 "give a sequence of planes, its third axis of kind `list`",
             ));
         }
-        let mut tracked = frames::parse(&fields, header.layout.size[2])?;
-        let (volume, warnings) = header.load(path)?;
-        let frames = (0..volume.size[2]).map(|i| tracked.remove(&i).unwrap_or_default());
-        let spacing = volume.spacing();
         let others = meta::unused_keys(&fields);
         let others = others.into_iter().filter(|f| f.key != ORIENTATION);
+        let others = others.map(|f| (f.key.clone(), f.value.clone())).collect();
+        let orientation = fields.find(&[ORIENTATION]).map(|f| f.value.clone());
+        Self::assemble(path, header, &fields, orientation, others)
+    }
+
+    /// The sequence of a header whose slices are frames, with the entries of frames among `entries`.
+    fn assemble(
+        path: &Path,
+        header: Header,
+        entries: &Fields,
+        orientation: Option<String>,
+        fields: Vec<(String, String)>,
+    ) -> Result<(Self, Vec<Warning>), FileError> {
+        let [width, height, count] = header.layout.size;
+        let mut tracked = frames::parse(entries, count)?;
+        let (volume, warnings) = header.load(path)?;
+        let frames = (0..count).map(|i| tracked.remove(&i).unwrap_or_default()).collect();
+        let spacing = volume.spacing();
         let sequence = Self {
             size: [width, height],
             spacing: [spacing.x, spacing.y],
-            orientation: fields.find(&[ORIENTATION]).map(|f| f.value.clone()),
+            orientation,
             pixels: volume.voxels,
-            frames: frames.collect(),
-            fields: others.map(|f| (f.key.clone(), f.value.clone())).collect(),
+            frames,
+            fields,
         };
         Ok((sequence, warnings))
     }
@@ -104,10 +129,12 @@ impl Sequence {
         frame * self.size[0] * self.size[1]
     }
 
-    /// Writes a sequence (.mha, pixels compressed) that reads back equal.
+    /// Writes a sequence (.mha or .nrrd, pixels compressed) that reads back equal, but for the spacing in NRRD: the
+    /// directions of its axes are the calibration, where all frames have the same, so that a plane has its size in mm
+    /// also where nobody looks for poses.
     ///
     /// # Errors
-    /// When the name is not .mha, or the file cannot be written.
+    /// When the name is neither, or the file cannot be written.
     ///
     /// # Panics
     /// When the pixels are not those of so many frames, or an entry would break the header.
@@ -115,6 +142,16 @@ impl Sequence {
         let [width, height] = self.size;
         let count = self.frames.len();
         assert_eq!(self.pixels.len(), width * height * count, "pixels");
+        let ends = |with: &str| path.extension().is_some_and(|e| e.eq_ignore_ascii_case(with));
+        if ends("nrrd") {
+            return nrrd::write(self, path);
+        } else if !ends("mha") {
+            return Err(FileError::file(
+                path,
+                "is not written: only MetaImage and NRRD in one file are",
+                "end the name in .mha or .nrrd",
+            ));
+        }
         let [x, y] = self.spacing.map(super::write::number);
         let mut header = super::write::Header::new(&self.pixels, 3);
         header.entry("CenterOfRotation", "0 0 0");
@@ -131,7 +168,9 @@ impl Sequence {
             header.entry(key, value);
         }
         for (index, frame) in self.frames.iter().enumerate() {
-            frame.write(index, &mut header);
+            for (key, value) in frame.entries(index) {
+                header.entry(&key, value);
+            }
         }
         header.finish(path, [&self.pixels])
     }

@@ -71,19 +71,24 @@ impl Header {
         let data = encoder.finish().expect("memory");
         self.entry("CompressedDataSize", data.len().to_string());
         self.entry("ElementDataFile", "LOCAL");
-        let write = || {
-            let mut file = File::create(path)?;
-            file.write_all(self.0.as_bytes())?;
-            file.write_all(&data)
-        };
-        write().map_err(|e| {
-            FileError::file(
-                path,
-                format!("cannot be written: {e}"),
-                "check the folder, its permissions and its free space",
-            )
-        })
+        create(path, &self.0, &data)
     }
+}
+
+/// Writes a file of a header and data.
+pub(super) fn create(path: &Path, header: &str, data: &[u8]) -> Result<(), FileError> {
+    let write = || {
+        let mut file = File::create(path)?;
+        file.write_all(header.as_bytes())?;
+        file.write_all(data)
+    };
+    write().map_err(|e| {
+        FileError::file(
+            path,
+            format!("cannot be written: {e}"),
+            "check the folder, its permissions and its free space",
+        )
+    })
 }
 
 /// Writes a volume, or several over time, as MetaImage (.mha). Voxels read back equal, the placement equal

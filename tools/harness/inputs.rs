@@ -140,6 +140,7 @@ pub fn rows(frame: &Frame) -> Vec<Row> {
                 receive_reach: 0.5 + 0.3 * depth,
                 black: -12.0 + 0.02 * depth,
                 sigma_wavefront: 5.0 - 0.06 * depth,
+                aperture: 0.1 - 0.0005 * depth,
                 ..Row::default()
             }
         })

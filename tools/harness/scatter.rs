@@ -59,6 +59,7 @@ fn narrow(s: &Segment) -> layout::Segment {
         direction_time: four(s.direction, s.time),
         lateral_weight: four(s.lateral, s.weight),
         spread: four(s.spread.into(), s.share),
+        lens: four(s.lens.into(), 0.0),
         tissue: s.tissue,
         instance: s.instance,
         line: s.line,

@@ -161,6 +161,10 @@ fn unmatched(mut got: Vec<Segment>, expected: &[Segment]) -> usize {
     missing + got.len()
 }
 
+/// Absolute error of a lens in single precision: of a direction, some 1e-7, over the step with which it is found; mm after
+/// 100 mm, its change per mm, and half of the change of that.
+const LENS: [f64; 3] = [1e-2, 2e-4, 1e-6];
+
 fn alike(a: &Segment, b: &Segment) -> bool {
     let close = |a: f64, b: f64, by: f64| (a - b).abs() <= by || (a.is_nan() && b.is_nan());
     let relative = |a: f64, b: f64| close(a, b, 1e-3 * b.abs());
@@ -174,4 +178,5 @@ fn alike(a: &Segment, b: &Segment) -> bool {
         && relative(a.weight, b.weight)
         && relative(a.share, b.share)
         && (0..3).all(|i| close(a.spread[i], b.spread[i], 1e-3 * b.spread[i].abs() + 1e-6))
+        && (0..3).all(|i| close(a.lens[i], b.lens[i], 5e-3 * b.lens[i].abs() + LENS[i]))
 }

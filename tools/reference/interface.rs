@@ -3,14 +3,14 @@
 use glam::DVec3;
 
 use super::Accumulator;
-use super::acoustics::{Fluid, mirror, power_cosine, reflection};
+use super::acoustics::{Fluid, mirror, power_cosine, reflection, refract};
 use super::footprint;
 use super::path::Path;
 use super::random::{PURPOSE_NORMAL, PURPOSE_THICKNESS, draw, gaussian, pcg4d, unit};
 use super::stack::Stack;
 use super::wavefront::{Slope, turned};
 use super::world::{Crossing, World};
-use insonify::sim::layout::{FLAG_COHERENT, Row, Surface, Tissue};
+use insonify::sim::layout::{BENDING_STEP, FLAG_COHERENT, Row, Surface, Tissue};
 
 /// Roughness exponent from which on a surface is a perfect mirror.
 pub(super) const MIRROR: f64 = 1e9;
@@ -35,6 +35,8 @@ pub(super) struct Interface {
     pub(super) geometric: DVec3,
     /// Normal averaged over the wavefront, by which the path refracts.
     pub(super) refracting: DVec3,
+    /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.
+    turning: DVec3,
     /// The micro-normal; none if no attempt was acceptable: then there is no echo and no reflected path.
     pub(super) micro: Option<Micro>,
     /// Fluids before and behind.
@@ -66,7 +68,7 @@ pub(super) fn meet(
     after: &Stack,
 ) -> Interface {
     let d = path.direction;
-    let Slope { geometric, shading, refracting, width } = world.slope(row, path, hit);
+    let Slope { geometric, shading, refracting, turning, width } = world.slope(row, path, hit);
     let tissue = |stack| &world.tissues[world.medium(stack).0 as usize];
     let (before, behind) = (tissue(&path.stack), tissue(after));
     let fluids = [fluid(before), fluid(behind)];
@@ -78,6 +80,7 @@ pub(super) fn meet(
     Interface {
         geometric,
         refracting,
+        turning,
         micro: micro_normal(world, path, geometric, shading, roughness),
         fluids,
         reflectance: footprint::reflectance(fluids[0], fluids[1], cos_i.max(0.0), width),
@@ -133,6 +136,19 @@ impl Interface {
     pub(super) fn turned(&self, world: &World, path: &Path, n: DVec3) -> Option<DVec3> {
         let direction = turned(world.frame, self.fluids, path.direction, n, self.geometric);
         direction.or(self.curved.then_some(path.direction))
+    }
+
+    /// Change of the direction in which `path` is refracted at normal `n`, per mm across, rad.
+    pub(super) fn bending(&self, path: &Path, n: DVec3) -> f64 {
+        if self.turning == DVec3::ZERO {
+            return 0.0;
+        }
+        let [before, behind] = self.fluids;
+        let through = |n: DVec3| refract(before, behind, path.direction, n);
+        let step = f64::from(BENDING_STEP);
+        let beside = through((n + step * self.turning).normalize());
+        let bent = beside.zip(through(n)).map(|(beside, middle)| (beside - middle) / step);
+        bent.map_or(0.0, |bent| bent.dot(path.lateral))
     }
 
     /// Deposits the echo that returns along the path: the part in phase at the surface, the rest displaced

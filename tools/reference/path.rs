@@ -47,6 +47,8 @@ pub(super) struct Path {
     pub(super) interactions: u32,
     pub(super) reflections: u32,
     pub(super) spread: [f64; 3],
+    /// See [`super::Segment::lens`].
+    pub(super) lens: [f64; 3],
     /// Probability with which it was followed; its weight is divided by it.
     pub(super) survival: f64,
     pub(super) stack: Stack,

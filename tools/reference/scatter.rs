@@ -9,7 +9,9 @@ use super::field::Field;
 use super::geometry::{beam_weight, probe, world_line};
 use super::world::World;
 use super::{Accumulator, Segment};
-use insonify::sim::layout::{FLAG_VOXEL, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD};
+use insonify::sim::layout::{
+    FLAG_VOXEL, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
+};
 
 /// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
 /// could belong to two layers or to none.
@@ -69,7 +71,9 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
         })
     };
     let fields: Vec<_> = (0..world.instances.len() as u32).map(deformed).collect();
-    let numbers = |s: &Segment| [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread);
+    let numbers = |s: &Segment| {
+        [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread).chain(s.lens)
+    };
     let finite = |s: &&Segment| {
         let vectors = [s.origin, s.direction, s.lateral];
         numbers(s).all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
@@ -159,7 +163,7 @@ impl<'a> Tube<'a> {
     }
 
     fn row(&self, x: f64, out: &Accumulator) -> &'a Row {
-        &self.world.rows[out.sample(self.time(x))]
+        &self.world.rows[self.sample(x, out)]
     }
 
     /// Weight at distance `x` without absorption: smaller off the scanline, and averaged where a rough
@@ -184,9 +188,14 @@ impl<'a> Tube<'a> {
         (self.weight(x, self.row(x, out)) * self.absorbed(x)).log2() + f64::from(self.tissue.level)
     }
 
+    /// Index of the sample at distance `x`.
+    fn sample(&self, x: f64, out: &Accumulator) -> usize {
+        out.sample(self.time(x))
+    }
+
     /// Bin of the sample at distance `x`.
     fn bin(&self, x: f64, out: &Accumulator) -> u32 {
-        out.sample(self.time(x)) as u32 / SCATTER_BIN
+        self.sample(x, out) as u32 / SCATTER_BIN
     }
 
     /// The bins that it passes.
@@ -236,14 +245,24 @@ impl<'a> Tube<'a> {
         [-1.0, 1.0].map(|side| (side + 2.0 * POINT_SHIFT) * reach)
     }
 
-    /// Half the beam's width at `row`, mm: the beam's section is an ellipse, of which the
+    /// Variance across of the beam at distance `x`, over that behind even surfaces, whose 1 / sigma^2 is `fall`: lenses
+    /// widen the transmitted and the received beam, and the product of both by half as much.
+    fn widened(&self, x: f64, fall: f64) -> f64 {
+        let [a, b, c] = self.segment.lens;
+        let off = a + x * (b + x * c);
+        1.0 + (0.5 * off * off * fall).min(MOST_WIDENED.into())
+    }
+
+    /// Half the beam's width at sample `k`, mm: the beam's section is an ellipse, of which the
     /// edge of the layer nearest to the middle is taken.
-    fn half_width(&self, row: &Row) -> f64 {
+    fn half_width(&self, k: usize) -> f64 {
         let frame = self.world.frame;
+        let row = &self.world.rows[k];
+        let widened = self.widened(self.distance(k as f64 + 0.5), falling(row)[0]);
         let cut = f64::from(frame.lateral_cut);
         let nearest = (self.layer_offset.abs() - f64::from(frame.elevation_reach)).max(0.0);
         let height = nearest / (cut * f64::from(row.sigma_elevation));
-        cut * f64::from(row.sigma_lateral) * (1.0 - height * height).max(0.0).sqrt()
+        cut * f64::from(row.sigma_lateral) * (widened * (1.0 - height * height).max(0.0)).sqrt()
     }
 
     /// Adds the echo at `from` the tube's origin; `amplitude` is without absorption and `beam`.
@@ -265,7 +284,10 @@ impl<'a> Tube<'a> {
     fn beam_of(&self, from: DVec3, [lateral, elevation]: [f64; 2]) -> f64 {
         let across = from.dot(self.lateral);
         let up = self.layer_offset + from.dot(self.elevation);
-        (-0.5 * (across * across * lateral + up * up * elevation)).exp()
+        let widened = self.widened(from.dot(self.direction), lateral);
+        // As much fainter as it is wider.
+        let exponent = -0.5 * (across * across * lateral / widened + up * up * elevation);
+        exponent.exp() / widened.sqrt()
     }
 
     /// 1 / sigma^2 at distance `x`: the value of a row is that of its sample's middle, and between them lies the

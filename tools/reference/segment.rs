@@ -21,6 +21,9 @@ pub struct Segment {
     pub weight: f64,
     /// Lateral variance a + 2 b x + c x^2 after rough reflections: a mm^2, b mm, c.
     pub spread: [f64; 3],
+    /// Lateral offset a + b x + c x^2, mm, of what comes one deviation beside the beam's axis, by surfaces that bend its
+    /// wavefront.
+    pub lens: [f64; 3],
     /// Share of the path among those that replace it.
     pub share: f64,
     /// Index of the tissue.
@@ -44,6 +47,7 @@ impl From<&layout::Segment> for Segment {
             lateral: xyz(s.lateral_weight),
             weight: s.lateral_weight[3].into(),
             spread: [s.spread[0].into(), s.spread[1].into(), s.spread[2].into()],
+            lens: [s.lens[0].into(), s.lens[1].into(), s.lens[2].into()],
             share: s.spread[3].into(),
             tissue: s.tissue,
             instance: s.instance,
@@ -61,6 +65,7 @@ impl From<&Segment> for layout::Segment {
             direction_time: pack(s.direction, s.time),
             lateral_weight: pack(s.lateral, s.weight),
             spread: pack(DVec3::from(s.spread), s.share),
+            lens: pack(DVec3::from(s.lens), 0.0),
             tissue: s.tissue,
             instance: s.instance,
             line: s.line,

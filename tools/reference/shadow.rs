@@ -61,6 +61,7 @@ fn middle(world: &World, line: u32, begin: &Start) -> Path {
         interactions: 0,
         reflections: 0,
         spread: [0.0; 3],
+        lens: [0.0; 3],
         survival: 1.0,
         stack: begin.media.clone(),
         t_min: if begin.travelled > 0.0 { step(origin) } else { 0.0 },

@@ -92,6 +92,7 @@ impl Tracer<'_> {
             interactions: begin.interactions,
             reflections: 0,
             spread: [jitter * jitter, 0.0, fan],
+            lens: [0.0; 3],
             survival: 1.0,
             stack: begin.media.clone(),
             t_min,
@@ -240,6 +241,8 @@ impl Tracer<'_> {
         path.time += t / self.speed(&path.stack);
         let [a, b, c] = path.spread;
         path.spread = [a + 2.0 * b * t + c * t * t, b + c * t, c];
+        let [a, b, c] = path.lens;
+        path.lens = [a + b * t + c * t * t, b + 2.0 * c * t, c];
         path.t_min = step(path.origin);
     }
 
@@ -308,6 +311,8 @@ impl Tracer<'_> {
             self.out.counters.paths_lost += 1;
             return false;
         };
+        let row = &self.world.rows[self.out.surface.sample(path.time)];
+        path.lens[2] += f64::from(row.aperture) * interface.bending(path, normal);
         path.direction = direction;
         path.lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
         path.stack = after;
@@ -353,6 +358,7 @@ impl Tracer<'_> {
             lateral: path.lateral,
             weight,
             spread: path.spread,
+            lens: path.lens,
             share,
             tissue,
             instance,

@@ -19,6 +19,8 @@ pub(super) struct Slope {
     pub(super) shading: DVec3,
     /// Normal of the mean slope over the wavefront; in geometric acoustics equal to `shading`.
     pub(super) refracting: DVec3,
+    /// Change of `refracting` per mm across the path, in the image plane; 0 in geometric acoustics.
+    pub(super) turning: DVec3,
     /// Deviation of sin i over the beam; 0 on flat surfaces and in geometric acoustics.
     pub(super) width: f64,
 }
@@ -73,6 +75,7 @@ impl World<'_> {
         let spread = path.spread[0];
         let wide = self.frame.flags & FLAG_WAVEFRONT != 0;
         let (mut corners, mut refracting) = (self.corner_normals(hit), shading);
+        let mut turning = DVec3::ZERO;
         if wide {
             let width = f64::from(row.sigma_wavefront).hypot(spread.sqrt());
             let upright = side * self.between(hit, self.averaged(hit, width).0);
@@ -83,6 +86,7 @@ impl World<'_> {
             refracting = side * self.between(hit, corners);
             let [u, v] = hit.uv;
             let coherence = (1.0 - u - v) * coherences[0] + u * coherences[1] + v * coherences[2];
+            turning = side * coherence * self.turning(hit, corners, path.lateral);
             if coherence <= 0.99999 {
                 refracting = partly_turned(refracting, coherence, d);
             }
@@ -96,7 +100,7 @@ impl World<'_> {
             let averaged_away = along.normalize().dot(shading - refracting);
             width = curved.hypot(averaged_away);
         }
-        Slope { geometric, shading, refracting, width }
+        Slope { geometric, shading, refracting, turning, width }
     }
 }
 

@@ -191,9 +191,9 @@ impl World<'_> {
         (affine(&instance.object_from_world).matrix3.transpose() * mean).normalize_or_zero()
     }
 
-    /// Rotation of the normal interpolated from `normals` at the corners of the triangle (object space), along the
-    /// direction `along` (world, any length), rad/mm.
-    pub fn curvature(&self, crossing: &Crossing, normals: [DVec3; 3], along: DVec3) -> f64 {
+    /// Change of the normal interpolated from `normals` at the corners of the triangle (object space) over the way
+    /// `along` (world, mm).
+    pub fn turning(&self, crossing: &Crossing, normals: [DVec3; 3], along: DVec3) -> DVec3 {
         let instance = &self.instances[crossing.instance as usize];
         let to_world = affine(&instance.world_from_object).matrix3;
         let turn = affine(&instance.object_from_world).matrix3.transpose();
@@ -201,13 +201,21 @@ impl World<'_> {
         let (u, v) = (to_world * (b - a), to_world * (c - a));
         let [n, n_u, n_v] = normals.map(|n| (turn * n).normalize_or_zero());
         let across = u.cross(v);
-        let (area2, size) = (across.length_squared(), along.length_squared());
-        if area2 == 0.0 || size == 0.0 {
-            return 0.0;
+        let area2 = across.length_squared();
+        if area2 == 0.0 {
+            return DVec3::ZERO;
         }
         let a = along.cross(v).dot(across) / area2;
         let b = u.cross(along).dot(across) / area2;
-        (a * (n_u - n) + b * (n_v - n)).dot(along).abs() / size
+        a * (n_u - n) + b * (n_v - n)
+    }
+
+    /// Rotation of that normal along the direction `along` (world, any length), rad/mm.
+    pub fn curvature(&self, crossing: &Crossing, normals: [DVec3; 3], along: DVec3) -> f64 {
+        match along.length_squared() {
+            0.0 => 0.0,
+            size => self.turning(crossing, normals, along).dot(along).abs() / size,
+        }
     }
 
     /// Index of the tissue where `stack` encloses a point, and of the instance or NONE.

@@ -106,13 +106,15 @@ fn unplaced(dicom: &Dicom, image: &Image) -> FileError {
     dicom.error(message, NO_PLACE)
 }
 
-/// The plane placed by these functional groups, or by the file itself.
+/// The plane placed by these functional groups, or by the file itself: in the patient where they say so, else in the
+/// volume's own frame of reference.
 fn plane(dicom: &Dicom, groups: &[&Item]) -> Option<Plane> {
     let elements = dicom.elements();
     let find = |tag| groups.iter().find_map(|g| first(g, tag));
+    let in_patient = find(elements::POSITION_PATIENT).and(find(elements::ORIENTATION_PATIENT));
     let (origin, orientation, patient) =
         match (find(elements::POSITION_VOLUME), find(elements::ORIENTATION_VOLUME)) {
-            (Some(position), Some(orientation)) => (
+            (Some(position), Some(orientation)) if in_patient.is_none() => (
                 elements.doubles::<3>(position, (0x0020, 0x9301))?,
                 elements.doubles::<6>(orientation, (0x0020, 0x9302))?,
                 false,

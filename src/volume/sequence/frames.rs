@@ -6,13 +6,15 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use crate::issue::FileError;
 use crate::volume::fields::{Field, Fields};
-use crate::volume::write::{Header, number};
+use crate::volume::write::number;
 
 /// Beginning of the keys of frames.
 pub(in crate::volume) const PREFIX: &str = "Seq_Frame";
 const TRANSFORM: &str = "Transform";
 const STATUS: &str = "TransformStatus";
 const IMAGE_STATUS: &str = "ImageStatus";
+/// The same as PLUS names it in NRRD.
+const PLUS_STATUS: &str = "Status";
 const TIMESTAMP: &str = "Timestamp";
 
 /// A measured transform, and whether it is valid.
@@ -57,9 +59,11 @@ impl TrackedFrame {
         self.image != Some(false)
     }
 
-    pub(super) fn write(&self, index: usize, header: &mut Header) {
+    /// Keys and values of frame `index` in a header.
+    pub(super) fn entries(&self, index: usize) -> Vec<(String, String)> {
+        let mut out = Vec::new();
         let mut entry = |name: &str, value: &str| {
-            header.entry(&format!("{PREFIX}{index:04}_{name}"), value);
+            out.push((format!("{PREFIX}{index:04}_{name}"), value.to_owned()));
         };
         for (name, pose) in &self.poses {
             let (m, t) = (pose.transform.matrix3, pose.transform.translation);
@@ -81,6 +85,7 @@ impl TrackedFrame {
         if let Some(image) = self.image {
             entry(IMAGE_STATUS, if image { "OK" } else { "INVALID" });
         }
+        out
     }
 }
 
@@ -131,7 +136,7 @@ pub(super) fn parse(
                 return Err(fields.error(field, "is no time", "write seconds"));
             }
             frame.timestamp = Some(time);
-        } else if name == IMAGE_STATUS {
+        } else if [IMAGE_STATUS, PLUS_STATUS].contains(&name) {
             frame.image = Some(field.value == "OK");
         } else {
             frame.fields.push((name.to_owned(), field.value.clone()));

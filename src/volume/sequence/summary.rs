@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 use std::fmt;
 use std::path::Path;
 
-use super::frames;
+use super::{frames, nrrd};
 use crate::issue::FileError;
-use crate::volume::meta;
+use crate::volume::{self, meta};
 
 /// Frames, poses and times of a sequence.
 #[derive(Clone, Debug, PartialEq)]
@@ -20,16 +20,25 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Reads the header of a file (.mha, .mhd); none where it is no sequence.
+    /// Reads the header of a file (.mha, .mhd, .nrrd, .nhdr); none where it is no sequence.
     ///
     /// # Errors
     /// A wrong header.
     pub fn read(path: &Path) -> Result<Option<Self>, FileError> {
-        let (fields, data) = meta::fields(path)?;
-        if !frames::in_header(&fields) {
-            return Ok(None);
-        }
-        let header = meta::of_fields(&fields, data)?;
+        let (fields, header) = if nrrd::is_meant(path) {
+            let (_, list, _) = volume::nrrd::fields(path)?;
+            if !nrrd::is_tracked(&list) {
+                return Ok(None);
+            }
+            nrrd::header(path)?
+        } else {
+            let (fields, data) = meta::fields(path)?;
+            if !frames::in_header(&fields) {
+                return Ok(None);
+            }
+            let header = meta::of_fields(&fields, data)?;
+            (fields, header)
+        };
         let count = match header.layout.size[2] {
             1 => header.layout.volumes,
             count => count,

@@ -4,9 +4,8 @@ use std::path::Path;
 
 use super::frames::{self, TrackedFrame};
 use crate::issue::FileError;
-use crate::volume::fields::{Field, Fields};
-use crate::volume::meta;
-use crate::volume::source::{self, MAX_HEADER};
+use crate::volume::fields::Fields;
+use crate::volume::{meta, nrrd};
 
 /// Reads the entries of frames from the header of a sequence (.mha, .mhd, .nrrd), in their order; the pixels, if
 /// there are any, are not looked at.
@@ -14,9 +13,8 @@ use crate::volume::source::{self, MAX_HEADER};
 /// # Errors
 /// A header that cannot be read, or describes no frame.
 pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, FileError> {
-    let name = path.to_string_lossy().to_ascii_lowercase();
-    let fields = match name.ends_with(".nrrd") || name.ends_with(".nhdr") {
-        true => pairs(path)?,
+    let fields = match super::nrrd::is_meant(path) {
+        true => Fields { path, list: nrrd::fields(path)?.1 },
         false => meta::fields(path)?.0,
     };
     let found = frames::parse(&fields, usize::MAX)?;
@@ -28,18 +26,4 @@ pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, FileError> {
         ));
     }
     Ok(found.into_values().collect())
-}
-
-/// The key/value pairs of a NRRD header as fields.
-fn pairs(path: &Path) -> Result<Fields<'_>, FileError> {
-    let bytes = source::prefix(path, MAX_HEADER)?;
-    let lines = bytes.split(|&b| b == b'\n').map(String::from_utf8_lossy);
-    let mut list = Vec::new();
-    for (line, text) in (1..).zip(lines).take_while(|(_, text)| !text.trim().is_empty()) {
-        if let Some((key, value)) = text.split_once(":=") {
-            let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
-            list.push(Field { line, key, value });
-        }
-    }
-    Ok(Fields { path, list })
 }

@@ -93,7 +93,7 @@ impl Tube<'_> {
         let drift = walk.across.x / walk.across.y;
         let step = walk.along.x - walk.along.y * drift;
         // Larger than the distance of any cell's scatterer from the crossing of its plane.
-        let widest = (self.world.rows.iter()).fold(0.0, |w, r| f64::max(w, self.half_width(r)));
+        let widest = (0..self.world.rows.len()).fold(0.0, |w, k| f64::max(w, self.half_width(k)));
         let margin = 2.0 * h + 2.0 * widest + 2.0 * reach;
         let ends = [-margin, self.segment.length + margin].map(|x| o[a] + x / step);
         let ends = [ends[0].min(ends[1]), ends[0].max(ends[1])];
@@ -108,7 +108,7 @@ impl Tube<'_> {
                 continue;
             }
             let row = self.row(x, out);
-            let width = self.half_width(row);
+            let width = self.half_width(self.sample(x, out));
             let strength =
                 self.weight(x, row) * power.sqrt() * factor(self.tissue, o + x * self.direction);
             let row_middle = o[b] - drift * da;
@@ -173,7 +173,7 @@ impl Tube<'_> {
                     continue;
                 }
                 let middle = self.origin + x0.midpoint(x1) * self.direction;
-                let rows = [x0, x1].map(|x| self.half_width(self.row(x, out)));
+                let rows = [x0, x1].map(|x| self.half_width(self.sample(x, out)));
                 let half = [1.1 * rows[0].max(rows[1]), 1.1 * reach];
                 let radius = DVec3::new((x1 - x0) / 2.0, half[0], half[1]).length();
                 let (back, spread) = deformed.back(middle, radius);
@@ -200,7 +200,8 @@ impl Tube<'_> {
                                 continue;
                             }
                             let row = self.row(x, out);
-                            let across = from.dot(self.lateral).abs() <= self.half_width(row);
+                            let half = self.half_width(self.sample(x, out));
+                            let across = from.dot(self.lateral).abs() <= half;
                             let [low, high] = self.slab();
                             if !across || !(low..high).contains(&from.dot(self.elevation)) {
                                 continue;

@@ -55,7 +55,9 @@ impl Tube<'_> {
                 continue;
             }
             let row = self.row(x, out);
-            if from.dot(self.lateral).abs() > POINT_CUT * f64::from(row.sigma_lateral) {
+            let sigma = f64::from(row.sigma_lateral);
+            let widened = self.widened(x, sigma.powi(-2));
+            if from.dot(self.lateral).abs() > POINT_CUT * sigma * widened.sqrt() {
                 continue;
             }
             let amplitude =

@@ -11,6 +11,7 @@ fn segment(length: f64) -> Segment {
         lateral: DVec3::X,
         weight: 1.0,
         spread: [0.0; 3],
+        lens: [0.0; 3],
         share: 1.0,
         tissue: 0,
         instance: NONE,
@@ -225,6 +226,28 @@ fn spread_averages_down_and_never_up() {
     close(echo([0.0, 0.0, 0.01], 1.0), cells.recip().sqrt());
     close(echo([0.0, 0.0, 0.01], 4.0), (4.0 / cells).sqrt());
     close(echo([0.0, 0.0, 0.01], 1e3), 1.0);
+}
+
+/// A lens widens the transmitted and the received beam by the offset's square, their product by half of it; energy
+/// stays, so that the echo on the axis falls as the width grows.
+#[test]
+fn a_lens_widens_and_dims() {
+    let mut fixture = point_fixture(0.0);
+    let mut echo = |lens, x| {
+        fixture.points = vec![[x, 0.0, 20.0, 1.0]];
+        let s = Segment { lens, ..segment(60.0) };
+        let out = scatter(&fixture.world(), &[s]);
+        magnitude(&out, 80) + magnitude(&out, 81)
+    };
+    let close = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 1e-6, "{a} {b}");
+    // 0.1 mm - 0.03 * 20 mm + 0.002 / mm * 400 mm^2 = 0.3 mm.
+    let lens = [0.1, -0.03, 0.002];
+    let widened = 1.0 + 0.045 / 0.16;
+    close(echo(lens, 0.0), 1.0 / f64::sqrt(widened));
+    let off_axis = f64::exp(-0.25 / (2.0 * 0.16 * widened));
+    close(echo(lens, 0.5), off_axis / f64::sqrt(widened));
+    close(echo(lens.map(|l| -l), 0.5), off_axis / f64::sqrt(widened));
+    close(echo([100.0, 0.0, 0.0], 0.0), 1.0 / 3.0);
 }
 
 #[test]

@@ -3,7 +3,7 @@ use glam::DAffine3;
 use super::super::fixture::{Fixture, tissue};
 use super::super::origin::origin;
 use super::*;
-use insonify::sim::layout::{FLAG_COHERENT, FLAG_COINCIDENT, NONE, Tissue};
+use insonify::sim::layout::{FLAG_COHERENT, FLAG_COINCIDENT, FLAG_WAVEFRONT, NONE, Tissue};
 
 const FAR: f64 = 500.0;
 
@@ -58,6 +58,32 @@ fn transmission_error(weights: &[f64], tissues: &[Tissue], tops: &[f64]) -> f64 
 fn main_weights(out: &Traced) -> Vec<f64> {
     let straight = out.segments[0].iter().filter(|s| s.direction.z > 0.0 && s.spread[2] == 0.0);
     straight.map(|s| s.weight).collect()
+}
+
+/// Where a wavefront as wide as can be computed for passes the top of a sphere of radius R, it is bent by
+/// (c2 / c1 - 1) / R per mm; the lens grows with the square of the way.
+#[test]
+fn a_sphere_is_a_thin_lens() {
+    let [c1, c2, radius, aperture] = [1.5, 1.6, 40.0, 0.1];
+    let mut fixture = Fixture::new(vec![tissue(c1 as f32, 1.5, 0.0), tissue(c2 as f32, 1.6, 0.0)]);
+    fixture.sphere(DVec3::new(0.0, 0.0, 10.0 + radius), radius, 48, 1, 0);
+    fixture.frame.flags |= FLAG_WAVEFRONT;
+    fixture.frame.max_reflections = 0;
+    for row in &mut fixture.rows {
+        row.aperture = aperture as f32;
+        row.sigma_wavefront = 2.0;
+    }
+    let inside = |fixture: &Fixture| {
+        let out = run(fixture);
+        let at = |s: &&Segment| s.instance == 0;
+        out.segments[0].iter().find(at).expect("inside the sphere").lens
+    };
+    let [a, b, c] = inside(&fixture);
+    let expected = aperture * (c2 / c1 - 1.0) / radius;
+    assert_eq!([a, b], [0.0; 2], "it begins at the surface");
+    assert!((c / expected - 1.0).abs() < 0.03, "{c} {expected}: a sphere of triangles");
+    fixture.frame.flags &= !FLAG_WAVEFRONT;
+    assert_eq!(inside(&fixture), [0.0; 3], "rays have no width");
 }
 
 // f64 against f64: 1e-5 only allows for depths stored in f32.

@@ -1,48 +1,42 @@
-//! Loops in DICOM, read back by pydicom and held to the standard by dciodvfy.
+//! Loops and volumes in DICOM, read back by pydicom and held to the standard by dciodvfy; loops with poses, read back by
+//! our own importer. What 3D Slicer makes of them is computed by its rules (docs/volumes.md, "In 3D Slicer").
 
-#[path = "common/program.rs"]
+#[path = "../common/program.rs"]
 mod program;
-#[path = "common/skip.rs"]
-mod skip;
+mod python;
+mod sequences;
+#[path = "../common/shared_data.rs"]
+mod shared_data;
+mod volumes;
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::OnceLock;
+use std::path::Path;
 
-use insonify::output::dicom::{About, Loop};
+use insonify::output::dicom::{About, Loop, Transducer};
 use insonify::scene::Scene;
 use program::insonify;
+use python::{errors, numbers, python, run};
 use serde_json::Value;
-use skip::{Lacking, skip};
 
-/// A Python that has pydicom, in a folder of the build; none where it cannot be had. Made once, whoever asks first.
-fn python() -> Option<PathBuf> {
-    static MADE: OnceLock<Option<PathBuf>> = OnceLock::new();
-    let made = MADE.get_or_init(make).clone();
-    if made.is_none() {
-        // From the network, like data.
-        skip(Lacking::Data, "no pydicom");
-    }
-    made
-}
-
-fn make() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pydicom");
-    let python = folder.join("bin/python");
-    let runs = |command: &mut Command| command.output().is_ok_and(|out| out.status.success());
-    let ready = || runs(Command::new(&python).args(["-c", "import numpy, pydicom"]));
-    if !ready() {
-        let made = runs(Command::new("python3").args(["-m", "venv"]).arg(&folder));
-        let install = ["-m", "pip", "install", "--quiet", "pydicom==3.0.1", "numpy"];
-        if !(made && runs(Command::new(&python).args(install)) && ready()) {
-            return None;
-        }
-    }
-    Some(python)
-}
+/// Settings with which a frame takes a second.
+const QUICK: [&str; 6] = [
+    "--set",
+    "simulation.paths=1",
+    "--set",
+    "probe.elevation_layers=1",
+    "--set",
+    "probe.scanlines=48",
+];
 
 const READ: &str = r#"
 import json, sys, pydicom
+# The size of a pixel in mm, by the rule of DICOMImageSequencePlugin.py.
+def slicer(d):
+    regions = d.get("SequenceOfUltrasoundRegions", [])
+    r = regions[0] if len(regions) == 1 else None
+    if d.Modality != "US" or r is None or r.RegionSpatialFormat != 1 or r.RegionDataType not in (1, 2):
+        return None
+    cm = r.PhysicalUnitsXDirection == 3 and r.PhysicalUnitsYDirection == 3
+    return [10 * r.PhysicalDeltaX, 10 * r.PhysicalDeltaY] if cm else None
 d = pydicom.dcmread(sys.argv[1])
 r = d.SequenceOfUltrasoundRegions[0]
 p = d.pixel_array
@@ -54,32 +48,12 @@ json.dump({
     "box": [r.RegionLocationMinX0, r.RegionLocationMinY0, r.RegionLocationMaxX1, r.RegionLocationMaxY1],
     "reference": [r.ReferencePixelX0, r.ReferencePixelY0], "at": [r.ReferencePixelPhysicalValueX, r.ReferencePixelPhysicalValueY],
     "kilohertz": r.TransducerFrequency, "modality": d.Modality, "pixels": p.reshape(-1)[:int(sys.argv[2])].tolist(),
-    "sum": int(p.astype("int64").sum()), "valid": d.SOPInstanceUID.is_valid,
+    "sum": int(p.astype("int64").sum()), "valid": d.SOPInstanceUID.is_valid, "slicer": slicer(d),
 }, sys.stdout)
 "#;
 
 fn read(python: &Path, file: &Path, pixels: usize) -> Value {
-    let out = Command::new(python).args(["-c", READ]).arg(file).arg(pixels.to_string()).output();
-    let out = out.expect("Python starts");
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
-    // Warnings of pydicom are faults of ours.
-    assert_eq!(String::from_utf8_lossy(&out.stderr), "");
-    serde_json::from_slice(&out.stdout).expect("JSON")
-}
-
-/// The errors that dicom3tools' validator finds; none where there is no validator.
-fn errors(file: &Path) -> Option<Vec<String>> {
-    let Ok(out) = Command::new("dciodvfy").arg(file).output() else {
-        skip(Lacking::Data, "no dciodvfy (Debian's dicom3tools)");
-        return None;
-    };
-    let text = String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned();
-    assert!(text.contains("USMultiFrameImage"), "{text}");
-    Some(text.lines().filter(|l| l.starts_with("Error")).map(str::to_owned).collect())
-}
-
-fn numbers(value: &Value) -> Vec<f64> {
-    value.as_array().expect("a list").iter().map(|v| v.as_f64().expect("a number")).collect()
+    run(python, READ, &[&file.to_string_lossy(), &pixels.to_string()])
 }
 
 #[test]
@@ -88,20 +62,12 @@ fn a_rendered_loop_has_the_spacing_and_the_time_of_its_frames() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let scene = Path::new(env!("CARGO_MANIFEST_DIR")).join("scenes/phantom.toml");
     let path = scene.to_str().expect("a plain path");
-    let quick = [
-        "--set",
-        "simulation.paths=1",
-        "--set",
-        "probe.elevation_layers=1",
-        "--set",
-        "probe.scanlines=48",
-    ];
     let args =
-        [&["render", path, "--frames", "3", "--fps", "25", "-o", "a.dcm"], &quick[..]].concat();
+        [&["render", path, "--frames", "3", "--fps", "25", "-o", "a.dcm"], &QUICK[..]].concat();
     let (done, said) = insonify(folder.path(), &args);
     assert!(done, "{said}");
     let (done, said) =
-        insonify(folder.path(), &[&["render", path, "-o", "a.png"], &quick[..]].concat());
+        insonify(folder.path(), &[&["render", path, "-o", "a.png"], &QUICK[..]].concat());
     assert!(done, "{said}");
     let picture = image::open(folder.path().join("a.png")).expect("a PNG").into_luma8();
     let found = read(&python, &folder.path().join("a.dcm"), 0);
@@ -123,6 +89,8 @@ fn a_rendered_loop_has_the_spacing_and_the_time_of_its_frames() {
     assert_eq!(pitch[0], pitch[1]);
     let expected = (bottom - top) / f64::from(picture.height()) / 10.0;
     assert!((pitch[1] - expected).abs() < 1e-6, "{pitch:?} {expected}");
+    let slicer = numbers(&found["slicer"]);
+    assert!(slicer.iter().all(|mm| (mm - 10.0 * expected).abs() < 1e-6), "{slicer:?} {expected}");
     let wide = (right - left) / f64::from(picture.width()) / 10.0;
     assert!((pitch[0] / wide - 1.0).abs() < 0.01, "{pitch:?} {wide}");
     let (reference, at) = (numbers(&found["reference"]), numbers(&found["at"]));
@@ -148,7 +116,7 @@ fn colours_and_odd_sizes_are_read_back() {
         pitch: 0.123_456_789,
         corner: [-0.3, 0.05],
         frequency: 3.5,
-        transducer: "CURVED LINEAR",
+        transducer: Transducer::Curved,
     };
     let grey = [10, 10, 10, 255, 0, 0, 0, 0, 30, 30, 30, 255];
     let color = [10, 20, 30, 255, 9, 9, 9, 0, 200, 0, 100, 255];
@@ -170,7 +138,7 @@ fn colours_and_odd_sizes_are_read_back() {
         assert_eq!(found["pixels"], serde_json::json!(expected), "{name}");
         assert_eq!(numbers(&found["delta"]), [0.012_345_678_9; 2]);
         assert!((found["time"].as_f64().expect("ms") - 33.333_333).abs() < 1e-5);
-        if let Some(errors) = errors(&path) {
+        if let Some(errors) = errors(&path, "USMultiFrameImage") {
             assert!(errors.is_empty(), "{name}: {errors:?}");
         }
         assert_eq!(found["kilohertz"], 3500);

@@ -1,0 +1,61 @@
+//! pydicom and dciodvfy, where they can be had.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::OnceLock;
+
+use serde_json::Value;
+
+use crate::shared_data::skip::{Lacking, skip};
+
+/// A Python that has pydicom, in a folder of the build; none where it cannot be had. Made once, whoever asks first.
+pub fn python() -> Option<PathBuf> {
+    static MADE: OnceLock<Option<PathBuf>> = OnceLock::new();
+    let made = MADE.get_or_init(make).clone();
+    if made.is_none() {
+        // From the network, like data.
+        skip(Lacking::Data, "no pydicom");
+    }
+    made
+}
+
+fn make() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pydicom");
+    let python = folder.join("bin/python");
+    let runs = |command: &mut Command| command.output().is_ok_and(|out| out.status.success());
+    let ready = || runs(Command::new(&python).args(["-c", "import numpy, pydicom"]));
+    if !ready() {
+        let made = runs(Command::new("python3").args(["-m", "venv"]).arg(&folder));
+        let install = ["-m", "pip", "install", "--quiet", "pydicom==3.0.1", "numpy"];
+        if !(made && runs(Command::new(&python).args(install)) && ready()) {
+            return None;
+        }
+    }
+    Some(python)
+}
+
+/// What a script prints in JSON.
+pub fn run(python: &Path, script: &str, args: &[&str]) -> Value {
+    let out = Command::new(python).args(["-c", script]).args(args).output();
+    let out = out.expect("Python starts");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    // Warnings of pydicom are faults of ours.
+    assert_eq!(String::from_utf8_lossy(&out.stderr), "");
+    serde_json::from_slice(&out.stdout).expect("JSON")
+}
+
+/// The errors that dicom3tools' validator finds in a file of a kind; none where there is no validator.
+pub fn errors(file: &Path, kind: &str) -> Option<Vec<String>> {
+    let Ok(out) = Command::new("dciodvfy").arg(file).output() else {
+        skip(Lacking::Data, "no dciodvfy (Debian's dicom3tools)");
+        return None;
+    };
+    let text = String::from_utf8_lossy(&[out.stdout, out.stderr].concat()).into_owned();
+    assert!(text.contains(kind), "{text}");
+    Some(text.lines().filter(|l| l.starts_with("Error")).map(str::to_owned).collect())
+}
+
+/// A list of numbers.
+pub fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("a list").iter().map(|v| v.as_f64().expect("a number")).collect()
+}
