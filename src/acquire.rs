@@ -7,11 +7,10 @@
 use glam::DAffine3;
 use thiserror::Error;
 
+use crate::issue::FileError;
 use crate::scene::Scene;
 use crate::sim::{SimError, Simulator};
-use crate::volume::{
-    Fan, ReconstructError, Reconstruction, Sequence, Settings, TrackedFrame, reconstruct,
-};
+use crate::volume::{Fan, Reconstruction, Sequence, Settings, TrackedFrame, reconstruct};
 
 mod recording;
 mod sweep;
@@ -90,10 +89,7 @@ pub fn middle<T>(all: &[T]) -> &T {
 ///
 /// # Panics
 /// When the sequence lacks the poses that [`acquire`] writes.
-pub fn volume(
-    sequence: &Sequence,
-    mut settings: Settings,
-) -> Result<Reconstruction, ReconstructError> {
+pub fn volume(sequence: &Sequence, mut settings: Settings) -> Result<Reconstruction, FileError> {
     let pose = |frame: &TrackedFrame, name: &str| frame.poses[name].transform;
     let world_from_middle = pose(middle(&sequence.frames), TRACKED);
     let poses = sequence.frames.iter().map(|frame| {

@@ -4,8 +4,6 @@
 //!
 //! In messages everything is in RAS and mm: 3D Slicer reads matrices so, whatever axes an image states.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
-
 mod answer;
 mod client;
 pub mod image;
@@ -31,9 +29,3 @@ pub const PORT: u16 = 18944;
 /// Warning about a server that other machines can reach.
 pub const OPEN: &str = "whoever reaches this machine can move the probe and see the images; OpenIGTLink \
     knows no passwords";
-
-/// Locks a mutex. The data behind the locks here are whole between any two statements: a thread that has
-/// panicked holding one leaves nothing half done.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
-}

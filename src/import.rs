@@ -1,8 +1,8 @@
-//! Segmentations and meshes of others made into scenes.
+//! Import of segmentations and meshes: scenes made of them.
 //!
 //! A label map (`labels`, with `names` from the file) becomes one closed surface per label, with the same faces on both
 //! sides of a border: `composed` parts what touches along an edge, `nets` makes all surfaces at once, `relax` smooths
-//! them, `surface` takes one out; `map` is the whole way. A folder of meshes goes through `folder`, compared with each other
+//! them, `surface` takes one out; `map` does all of this. A folder of meshes goes through `folder`, compared with each other
 //! by `raster`. `table` says which tissue a structure is made of, `hull`
 //! makes up a skin where there is none, `pose` finds a place on it from which an organ is seen, `draft` writes the
 //! scene. Configurations of PLUS (`plus`) become scenes by `device_set`, poses of sequences rows of a `trajectory`. Knows no
@@ -16,7 +16,6 @@ use crate::volume::Frame;
 pub mod composed;
 pub mod device_set;
 mod draft;
-mod error;
 pub mod folder;
 pub mod grid;
 mod hull;
@@ -35,7 +34,6 @@ mod tests;
 pub mod trajectory;
 
 pub use draft::{Draft, Part, way};
-pub use error::ImportError;
 pub use labels::LabelMap;
 pub use pose::View;
 
@@ -48,7 +46,7 @@ pub struct Options {
     pub spacing: Option<DVec3>,
     /// Organ that the probe looks at.
     pub look_at: Option<String>,
-    /// Tissue of what is inside the skin and no structure of its own.
+    /// Tissue of the space inside the skin that belongs to no structure.
     pub around: String,
     /// Unit of mesh files, where they are in another than their format's.
     pub units: Option<Units>,

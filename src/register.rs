@@ -7,7 +7,6 @@
 
 use glam::DAffine3;
 
-mod error;
 pub mod icp;
 pub mod landmarks;
 pub mod placement;
@@ -15,13 +14,12 @@ pub mod points;
 pub mod surface;
 mod symmetric;
 
-pub use error::RegisterError;
 pub use icp::{Fit, Residuals};
 pub use placement::Placement;
 pub use surface::TriangleSurface;
 
 /// Degrees of freedom of a registration. Neither mirrors.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Transformation {
     /// Rotation and shift.
     Rigid,

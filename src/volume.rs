@@ -8,11 +8,11 @@ use std::path::Path;
 
 use glam::{DAffine3, DVec3};
 
+use crate::issue::FileError;
 /// A finding on a volume that could be loaded.
 pub use crate::issue::Warning;
 
 mod dicom;
-mod error;
 mod fields;
 mod grid;
 mod header;
@@ -20,8 +20,10 @@ mod layout;
 mod meta;
 mod nifti;
 mod nrrd;
+pub mod plus;
 mod reconstruct;
 mod report;
+mod scalar;
 mod sequence;
 mod series;
 mod source;
@@ -31,15 +33,15 @@ mod voxels;
 mod write;
 
 pub use dicom::segmentation::{DicomSegment, Segmentation};
-pub use error::{Place, VolumeError};
 pub use grid::Frame;
 pub use reconstruct::{
-    Compounding, Config, Fan, Filling, Interpolation, Lattice, ReconstructError, Reconstruction,
-    Settings, Transforms, frames_of_pose, reconstruct,
+    Compounding, Config, Fan, Filling, Interpolation, Lattice, Reconstruction, Settings,
+    Transforms, frames_of_pose, reconstruct,
 };
+pub use scalar::Scalar;
 pub use sequence::frames::matrix as transform;
 pub use sequence::{Pose, Sequence, Summary, TrackedFrame, track};
-pub use voxels::{Statistics, VoxelType, Voxels};
+pub use voxels::{Statistics, Voxels};
 pub use write::write_meta;
 
 /// Format of a volume file.
@@ -75,7 +77,7 @@ pub struct Volume {
     /// Frame that its file is written in.
     pub frame: Frame,
     /// Type of the values in its file.
-    pub stored_as: VoxelType,
+    pub stored_as: Scalar,
     /// Voxels along each axis, all at least 1.
     pub size: [usize; 3],
     /// Voxel indices (integers at voxel centres) to LPS, mm.
@@ -113,7 +115,7 @@ impl Volume {
     ///
     /// # Errors
     /// A file, or a data file that it names, that is missing, cut off or wrong.
-    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), FileError> {
         let name = path.to_string_lossy().to_ascii_lowercase();
         let is = |ends: &[&str]| ends.iter().any(|e| name.ends_with(e));
         if is(&[".mha", ".mhd"]) {
@@ -125,10 +127,10 @@ impl Volume {
         } else if is(&[".dcm", ".dicom"]) {
             dicom::load(path)
         } else {
-            Err(VolumeError::file(
+            Err(FileError::file(
                 path,
                 "is no volume by its extension",
-                &format!("give a file of the kinds {KINDS}"),
+                format!("give a file of the kinds {KINDS}"),
             ))
         }
     }

@@ -39,7 +39,7 @@ impl Folder {
     fn load(&self, bytes: &[u8]) -> Result<Volume, String> {
         let path = self.0.path().join("a.dcm");
         std::fs::write(&path, bytes).expect("written");
-        let error = |e: insonify::volume::VolumeError| {
+        let error = |e: insonify::issue::FileError| {
             assert!(!e.remedy.is_empty(), "{e}");
             e.to_string()
         };

@@ -550,7 +550,7 @@ fn the_tint_marks_the_acquired_pixels_and_leaves_the_image_alone() {
         simulator.frame(&scene, 0).unwrap();
         assert!(simulator.pixels().unwrap() == plain, "{settings}");
         let tinted = simulator.tinted_pixels().unwrap().expect("asked for");
-        assert!(device.read_back_image(&image).unwrap() == tinted);
+        assert!(image.read_back().unwrap() == tinted);
         let steps = simulator.fusion_steps().unwrap().expect("fused");
         let (mut acquired, mut simulated, mut mixed) = (0, 0, 0);
         let pixels = plain.2.chunks_exact(4).zip(tinted.chunks_exact(4));

@@ -219,7 +219,7 @@ fn images_are_uploaded_sampled_written_and_read_back() {
     let texels: Vec<f32> = layer(0.0).chain(layer(2.0)).collect();
     device.upload_image(&volume, bytemuck::cast_slice(&texels)).unwrap();
     device.upload_image(&plane, bytemuck::cast_slice(&[0.0_f32, 0.0, 8.0, 8.0])).unwrap();
-    assert_eq!(device.read_back_image(&volume).unwrap(), bytemuck::cast_slice::<f32, u8>(&texels));
+    assert_eq!(volume.read_back().unwrap(), bytemuck::cast_slice::<f32, u8>(&texels));
     let bindings = [
         Binding::Image(&volume),
         Binding::Sampler(&linear),
@@ -227,7 +227,7 @@ fn images_are_uploaded_sampled_written_and_read_back() {
         Binding::Image(&result),
     ];
     device.once(|commands| commands.dispatch(&kernel, [7, 5, 1], &[], &bindings)).unwrap();
-    let bytes = device.read_back_image(&result).unwrap();
+    let bytes = result.read_back().unwrap();
     let got: &[f32] = bytemuck::cast_slice(&bytes);
     for (at, &value) in got.iter().enumerate() {
         let (u, v) = (((at % 7) as f32 + 0.5) / 7.0, ((at / 7) as f32 + 0.5) / 5.0);

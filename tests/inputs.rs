@@ -110,7 +110,7 @@ fn files_that_the_gltf_validator_refuses_are_not_loaded_silently() {
     assert!(silent.is_empty(), "{}", silent.join("\n"));
 }
 
-/// What an independent reader (trimesh) finds in PLY, OFF and STL files: triangles and boxes.
+/// PLY, OFF and STL files have the triangles and boxes that an independent reader (trimesh) finds.
 #[test]
 fn meshes_are_read_as_trimesh_reads_them() {
     let Some(data) = shared_data() else { return };

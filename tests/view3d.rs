@@ -62,7 +62,7 @@ fn pictures(scene: &Scene, sight: &CameraView) -> [Vec<[u8; 4]>; 2] {
         let format = ImageFormat::Rgba8Unorm;
         let image = Image::new(&device, "picture", ImageDim::D2, extent, format).unwrap();
         simulator.view3d(&library, sight, &image).unwrap();
-        bytemuck::pod_collect_to_vec(&device.read_back_image(&image).unwrap())
+        bytemuck::pod_collect_to_vec(&image.read_back().unwrap())
     });
     assert_eq!(device.validation_messages(), Vec::<String>::new());
     made

@@ -25,7 +25,7 @@ pub struct Common {
     /// Path and scatterer counts that suit the device [default: the scene's own]. Counts that --set
     /// gives stay.
     #[arg(long, value_enum)]
-    pub quality: Option<QualityChoice>,
+    pub quality: Option<Quality>,
     /// Time of the first frame: seconds, or with a unit, e.g. "400 ms".
     #[arg(long, default_value = "0", value_parser = seconds, allow_hyphen_values = true)]
     pub time: f64,
@@ -59,17 +59,6 @@ pub enum TracerChoice {
     RayQuery,
     /// Our BVH in a compute kernel; runs everywhere.
     Bvh,
-}
-
-/// Value of `--quality`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum QualityChoice {
-    /// A first look. Software driver: 2 paths, 5 scatterers per resolution cell. GPU: 8 paths, 8 scatterers.
-    Draft,
-    /// Software driver: 8 paths, 8 scatterers per resolution cell. GPU: 32 paths, 16 scatterers.
-    Standard,
-    /// A proof, on any device: 128 paths, lattice cells 2/3 as long, no scatterer left out.
-    Reference,
 }
 
 /// A time on the command line, s.
@@ -140,9 +129,7 @@ impl Common {
     /// The fault of the file.
     pub fn scene(&self, path: &Path) -> Result<Scene> {
         let (scene, warnings) = Scene::load(path, &self.overrides(path))?;
-        for warning in &warnings {
-            output::note(warning);
-        }
+        notes(&warnings);
         Ok(scene)
     }
 
@@ -175,6 +162,11 @@ impl Common {
             _ => Ok(()),
         }
     }
+}
+
+/// Writes each of these to standard error.
+pub fn notes<T: std::fmt::Display>(all: impl IntoIterator<Item = T>) {
+    all.into_iter().for_each(output::note);
 }
 
 /// Refuses a file whose folder does not exist, before minutes of work for it.
@@ -243,15 +235,10 @@ fn too_large(error: &GpuError) -> Report {
 /// Sets the counts of `quality` for this device, except those that the user set by hand.
 fn set_quality(
     simulation: &mut Simulation,
-    quality: QualityChoice,
+    quality: Quality,
     device: &Device,
     overrides: &[(String, String)],
 ) {
-    let quality = match quality {
-        QualityChoice::Draft => Quality::Draft,
-        QualityChoice::Standard => Quality::Standard,
-        QualityChoice::Reference => Quality::Reference,
-    };
     let by_hand = simulation.clone();
     simulation.set_quality(quality, sim::machine(device));
     for (key, _) in overrides {

@@ -14,7 +14,7 @@ use insonify::settings::suggest;
 use insonify::volume::{Frame, Pose, frames_of_pose, transform};
 use miette::{Result, miette};
 
-use super::common::Progress;
+use super::common::{Progress, notes};
 use super::reconstruct::spacing;
 
 /// Arguments of `insonify import`.
@@ -48,7 +48,7 @@ pub struct Import {
     units: Option<Units>,
     /// Frame of mesh files that do not state theirs (SPACE=) [default: lps]
     #[arg(long, value_enum)]
-    frame: Option<FrameChoice>,
+    frame: Option<Frame>,
     /// Tracked sequence whose poses a configuration of PLUS is seen with: the first that are valid
     #[arg(long, value_name = "FILE")]
     sequence: Option<PathBuf>,
@@ -77,15 +77,6 @@ pub struct Import {
 enum Classes {
     /// The 117 classes of TotalSegmentator's task `total`, version 2.
     Totalsegmentator,
-}
-
-/// Value of `--frame`.
-#[derive(Clone, Copy, Debug, clap::ValueEnum)]
-enum FrameChoice {
-    /// Left, posterior, superior.
-    Lps,
-    /// Right, anterior, superior.
-    Ras,
 }
 
 fn named_transform(text: &str) -> Result<(String, DAffine3), String> {
@@ -138,10 +129,7 @@ pub fn run(args: &Import) -> Result<()> {
         look_at: args.look_at.clone(),
         around: args.around.clone(),
         units: args.units,
-        frame: args.frame.map(|frame| match frame {
-            FrameChoice::Lps => Frame::Lps,
-            FrameChoice::Ras => Frame::Ras,
-        }),
+        frame: args.frame,
         force: args.force,
     };
     let mut shown: Option<(String, Progress)> = None;
@@ -165,9 +153,7 @@ pub fn run(args: &Import) -> Result<()> {
         progress.finish();
     }
     let (draft, issues) = done?;
-    for issue in issues {
-        output::note(issue);
-    }
+    notes(issues);
     let path = draft.finish()?;
     report(&draft);
     output::line(path.display());
@@ -182,9 +168,7 @@ fn device_set(source: &Path, folder: &Path, args: &Import) -> Result<()> {
     };
     poses.extend(args.transform.iter().map(|(name, t)| (name.clone(), Pose::ok(*t))));
     let scene = import::device_set::import(source, folder, &poses, args.force)?;
-    for issue in &scene.issues {
-        output::note(issue);
-    }
+    notes(&scene.issues);
     let path = scene.finish()?;
     for structure in &scene.draft.left_out {
         output::line(format!("left out: {structure}, which no scene takes"));

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use glam::{DAffine3, DVec3};
 use insonify::output;
 use insonify::volume::{
@@ -10,6 +10,8 @@ use insonify::volume::{
     Transforms, reconstruct, transform, write_meta,
 };
 use miette::{Context, Result};
+
+use super::common::notes;
 
 /// Arguments of `insonify reconstruct`. What is given here goes before the configuration.
 #[derive(Debug, Args)]
@@ -43,36 +45,16 @@ pub struct Reconstruct {
     clip: Option<[i32; 4]>,
     /// Voxels that a pixel goes to.
     #[arg(long, value_enum)]
-    interpolation: Option<InterpolationChoice>,
+    interpolation: Option<Interpolation>,
     /// Value of a voxel that several pixels reach.
     #[arg(long, value_enum)]
-    compounding: Option<CompoundingChoice>,
+    compounding: Option<Compounding>,
     /// Voxels of the longest line that fills a hole; 0 leaves holes.
     #[arg(long, value_name = "VOXELS", value_parser = clap::value_parser!(u8).range(0..=99))]
     fill: Option<u8>,
     /// Volume to write (.mha).
     #[arg(short, long)]
     output: PathBuf,
-}
-
-/// Value of `--interpolation`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum InterpolationChoice {
-    /// The voxel it lies in.
-    Nearest,
-    /// The eight around it.
-    Linear,
-}
-
-/// Value of `--compounding`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum CompoundingChoice {
-    /// Their mean.
-    Mean,
-    /// The largest.
-    Maximum,
-    /// The latest.
-    Latest,
 }
 
 fn matrix(text: &str) -> Result<DAffine3, String> {
@@ -119,9 +101,7 @@ fn clip(text: &str) -> Result<[i32; 4], String> {
 /// Every fault of files and settings, reported once.
 pub fn run(args: &Reconstruct) -> Result<()> {
     let (sequence, warnings) = Sequence::load(&args.sequence)?;
-    for warning in &warnings {
-        output::note(warning);
-    }
+    notes(&warnings);
     let config = args.config.as_deref().map(Config::load).transpose()?;
     let mut config = config.unwrap_or_else(|| Config {
         transforms: Transforms::default(),
@@ -141,19 +121,8 @@ pub fn run(args: &Reconstruct) -> Result<()> {
     settings.spacing = args.spacing.unwrap_or(settings.spacing);
     settings.lattice = args.extent.or(settings.lattice);
     settings.clip = args.clip.or(settings.clip);
-    if let Some(choice) = args.interpolation {
-        settings.interpolation = match choice {
-            InterpolationChoice::Nearest => Interpolation::Nearest,
-            InterpolationChoice::Linear => Interpolation::Linear,
-        };
-    }
-    if let Some(choice) = args.compounding {
-        settings.compounding = match choice {
-            CompoundingChoice::Mean => Compounding::Mean,
-            CompoundingChoice::Maximum => Compounding::Maximum,
-            CompoundingChoice::Latest => Compounding::Latest,
-        };
-    }
+    settings.interpolation = args.interpolation.unwrap_or(settings.interpolation);
+    settings.compounding = args.compounding.unwrap_or(settings.compounding);
     if let Some(length) = args.fill {
         let stick = Filling::Stick { length: usize::from(length), count: 1 };
         settings.holes = if length > 0 { vec![stick] } else { vec![] };

@@ -12,7 +12,7 @@ use insonify::scene::{Acquired, Scene};
 use insonify::volume::Frame;
 use miette::{IntoDiagnostic, Result, WrapErr, miette};
 
-use super::common::seconds;
+use super::common::{notes, seconds};
 
 mod inputs;
 mod told;
@@ -52,10 +52,10 @@ pub struct Register {
     volume_landmarks: Option<PathBuf>,
     /// Frame of the volume's points, surface and landmarks where their files say none [default: lps].
     #[arg(long, value_enum)]
-    frame: Option<FrameChoice>,
+    frame: Option<Frame>,
     /// Changes allowed: rotation and shift, or the scale as well.
     #[arg(long, value_enum, default_value = "rigid")]
-    transformation: TransformationChoice,
+    transformation: Transformation,
     /// Start of the search without landmarks.
     #[arg(long, value_enum, default_value = "scene", conflicts_with_all = ["landmarks", "model_landmarks"])]
     start: Start,
@@ -80,24 +80,6 @@ pub struct Register {
     json: Option<PathBuf>,
 }
 
-/// Value of `--frame`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum FrameChoice {
-    /// Left, posterior, superior: DICOM, ITK, files of 3D Slicer.
-    Lps,
-    /// Right, anterior, superior: what 3D Slicer shows.
-    Ras,
-}
-
-/// Value of `--transformation`.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum TransformationChoice {
-    /// Rotation and shift.
-    Rigid,
-    /// Those and one scale for all axes.
-    Similarity,
-}
-
 /// Value of `--start`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Start {
@@ -105,22 +87,6 @@ enum Start {
     Scene,
     /// The same, shifted so that the mean of the points lies on the centroid of the surface.
     Centroids,
-}
-
-impl Register {
-    fn frame(&self) -> Option<Frame> {
-        self.frame.map(|frame| match frame {
-            FrameChoice::Lps => Frame::Lps,
-            FrameChoice::Ras => Frame::Ras,
-        })
-    }
-
-    fn transformation(&self) -> Transformation {
-        match self.transformation {
-            TransformationChoice::Rigid => Transformation::Rigid,
-            TransformationChoice::Similarity => Transformation::Similarity,
-        }
-    }
 }
 
 /// Result of a registration. Transforms are from the world with the volume at its present place to the world
@@ -143,9 +109,7 @@ struct Registered {
 /// Every mistake of the user, reported once; the scene file is then untouched.
 pub fn run(args: &Register) -> Result<()> {
     let (mut scene, found) = Scene::load(&args.scene, &[])?;
-    for warning in &found {
-        output::note(warning);
-    }
+    notes(&found);
     scene.set_time(args.time);
     let volume = scene.volume.take().ok_or_else(|| {
         miette!(
@@ -159,7 +123,7 @@ pub fn run(args: &Register) -> Result<()> {
     let made = search(args, &scene, &volume, &mut warnings);
     // The warnings may explain why there is no result.
     let made = made.inspect_err(|_| told::warn(&warnings))?;
-    let placement = Placement::of(&target.placed(&made.transform), args.transformation());
+    let placement = Placement::of(&target.placed(&made.transform), args.transformation);
     warnings.extend(told::doubts(&made));
     told::print(&made);
     told::warn(&warnings);
@@ -194,7 +158,7 @@ fn search(
         let placed = all.into_iter().map(|p| world_from_lps.transform_point3(p));
         placed.collect()
     });
-    let (transformation, from) = (args.transformation(), landmarks.iter().map(|l| l.from));
+    let (transformation, from) = (args.transformation, landmarks.iter().map(|l| l.from));
     let mut start = match landmarks.is_empty() {
         true => DAffine3::IDENTITY,
         false => landmarks::closed_form(&landmarks, transformation)?,

@@ -73,9 +73,7 @@ pub fn run(args: &Vary) -> Result<()> {
     let common = &args.common;
     let (mut scene, variants, warnings) =
         Scene::load_variants(&args.scene, &common.overrides(&args.scene))?;
-    for warning in &warnings {
-        output::note(warning);
-    }
+    common::notes(&warnings);
     if args.show != Show::Parameters && scene.volume.is_none() {
         return Err(miette!(
             help = "add [volume] and [fusion] to it, or leave out --show",

@@ -332,12 +332,6 @@ impl<'a> Commands<'a> {
     ) -> Result<(), GpuError> {
         self.slot.submit_between(self.frame, wait, done)
     }
-
-    /// Hands the commands to the device and waits until they have finished.
-    pub fn submit_and_wait(self) -> Result<FrameTimings, GpuError> {
-        self.slot.submit(self.frame)?;
-        Ok(self.slot.wait()?.unwrap_or_default())
-    }
 }
 
 impl Device {
@@ -358,7 +352,7 @@ impl Device {
         let mut slot = SubmissionSlot::new(self, "once", QueueUser::Work)?;
         let mut commands = Commands::begin(&mut slot, 0)?;
         let result = record(&mut commands)?;
-        let timings = commands.submit_and_wait()?;
-        Ok((result, timings))
+        commands.submit()?;
+        Ok((result, slot.wait()?.unwrap_or_default()))
     }
 }

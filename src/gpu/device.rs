@@ -4,10 +4,11 @@ mod create;
 
 use std::ffi::CString;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use parking_lot::Mutex;
 use winit::window::Window;
 
 use super::adapter::{self, AdapterKind, DeviceInfo};
@@ -300,7 +301,7 @@ impl Device {
 
     /// Runs `work` with the allocator.
     pub(crate) fn with_allocator<T>(&self, work: impl FnOnce(&mut Allocator) -> T) -> T {
-        let mut allocator = self.allocator.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut allocator = self.allocator.lock();
         work(allocator.as_mut().expect("the device is alive"))
     }
 
@@ -336,7 +337,7 @@ impl Device {
 
 impl Drop for Device {
     fn drop(&mut self) {
-        let allocator = self.allocator.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        let allocator = self.allocator.get_mut().take();
         let _changing = LOADER_LISTS.write();
         // SAFETY: everything made from the device holds it alive, so nothing is left but the cache
         // and the allocator's blocks. A lost device may be destroyed without waiting.

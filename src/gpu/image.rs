@@ -5,9 +5,10 @@ use std::sync::Arc;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
+use super::barrier::Stage;
 use super::device::Device;
 use super::error::{GpuError, during};
-use super::memory::CountedMemory;
+use super::memory::{BufferKind, CountedMemory};
 
 /// Number of axes of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -157,7 +158,17 @@ impl Image {
     /// # Errors
     /// No memory; a lost device.
     pub fn read_back(&self) -> Result<Vec<u8>, GpuError> {
-        self.0.device.read_back_image(self)
+        let device = &self.0.device;
+        let readback = device.buffer("readback", self.bytes(), BufferKind::Readback)?;
+        device.once(|commands| {
+            commands.copy_from_image(self, &readback)?;
+            commands.barrier(Stage::Transfer, Stage::Host);
+            Ok(())
+        })?;
+        let mut bytes = vec![0; self.bytes() as usize];
+        // SAFETY: the copy was waited for, after a barrier to the host.
+        unsafe { readback.read_mapped(&mut bytes) };
+        Ok(bytes)
     }
 
     /// Name given at creation.

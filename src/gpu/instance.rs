@@ -1,9 +1,10 @@
 //! The Vulkan instance: loader, validation layers and the log of their messages.
 
 use std::ffi::{CStr, c_char, c_void};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, RwLock};
 
 use ash::{ext, khr, vk};
+use parking_lot::Mutex;
 
 use super::error::{GpuError, during};
 
@@ -31,24 +32,19 @@ pub struct ValidationLog(Arc<Mutex<Vec<String>>>);
 impl ValidationLog {
     /// Every message so far, oldest first.
     pub fn messages(&self) -> Vec<String> {
-        self.lock().clone()
+        self.0.lock().clone()
     }
 
     /// Empties the list and returns it.
     pub fn take(&self) -> Vec<String> {
-        std::mem::take(&mut *self.lock())
+        std::mem::take(&mut *self.0.lock())
     }
 
     pub(crate) fn push(&self, message: String) {
-        let mut messages = self.lock();
+        let mut messages = self.0.lock();
         if messages.len() < MAX_MESSAGES {
             messages.push(message);
         }
-    }
-
-    /// A list of strings stays usable after a panic elsewhere, so poisoning is ignored.
-    fn lock(&self) -> MutexGuard<'_, Vec<String>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -279,7 +275,7 @@ unsafe extern "system" fn on_message(
             .unwrap_or_default()
     };
     let (name, text) = (text(|d| d.p_message_id_name), text(|d| d.p_message));
-    let mut messages = log.lock().unwrap_or_else(PoisonError::into_inner);
+    let mut messages = log.lock();
     if messages.len() < MAX_MESSAGES {
         messages.push(format!("{severity:?}: {name}: {text}"));
     }

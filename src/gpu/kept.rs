@@ -9,13 +9,14 @@
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError, Sender};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 use std::time::Duration;
 
 use ash::vk;
+use parking_lot::Mutex;
 
 /// First bytes of a file; the number counts the format's versions.
 const MAGIC: &[u8] = b"insonify pipelines 1\n";
@@ -111,19 +112,14 @@ impl PipelineStore {
         self.cache
     }
 
-    /// A set stays usable after a panic elsewhere, so poisoning is ignored.
-    fn known(&self) -> MutexGuard<'_, BTreeSet<u64>> {
-        self.known.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Returns whether a number was learnt.
     pub(crate) fn knows(&self, what: u64) -> bool {
-        self.known().contains(&what)
+        self.known.lock().contains(&what)
     }
 
     /// Returns whether a kernel has never run here before; false where nothing is kept.
     pub(crate) fn is_new(&self, kernel: u64) -> bool {
-        self.file.is_some() && !self.known().contains(&kernel)
+        self.file.is_some() && !self.known.lock().contains(&kernel)
     }
 
     /// Tells the user the reason for the wait, once, if the returned value is not dropped within a second
@@ -147,7 +143,7 @@ impl PipelineStore {
     /// Notes that these kernels have run; writes the driver's data if any is new.
     pub(crate) fn learn(&self, kernels: impl IntoIterator<Item = u64>) {
         let Some(file) = &self.file else { return };
-        let mut known = self.known();
+        let mut known = self.known.lock();
         let before = known.len();
         known.extend(kernels);
         if known.len() == before {

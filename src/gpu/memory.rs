@@ -93,8 +93,7 @@ impl BufferKind {
         match self {
             // Copies are read once, so host memory is good enough: the small part of the device's memory that
             // the CPU can write stays free.
-            Self::Upload => MemoryLocation::GpuToCpu,
-            Self::Readback => MemoryLocation::GpuToCpu,
+            Self::Upload | Self::Readback => MemoryLocation::GpuToCpu,
             _ => MemoryLocation::GpuOnly,
         }
     }
@@ -167,67 +166,6 @@ pub(crate) struct RawBuffer {
 pub struct Buffer(pub(crate) Arc<RawBuffer>);
 
 impl Buffer {
-    /// Makes a buffer of `size` bytes (rounded up to a multiple of 4, at least 4); its content is
-    /// undefined.
-    pub fn new(
-        device: &Arc<Device>,
-        name: &str,
-        size: u64,
-        kind: BufferKind,
-    ) -> Result<Self, GpuError> {
-        if matches!(
-            kind,
-            BufferKind::BuildInput | BufferKind::Scratch | BufferKind::AccelerationStructure
-        ) {
-            device.require_accel()?;
-        }
-        // fill() works on words, and a buffer of no bytes cannot exist.
-        let size = size.max(4).next_multiple_of(4);
-        let limit = device.limits().max_storage_buffer_bytes;
-        if kind == BufferKind::Storage && size > limit {
-            return Err(GpuError::TooLarge {
-                name: name.into(),
-                what: format!("{size} bytes"),
-                limit_name: "maxStorageBufferRange",
-                limit: format!("{limit} bytes"),
-            });
-        }
-        let info = vk::BufferCreateInfo::default()
-            .size(size)
-            .usage(kind.usage(device.supports_acceleration_structure()))
-            .sharing_mode(vk::SharingMode::EXCLUSIVE);
-        // SAFETY: the size is positive; usages that need an extension were refused above
-        // where it is absent.
-        let handle = unsafe { device.raw.create_buffer(&info, None) }
-            .map_err(during(format!("creating the buffer '{name}'")))?;
-        let mut raw = RawBuffer {
-            handle,
-            name: name.into(),
-            size,
-            kind,
-            memory: None,
-            device: device.clone(),
-        };
-        // SAFETY: the buffer was just made from this device.
-        let requirements = unsafe { device.raw.get_buffer_memory_requirements(handle) };
-        let memory = CountedMemory::new(device, name, requirements, kind.location(), true)?;
-        let (block, offset) = memory.bind();
-        // SAFETY: the memory fulfils the buffer's requirements and is owned by it from here on.
-        unsafe { device.raw.bind_buffer_memory(handle, block, offset) }
-            .map_err(during(format!("binding memory to the buffer '{name}'")))?;
-        raw.memory = Some(memory);
-        device.set_name(handle, name);
-        let buffer = Self(Arc::new(raw));
-        if kind == BufferKind::Storage && device.is_validating() {
-            // Fresh memory is often zero on one device and never on another.
-            device.once(|commands| {
-                commands.fill(&buffer, POISON);
-                Ok(())
-            })?;
-        }
-        Ok(buffer)
-    }
-
     /// Name given at creation.
     pub fn name(&self) -> &str {
         &self.0.name
@@ -311,14 +249,62 @@ impl Drop for RawBuffer {
 }
 
 impl Device {
-    /// See [`Buffer::new`].
+    /// Makes a buffer of `size` bytes (rounded up to a multiple of 4, at least 4); its content is
+    /// undefined.
+    ///
+    /// # Errors
+    /// A size or kind that the device does not have; no memory.
     pub fn buffer(
         self: &Arc<Self>,
         name: &str,
-        size_bytes: u64,
+        size: u64,
         kind: BufferKind,
     ) -> Result<Buffer, GpuError> {
-        Buffer::new(self, name, size_bytes, kind)
+        if matches!(
+            kind,
+            BufferKind::BuildInput | BufferKind::Scratch | BufferKind::AccelerationStructure
+        ) {
+            self.require_accel()?;
+        }
+        // fill() works on words, and a buffer of no bytes cannot exist.
+        let size = size.max(4).next_multiple_of(4);
+        let limit = self.limits().max_storage_buffer_bytes;
+        if kind == BufferKind::Storage && size > limit {
+            return Err(GpuError::TooLarge {
+                name: name.into(),
+                what: format!("{size} bytes"),
+                limit_name: "maxStorageBufferRange",
+                limit: format!("{limit} bytes"),
+            });
+        }
+        let info = vk::BufferCreateInfo::default()
+            .size(size)
+            .usage(kind.usage(self.supports_acceleration_structure()))
+            .sharing_mode(vk::SharingMode::EXCLUSIVE);
+        // SAFETY: the size is positive; usages that need an extension were refused above
+        // where it is absent.
+        let handle = unsafe { self.raw.create_buffer(&info, None) }
+            .map_err(during(format!("creating the buffer '{name}'")))?;
+        let mut raw =
+            RawBuffer { handle, name: name.into(), size, kind, memory: None, device: self.clone() };
+        // SAFETY: the buffer was just made from this device.
+        let requirements = unsafe { self.raw.get_buffer_memory_requirements(handle) };
+        let memory = CountedMemory::new(self, name, requirements, kind.location(), true)?;
+        let (block, offset) = memory.bind();
+        // SAFETY: the memory fulfils the buffer's requirements and is owned by it from here on.
+        unsafe { self.raw.bind_buffer_memory(handle, block, offset) }
+            .map_err(during(format!("binding memory to the buffer '{name}'")))?;
+        raw.memory = Some(memory);
+        self.set_name(handle, name);
+        let buffer = Buffer(Arc::new(raw));
+        if kind == BufferKind::Storage && self.is_validating() {
+            // Fresh memory is often zero on one device and never on another.
+            self.once(|commands| {
+                commands.fill(&buffer, POISON);
+                Ok(())
+            })?;
+        }
+        Ok(buffer)
     }
 }
 

@@ -1,6 +1,6 @@
 //! The queues of a device, and their users.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use parking_lot::{Mutex, MutexGuard};
 
 use ash::vk;
 
@@ -99,14 +99,12 @@ impl Queues {
         }
     }
 
-    /// Locks the queue of `user` against other threads. A handle stays usable after a panic elsewhere, so
-    /// poisoning is ignored.
+    /// Locks the queue of `user` against other threads.
     pub(crate) fn lock(&self, user: QueueUser) -> MutexGuard<'_, vk::Queue> {
-        let queue = match (user, &self.window) {
-            (QueueUser::Window, Some(window)) => window,
-            _ => &self.work,
-        };
-        queue.lock().unwrap_or_else(PoisonError::into_inner)
+        match (user, &self.window) {
+            (QueueUser::Window, Some(window)) => window.lock(),
+            _ => self.work.lock(),
+        }
     }
 
     /// The family of a user's queue.

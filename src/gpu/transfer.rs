@@ -241,20 +241,6 @@ impl Device {
             commands.copy_to_image(&staging, image)
         })
     }
-
-    /// All texels of an image without padding, after everything submitted so far.
-    pub fn read_back_image(self: &Arc<Self>, image: &Image) -> Result<Vec<u8>, GpuError> {
-        let readback = self.buffer("readback", image.bytes(), BufferKind::Readback)?;
-        self.once(|commands| {
-            commands.copy_from_image(image, &readback)?;
-            commands.barrier(Stage::Transfer, Stage::Host);
-            Ok(())
-        })?;
-        let mut bytes = vec![0; image.bytes() as usize];
-        // SAFETY: the copy was waited for, after a barrier to the host.
-        unsafe { readback.read_mapped(&mut bytes) };
-        Ok(bytes)
-    }
 }
 
 fn check_texels(what: &'static str, image: &Image, bytes: u64) -> Result<(), GpuError> {

@@ -3,11 +3,12 @@
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream};
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use parking_lot::{Condvar, Mutex};
+
 use super::answer::tracking_message;
-use super::lock;
 use super::picture::Published;
 use super::server::Shared;
 
@@ -89,7 +90,7 @@ impl Client {
 
     /// Hands over a frame; returns whether it replaces one that was not sent yet.
     pub fn offer(&self, frame: Arc<Published>) -> bool {
-        let mut outbox = lock(&self.outbox);
+        let mut outbox = self.outbox.lock();
         // A client that has just come may have been given this very frame already.
         let late = |old: &Arc<Published>| !Arc::ptr_eq(old, &frame);
         let late = outbox.frame.as_ref().is_some_and(late);
@@ -100,7 +101,7 @@ impl Client {
 
     /// Queues an answer; returns false when too many wait.
     pub fn answer(&self, answer: Answer) -> bool {
-        let mut outbox = lock(&self.outbox);
+        let mut outbox = self.outbox.lock();
         if outbox.answers.len() >= MOST_ANSWERS {
             return false;
         }
@@ -111,24 +112,24 @@ impl Client {
 
     /// Changes the messages that it receives unasked.
     pub fn choose(&self, change: impl FnOnce(&mut Subscriptions)) {
-        change(&mut lock(&self.outbox).wants);
+        change(&mut self.outbox.lock().wants);
     }
 
     /// Ends the connection: both threads return soon.
     pub fn close(&self) {
-        lock(&self.outbox).closed = true;
+        self.outbox.lock().closed = true;
         self.changed.notify_one();
         // It fails where the other side has ended the connection already.
         let _ = self.stream.shutdown(Shutdown::Both);
     }
 
     pub fn is_closed(&self) -> bool {
-        lock(&self.outbox).closed
+        self.outbox.lock().closed
     }
 
     /// Waits for the next item to send; none when the connection has ended.
     fn next(&self) -> Option<NextMessage> {
-        let mut outbox = lock(&self.outbox);
+        let mut outbox = self.outbox.lock();
         loop {
             if outbox.closed {
                 return None;
@@ -139,13 +140,13 @@ impl Client {
             if let Some(frame) = outbox.frame.take() {
                 return Some(NextMessage::Frame(frame));
             }
-            outbox = self.changed.wait(outbox).unwrap_or_else(std::sync::PoisonError::into_inner);
+            self.changed.wait(&mut outbox);
         }
     }
 
     /// Returns whether image, pose and TDATA are to be sent now.
     fn due(&self) -> (bool, bool, bool) {
-        let outbox = &mut *lock(&self.outbox);
+        let outbox = &mut *self.outbox.lock();
         let now = Instant::now();
         let tracking = outbox.wants.tracking.is_some_and(|least| {
             let sent = outbox.tracking_sent;

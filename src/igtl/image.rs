@@ -4,42 +4,22 @@ use glam::{DAffine3, DMat3, DVec3};
 
 use super::wire::{DecodeError, Reader, put_floats, put_shorts};
 use crate::scene::tracker::Axes;
+use crate::volume::Scalar;
 
 /// Version of the image header.
 const VERSION: u16 = 1;
 const HEADER: usize = 72;
 
-/// Type of a pixel's components.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Scalar {
-    /// 8 bits, signed.
-    I8,
-    /// 8 bits.
-    U8,
-    /// 16 bits, signed.
-    I16,
-    /// 16 bits.
-    U16,
-    /// 32 bits, signed.
-    I32,
-    /// 32 bits.
-    U32,
-    /// Single precision.
-    F32,
-    /// Double precision.
-    F64,
-}
-
-/// Code in messages and size in bytes of each type.
-const SCALARS: [(Scalar, u8, u64); 8] = [
-    (Scalar::I8, 2, 1),
-    (Scalar::U8, 3, 1),
-    (Scalar::I16, 4, 2),
-    (Scalar::U16, 5, 2),
-    (Scalar::I32, 6, 4),
-    (Scalar::U32, 7, 4),
-    (Scalar::F32, 10, 4),
-    (Scalar::F64, 11, 8),
+/// Code of each type in messages.
+const SCALARS: [(Scalar, u8); 8] = [
+    (Scalar::I8, 2),
+    (Scalar::U8, 3),
+    (Scalar::I16, 4),
+    (Scalar::U16, 5),
+    (Scalar::I32, 6),
+    (Scalar::U32, 7),
+    (Scalar::F32, 10),
+    (Scalar::F64, 11),
 ];
 
 /// A picture or volume, or a box cut out of one.
@@ -47,7 +27,7 @@ const SCALARS: [(Scalar, u8, u64); 8] = [
 pub struct Image {
     /// Values per pixel, interleaved: 1 grey, 3 RGB.
     pub components: u8,
-    /// Their type.
+    /// Their type: none of 64 bits but F64, for which messages have no code.
     pub scalar: Scalar,
     /// Byte order of the values.
     pub little_endian: bool,
@@ -109,7 +89,7 @@ impl Image {
 
     pub(super) fn encode(&self, out: &mut Vec<u8>) {
         let code = SCALARS.iter().find(|s| s.0 == self.scalar);
-        let code = code.expect("every type has a code").1;
+        let code = code.expect("a type that messages have").1;
         out.reserve(HEADER + self.values.len());
         put_shorts(out, &[VERSION]);
         let (endian, axes) = (
@@ -138,7 +118,7 @@ impl Image {
         let components = from.u8()?;
         let code = from.u8()?;
         let scalar = SCALARS.iter().find(|s| s.1 == code);
-        let &(scalar, _, bytes) = scalar.ok_or(undefined("a scalar type", code.into()))?;
+        let &(scalar, _) = scalar.ok_or(undefined("a scalar type", code.into()))?;
         let little_endian = match from.u8()? {
             1 => false,
             2 => true,
@@ -162,7 +142,9 @@ impl Image {
         let values = from.rest();
         // At most 2^48 pixels of 255 components of 8 bytes: this does not overflow.
         let pixels: u64 = part_size.iter().map(|&n| u64::from(n)).product();
-        if u128::from(pixels) * u128::from(components) * u128::from(bytes) != values.len() as u128 {
+        if u128::from(pixels) * u128::from(components) * scalar.bytes() as u128
+            != values.len() as u128
+        {
             return Err(DecodeError::Length { what: "an image with pixels", bytes: values.len() });
         }
         Ok(Self {

@@ -3,17 +3,18 @@
 use std::collections::VecDeque;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
+use parking_lot::Mutex;
 
 use super::client::{CHECK_INTERVAL, Client};
 use super::picture::{Picture, Published};
 use super::tracking::{TrackerState, Tracking};
-use super::{answer, lock, receive};
+use super::{answer, receive};
 use crate::scene::tracker::Tracker;
 
 /// Time between two looks of the listener for clients.
@@ -123,7 +124,7 @@ pub(super) struct Shared {
 impl Shared {
     /// The last published frame.
     pub fn latest(&self) -> Option<Arc<Published>> {
-        lock(&self.latest).clone()
+        self.latest.lock().clone()
     }
 
     /// The frame for a client that has just come.
@@ -141,7 +142,7 @@ impl Shared {
 
     /// Changes the counts.
     pub fn count(&self, change: impl FnOnce(&mut Status)) {
-        change(&mut lock(&self.status));
+        change(&mut self.status.lock());
     }
 
     /// Counts a client's fault.
@@ -227,9 +228,9 @@ impl Server {
     pub fn publish(&self, picture: Picture, world_from_probe: &DAffine3) {
         let axes = self.shared.tracking.tracker().axes;
         let frame = Arc::new(Published::new(picture, axes.to_ras() * *world_from_probe));
-        *lock(&self.shared.latest) = Some(Arc::clone(&frame));
+        *self.shared.latest.lock() = Some(Arc::clone(&frame));
         self.shared.outdated.store(false, Ordering::Relaxed);
-        let clients = lock(&self.shared.clients).clone();
+        let clients = self.shared.clients.lock().clone();
         let late = clients.iter().filter(|c| c.offer(Arc::clone(&frame)));
         let late = late.count() as u64;
         self.shared.count(|status| status.images_dropped += late);
@@ -243,7 +244,7 @@ impl Server {
 
     /// Counts of events so far.
     pub fn status(&self) -> Status {
-        lock(&self.shared.status).clone()
+        self.shared.status.lock().clone()
     }
 }
 
@@ -299,7 +300,7 @@ impl Acceptor {
     fn see_out(&mut self) {
         let ended = |threads: &[JoinHandle<()>; 2]| threads.iter().all(JoinHandle::is_finished);
         self.threads.retain(|(_, threads)| !ended(threads));
-        lock(&self.shared.clients).retain(|client| !client.is_closed());
+        self.shared.clients.lock().retain(|client| !client.is_closed());
         let mut scratch = [0; 4096];
         self.refused.retain_mut(|(stream, since)| {
             let open = match stream.read(&mut scratch) {
@@ -330,7 +331,7 @@ impl Acceptor {
         stream.set_write_timeout(Some(CHECK_INTERVAL))?;
         // Both under one lock: a frame that is published now reaches it one way or the other.
         let client = {
-            let mut clients = lock(&self.shared.clients);
+            let mut clients = self.shared.clients.lock();
             let client = Arc::new(Client::new(stream, peer, self.shared.first()));
             clients.push(Arc::clone(&client));
             client

@@ -1,13 +1,13 @@
 //! The last pose from the tracker.
 
-use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
+use parking_lot::Mutex;
 
+use super::POSE_DEVICE;
 use super::message::Message;
 use super::wire::Label;
-use super::{POSE_DEVICE, lock};
 use crate::scene::tracker::{Tracker, rigid};
 
 /// A pose of the probe.
@@ -63,17 +63,17 @@ impl Tracking {
     }
 
     pub fn tracker(&self) -> Tracker {
-        lock(&self.tracker).clone()
+        self.tracker.lock().clone()
     }
 
     /// Goes on with another calibration. Poses from the one before are forgotten.
     pub fn calibrate(&self, tracker: Tracker) {
-        *lock(&self.tracker) = tracker;
-        *lock(&self.last) = None;
+        *self.tracker.lock() = tracker;
+        *self.last.lock() = None;
     }
 
     pub fn now(&self) -> TrackerState {
-        match &*lock(&self.last) {
+        match &*self.last.lock() {
             None => TrackerState::Never,
             Some(last) => {
                 let timeout = Duration::from_secs_f64(self.tracker().timeout);
@@ -88,7 +88,7 @@ impl Tracking {
     /// Returns whether this tool moves the probe. Without a choice all do, except the pose sent from here:
     /// some programs send back what they receive.
     fn is_meant(&self, device: &Label<20>) -> bool {
-        match &lock(&self.tracker).device {
+        match &self.tracker.lock().device {
             Some(wanted) => device.is(wanted),
             None => !device.is(POSE_DEVICE),
         }
@@ -110,7 +110,7 @@ impl Tracking {
         // For a tool out of view PLUS sends the last matrix and a status that is not OK.
         let status = message.metadata("TransformStatus");
         if status.is_some_and(|status| status != "OK") {
-            if let Some(last) = &mut *lock(&self.last) {
+            if let Some(last) = &mut *self.last.lock() {
                 last.missing |= last.pose.device == device;
             }
             return Ok(true);
@@ -119,7 +119,7 @@ impl Tracking {
         let reported =
             rigid(reported).map_err(|why| format!("{device} is no pose of a probe: {why}"))?;
         let world_from_probe = self.tracker().world_from_probe(reported);
-        let mut last = lock(&self.last);
+        let mut last = self.last.lock();
         let number = last.as_ref().map_or(0, |last| last.pose.number) + 1;
         *last = Some(LastPose {
             pose: TrackedPose { world_from_probe, arrived: Instant::now(), number, device },

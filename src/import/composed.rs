@@ -1,4 +1,4 @@
-//! Voxels of a label that touch along an edge only. Surfaces around them would meet in that edge, four sheets in
+//! Removal of voxels of a label that touch along an edge only. Surfaces around them would meet in that edge, four sheets in
 //! one, and be no surface of a body; so a voxel beside it changes its label, once and for all labels.
 //!
 //! Well-composed sets: Latecki, Eckhardt, Rosenfeld, "Well-composed sets" (CVIU 61:70, 1995).

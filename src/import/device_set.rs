@@ -2,20 +2,18 @@
 
 use std::collections::BTreeMap;
 use std::f64::consts::LN_10;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
 use super::draft::{self, Draft, Part};
-use super::error::ImportError;
 use super::plus::{DeviceSet, Geometry, Model, Placed};
-use crate::output::files;
+use crate::issue::FileError;
 use crate::scene::Issue;
 use crate::scene::mesh::{self, Soup};
 use crate::volume::Pose;
 
-/// What PLUS's simulator has by default, which counts as 0 dB: 0.65 dB/(cm MHz), of which a tenth is scattered back.
+/// Backscatter that counts as 0 dB, the default of PLUS's simulator: a tenth of 0.65 dB/(cm MHz).
 const USUAL: f64 = 0.65 * 0.1;
 
 /// PLUS's frame of the marker on the probe.
@@ -28,7 +26,7 @@ pub struct PlusScene {
     pub draft: Draft,
     /// The scene file.
     pub text: String,
-    /// What is to be said of the meshes, and of bodies that are left out.
+    /// Findings on the meshes, and on bodies that are left out.
     pub issues: Vec<Issue>,
 }
 
@@ -41,11 +39,11 @@ pub fn import(
     folder: &Path,
     poses: &BTreeMap<String, Pose>,
     force: bool,
-) -> Result<PlusScene, ImportError> {
+) -> Result<PlusScene, FileError> {
     let set = DeviceSet::load(path)?;
     let world_from_image = set.reference_from(&set.image, poses).map_err(|cause| {
         let remedy = "give the poses: --sequence FILE, or --transform NAME=MATRIX such as ProbeToReference=...";
-        ImportError::file(path, cause, remedy)
+        FileError::file(path, cause, remedy)
     })?;
     let placed = set.transducer.placed(&world_from_image);
     let mut issues = Vec::new();
@@ -68,7 +66,7 @@ pub fn import(
         let file = find(path, model)?;
         let (read, found) = mesh::load(&file, &mesh::Options::default()).map_err(|issues| {
             let worst = issues.into_iter().find(Issue::is_error).expect("a reason");
-            ImportError::file(&file, worst.message, worst.remedy)
+            FileError::file(&file, worst.message, worst.remedy)
         })?;
         issues.extend(found);
         let world_from_model = world_from_object * model.object_from_model;
@@ -91,14 +89,11 @@ pub fn import(
         let file = model.file.as_ref().expect("bodies have files");
         let part = Part {
             name: model.name.clone(),
-            file: String::new(),
             tissue: tissue_name(&set, model),
             priority: n as i32,
             origin: file.display().to_string(),
-            note: String::new(),
             known: true,
-            triangles: 0,
-            volume: 0.0,
+            ..Part::default()
         };
         draft.add(part, soup)?;
     }
@@ -111,25 +106,20 @@ impl PlusScene {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn finish(&self) -> Result<PathBuf, ImportError> {
-        let path = self.draft.folder.join(draft::SCENE);
-        files::replace(&path, self.text.as_bytes()).map_err(|e| {
-            let message = format!("cannot be written: {e}");
-            ImportError::file(&path, message, "check the folder and the room in it")
-        })?;
-        Ok(path)
+    pub fn finish(&self) -> Result<PathBuf, FileError> {
+        self.draft.save(&self.text)
     }
 }
 
 /// The mesh of a model, beside the configuration or below it: no path out of there is followed.
-fn find(config: &Path, model: &Model) -> Result<PathBuf, ImportError> {
+fn find(config: &Path, model: &Model) -> Result<PathBuf, FileError> {
     let file = model.file.as_ref().expect("it has one");
     let inside = |c: std::path::Component| {
         matches!(c, std::path::Component::Normal(_) | std::path::Component::CurDir)
     };
     if !file.components().all(inside) {
         let message = format!("`{}` names {}, which is not beside it", model.name, file.display());
-        return Err(ImportError::file(config, message, "copy the mesh there and name it so"));
+        return Err(FileError::file(config, message, "copy the mesh there and name it so"));
     }
     let path = config.with_file_name(file);
     match path.is_file() {
@@ -138,7 +128,7 @@ fn find(config: &Path, model: &Model) -> Result<PathBuf, ImportError> {
             let message = format!("`{}`: there is no file {}", model.name, path.display());
             let remedy =
                 "PLUS looks for models in its image directory: copy them beside the configuration";
-            Err(ImportError::file(config, message, remedy))
+            Err(FileError::file(config, message, remedy))
         }
     }
 }
@@ -158,135 +148,122 @@ fn tissue_name(set: &DeviceSet, model: &Model) -> String {
 }
 
 fn text(set: &DeviceSet, draft: &Draft, placed: &Placed, issues: &[Issue]) -> String {
-    let mut out = String::new();
-    // Writing to a string cannot fail.
-    let _ = write(&mut out, set, draft, placed, issues);
-    out
-}
-
-fn write(
-    out: &mut String,
-    set: &DeviceSet,
-    draft: &Draft,
-    placed: &Placed,
-    issues: &[Issue],
-) -> std::fmt::Result {
-    let file = draft.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    writeln!(out, "# Made by `insonify import` from {file}, a configuration of PLUS.\n#")?;
-    writeln!(
-        out,
-        "# World, mm: PLUS's frame `{}` as it is. The meshes have been brought there by their",
+    let file = draft.source_name();
+    let mut out = format!(
+        "# Made by `insonify import` from {file}, a configuration of PLUS.\n\
+         #\n\
+         # World, mm: PLUS's frame `{}` as it is. The meshes have been brought there by their\n\
+         # ModelToObjectTransform and the transforms of the configuration and the tracker.\n",
         set.reference
-    )?;
-    writeln!(
-        out,
-        "# ModelToObjectTransform and the transforms of the configuration and the tracker."
-    )?;
+    );
     for issue in issues.iter().filter(|i| i.message.contains("left out")) {
-        writeln!(out, "# {}", issue.message)?;
+        out += &format!("# {}\n", issue.message);
     }
-    writeln!(out, "name = {}", draft::quoted(set.name.as_deref().unwrap_or(&file)))?;
+    out += &format!("name = {}\n", draft::quoted(set.name.as_deref().unwrap_or(&file)));
     let background = set.models.iter().rev().find(|m| m.file.is_none());
-    match background {
+    out += &match background {
         Some(model) => {
-            writeln!(
-                out,
-                "# The model without a mesh.\nbackground = \"{}\"\n",
-                tissue_name(set, model)
-            )?;
+            let tissue = tissue_name(set, model);
+            format!("# The model without a mesh.\nbackground = \"{tissue}\"\n\n")
         }
-        None => writeln!(out, "background = \"water\"\n")?,
-    }
-    probe(out, set, placed)?;
-    tracker(out, set)?;
-    writeln!(
-        out,
-        "# Materials of the configuration. Its backscatter is a share of what is absorbed: the level is that of"
-    )?;
-    writeln!(
-        out,
-        "# attenuation times share over PLUS's default. Surfaces and texture are those of liver."
-    )?;
+        None => "background = \"water\"\n\n".to_owned(),
+    };
+    out += &probe(set, placed);
+    out += &tracker(set);
+    out += "# Materials of the configuration. Its backscatter is a share of what is absorbed: the level is that of\n\
+            # attenuation times share over PLUS's default. Surfaces and texture are those of liver.\n";
     for model in &set.models {
         let name = tissue_name(set, model);
         let around = model.file.is_none() && background == Some(model);
         if !around && !draft.parts.iter().any(|p| p.tissue == name) {
             continue;
         }
-        writeln!(out, "[tissues.{name}]")?;
-        writeln!(out, "based_on = \"liver\"")?;
-        writeln!(out, "speed = {}\ndensity = {}", model.speed, model.density)?;
-        writeln!(out, "attenuation = {}", model.attenuation)?;
         let level = 10.0 * (model.attenuation * model.backscatter / USUAL).ln() / LN_10;
-        match level > -60.0 {
-            true => writeln!(out, "echogenicity = \"{:.1} dB\"", level.min(60.0))?,
-            false => writeln!(out, "echogenicity = \"-inf dB\"")?,
-        }
-        writeln!(out, "source = \"SpatialModel of {}\"\n", file.replace(['"', '\\'], "_"))?;
+        let level = match level > -60.0 {
+            true => format!("{:.1}", level.min(60.0)),
+            false => "-inf".to_owned(),
+        };
+        out += &format!(
+            "[tissues.{name}]\n\
+             based_on = \"liver\"\n\
+             speed = {}\n\
+             density = {}\n\
+             attenuation = {}\n\
+             echogenicity = \"{level} dB\"\n\
+             source = \"SpatialModel of {}\"\n\n",
+            model.speed,
+            model.density,
+            model.attenuation,
+            file.replace(['"', '\\'], "_")
+        );
     }
-    draft.meshes(out)
+    out + &draft.meshes()
 }
 
-fn probe(out: &mut String, set: &DeviceSet, placed: &Placed) -> std::fmt::Result {
+fn probe(set: &DeviceSet, placed: &Placed) -> String {
     let transducer = &set.transducer;
-    let scale = placed.scale;
+    let (scale, spacing) = (placed.scale, transducer.spacing);
+    let mut out = String::new();
     if (scale - 1.0).abs().max_element() > 1e-3 {
-        writeln!(
-            out,
-            "# A pixel measures {:.5} x {:.5} mm by the transform of `{}`, and {} x {} mm by",
-            scale.x * transducer.spacing.x,
-            scale.y * transducer.spacing.y,
+        out += &format!(
+            "# A pixel measures {:.5} x {:.5} mm by the transform of `{}`, and {} x {} mm by\n\
+             # OutputImageSpacingMmPerPixel. The former is true in the world: lengths are scaled by {:.5} and {:.5}.\n",
+            scale.x * spacing.x,
+            scale.y * spacing.y,
             set.image,
-            transducer.spacing.x,
-            transducer.spacing.y
-        )?;
-        writeln!(
-            out,
-            "# OutputImageSpacingMmPerPixel. The former is true in the world: lengths are scaled by {:.5} and {:.5}.",
-            scale.x, scale.y
-        )?;
+            spacing.x,
+            spacing.y,
+            scale.x,
+            scale.y
+        );
     }
-    writeln!(out, "[probe]")?;
-    let depth = match transducer.geometry {
+    let (face, depth) = match transducer.geometry {
         Geometry::Linear { width, depth } => {
-            writeln!(out, "preset = \"linear\"\nwidth = {:.4}", width * scale.x)?;
-            depth * scale.y
+            (format!("preset = \"linear\"\nwidth = {:.4}", width * scale.x), depth)
         }
         Geometry::Curvilinear { radius, field_of_view, depth } => {
             // A circle that is scaled unevenly is none; the calibration's two sizes differ by its error.
-            let mean = (scale.x + scale.y) / 2.0;
-            writeln!(
-                out,
-                "preset = \"abdominal\"\nradius = {:.4}\nfield_of_view = \"{:.4} deg\"",
-                radius * mean,
-                field_of_view.to_degrees()
-            )?;
-            depth * scale.y
+            let radius = radius * (scale.x + scale.y) / 2.0;
+            let angle = field_of_view.to_degrees();
+            let face = format!(
+                "preset = \"abdominal\"\nradius = {radius:.4}\nfield_of_view = \"{angle:.4} deg\""
+            );
+            (face, depth)
         }
     };
-    writeln!(out, "depth = {depth:.4}\nfocus = {:.1}", depth / 2.0)?;
-    writeln!(out, "frequency = {}", transducer.frequency)?;
-    writeln!(out, "scanlines = {}\nsamples = {}\n", transducer.scanlines, transducer.samples)?;
-    writeln!(out, "[probe.pose]")?;
-    writeln!(out, "position = {}", draft::vector(placed.position, 4))?;
-    writeln!(out, "direction = {}", draft::vector(placed.direction, 7))?;
-    writeln!(out, "lateral = {}\n", draft::vector(placed.lateral, 7))
+    let depth = depth * scale.y;
+    out + &format!(
+        "[probe]\n\
+         {face}\n\
+         depth = {depth:.4}\n\
+         focus = {:.1}\n\
+         frequency = {}\n\
+         scanlines = {}\n\
+         samples = {}\n\n{}",
+        depth / 2.0,
+        transducer.frequency,
+        transducer.scanlines,
+        transducer.samples,
+        draft::pose(placed.position, placed.direction, placed.lateral, [4, 7])
+    )
 }
 
 /// The table for poses that a tracker sends, where the calibration of the probe's marker is in the configuration.
-fn tracker(out: &mut String, set: &DeviceSet) -> std::fmt::Result {
+fn tracker(set: &DeviceSet) -> String {
     let calibration = set.transforms.between(&BTreeMap::new(), &set.image, MARKER);
-    let Some(tool_from_image) = calibration.flatten() else { return Ok(()) };
-    let matrix = set.transducer.placed(&tool_from_image).world_from_probe();
-    writeln!(
-        out,
-        "# `insonify serve` follows the poses that a tracker sends; the matrix leads from the probe's face to its marker."
-    )?;
-    writeln!(out, "[tracker]\ndevice = \"{MARKER}To{}\"\naxes = \"ras\"", set.reference)?;
-    writeln!(out, "tool_from_probe.matrix = [")?;
-    for row in 0..3 {
-        let [x, y, z] = matrix.matrix3.row(row).to_array();
-        writeln!(out, "  {x:.7}, {y:.7}, {z:.7}, {:.4},", matrix.translation[row])?;
-    }
-    writeln!(out, "  0, 0, 0, 1,\n]\n")
+    let Some(tool_from_image) = calibration.flatten() else { return String::new() };
+    let tool_from_probe = set.transducer.placed(&tool_from_image).world_from_probe();
+    let row = |row: usize| {
+        let [x, y, z] = tool_from_probe.matrix3.row(row).to_array();
+        format!("  {x:.7}, {y:.7}, {z:.7}, {:.4},\n", tool_from_probe.translation[row])
+    };
+    format!(
+        "# `insonify serve` follows the poses that a tracker sends; the matrix leads from the probe's face to its marker.\n\
+         [tracker]\n\
+         device = \"{MARKER}To{}\"\n\
+         axes = \"ras\"\n\
+         tool_from_probe.matrix = [\n{}  0, 0, 0, 1,\n]\n\n",
+        set.reference,
+        [0, 1, 2].map(row).concat()
+    )
 }

@@ -3,8 +3,10 @@
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use super::error::ImportError;
+use glam::DVec3;
+
 use super::pose::View;
+use crate::issue::FileError;
 use crate::output::files;
 use crate::scene::check::SENSIBLE_SIZE;
 use crate::scene::mesh::Soup;
@@ -18,7 +20,7 @@ const MESHES: &str = "meshes";
 pub const SKIN: &str = "skin";
 
 /// One mesh of the scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Part {
     /// Name in the scene.
     pub name: String,
@@ -26,11 +28,12 @@ pub struct Part {
     pub file: String,
     /// Tissue.
     pub tissue: String,
-    /// Who wins where surfaces lie on or in each other: before [`rank`] by the table, then one for each.
+    /// Priority where surfaces lie on or in each other, the higher wins: before [`rank`] the table's, after it a number
+    /// of its own for each part.
     pub priority: i32,
-    /// Where it comes from.
+    /// Origin of the mesh, in words.
     pub origin: String,
-    /// What there is to say about the tissue.
+    /// Note on the tissue.
     pub note: String,
     /// False where no table knows the name.
     pub known: bool,
@@ -45,17 +48,17 @@ pub struct Part {
 pub struct Draft {
     /// Folder to be written.
     pub folder: PathBuf,
-    /// What was imported.
+    /// File or folder that was imported.
     pub source: PathBuf,
-    /// What is to be said about its frame.
+    /// Statement of its frame, in words.
     pub frame: String,
     /// Structures, then the skin where there is one.
     pub parts: Vec<Part>,
     /// Structures that are no mesh of the scene, and why.
     pub left_out: Vec<String>,
-    /// What the skin is made of and where it comes from.
+    /// Tissue and origin of the skin, in words.
     pub skin: Option<String>,
-    /// Where the probe is, and the name of the organ that it looks at.
+    /// Place of the probe, and the name of the organ that it looks at.
     pub view: Option<(View, String)>,
 }
 
@@ -64,12 +67,12 @@ impl Draft {
     ///
     /// # Errors
     /// There is a scene in it already, unless `force`; it cannot be made.
-    pub fn begin(folder: &Path, source: &Path, force: bool) -> Result<Self, ImportError> {
+    pub fn begin(folder: &Path, source: &Path, force: bool) -> Result<Self, FileError> {
         let scene = folder.join(SCENE);
         if scene.exists() && !force {
             let message = "is there already";
             let remedy = "name another folder, or give --force to replace it";
-            return Err(ImportError::file(&scene, message, remedy));
+            return Err(FileError::file(&scene, message, remedy));
         }
         std::fs::create_dir_all(folder.join(MESHES)).map_err(|e| unwritten(folder, &e))?;
         Ok(Self {
@@ -88,7 +91,7 @@ impl Draft {
     ///
     /// # Errors
     /// The file cannot be written.
-    pub fn add(&mut self, part: Part, surface: &Soup) -> Result<Option<String>, ImportError> {
+    pub fn add(&mut self, part: Part, surface: &Soup) -> Result<Option<String>, FileError> {
         let size = extent(surface);
         if !(SENSIBLE_SIZE.0..=SENSIBLE_SIZE.1).contains(&size) {
             self.left_out.push(format!("{}: {size:.3} mm large", part.name));
@@ -143,101 +146,126 @@ impl Draft {
     ///
     /// # Errors
     /// It cannot be written.
-    pub fn finish(&self) -> Result<PathBuf, ImportError> {
+    pub fn finish(&self) -> Result<PathBuf, FileError> {
+        self.save(&self.text())
+    }
+
+    /// Writes `text` as the scene file, and returns where it is.
+    ///
+    /// # Errors
+    /// It cannot be written.
+    pub(super) fn save(&self, text: &str) -> Result<PathBuf, FileError> {
         let path = self.folder.join(SCENE);
-        files::replace(&path, self.text().as_bytes()).map_err(|e| unwritten(&path, &e))?;
+        files::replace(&path, text.as_bytes()).map_err(|e| unwritten(&path, &e))?;
         Ok(path)
+    }
+
+    /// Name of the imported file or folder.
+    pub(super) fn source_name(&self) -> String {
+        self.source.file_name().unwrap_or_default().to_string_lossy().into_owned()
     }
 
     /// The scene file.
     fn text(&self) -> String {
-        let mut out = String::new();
-        let name = self.source.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        // Writing to a string cannot fail.
-        let _ = self.write(&mut out, &name);
-        out
-    }
-
-    fn write(&self, out: &mut String, name: &str) -> std::fmt::Result {
-        writeln!(out, "# Made by `insonify import` from {name}.")?;
-        writeln!(
-            out,
-            "#\n# World, mm: x to the patient's left, y to the back, z to the head (LPS)."
-        )?;
-        writeln!(out, "# {}", self.frame)?;
-        writeln!(out, "name = {}", quoted(name))?;
-        writeln!(out, "# Around the skin.")?;
-        writeln!(out, "background = \"gel\"\n")?;
+        let name = self.source_name();
+        let mut out = format!(
+            "# Made by `insonify import` from {name}.\n\
+             #\n\
+             # World, mm: x to the patient's left, y to the back, z to the head (LPS).\n\
+             # {}\n\
+             name = {}\n\
+             # Around the skin.\n\
+             background = \"gel\"\n\n",
+            self.frame,
+            quoted(&name)
+        );
         if let Some((view, organ)) = &self.view {
-            self.probe(out, view, organ)?;
+            out += &self.probe(view, organ);
         }
         if let Some(skin) = &self.skin {
-            writeln!(out, "# The skin: {skin}")?;
-            writeln!(
-                out,
-                "# It is rigid: gel fills what real skin would yield to the curved face."
-            )?;
-            writeln!(out, "[contact]\nmesh = [\"{SKIN}\"]\ngel = \"9 mm\"\n")?;
+            out += &format!(
+                "# The skin: {skin}\n\
+                 # It is rigid: gel fills what real skin would yield to the curved face.\n\
+                 [contact]\n\
+                 mesh = [\"{SKIN}\"]\n\
+                 gel = \"9 mm\"\n\n"
+            );
         }
-        let unknown: Vec<_> = self.parts.iter().filter(|p| !p.known).collect();
+        let unknown = self.parts.iter().filter(|p| !p.known);
+        let unknown: String =
+            unknown.map(|part| format!("#   {}: {}\n", part.name, part.tissue)).collect();
         if !unknown.is_empty() {
-            writeln!(
-                out,
-                "# No table knows these names; their tissue is a guess, to be corrected here or with --labels:"
-            )?;
-            for part in unknown {
-                writeln!(out, "#   {}: {}", part.name, part.tissue)?;
-            }
-            writeln!(out)?;
+            out += "# No table knows these names; their tissue is a guess, to be corrected here or with --labels:\n";
+            out += &unknown;
+            out += "\n";
         }
-        self.meshes(out)
+        out + &self.meshes()
     }
 
     /// The meshes of the scene file.
-    pub(super) fn meshes(&self, out: &mut String) -> std::fmt::Result {
+    pub(super) fn meshes(&self) -> String {
+        let mut out = String::new();
         for structure in &self.left_out {
-            writeln!(out, "# Left out: {structure}, which no scene takes.")?;
+            out += &format!("# Left out: {structure}, which no scene takes.\n");
         }
-        writeln!(
-            out,
-            "# In rising priority: where two lie on or in each other, the later one wins."
-        )?;
+        out += "# In rising priority: where two lie on or in each other, the later one wins.\n";
         for part in &self.parts {
-            writeln!(
-                out,
-                "# {}: {} triangles, {:.1} ml",
-                part.origin, part.triangles, part.volume
-            )?;
-            writeln!(out, "[[mesh]]")?;
-            writeln!(out, "name = {}", quoted(&part.name))?;
-            writeln!(out, "file = {}", quoted(&part.file))?;
-            writeln!(out, "units = \"mm\"")?;
             let note =
                 if part.note.is_empty() { String::new() } else { format!("  # {}", part.note) };
-            writeln!(out, "tissue = \"{}\"{note}", part.tissue)?;
-            writeln!(out, "priority = {}\n", part.priority)?;
+            out += &format!(
+                "# {}: {} triangles, {:.1} ml\n\
+                 [[mesh]]\n\
+                 name = {}\n\
+                 file = {}\n\
+                 units = \"mm\"\n\
+                 tissue = \"{}\"{note}\n\
+                 priority = {}\n\n",
+                part.origin,
+                part.triangles,
+                part.volume,
+                quoted(&part.name),
+                quoted(&part.file),
+                part.tissue,
+                part.priority
+            );
         }
-        Ok(())
+        out
     }
 
-    fn probe(&self, out: &mut String, view: &View, organ: &str) -> std::fmt::Result {
+    fn probe(&self, view: &View, organ: &str) -> String {
         let volume = self.parts.iter().find(|p| p.name == organ).map_or(0.0, |p| p.volume);
         // The organ as a ball, and a bit of what is behind it.
         let radius = (volume.abs() * 750.0 / std::f64::consts::PI).cbrt();
         let depth = ((view.distance + 1.2 * radius + 10.0) / 10.0).round() * 10.0;
         let (preset, most) = if depth <= 45.0 { ("linear", 45.0) } else { ("abdominal", 240.0) };
-        writeln!(out, "# It looks at `{organ}`, {:.0} mm deep; {}.", view.distance, way(view))?;
-        writeln!(
-            out,
-            "[probe]\npreset = \"{preset}\"\ndepth = \"{} mm\"",
-            depth.clamp(30.0, most)
-        )?;
-        writeln!(out, "focus = \"{:.0} mm\"\n", view.distance.clamp(10.0, most))?;
-        writeln!(out, "[probe.pose]")?;
-        writeln!(out, "position = {}", vector(view.position, 2))?;
-        writeln!(out, "direction = {}", vector(view.direction, 5))?;
-        writeln!(out, "lateral = {}\n", vector(view.lateral, 5))
+        format!(
+            "# It looks at `{organ}`, {:.0} mm deep; {}.\n\
+             [probe]\n\
+             preset = \"{preset}\"\n\
+             depth = \"{} mm\"\n\
+             focus = \"{:.0} mm\"\n\n{}",
+            view.distance,
+            way(view),
+            depth.clamp(30.0, most),
+            view.distance.clamp(10.0, most),
+            pose(view.position, view.direction, view.lateral, [2, 5])
+        )
     }
+}
+
+/// The table of a pose, with so many digits of the place and of the axes.
+pub(super) fn pose(
+    position: DVec3,
+    direction: DVec3,
+    lateral: DVec3,
+    [place, axis]: [usize; 2],
+) -> String {
+    format!(
+        "[probe.pose]\nposition = {}\ndirection = {}\nlateral = {}\n\n",
+        vector(position, place),
+        vector(direction, axis),
+        vector(lateral, axis)
+    )
 }
 
 /// Largest edge of a surface's box, mm.
@@ -267,7 +295,7 @@ pub fn way(view: &View) -> String {
 }
 
 /// A vector as TOML has it.
-pub(super) fn vector(v: glam::DVec3, digits: usize) -> String {
+fn vector(v: DVec3, digits: usize) -> String {
     // Turns -0 into 0.
     let v = v.to_array().map(|x| format!("{:.digits$}", x + 0.0));
     format!("[{}]", v.join(", "))
@@ -278,9 +306,9 @@ pub(super) fn quoted(text: &str) -> String {
     toml::Value::String(text.to_owned()).to_string()
 }
 
-fn unwritten(path: &Path, error: &std::io::Error) -> ImportError {
+fn unwritten(path: &Path, error: &std::io::Error) -> FileError {
     let message = format!("cannot be written: {error}");
-    ImportError::file(path, message, "check the folder and the room in it")
+    FileError::file(path, message, "check the folder and the room in it")
 }
 
 /// A surface as text, from which every coordinate is read back to the last bit: what two surfaces share stays the same.

@@ -5,12 +5,13 @@ use std::path::{Path, PathBuf};
 use glam::{DAffine3, DVec3};
 
 use super::draft::Draft;
-use super::error::ImportError;
 use super::grid::Grid;
 use super::map::{self, Progress};
 use super::pose::{self, Task};
 use super::table::{Entry, OUTLINE};
 use super::{Options, hull, raster};
+use crate::issue::FileError;
+use crate::register::points::frame_of_mesh;
 use crate::scene::mesh::{self, Soup};
 use crate::scene::{Issue, Tissue, check::Facts, topology};
 use crate::volume::Frame;
@@ -20,7 +21,7 @@ const MOST: usize = Grid::MOST as usize;
 /// Distance of voxels in which meshes are compared, mm, and most of them along an axis.
 const COARSE: f64 = 2.0;
 const MOST_VOXELS: f64 = 200.0;
-/// What a skin that is made up stands off, mm.
+/// Distance of an invented skin from the organs, mm.
 const MARGIN: f64 = 15.0;
 /// Share of a mesh inside another from which on it counts as a part of it.
 const WITHIN: f64 = 0.9;
@@ -37,9 +38,9 @@ struct Organ {
 }
 
 /// The mesh files of a folder, by name.
-fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
+fn files(folder: &Path) -> Result<Vec<PathBuf>, FileError> {
     let fail = |e: std::io::Error| {
-        ImportError::file(folder, format!("cannot be read: {e}"), "check the path of the folder")
+        FileError::file(folder, format!("cannot be read: {e}"), "check the path of the folder")
     };
     let mut out = Vec::new();
     for entry in std::fs::read_dir(folder).map_err(fail)? {
@@ -50,12 +51,12 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     }
     out.sort();
     match out.len() {
-        0 => Err(ImportError::file(
+        0 => Err(FileError::file(
             folder,
             "holds no mesh that can be read",
             "give a folder of mesh files, one per organ, named after them; or a label map",
         )),
-        n if n > MOST => Err(ImportError::file(
+        n if n > MOST => Err(FileError::file(
             folder,
             format!("holds {n} meshes, more than {MOST}"),
             "leave in it those that are seen",
@@ -64,7 +65,7 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>, ImportError> {
     }
 }
 
-/// Makes a scene of the meshes of a folder. Also returns what is to be said about them.
+/// Makes a scene of the meshes of a folder. Also returns findings on them.
 ///
 /// # Errors
 /// A mesh that cannot be read, or an organ to look at that is not there.
@@ -73,7 +74,7 @@ pub fn import(
     folder: &Path,
     options: &Options,
     progress: Progress,
-) -> Result<(Draft, Vec<Issue>), ImportError> {
+) -> Result<(Draft, Vec<Issue>), FileError> {
     let files = files(source)?;
     let mut organs = Vec::new();
     let mut issues = Vec::new();
@@ -83,7 +84,7 @@ pub fn import(
         organs.push(organ);
         issues.extend(found);
     }
-    // What is in front of what, by voxels; the inner of two lies above the outer.
+    // The order of the meshes in the voxels: the inner of two lies above the outer.
     organs.sort_by(|a, b| {
         a.entry.priority.cmp(&b.entry.priority).then(b.volume.total_cmp(&a.volume))
     });
@@ -134,7 +135,7 @@ pub fn import(
             let around = hull::around(&grid, MARGIN);
             around.ok_or_else(|| {
                 let message = "its meshes enclose nothing: no skin can be put around them";
-                ImportError::file(source, message, "close them, or check their unit (--units)")
+                FileError::file(source, message, "close them, or check their unit (--units)")
             })?
         }
     };
@@ -163,7 +164,7 @@ fn name_of(path: &Path) -> String {
 }
 
 /// Reads a mesh in mm and LPS, and looks its name up.
-fn load(file: &Path, options: &Options) -> Result<(Organ, Vec<Issue>), ImportError> {
+fn load(file: &Path, options: &Options) -> Result<(Organ, Vec<Issue>), FileError> {
     let reading = mesh::Options { units: options.units, ..mesh::Options::default() };
     let mesh::Inspected { mesh, facts, issues, .. } = mesh::inspect(file, &reading);
     let Some(read) = mesh else {
@@ -172,13 +173,11 @@ fn load(file: &Path, options: &Options) -> Result<(Organ, Vec<Issue>), ImportErr
             true => worst.remedy,
             false => format!("{}; for all files of the folder: --units", worst.remedy),
         };
-        return Err(ImportError::file(file, worst.message, remedy));
+        return Err(FileError::file(file, worst.message, remedy));
     };
-    let said = crate::register::points::frame_of_mesh(file).map_err(|e| {
-        ImportError::file(file, e.to_string(), "correct the comment SPACE= in the file")
-    })?;
-    let turn = match (said, options.frame) {
-        (Frame::Ras, _) | (Frame::Unstated, Some(Frame::Ras)) => -1.0,
+    // A file that states its frame was read into LPS.
+    let turn = match (frame_of_mesh(file)?, options.frame) {
+        (Frame::Unstated, Some(Frame::Ras)) => -1.0,
         _ => 1.0,
     };
     let place = |[x, y, z]: &[f32; 3]| [turn * x, turn * y, *z];
@@ -194,7 +193,7 @@ fn load(file: &Path, options: &Options) -> Result<(Organ, Vec<Issue>), ImportErr
 }
 
 /// Empty voxels around all meshes.
-fn box_of(source: &Path, organs: &[Organ]) -> Result<Grid, ImportError> {
+fn box_of(source: &Path, organs: &[Organ]) -> Result<Grid, FileError> {
     let points = organs.iter().flat_map(|o| &o.surface.positions);
     let (low, high) = points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| {
         let p = DVec3::from(p.map(f64::from));
@@ -204,7 +203,7 @@ fn box_of(source: &Path, organs: &[Organ]) -> Result<Grid, ImportError> {
     if extent.max_element() > LARGEST {
         let message =
             format!("its meshes lie {:.0} mm apart: not in one body", extent.max_element());
-        return Err(ImportError::file(source, message, "check their frames and units"));
+        return Err(FileError::file(source, message, "check their frames and units"));
     }
     let spacing = f64::max(COARSE, extent.max_element() / MOST_VOXELS);
     let size = [0, 1, 2].map(|a| (extent[a] / spacing).ceil() as usize + 2);

@@ -115,7 +115,7 @@ impl Grid {
         Self { size, world_from_voxel, voxels }
     }
 
-    /// Gives the voxels of 0 that no way of such voxels leads to from the border to `label`. Returns their number.
+    /// Gives to `label` the voxels of 0 that are not connected to the border by voxels of 0. Returns their number.
     pub fn fill_holes(&mut self, label: u8) -> u64 {
         const OUTSIDE: u8 = u8::MAX;
         let [x, y, z] = self.size;

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::error::ImportError;
 use super::grid::Grid;
 use super::names::{self, Segment};
+use crate::issue::FileError;
 use crate::volume::{DicomSegment, Segmentation, Summary, Volume, Voxels};
 
 /// A label map and what its labels are.
@@ -26,7 +26,7 @@ impl LabelMap {
     ///
     /// # Errors
     /// A file that is no volume; values that are no labels, or too many.
-    pub fn load(path: &Path) -> Result<Self, ImportError> {
+    pub fn load(path: &Path) -> Result<Self, FileError> {
         let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
         if (extension == "dcm" || extension == "dicom")
             && let Some(found) = Segmentation::load(path)?
@@ -37,14 +37,14 @@ impl LabelMap {
             let message = "is a tracked sequence: images and no label map";
             let remedy =
                 "for its poses give -o NAME.csv; for its images see `insonify reconstruct`";
-            return Err(ImportError::file(path, message, remedy));
+            return Err(FileError::file(path, message, remedy));
         }
         let (volume, _) = Volume::load(path)?;
         let segments = names::of(path)?;
         let layered = segments.iter().any(|s| s.layer > 0);
         if !volume.later.is_empty() && !layered {
             let count = volume.later.len() + 1;
-            return Err(ImportError::file(
+            return Err(FileError::file(
                 path,
                 format!("holds {count} volumes over time; a label map is one"),
                 "save the one that you want",
@@ -69,16 +69,16 @@ impl LabelMap {
         }
         if labels.is_empty() {
             let message = "every voxel is 0: no structure is labelled";
-            return Err(ImportError::file(path, message, "give the segmentation"));
+            return Err(FileError::file(path, message, "give the segmentation"));
         }
         Ok(Self { grid: grid.expect("a volume"), labels })
     }
 }
 
-fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, ImportError> {
+fn of_dicom(path: &Path, found: Segmentation) -> Result<LabelMap, FileError> {
     if found.voxels.iter().all(|v| *v == 0) {
         let message = "none of its segments has a pixel";
-        return Err(ImportError::file(path, message, "give the segmentation"));
+        return Err(FileError::file(path, message, "give the segmentation"));
     }
     let segment = |s: DicomSegment| Segment { layer: 0, value: s.number.into(), names: s.names };
     let Segmentation { size, world_from_voxel, voxels, segments } = found;
@@ -93,7 +93,7 @@ fn segment(segments: &[Segment], layer: usize, value: u32) -> Segment {
 }
 
 /// Voxels as 0 and numbers from `first + 1` on, in the order of their values, which are returned.
-fn number(path: &Path, voxels: Voxels, first: usize) -> Result<(Vec<u8>, Vec<u32>), ImportError> {
+fn number(path: &Path, voxels: Voxels, first: usize) -> Result<(Vec<u8>, Vec<u32>), FileError> {
     let values = match &voxels {
         Voxels::U8(v) => distinct(path, v.iter().map(|&x| f64::from(x)), first),
         Voxels::I8(v) => distinct(path, v.iter().map(|&x| f64::from(x)), first),
@@ -131,7 +131,7 @@ fn distinct(
     path: &Path,
     voxels: impl Iterator<Item = f64>,
     before: usize,
-) -> Result<Vec<u32>, ImportError> {
+) -> Result<Vec<u32>, FileError> {
     const REMEDY: &str = "give a label map: a whole number for each structure, 0 around them";
     let mut seen = BTreeMap::new();
     let mut last = 0.0;
@@ -142,7 +142,7 @@ fn distinct(
         last = value;
         if !(0.0..=MAX_VALUE).contains(&value) || value.fract() != 0.0 {
             let message = format!("has voxels of {value}: an image and no label map");
-            return Err(ImportError::file(path, message, REMEDY));
+            return Err(FileError::file(path, message, REMEDY));
         }
         if value > 0.0 {
             seen.insert(value as u32, ());
@@ -150,7 +150,7 @@ fn distinct(
         if before + seen.len() > usize::from(Grid::MOST) {
             let message =
                 format!("has more than {} different values: an image and no label map", Grid::MOST);
-            return Err(ImportError::file(path, message, REMEDY));
+            return Err(FileError::file(path, message, REMEDY));
         }
     }
     Ok(seen.into_keys().collect())

@@ -5,13 +5,13 @@ use std::path::Path;
 use glam::{DAffine3, DVec3};
 
 use super::draft::{Draft, Part, SKIN};
-use super::error::ImportError;
 use super::grid::Grid;
 use super::labels::LabelMap;
 use super::pose::{self, Task};
 use super::surface::Surfaces;
 use super::table::{Entry, OUTLINE};
 use super::{Options, composed, hull, nets, relax};
+use crate::issue::FileError;
 use crate::scene::Tissue;
 use crate::scene::mesh::{MAX_ELEMENTS, Soup};
 use crate::settings::suggest;
@@ -22,10 +22,10 @@ const MAX_FACES: u64 = 12_000_000;
 const MANY: usize = 20;
 /// Distance of voxels in which the place of the probe is sought, mm: a rib is three of them thick.
 const COARSE: f64 = 3.0;
-/// What a skin that is made up stands off, mm: some skin, fat and muscle.
+/// Distance of an invented skin from the organs, mm: some skin, fat and muscle.
 const MARGIN: f64 = 15.0;
 
-/// What is told of a stage: what is counted, how many are done, of how many.
+/// Reports the progress of a stage: name of the items, number done, number in all.
 pub type Progress<'p> = &'p mut dyn FnMut(&str, usize, usize);
 
 /// Makes a scene of a label map in `folder`.
@@ -37,7 +37,7 @@ pub fn import(
     folder: &Path,
     options: &Options,
     progress: Progress,
-) -> Result<Draft, ImportError> {
+) -> Result<Draft, FileError> {
     progress("read", 0, 1);
     let LabelMap { mut grid, labels } = LabelMap::load(path)?;
     if let Some(spacing) = options.spacing {
@@ -130,19 +130,17 @@ pub fn import(
 pub fn part(entry: &Entry, origin: String) -> Part {
     Part {
         name: entry.name.clone(),
-        file: String::new(),
         tissue: entry.tissue.clone(),
         priority: entry.priority,
         origin,
         note: entry.note.clone(),
         known: entry.known,
-        triangles: 0,
-        volume: 0.0,
+        ..Part::default()
     }
 }
 
 /// Adds the skin, below everything else.
-pub fn add_skin(draft: &mut Draft, skin: &Soup, options: &Options) -> Result<(), ImportError> {
+pub fn add_skin(draft: &mut Draft, skin: &Soup, options: &Options) -> Result<(), FileError> {
     let entry = Entry {
         name: SKIN.to_owned(),
         tissue: options.around.clone(),
@@ -160,18 +158,18 @@ pub fn add_skin(draft: &mut Draft, skin: &Soup, options: &Options) -> Result<(),
         Some(_) => Ok(()),
         None => {
             let message = format!("the body is {}", draft.left_out.pop().unwrap_or_default());
-            Err(ImportError::file(&draft.source, message, "check its unit and its voxel size"))
+            Err(FileError::file(&draft.source, message, "check its unit and its voxel size"))
         }
     }
 }
 
-fn resampled(path: &Path, grid: &Grid, spacing: DVec3) -> Result<Grid, ImportError> {
+fn resampled(path: &Path, grid: &Grid, spacing: DVec3) -> Result<Grid, FileError> {
     let own = grid.spacing();
     let counts = [0, 1, 2].map(|a| (grid.size[a] as f64 * own[a] / spacing[a]).round().max(1.0));
     let voxels: f64 = counts.iter().product();
     if voxels > 4e8 || counts.iter().any(|n| *n > 65_000.0) {
         let message = format!("at that spacing has {voxels:.3e} voxels, more than 400 million");
-        return Err(ImportError::file(path, message, "give a larger --spacing"));
+        return Err(FileError::file(path, message, "give a larger --spacing"));
     }
     Ok(grid.resampled(spacing))
 }
@@ -196,9 +194,9 @@ fn bounded(
     grid: &Grid,
     entries: &[Entry],
     spacing: Option<DVec3>,
-) -> Result<u64, ImportError> {
+) -> Result<u64, FileError> {
     if grid.size.iter().any(|&n| n >= usize::from(u16::MAX)) {
-        return Err(ImportError::file(path, "has more than 65534 voxels along an axis", "crop it"));
+        return Err(FileError::file(path, "has more than 65534 voxels along an axis", "crop it"));
     }
     let (all, each) = nets::count(grid);
     // Surface shrinks with the square of the spacing.
@@ -212,14 +210,14 @@ fn bounded(
     let labelled = grid.voxels.iter().filter(|v| **v > 0).count() as u64;
     if entries.len() > MANY && all > labelled {
         let message = "nearly every voxel differs from its neighbours: an image and no label map";
-        return Err(ImportError::file(path, message, "give the segmentation"));
+        return Err(FileError::file(path, message, "give the segmentation"));
     }
     if all > MAX_FACES {
         let needed = nets::bytes(grid, all) >> 20;
         let message = format!(
             "its surfaces have {all} faces between voxels (and need {needed} MB), more than {MAX_FACES}"
         );
-        return Err(ImportError::file(path, message, advice(all as f64 / MAX_FACES as f64)));
+        return Err(FileError::file(path, message, advice(all as f64 / MAX_FACES as f64)));
     }
     // The outline has the faces towards what is outside; what it shares with organs is theirs.
     let outline = entries.iter().any(|e| e.priority == OUTLINE).then_some((SKIN, each[0]));
@@ -230,7 +228,7 @@ fn bounded(
             let message = format!(
                 "the surface of `{name}` would have {triangles} triangles, more than {MAX_ELEMENTS}"
             );
-            return Err(ImportError::file(
+            return Err(FileError::file(
                 path,
                 message,
                 advice(triangles as f64 / MAX_ELEMENTS as f64),
@@ -247,7 +245,7 @@ pub fn choose(
     hides: &[bool; 256],
     options: &Options,
     path: &Path,
-) -> Result<Option<u8>, ImportError> {
+) -> Result<Option<u8>, FileError> {
     let largest = |accepted: &dyn Fn(u8, &Entry) -> bool| {
         let parts = parts.iter().filter(|(label, entry)| accepted(*label, entry));
         parts.map(|(label, _)| *label).max_by_key(|label| size(*label))
@@ -265,11 +263,11 @@ pub fn choose(
     let found = largest(&same).or_else(|| largest(&within));
     found.map(Some).ok_or_else(|| {
         let remedy = suggest::among(wanted, parts.iter().map(|(_, e)| e.name.as_str()));
-        ImportError::file(path, format!("has no structure `{wanted}` to look at"), remedy)
+        FileError::file(path, format!("has no structure `{wanted}` to look at"), remedy)
     })
 }
 
-/// Whether a place of the skin is where the volume ends and the body goes on.
+/// Returns true for a place of the skin where the volume ends and the body goes on.
 fn cut(grid: &Grid, outline: bool) -> impl Fn(DVec3) -> bool {
     let back: DAffine3 = grid.world_from_voxel.inverse();
     let size = DVec3::from(grid.size.map(|n| n as f64));

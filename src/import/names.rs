@@ -5,7 +5,7 @@ use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
-use super::error::ImportError;
+use crate::issue::FileError;
 
 /// A segment of a file.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -28,11 +28,10 @@ const NIFTI: usize = 348;
 ///
 /// # Errors
 /// A file that cannot be read.
-pub fn of(path: &Path) -> Result<Vec<Segment>, ImportError> {
+pub fn of(path: &Path) -> Result<Vec<Segment>, FileError> {
     let name = path.to_string_lossy().to_ascii_lowercase();
-    let fail = |e: std::io::Error| {
-        ImportError::file(path, format!("cannot be read: {e}"), "check the path")
-    };
+    let fail =
+        |e: std::io::Error| FileError::file(path, format!("cannot be read: {e}"), "check the path");
     let open = || std::fs::File::open(path).map_err(fail);
     if name.ends_with(".nrrd") || name.ends_with(".nhdr") {
         Ok(of_nrrd(&head(open()?)))

@@ -1,24 +1,21 @@
 //! Configurations of PLUS (`PlusDeviceSet_*.xml`): its simulator's bodies and transducer, and its transforms.
 //!
-//! What the words mean there: vtkPlusUsSimulatorAlgo, PlusSpatialModel, vtkPlusUsScanConvertLinear and
+//! Sources of the meanings: vtkPlusUsSimulatorAlgo, PlusSpatialModel, vtkPlusUsScanConvertLinear and
 //! -Curvilinear of github.com/PlusToolkit/PlusLib. A model of higher number in the file covers those before it; one
 //! without a file is everywhere. Scanlines lie in the plane of the image, whose pixels `ImageTo...` takes to mm:
 //! the size of a pixel there and `OutputImageSpacingMmPerPixel`, by which the transducer is laid out in pixels, may differ.
 
 use std::collections::BTreeMap;
-use std::io::Read;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec2, DVec3};
-use roxmltree::{Document, Node};
 
-use super::error::ImportError;
-use crate::volume::{Pose, Transforms, transform};
+use crate::issue::FileError;
+use crate::volume::plus::{self, Element};
+use crate::volume::{Pose, Transforms};
 
-/// Longest configuration, bytes.
-const MAX_CONFIG: u64 = 4 << 20;
-
-/// What a configuration has for a scene.
+/// Content of a configuration that a scene needs.
 #[derive(Clone, Debug)]
 pub struct DeviceSet {
     /// Name of the device set, where it has one.
@@ -52,7 +49,7 @@ pub struct Model {
     pub speed: f64,
     /// One-way attenuation at 1 MHz, dB/cm.
     pub attenuation: f64,
-    /// Share of what is absorbed that comes back.
+    /// Backscattered share of the absorbed energy.
     pub backscatter: f64,
 }
 
@@ -125,39 +122,36 @@ impl DeviceSet {
     ///
     /// # Errors
     /// It is no XML, has no simulator, or one without what a scene needs.
-    pub fn load(path: &Path) -> Result<Self, ImportError> {
-        let text = text(path)?;
-        let document = Document::parse(&text).map_err(|e| {
-            let line = e.pos().row as usize;
-            ImportError::line(path, line, format!("is no XML: {e}"), "correct it")
-        })?;
-        let find = |names: &[&str]| {
-            let node =
-                document.descendants().find(|n| names.iter().any(|name| n.has_tag_name(*name)));
-            node.map(|node| Element { node, path })
-        };
-        let transforms = transforms(&document, path)?;
-        let Some(simulator) = find(&["vtkPlusUsSimulatorAlgo", "vtkUsSimulatorAlgo"]) else {
-            return Err(ImportError::file(
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let text = plus::text(path)?;
+        let document = plus::parse(path, &text)?;
+        let root = Element::root(path, &document);
+        let transforms = root.transforms()?;
+        let mut simulators =
+            ["vtkPlusUsSimulatorAlgo", "vtkUsSimulatorAlgo"].map(|name| root.named(name).next());
+        let Some(simulator) = simulators.iter_mut().find_map(Option::take) else {
+            return Err(FileError::file(
                 path,
                 "has no element `vtkPlusUsSimulatorAlgo`: it simulates nothing",
                 "give the configuration of a device of Type=\"UsSimulator\"",
             ));
         };
-        let Some(scan) = find(&["ScanConversion"]) else {
+        let Some(scan) = root.named("ScanConversion").next() else {
             return Err(
                 simulator.error("has no element `ScanConversion`", "add it: the transducer")
             );
         };
-        let nodes = simulator.node.children().filter(|n| n.has_tag_name("SpatialModel"));
-        let models: Result<Vec<_>, _> =
-            nodes.enumerate().map(|(n, node)| model(&Element { node, path }, n)).collect();
+        let models: Result<Vec<_>, _> = simulator
+            .named("SpatialModel")
+            .enumerate()
+            .map(|(n, found)| model(&found, n))
+            .collect();
         let own = |name: &str, otherwise: &str| {
             simulator.node.attribute(name).unwrap_or(otherwise).to_owned()
         };
-        let set = document.descendants().find(|n| n.has_tag_name("DeviceSet"));
+        let name = root.named("DeviceSet").next().and_then(|set| set.node.attribute("Name"));
         Ok(Self {
-            name: set.and_then(|n| n.attribute("Name")).map(str::to_owned),
+            name: name.map(str::to_owned),
             image: own("ImageCoordinateFrame", "Image"),
             reference: own("ReferenceCoordinateFrame", "Reference"),
             transforms,
@@ -169,7 +163,7 @@ impl DeviceSet {
     /// The transform from a frame to the reference, by these poses and what always holds.
     ///
     /// # Errors
-    /// What is missing, in words.
+    /// The missing parts, in words.
     pub fn reference_from(
         &self,
         frame: &str,
@@ -189,133 +183,67 @@ impl DeviceSet {
 ///
 /// # Errors
 /// It is no XML, or has a matrix that is none.
-pub fn definitions(path: &Path) -> Result<Transforms, ImportError> {
-    let text = text(path)?;
-    let document = Document::parse(&text).map_err(|e| {
-        let line = e.pos().row as usize;
-        ImportError::line(path, line, format!("is no XML: {e}"), "correct it")
-    })?;
-    transforms(&document, path)
+pub fn definitions(path: &Path) -> Result<Transforms, FileError> {
+    let text = plus::text(path)?;
+    Element::root(path, &plus::parse(path, &text)?).transforms()
 }
 
-fn text(path: &Path) -> Result<String, ImportError> {
-    let fail = |e: std::io::Error| {
-        ImportError::file(path, format!("cannot be read: {e}"), "check the path")
-    };
-    if !std::fs::metadata(path).map_err(fail)?.is_file() {
-        return Err(ImportError::file(path, "is not an ordinary file", "give a file"));
+/// N numbers in a range, where the attribute is there.
+fn numbers<const N: usize>(
+    element: &Element,
+    name: &str,
+    range: RangeInclusive<f64>,
+) -> Result<Option<[f64; N]>, FileError> {
+    let values = element.numbers::<f64, N>(name)?;
+    if values.iter().flatten().all(|x| range.contains(x)) {
+        return Ok(values);
     }
-    let mut bytes = Vec::new();
-    let file = std::fs::File::open(path).map_err(fail)?;
-    file.take(MAX_CONFIG + 1).read_to_end(&mut bytes).map_err(fail)?;
-    if bytes.len() as u64 > MAX_CONFIG {
-        let message = format!("is larger than {} MB", MAX_CONFIG >> 20);
-        return Err(ImportError::file(path, message, "give a configuration of PLUS"));
-    }
-    Ok(String::from_utf8_lossy(&bytes).into_owned())
+    let remedy = format!("write {N} numbers from {} to {}", range.start(), range.end());
+    Err(element.wrong(name, "out of range", &remedy))
 }
 
-fn transforms(document: &Document, path: &Path) -> Result<Transforms, ImportError> {
-    let mut out = Transforms::default();
-    for node in document.descendants().filter(|n| n.has_tag_name("Transform")) {
-        let element = Element { node, path };
-        // Transforms in other parts of a configuration have no matrix.
-        if let Some(matrix) = element.matrix("Matrix")? {
-            out.add(element.need("From")?, element.need("To")?, matrix);
-        }
-    }
-    Ok(out)
+fn number(
+    element: &Element,
+    name: &str,
+    otherwise: f64,
+    range: RangeInclusive<f64>,
+) -> Result<f64, FileError> {
+    Ok(numbers::<1>(element, name, range)?.map_or(otherwise, |[v]| v))
 }
 
-struct Element<'d, 'p> {
-    node: Node<'d, 'd>,
-    path: &'p Path,
-}
-
-impl Element<'_, '_> {
-    fn error(&self, message: impl Into<String>, remedy: &str) -> ImportError {
-        let line = self.node.document().text_pos_at(self.node.range().start).row as usize;
-        let message = format!("`{}`: {}", self.node.tag_name().name(), message.into());
-        ImportError::line(self.path, line, message, remedy)
-    }
-
-    fn need(&self, name: &str) -> Result<&str, ImportError> {
-        self.node.attribute(name).ok_or_else(|| self.error(format!("lacks `{name}`"), "add it"))
-    }
-
-    fn matrix(&self, name: &str) -> Result<Option<DAffine3>, ImportError> {
-        let Some(text) = self.node.attribute(name) else { return Ok(None) };
-        let matrix = transform(text).map_err(|cause| {
-            self.error(format!("`{name}` {cause}"), "write 16 numbers, row by row")
-        })?;
-        if matrix.matrix3.determinant().abs() < 1e-12 {
-            return Err(self.error(format!("`{name}` is singular"), "correct it"));
-        }
-        Ok(Some(matrix))
-    }
-
-    /// N numbers in a range, where the attribute is there.
-    fn numbers<const N: usize>(
-        &self,
-        name: &str,
-        range: std::ops::RangeInclusive<f64>,
-    ) -> Result<Option<[f64; N]>, ImportError> {
-        let Some(text) = self.node.attribute(name) else { return Ok(None) };
-        let values: Option<Vec<f64>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-        let values = values.and_then(|v| <[f64; N]>::try_from(v).ok());
-        match values.filter(|v| v.iter().all(|x| range.contains(x))) {
-            Some(values) => Ok(Some(values)),
-            None => {
-                let text: String = text.chars().take(60).collect();
-                let remedy = format!("write {N} numbers from {} to {}", range.start(), range.end());
-                Err(self.error(format!("`{name}` is `{text}`"), &remedy))
-            }
-        }
-    }
-
-    fn number(
-        &self,
-        name: &str,
-        otherwise: f64,
-        range: std::ops::RangeInclusive<f64>,
-    ) -> Result<f64, ImportError> {
-        Ok(self.numbers::<1>(name, range)?.map_or(otherwise, |[v]| v))
-    }
-
-    fn length(&self, name: &str) -> Result<f64, ImportError> {
-        self.need(name)?;
-        self.number(name, 0.0, 0.01..=1000.0)
-    }
+fn length(element: &Element, name: &str) -> Result<f64, FileError> {
+    element.need(name)?;
+    number(element, name, 0.0, 0.01..=1000.0)
 }
 
 /// PLUS's own values where none is given.
-fn model(element: &Element, number: usize) -> Result<Model, ImportError> {
+fn model(element: &Element, n: usize) -> Result<Model, FileError> {
     let own = |name: &str| element.node.attribute(name).filter(|v| !v.is_empty());
     Ok(Model {
-        name: own("Name").map_or_else(|| format!("model {}", number + 1), str::to_owned),
+        name: own("Name").map_or_else(|| format!("model {}", n + 1), str::to_owned),
         file: own("ModelFile").map(PathBuf::from),
         frame: own("ObjectCoordinateFrame").map(str::to_owned),
         object_from_model: element.matrix("ModelToObjectTransform")?.unwrap_or(DAffine3::IDENTITY),
-        density: element.number("DensityKgPerM3", 910.0, 0.1..=25_000.0)? / 1000.0,
-        speed: element.number("SoundVelocityMPerSec", 1540.0, 100.0..=10_000.0)? / 1000.0,
-        attenuation: element.number("AttenuationCoefficientDbPerCmMhz", 0.65, 0.0..=1000.0)?,
-        backscatter: element.number("BackscatterDiffuseReflectionCoefficient", 0.1, 0.0..=1e6)?,
+        density: number(element, "DensityKgPerM3", 910.0, 0.1..=25_000.0)? / 1000.0,
+        speed: number(element, "SoundVelocityMPerSec", 1540.0, 100.0..=10_000.0)? / 1000.0,
+        attenuation: number(element, "AttenuationCoefficientDbPerCmMhz", 0.65, 0.0..=1000.0)?,
+        backscatter: number(element, "BackscatterDiffuseReflectionCoefficient", 0.1, 0.0..=1e6)?,
     })
 }
 
-fn transducer(simulator: &Element, scan: &Element) -> Result<Transducer, ImportError> {
+fn transducer(simulator: &Element, scan: &Element) -> Result<Transducer, FileError> {
     let kind = scan.need("TransducerGeometry")?;
     let geometry = match kind.to_ascii_uppercase().as_str() {
         "LINEAR" => Geometry::Linear {
-            width: scan.length("TransducerWidthMm")?,
-            depth: scan.length("ImagingDepthMm")?,
+            width: length(scan, "TransducerWidthMm")?,
+            depth: length(scan, "ImagingDepthMm")?,
         },
         "CURVILINEAR" => {
             let angle = |name| {
                 scan.need(name)?;
-                scan.number(name, 0.0, -90.0..=90.0)
+                number(scan, name, 0.0, -90.0..=90.0)
             };
-            let (radius, stop) = (scan.length("RadiusStartMm")?, scan.length("RadiusStopMm")?);
+            let (radius, stop) = (length(scan, "RadiusStartMm")?, length(scan, "RadiusStopMm")?);
             let (from, to) = (angle("ThetaStartDeg")?, angle("ThetaStopDeg")?);
             if stop <= radius || to <= from {
                 return Err(scan.error("its radii or angles do not grow", "correct them"));
@@ -335,14 +263,14 @@ fn transducer(simulator: &Element, scan: &Element) -> Result<Transducer, ImportE
     };
     scan.need("TransducerCenterPixel")?;
     scan.need("OutputImageSpacingMmPerPixel")?;
-    let center = scan.numbers::<2>("TransducerCenterPixel", -1e5..=1e5)?.unwrap_or_default();
-    let spacing = scan.numbers::<2>("OutputImageSpacingMmPerPixel", 1e-4..=100.0)?;
+    let center = numbers::<2>(scan, "TransducerCenterPixel", -1e5..=1e5)?.unwrap_or_default();
+    let spacing = numbers::<2>(scan, "OutputImageSpacingMmPerPixel", 1e-4..=100.0)?;
     Ok(Transducer {
         geometry,
         center: center.into(),
         spacing: spacing.unwrap_or([1.0; 2]).into(),
-        frequency: simulator.number("FrequencyMhz", 2.5, 0.1..=100.0)?,
-        scanlines: simulator.number("NumberOfScanlines", 256.0, 1.0..=4096.0)? as u32,
-        samples: simulator.number("NumberOfSamplesPerScanline", 1000.0, 16.0..=65_536.0)? as u32,
+        frequency: number(simulator, "FrequencyMhz", 2.5, 0.1..=100.0)?,
+        scanlines: number(simulator, "NumberOfScanlines", 256.0, 1.0..=4096.0)? as u32,
+        samples: number(simulator, "NumberOfSamplesPerScanline", 1000.0, 16.0..=65_536.0)? as u32,
     })
 }

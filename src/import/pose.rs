@@ -1,4 +1,4 @@
-//! Where on the skin a probe sees an organ: the place from which least bone and gas is in the way.
+//! Search for the place on the skin from which a probe sees an organ with the least bone and gas in the way.
 
 use glam::{DAffine3, DVec3};
 
@@ -17,17 +17,17 @@ pub struct View {
     pub lateral: DVec3,
     /// Distance to the point that is looked at, mm.
     pub distance: f64,
-    /// Bone and gas on the way to it, mm.
+    /// Length of bone and gas on the straight path to it, mm.
     pub blocked: f64,
-    /// Share of the ways to points beside it, in the image, that meet bone or gas.
+    /// Share of the straight paths to points beside it, in the image, that meet bone or gas.
     pub shaded: f64,
 }
 
-/// What the search goes by.
+/// Inputs of the search.
 pub struct Task<'t> {
     /// The body in coarse voxels.
     pub grid: &'t Grid,
-    /// Whether sound hardly passes, by label.
+    /// True for each label that sound hardly passes.
     pub blocks: &'t [bool; 256],
     /// Label of the organ.
     pub target: u8,
@@ -37,13 +37,13 @@ pub struct Task<'t> {
     pub forbidden: &'t dyn Fn(DVec3) -> bool,
 }
 
-/// Reflected share of the intensity at normal incidence on soft tissue from which on a tissue hides what is behind.
+/// Reflected share of the intensity, at normal incidence from soft tissue, above which a tissue hides structures behind it.
 const HIDES: f64 = 0.1;
 /// Impedance of soft tissue, MRayl.
 const SOFT: f64 = 1.63;
 /// Places of the skin that are tried.
 const PLACES: usize = 3000;
-/// Ways to either side in the image, and the angle between two, rad.
+/// Number of straight paths to either side in the image, and the angle between two, rad.
 const SIDES: i32 = 4;
 const ANGLE: f64 = 0.1;
 /// Least cosine of the angle between beam and skin: 45 degrees.
@@ -51,7 +51,7 @@ const STEEPEST: f64 = 0.7;
 /// Depth by which the face is pressed into the skin, mm.
 const PRESSED: f64 = 1.0;
 
-/// Returns whether what lies behind a tissue is hidden: bone and gas.
+/// Returns whether a tissue hides structures behind it, as bone and gas do.
 pub fn blocks(tissue: &Tissue) -> bool {
     let z = tissue.impedance();
     ((z - SOFT) / (z + SOFT)).powi(2) > HIDES
@@ -128,7 +128,7 @@ fn laterals(direction: DVec3) -> [DVec3; 2] {
     [transverse * turn, -transverse.cross(direction) * transverse.cross(direction).z.signum()]
 }
 
-/// Length of bone and gas on a straight way, mm.
+/// Length of bone and gas on a straight path, mm.
 fn hidden(task: &Task, back: &DAffine3, from: DVec3, to: DVec3) -> f64 {
     let step = task.grid.spacing().min_element() * 0.5;
     let way = to - from;
@@ -140,7 +140,7 @@ fn hidden(task: &Task, back: &DAffine3, from: DVec3, to: DVec3) -> f64 {
     blocked.count() as f64 * way.length() / count
 }
 
-/// Share of the ways to either side in the image plane that are hidden.
+/// Share of the straight paths to either side in the image plane that are hidden.
 fn shaded(
     task: &Task,
     back: &DAffine3,

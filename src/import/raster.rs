@@ -47,7 +47,7 @@ pub fn rasterise(
     }
 }
 
-/// Where the line along x through (y, z) crosses a triangle.
+/// The x at which the line along x through (y, z) crosses a triangle; none where it does not.
 fn crossing(triangle: [u32; 3], corners: [DVec3; 3], y: f64, z: f64) -> Option<f64> {
     let mut weights = [0.0; 3];
     let mut sides = [false; 3];

@@ -5,6 +5,8 @@
 //! normals gives back, until each has the volume of its voxels. A vertex where surfaces join moves along the joint
 //! alone, and one where joints meet stays (Frisken 2022).
 
+use glam::DVec3;
+
 use super::nets::{Face, NONE, Net, Vertex};
 
 /// Bytes beside each vertex while it works.
@@ -28,7 +30,7 @@ const PUSHES: usize = 8;
 /// Steps that `done` of [`relax`] is told.
 pub const STEPS: usize = 2 * ROUNDS + PUSHES;
 
-/// Smooths a net; `volumes` is how many voxels each label has to enclose.
+/// Smooths a net; `volumes` are the numbers of voxels that the labels have to enclose.
 pub fn relax(net: &mut Net, volumes: &[u64; 256], reach: f32, mut done: impl FnMut(usize)) {
     let mut motions: Vec<Motion> = vec![([0.0; 3], 0.0); net.vertices.len()];
     for round in 0..ROUNDS {
@@ -78,13 +80,8 @@ fn shift(vertex: &mut Vertex, by: [f32; 3], reach: f32) {
 
 /// Half the cross product of a face's diagonals: its area along its normal, which points to its second label.
 fn area(net: &Net, face: &Face) -> [f64; 3] {
-    let [p, q, r, s] = face.vertices.map(|v| net.place(v));
-    let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
-    let (u, v) = (minus(r, p), minus(s, q));
-    [0, 1, 2].map(|a| {
-        let (b, c) = ((a + 1) % 3, (a + 2) % 3);
-        (u[b] * v[c] - u[c] * v[b]) / 2.0
-    })
+    let [p, q, r, s] = face.vertices.map(|v| DVec3::from(net.place(v)));
+    ((r - p).cross(s - q) / 2.0).to_array()
 }
 
 /// Volume and area of each label, voxels.
@@ -111,7 +108,7 @@ fn inflate(net: &mut Net, motions: &mut [Motion], volumes: &[u64; 256], reach: f
     let measures = measure(net);
     let depth = |label: u8| {
         let (volume, area) = measures[usize::from(label)];
-        // What is outside all labels has no volume of its own.
+        // The outside of all labels has no volume.
         if label == 0 || area == 0.0 {
             return 0.0;
         }

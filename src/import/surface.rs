@@ -1,4 +1,4 @@
-//! The surface of one body out of a net: what lies between it and everything else.
+//! The surface of one body out of a net: the faces between it and everything else.
 
 use glam::DVec3;
 
@@ -13,7 +13,7 @@ pub struct Surfaces<'n> {
     positions: Vec<[f32; 3]>,
     /// True where the axes of the voxels are left-handed.
     mirrored: bool,
-    /// Number of each vertex in the surface at hand; what is older than that is of no meaning.
+    /// Number of each vertex in the present surface; numbers from earlier surfaces have no meaning.
     numbers: Vec<u32>,
 }
 

@@ -1,9 +1,8 @@
 //! The tissue of a structure, by its name or by the value of its label.
 
-use std::io::Read;
 use std::path::Path;
 
-use super::error::ImportError;
+use crate::issue::{self, FileError};
 use crate::scene::tissue::table as tissue;
 use crate::settings::suggest;
 
@@ -22,7 +21,7 @@ const UNKNOWN_PRIORITY: i32 = 20;
 /// Priority of outlines of the body.
 pub const OUTLINE: i32 = 0;
 
-/// One row; what it leaves open is none.
+/// One row; values that it leaves out are none.
 #[derive(Clone, Debug, PartialEq)]
 struct Row {
     value: Option<u32>,
@@ -41,18 +40,18 @@ pub struct Table {
     shipped: Vec<Row>,
 }
 
-/// What a table says of a structure.
+/// The statement of a table on a structure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Entry {
     /// Its name: the user's for its value, else the file's.
     pub name: String,
     /// Its tissue.
     pub tissue: String,
-    /// Who wins where surfaces lie on or in each other: the higher.
+    /// Priority where surfaces lie on or in each other: the higher wins.
     pub priority: i32,
     /// False where no row knows it: the tissue is then [`UNKNOWN`].
     pub known: bool,
-    /// What there is to say about the choice.
+    /// Note on the choice.
     pub note: String,
 }
 
@@ -68,25 +67,8 @@ impl Table {
     ///
     /// # Errors
     /// The first mistake with its line.
-    pub fn load(path: &Path) -> Result<Self, ImportError> {
-        let fail = |e: std::io::Error| {
-            ImportError::file(path, format!("cannot be read: {e}"), "check the path of the table")
-        };
-        let info = std::fs::metadata(path).map_err(fail)?;
-        if !info.is_file() {
-            return Err(ImportError::file(path, "is not an ordinary file", "give a table"));
-        }
-        let mut bytes = Vec::new();
-        let file = std::fs::File::open(path).map_err(fail)?;
-        file.take(MAX_TABLE + 1).read_to_end(&mut bytes).map_err(fail)?;
-        if bytes.len() as u64 > MAX_TABLE {
-            let message = format!("is larger than {} MB", MAX_TABLE >> 20);
-            return Err(ImportError::file(path, message, "give a table of labels"));
-        }
-        let text = String::from_utf8(bytes).map_err(|_| {
-            ImportError::file(path, "is no text in UTF-8", "save it as CSV in UTF-8")
-        })?;
-        let own = parse(path, text.strip_prefix('\u{feff}').unwrap_or(&text))?;
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let own = parse(path, &issue::read_text(path, MAX_TABLE, "give a table of labels")?)?;
         Ok(Self { own, ..Self::shipped() })
     }
 
@@ -103,7 +85,7 @@ impl Table {
         Some(&row.name)
     }
 
-    /// What is known of a structure by the value of its label and by its names, the first of which is its own. A row of
+    /// The entry of a structure, by the value of its label and by its names, the first of which is its own. A row of
     /// the user for the value counts before rows for names, and those of the user before those that ship.
     pub fn look_up(&self, value: Option<u32>, names: &[&str]) -> Entry {
         let by_value = value.and_then(|v| self.own.iter().find(|r| r.value == Some(v)));
@@ -171,7 +153,7 @@ fn best<'r>(rows: &'r [Row], name: &str) -> Option<&'r Row> {
 const COLUMNS: [&str; 5] = ["value", "name", "tissue", "priority", "note"];
 
 /// The cells of each line with its number, from 1; lines that begin with # and empty ones say nothing.
-fn cells(path: &Path, text: &str) -> Result<Vec<(usize, Vec<String>)>, ImportError> {
+fn cells(path: &Path, text: &str) -> Result<Vec<(usize, Vec<String>)>, FileError> {
     let mut out = Vec::new();
     for (line, text) in (1..).zip(text.lines()) {
         if text.trim().is_empty() || text.starts_with('#') {
@@ -182,7 +164,7 @@ fn cells(path: &Path, text: &str) -> Result<Vec<(usize, Vec<String>)>, ImportErr
             .trim(csv::Trim::All)
             .from_reader(text.as_bytes());
         let record = reader.records().next().and_then(Result::ok).ok_or_else(|| {
-            ImportError::line(path, line, "is no line of CSV", "separate cells by commas")
+            FileError::line(path, line, "is no line of CSV", "separate cells by commas")
         })?;
         out.push((line, record.iter().map(str::to_owned).collect()));
     }
@@ -190,23 +172,23 @@ fn cells(path: &Path, text: &str) -> Result<Vec<(usize, Vec<String>)>, ImportErr
 }
 
 /// The rows of a text.
-fn parse(path: &Path, text: &str) -> Result<Vec<Row>, ImportError> {
+fn parse(path: &Path, text: &str) -> Result<Vec<Row>, FileError> {
     let mut lines = cells(path, text)?.into_iter();
     let (first, header) = lines.next().ok_or_else(|| {
-        ImportError::file(path, "is empty", "begin with the line value,name,tissue,priority")
+        FileError::file(path, "is empty", "begin with the line value,name,tissue,priority")
     })?;
     let mut columns = Vec::new();
     for name in &header {
         let name = name.to_lowercase();
         let found = COLUMNS.iter().position(|c| *c == name).ok_or_else(|| {
             let remedy = suggest::among(&name, COLUMNS.iter().copied());
-            ImportError::line(path, first, format!("unknown column `{name}`"), remedy)
+            FileError::line(path, first, format!("unknown column `{name}`"), remedy)
         })?;
         columns.push(found);
     }
     if !columns.contains(&0) && !columns.contains(&1) {
         let message = "has neither a column `value` nor a column `name`";
-        return Err(ImportError::line(
+        return Err(FileError::line(
             path,
             first,
             message,
@@ -218,7 +200,7 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Row>, ImportError> {
         if record.len() != header.len() {
             let message = format!("has {} cells under {} columns", record.len(), header.len());
             let remedy = "give one cell per column, also empty ones";
-            return Err(ImportError::line(path, line, message, remedy));
+            return Err(FileError::line(path, line, message, remedy));
         }
         let cell = |column: usize| {
             let at = columns.iter().position(|c| *c == column);
@@ -228,7 +210,7 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Row>, ImportError> {
             let parse = |cell: &str| {
                 cell.parse::<i32>().map_err(|_| {
                     let message = format!("`{cell}` under {} is no integer", COLUMNS[column]);
-                    ImportError::line(path, line, message, "write a number such as 5")
+                    FileError::line(path, line, message, "write a number such as 5")
                 })
             };
             cell(column).map(parse).transpose()
@@ -236,14 +218,14 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Row>, ImportError> {
         let value = integer(0)?.map(|value| {
             u32::try_from(value).map_err(|_| {
                 let message = format!("the value {value} is negative");
-                ImportError::line(path, line, message, "write the number of the label")
+                FileError::line(path, line, message, "write the number of the label")
             })
         });
         let value = value.transpose()?;
         let name = cell(1).unwrap_or_default().to_owned();
         if value.is_none() && name.is_empty() {
             let message = "has neither value nor name";
-            return Err(ImportError::line(path, line, message, "say which structure it is for"));
+            return Err(FileError::line(path, line, message, "say which structure it is for"));
         }
         let tissue = cell(2).map(str::to_owned);
         if let Some(tissue) = &tissue
@@ -251,7 +233,7 @@ fn parse(path: &Path, text: &str) -> Result<Vec<Row>, ImportError> {
         {
             let remedy = suggest::among(tissue, tissue::names());
             let message = format!("unknown tissue `{tissue}`");
-            return Err(ImportError::line(path, line, message, remedy));
+            return Err(FileError::line(path, line, message, remedy));
         }
         let note = cell(4).unwrap_or_default().to_owned();
         rows.push(Row { value, words: words(&name), name, tissue, priority: integer(3)?, note });
@@ -349,7 +331,7 @@ mod tests {
             ("value,name,tissue\n,,liver\n", 2, "neither value nor name"),
         ] {
             let error = parse(Path::new("t.csv"), text).expect_err(text);
-            assert_eq!(error.line, line, "{error}");
+            assert_eq!(error.place, issue::Place::Line(line), "{error}");
             assert!(error.message.contains(cause), "{error}");
         }
     }

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use glam::{DAffine3, DQuat};
 
-use super::error::ImportError;
 use super::plus::{self, DeviceSet};
+use crate::issue::FileError;
 use crate::scene::tracker::rigid;
 use crate::volume::{Pose, TrackedFrame, Transforms, track};
 
@@ -44,7 +44,7 @@ pub fn import(
     path: &Path,
     config: Option<&Path>,
     naming: &Naming,
-) -> Result<Trajectory, ImportError> {
+) -> Result<Trajectory, FileError> {
     let frames = track(path)?;
     let set = config.map(DeviceSet::load).and_then(Result::ok);
     let transforms = match (&set, config) {
@@ -54,8 +54,10 @@ pub fn import(
     };
     let turn = DAffine3::from_rotation_z(std::f64::consts::PI);
     let to_world = if naming.to_lps { turn } else { DAffine3::IDENTITY };
-    let connected =
-        frames.iter().any(|f| between(&transforms, f, &naming.tool, &naming.reference).is_some());
+    let between = |frame: &TrackedFrame, from: &str| {
+        transforms.between(&frame.poses, from, &naming.reference)
+    };
+    let connected = frames.iter().any(|f| between(f, &naming.tool).is_some());
     if !connected {
         let mut names: Vec<_> = frames.iter().flat_map(|f| f.poses.keys().cloned()).collect();
         names.sort();
@@ -65,15 +67,15 @@ pub fn import(
             "it has {}: choose by --pose FROMToTO, or add transforms by --config",
             names.join(", ")
         );
-        return Err(ImportError::file(path, message, remedy));
+        return Err(FileError::file(path, message, remedy));
     }
     let probe = |frame: &TrackedFrame| -> Option<DAffine3> {
         let pose = match &set {
             Some(set) => {
-                let image = between(&transforms, frame, &set.image, &naming.reference)??;
+                let image = between(frame, &set.image)??;
                 set.transducer.placed(&image).world_from_probe()
             }
-            None => between(&transforms, frame, &naming.tool, &naming.reference)??,
+            None => between(frame, &naming.tool)??,
         };
         rigid(to_world * pose).ok()
     };
@@ -112,7 +114,7 @@ pub fn import(
     }
     if rows == 0 {
         let message = format!("none of {} frames has a time and a valid rigid pose", frames.len());
-        return Err(ImportError::file(
+        return Err(FileError::file(
             path,
             message,
             "give a sequence with timestamps and poses that are OK",
@@ -121,20 +123,11 @@ pub fn import(
     Ok(Trajectory { text, rows, left_out, duration: last })
 }
 
-fn between(
-    transforms: &Transforms,
-    frame: &TrackedFrame,
-    from: &str,
-    to: &str,
-) -> Option<Option<DAffine3>> {
-    transforms.between(&frame.poses, from, to)
-}
-
 /// The poses of the first frame in which all are valid; of the first where there is no such frame.
 ///
 /// # Errors
 /// The fault of the file.
-pub fn first_poses(path: &Path) -> Result<BTreeMap<String, Pose>, ImportError> {
+pub fn first_poses(path: &Path) -> Result<BTreeMap<String, Pose>, FileError> {
     let frames = track(path)?;
     let whole =
         frames.iter().position(|f| !f.poses.is_empty() && f.poses.values().all(Pose::is_ok));

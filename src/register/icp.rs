@@ -9,7 +9,8 @@ use glam::{DAffine3, DQuat, DVec3};
 use rayon::prelude::*;
 
 use super::symmetric::{Square, eigen};
-use super::{RegisterError, Transformation, TriangleSurface, scale_of};
+use super::{Transformation, TriangleSurface, scale_of};
+use crate::issue::FileError;
 use crate::statistics::Statistics;
 
 /// Fewest points.
@@ -109,13 +110,13 @@ pub fn fit(
     surface: &TriangleSurface,
     start: DAffine3,
     transformation: Transformation,
-) -> Result<Fit, RegisterError> {
+) -> Result<Fit, FileError> {
     check(points)?;
     let mut transform = start;
     let mut matched = matches(points, surface, &transform);
     let typical = Statistics::of(matched.iter().map(|m| m.off)).median;
     if typical > surface.size() {
-        return Err(RegisterError::data(
+        return Err(FileError::data(
             format!(
                 "at the start the points lie {typical:.0} mm off the surface, which is {:.0} mm large",
                 surface.size()
@@ -149,7 +150,7 @@ pub fn fit(
         }
         let growth = scale_of(&transform) / scale_of(&start);
         if !(SCALES.0..=SCALES.1).contains(&growth) {
-            return Err(RegisterError::data(
+            return Err(FileError::data(
                 format!("the scale runs away: it is {growth:.2} times that of the start"),
                 "give --landmarks, register with --transformation rigid, or give points of more \
                  of the surface",
@@ -166,8 +167,8 @@ pub fn fit(
     })
 }
 
-fn check(points: &[DVec3]) -> Result<(), RegisterError> {
-    let fail = |cause: String, remedy| Err(RegisterError::data(cause, remedy));
+fn check(points: &[DVec3]) -> Result<(), FileError> {
+    let fail = |cause: String, remedy| Err(FileError::data(cause, remedy));
     if points.len() < MIN_POINTS {
         return fail(
             format!("{} points are given", points.len()),

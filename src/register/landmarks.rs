@@ -2,8 +2,9 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
+use super::Transformation;
 use super::symmetric::eigen;
-use super::{RegisterError, Transformation};
+use crate::issue::FileError;
 
 /// Least breadth of landmarks as a share of their length: below it they are nearly on a line, and errors of a
 /// few mm turn everything right about it. Landmarks that leave a plane by less do not distinguish a structure
@@ -31,16 +32,16 @@ pub struct Landmark {
 pub fn closed_form(
     landmarks: &[Landmark],
     transformation: Transformation,
-) -> Result<DAffine3, RegisterError> {
+) -> Result<DAffine3, FileError> {
     if landmarks.len() < 3 {
-        return Err(RegisterError::data(
+        return Err(FileError::data(
             format!("{} landmarks are given", landmarks.len()),
             "give at least three that are not on a line, better six, spread over the structure",
         ));
     }
     let finite = |l: &&Landmark| !(l.from.is_finite() && l.to.is_finite());
     if let Some(bad) = landmarks.iter().find(finite) {
-        return Err(RegisterError::data(
+        return Err(FileError::data(
             format!("landmark `{}` has a coordinate that is no number", bad.name),
             "give its position in mm",
         ));
@@ -64,7 +65,7 @@ pub fn closed_form(
     let mirrored = with(-1.0, turns[3]);
     let (error, mirrored) = (rms(&found, landmarks), rms(&mirrored, landmarks));
     if !is_flat && 2.0 * mirrored < error {
-        return Err(RegisterError::data(
+        return Err(FileError::data(
             format!(
                 "the landmarks are mirrored: with left and right exchanged they fit to \
                  {mirrored:.1} mm, without to {error:.1} mm"
@@ -127,7 +128,7 @@ impl CentredPoints {
     }
 
     /// Returns whether the points lie in a plane. Fails where they leave a rotation open.
-    fn spread(&self, side: &str) -> Result<bool, RegisterError> {
+    fn spread(&self, side: &str) -> Result<bool, FileError> {
         let [length, breadth, height] =
             eigen(self.covariance.to_cols_array_2d()).map(|(square, _)| square.max(0.0).sqrt());
         let cause = if length < 1e-3 {
@@ -138,7 +139,7 @@ impl CentredPoints {
             return Ok(height < LEAST_BREADTH * length);
         };
         let remedy = "add one that is far from that line: the rotation about it is open";
-        Err(RegisterError::data(cause, remedy))
+        Err(FileError::data(cause, remedy))
     }
 }
 

@@ -6,8 +6,8 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use super::RegisterError;
 use super::landmarks::Landmark;
+use crate::issue::{self, FileError};
 use crate::volume::Frame;
 
 mod markups;
@@ -43,14 +43,14 @@ pub struct Point {
 ///
 /// # Errors
 /// The first mistake, with its line; a file that states another frame than `stated`.
-pub fn load(path: &Path, stated: Option<Frame>) -> Result<Vec<Point>, RegisterError> {
-    let text = text(path)?;
+pub fn load(path: &Path, stated: Option<Frame>) -> Result<Vec<Point>, FileError> {
+    let text = issue::read_text(path, MAX_TEXT, "give fewer points: thousands are enough")?;
     let name = path.to_string_lossy().to_ascii_lowercase();
     if name.ends_with(".json") {
         return markups::read(path, &text, stated);
     }
     if !name.ends_with(".csv") && !name.ends_with(".fcsv") {
-        return Err(RegisterError::file(
+        return Err(FileError::file(
             path,
             "is no file of points by its extension",
             "give a .csv, or the .fcsv or .mrk.json of 3D Slicer; a mesh goes to --volume-surface",
@@ -81,8 +81,8 @@ pub fn load(path: &Path, stated: Option<Frame>) -> Result<Vec<Point>, RegisterEr
 ///
 /// # Errors
 /// The first mistake, with its line.
-pub fn load_landmarks(path: &Path, stated: Option<Frame>) -> Result<Vec<Landmark>, RegisterError> {
-    let text = text(path)?;
+pub fn load_landmarks(path: &Path, stated: Option<Frame>) -> Result<Vec<Landmark>, FileError> {
+    let text = issue::read_text(path, MAX_TEXT, "give fewer points: thousands are enough")?;
     let table = Table::read(path, &text)?;
     let side = |side: &str| ["x", "y", "z"].map(|axis| format!("{side}_{axis}"));
     let (model, volume) = (side("model"), side("volume"));
@@ -110,7 +110,7 @@ pub fn load_landmarks(path: &Path, stated: Option<Frame>) -> Result<Vec<Landmark
 pub fn pair(
     (model_file, model): (&Path, &[Point]),
     (volume_file, volume): (&Path, &[Point]),
-) -> Result<(Vec<Landmark>, Vec<String>), RegisterError> {
+) -> Result<(Vec<Landmark>, Vec<String>), FileError> {
     let (of_model, of_volume) = (named(model_file, model)?, named(volume_file, volume)?);
     let landmark = |to: &Point| {
         of_volume.get(to.name.as_str()).map(|from| Landmark {
@@ -125,7 +125,7 @@ pub fn pair(
             let names = points.iter().take(5).map(|p| format!("`{}`", p.name));
             names.collect::<Vec<_>>().join(", ")
         };
-        return Err(RegisterError::file(
+        return Err(FileError::file(
             volume_file,
             format!("shares no label with {}", model_file.display()),
             format!(
@@ -142,14 +142,11 @@ pub fn pair(
 }
 
 /// The points of a file by their names, which must differ.
-fn named<'p>(
-    file: &Path,
-    points: &'p [Point],
-) -> Result<BTreeMap<&'p str, &'p Point>, RegisterError> {
+fn named<'p>(file: &Path, points: &'p [Point]) -> Result<BTreeMap<&'p str, &'p Point>, FileError> {
     let mut out = BTreeMap::new();
     for point in points {
         if out.insert(point.name.as_str(), point).is_some() {
-            return Err(RegisterError::file(
+            return Err(FileError::file(
                 file,
                 format!("has several points called `{}`", point.name),
                 "give each landmark a label of its own, the same in both files",
@@ -163,10 +160,9 @@ fn named<'p>(
 ///
 /// # Errors
 /// A file that cannot be read; a frame other than LPS and RAS.
-pub fn frame_of_mesh(path: &Path) -> Result<Frame, RegisterError> {
-    let fail = |e: std::io::Error| {
-        RegisterError::file(path, format!("cannot be read: {e}"), "check the path")
-    };
+pub fn frame_of_mesh(path: &Path) -> Result<Frame, FileError> {
+    let fail =
+        |e: std::io::Error| FileError::file(path, format!("cannot be read: {e}"), "check the path");
     let mut head = Vec::new();
     let file = std::fs::File::open(path).map_err(fail)?;
     file.take(1024).read_to_end(&mut head).map_err(fail)?;
@@ -182,10 +178,10 @@ pub fn frame_of_mesh(path: &Path) -> Result<Frame, RegisterError> {
 ///
 /// # Errors
 /// The two differ.
-pub fn agreed(path: &Path, said: Frame, stated: Option<Frame>) -> Result<Frame, RegisterError> {
+pub fn agreed(path: &Path, said: Frame, stated: Option<Frame>) -> Result<Frame, FileError> {
     match (said, stated) {
         (Frame::Unstated, stated) => Ok(stated.unwrap_or(Frame::Lps)),
-        (said, Some(stated)) if said != stated => Err(RegisterError::file(
+        (said, Some(stated)) if said != stated => Err(FileError::file(
             path,
             format!("says that it is in {}, and --frame {}", said.name(), stated.name()),
             "leave --frame out; or correct the file",
@@ -203,31 +199,17 @@ fn frame_named(name: &str) -> Result<Frame, String> {
     }
 }
 
-fn unknown_frame(path: &Path, line: u64, cause: &str) -> RegisterError {
-    RegisterError::line(path, line, cause, "save it in LPS or RAS, in mm")
+fn unknown_frame(path: &Path, line: usize, cause: &str) -> FileError {
+    FileError::line(path, line, cause, "save it in LPS or RAS, in mm")
 }
 
-fn text(path: &Path) -> Result<String, RegisterError> {
-    let fail = |cause: String, remedy: &str| RegisterError::file(path, cause, remedy);
-    let unread = |e: std::io::Error| fail(format!("cannot be read: {e}"), "check the path");
-    let info = std::fs::metadata(path).map_err(unread)?;
-    if !info.is_file() {
-        return Err(fail("is not a regular file".to_owned(), "name a file"));
-    }
-    if info.len() > MAX_TEXT {
-        let cause = format!("is {} MB, the limit is {} MB", info.len() >> 20, MAX_TEXT >> 20);
-        return Err(fail(cause, "give fewer points: thousands are enough"));
-    }
-    std::fs::read_to_string(path).map_err(unread)
-}
-
-fn too_many(path: &Path, line: u64) -> RegisterError {
+fn too_many(path: &Path, line: usize) -> FileError {
     let cause = format!("more than {MAX_POINTS} points");
-    RegisterError::line(path, line, cause, "give fewer: thousands are enough")
+    FileError::line(path, line, cause, "give fewer: thousands are enough")
 }
 
-fn far(path: &Path, line: u64, value: f64) -> RegisterError {
-    RegisterError::line(
+fn far(path: &Path, line: usize, value: f64) -> FileError {
+    FileError::line(
         path,
         line,
         format!("a coordinate is {value}"),

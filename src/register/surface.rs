@@ -8,7 +8,7 @@ use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::builder::build_bvh2;
 
-use super::RegisterError;
+use crate::issue::FileError;
 
 /// A triangle, mm.
 pub type Triangle = [DVec3; 3];
@@ -39,16 +39,16 @@ impl TriangleSurface {
     ///
     /// # Errors
     /// Coordinates that are no numbers; no triangle that has area.
-    pub fn new(triangles: &[Triangle]) -> Result<Self, RegisterError> {
+    pub fn new(triangles: &[Triangle]) -> Result<Self, FileError> {
         if !triangles.iter().flatten().all(|p| p.is_finite()) {
-            return Err(RegisterError::data(
+            return Err(FileError::data(
                 "the surface has coordinates that are no numbers",
                 "export its mesh again",
             ));
         }
         let solid: Vec<Triangle> = triangles.iter().filter(|t| area(t) > 0.0).copied().collect();
         if solid.is_empty() {
-            return Err(RegisterError::data(
+            return Err(FileError::data(
                 "the surface has no triangle",
                 "name a mesh with faces, or several",
             ));

@@ -8,6 +8,6 @@ pub struct Contact {
     pub skin: Vec<usize>,
     /// Widest gap between face and skin, along the beam, that sound still crosses, mm.
     pub gel: f64,
-    /// What fills the gap: index into [`super::Scene::tissues`].
+    /// Tissue that fills the gap: index into [`super::Scene::tissues`].
     pub couplant: usize,
 }

@@ -6,10 +6,10 @@ use std::path::Path;
 
 use super::mesh::{MAX_ELEMENTS, Parts, Soup};
 use crate::issue::Issue;
+use crate::volume::Scalar;
 
 pub(super) mod off;
 pub(super) mod ply;
-mod scalar;
 pub(super) mod stl;
 pub(super) mod threemf;
 pub(super) mod vtk;
@@ -17,7 +17,6 @@ pub(super) mod vtp;
 mod words;
 mod xml;
 
-use scalar::Scalar;
 use words::Words;
 
 /// Most values of a list, such as the corners of all polygons: each is in memory as eight bytes.
@@ -30,7 +29,7 @@ const REDUCE: &str = "reduce the mesh";
 /// The reason why a file cannot be read.
 #[derive(Debug)]
 struct Fault {
-    /// Line of text, from 1; 0 where that says nothing.
+    /// Line of text, from 1; 0 where it does not apply.
     line: usize,
     cause: String,
     remedy: &'static str,
@@ -66,15 +65,11 @@ impl Fault {
     }
 }
 
-/// Returns whether a file is text in UTF-16, by its mark.
-fn is_utf16(bytes: &[u8]) -> bool {
-    bytes.starts_with(&[0xff, 0xfe]) || bytes.starts_with(&[0xfe, 0xff])
-}
-
-/// The reason why a text in UTF-16 is not read; none where it is no such text.
+/// The reason why a text in UTF-16 is not read; none where it is no such text, by its mark.
 pub(super) fn utf16(path: &Path, bytes: &[u8]) -> Option<Issue> {
     let cause = "is text in UTF-16, which no mesh format allows";
-    is_utf16(bytes).then(|| Issue::error(path, 1, cause, "save it as UTF-8 in a text editor"))
+    let marked = matches!(bytes, [0xff, 0xfe, ..] | [0xfe, 0xff, ..]);
+    marked.then(|| Issue::error(path, 1, cause, "save it as UTF-8 in a text editor"))
 }
 
 /// Bytes of a header in which a file may state its frame.
@@ -107,8 +102,7 @@ struct Faces {
 impl Faces {
     /// Adds a polygon as a fan about its first corner.
     fn polygon(&mut self, corners: &[u32]) -> Result<(), Fault> {
-        self.short += usize::from(corners.len() < 3);
-        self.room_for(corners.len().saturating_sub(2))?;
+        self.note(corners)?;
         for pair in corners.get(1..).unwrap_or_default().windows(2) {
             self.triangles.push([corners[0], pair[0], pair[1]]);
         }
@@ -117,16 +111,17 @@ impl Faces {
 
     /// Adds a strip of triangles; every other one is turned.
     fn strip(&mut self, corners: &[u32]) -> Result<(), Fault> {
-        self.short += usize::from(corners.len() < 3);
-        self.room_for(corners.len().saturating_sub(2))?;
+        self.note(corners)?;
         for (k, c) in corners.windows(3).enumerate() {
             self.triangles.push(if k % 2 == 0 { [c[0], c[1], c[2]] } else { [c[1], c[0], c[2]] });
         }
         Ok(())
     }
 
-    fn room_for(&self, more: usize) -> Result<(), Fault> {
-        match self.triangles.len() + more > MAX_ELEMENTS {
+    /// Notes a face of too few corners, or fails where there are too many faces.
+    fn note(&mut self, corners: &[u32]) -> Result<(), Fault> {
+        self.short += usize::from(corners.len() < 3);
+        match self.triangles.len() + corners.len().saturating_sub(2) > MAX_ELEMENTS {
             true => Err(Fault::too_many("these", "triangles")),
             false => Ok(()),
         }
@@ -140,7 +135,7 @@ impl Faces {
         }
     }
 
-    /// The warning about faces that are none.
+    /// The warning about faces with fewer than three corners.
     fn warning(&self, path: &Path) -> Option<Issue> {
         let message = format!("faces with fewer than three corners are ignored ({})", self.short);
         (self.short > 0).then(|| Issue::warning(path, self.short, message, ""))
@@ -152,9 +147,14 @@ fn no_vertex(index: impl fmt::Display, vertices: usize) -> Fault {
     Fault::new(cause, EXPORT_AGAIN)
 }
 
-/// A vertex index; what is none of 32 bits names no vertex.
+/// A vertex index; a number that does not fit into 32 bits names no vertex.
 fn index(value: i64) -> Result<u32, Fault> {
     u32::try_from(value).map_err(|_| {
         Fault::new(format!("a face names vertex {value}, which cannot be"), EXPORT_AGAIN)
     })
+}
+
+/// A number as an index or a count; none where it is no whole number, or one that f64 does not tell from others.
+fn whole(value: f64) -> Option<i64> {
+    (value.fract() == 0.0 && value.abs() < 9e15).then_some(value as i64)
 }

@@ -63,7 +63,8 @@ fn open<'p>(
     }
     let chosen = animation.map(|choice| Chosen::of(path, &root, choice));
     let chosen = chosen.transpose().map_err(one)?;
-    let typed = Typed::of(&root, chosen.as_ref().map(|c| c.number));
+    let typed = Typed::of(root, chosen.as_ref().map(|c| c.number))
+        .map_err(|message| one(Issue::error(path, 1, message, validate::EXPORT_AGAIN)))?;
     let (needed, without_data) = (typed.buffers(), typed.without_data);
     let gltf = gltf::Document::from_json_without_validation(typed.root);
     let buffers::Buffers { bytes: buffers, issues: unread } =
@@ -72,7 +73,7 @@ fn open<'p>(
     if issues.iter().any(Issue::is_error) {
         return Err(issues);
     }
-    issues.extend(validate::issues(path, bounds::check(&root, &buffers)));
+    issues.extend(validate::issues(path, bounds::check(&gltf, &buffers)));
     Ok(File { path, gltf, buffers, animation: chosen, without_data, issues })
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::formats::{self, off, ply, stl, threemf, vtk, vtp};
 use super::{Mesh, check, load_gltf, load_obj};
-use crate::issue::Issue;
+use crate::issue::{self, Issue};
 
 mod animated;
 mod keyframes;
@@ -265,19 +265,8 @@ pub fn is_mesh(path: &Path) -> bool {
 
 /// Reads a regular file of at most [`MAX_FILE`] bytes.
 pub(super) fn read_bounded(path: &Path) -> Result<Vec<u8>, Vec<Issue>> {
-    let fail = |message: String, remedy: &str| vec![Issue::error(path, 1, message, remedy)];
-    let info = std::fs::metadata(path)
-        .map_err(|e| fail(format!("cannot be read: {e}"), "check the path"))?;
-    if !info.is_file() {
-        return Err(fail("is not a regular file".to_owned(), "name a file"));
-    }
-    if info.len() > MAX_FILE {
-        return Err(fail(
-            format!("is {} MB, the limit is {} MB", info.len() >> 20, MAX_FILE >> 20),
-            "reduce the mesh or split the file",
-        ));
-    }
-    std::fs::read(path).map_err(|e| fail(format!("cannot be read: {e}"), "check permissions"))
+    let smaller = "reduce the mesh or split the file";
+    issue::read(path, MAX_FILE, smaller).map_err(|error| vec![error.into()])
 }
 
 fn merge(parts: Vec<Soup>, units: Units) -> Soup {

@@ -58,15 +58,15 @@ group! {
         /// many pixels.
         blur: u32 = 32,
             Facts::whole(1, 512).counted("pixels").label("Blur").usual(1.0, 128.0);
-        /// How: by the blurred mask itself, as in the paper; by its smoothstep; or by bands, so that brightness fades
-        /// over `blur` pixels and speckle over few.
+        /// Blending of both images: by the blurred mask itself, as in the paper; by its smoothstep; or by bands, so
+        /// that brightness fades over `blur` pixels and speckle over few.
         blend: Blend = Blend::Linear,
             Facts::word::<Blend>().label("Blend");
         /// Speed of sound at which the samples of mask and volume go through a masking mesh: that of its tissue, as in
         /// the paper, or the probe's `speed`.
         mask_speed: MaskSpeed = MaskSpeed::Enclosing,
             Facts::word::<MaskSpeed>().label("Mask speed");
-        /// Whether what is simulated throws its shadow into the acquired volume.
+        /// Shadows of what is simulated fall into the acquired volume.
         background_shadows: bool = false,
             Facts::switch().label("Shadows");
     } beside {

@@ -103,7 +103,7 @@ pub struct Facts {
     pub required: bool,
     /// The range in words, where two numbers do not say it.
     pub limits: Option<&'static str>,
-    /// What it is, in Markdown.
+    /// Meaning, in Markdown.
     meaning: &'static str,
 }
 
@@ -292,7 +292,7 @@ impl Facts {
         self.key.rsplit('.').next().unwrap_or(self.key)
     }
 
-    /// What it is, in Markdown.
+    /// Meaning, in Markdown.
     pub fn meaning(&self) -> &'static str {
         self.meaning.trim()
     }

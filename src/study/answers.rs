@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::key::{Key, crc32};
-use super::{StudyError, text_of};
+use crate::issue::{self, FileError};
 
 /// Largest file of answers, bytes: a thousand cases with remarks.
 const MAX_TEXT: u64 = 16 << 20;
@@ -95,9 +95,9 @@ impl Answers {
     /// # Errors
     /// A file that cannot be read, that belongs to another study or version, or that is not as a form
     /// saved it.
-    pub fn read(path: &Path, key: &Key) -> Result<Self, StudyError> {
-        let fail = |cause: &str, remedy: &str| Err(StudyError::new(path, cause, remedy));
-        let text = text_of(path, MAX_TEXT, "check the path of the answers")?;
+    pub fn read(path: &Path, key: &Key) -> Result<Self, FileError> {
+        let fail = |cause: &str, remedy: &str| Err(FileError::file(path, cause, remedy));
+        let text = issue::read_text(path, MAX_TEXT, "give the file of a study")?;
         let foreign = "give a file that the form saved";
         let file: AnswersFile = match serde_json::from_str(&text) {
             Ok(file) => file,
@@ -195,7 +195,7 @@ impl Answers {
 ///
 /// # Errors
 /// Those of [`Answers::read`]; two files that were saved from one filled form.
-pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, StudyError> {
+pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, FileError> {
     let mut all: Vec<Answers> = Vec::new();
     for path in paths {
         let answers = Answers::read(path, key)?;
@@ -204,7 +204,7 @@ pub fn read_all(paths: &[PathBuf], key: &Key) -> Result<Vec<Answers>, StudyError
                 true => &other.file,
                 false => path,
             };
-            return Err(StudyError::new(
+            return Err(FileError::file(
                 path,
                 format!("holds answers of the same form as {}", other.file.display()),
                 format!("give one of the two; {} was saved later", newer.display()),

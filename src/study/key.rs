@@ -6,7 +6,7 @@ use std::path::Path;
 use crc::{CRC_32_ISO_HDLC, CRC_64_XZ, Crc};
 use serde::{Deserialize, Serialize};
 
-use super::{StudyError, text_of};
+use crate::issue::{self, FileError};
 
 /// Largest key, bytes: a hundred thousand images.
 const MAX_TEXT: u64 = 64 << 20;
@@ -209,13 +209,13 @@ impl Key {
     ///
     /// # Errors
     /// A file that cannot be read, or that was changed: one edited row changes the id.
-    pub fn read(path: &Path) -> Result<Self, StudyError> {
+    pub fn read(path: &Path) -> Result<Self, FileError> {
         let fail = |cause: String| {
             let remedy = "give the file key.csv as `insonify study make` wrote it: a program for \
                           tables changes numbers when it saves";
-            StudyError::new(path, cause, remedy)
+            FileError::file(path, cause, remedy)
         };
-        let text = text_of(path, MAX_TEXT, "check the path of the key")?;
+        let text = issue::read_text(path, MAX_TEXT, "give the file of a study")?;
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let rows: Result<Vec<Row>, _> = reader.deserialize().collect();
         let rows = rows.map_err(|e| fail(format!("is not the key of a study: {e}")))?;

@@ -2,14 +2,12 @@
 
 use std::time::Instant;
 
-use egui::{
-    Align, ComboBox, CornerRadius, Layout, Rect, Response, Sense, Shape, Stroke, Ui, pos2, vec2,
-};
+use egui::{Align, CornerRadius, Layout, Rect, Response, Sense, Shape, Stroke, Ui, pos2, vec2};
 
 use super::captures::Format;
 use super::engine::Frame;
 use super::model::{Cine, Model};
-use super::style;
+use super::style::{self, button};
 use super::tools::Tools;
 
 /// Height of the bar, points.
@@ -46,13 +44,13 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
         true => ("⏸", "Stop the loop (Enter)"),
         false => ("▶", "Play the loop (Enter)"),
     };
-    if ui.button(word).on_hover_text(tip).clicked() {
+    if button(ui, word, tip) {
         cine.play(!cine.is_playing(), now);
     }
-    if ui.button("<").on_hover_text("One image back (,)").clicked() {
+    if button(ui, "<", "One image back (,)") {
         cine.step(-1);
     }
-    if ui.button(">").on_hover_text("One image on (.)").clicked() {
+    if button(ui, ">", "One image on (.)") {
         cine.step(1);
     }
     let is_wide = ui.available_width() > WIDE;
@@ -61,12 +59,10 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
             choose(ui, format);
             speed(ui, cine, now);
             let here = cine.cursor();
-            let tip = "The loop that plays and is saved ends with this image";
-            if ui.button("End").on_hover_text(tip).clicked() {
+            if button(ui, "End", "The loop that plays and is saved ends with this image") {
                 cine.mark_last(here);
             }
-            let tip = "The loop that plays and is saved begins with this image";
-            if ui.button("Start").on_hover_text(tip).clicked() {
+            if button(ui, "Start", "The loop that plays and is saved begins with this image") {
                 cine.mark_first(here);
             }
         }
@@ -83,15 +79,7 @@ fn player(ui: &mut Ui, cine: &mut Cine<Frame>, format: &mut Format, now: Instant
 
 fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
     let mut speed = cine.speed();
-    ComboBox::from_id_salt("speed")
-        .width(58.0)
-        .selected_text(format!("x {speed}"))
-        .show_ui(ui, |ui| {
-            for value in SPEEDS {
-                ui.selectable_value(&mut speed, value, format!("x {value}"));
-            }
-        })
-        .response
+    style::choice(ui, ("speed", 58.0), &mut speed, &SPEEDS, |speed| format!("x {speed}"))
         .on_hover_text("How fast the loop plays; 1 is the pace at which it was imaged");
     if speed != cine.speed() {
         cine.set_speed(speed, now);
@@ -100,18 +88,10 @@ fn speed(ui: &mut Ui, cine: &mut Cine<Frame>, now: Instant) {
 
 fn choose(ui: &mut Ui, format: &mut Format) {
     let name = |format| match format {
-        Format::Gif => "GIF",
-        Format::Sequence => "PNGs",
+        Format::Gif => "GIF".to_owned(),
+        Format::Sequence => "PNGs".to_owned(),
     };
-    ComboBox::from_id_salt("format")
-        .width(56.0)
-        .selected_text(name(*format))
-        .show_ui(ui, |ui| {
-            for value in [Format::Gif, Format::Sequence] {
-                ui.selectable_value(format, value, name(value));
-            }
-        })
-        .response
+    style::choice(ui, ("format", 56.0), format, &[Format::Gif, Format::Sequence], name)
         .on_hover_text("How a clip is saved (F3): an animated GIF, or a folder of PNG files");
 }
 

@@ -18,6 +18,7 @@ use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 use super::files;
 use super::model::{Model, Source};
 use super::state::State;
+use crate::view::style::button;
 
 /// Width of the console, points.
 pub(super) const WIDTH: f32 = 336.0;
@@ -64,8 +65,7 @@ fn section(ui: &mut Ui, name: &str, open: bool, add: impl FnOnce(&mut Ui)) {
 fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.horizontal(|ui| {
         let word = if model.frozen { "Live" } else { "Freeze" };
-        let tip = "Stop or start the image and the scene's time (Space)";
-        if ui.button(word).on_hover_text(tip).clicked() {
+        if button(ui, word, "Stop or start the image and the scene's time (Space)") {
             model.freeze(!model.frozen, now);
         }
         let [back, forward] = model.undoable();
@@ -77,13 +77,11 @@ fn actions(ui: &mut Ui, model: &mut Model, now: Instant) {
         if redo.on_hover_text("Make it again (Ctrl+Y)").clicked() {
             model.redo(now);
         }
-        let tip = "Settings as in the scene file; the probe stays where it is";
-        if ui.button("Reset").on_hover_text(tip).clicked() {
+        if button(ui, "Reset", "Settings as in the scene file; the probe stays where it is") {
             let before = std::mem::replace(&mut model.settings, model.loaded.clone());
             model.note(&before, now);
         }
-        let tip = "Put the probe where the scene file has it (Home)";
-        if ui.button("Home").on_hover_text(tip).clicked() {
+        if button(ui, "Home", "Put the probe where the scene file has it (Home)") {
             model.place_probe(Source::Pointer, model.home, now);
         }
     });

@@ -1,10 +1,11 @@
 //! Threads that died by a bug: their last messages, and the actions left to the user.
 
 use std::panic::PanicHookInfo;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::thread;
 
-use egui::{Align2, Label, RichText, ScrollArea, Ui};
+use egui::{Label, RichText, ScrollArea, Ui};
+use parking_lot::Mutex;
 
 use super::model::Model;
 use super::state::State;
@@ -69,11 +70,6 @@ impl Death {
 pub(super) struct Deaths(Arc<Mutex<Vec<Death>>>);
 
 impl Deaths {
-    /// Whole between any two statements, so poisoning is ignored.
-    fn lock(&self) -> MutexGuard<'_, Vec<Death>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Records from now on the panics of other threads than this one, and calls `wake` for each. They are printed
     /// as before.
     pub(super) fn watch(&self, wake: impl Fn() + Send + Sync + 'static) {
@@ -91,7 +87,7 @@ impl Deaths {
 
     fn add(&self, thread: &str, said: &str) {
         let death = Death { thread: thread.to_owned(), said: said.to_owned() };
-        let mut deaths = self.lock();
+        let mut deaths = self.0.lock();
         if deaths.len() < KEPT && !deaths.contains(&death) {
             deaths.push(death);
         }
@@ -99,7 +95,7 @@ impl Deaths {
 
     /// Records that the simulation's thread is gone; a panic passed on by one of its helpers has the helper's name.
     pub(super) fn simulation_died(&self) {
-        let noted = self.lock().iter().any(|death| death.thread == SIMULATION);
+        let noted = self.0.lock().iter().any(|death| death.thread == SIMULATION);
         if !noted {
             self.add(SIMULATION, "a thread that worked for it died");
         }
@@ -109,7 +105,7 @@ impl Deaths {
     fn report(&self, device: &str, model: &Model) -> String {
         let mut text = format!("insonify {} on {device}\n", env!("CARGO_PKG_VERSION"));
         text += &format!("scene: {}\n", model.file.path.display());
-        for death in self.lock().iter() {
+        for death in self.0.lock().iter() {
             text += &format!("thread '{}' died: {}\n", death.thread, death.said);
         }
         text
@@ -127,28 +123,24 @@ fn last_words(info: &PanicHookInfo) -> String {
 
 /// Shows which threads have died until the user has taken note.
 pub(super) fn show(ctx: &egui::Context, model: &mut Model, state: &mut State) {
-    let deaths = state.deaths.lock().clone();
+    let deaths = state.deaths.0.lock().clone();
     if deaths.is_empty() {
         return;
     }
-    egui::Window::new("The program has a bug")
-        .anchor(Align2::CENTER_TOP, [0.0, 64.0])
-        .resizable(false)
-        .collapsible(false)
-        .show(ctx, |ui| {
-            ui.set_width(WIDTH);
-            ui.horizontal(|ui| buttons(ui, model, state));
-            ui.label(
-                "Please report it: the copied text names version, device, scene and what was said.",
-            );
-            ScrollArea::vertical().max_height(HEIGHT).show(ui, |ui| {
-                for death in &deaths {
-                    let text = format!("The thread '{}' died: {}", death.thread, death.said);
-                    ui.add(Label::new(RichText::new(text).color(style::WARN)).wrap());
-                    ui.label(death.remedy(state.stopped));
-                }
-            });
+    style::window("The program has a bug", 64.0).show(ctx, |ui| {
+        ui.set_width(WIDTH);
+        ui.horizontal(|ui| buttons(ui, model, state));
+        ui.label(
+            "Please report it: the copied text names version, device, scene and what was said.",
+        );
+        ScrollArea::vertical().max_height(HEIGHT).show(ui, |ui| {
+            for death in &deaths {
+                let text = format!("The thread '{}' died: {}", death.thread, death.said);
+                ui.add(Label::new(RichText::new(text).color(style::WARN)).wrap());
+                ui.label(death.remedy(state.stopped));
+            }
         });
+    });
 }
 
 fn buttons(ui: &mut Ui, model: &mut Model, state: &mut State) {
@@ -163,7 +155,7 @@ fn buttons(ui: &mut Ui, model: &mut Model, state: &mut State) {
     }
     // While the simulation stands still the message stays on the screen.
     if !state.stopped && ui.button("Close").clicked() {
-        state.deaths.lock().clear();
+        state.deaths.0.lock().clear();
     }
 }
 
@@ -188,7 +180,7 @@ mod tests {
             assert!(dying.expect("started").join().is_err());
         }
         // Other tests may die meanwhile.
-        let noted = deaths.lock().clone();
+        let noted = deaths.0.lock().clone();
         let own: Vec<_> = noted.iter().filter(|d| d.thread == "deaths' own").collect();
         assert_eq!(own.len(), 1, "{noted:?}");
         assert!(own[0].said.contains("deaths.rs:") && own[0].said.ends_with(": a planted bug"));
@@ -202,12 +194,12 @@ mod tests {
         deaths.add("rayon 3", "src/a.rs:1:1: too short");
         deaths.simulation_died();
         deaths.simulation_died();
-        let names: Vec<_> = deaths.lock().iter().map(|d| d.thread.clone()).collect();
+        let names: Vec<_> = deaths.0.lock().iter().map(|d| d.thread.clone()).collect();
         assert_eq!(names, ["rayon 3", SIMULATION]);
         for at in 0..2 * KEPT {
             deaths.add("another", &at.to_string());
         }
-        assert_eq!(deaths.lock().len(), KEPT);
+        assert_eq!(deaths.0.lock().len(), KEPT);
     }
 
     #[test]

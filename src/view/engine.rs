@@ -1,12 +1,13 @@
 //! The simulation on its own thread: it takes the newest order and hands over finished pictures.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
+use parking_lot::{Condvar, Mutex, MutexGuard};
 
 use super::deaths::SIMULATION;
 use super::link::Link;
@@ -176,11 +177,6 @@ struct Shared {
 }
 
 impl Shared {
-    /// Locks the state. The lists stay whole after a panic of the other thread, so poisoning is ignored.
-    fn lock(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Wakes the thread for something that does not wait for a job at rest.
     fn interrupt(&self, mut state: MutexGuard<'_, State>) {
         state.touched = Instant::now();
@@ -230,9 +226,9 @@ impl Engine {
         let (mourner, bell) = (shared.clone(), wake.clone());
         let worker = Worker::new(device, library, scene, link, shared.clone(), wake);
         let thread = std::thread::Builder::new().name(SIMULATION.into()).spawn(move || {
-            // The worker is gone with its panic; what is shared stays whole (`Shared::lock`).
+            // The worker is gone with its panic; the lists that are shared stay whole.
             if catch_unwind(AssertUnwindSafe(|| worker.run())).is_err() {
-                mourner.lock().news.push(News::Died);
+                mourner.state.lock().news.push(News::Died);
                 bell();
             }
         })?;
@@ -241,7 +237,7 @@ impl Engine {
 
     /// Replaces the order that was not taken yet. While `frozen`, no order is carried out.
     pub fn order(&self, order: Order, frozen: bool) {
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         state.order = Some(order);
         state.frozen = frozen;
         self.shared.interrupt(state);
@@ -249,45 +245,47 @@ impl Engine {
 
     /// Goes on with another scene, if the device can hold it beside the one before.
     pub fn open(&self, scene: Scene, order: Order) {
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         state.opening = Some((Box::new(scene), order));
         self.shared.interrupt(state);
     }
 
     /// Sends the last picture to the clients of the link once more.
     pub(super) fn send_again(&self) {
-        self.shared.lock().resend = true;
+        self.shared.state.lock().resend = true;
         self.shared.changed.notify_all();
     }
 
     /// Sets the view from which the anatomy is pictured from now on, frozen or not; with none it is not pictured.
     pub fn look(&self, look: Option<Look>) {
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         let camera = |look: &Option<Look>| look.as_ref().map(|look| look.camera);
         let moved = camera(&look) != camera(&state.look);
         state.looks_new = look.is_some();
         state.look = look;
         match moved {
             true => self.shared.interrupt(state),
-            false => self.shared.changed.notify_all(),
+            false => {
+                self.shared.changed.notify_all();
+            }
         }
     }
 
     /// Tells the simulation that the window has drawn its last image.
     pub(super) fn drawn(&self) {
-        self.shared.lock().undrawn = None;
+        self.shared.state.lock().undrawn = None;
         self.shared.changed.notify_all();
     }
 
     /// News since the last call, oldest first.
     pub fn news(&self) -> Vec<News> {
-        std::mem::take(&mut self.shared.lock().news)
+        std::mem::take(&mut self.shared.state.lock().news)
     }
 }
 
 impl Drop for Engine {
     fn drop(&mut self) {
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         state.stop = true;
         self.shared.interrupt(state);
         if let Some(thread) = self.thread.take() {

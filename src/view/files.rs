@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use egui::{Align2, Button, Key, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Key, RichText, ScrollArea, TextEdit, Ui};
 
 use super::model::Model;
-use super::style;
+use super::style::{self, button};
 use crate::scene::SceneError;
 
 /// Most scene files listed of a folder.
@@ -122,15 +122,14 @@ pub(super) fn row(ui: &mut Ui, model: &mut Model, files: &mut Files) {
             "Write what differs into {}; its comments stay (Ctrl+S)",
             model.file.path.display()
         );
-        if ui.button("Save").on_hover_text(tip).clicked() {
+        if button(ui, "Save", tip) {
             files.save(model);
         }
         let tip = "Write the scene with these settings into another file (Ctrl+Shift+S)";
-        if ui.button("Save as").on_hover_text(tip).clicked() {
+        if button(ui, "Save as", tip) {
             files.ask(Purpose::Save, model);
         }
-        let tip = "Take settings from another scene file, or open it (Ctrl+O)";
-        if ui.button("Load").on_hover_text(tip).clicked() {
+        if button(ui, "Load", "Take settings from another scene file, or open it (Ctrl+O)") {
             files.ask(Purpose::Load, model);
         }
         ui.checkbox(&mut files.with_pose, "with the pose")
@@ -156,15 +155,10 @@ pub(super) fn dialog(ctx: &egui::Context, model: &mut Model, files: &mut Files, 
         Purpose::Load => "Load",
     };
     let escape = ctx.input(|input| input.key_pressed(Key::Escape));
-    let shown = egui::Window::new(title)
-        .anchor(Align2::CENTER_TOP, [0.0, 48.0])
-        .resizable(false)
-        .collapsible(false)
-        .open(&mut open)
-        .show(ctx, |ui| {
-            ui.set_width(WIDTH);
-            contents(ui, model, files, &mut dialog, now)
-        });
+    let shown = style::window(title, 48.0).open(&mut open).show(ctx, |ui| {
+        ui.set_width(WIDTH);
+        contents(ui, model, files, &mut dialog, now)
+    });
     let is_done = shown.and_then(|s| s.inner).unwrap_or(false);
     if open && !is_done && !escape {
         files.dialog = Some(dialog);

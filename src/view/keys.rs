@@ -49,56 +49,27 @@ enum Action {
 /// A key, whether it is held with Ctrl, and its action.
 type Binding = (Key, bool, Action);
 
+/// The keys that move the probe back and forth along or about an axis.
+const fn moves(back: Key, forth: Key, axis: Axis) -> [Binding; 2] {
+    [(back, false, Action::Move(axis, -1.0)), (forth, false, Action::Move(axis, 1.0))]
+}
+
 /// Every key with its row in the list of keys; rows without a text belong to the one before.
 const BINDINGS: &[(&str, &[Binding], &str)] = &[
     (
         "Left Right",
-        &[
-            (Key::ArrowLeft, false, Action::Move(Axis::Lateral, -1.0)),
-            (Key::ArrowRight, false, Action::Move(Axis::Lateral, 1.0)),
-        ],
+        &moves(Key::ArrowLeft, Key::ArrowRight, Axis::Lateral),
         "slide along the image (2 mm)",
     ),
     (
         "Up Down",
-        &[
-            (Key::ArrowUp, false, Action::Move(Axis::Elevation, 1.0)),
-            (Key::ArrowDown, false, Action::Move(Axis::Elevation, -1.0)),
-        ],
+        &moves(Key::ArrowDown, Key::ArrowUp, Axis::Elevation),
         "slide across the image (2 mm)",
     ),
-    (
-        "Page Up Page Down",
-        &[
-            (Key::PageUp, false, Action::Move(Axis::Depth, -1.0)),
-            (Key::PageDown, false, Action::Move(Axis::Depth, 1.0)),
-        ],
-        "lift and press (2 mm)",
-    ),
-    (
-        "A D",
-        &[
-            (Key::A, false, Action::Move(Axis::Rock, -1.0)),
-            (Key::D, false, Action::Move(Axis::Rock, 1.0)),
-        ],
-        "rock in the image plane (2 deg)",
-    ),
-    (
-        "W S",
-        &[
-            (Key::W, false, Action::Move(Axis::Tilt, 1.0)),
-            (Key::S, false, Action::Move(Axis::Tilt, -1.0)),
-        ],
-        "tilt (fan) the image plane (2 deg)",
-    ),
-    (
-        "Q E",
-        &[
-            (Key::Q, false, Action::Move(Axis::Rotate, -1.0)),
-            (Key::E, false, Action::Move(Axis::Rotate, 1.0)),
-        ],
-        "rotate about the depth axis (2 deg)",
-    ),
+    ("Page Up Page Down", &moves(Key::PageUp, Key::PageDown, Axis::Depth), "lift and press (2 mm)"),
+    ("A D", &moves(Key::A, Key::D, Axis::Rock), "rock in the image plane (2 deg)"),
+    ("W S", &moves(Key::S, Key::W, Axis::Tilt), "tilt (fan) the image plane (2 deg)"),
+    ("Q E", &moves(Key::Q, Key::E, Axis::Rotate), "rotate about the depth axis (2 deg)"),
     ("H", &[(Key::H, false, Action::Hold)], "hold the probe to the skin: it slides along it"),
     ("Home", &[(Key::Home, false, Action::Home)], "probe back to the scene file's pose"),
     (

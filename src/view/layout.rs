@@ -123,15 +123,10 @@ pub(super) fn show(
     }
     if let Some(problem) = &state.problem {
         let mut open = true;
-        egui::Window::new("A problem")
-            .anchor(Align2::CENTER_TOP, [0.0, 64.0])
-            .resizable(false)
-            .collapsible(false)
-            .open(&mut open)
-            .show(ui.ctx(), |ui| {
-                ui.set_max_width(460.0);
-                ui.label(RichText::new(problem).color(style::WARN));
-            });
+        style::window("A problem", 64.0).open(&mut open).show(ui.ctx(), |ui| {
+            ui.set_max_width(460.0);
+            ui.label(RichText::new(problem).color(style::WARN));
+        });
         if !open {
             state.problem = None;
         }

@@ -2,14 +2,15 @@
 //! pictures for its clients.
 
 use std::net::{IpAddr, SocketAddr};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DAffine3;
+use parking_lot::Mutex;
 use winit::event_loop::EventLoopProxy;
 
 use super::session::Wake;
-use crate::gpu::{Device, GpuError, Image};
+use crate::gpu::{GpuError, Image};
 use crate::igtl::{IgtlError, Picture, Server, ServerSettings, Status, TrackerState};
 use crate::scene::Tracker;
 use crate::sim::layout;
@@ -58,11 +59,6 @@ pub(super) struct Report {
 pub(super) struct Link(Arc<Mutex<Option<Server>>>);
 
 impl Link {
-    /// Locks the server. It stays whole whatever its users do, so poisoning is ignored.
-    fn lock(&self) -> MutexGuard<'_, Option<Server>> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     /// Starts a server in place of the one before; port 0 takes any that is free.
     pub(super) fn open(
         &self,
@@ -70,7 +66,7 @@ impl Link {
         tracker: Tracker,
         bell: Bell,
     ) -> Result<SocketAddr, IgtlError> {
-        let mut server = self.lock();
+        let mut server = self.0.lock();
         // The old one first: it may hold the port.
         *server = None;
         let (at, settings) = (SocketAddr::new(address, port), ServerSettings::new(tracker));
@@ -80,19 +76,19 @@ impl Link {
 
     /// Goes on with another scene's tracker.
     pub(super) fn calibrate(&self, tracker: Tracker) {
-        if let Some(server) = &*self.lock() {
+        if let Some(server) = &*self.0.lock() {
             server.calibrate(tracker);
         }
     }
 
     /// Ends all connections.
     pub(super) fn close(&self) {
-        *self.lock() = None;
+        *self.0.lock() = None;
     }
 
     /// State of the server; none without one.
     pub(super) fn report(&self) -> Option<Report> {
-        self.lock().as_ref().map(|server| Report {
+        self.0.lock().as_ref().map(|server| Report {
             address: server.address(),
             status: server.status(),
             tracked: server.pose(),
@@ -103,13 +99,12 @@ impl Link {
 /// The last picture of the simulation, for clients.
 pub(super) struct Broadcast {
     link: Link,
-    device: Arc<Device>,
     last: Option<(Image, layout::Frame, DAffine3)>,
 }
 
 impl Broadcast {
-    pub(super) fn new(link: Link, device: &Arc<Device>) -> Self {
-        Self { link, device: device.clone(), last: None }
+    pub(super) fn new(link: Link) -> Self {
+        Self { link, last: None }
     }
 
     /// Offers a finished picture, with its pixels where they have been read, its constants and its pose.
@@ -124,18 +119,13 @@ impl Broadcast {
         self.send(rgba)
     }
 
-    /// Offers the last picture again, for a client that has just come.
-    pub(super) fn again(&self) -> Result<(), GpuError> {
-        self.send(None)
-    }
-
-    /// Sends the last picture. It is copied to the host only where there is a client; the server decides
-    /// which client takes it and when.
-    fn send(&self, rgba: Option<&[u8]>) -> Result<(), GpuError> {
+    /// Sends the last picture, also for a client that has just come. It is copied to the host only where there is a
+    /// client; the server decides which client takes it and when.
+    pub(super) fn send(&self, rgba: Option<&[u8]>) -> Result<(), GpuError> {
         let Some((image, constants, pose)) = &self.last else {
             return Ok(());
         };
-        let clients = match &*self.link.lock() {
+        let clients = match &*self.link.0.lock() {
             Some(server) => {
                 // Valid until there is a client, or until the next picture is published.
                 server.outdate();
@@ -148,9 +138,9 @@ impl Broadcast {
         }
         let picture = match rgba {
             Some(rgba) => Picture::new(constants, rgba),
-            None => Picture::new(constants, &self.device.read_back_image(image)?),
+            None => Picture::new(constants, &image.read_back()?),
         };
-        if let Some(server) = &*self.link.lock() {
+        if let Some(server) = &*self.link.0.lock() {
             server.publish(picture, pose);
         }
         Ok(())

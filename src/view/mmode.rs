@@ -1,7 +1,7 @@
 //! The M-mode strip below the image, and its scanline in the image.
 
 use egui::{
-    Align2, Color32, ColorImage, ComboBox, DragValue, FontId, PointerButton, Rect, Sense, Stroke,
+    Align2, Color32, ColorImage, DragValue, FontId, PointerButton, Rect, Sense, Stroke,
     TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 
@@ -120,15 +120,8 @@ fn line(ui: &mut Ui, strip: &mut Strip, scanlines: u32) {
 fn width(ui: &mut Ui, panel: &mut Panel) {
     ui.horizontal(|ui| {
         ui.label("Width");
-        let choice = ComboBox::from_id_salt("width")
-            .width(60.0)
-            .selected_text(format!("{} s", panel.window))
-            .show_ui(ui, |ui| {
-                for seconds in WINDOWS {
-                    ui.selectable_value(&mut panel.window, seconds, format!("{seconds} s"));
-                }
-            });
-        choice.response.on_hover_text("Time across the strip, s");
+        style::choice(ui, ("width", 60.0), &mut panel.window, &WINDOWS, |s| format!("{s} s"))
+            .on_hover_text("Time across the strip, s");
     });
 }
 

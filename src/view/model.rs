@@ -268,16 +268,18 @@ impl Model {
 
     /// Goes back by one change of the settings, if there is one.
     pub fn undo(&mut self, now: Instant) {
-        if let Some(settings) = self.history.undo(self.settings.clone()) {
-            let before = std::mem::replace(&mut self.settings, settings);
-            self.carry_skin(&before);
-            self.touch(now);
-        }
+        let earlier = self.history.undo(self.settings.clone());
+        self.change(earlier, now);
     }
 
     /// Goes forward again.
     pub fn redo(&mut self, now: Instant) {
-        if let Some(settings) = self.history.redo(self.settings.clone()) {
+        let later = self.history.redo(self.settings.clone());
+        self.change(later, now);
+    }
+
+    fn change(&mut self, settings: Option<Settings>, now: Instant) {
+        if let Some(settings) = settings {
             let before = std::mem::replace(&mut self.settings, settings);
             self.carry_skin(&before);
             self.touch(now);

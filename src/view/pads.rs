@@ -1,10 +1,11 @@
 //! Game pads, on a thread of their own that sleeps until one of them sends an event.
 
 use std::collections::HashMap;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use gilrs::{EventType, GamepadId, Gilrs};
+use parking_lot::Mutex;
 
 use super::deaths::PADS;
 use super::link::Bell;
@@ -59,25 +60,20 @@ impl Pads {
         let thread = std::thread::Builder::new().name(PADS.to_owned());
         // Without another thread there are no pads, and the keyboard is left.
         if let Err(error) = thread.spawn(move || listener.run()) {
-            lock(&word).problem = Some(format!("no game pads: {error}"));
+            word.lock().problem = Some(format!("no game pads: {error}"));
         }
         Self(word)
     }
 
     /// News since the last call.
     pub(super) fn take(&self) -> Word {
-        let mut word = lock(&self.0);
+        let mut word = self.0.lock();
         Word {
             travel: std::mem::take(&mut word.travel),
             presses: std::mem::take(&mut word.presses),
             ..word.clone()
         }
     }
-}
-
-/// Locks the news. They are whole between any two statements, so poisoning is ignored.
-fn lock(word: &Mutex<Word>) -> MutexGuard<'_, Word> {
-    word.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 struct Listener {
@@ -105,7 +101,7 @@ impl Listener {
             let now = Instant::now();
             let step = now - last;
             last = now;
-            let mut word = lock(&self.word);
+            let mut word = self.word.lock();
             // At the speeds that were held until this event.
             for pad in pads.values() {
                 word.go(pad, step);
@@ -133,7 +129,7 @@ impl Listener {
     /// Notes the names of the pads.
     fn names(&self, gilrs: &Gilrs) {
         let names: Vec<String> = (gilrs.gamepads()).map(|(_, pad)| pad.name().to_owned()).collect();
-        let mut word = lock(&self.word);
+        let mut word = self.word.lock();
         if !names.is_empty() {
             word.problem = None;
         }
@@ -145,7 +141,7 @@ impl Listener {
     /// Reports once why there are no pads.
     fn give_up(&self, why: &str) {
         crate::output::note(format!("note: {why}"));
-        lock(&self.word).problem = Some(why.to_owned());
+        self.word.lock().problem = Some(why.to_owned());
         self.bell.ring();
     }
 }

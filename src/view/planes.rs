@@ -11,7 +11,7 @@ use glam::{DAffine3, DVec3};
 
 use super::model::registration::{Outline, Plane, Registration};
 use super::model::{Model, Settings};
-use super::style;
+use super::style::{self, button};
 use crate::scene::Display;
 
 /// Points of a wheel's turn that move the planes on by a pixel.
@@ -96,11 +96,10 @@ fn buttons(ui: &mut Ui, room: Rect, registration: &mut Registration, open: &mut 
     let line = Rect::from_min_max(at, pos2(room.right() - 8.0, at.y + 22.0));
     ui.scope_builder(egui::UiBuilder::new().max_rect(line), |ui| {
         ui.horizontal(|ui| {
-            let tip = "Let the planes meet in the middle of the masks";
-            if ui.button("To the mask").on_hover_text(tip).clicked() {
+            if button(ui, "To the mask", "Let the planes meet in the middle of the masks") {
                 registration.centre();
             }
-            if ui.button("Close").on_hover_text("Back to the 3D view").clicked() {
+            if button(ui, "Close", "Back to the 3D view") {
                 *open = false;
             }
             let hint = "drag: move  Shift: turn  Ctrl: scale  right: meeting point  wheel: through";

@@ -106,7 +106,7 @@ mod tests {
             let other = ring.free([8, 8]).unwrap();
             device.upload_image(&other, &[9; 256]).unwrap();
         }
-        assert_eq!(device.read_back_image(&held).unwrap(), [7; 256]);
+        assert_eq!(held.read_back().unwrap(), [7; 256]);
         // Other sizes are other sets of images; held images stay as they are.
         let [small, smaller] = [[4, 4], [2, 2]].map(|size| ring.free(size).unwrap());
         drop((small, smaller));

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use egui::{Align2, Area, Frame, Id, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
 
-use super::style;
+use super::style::{self, button};
 use super::tools::Tools;
 
 /// Time for which a message about a saved file is shown.
@@ -74,8 +74,7 @@ fn running(ui: &mut Ui, tools: &Tools) {
             let share = done as f32 / total.max(1) as f32;
             let text = format!("saving {done} / {total}");
             ui.add(ProgressBar::new(share).desired_width(220.0).text(text));
-            let tip = "Keep nothing of this clip; the loop stays";
-            if ui.button("Cancel").on_hover_text(tip).clicked() {
+            if button(ui, "Cancel", "Keep nothing of this clip; the loop stays") {
                 progress.cancel();
             }
         });
@@ -94,8 +93,7 @@ fn failed(ui: &mut Ui, tools: &mut Tools) {
         if ui.add(field).changed() {
             tools.folder = folder.into();
         }
-        let tip = "Save into this folder what is shown now";
-        if ui.button("Try again").on_hover_text(tip).clicked() {
+        if button(ui, "Try again", "Save into this folder what is shown now") {
             tools.notices.failed = None;
             tools.want_again();
         }

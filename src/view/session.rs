@@ -1,7 +1,8 @@
 //! A window with its device: everything that is made anew when the device is lost.
 
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
+use parking_lot::Mutex;
 use winit::event_loop::{ActiveEventLoop, EventLoopProxy};
 use winit::window::Window;
 
@@ -25,7 +26,7 @@ pub(super) struct Session {
 /// Wakes the event loop, from any thread; one that is gone needs no news.
 pub(super) fn waker(proxy: EventLoopProxy<Wake>) -> impl Fn() + Send + Sync + 'static {
     let proxy = Mutex::new(proxy);
-    move || drop(proxy.lock().unwrap_or_else(PoisonError::into_inner).send_event(Wake))
+    move || drop(proxy.lock().send_event(Wake))
 }
 
 /// A window of the default size.

@@ -1,6 +1,6 @@
 //! Colours and sizes: dark, as the room for scanning.
 
-use egui::{Color32, CornerRadius, Visuals};
+use egui::{Align2, Color32, ComboBox, CornerRadius, Response, Ui, Visuals, WidgetText, Window};
 
 /// Background of graphs.
 pub(super) const BACK: Color32 = Color32::from_rgb(14, 16, 18);
@@ -33,4 +33,31 @@ pub(super) fn apply(ctx: &egui::Context) {
         style.spacing.slider_width = 110.0;
         style.spacing.combo_width = 110.0;
     });
+}
+
+/// A button with an explanation; returns whether it was clicked.
+pub(super) fn button(ui: &mut Ui, word: &str, tip: impl Into<WidgetText>) -> bool {
+    ui.button(word).on_hover_text(tip).clicked()
+}
+
+/// A list to choose a value from.
+pub(super) fn choice<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    (id, width): (&str, f32),
+    value: &mut T,
+    all: &[T],
+    name: impl Fn(T) -> String,
+) -> Response {
+    let list = ComboBox::from_id_salt(id).width(width).selected_text(name(*value));
+    let shown = list.show_ui(ui, |ui| {
+        for &one in all {
+            ui.selectable_value(value, one, name(one));
+        }
+    });
+    shown.response
+}
+
+/// A window in the middle over the image, `top` points below its edge.
+pub(super) fn window(title: &str, top: f32) -> Window<'_> {
+    Window::new(title).anchor(Align2::CENTER_TOP, [0.0, top]).resizable(false).collapsible(false)
 }

@@ -8,9 +8,10 @@ use std::time::{Duration, Instant};
 use egui::{Align2, FontId, PointerButton, Rect, Response, Sense, Stroke, Ui, pos2, vec2};
 use glam::{DVec2, DVec3};
 
+use super::hold;
 use super::look::{Look, Pictured};
 use super::model::{Camera, Model, Ray};
-use super::{hold, style};
+use super::style::{self, button};
 
 /// Least useful width of the view, points.
 const LEAST: f32 = 240.0;
@@ -233,16 +234,13 @@ fn buttons(ui: &mut Ui, place: &Place, model: &mut Model, state: &mut State) {
             ui.toggle_value(&mut model.view3d.cut, "Cut")
                 .on_hover_text("Cut away what lies between the eye and the image plane");
             ui.separator();
-            let tip = "Look at the image plane as the B-mode image shows it";
-            if ui.button("Front").on_hover_text(tip).clicked() {
+            if button(ui, "Front", "Look at the image plane as the B-mode image shows it") {
                 model.view3d.camera.face(&pose);
             }
-            let tip = "Look along the probe into the body";
-            if ui.button("Along").on_hover_text(tip).clicked() {
+            if button(ui, "Along", "Look along the probe into the body") {
                 model.view3d.camera.along(&pose);
             }
-            let tip = "Probe and fan from the side, all of them in view";
-            if ui.button("Reset").on_hover_text(tip).clicked() {
+            if button(ui, "Reset", "Probe and fan from the side, all of them in view") {
                 model.view3d.reset(&pose, &model.settings.probe);
             }
             hold::button(ui, model);

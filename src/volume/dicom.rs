@@ -3,9 +3,9 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::source::{self, MAX_BYTES};
-use super::{Format, Frame, Volume, VoxelType, Warning};
+use super::{Format, Frame, Scalar, Volume, Warning};
+use crate::issue::FileError;
 use elements::{Elements, Item, Tag};
 use image::Image;
 
@@ -31,11 +31,11 @@ impl Dicom<'_> {
         Elements { bytes: &self.bytes, big: self.syntax.elements().big }
     }
 
-    fn error(&self, message: impl Into<String>, remedy: &str) -> VolumeError {
-        VolumeError::file(self.path, message, remedy)
+    fn error(&self, message: impl Into<String>, remedy: &str) -> FileError {
+        FileError::file(self.path, message, remedy)
     }
 
-    fn lacks(&self, name: &str, tag: Tag) -> VolumeError {
+    fn lacks(&self, name: &str, tag: Tag) -> FileError {
         let (group, element) = tag;
         let message = format!("lacks {name} ({group:04x},{element:04x}), or it is malformed");
         self.error(message, SAVE)
@@ -43,7 +43,7 @@ impl Dicom<'_> {
 }
 
 /// Reads a volume.
-pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
+pub(super) fn load(path: &Path) -> Result<(Volume, Vec<Warning>), FileError> {
     let dicom = file::read(path)?;
     let image = Image::of(&dicom)?;
     let planes = geometry::planes(&dicom, &image)?;

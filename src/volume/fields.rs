@@ -1,9 +1,10 @@
 //! Keys and values of a text header, each with the number of its text line.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use super::error::VolumeError;
+use super::source::{self, Skip};
+use crate::issue::FileError;
 
 /// One key and its value.
 pub(super) struct Field {
@@ -30,9 +31,9 @@ impl Fields<'_> {
     }
 
     /// The field of this key; an error where it is missing.
-    pub fn need(&self, key: &str) -> Result<&Field, VolumeError> {
+    pub fn need(&self, key: &str) -> Result<&Field, FileError> {
         self.find(&[key]).ok_or_else(|| {
-            VolumeError::file(
+            FileError::file(
                 self.path,
                 format!("the header lacks `{key}`"),
                 "add it or export the volume again",
@@ -41,14 +42,14 @@ impl Fields<'_> {
     }
 
     /// An error on the line of a field; the message follows its key and value.
-    pub fn error(&self, field: &Field, message: &str, remedy: &str) -> VolumeError {
+    pub fn error(&self, field: &Field, message: &str, remedy: &str) -> FileError {
         let value: String = field.value.chars().take(60).collect();
         let message = format!("`{}` is `{value}`: {message}", field.key);
-        VolumeError::line(self.path, field.line, message, remedy)
+        FileError::line(self.path, field.line, message, remedy)
     }
 
     /// The value as exactly `count` numbers.
-    pub fn numbers<T: FromStr>(&self, field: &Field, count: usize) -> Result<Vec<T>, VolumeError> {
+    pub fn numbers<T: FromStr>(&self, field: &Field, count: usize) -> Result<Vec<T>, FileError> {
         let words: Vec<_> = field.value.split_whitespace().collect();
         if words.len() != count {
             return Err(self.error(
@@ -66,12 +67,34 @@ impl Fields<'_> {
     }
 
     /// The value as one number.
-    pub fn number<T: FromStr>(&self, field: &Field) -> Result<T, VolumeError> {
+    pub fn number<T: FromStr>(&self, field: &Field) -> Result<T, FileError> {
         Ok(self.numbers(field, 1)?.remove(0))
     }
 
+    /// Bytes before the voxels, stated at one of these keys; with `from_end`, -1 means all but those of the voxels.
+    pub fn skip(&self, keys: &[&str], from_end: bool) -> Result<Skip, FileError> {
+        let Some(field) = self.find(keys) else { return Ok(Skip::Bytes(0)) };
+        match self.number(field)? {
+            -1i64 if from_end => Ok(Skip::AllButLast),
+            bytes => u64::try_from(bytes).map(Skip::Bytes).map_err(|_| {
+                self.error(field, "no number of bytes", "write -1 or the bytes to skip")
+            }),
+        }
+    }
+
+    /// The file with the voxels that a field names.
+    pub fn detached(&self, field: &Field) -> Result<PathBuf, FileError> {
+        if field.value.starts_with("LIST") || field.value.contains('%') {
+            let message = "volumes in several files, such as one file per slice, cannot be read";
+            return Err(self.error(field, message, "save the volume to one file"));
+        }
+        source::detached(self.path, &field.value).map_err(|cause| {
+            self.error(field, &cause, "put the data beside the header and name it there")
+        })
+    }
+
     /// Sizes along the axes, none of them zero.
-    pub fn sizes(&self, field: &Field, count: usize) -> Result<Vec<usize>, VolumeError> {
+    pub fn sizes(&self, field: &Field, count: usize) -> Result<Vec<usize>, FileError> {
         let sizes = self.numbers(field, count)?;
         if sizes.contains(&0) {
             return Err(self.error(
@@ -84,7 +107,7 @@ impl Fields<'_> {
     }
 
     /// Spacings along the axes, mm or the file's unit: finite and above zero.
-    pub fn spacings(&self, field: &Field, count: usize) -> Result<Vec<f64>, VolumeError> {
+    pub fn spacings(&self, field: &Field, count: usize) -> Result<Vec<f64>, FileError> {
         let spacings: Vec<f64> = self.numbers(field, count)?;
         if spacings.iter().all(|s| s.is_finite() && *s > 0.0) {
             return Ok(spacings);

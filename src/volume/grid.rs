@@ -7,15 +7,17 @@ use glam::{DAffine3, DMat3, DVec3};
 const MIN_DETERMINANT: f64 = 0.05;
 
 /// Anatomical frame of a file. The letters name the directions in which x, y and z grow.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Frame {
     /// Left, posterior, superior: DICOM, ITK and this program.
     Lps,
     /// Right, anterior, superior: NIfTI and 3D Slicer.
     Ras,
     /// Left, anterior, superior.
+    #[value(skip)]
     Las,
     /// None is stated; taken for LPS.
+    #[value(skip)]
     Unstated,
 }
 

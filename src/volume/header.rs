@@ -2,12 +2,13 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::grid::Grid;
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::source::{Coding, MAX_BYTES, Payload, Skip};
-use super::voxels::{self, VoxelType, Voxels};
+use super::voxels::{self, Voxels};
 use super::{Format, Statistics, Volume, Warning};
+use crate::issue::FileError;
 
 /// Most volumes over time: twice the largest count of an axis in NIfTI-1. Each takes memory beside its voxels.
 const MAX_VOLUMES: usize = 1 << 16;
@@ -27,7 +28,7 @@ struct Decoded {
 /// A header that has been read and checked by itself.
 pub(super) struct Header {
     pub format: Format,
-    pub kind: VoxelType,
+    pub kind: Scalar,
     pub big_endian: bool,
     pub layout: Layout,
     /// Time from one volume to the next, s, where stated.
@@ -46,9 +47,9 @@ impl Header {
     }
 
     /// Reads the voxels of all volumes; of several values per voxel the first.
-    pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), VolumeError> {
+    pub fn load(mut self, path: &Path) -> Result<(Volume, Vec<Warning>), FileError> {
         let world_from_voxel = self.grid.world_from_voxel().map_err(|cause| {
-            VolumeError::file(path, cause, "correct the direction or export it again")
+            FileError::file(path, cause, "correct the direction or export it again")
         })?;
         let total = self.bytes(path)?;
         let Decoded { mut volumes, rounded, more } = match self.is_streamed() {
@@ -96,9 +97,9 @@ impl Header {
     }
 
     /// Type of the voxels in memory.
-    fn held(&self) -> VoxelType {
+    fn held(&self) -> Scalar {
         match self.scale {
-            Some(_) => VoxelType::F32,
+            Some(_) => Scalar::F32,
             None => self.kind,
         }
     }
@@ -111,7 +112,7 @@ impl Header {
     }
 
     /// Decodes the voxels block by block as they are read.
-    fn stream(&self, total: u64) -> Result<Decoded, VolumeError> {
+    fn stream(&self, total: u64) -> Result<Decoded, FileError> {
         let mut stream = self.payload.stream(total)?;
         let mut out = Decoded::default();
         let each = self.kind.bytes() * self.layout.channels;
@@ -140,7 +141,7 @@ impl Header {
     }
 
     /// Reads all bytes, then decodes them.
-    fn decode(&self, total: u64) -> Result<Decoded, VolumeError> {
+    fn decode(&self, total: u64) -> Result<Decoded, FileError> {
         let text = self.payload.coding == Coding::Text;
         let (bytes, more) = match text {
             true => voxels::parse_text(&self.payload, self.kind, total / self.kind.bytes() as u64)?,
@@ -158,10 +159,10 @@ impl Header {
     }
 
     /// Size in bytes of all values in the file; an error where that, or the size in memory, is too large.
-    fn bytes(&self, path: &Path) -> Result<u64, VolumeError> {
+    fn bytes(&self, path: &Path) -> Result<u64, FileError> {
         let layout = &self.layout;
         if layout.volumes > MAX_VOLUMES {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 format!("{} volumes over time are more than {MAX_VOLUMES}", layout.volumes),
                 "correct the sizes in the header, or leave out some",
@@ -171,7 +172,7 @@ impl Header {
         let all = layout.voxels().and_then(|n| n.checked_mul(layout.volumes as u64));
         let held = bytes(all, self.held().held_bytes());
         let total = bytes(layout.values(), self.kind.bytes());
-        // What is not streamed is in memory twice.
+        // Values that are not streamed are in memory twice.
         let peak = held.zip(total).and_then(|(held, total)| match self.is_streamed() {
             true => Some(held.max(total)),
             false => held.checked_add(total),
@@ -179,7 +180,7 @@ impl Header {
         let total = total.filter(|_| peak.is_some_and(|peak| peak <= MAX_BYTES));
         total.ok_or_else(|| {
             let [x, y, z] = layout.size;
-            VolumeError::file(
+            FileError::file(
                 path,
                 format!(
                     "{x} x {y} x {z} voxels of {} values, {} times, are more than {} GB",

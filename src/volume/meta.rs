@@ -3,15 +3,15 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::{self, Frame, Grid};
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::sequence::{self, frames};
-use super::source::{self, Coding, Line, Lines, Payload, Skip};
-use super::voxels::VoxelType;
+use super::source::{Coding, Line, Lines, Payload, Skip};
 use super::{Format, Warning};
+use crate::issue::FileError;
 
 /// Most axes that are read. MetaIO takes ten.
 const MAX_AXES: usize = 10;
@@ -53,7 +53,7 @@ const KNOWN: [&str; 29] = [
     "TransformType",
 ];
 
-pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let (fields, data) = fields(path)?;
     let mut out = of_fields(&fields, data)?;
     let keys = unused_keys(&fields);
@@ -67,7 +67,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
 }
 
 /// The header made of these fields; the voxels follow byte `data` if they are in the same file.
-pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeError> {
+pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, FileError> {
     if let Some(object) = fields.find(&["ObjectType"])
         && !object.value.eq_ignore_ascii_case("Image")
     {
@@ -116,7 +116,7 @@ pub(super) fn of_fields(fields: &Fields, data: u64) -> Result<Header, VolumeErro
 }
 
 /// Fields up to the one with the place of the voxels, and the byte after it.
-pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
+pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), FileError> {
     let mut lines = Lines::of(path)?;
     let mut list = Vec::new();
     while let Some(Line { number, text, end }) = lines.next()? {
@@ -124,7 +124,7 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
             continue;
         }
         let Some((key, value)) = text.split_once('=') else {
-            return Err(VolumeError::line(
+            return Err(FileError::line(
                 path,
                 number,
                 "is not of the form `Key = value`",
@@ -138,7 +138,7 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, u64), VolumeError> {
             return Ok((Fields { path, list }, end));
         }
     }
-    Err(VolumeError::file(
+    Err(FileError::file(
         path,
         "the header does not end: ElementDataFile is missing",
         "export or copy it again",
@@ -149,29 +149,30 @@ fn truth(field: &Field) -> bool {
     ["true", "1", "t", "y", "yes"].contains(&field.value.to_ascii_lowercase().as_str())
 }
 
-fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
-    let field = fields.need("ElementType")?;
+/// Types that are read, by their names; those that are written come first.
+pub(super) const TYPES: [(&str, Scalar); 10] = [
+    ("MET_UCHAR", Scalar::U8),
+    ("MET_CHAR", Scalar::I8),
+    ("MET_USHORT", Scalar::U16),
+    ("MET_SHORT", Scalar::I16),
+    ("MET_UINT", Scalar::U32),
+    ("MET_INT", Scalar::I32),
+    ("MET_FLOAT", Scalar::F32),
+    ("MET_DOUBLE", Scalar::F64),
     // In MetaIO a LONG has 32 bits in files.
-    Ok(match field.value.trim_end_matches("_ARRAY") {
-        "MET_UCHAR" => VoxelType::U8,
-        "MET_CHAR" => VoxelType::I8,
-        "MET_USHORT" => VoxelType::U16,
-        "MET_SHORT" => VoxelType::I16,
-        "MET_UINT" | "MET_ULONG" => VoxelType::U32,
-        "MET_INT" | "MET_LONG" => VoxelType::I32,
-        "MET_FLOAT" => VoxelType::F32,
-        "MET_DOUBLE" => VoxelType::F64,
-        _ => {
-            return Err(fields.error(
-                field,
-                "this type cannot be read",
-                "save it as MET_UCHAR, MET_SHORT or MET_FLOAT",
-            ));
-        }
-    })
+    ("MET_ULONG", Scalar::U32),
+    ("MET_LONG", Scalar::I32),
+];
+
+fn kind(fields: &Fields) -> Result<Scalar, FileError> {
+    let field = fields.need("ElementType")?;
+    let name = field.value.trim_end_matches("_ARRAY");
+    let found = TYPES.iter().find(|(known, _)| *known == name).map(|(_, kind)| *kind);
+    let remedy = "save it as MET_UCHAR, MET_SHORT or MET_FLOAT";
+    found.ok_or_else(|| fields.error(field, "this type cannot be read", remedy))
 }
 
-fn unit(fields: &Fields) -> Result<f64, VolumeError> {
+fn unit(fields: &Fields) -> Result<f64, FileError> {
     let Some(field) = fields.find(&["DistanceUnits"]) else {
         return Ok(1.0);
     };
@@ -183,35 +184,16 @@ fn unit(fields: &Fields) -> Result<f64, VolumeError> {
     }
 }
 
-fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
+fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
     let place = fields.need("ElementDataFile")?;
     let local = place.value.eq_ignore_ascii_case("LOCAL");
-    if place.value.starts_with("LIST") || place.value.contains('%') {
-        return Err(fields.error(
-            place,
-            "volumes in one file per slice cannot be read",
-            "save the volume to one file",
-        ));
-    }
-    let file = if local {
-        fields.path.to_owned()
-    } else {
-        source::detached(fields.path, &place.value).map_err(|cause| {
-            fields.error(place, &cause, "put the data beside the header and name it there")
-        })?
+    let (file, offset) = match local {
+        true => (fields.path.to_owned(), after_header),
+        false => (fields.detached(place)?, 0),
     };
-    let skip = match fields.find(&["HeaderSize"]) {
-        None => Skip::Bytes(0),
-        Some(field) => match fields.number(field)? {
-            -1i64 => Skip::AllButLast,
-            bytes => Skip::Bytes(u64::try_from(bytes).map_err(|_| {
-                fields.error(field, "no number of bytes", "write -1 or the bytes to skip")
-            })?),
-        },
-    };
+    let skip = fields.skip(&["HeaderSize"], true)?;
     let compressed = fields.find(&["CompressedData"]).is_some_and(truth);
     let text = fields.find(&["BinaryData"]).is_some_and(|f| !truth(f));
-    let offset = if local { after_header } else { 0 };
     Ok(Payload {
         file,
         offset,

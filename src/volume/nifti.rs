@@ -6,12 +6,12 @@ use std::path::Path;
 use glam::{DQuat, DVec3};
 
 use super::Format;
-use super::error::VolumeError;
 use super::grid::{Frame, Grid};
 use super::header::Header;
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::source::{Coding, Payload, Skip};
-use super::voxels::VoxelType;
+use crate::issue::FileError;
 
 /// Bytes of a header.
 const LENGTH: u64 = 348;
@@ -41,12 +41,12 @@ impl Raw<'_> {
         f64::from(f32::from_le_bytes(self.array(at)))
     }
 
-    fn error(&self, at: usize, message: impl Into<String>, remedy: &str) -> VolumeError {
-        VolumeError::byte(self.path, at as u64, message, remedy)
+    fn error(&self, at: usize, message: impl Into<String>, remedy: &str) -> FileError {
+        FileError::byte(self.path, at as u64, message, remedy)
     }
 }
 
-pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let packed = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("gz"));
     let mut payload = Payload {
         file: path.to_owned(),
@@ -105,37 +105,37 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
     Ok(out)
 }
 
-fn raw<'p>(path: &'p Path, payload: &Payload) -> Result<Raw<'p>, VolumeError> {
+fn raw<'p>(path: &'p Path, payload: &Payload) -> Result<Raw<'p>, FileError> {
     let mut bytes = Vec::new();
     let read = payload.stream(1)?.take(LENGTH).read_to_end(&mut bytes);
     if let Err(error) = read {
         let message = format!("the header cannot be read: {error}");
-        return Err(VolumeError::byte(path, bytes.len() as u64, message, EXPORT));
+        return Err(FileError::byte(path, bytes.len() as u64, message, EXPORT));
     }
     let length = bytes.first_chunk::<4>().map(|b| i32::from_le_bytes(*b));
     let big = match length {
         Some(348) => false,
         Some(length) if length.swap_bytes() == 348 => true,
         Some(length) if length == 540 || length.swap_bytes() == 540 => {
-            return Err(VolumeError::byte(path, 0, "NIfTI-2 cannot be read", EXPORT));
+            return Err(FileError::byte(path, 0, "NIfTI-2 cannot be read", EXPORT));
         }
         _ => {
             let message = "is not NIfTI-1: sizeof_hdr is not 348";
-            return Err(VolumeError::byte(path, 0, message, EXPORT));
+            return Err(FileError::byte(path, 0, message, EXPORT));
         }
     };
     if (bytes.len() as u64) < LENGTH {
         let message = format!("is cut off: {} of {LENGTH} bytes of the header", bytes.len());
-        return Err(VolumeError::byte(path, bytes.len() as u64, message, EXPORT));
+        return Err(FileError::byte(path, bytes.len() as u64, message, EXPORT));
     }
     if bytes[344..348] != *b"n+1\0" {
         let message = "is not NIfTI-1 in one file: the magic is not `n+1`";
-        return Err(VolumeError::byte(path, 344, message, EXPORT));
+        return Err(FileError::byte(path, 344, message, EXPORT));
     }
     Ok(Raw { path, bytes, big })
 }
 
-fn dims(raw: &Raw) -> Result<Vec<usize>, VolumeError> {
+fn dims(raw: &Raw) -> Result<Vec<usize>, FileError> {
     let count = raw.i16(40);
     if !(2..=7).contains(&count) {
         let message = format!("dim[0] is {count}: 2 to 7 axes are possible");
@@ -154,19 +154,19 @@ fn dims(raw: &Raw) -> Result<Vec<usize>, VolumeError> {
 }
 
 /// Type and number of values per voxel.
-fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
+fn kind(raw: &Raw) -> Result<(Scalar, usize), FileError> {
     let code = raw.i16(70);
     let (kind, channels) = match code {
-        2 => (VoxelType::U8, 1),
-        4 => (VoxelType::I16, 1),
-        8 => (VoxelType::I32, 1),
-        16 => (VoxelType::F32, 1),
-        64 => (VoxelType::F64, 1),
-        128 => (VoxelType::U8, 3),
-        256 => (VoxelType::I8, 1),
-        512 => (VoxelType::U16, 1),
-        768 => (VoxelType::U32, 1),
-        2304 => (VoxelType::U8, 4),
+        2 => (Scalar::U8, 1),
+        4 => (Scalar::I16, 1),
+        8 => (Scalar::I32, 1),
+        16 => (Scalar::F32, 1),
+        64 => (Scalar::F64, 1),
+        128 => (Scalar::U8, 3),
+        256 => (Scalar::I8, 1),
+        512 => (Scalar::U16, 1),
+        768 => (Scalar::U32, 1),
+        2304 => (Scalar::U8, 4),
         _ => {
             let message = format!("datatype {code} cannot be read");
             return Err(raw.error(70, message, "save it as 8- or 16-bit integers or as floats"));
@@ -182,7 +182,7 @@ fn kind(raw: &Raw) -> Result<(VoxelType, usize), VolumeError> {
 
 /// Time from one volume to the next, s, where the fourth axis is one of time and states it; and whether
 /// its unit is assumed.
-fn interval(raw: &Raw) -> Result<(Option<f64>, bool), VolumeError> {
+fn interval(raw: &Raw) -> Result<(Option<f64>, bool), FileError> {
     let stated = raw.f32(92) as f32;
     if !(stated.is_finite() && stated >= 0.0) {
         let message =
@@ -205,7 +205,7 @@ fn interval(raw: &Raw) -> Result<(Option<f64>, bool), VolumeError> {
 
 /// Position of voxels by sform, else qform, else spacing alone; and whether one of the first two
 /// is set.
-fn grid(raw: &Raw) -> Result<(Grid, bool), VolumeError> {
+fn grid(raw: &Raw) -> Result<(Grid, bool), FileError> {
     let (qform, sform) = (raw.i16(252) > 0, raw.i16(254) > 0);
     let vector = |at: usize, stride: usize| {
         DVec3::new(raw.f32(at), raw.f32(at + stride), raw.f32(at + 2 * stride))

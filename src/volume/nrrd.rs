@@ -4,14 +4,14 @@
 use std::path::Path;
 
 use super::Format;
-use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::grid::Frame;
 use super::header::{Header, unused};
 use super::layout::{Axis, Layout};
+use super::scalar::Scalar;
 use super::sequence::{frames, nrrd as planes};
-use super::source::{self, Coding, Line, Lines, Payload, Skip};
-use super::voxels::VoxelType;
+use super::source::{Coding, Line, Lines, Payload};
+use crate::issue::FileError;
 
 mod space;
 
@@ -54,7 +54,7 @@ const KNOWN: [&str; 32] = [
     "centerings",
 ];
 
-pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
+pub(super) fn header(path: &Path) -> Result<Header, FileError> {
     let (fields, pairs, data) = fields(path)?;
     let dimension = fields.need("dimension")?;
     let n: usize = fields.number(dimension)?;
@@ -86,7 +86,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
         },
         None if kind.bytes() == 1 || payload.coding == Coding::Text => false,
         None => {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "the header lacks `endian`",
                 "add `endian: little` or `endian: big`",
@@ -133,7 +133,7 @@ pub(super) fn header(path: &Path) -> Result<Header, VolumeError> {
 }
 
 /// Fields, key/value pairs, and the byte after the empty line that ends the header.
-pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), VolumeError> {
+pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), FileError> {
     let mut lines = Lines::of(path)?;
     let (mut list, mut pairs, mut at) = (Vec::new(), Vec::new(), 0);
     while let Some(Line { number, text, end }) = lines.next()? {
@@ -142,7 +142,7 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), Volum
         if number == 1 {
             let version = text.strip_prefix("NRRD").filter(|v| v.len() == 4);
             if version.and_then(|v| v.parse::<u32>().ok()).is_none_or(|v| v > 5) {
-                return Err(VolumeError::line(
+                return Err(FileError::line(
                     path,
                     1,
                     "does not begin with NRRD and a version up to 0005",
@@ -161,7 +161,7 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), Volum
             let (key, value) = (key.trim().to_owned(), value.trim().to_owned());
             into.push(Field { line: number, key, value });
         } else {
-            return Err(VolumeError::line(
+            return Err(FileError::line(
                 path,
                 number,
                 "is neither `field: value` nor `key:=value`, and no empty line ended the header",
@@ -172,21 +172,19 @@ pub(super) fn fields(path: &Path) -> Result<(Fields<'_>, Vec<Field>, u64), Volum
     Ok((Fields { path, list }, pairs, at))
 }
 
-fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
+fn kind(fields: &Fields) -> Result<Scalar, FileError> {
     let field = fields.need("type")?;
     Ok(match field.value.to_ascii_lowercase().as_str() {
-        "signed char" | "int8" | "int8_t" => VoxelType::I8,
-        "uchar" | "unsigned char" | "uint8" | "uint8_t" => VoxelType::U8,
+        "signed char" | "int8" | "int8_t" => Scalar::I8,
+        "uchar" | "unsigned char" | "uint8" | "uint8_t" => Scalar::U8,
         "short" | "short int" | "signed short" | "signed short int" | "int16" | "int16_t" => {
-            VoxelType::I16
+            Scalar::I16
         }
-        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => {
-            VoxelType::U16
-        }
-        "int" | "signed int" | "int32" | "int32_t" => VoxelType::I32,
-        "uint" | "unsigned int" | "uint32" | "uint32_t" => VoxelType::U32,
-        "float" => VoxelType::F32,
-        "double" => VoxelType::F64,
+        "ushort" | "unsigned short" | "unsigned short int" | "uint16" | "uint16_t" => Scalar::U16,
+        "int" | "signed int" | "int32" | "int32_t" => Scalar::I32,
+        "uint" | "unsigned int" | "uint32" | "uint32_t" => Scalar::U32,
+        "float" => Scalar::F32,
+        "double" => Scalar::F64,
         _ => {
             return Err(fields.error(
                 field,
@@ -197,7 +195,7 @@ fn kind(fields: &Fields) -> Result<VoxelType, VolumeError> {
     })
 }
 
-fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
+fn payload(fields: &Fields, after_header: u64) -> Result<Payload, FileError> {
     let encoding = fields.need("encoding")?;
     let coding = match encoding.value.to_ascii_lowercase().as_str() {
         "raw" => Coding::Raw,
@@ -217,30 +215,10 @@ fn payload(fields: &Fields, after_header: u64) -> Result<Payload, VolumeError> {
         Some(field) => fields.number(field)?,
         None => 0,
     };
-    let skip = match fields.find(&["byte skip", "byteskip"]) {
-        None => Skip::Bytes(0),
-        Some(field) => match fields.number(field)? {
-            -1i64 if coding != Coding::Text => Skip::AllButLast,
-            bytes => Skip::Bytes(u64::try_from(bytes).map_err(|_| {
-                fields.error(field, "no number of bytes", "write -1 or the bytes to skip")
-            })?),
-        },
-    };
+    let skip = fields.skip(&["byte skip", "byteskip"], coding != Coding::Text)?;
     let (file, offset) = match fields.find(&["data file", "datafile"]) {
         None => (fields.path.to_owned(), after_header),
-        Some(field) if field.value.starts_with("LIST") || field.value.contains('%') => {
-            return Err(fields.error(
-                field,
-                "volumes in several files cannot be read",
-                "save the volume to one file",
-            ));
-        }
-        Some(field) => {
-            let file = source::detached(fields.path, &field.value).map_err(|cause| {
-                fields.error(field, &cause, "put the data beside the header and name it there")
-            })?;
-            (file, 0)
-        }
+        Some(field) => (fields.detached(field)?, 0),
     };
     Ok(Payload { file, offset, lines, skip, coding })
 }

@@ -3,11 +3,10 @@
 //! PLUS (vtkIGSIOVolumeReconstructor; Lasso et al., IEEE Trans. Biomed. Eng. 61:2527, 2014).
 
 use glam::{DAffine3, DVec3};
-use miette::Diagnostic;
-use thiserror::Error;
 
 use super::source::MAX_BYTES;
 use super::{Format, Frame, Sequence, Volume, Voxels};
+use crate::issue::FileError;
 
 mod config;
 pub(super) mod fan;
@@ -21,25 +20,8 @@ pub use fan::Fan;
 pub use grid::Lattice;
 pub use poses::{Transforms, names as frames_of_pose};
 
-/// The reason why nothing can be reconstructed.
-#[derive(Debug, Error, Diagnostic)]
-#[error("{message}")]
-#[diagnostic(help("{remedy}"))]
-pub struct ReconstructError {
-    /// Cause.
-    pub message: String,
-    /// Remedy.
-    pub remedy: String,
-}
-
-impl ReconstructError {
-    fn new(message: impl Into<String>, remedy: &str) -> Self {
-        Self { message: message.into(), remedy: remedy.to_owned() }
-    }
-}
-
 /// Distribution of a pixel over voxels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Interpolation {
     /// To the voxel at its place.
     Nearest,
@@ -48,13 +30,13 @@ pub enum Interpolation {
 }
 
 /// Value of a voxel that several pixels reach.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Compounding {
     /// Their mean, by the weights of the interpolation.
     Mean,
-    /// The largest. With `Linear` only pixels of a weight of at least 1/8 count.
+    /// The largest. With `linear` only pixels of a weight of at least 1/8 count.
     Maximum,
-    /// The one of the latest frame. With `Linear` as for the largest.
+    /// The one of the latest frame. With `linear` as for the largest.
     Latest,
 }
 
@@ -145,14 +127,14 @@ pub fn reconstruct(
     sequence: &Sequence,
     reference_from_image: &[Option<DAffine3>],
     settings: &Settings,
-) -> Result<Reconstruction, ReconstructError> {
+) -> Result<Reconstruction, FileError> {
     assert_eq!(sequence.frames.len(), reference_from_image.len(), "frames");
     let source = insert::Source::new(sequence, settings)?;
     let usable = (0..sequence.frames.len()).step_by(settings.every.max(1));
     let usable = usable.filter(|&i| sequence.frames[i].has_image());
     let frames: Vec<_> = usable.filter_map(|i| Some((i, reference_from_image[i]?))).collect();
     if frames.is_empty() {
-        return Err(ReconstructError::new(
+        return Err(FileError::data(
             "no frame has both an image and a pose that is OK",
             "check the status of the poses with `insonify check`, and the names of the frames",
         ));

@@ -3,11 +3,11 @@
 
 use std::path::Path;
 
-use super::error::VolumeError;
 use super::fields::{Field, Fields};
 use super::header::Header;
 use super::reconstruct::fan;
 use super::{Voxels, Warning, meta};
+use crate::issue::FileError;
 
 pub(super) mod frames;
 pub(super) mod nrrd;
@@ -51,7 +51,7 @@ impl Sequence {
     ///
     /// # Errors
     /// Those of a volume; malformed entries of frames; a frame that is a volume itself.
-    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), VolumeError> {
+    pub fn load(path: &Path) -> Result<(Self, Vec<Warning>), FileError> {
         if nrrd::is_meant(path) {
             let (pairs, header) = nrrd::header(path)?;
             let orientation = nrrd::orientation(&pairs).map(|f| f.value.clone());
@@ -62,7 +62,7 @@ impl Sequence {
         }
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
         if !["mha", "mhd"].contains(&extension.to_ascii_lowercase().as_str()) {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "is neither MetaImage nor NRRD by its extension, in which tracked sequences are read",
                 "save it as .igs.mha (3D Slicer and PLUS do)",
@@ -103,7 +103,7 @@ impl Sequence {
         entries: &Fields,
         orientation: Option<String>,
         fields: Vec<(String, String)>,
-    ) -> Result<(Self, Vec<Warning>), VolumeError> {
+    ) -> Result<(Self, Vec<Warning>), FileError> {
         let [width, height, count] = header.layout.size;
         let mut tracked = frames::parse(entries, count)?;
         let (volume, warnings) = header.load(path)?;
@@ -138,7 +138,7 @@ impl Sequence {
     ///
     /// # Panics
     /// When the pixels are not those of so many frames, or an entry would break the header.
-    pub fn write(&self, path: &Path) -> Result<(), VolumeError> {
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
         let [width, height] = self.size;
         let count = self.frames.len();
         assert_eq!(self.pixels.len(), width * height * count, "pixels");
@@ -146,7 +146,7 @@ impl Sequence {
         if ends("nrrd") {
             return nrrd::write(self, path);
         } else if !ends("mha") {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "is not written: only MetaImage and NRRD in one file are",
                 "end the name in .mha or .nrrd",

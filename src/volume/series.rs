@@ -2,9 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::error::VolumeError;
 use super::source::MAX_BYTES;
 use super::{Statistics, Volume, Warning};
+use crate::issue::FileError;
 
 /// Largest difference of positions between equal grids, voxels: files round them.
 const SAME_PLACE: f64 = 0.01;
@@ -20,7 +20,7 @@ impl Volume {
     ///
     /// # Panics
     /// Without files.
-    pub fn load_series(files: &[PathBuf]) -> Result<(Self, Vec<Warning>), (usize, VolumeError)> {
+    pub fn load_series(files: &[PathBuf]) -> Result<(Self, Vec<Warning>), (usize, FileError)> {
         let (first, rest) = files.split_first().expect("a file");
         let (mut series, mut warnings) = Self::load(first).map_err(|e| (0, e))?;
         if rest.is_empty() {
@@ -34,7 +34,7 @@ impl Volume {
             if let Some(difference) = series.difference(&next) {
                 let message = format!("{difference} in {}", first.display());
                 let remedy = "give volumes of the same grid and type";
-                return Err((number, VolumeError::file(file, message, remedy)));
+                return Err((number, FileError::file(file, message, remedy)));
             }
             let new = |w: &Warning| !warnings.iter().any(|old: &Warning| old.message == w.message);
             let new: Vec<_> = found.into_iter().filter(new).collect();
@@ -58,10 +58,10 @@ impl Volume {
     }
 
     /// Fails unless this is one volume.
-    fn alone(&self, file: &Path) -> Result<(), VolumeError> {
+    fn alone(&self, file: &Path) -> Result<(), FileError> {
         match self.later.len() {
             0 => Ok(()),
-            more => Err(VolumeError::file(
+            more => Err(FileError::file(
                 file,
                 format!("holds {} volumes, where each file is to hold one", more + 1),
                 "name it alone, or save its volumes one by one",
@@ -73,11 +73,11 @@ impl Volume {
     ///
     /// # Errors
     /// They exceed it.
-    pub fn fits(&self, count: usize, file: &Path) -> Result<(), VolumeError> {
+    pub fn fits(&self, count: usize, file: &Path) -> Result<(), FileError> {
         let each = (self.voxels.len() * self.voxels.kind().bytes()) as u64;
         match each.checked_mul(count as u64) {
             Some(bytes) if bytes <= MAX_BYTES => Ok(()),
-            _ => Err(VolumeError::file(
+            _ => Err(FileError::file(
                 file,
                 format!(
                     "{count} volumes of {:.1} MB are more than {} GB",

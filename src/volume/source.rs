@@ -7,7 +7,7 @@ use std::path::{Component, Path, PathBuf};
 use bzip2::bufread::MultiBzDecoder;
 use flate2::bufread::{MultiGzDecoder, ZlibDecoder};
 
-use super::error::VolumeError;
+use crate::issue::FileError;
 
 /// Largest volume that is read, bytes of all its frames and channels: small enough to lie beside the rest in
 /// the memory of a workstation.
@@ -67,29 +67,25 @@ pub(super) struct Payload {
 }
 
 /// A regular file and its length. Pipes and devices, which may never end, are refused.
-pub(super) fn open(path: &Path) -> Result<(File, u64), VolumeError> {
+pub(super) fn open(path: &Path) -> Result<(File, u64), FileError> {
     let unreadable = |e: io::Error| {
-        VolumeError::file(
-            path,
-            format!("cannot be read: {e}"),
-            "check the name and the permissions",
-        )
+        FileError::file(path, format!("cannot be read: {e}"), "check the name and the permissions")
     };
     let data = std::fs::metadata(path).map_err(unreadable)?;
     if !data.is_file() {
-        return Err(VolumeError::file(path, "is not an ordinary file", "give a file"));
+        return Err(FileError::file(path, "is not an ordinary file", "give a file"));
     }
     let file = File::open(path).map_err(unreadable)?;
     Ok((file, data.len()))
 }
 
 /// The first bytes of a file, at most `limit`.
-pub(super) fn prefix(path: &Path, limit: u64) -> Result<Vec<u8>, VolumeError> {
+pub(super) fn prefix(path: &Path, limit: u64) -> Result<Vec<u8>, FileError> {
     let (file, len) = open(path)?;
     let mut bytes = Vec::new();
     file.take(limit.min(len))
         .read_to_end(&mut bytes)
-        .map_err(|e| VolumeError::file(path, format!("cannot be read: {e}"), AGAIN))?;
+        .map_err(|e| FileError::file(path, format!("cannot be read: {e}"), AGAIN))?;
     Ok(bytes)
 }
 
@@ -113,7 +109,7 @@ pub(super) struct Line {
 }
 
 impl<'p> Lines<'p> {
-    pub fn of(path: &'p Path) -> Result<Self, VolumeError> {
+    pub fn of(path: &'p Path) -> Result<Self, FileError> {
         let (file, _) = open(path)?;
         Ok(Self { path, rest: BufReader::new(file.take(MAX_HEADER)), number: 0, at: 0 })
     }
@@ -122,8 +118,8 @@ impl<'p> Lines<'p> {
     ///
     /// # Errors
     /// The file cannot be read, or the header is too long.
-    pub fn next(&mut self) -> Result<Option<Line>, VolumeError> {
-        let fail = |cause: String, remedy: &str| Err(VolumeError::file(self.path, cause, remedy));
+    pub fn next(&mut self) -> Result<Option<Line>, FileError> {
+        let fail = |cause: String, remedy: &str| Err(FileError::file(self.path, cause, remedy));
         let mut bytes = Vec::new();
         if let Err(e) = self.rest.read_until(b'\n', &mut bytes) {
             return fail(format!("cannot be read: {e}"), AGAIN);
@@ -192,7 +188,7 @@ impl<R: BufRead> Read for Hex<R> {
 impl Payload {
     /// Opens the stream of voxels and checks that it can hold `total` bytes, or in text as many numbers. The
     /// voxels begin at the present place of the stream, unless they are its last bytes.
-    pub fn stream(&self, total: u64) -> Result<Box<dyn Read>, VolumeError> {
+    pub fn stream(&self, total: u64) -> Result<Box<dyn Read>, FileError> {
         let (mut file, len) = open(&self.file)?;
         let broken = |e: io::Error| self.broken(0, total, &e);
         file.seek(SeekFrom::Start(self.offset)).map_err(broken)?;
@@ -246,7 +242,7 @@ impl Payload {
 
     /// The `total` bytes, and whether more follow. At most one byte more of a compressed stream is
     /// unpacked.
-    pub fn read(&self, total: u64) -> Result<(Vec<u8>, bool), VolumeError> {
+    pub fn read(&self, total: u64) -> Result<(Vec<u8>, bool), FileError> {
         let mut stream = self.stream(total)?;
         let from_end = self.skip == Skip::AllButLast && self.coding != Coding::Raw;
         let keep = if from_end { total + MAX_LEAD + 1 } else { total };
@@ -257,7 +253,7 @@ impl Payload {
         let read = out.len() as u64;
         if from_end {
             if read > total + MAX_LEAD {
-                return Err(VolumeError::byte(
+                return Err(FileError::byte(
                     &self.file,
                     read,
                     format!("more than {MAX_LEAD} bytes precede the voxels"),
@@ -284,7 +280,7 @@ impl Payload {
         block: &mut [u8],
         done: u64,
         total: u64,
-    ) -> Result<(), VolumeError> {
+    ) -> Result<(), FileError> {
         let mut held = 0;
         while held < block.len() {
             match stream.read(&mut block[held..]) {
@@ -301,23 +297,23 @@ impl Payload {
     }
 
     /// Returns whether a stream goes on after its `total` bytes.
-    pub fn goes_on(&self, stream: &mut dyn Read, total: u64) -> Result<bool, VolumeError> {
+    pub fn goes_on(&self, stream: &mut dyn Read, total: u64) -> Result<bool, FileError> {
         let more = stream.read(&mut [0]);
         Ok(more.map_err(|e| self.broken(total, total, &e))? > 0)
     }
 
     /// The error for voxels for which there is no room.
-    pub fn too_large(&self, total: u64) -> VolumeError {
-        VolumeError::file(
+    pub fn too_large(&self, total: u64) -> FileError {
+        FileError::file(
             &self.file,
             format!("{total} bytes of voxels do not fit into memory"),
             "crop or resample the volume",
         )
     }
 
-    fn short(&self, at: u64, held: u64, total: u64) -> VolumeError {
+    fn short(&self, at: u64, held: u64, total: u64) -> FileError {
         let what = if self.coding == Coding::Text { "numbers" } else { "bytes" };
-        VolumeError::byte(
+        FileError::byte(
             &self.file,
             at,
             format!(
@@ -327,10 +323,10 @@ impl Payload {
         )
     }
 
-    fn broken(&self, at: u64, total: u64, error: &io::Error) -> VolumeError {
+    fn broken(&self, at: u64, total: u64, error: &io::Error) -> FileError {
         if error.kind() == ErrorKind::UnexpectedEof {
             return self.short(at, at, total);
         }
-        VolumeError::byte(&self.file, at, format!("the voxels cannot be read: {error}"), AGAIN)
+        FileError::byte(&self.file, at, format!("the voxels cannot be read: {error}"), AGAIN)
     }
 }

@@ -9,6 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use tempfile::TempDir;
 
 use super::*;
+use crate::issue::Place;
 
 mod planted;
 mod sequences;
@@ -137,7 +138,7 @@ impl Folder {
         path
     }
 
-    fn load(&self, name: &str, bytes: &[u8]) -> Result<(Volume, Vec<Warning>), VolumeError> {
+    fn load(&self, name: &str, bytes: &[u8]) -> Result<(Volume, Vec<Warning>), FileError> {
         Volume::load(&self.write(name, bytes))
     }
 
@@ -156,7 +157,7 @@ impl Folder {
         }
     }
 
-    fn refused(&self, name: &str, bytes: &[u8], cause: &str) -> VolumeError {
+    fn refused(&self, name: &str, bytes: &[u8], cause: &str) -> FileError {
         let error = self.load(name, bytes).expect_err(cause);
         let text = error.to_string();
         assert!(text.contains(cause) && text.contains(name), "{text}, not {cause}");

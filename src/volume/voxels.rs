@@ -3,54 +3,10 @@
 use std::collections::TryReserveError;
 use std::io::{BufReader, Read};
 
-use super::error::VolumeError;
 use super::layout::Layout;
+use super::scalar::Scalar;
 use super::source::Payload;
-
-/// Type of a value in a file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(missing_docs)]
-pub enum VoxelType {
-    U8,
-    I8,
-    U16,
-    I16,
-    U32,
-    I32,
-    F32,
-    F64,
-}
-
-impl VoxelType {
-    /// Bytes of one value.
-    pub fn bytes(self) -> usize {
-        match self {
-            Self::U8 | Self::I8 => 1,
-            Self::U16 | Self::I16 => 2,
-            Self::U32 | Self::I32 | Self::F32 => 4,
-            Self::F64 => 8,
-        }
-    }
-
-    /// Bytes of one value as [`Voxels`] hold it.
-    pub(super) fn held_bytes(self) -> usize {
-        self.bytes().min(4)
-    }
-
-    /// Name in words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::U8 => "8-bit unsigned integer",
-            Self::I8 => "8-bit signed integer",
-            Self::U16 => "16-bit unsigned integer",
-            Self::I16 => "16-bit signed integer",
-            Self::U32 => "32-bit unsigned integer",
-            Self::I32 => "32-bit signed integer",
-            Self::F32 => "32-bit float",
-            Self::F64 => "64-bit float",
-        }
-    }
-}
+use crate::issue::FileError;
 
 /// Values, first axis fastest. 8- and 16-bit integers are kept as such; everything else is f32, which a 3D
 /// texture can hold.
@@ -102,13 +58,13 @@ impl Voxels {
     }
 
     /// Type of the values as held here.
-    pub fn kind(&self) -> VoxelType {
+    pub fn kind(&self) -> Scalar {
         match self {
-            Self::U8(_) => VoxelType::U8,
-            Self::I8(_) => VoxelType::I8,
-            Self::U16(_) => VoxelType::U16,
-            Self::I16(_) => VoxelType::I16,
-            Self::F32(_) => VoxelType::F32,
+            Self::U8(_) => Scalar::U8,
+            Self::I8(_) => Scalar::I8,
+            Self::U16(_) => Scalar::U16,
+            Self::I16(_) => Scalar::I16,
+            Self::F32(_) => Scalar::F32,
         }
     }
 
@@ -137,15 +93,13 @@ impl Voxels {
     }
 
     /// No voxels yet, of a type as [`Self::decode`] makes it, with room for `count`.
-    pub(super) fn with_room(kind: VoxelType, count: usize) -> Result<Self, TryReserveError> {
+    pub(super) fn with_room(kind: Scalar, count: usize) -> Result<Self, TryReserveError> {
         let mut out = match kind {
-            VoxelType::U8 => Self::U8(Vec::new()),
-            VoxelType::I8 => Self::I8(Vec::new()),
-            VoxelType::U16 => Self::U16(Vec::new()),
-            VoxelType::I16 => Self::I16(Vec::new()),
-            VoxelType::U32 | VoxelType::I32 | VoxelType::F32 | VoxelType::F64 => {
-                Self::F32(Vec::new())
-            }
+            Scalar::U8 => Self::U8(Vec::new()),
+            Scalar::I8 => Self::I8(Vec::new()),
+            Scalar::U16 => Self::U16(Vec::new()),
+            Scalar::I16 => Self::I16(Vec::new()),
+            _ => Self::F32(Vec::new()),
         };
         values!(&mut out, v => v.try_reserve_exact(count))?;
         Ok(out)
@@ -169,7 +123,7 @@ impl Voxels {
     /// One of the volumes in these bytes, and the number of rounded values.
     pub(super) fn decode(
         bytes: &[u8],
-        kind: VoxelType,
+        kind: Scalar,
         big: bool,
         layout: &Layout,
         volume: usize,
@@ -199,15 +153,17 @@ impl Voxels {
             }};
         }
         let voxels = match kind {
-            VoxelType::U8 => Self::U8(read!(u8, |x| x)),
-            VoxelType::I8 => Self::I8(read!(i8, |x| x)),
-            VoxelType::U16 => Self::U16(read!(u16, |x| x)),
-            VoxelType::I16 => Self::I16(read!(i16, |x| x)),
-            VoxelType::F32 => Self::F32(read!(f32, |x| x)),
-            VoxelType::U32 => Self::F32(read!(u32, |x| round(f64::from(x)))),
-            VoxelType::I32 => Self::F32(read!(i32, |x| round(f64::from(x)))),
+            Scalar::U8 => Self::U8(read!(u8, |x| x)),
+            Scalar::I8 => Self::I8(read!(i8, |x| x)),
+            Scalar::U16 => Self::U16(read!(u16, |x| x)),
+            Scalar::I16 => Self::I16(read!(i16, |x| x)),
+            Scalar::F32 => Self::F32(read!(f32, |x| x)),
+            Scalar::U32 => Self::F32(read!(u32, |x| round(f64::from(x)))),
+            Scalar::I32 => Self::F32(read!(i32, |x| round(f64::from(x)))),
+            Scalar::U64 => Self::F32(read!(u64, |x| round(x as f64))),
+            Scalar::I64 => Self::F32(read!(i64, |x| round(x as f64))),
             // Decimal fractions are never exact in single precision; only a lost range matters.
-            VoxelType::F64 => Self::F32(read!(f64, |x| x as f32)),
+            Scalar::F64 => Self::F32(read!(f64, |x| x as f32)),
         };
         (voxels, rounded)
     }
@@ -254,16 +210,16 @@ const MAX_WORD: usize = 64;
 /// `total` numbers in text as the bytes of little-endian values; also whether more follow.
 pub(super) fn parse_text(
     payload: &Payload,
-    kind: VoxelType,
+    kind: Scalar,
     total: u64,
-) -> Result<(Vec<u8>, bool), VolumeError> {
+) -> Result<(Vec<u8>, bool), FileError> {
     let mut bytes = BufReader::new(payload.stream(total)?).bytes();
     let (mut out, mut count, mut at) = (Vec::new(), 0, payload.offset);
     let mut word = String::new();
     loop {
         let byte = bytes.next().transpose();
         let byte = byte.map_err(|e| {
-            VolumeError::byte(&payload.file, at, format!("cannot be read: {e}"), "copy it again")
+            FileError::byte(&payload.file, at, format!("cannot be read: {e}"), "copy it again")
         })?;
         at += 1;
         let separator = byte.is_none_or(|b| b.is_ascii_whitespace() || b == b',');
@@ -274,7 +230,7 @@ pub(super) fn parse_text(
             _ if count == total => return Ok((out, true)),
             _ => {
                 let value =
-                    encode(&word, kind).ok_or_else(|| no_number(payload, at, &word, kind))?;
+                    kind.encoded(&word).ok_or_else(|| no_number(payload, at, &word, kind))?;
                 out.extend(value);
                 count += 1;
                 word.clear();
@@ -285,7 +241,7 @@ pub(super) fn parse_text(
         }
     }
     if count < total {
-        return Err(VolumeError::byte(
+        return Err(FileError::byte(
             &payload.file,
             at,
             format!("is cut off: {count} of {total} numbers are there"),
@@ -295,29 +251,11 @@ pub(super) fn parse_text(
     Ok((out, false))
 }
 
-fn no_number(payload: &Payload, at: u64, word: &str, kind: VoxelType) -> VolumeError {
-    VolumeError::byte(
+fn no_number(payload: &Payload, at: u64, word: &str, kind: Scalar) -> FileError {
+    FileError::byte(
         &payload.file,
         at.saturating_sub(word.len() as u64 + 1),
         format!("`{word}` is not a {}", kind.name()),
         "correct it or the type in the header",
     )
-}
-
-fn encode(word: &str, kind: VoxelType) -> Option<Vec<u8>> {
-    macro_rules! parse {
-        ($t:ty) => {
-            word.parse::<$t>().ok()?.to_le_bytes().to_vec()
-        };
-    }
-    Some(match kind {
-        VoxelType::U8 => parse!(u8),
-        VoxelType::I8 => parse!(i8),
-        VoxelType::U16 => parse!(u16),
-        VoxelType::I16 => parse!(i16),
-        VoxelType::U32 => parse!(u32),
-        VoxelType::I32 => parse!(i32),
-        VoxelType::F32 => parse!(f32),
-        VoxelType::F64 => parse!(f64),
-    })
 }

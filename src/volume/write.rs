@@ -9,8 +9,8 @@ use flate2::Compression;
 use flate2::write::ZlibEncoder;
 use glam::DMat3;
 
-use super::error::VolumeError;
-use super::{Volume, VoxelType, Voxels};
+use super::{Volume, Voxels, meta};
+use crate::issue::FileError;
 
 /// A header under construction.
 pub(super) struct Header(String);
@@ -28,16 +28,8 @@ pub(super) fn number(value: f64) -> String {
 impl Header {
     /// A header with the entries that depend on the voxels alone.
     pub fn new(voxels: &Voxels, axes: usize) -> Self {
-        let kind = match voxels.kind() {
-            VoxelType::U8 => "MET_UCHAR",
-            VoxelType::I8 => "MET_CHAR",
-            VoxelType::U16 => "MET_USHORT",
-            VoxelType::I16 => "MET_SHORT",
-            VoxelType::U32 => "MET_UINT",
-            VoxelType::I32 => "MET_INT",
-            VoxelType::F32 => "MET_FLOAT",
-            VoxelType::F64 => "MET_DOUBLE",
-        };
+        let kind = meta::TYPES.iter().find(|(_, kind)| *kind == voxels.kind());
+        let (kind, _) = kind.expect("volumes are held in types that MetaImage has");
         let mut out = Self(String::new());
         out.entry("ObjectType", "Image");
         out.entry("NDims", axes.to_string());
@@ -64,9 +56,9 @@ impl Header {
         mut self,
         path: &Path,
         volumes: impl IntoIterator<Item = &'v Voxels>,
-    ) -> Result<(), VolumeError> {
+    ) -> Result<(), FileError> {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("mha")) {
-            return Err(VolumeError::file(
+            return Err(FileError::file(
                 path,
                 "is not written: only MetaImage in one file is",
                 "end the name in .mha",
@@ -84,14 +76,14 @@ impl Header {
 }
 
 /// Writes a file of a header and data.
-pub(super) fn create(path: &Path, header: &str, data: &[u8]) -> Result<(), VolumeError> {
+pub(super) fn create(path: &Path, header: &str, data: &[u8]) -> Result<(), FileError> {
     let write = || {
         let mut file = File::create(path)?;
         file.write_all(header.as_bytes())?;
         file.write_all(data)
     };
     write().map_err(|e| {
-        VolumeError::file(
+        FileError::file(
             path,
             format!("cannot be written: {e}"),
             "check the folder, its permissions and its free space",
@@ -107,7 +99,7 @@ pub(super) fn create(path: &Path, header: &str, data: &[u8]) -> Result<(), Volum
 ///
 /// # Panics
 /// When several volumes have no interval, which the file has to state.
-pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), VolumeError> {
+pub fn write_meta(path: &Path, volume: &Volume) -> Result<(), FileError> {
     let [x, y, z] = volume.size;
     assert_eq!(volume.voxels.len(), x * y * z, "voxels");
     let mut size = vec![x, y, z];

@@ -1,11 +1,12 @@
 //! Properties of the codec: no input makes it panic, and it reads what it writes.
 
-use insonify::igtl::image::{Image, Scalar};
+use insonify::igtl::image::Image;
 use insonify::igtl::message::{
     Content, ExtendedHeader, HEADER, Header, Message, MetadataEntry, TrackedTool,
 };
 use insonify::igtl::wire::{Label, Timestamp, checksum};
 use insonify::scene::tracker::Axes;
+use insonify::volume::Scalar;
 use proptest::collection::vec;
 use proptest::prelude::*;
 

@@ -1,10 +1,10 @@
 //! Messages written by other programs: they decode to their content and encode to the same bytes.
 
 use glam::{DAffine3, DVec3};
-use insonify::igtl::image::Scalar;
 use insonify::igtl::message::{Content, ExtendedHeader, HEADER, Header, Message};
 use insonify::igtl::wire::DecodeError;
 use insonify::scene::tracker::Axes;
+use insonify::volume::Scalar;
 use serde_json::Value;
 
 use crate::shared_data::shared_data;

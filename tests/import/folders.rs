@@ -23,7 +23,9 @@ fn a_folder_of_meshes_becomes_a_scene() {
     let ball = |radius| shapes::sphere(radius, 3);
     // In RAS: the liver is on the patient's right, which is +x there.
     write("Liver.obj", obj(&ball(50.0), DVec3::new(40.0, 10.0, 0.0)));
-    write("portal_vein.obj", obj(&ball(9.0), DVec3::new(40.0, 10.0, 30.0)));
+    // A file that states its frame is turned once, whatever --frame says.
+    let vein = obj(&ball(9.0), DVec3::new(40.0, 10.0, 30.0));
+    write("portal_vein.obj", format!("# 3D Slicer output. SPACE=RAS\n{vein}"));
     // A clot in the vein: by its name below vessels, by where it is above.
     write("clot.obj", obj(&ball(4.0), DVec3::new(40.0, 10.0, 32.0)));
     write("rib_right_7.obj", obj(&ball(7.0), DVec3::new(40.0, 75.0, 0.0)));
@@ -38,10 +40,12 @@ fn a_folder_of_meshes_becomes_a_scene() {
     let ranks =
         ["skin", "Liver", "portal_vein", "clot", "rib_right_7"].map(|n| priority(&scene, n));
     assert!(ranks.is_sorted() && ranks[3] < ranks[4], "{ranks:?}");
-    let liver = scene.instances.iter().find(|i| i.name == "Liver").expect("a liver");
-    let mesh = &scene.meshes[liver.mesh];
-    let left = mesh.positions.iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
-    assert!((left + 90.0).abs() < 0.1, "{left}");
+    for (name, expected) in [("Liver", -90.0), ("portal_vein", -49.0)] {
+        let organ = scene.instances.iter().find(|i| i.name == name).expect("an organ");
+        let mesh = &scene.meshes[organ.mesh];
+        let left = mesh.positions.iter().map(|p| p[0]).fold(f32::INFINITY, f32::min);
+        assert!((left - expected).abs() < 0.1, "{name}: {left}");
+    }
     // The skin is made up 15 mm around all of it.
     let skin = scene.instances.iter().find(|i| i.name == "skin").expect("a skin");
     let front =

@@ -1,4 +1,4 @@
-//! What PLUS writes: device sets of its simulator, sequences of trackers.
+//! Files of PLUS: device sets of its simulator, sequences of trackers.
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -139,7 +139,7 @@ fn a_device_set_of_plus_shows_its_surfaces_where_the_image_plane_cuts_them() {
         npy[start..].as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
     let (lines, samples) = (128, 1000);
     assert_eq!(words.len(), 2 * lines * samples);
-    // Where PLUS's scanlines are: vtkPlusUsScanConvertLinear lays them out in pixels from the middle of the face.
+    // Positions of PLUS's scanlines: vtkPlusUsScanConvertLinear lays them out in pixels from the middle of the face.
     let m = world_from_image();
     let [across, along] = [m.matrix3.x_axis.length(), m.matrix3.y_axis.length()];
     let depth = 60.0 / 0.087 * along;

@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
-use insonify::output;
+use insonify::issue::FileError;
 use insonify::register::landmarks::Landmark;
+use insonify::register::points;
 use insonify::register::surface::{Triangle, TriangleSurface, samples};
-use insonify::register::{RegisterError, points};
 use insonify::scene::graph::{Placed, is_even};
 use insonify::scene::{Acquired, Mesh, Scene, mesh};
 use insonify::settings::suggest;
@@ -14,11 +14,12 @@ use insonify::volume::Frame;
 use miette::{Report, Result, miette};
 
 use super::Register;
+use crate::cli::common::notes;
 
 /// Points of the surface in the volume, LPS in mm; none where there are only landmarks.
 pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     if let Some(file) = &args.points {
-        let points = points::load(file, args.frame())?;
+        let points = points::load(file, args.frame)?;
         return Ok(Some(points.into_iter().map(|p| p.position).collect()));
     }
     let Some(file) = &args.volume_surface else {
@@ -26,7 +27,7 @@ pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     };
     let mesh = mesh_file(file)?;
     let said = points::frame_of_mesh(file)?;
-    let frame = points::agreed(file, said, args.frame())?;
+    let frame = points::agreed(file, said, args.frame)?;
     // A file that states its frame was read into LPS.
     let read = if said == Frame::Unstated { frame } else { Frame::Lps };
     let signs = read.lps_signs();
@@ -41,10 +42,10 @@ pub fn landmarks(
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Landmark>> {
     let mut out = match (&args.landmarks, &args.model_landmarks, &args.volume_landmarks) {
-        (Some(file), ..) => points::load_landmarks(file, args.frame())?,
+        (Some(file), ..) => points::load_landmarks(file, args.frame)?,
         (None, Some(model), Some(volume)) => {
             let (of_model, of_volume) =
-                (points::load(model, None)?, points::load(volume, args.frame())?);
+                (points::load(model, None)?, points::load(volume, args.frame)?);
             let (pairs, single) = points::pair((model, &of_model), (volume, &of_volume))?;
             warnings.extend(single.iter().map(|name| {
                 format!("landmark `{name}` is in one of the two files only, and does not count")
@@ -169,11 +170,9 @@ fn mesh_file(path: &Path) -> Result<Mesh> {
     let (mesh, issues) = mesh::load(path, &mesh::Options::default()).map_err(|issues| {
         let first = issues.into_iter().find(insonify::scene::Issue::is_error);
         let (message, remedy) = first.map_or_else(Default::default, |i| (i.message, i.remedy));
-        Report::from(RegisterError { file: Some(path.to_owned()), line: 0, cause: message, remedy })
+        Report::from(FileError::file(path, message, remedy))
     })?;
-    for issue in issues {
-        output::note(issue);
-    }
+    notes(issues);
     Ok(mesh)
 }
 

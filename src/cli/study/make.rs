@@ -78,9 +78,7 @@ fn load(plan: &Plan, common: &Common) -> Result<Vec<Loaded>> {
     let mut loaded = Vec::new();
     for (i, scenario) in plan.scenarios.iter().enumerate() {
         let (scene, variants, warnings) = Scene::load_variants(&scenario.scene, &common.overrides)?;
-        for warning in &warnings {
-            output::note(warning);
-        }
+        common::notes(&warnings);
         check_backgrounds(plan, i, &scene)?;
         loaded.push(Loaded { scene, variants });
     }

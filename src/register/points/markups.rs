@@ -7,7 +7,7 @@ use serde::Deserialize;
 use serde_json::Value;
 
 use super::{FARTHEST, MAX_POINTS, Point, agreed, far, frame_named, too_many, unknown_frame};
-use crate::register::RegisterError;
+use crate::issue::FileError;
 use crate::volume::Frame;
 
 /// The part of a markups file with the points (schema 1.0 of 3D Slicer).
@@ -40,10 +40,10 @@ pub(super) fn read(
     path: &Path,
     text: &str,
     stated: Option<Frame>,
-) -> Result<Vec<Point>, RegisterError> {
+) -> Result<Vec<Point>, FileError> {
     let file: Markups = serde_json::from_str(text).map_err(|e| {
         let remedy = "save the markups of 3D Slicer as .mrk.json or .fcsv";
-        RegisterError::line(path, e.line() as u64, format!("is no markups file: {e}"), remedy)
+        FileError::line(path, e.line(), format!("is no markups file: {e}"), remedy)
     })?;
     let mut out = Vec::new();
     for markup in file.markups {
@@ -53,7 +53,7 @@ pub(super) fn read(
         let units = markup.coordinate_units.unwrap_or_else(|| "mm".into());
         let all = units.as_array().map_or(std::slice::from_ref(&units), Vec::as_slice);
         if let Some(other) = all.iter().find(|u| *u != "mm") {
-            return Err(RegisterError::file(
+            return Err(FileError::file(
                 path,
                 format!("has positions in {other}"),
                 "save them in mm",
@@ -65,7 +65,7 @@ pub(super) fn read(
                 continue;
             }
             let Ok(position) = <[f64; 3]>::try_from(point.position) else {
-                return Err(RegisterError::file(
+                return Err(FileError::file(
                     path,
                     format!("the position of `{}` is not three numbers", point.label),
                     "place it again, or take it out",

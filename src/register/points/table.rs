@@ -6,13 +6,13 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 use glam::DVec3;
 
 use super::{FARTHEST, MAX_POINTS, far, frame_named, too_many, unknown_frame};
-use crate::register::RegisterError;
+use crate::issue::FileError;
 use crate::settings::suggest;
 use crate::volume::Frame;
 
 /// A row that is not empty.
 pub(super) struct Row {
-    pub line: u64,
+    pub line: usize,
     pub cells: StringRecord,
 }
 
@@ -27,8 +27,7 @@ pub(super) struct Table<'p> {
 }
 
 impl<'p> Table<'p> {
-    pub fn read(path: &'p Path, text: &str) -> Result<Self, RegisterError> {
-        let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    pub fn read(path: &'p Path, text: &str) -> Result<Self, FileError> {
         let (mut frame, mut columns) = (Frame::Unstated, None);
         // The header of a .fcsv is comments.
         let comments = (1..).zip(text.lines()).filter(|(_, l)| l.starts_with('#'));
@@ -48,9 +47,9 @@ impl<'p> Table<'p> {
         let mut rows = Vec::new();
         for record in reader.from_reader(text.as_bytes()).into_records() {
             let cells = record.map_err(|e| {
-                RegisterError::file(path, format!("is no table: {e}"), "save it as CSV")
+                FileError::file(path, format!("is no table: {e}"), "save it as CSV")
             })?;
-            let line = cells.position().map_or(0, csv::Position::line);
+            let line = cells.position().map_or(0, |p| p.line() as usize);
             if rows.len() > MAX_POINTS {
                 return Err(too_many(path, line));
             }
@@ -69,7 +68,7 @@ impl<'p> Table<'p> {
             (None, None) => Vec::new(),
         };
         if rows.is_empty() {
-            return Err(RegisterError::file(
+            return Err(FileError::file(
                 path,
                 "holds no points",
                 "give a line x,y,z for each, in mm",
@@ -87,12 +86,12 @@ impl<'p> Table<'p> {
     }
 
     /// An error: one of these columns is missing.
-    pub fn lacks(&self, wanted: &[&str]) -> RegisterError {
+    pub fn lacks(&self, wanted: &[&str]) -> FileError {
         let missing = wanted.iter().find(|n| self.column(n).is_none());
         let missing = missing.expect("one is missing");
         let near = suggest::nearest(missing, self.columns.iter().map(String::as_str));
         let near = near.map_or_else(String::new, |n| format!("; `{n}` is not it"));
-        RegisterError::line(
+        FileError::line(
             self.path,
             1,
             format!("has no column `{missing}`{near}"),
@@ -101,13 +100,13 @@ impl<'p> Table<'p> {
     }
 
     /// The vector in these columns, which must exist.
-    pub fn vector(&self, row: &Row, names: &[String; 3]) -> Result<DVec3, RegisterError> {
+    pub fn vector(&self, row: &Row, names: &[String; 3]) -> Result<DVec3, FileError> {
         let mut out = DVec3::ZERO;
         for (axis, name) in names.iter().enumerate() {
             let column = self.column(name).expect("the table has it");
             let fail = |cause: String| {
                 let remedy = format!("write `{name}` as a number of mm, like 1.5");
-                RegisterError::line(self.path, row.line, cause, remedy)
+                FileError::line(self.path, row.line, cause, remedy)
             };
             let cell = row.cells.get(column);
             let cell = cell.ok_or_else(|| fail(format!("the row ends before column `{name}`")))?;

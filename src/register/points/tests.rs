@@ -7,7 +7,7 @@ fn file(name: &str, text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     (folder, path)
 }
 
-fn read(name: &str, text: &str, stated: Option<Frame>) -> Result<Vec<Point>, RegisterError> {
+fn read(name: &str, text: &str, stated: Option<Frame>) -> Result<Vec<Point>, FileError> {
     load(&file(name, text).1, stated)
 }
 

@@ -7,6 +7,7 @@ use std::sync::Arc;
 use miette::{Diagnostic, NamedSource, SourceSpan};
 use thiserror::Error;
 
+use crate::issue::FileError;
 use crate::settings::suggest;
 
 /// A mistake in a scene file or in what it names. Nothing is loaded.
@@ -71,6 +72,12 @@ impl SceneError {
             0 => format!("{}: ", self.file.display()),
             line => format!("{}:{line}:{}: ", self.file.display(), self.column),
         }
+    }
+}
+
+impl From<FileError> for SceneError {
+    fn from(error: FileError) -> Self {
+        Self::file(&error.file, error.message, &error.remedy)
     }
 }
 

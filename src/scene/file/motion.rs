@@ -68,7 +68,7 @@ group! {
 group! {
     /// Motion of a transform.
     pub struct MotionKeys in "transform.motion" {
-        /// What it is.
+        /// Kind of the motion.
         kind: Kind = Kind::Sine, Facts::word::<Kind>().required();
         /// Time of one oscillation or turn. Sine and orbit.
         period: Option<f64> = None, PERIOD.by_default("required");
@@ -185,9 +185,8 @@ pub(super) fn motion(
                 Between::Step => Curve::Step,
             };
             let at = format!("{path}.file");
-            let text = trajectory::text(&full).map_err(|cause| {
-                let message = format!("{}: {cause}", full.display());
-                document.fail(&at, message, "check the path of the trajectory")
+            let text = trajectory::text(&full).map_err(|e| {
+                document.fail(&at, e.to_string(), "check the path of the trajectory")
             })?;
             let track = trajectory::parse(&full, &text, curve)?;
             let (start, end) = track.span().expect("a trajectory has rows");

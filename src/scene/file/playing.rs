@@ -18,7 +18,7 @@ use crate::settings::{Value, group};
 group! {
     /// Strategy and interpolation for shapes that change.
     pub struct Following in "" {
-        /// How the device follows.
+        /// Way in which the device follows the shapes.
         strategy: Strategy = Strategy::Exchange, Facts::word::<Strategy>();
         /// Shapes between keyframes: on straight lines, or smoothly. With `interpolate` only.
         interpolation: Interpolation = Interpolation::Linear, Facts::word::<Interpolation>();

@@ -29,7 +29,7 @@ group! {
     pub struct MeshKeys in "mesh" {
         /// Tissue that it encloses: one of `[tissues]` or a shipped one.
         tissue: String = String::new(), Facts::of(Form::Text).required();
-        /// Who wins where meshes overlap: the highest.
+        /// Priority where meshes overlap: the highest wins.
         priority: i32 = 0, Facts::of(Form::Integer).limits("32 bits, signed");
         /// A mesh file of one of the formats below; the path is relative to the scene file.
         file: Option<String> = None, Facts::of(Form::Text);

@@ -11,12 +11,14 @@ use super::error::SceneError;
 use super::placing::{Placed, placement};
 use super::probe::{self, look, pose};
 use super::table::{Key, Keys, Table, defaults};
-use super::trajectory;
+use crate::issue;
 use crate::scene::Scene;
 use crate::settings::{Facts, Form, Surroundings, Value, Words, group};
 
 /// Most cases of a study; the paper has 27, for which an assessor needs a day.
 const MAX_CASES: usize = 999;
+/// Largest plan, bytes.
+const MAX_PLAN: u64 = 16 << 20;
 /// Longest text that is shown, bytes.
 const MAX_WORDS: usize = 4000;
 /// Default height of an image, pixels; the paper's 621 images take about 50 MB.
@@ -153,7 +155,7 @@ group! {
     pub struct SliceKeys in "scenario.slice" {
         /// Name in key and tables.
         name: String = String::new(), Facts::of(Form::Text).required();
-        /// What the assessor reads where its images are ranked.
+        /// Title for the assessor where its images are ranked.
         title: String = String::new(), Facts::of(Form::Text);
     }
 }
@@ -173,9 +175,7 @@ impl Plan {
     /// # Errors
     /// The first mistake, with file, line, column and remedy.
     pub fn load(path: &Path) -> Result<Self, SceneError> {
-        let text = trajectory::text(path)
-            .map_err(|cause| SceneError::file(path, cause, "check the path of the plan"))?;
-        let source = Source::of(path, text);
+        let source = Source::of(path, issue::read_text(path, MAX_PLAN, "leave out slices")?);
         let document = source.document()?;
         let table: PlanTable = document.parse_as()?;
         let check = Check { source: &source };

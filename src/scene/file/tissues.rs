@@ -20,7 +20,7 @@ group! {
         /// Only checked: a stated value that contradicts the product is an error.
         impedance: Option<f64> = None,
             Facts::of(Form::Quantity(&IMPEDANCE)).by_default("density times speed").limits("within 2 % of it");
-        /// Where the numbers come from.
+        /// Origin of the numbers.
         source: Option<String> = None, Facts::of(Form::Text).by_default("base, marked as changed");
     }
 }

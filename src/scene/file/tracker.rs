@@ -21,7 +21,7 @@ group! {
             Facts::of(Form::Text).by_default("every tool").limits("not empty, at most 20 bytes");
         /// Silence after which the tracker counts as lost. The probe stays where it was.
         timeout: f64 = 0.5, Facts::quantity(&DURATION, 0.01, 3600.0);
-        /// What x and y of the world are: left and back of the patient, as in the volumes of scenes, or right and
+        /// Directions of x and y of the world: left and back of the patient, as in the volumes of scenes, or right and
         /// front. What is sent is RAS.
         axes: Axes = Axes::Lps, Facts::word::<Axes>();
     }

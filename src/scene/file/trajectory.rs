@@ -9,6 +9,7 @@ use toml::Spanned;
 
 use super::error::SceneError;
 use super::motion::SQUEEZE;
+use crate::issue::{self, FileError};
 use crate::scene::animation::{Channel, Curve, Track, TrackError};
 use crate::settings::suggest;
 
@@ -36,17 +37,9 @@ struct Table<'t> {
     columns: BTreeMap<&'static str, Column>,
 }
 
-/// Text of the file at `path`, or the reason why it cannot be read.
-pub(super) fn text(path: &Path) -> Result<String, String> {
-    let info = std::fs::metadata(path).map_err(|e| format!("cannot be read: {e}"))?;
-    if !info.is_file() {
-        return Err("is not a regular file".to_owned());
-    }
-    if info.len() > MAX_TEXT {
-        let (size, most) = (info.len() >> 20, MAX_TEXT >> 20);
-        return Err(format!("is {size} MB, the limit is {most} MB"));
-    }
-    std::fs::read_to_string(path).map_err(|e| format!("cannot be read: {e}"))
+/// Text of the file at `path`.
+pub(super) fn text(path: &Path) -> Result<String, FileError> {
+    issue::read_text(path, MAX_TEXT, "sample it more coarsely")
 }
 
 /// The samples of the probe's trajectory in the file at `path`, linear between them: TOML by its extension, else
@@ -55,8 +48,7 @@ pub(super) fn text(path: &Path) -> Result<String, String> {
 /// # Errors
 /// A file that cannot be read, or the first mistake with its place in it.
 pub fn load_trajectory(path: &Path) -> Result<Track, SceneError> {
-    let text = text(path)
-        .map_err(|cause| SceneError::file(path, cause, "check the path of the trajectory"))?;
+    let text = text(path)?;
     let track = parse(path, &text, Curve::Linear)?;
     match track.scale {
         None => Ok(track),
@@ -122,9 +114,8 @@ fn of_csv<'t>(path: &'t Path, text: &'t str) -> Result<Table<'t>, SceneError> {
             })
             .collect::<Vec<_>>()
     };
-    let body = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines =
-        body.lines().filter(|l| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
+        text.lines().filter(|l| !l.trim().is_empty() && !l.trim_start().starts_with('#'));
     let header = lines.next().map(cells).ok_or_else(|| {
         let remedy = format!("begin with a header line of {}", NAMES.join(","));
         fail(path, text, 0..0, "the trajectory is empty", remedy)

@@ -3,8 +3,7 @@
 
 use std::path::Path;
 
-use super::scalar::whole;
-use super::{EXPORT_AGAIN, Faces, Fault, REDUCE, index, surface};
+use super::{EXPORT_AGAIN, Faces, Fault, REDUCE, index, surface, whole};
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 

@@ -3,8 +3,8 @@
 
 use std::path::Path;
 
-use super::scalar::whole;
-use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, Scalar, Words, index, surface};
+use super::words::shown;
+use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, Scalar, Words, index, surface, whole};
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 
@@ -38,7 +38,7 @@ impl Element {
     }
 }
 
-/// What follows the header.
+/// The content after the header.
 enum Body<'b> {
     Text(Words<'b>),
     Binary { words: Words<'b>, big: bool },
@@ -143,8 +143,7 @@ fn header(bytes: &[u8]) -> Result<(Vec<Element>, Body<'_>), Fault> {
         let line = lines.next().ok_or_else(|| Fault::cut("the header"))?;
         let words: Vec<_> = line.split(u8::is_ascii_whitespace).filter(|w| !w.is_empty()).collect();
         let wrong = |cause: &str| {
-            let shown: String = String::from_utf8_lossy(line).chars().take(60).collect();
-            Err(Fault::new(format!("`{shown}`: {cause}"), EXPORT_AGAIN).at(lines.number))
+            Err(Fault::new(format!("`{}`: {cause}", shown(line)), EXPORT_AGAIN).at(lines.number))
         };
         match words[..] {
             [] | [b"comment" | b"obj_info", ..] => {}

@@ -1,4 +1,4 @@
-//! STL, binary and text, with all solids of a text. Normals are not read: the order of the corners says them.
+//! STL, binary and text, with all solids of a text. Normals are not read: they follow from the order of the corners.
 //!
 //! Text is read as other programs read it: upper or lower case, any white space, names of any bytes or none, any
 //! words for a normal.
@@ -26,12 +26,8 @@ pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Iss
 /// and has no zero among its first bytes.
 fn is_text(bytes: &[u8]) -> bool {
     let exact = declared(bytes).is_some_and(|n| bytes.len() == HEADER + n * RECORD);
-    !exact && begins_with_solid(bytes) && !bytes.iter().take(BEGINNING).any(|&b| b == 0)
-}
-
-fn begins_with_solid(bytes: &[u8]) -> bool {
-    let word = bytes.trim_ascii_start().get(..5);
-    word.is_some_and(|word| word.eq_ignore_ascii_case(b"solid"))
+    let solid = bytes.trim_ascii_start().get(..5).is_some_and(|w| w.eq_ignore_ascii_case(b"solid"));
+    !exact && solid && !bytes.iter().take(BEGINNING).any(|&b| b == 0)
 }
 
 fn declared(bytes: &[u8]) -> Option<usize> {

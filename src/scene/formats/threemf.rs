@@ -9,6 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 use quick_xml::events::{BytesStart, Event};
 use zip::ZipArchive;
 
+use super::words::shown;
 use super::xml::{self, attribute, number};
 use super::{COPY_AGAIN, EXPORT_AGAIN, Fault, no_vertex};
 use crate::issue::Issue;
@@ -18,7 +19,7 @@ use crate::scene::mesh::{MAX_ELEMENTS, MAX_FILE, Parts, Soup, Units};
 const MAX_FILES: usize = 10_000;
 /// Most objects that components place, one in another.
 const MAX_PLACED: u64 = 100_000;
-/// Where the model is, unless the archive says otherwise.
+/// Path of the model in the archive, unless the archive names another.
 const MODEL: &str = "3D/3dmodel.model";
 
 pub(in crate::scene) fn read(path: &Path, bytes: &[u8]) -> Result<Parts, Vec<Issue>> {
@@ -44,14 +45,14 @@ struct Component {
 #[derive(Default)]
 struct Object {
     name: String,
-    /// True where it only supports others.
+    /// True for a support structure.
     support: bool,
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     components: Vec<Component>,
 }
 
-/// What the models of a package hold.
+/// The objects of all models of a package.
 struct Models {
     /// Objects, each after those that it consists of.
     objects: Vec<Object>,
@@ -289,8 +290,7 @@ fn unit(model: &BytesStart<'_>) -> Result<f64, Fault> {
         "foot" => 304.8,
         "meter" => 1000.0,
         other => {
-            let other: String = other.chars().take(40).collect();
-            return Err(Fault::new(format!("`{other}` is no unit of 3MF"), EXPORT_AGAIN));
+            return Err(Fault::new(format!("`{}` is no unit of 3MF", shown(other)), EXPORT_AGAIN));
         }
     })
 }
@@ -301,8 +301,7 @@ fn transform(text: &str) -> Result<DAffine3, Fault> {
     let values = values.ok().filter(|v| v.iter().all(|v| v.is_finite()));
     let rows: Option<[f64; 12]> = values.and_then(|v| v.try_into().ok());
     let m = rows.ok_or_else(|| {
-        let text: String = text.chars().take(80).collect();
-        Fault::new(format!("`{text}` is no transform of 12 numbers"), EXPORT_AGAIN)
+        Fault::new(format!("`{}` is no transform of 12 numbers", shown(text)), EXPORT_AGAIN)
     })?;
     let row = |i: usize| DVec3::new(m[i], m[i + 1], m[i + 2]);
     let matrix = DMat3::from_cols(row(0), row(3), row(6));

@@ -4,8 +4,10 @@
 
 use std::path::Path;
 
-use super::scalar::whole;
-use super::{COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, MAX_VALUES, Scalar, Words, index, surface};
+use super::words::shown;
+use super::{
+    COPY_AGAIN, EXPORT_AGAIN, Faces, Fault, MAX_VALUES, Scalar, Words, index, surface, whole,
+};
 use crate::issue::Issue;
 use crate::scene::mesh::{MAX_ELEMENTS, Parts, Soup};
 
@@ -50,8 +52,8 @@ fn parse(bytes: &[u8]) -> Result<(Soup, Faces), Fault> {
             b"DATASET" => {
                 let kind = file.words.line_left();
                 if !kind.eq_ignore_ascii_case(b"POLYDATA") {
-                    let kind: String = String::from_utf8_lossy(kind).chars().take(40).collect();
-                    let cause = format!("holds a dataset `{kind}`, and only POLYDATA is read");
+                    let cause =
+                        format!("holds a dataset `{}`, and only POLYDATA is read", shown(kind));
                     return Err(Fault::new(cause, SURFACE).at(line));
                 }
             }
@@ -69,16 +71,11 @@ fn parse(bytes: &[u8]) -> Result<(Soup, Faces), Fault> {
             b"TRIANGLE_STRIPS" => file.cells(Some(Cells::Strips), &mut faces)?,
             b"VERTICES" | b"LINES" => file.cells(None, &mut faces)?,
             b"FIELD" => file.field()?,
-            b"METADATA" => {
-                // The rest of its own line, then lines up to an empty one.
-                file.words.line_left();
-                while !file.words.line_left().is_empty() {}
-            }
-            // What follows says something of points and cells that are known.
+            b"METADATA" => file.metadata(),
+            // The rest are attributes of points and cells that have been read.
             b"POINT_DATA" | b"CELL_DATA" => break,
             other => {
-                let shown: String = String::from_utf8_lossy(other).chars().take(40).collect();
-                let cause = format!("`{shown}` is no part of polydata");
+                let cause = format!("`{}` is no part of polydata", shown(other));
                 return Err(Fault::new(cause, COPY_AGAIN).at(line));
             }
         }
@@ -100,8 +97,8 @@ impl File<'_> {
         let word = self.words.next().ok_or_else(|| Fault::cut("the type of values"))?;
         let line = self.words.line();
         let kind = scalar(word).ok_or_else(|| {
-            let shown: String = String::from_utf8_lossy(word).chars().take(40).collect();
-            Fault::new(format!("`{shown}` is no type of VTK that can be read"), EXPORT_AGAIN)
+            let cause = format!("`{}` is no type of VTK that can be read", shown(word));
+            Fault::new(cause, EXPORT_AGAIN)
         });
         self.data_begin();
         kind.map_err(|fault| fault.at(line))
@@ -158,6 +155,12 @@ impl File<'_> {
         offset_cells(cells, &offsets, &corners, faces)
     }
 
+    /// Skips the rest of a line, then lines up to an empty one.
+    fn metadata(&mut self) {
+        self.words.line_left();
+        while !self.words.line_left().is_empty() {}
+    }
+
     /// Skips arrays that belong to the whole file.
     fn field(&mut self) -> Result<(), Fault> {
         let what = "the field data";
@@ -194,8 +197,7 @@ impl File<'_> {
                 }
             }
             if self.words.peek() == Some(b"METADATA") {
-                self.words.line_left();
-                while !self.words.line_left().is_empty() {}
+                self.metadata();
             }
         }
         Ok(())

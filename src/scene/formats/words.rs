@@ -23,7 +23,7 @@ impl<'b> Words<'b> {
         self.line
     }
 
-    /// What has not been read.
+    /// The bytes not yet read.
     pub fn rest(&self) -> &'b [u8] {
         &self.bytes[self.at..]
     }
@@ -51,7 +51,7 @@ impl<'b> Words<'b> {
         self.clone().next()
     }
 
-    /// What is left of the line, without space around it; its end (line feed, carriage return or both) is skipped.
+    /// The rest of the line, without space around it; its end (line feed, carriage return or both) is skipped.
     pub fn line_left(&mut self) -> &'b [u8] {
         let rest = self.rest();
         let len = rest.iter().position(|b| b"\r\n".contains(b)).unwrap_or(rest.len());
@@ -82,6 +82,10 @@ impl<'b> Words<'b> {
 
 /// The fault of a word that is no number.
 pub(super) fn no_number(word: &[u8], what: &str) -> Fault {
-    let shown: String = String::from_utf8_lossy(word).chars().take(40).collect();
-    Fault::new(format!("`{shown}` is no number that fits: {what}"), EXPORT_AGAIN)
+    Fault::new(format!("`{}` is no number that fits: {what}", shown(word)), EXPORT_AGAIN)
+}
+
+/// The beginning of a text, for a message.
+pub(super) fn shown(text: impl AsRef<[u8]>) -> String {
+    String::from_utf8_lossy(text.as_ref()).chars().take(60).collect()
 }

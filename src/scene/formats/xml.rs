@@ -14,7 +14,7 @@ pub(super) fn reader(bytes: &[u8]) -> Reader<&[u8]> {
     Reader::from_reader(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
 }
 
-/// The fault of XML that is none.
+/// The fault of a file that is no valid XML.
 pub(super) fn malformed(error: impl std::fmt::Display) -> Fault {
     Fault::new(format!("is not valid XML: {error}"), EXPORT_AGAIN)
 }

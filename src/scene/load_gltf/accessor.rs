@@ -157,7 +157,7 @@ fn unsigned(bytes: &[u8]) -> u32 {
 }
 
 /// One component; normalised integers by the equations of glTF 2.0, 3.11.
-fn number(kind: DataType, normalized: bool, bytes: &[u8]) -> f64 {
+pub(super) fn number(kind: DataType, normalized: bool, bytes: &[u8]) -> f64 {
     let raw = unsigned(bytes);
     let (value, most) = match kind {
         DataType::F32 => return f64::from(f32::from_bits(raw)),

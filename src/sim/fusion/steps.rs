@@ -31,7 +31,7 @@ impl Simulator {
         else {
             return Ok(Vec::new());
         };
-        let mut dumped = vec![("acquired", fused.texture.read(&self.device, acquired.now)?)];
+        let mut dumped = vec![("acquired", fused.texture.read(acquired.now)?)];
         if fused.banded {
             let pixels = self.sizes().pixels() as usize;
             let change = self.device.read_back(fused.pyramid.change())?;

@@ -88,13 +88,9 @@ impl VolumeTexture {
     }
 
     /// The texels of one time as a kernel fetches them, floats.
-    pub(in crate::sim) fn read(
-        &self,
-        device: &Arc<Device>,
-        time: usize,
-    ) -> Result<Vec<u8>, GpuError> {
+    pub(in crate::sim) fn read(&self, time: usize) -> Result<Vec<u8>, GpuError> {
         let image = &self.images[time];
-        let bytes = device.read_back_image(image)?;
+        let bytes = image.read_back()?;
         let floats: Vec<f32> = match image.format() {
             ImageFormat::R8Unorm => bytes.iter().map(|&b| f32::from(b) / 255.0).collect(),
             ImageFormat::R16Unorm => {

@@ -32,7 +32,7 @@ pub(in crate::study) fn file(key: &Key, content: &Value) -> Value {
     })
 }
 
-fn read(file: &Value) -> Result<Answers, StudyError> {
+fn read(file: &Value) -> Result<Answers, FileError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("answers.json");
     std::fs::write(&path, serde_json::to_string_pretty(file).expect("JSON")).expect("written");

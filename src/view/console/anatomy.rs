@@ -5,6 +5,7 @@ use egui::{ComboBox, Ui};
 use super::controls::group;
 use crate::settings::{Group, Tissue};
 use crate::view::model::{Placed, Settings};
+use crate::view::style::button;
 
 /// A list to choose one name from; the last choice may be gone with another scene.
 fn pick<'n>(ui: &mut Ui, id: &str, names: impl Iterator<Item = &'n str>, chosen: &mut usize) {
@@ -24,7 +25,7 @@ pub(super) fn tissues(ui: &mut Ui, settings: &mut Settings, loaded: &Settings, c
     ui.horizontal(|ui| {
         pick(ui, "tissue", settings.tissues.iter().map(|t| t.name.as_str()), chosen);
         if let Some(original) = loaded.tissues.get(*chosen)
-            && ui.button("Reset").on_hover_text("As in the scene file").clicked()
+            && button(ui, "Reset", "As in the scene file")
         {
             settings.tissues[*chosen].clone_from(original);
         }
@@ -48,7 +49,7 @@ pub(super) fn surfaces(
     ui.horizontal(|ui| {
         pick(ui, "mesh", meshes.iter().map(|m| m.name.as_str()), chosen);
         if let Some(original) = loaded.surfaces.get(*chosen)
-            && ui.button("Reset").on_hover_text("As in the scene file").clicked()
+            && button(ui, "Reset", "As in the scene file")
         {
             settings.surfaces[*chosen] = *original;
         }

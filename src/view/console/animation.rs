@@ -8,6 +8,7 @@ use super::controls::words;
 use crate::scene::Strategy;
 use crate::sim::Tracer;
 use crate::view::model::{Model, Placed};
+use crate::view::style::button;
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
     if !model.animated {
@@ -16,7 +17,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
     }
     ui.horizontal(|ui| {
         let word = if model.clock.is_playing() { "Pause" } else { "Play" };
-        if ui.button(word).on_hover_text("Let the scene's time pass (P)").clicked() {
+        if button(ui, word, "Let the scene's time pass (P)") {
             model.clock.play(!model.clock.is_playing(), now);
             model.touch(now);
         }
@@ -56,7 +57,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, now: Instant) {
                     s => shares || !s.needs_shared_topology(),
                 };
                 words(ui, &format!("strategy {index}"), strategy, possible)
-                    .on_hover_text("How the device follows");
+                    .on_hover_text("Way in which the device follows the shapes");
                 let names: Vec<_> = meshes().map(|mesh| mesh.name.as_str()).collect();
                 ui.add(Label::new(names.join(", ")).truncate());
             });

@@ -5,6 +5,7 @@ use egui::{Slider, SliderClamping, Ui};
 use super::controls::{explained, group_with};
 use crate::settings::{Group, Imaging};
 use crate::view::model::Settings;
+use crate::view::style::button;
 
 pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
     let depth = settings.probe.depth;
@@ -25,7 +26,7 @@ pub(super) fn show(ui: &mut Ui, settings: &mut Settings) {
             *level = level.clamp(facts.range[0], facts.range[1]);
             ui.end_row();
         }
-        if ui.button("Level").on_hover_text("All eight sliders to 0 dB").clicked() {
+        if button(ui, "Level", "All eight sliders to 0 dB") {
             imaging.tgc_sliders = [0.0; 8];
         }
         ui.end_row();

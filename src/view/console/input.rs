@@ -10,7 +10,7 @@ use crate::view::inputs::Inputs;
 use crate::view::link::Report;
 use crate::view::model::{Model, Source, age};
 use crate::view::pads::Word;
-use crate::view::style;
+use crate::view::style::{self, button};
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs, now: Instant) {
     let holder = model.devices.holder();
@@ -136,8 +136,7 @@ fn way(ui: &mut Ui, model: &mut Model, now: Instant) {
     ui.horizontal(|ui| {
         let is_recording = model.trajectory.recorder.is_some();
         let word = if is_recording { "Stop recording" } else { "Record" };
-        let tip = "Record where the probe goes, whatever moves it (R)";
-        if ui.button(word).on_hover_text(tip).clicked() {
+        if button(ui, word, "Record where the probe goes, whatever moves it (R)") {
             model.record(now);
         }
         if is_recording {
@@ -170,11 +169,11 @@ fn file(ui: &mut Ui, model: &mut Model, inputs: &mut Inputs) {
         let unsaved = model.trajectory.stored.as_ref().is_some_and(|k| k.unsaved.is_some());
         let replaces = std::path::Path::new(&inputs.path).exists();
         let word = if replaces && unsaved { "Replace" } else { "Save" };
-        let button = ui.add_enabled(unsaved, egui::Button::new(word));
-        if button.on_hover_text("Write what was recorded").clicked() {
+        let save = ui.add_enabled(unsaved, egui::Button::new(word));
+        if save.on_hover_text("Write what was recorded").clicked() {
             inputs.save(&mut model.trajectory);
         }
-        if ui.button("Load").on_hover_text("Read a trajectory").clicked() {
+        if button(ui, "Load", "Read a trajectory") {
             inputs.load(&mut model.trajectory);
         }
     });

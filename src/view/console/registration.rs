@@ -8,6 +8,7 @@ use crate::scene::file::SCALES;
 use crate::settings::{Display, Group};
 use crate::view::model::Model;
 use crate::view::model::registration::Moves;
+use crate::view::style::button;
 
 pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
     let Some(registration) = &mut model.registration else {
@@ -30,8 +31,7 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, planes: &mut bool) {
     if changed != place {
         registration.put(&mut model.settings, changed);
     }
-    let tip = "Volume and model where the scene file has them";
-    if ui.button("Place as in the file").on_hover_text(tip).clicked() {
+    if button(ui, "Place as in the file", "Volume and model where the scene file has them") {
         let (settings, loaded) = (&mut model.settings, &model.loaded);
         settings.model = loaded.model;
         if let (Some(volume), Some(as_loaded)) = (&mut settings.volume, &loaded.volume) {

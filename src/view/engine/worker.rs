@@ -2,11 +2,12 @@
 
 mod pictures;
 
+use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::{Arc, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use glam::DAffine3;
+use parking_lot::MutexGuard;
 
 use super::{Job, News, Shared, State, VIEW3D_PUT_OFF, WINDOW_PATIENCE, Wake};
 use crate::gpu::{Device, GpuError};
@@ -75,7 +76,7 @@ impl Worker {
         Self {
             shared,
             ring: Ring::new(device, "B-mode"),
-            broadcast: Broadcast::new(link, device),
+            broadcast: Broadcast::new(link),
             pictures: Ring::new(device, "view3d"),
             device: device.clone(),
             library,
@@ -149,7 +150,7 @@ impl Worker {
     /// Pictures the anatomy; returns whether there will be more. A picture begun because something moves is finished,
     /// or there would be no picture at all.
     fn look(&mut self, simulator: &mut Option<(Simulator, Tracer)>, moving: bool) -> bool {
-        self.shared.lock().looks_new = false;
+        self.shared.state.lock().looks_new = false;
         let Some((simulator, _)) = simulator else {
             return true;
         };
@@ -160,7 +161,7 @@ impl Worker {
         match pictured {
             // It is still to be made, after the newer job.
             Some(Err(SimError::Gpu(GpuError::Abandoned))) => {
-                let mut state = self.shared.lock();
+                let mut state = self.shared.state.lock();
                 state.looks_new = state.look.is_some();
                 true
             }
@@ -197,7 +198,7 @@ impl Worker {
     }
 
     fn tell(&self, news: News) {
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         if matches!(news, News::Frame(..)) && self.device.queues.are_shared() {
             state.undrawn.get_or_insert_with(Instant::now);
         }
@@ -209,7 +210,7 @@ impl Worker {
     /// The newest order once there is one, or the last one again while its image changes by itself; at rest
     /// the last image at a finer level; none at the end. Pictures of the anatomy come between.
     fn next(&self) -> Option<Job> {
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         loop {
             self.shared.newer.store(false, Ordering::Release);
             if state.stop {
@@ -221,13 +222,13 @@ impl Worker {
             if std::mem::take(&mut state.resend) {
                 drop(state);
                 // An error of the device will be told by the next frame.
-                let _ = self.broadcast.again();
-                state = self.shared.lock();
+                let _ = self.broadcast.send(None);
+                state = self.shared.state.lock();
                 continue;
             }
             let undrawn = state.undrawn.map(|since| since.elapsed());
             if let Some(late) = undrawn.filter(|late| *late < WINDOW_PATIENCE) {
-                state = self.wait(state, Some(WINDOW_PATIENCE - late));
+                self.wait(&mut state, Some(WINDOW_PATIENCE - late));
                 continue;
             }
             let left = self.left.as_ref();
@@ -257,23 +258,17 @@ impl Worker {
             }
             let rest = finer.map(|_| live::REST - quiet);
             let look = looks.then(|| put_off.min(live::REST.saturating_sub(touched)));
-            state = self.wait(state, rest.into_iter().chain(look).min());
+            self.wait(&mut state, rest.into_iter().chain(look).min());
         }
     }
 
     /// Waits until something has changed, but no longer than `most`.
-    fn wait<'s>(
-        &'s self,
-        state: MutexGuard<'s, State>,
-        most: Option<Duration>,
-    ) -> MutexGuard<'s, State> {
-        let changed = &self.shared.changed;
+    fn wait(&self, state: &mut MutexGuard<'_, State>, most: Option<Duration>) {
         match most {
             Some(time) => {
-                let waited = changed.wait_timeout(state, time);
-                waited.unwrap_or_else(PoisonError::into_inner).0
+                self.shared.changed.wait_for(state, time);
             }
-            None => changed.wait(state).unwrap_or_else(PoisonError::into_inner),
+            None => self.shared.changed.wait(state),
         }
     }
 }

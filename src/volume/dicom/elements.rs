@@ -18,7 +18,7 @@ pub(super) const POSITION_PATIENT: Tag = (0x0020, 0x9113);
 pub(super) const ORIENTATION_PATIENT: Tag = (0x0020, 0x9116);
 pub(super) const MEASURES: Tag = (0x0028, 0x9110);
 pub(super) const VALUES: Tag = (0x0028, 0x9145);
-/// Of segmentations.
+/// Tags of segmentations.
 pub(super) const SEGMENTS: Tag = (0x0062, 0x0002);
 pub(super) const CATEGORY: Tag = (0x0062, 0x0003);
 pub(super) const IDENTIFICATION: Tag = (0x0062, 0x000a);

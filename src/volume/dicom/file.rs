@@ -8,7 +8,7 @@ use flate2::read::DeflateDecoder;
 use super::elements::{Elements, Item, Parser, Syntax};
 use super::source::{self, MAX_BYTES};
 use super::{Dicom, SAVE};
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 
 /// The preamble and the four letters after it.
 const START: usize = 132;
@@ -67,20 +67,20 @@ fn name(uid: &str) -> &'static str {
     }
 }
 
-pub(super) fn read(path: &Path) -> Result<Dicom<'_>, VolumeError> {
+pub(super) fn read(path: &Path) -> Result<Dicom<'_>, FileError> {
     let start = source::prefix(path, START as u64)?;
     if start.get(START - 4..) != Some(b"DICM") {
         let message = "is no DICOM file: the letters DICM are not at byte 128";
-        return Err(VolumeError::file(path, message, SAVE));
+        return Err(FileError::file(path, message, SAVE));
     }
     let (_, len) = source::open(path)?;
     if len > MAX_FILE {
         let message = format!("is {} MB, the limit is {} MB", len >> 20, MAX_FILE >> 20);
         let remedy = "crop or resample the volume, or convert it to .nrrd, .mha or .nii.gz";
-        return Err(VolumeError::file(path, message, remedy));
+        return Err(FileError::file(path, message, remedy));
     }
     let bytes = source::prefix(path, MAX_FILE)?;
-    let mistake = |(at, cause): (usize, String)| VolumeError::byte(path, at as u64, cause, SAVE);
+    let mistake = |(at, cause): (usize, String)| FileError::byte(path, at as u64, cause, SAVE);
     let mut parser = Parser { bytes: &bytes, at: START, syntax: Transfer::Explicit.elements() };
     // Group 2 alone is written with types in every file.
     let end = parser.end_of_group_2();
@@ -88,13 +88,13 @@ pub(super) fn read(path: &Path) -> Result<Dicom<'_>, VolumeError> {
     let elements = Elements { bytes: &bytes, big: false };
     let Some(uid) = elements.text(&meta, (0x0002, 0x0010)) else {
         let message = "lacks TransferSyntaxUID (0002,0010)";
-        return Err(VolumeError::file(path, message, SAVE));
+        return Err(FileError::file(path, message, SAVE));
     };
     let Some(syntax) = Transfer::of(&uid) else {
         let uid: String = uid.chars().take(64).collect();
         let message = format!("is written in {} that cannot be read ({uid})", name(&uid));
         let remedy = "decompress it (e.g. gdcmconv --raw), or save it as .nrrd or .mha";
-        return Err(VolumeError::file(path, message, remedy));
+        return Err(FileError::file(path, message, remedy));
     };
     let (bytes, at) = match syntax {
         Transfer::Deflated => (inflate(path, &bytes[end..])?, 0),
@@ -109,17 +109,17 @@ fn root(bytes: &[u8], at: usize, syntax: Transfer) -> Result<Item, (usize, Strin
     parser.item(bytes.len(), 0)
 }
 
-fn inflate(path: &Path, packed: &[u8]) -> Result<Vec<u8>, VolumeError> {
+fn inflate(path: &Path, packed: &[u8]) -> Result<Vec<u8>, FileError> {
     let most = (packed.len() as u64).saturating_mul(MAX_INFLATION).min(MAX_FILE);
     let mut out = Vec::new();
     let mut stream = DeflateDecoder::new(packed).take(most + 1);
     stream.read_to_end(&mut out).map_err(|e| {
         let message = format!("the deflated elements cannot be read: {e}");
-        VolumeError::file(path, message, SAVE)
+        FileError::file(path, message, SAVE)
     })?;
     if out.len() as u64 > most {
         let message = format!("unpacks to more than {MAX_INFLATION} times its size");
-        return Err(VolumeError::file(path, message, SAVE));
+        return Err(FileError::file(path, message, SAVE));
     }
     Ok(out)
 }

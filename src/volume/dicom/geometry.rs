@@ -2,10 +2,11 @@
 
 use glam::DVec3;
 
+use super::Dicom;
 use super::elements::{self, Item, first};
 use super::image::Image;
 use super::segmentation::Places;
-use super::{Dicom, VolumeError};
+use crate::issue::FileError;
 use crate::volume::grid::{Frame, Grid};
 
 /// Largest deviation of a plane from its place, as a part of the distance between planes.
@@ -33,7 +34,7 @@ struct Plane {
 
 const NO_PLACE: &str = "give an enhanced ultrasound volume, or reconstruct one from tracked frames";
 
-pub(super) fn planes(dicom: &Dicom, image: &Image) -> Result<Planes, VolumeError> {
+pub(super) fn planes(dicom: &Dicom, image: &Image) -> Result<Planes, FileError> {
     let shared = first(&dicom.root, elements::SHARED);
     let empty = Vec::new();
     let frames = match dicom.root.get(&elements::PER_FRAME) {
@@ -70,7 +71,7 @@ pub(super) fn planes(dicom: &Dicom, image: &Image) -> Result<Planes, VolumeError
 }
 
 /// The places of frames whose pixels have none of a volume's order: those of a segmentation.
-pub(super) fn places(dicom: &Dicom, frames: &[Item]) -> Result<Places, VolumeError> {
+pub(super) fn places(dicom: &Dicom, frames: &[Item]) -> Result<Places, FileError> {
     let shared = first(&dicom.root, elements::SHARED);
     let mut planes = Vec::with_capacity(frames.len());
     for own in frames {
@@ -94,7 +95,7 @@ pub(super) fn places(dicom: &Dicom, frames: &[Item]) -> Result<Places, VolumeErr
     Ok(Places { origins, x: lead.x * x, y: lead.y * y, normal, thickness })
 }
 
-fn unplaced(dicom: &Dicom, image: &Image) -> VolumeError {
+fn unplaced(dicom: &Dicom, image: &Image) -> FileError {
     let elements = dicom.elements();
     let time = elements.decimals::<1>(&dicom.root, (0x0018, 0x1063));
     let time = time.map_or(String::new(), |[t]| format!(", {t} ms apart"));
@@ -142,7 +143,7 @@ fn measures(
     dicom: &Dicom,
     frame: Option<&Item>,
     shared: Option<&Item>,
-) -> Result<([f64; 2], f64), VolumeError> {
+) -> Result<([f64; 2], f64), FileError> {
     let elements = dicom.elements();
     let mut groups = frame.into_iter().chain(shared);
     let item = groups.find_map(|g| first(g, elements::MEASURES)).unwrap_or(&dicom.root);
@@ -163,7 +164,7 @@ fn assemble(
     planes: &[Plane],
     [x, y]: [f64; 2],
     thickness: f64,
-) -> Result<Planes, VolumeError> {
+) -> Result<Planes, FileError> {
     let lead = planes[0];
     let finite = |p: &Plane| p.origin.is_finite() && p.x.is_finite() && p.y.is_finite();
     let normal = lead.x.cross(lead.y).normalize_or_zero();

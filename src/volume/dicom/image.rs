@@ -1,7 +1,8 @@
 //! The pixel format of a DICOM file.
 
 use super::elements::{FLOAT_PIXELS, VALUES, first};
-use super::{Dicom, MAX_VOXELS, SAVE, VolumeError, VoxelType, bytes_of};
+use super::{Dicom, MAX_VOXELS, SAVE, Scalar, bytes_of};
+use crate::issue::FileError;
 
 /// Meaning of a pixel's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -27,7 +28,7 @@ pub(super) struct Image {
     /// True where each value of the pixels has a plane of its own.
     pub planar: bool,
     pub color: Color,
-    pub kind: VoxelType,
+    pub kind: Scalar,
     /// Number of significant bits of a value.
     pub bits: u32,
     /// Slope and intercept, where they have an effect.
@@ -39,7 +40,7 @@ impl Image {
         self.color != Color::Grey
     }
 
-    pub fn of(dicom: &Dicom) -> Result<Self, VolumeError> {
+    pub fn of(dicom: &Dicom) -> Result<Self, FileError> {
         let elements = dicom.elements();
         let root = &dicom.root;
         let number = |element: u16, name: &str| {
@@ -73,11 +74,11 @@ impl Image {
         let allocated = number(0x0100, "BitsAllocated")?;
         let float = root.contains_key(&FLOAT_PIXELS);
         let kind = match (allocated, signed, float) {
-            (32, _, true) => VoxelType::F32,
-            (8, false, false) => VoxelType::U8,
-            (8, true, false) => VoxelType::I8,
-            (16, false, false) => VoxelType::U16,
-            (16, true, false) => VoxelType::I16,
+            (32, _, true) => Scalar::F32,
+            (8, false, false) => Scalar::U8,
+            (8, true, false) => Scalar::I8,
+            (16, false, false) => Scalar::U16,
+            (16, true, false) => Scalar::I16,
             _ => {
                 let message = format!("values of {allocated} bits cannot be read");
                 return Err(dicom.error(message, "save it with 8 or 16 bits"));
@@ -89,7 +90,7 @@ impl Image {
             let message = format!("{bits} bits up to bit {high} of {allocated} cannot be read");
             return Err(dicom.error(message, SAVE));
         }
-        if (color != Color::Grey) && kind != VoxelType::U8 {
+        if (color != Color::Grey) && kind != Scalar::U8 {
             return Err(dicom.error("colours of more than 8 bits cannot be read", SAVE));
         }
         let image = Self {
@@ -116,7 +117,7 @@ impl Image {
     }
 }
 
-fn scale(dicom: &Dicom) -> Result<Option<(f64, f64)>, VolumeError> {
+fn scale(dicom: &Dicom) -> Result<Option<(f64, f64)>, FileError> {
     let shared = first(&dicom.root, super::elements::SHARED);
     let item = shared.and_then(|s| first(s, VALUES)).unwrap_or(&dicom.root);
     let elements = dicom.elements();

@@ -8,21 +8,18 @@ use image::{ImageDecoder, codecs::jpeg::JpegDecoder};
 use super::elements::{FLOAT_PIXELS, PIXELS, Value};
 use super::file::Transfer;
 use super::image::{Color, Image};
-use super::{Dicom, SAVE, VolumeError, bytes_of, source};
+use super::{Dicom, SAVE, bytes_of, source};
+use crate::issue::FileError;
 use crate::volume::layout::{Axis, Layout};
-use crate::volume::voxels::{VoxelType, Voxels};
+use crate::volume::{Scalar, Voxels};
 
 /// Most bytes of pixels for a compressed byte, with a margin: a run of 128 is two bytes, a JPEG block of 64
 /// values two bits.
 const MAX_RATIO: usize = source::MAX_RATIO as usize;
 
 /// The voxels of these frames, one after another.
-pub(super) fn decode(
-    dicom: &Dicom,
-    image: &Image,
-    frames: &[usize],
-) -> Result<Voxels, VolumeError> {
-    let tag = if image.kind == VoxelType::F32 { FLOAT_PIXELS } else { PIXELS };
+pub(super) fn decode(dicom: &Dicom, image: &Image, frames: &[usize]) -> Result<Voxels, FileError> {
+    let tag = if image.kind == Scalar::F32 { FLOAT_PIXELS } else { PIXELS };
     let big = dicom.syntax == Transfer::Big;
     let mut voxels: Option<Voxels> = None;
     // A frame at a time: what is packed and what is not are never in memory together.
@@ -68,7 +65,7 @@ fn native(
     range: Range<usize>,
     frames: &[usize],
     each: &mut impl FnMut(&[u8]),
-) -> Result<(), VolumeError> {
+) -> Result<(), FileError> {
     let samples = if image.color == Color::Ybr422 { 2 } else { image.samples };
     let frame = image.rows * image.columns * samples * image.kind.bytes();
     // 8-bit values in big-endian words would be swapped in pairs; nobody has written them since 2006.
@@ -78,7 +75,7 @@ fn native(
             "is cut off: {} frames of {frame} bytes are declared, {held} bytes are there",
             image.frames
         );
-        return Err(VolumeError::byte(dicom.path, range.start as u64, message, SAVE));
+        return Err(FileError::byte(dicom.path, range.start as u64, message, SAVE));
     }
     let mut out = Vec::new();
     for &index in frames {
@@ -120,7 +117,7 @@ fn packed(
     fragments: &[Range<usize>],
     frames: &[usize],
     each: &mut impl FnMut(&[u8]),
-) -> Result<(), VolumeError> {
+) -> Result<(), FileError> {
     // The table of offsets comes first. A frame may be cut into several fragments; then the table has
     // their starts, which only files of old video recorders need.
     let data = fragments.get(1..).unwrap_or_default();
@@ -135,7 +132,7 @@ fn packed(
         let at = range.start as u64;
         let bytes = &dicom.bytes[range];
         let wrong = |cause: String| {
-            VolumeError::byte(dicom.path, at, format!("frame {index}: {cause}"), SAVE)
+            FileError::byte(dicom.path, at, format!("frame {index}: {cause}"), SAVE)
         };
         if bytes.len().saturating_mul(MAX_RATIO) < size {
             let cause = format!("{} bytes cannot hold {size} bytes of pixels", bytes.len());

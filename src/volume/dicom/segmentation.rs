@@ -6,7 +6,8 @@ use glam::{DAffine3, DVec3};
 
 use super::elements::{self, Item, PIXELS, Value, first};
 use super::source::MAX_BYTES;
-use super::{Dicom, SAVE, VolumeError, file, geometry};
+use super::{Dicom, SAVE, file, geometry};
+use crate::issue::FileError;
 use crate::volume::grid::{Frame, Grid};
 
 /// Segmentation Storage.
@@ -43,7 +44,7 @@ impl Segmentation {
     ///
     /// # Errors
     /// A file that is no DICOM; frames that do not fit their segments, places or pixels.
-    pub fn load(path: &Path) -> Result<Option<Self>, VolumeError> {
+    pub fn load(path: &Path) -> Result<Option<Self>, FileError> {
         let dicom = file::read(path)?;
         let elements = dicom.elements();
         let class = elements.text(&dicom.root, (0x0008, 0x0016));
@@ -77,7 +78,7 @@ impl Segmentation {
                 frames.len(),
                 pixels.len()
             );
-            return Err(VolumeError::byte(path, range.start as u64, message, SAVE));
+            return Err(FileError::byte(path, range.start as u64, message, SAVE));
         }
         let places = geometry::places(&dicom, frames)?;
         let heights: Vec<f64> = places.origins.iter().map(|o| o.dot(places.normal)).collect();
@@ -123,7 +124,7 @@ impl Segmentation {
     }
 }
 
-fn segments(dicom: &Dicom) -> Result<Vec<DicomSegment>, VolumeError> {
+fn segments(dicom: &Dicom) -> Result<Vec<DicomSegment>, FileError> {
     let elements = dicom.elements();
     let tag = elements::SEGMENTS;
     let Some(Value::Items(items)) = dicom.root.get(&tag) else {
@@ -153,11 +154,7 @@ fn segments(dicom: &Dicom) -> Result<Vec<DicomSegment>, VolumeError> {
 }
 
 /// Place in the list of the segment that a frame shows.
-fn segment_of(
-    dicom: &Dicom,
-    frame: &Item,
-    segments: &[DicomSegment],
-) -> Result<usize, VolumeError> {
+fn segment_of(dicom: &Dicom, frame: &Item, segments: &[DicomSegment]) -> Result<usize, FileError> {
     let tag = elements::IDENTIFICATION;
     let shared = first(&dicom.root, elements::SHARED);
     let item = first(frame, tag).or(shared.and_then(|s| first(s, tag)));
@@ -171,11 +168,7 @@ fn segment_of(
 
 /// The lowest height, the distance of planes and their number. Frames without pixels of their segment are left out of
 /// files, so that planes may be missing.
-fn spaced(
-    dicom: &Dicom,
-    heights: &[f64],
-    thickness: f64,
-) -> Result<(f64, f64, usize), VolumeError> {
+fn spaced(dicom: &Dicom, heights: &[f64], thickness: f64) -> Result<(f64, f64, usize), FileError> {
     let mut sorted = heights.to_vec();
     sorted.sort_by(f64::total_cmp);
     sorted.dedup_by(|b, a| *b - *a < geometry::SAME);
@@ -199,7 +192,7 @@ fn spaced(
     Ok((low, step, count as usize + 1))
 }
 
-/// Where frames lie.
+/// Positions of the frames.
 pub(super) struct Places {
     /// First pixels.
     pub origins: Vec<DVec3>,

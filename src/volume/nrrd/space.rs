@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::fields::{Field, Fields};
 use crate::volume::grid::{self, Frame, Grid};
 use crate::volume::layout::Axis;
@@ -14,7 +14,7 @@ pub(super) type Directions = Vec<Option<DVec3>>;
 pub(super) fn directions(
     fields: &Fields,
     n: usize,
-) -> Result<(Option<Directions>, Frame), VolumeError> {
+) -> Result<(Option<Directions>, Frame), FileError> {
     let space = fields.find(&["space"]);
     let frame = match space.map(|f| f.value.to_ascii_lowercase()).as_deref() {
         Some("right-anterior-superior" | "ras") => Frame::Ras,
@@ -42,7 +42,7 @@ pub(super) fn directions(
 }
 
 /// Vectors from text like `(1,0,0) none (0, 1, 0)`; of two components the third is zero.
-fn vectors(fields: &Fields, field: &Field) -> Result<Directions, VolumeError> {
+fn vectors(fields: &Fields, field: &Field) -> Result<Directions, FileError> {
     let wrong = || fields.error(field, "is no list of vectors", "write it like (1,0,0) (0,1,0)");
     let mut out = Vec::new();
     let mut rest = field.value.trim();
@@ -71,7 +71,7 @@ pub(super) fn axes(
     fields: &Fields,
     n: usize,
     directions: Option<&[Option<DVec3>]>,
-) -> Result<Vec<Axis>, VolumeError> {
+) -> Result<Vec<Axis>, FileError> {
     let kinds = fields.find(&["kinds"]);
     let kinds: Vec<_> = kinds.map_or(Vec::new(), |k| k.value.split_whitespace().collect());
     let kind = |axis: usize| kinds.get(axis).map_or("domain".into(), |k| k.to_ascii_lowercase());
@@ -107,7 +107,7 @@ pub(super) fn axes(
 }
 
 /// Time from one volume to the next along the axis of time, s, where stated.
-pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<f64>, VolumeError> {
+pub(super) fn interval(fields: &Fields, n: usize, time: usize) -> Result<Option<f64>, FileError> {
     let Some(field) = fields.find(&["spacings"]) else {
         return Ok(None);
     };
@@ -144,7 +144,7 @@ pub(super) fn grid(
     axes: &[Axis],
     directions: Option<&[Option<DVec3>]>,
     frame: Frame,
-) -> Result<Grid, VolumeError> {
+) -> Result<Grid, FileError> {
     let mut steps = [DVec3::X, DVec3::Y, DVec3::Z];
     let of_space = axes.iter().enumerate().filter(|(_, a)| **a == Axis::Space);
     let of_space = of_space.map(|(axis, _)| axis);
@@ -176,7 +176,7 @@ pub(super) fn grid(
     Ok(Grid { steps, origin, frame, unit: unit(fields, axes)? })
 }
 
-fn unit(fields: &Fields, axes: &[Axis]) -> Result<f64, VolumeError> {
+fn unit(fields: &Fields, axes: &[Axis]) -> Result<f64, FileError> {
     let Some(field) = fields.find(&["space units", "units"]) else {
         return Ok(1.0);
     };

@@ -1,19 +1,13 @@
 //! Settings and calibration from a configuration of PLUS (`PlusDeviceSet_*.xml`).
 
 use std::path::Path;
-use std::str::FromStr;
 
 use glam::DVec3;
-use roxmltree::{Document, Node};
 
 use super::poses::Transforms;
 use super::{Compounding, Fan, Filling, Interpolation, Settings};
-use crate::volume::error::VolumeError;
-use crate::volume::sequence::frames;
-use crate::volume::source;
-
-/// Longest configuration, bytes.
-const MAX_CONFIG: u64 = 4 << 20;
+use crate::issue::FileError;
+use crate::volume::plus::{self, Element};
 
 /// Content of a configuration for a reconstruction.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,39 +22,18 @@ pub struct Config {
     pub reference: Option<String>,
 }
 
-/// An element and its file.
-struct Element<'d, 'p> {
-    node: Node<'d, 'd>,
-    path: &'p Path,
-}
-
 impl Config {
     /// Reads a configuration.
     ///
     /// # Errors
     /// It is no XML, lacks `VolumeReconstruction`, or asks for a method that this program lacks.
-    pub fn load(path: &Path) -> Result<Self, VolumeError> {
-        let bytes = source::prefix(path, MAX_CONFIG)?;
-        let text = String::from_utf8_lossy(&bytes);
-        let document = Document::parse(&text).map_err(|e| {
-            let line = e.pos().row as usize;
-            VolumeError::line(path, line, format!("is no XML: {e}"), "correct it")
-        })?;
-        let named = |name: &'static str| {
-            let nodes = document.descendants().filter(move |n| n.has_tag_name(name));
-            nodes.map(|node| Element { node, path })
-        };
-        let mut transforms = Transforms::default();
-        for element in named("Transform") {
-            // Transforms in other parts of a configuration have no matrix.
-            if let Some(matrix) = element.node.attribute("Matrix") {
-                let matrix = frames::matrix(matrix)
-                    .map_err(|cause| element.error("Matrix", cause, "write 16 numbers"))?;
-                transforms.add(element.need("From")?, element.need("To")?, matrix);
-            }
-        }
-        let Some(element) = named("VolumeReconstruction").next() else {
-            return Err(VolumeError::file(
+    pub fn load(path: &Path) -> Result<Self, FileError> {
+        let text = plus::text(path)?;
+        let document = plus::parse(path, &text)?;
+        let root = Element::root(path, &document);
+        let transforms = root.transforms()?;
+        let Some(element) = root.named("VolumeReconstruction").next() else {
+            return Err(FileError::file(
                 path,
                 "has no element `VolumeReconstruction`",
                 "add it with at least OutputSpacing",
@@ -76,50 +49,7 @@ impl Config {
     }
 }
 
-impl Element<'_, '_> {
-    fn error(&self, name: &str, cause: &str, remedy: &str) -> VolumeError {
-        let line = self.node.document().text_pos_at(self.node.range().start).row;
-        let value = self.node.attribute(name).unwrap_or_default();
-        let value: String = value.chars().take(60).collect();
-        let message = format!("`{name}` is `{value}`: {cause}");
-        VolumeError::line(self.path, line as usize, message, remedy)
-    }
-
-    fn need(&self, name: &str) -> Result<&str, VolumeError> {
-        let missing = || self.error(name, "it is missing", "add it");
-        self.node.attribute(name).ok_or_else(missing)
-    }
-
-    /// N numbers, where the attribute is there.
-    fn numbers<T: FromStr, const N: usize>(
-        &self,
-        name: &str,
-    ) -> Result<Option<[T; N]>, VolumeError> {
-        let Some(text) = self.node.attribute(name) else {
-            return Ok(None);
-        };
-        let values: Option<Vec<T>> = text.split_whitespace().map(|w| w.parse().ok()).collect();
-        let values = values.and_then(|v| <[T; N]>::try_from(v).ok());
-        match values {
-            Some(values) => Ok(Some(values)),
-            None => Err(self.error(name, "does not fit", &format!("write {N} numbers"))),
-        }
-    }
-
-    /// The value of a word, where the attribute is there.
-    fn choice<T: Copy>(&self, name: &str, known: &[(&str, T)]) -> Result<Option<T>, VolumeError> {
-        let Some(word) = self.node.attribute(name) else {
-            return Ok(None);
-        };
-        let found = known.iter().find(|(w, _)| w.eq_ignore_ascii_case(word));
-        let words: Vec<_> = known.iter().map(|(w, _)| *w).collect();
-        let remedy = format!("write one of {}", words.join(", "));
-        let value = found.ok_or_else(|| self.error(name, "cannot be done", &remedy))?;
-        Ok(Some(value.1))
-    }
-}
-
-fn settings(element: &Element) -> Result<Settings, VolumeError> {
+fn settings(element: &Element) -> Result<Settings, FileError> {
     element.need("OutputSpacing")?;
     let spacing = element.numbers("OutputSpacing")?.map(DVec3::from_array);
     let mut out = Settings::new(spacing.unwrap_or(DVec3::ONE));
@@ -154,18 +84,12 @@ fn settings(element: &Element) -> Result<Settings, VolumeError> {
     out.every = element.numbers("SkipInterval")?.map_or(1, |[n]: [usize; 1]| n.max(1));
     element.choice("EnableFanAnglesAutoDetect", &[("FALSE", ())])?;
     let fill = element.choice("FillHoles", &[("ON", true), ("OFF", false)])?;
-    out.holes = Vec::new();
-    if fill == Some(true) {
-        let nodes = element.node.descendants();
-        for node in nodes.filter(|n| n.has_tag_name("HoleFillingElement")) {
-            let element = Element { node, path: element.path };
-            out.holes.push(filling(&element)?);
-        }
-    }
+    let holes = element.named("HoleFillingElement").filter(|_| fill == Some(true));
+    out.holes = holes.map(|e| filling(&e)).collect::<Result<_, _>>()?;
     Ok(out)
 }
 
-fn fan(element: &Element) -> Result<Option<Fan>, VolumeError> {
+fn fan(element: &Element) -> Result<Option<Fan>, FileError> {
     let Some(angles) = element.numbers::<f64, 2>("FanAnglesDeg")? else {
         return Ok(None);
     };
@@ -184,13 +108,13 @@ fn fan(element: &Element) -> Result<Option<Fan>, VolumeError> {
     }))
 }
 
-fn filling(element: &Element) -> Result<Filling, VolumeError> {
+fn filling(element: &Element) -> Result<Filling, FileError> {
     let integer = |name: &str| {
         element.need(name)?;
         let value = element.numbers::<usize, 1>(name)?;
         // A larger hole is no hole, and filling it takes hours.
         let value = value.map(|[v]| v).filter(|v| (1..=99).contains(v));
-        value.ok_or_else(|| element.error(name, "out of range", "write a number from 1 to 99"))
+        value.ok_or_else(|| element.wrong(name, "out of range", "write a number from 1 to 99"))
     };
     element.need("Type")?;
     let kinds = [("STICK", true), ("NEAREST_NEIGHBOR", false)];

@@ -1,6 +1,6 @@
 //! The sector of a frame that holds the image.
 
-use super::ReconstructError;
+use crate::issue::FileError;
 use crate::volume::Sequence;
 
 /// The part of a frame that holds the image of a curved array, pixels and degrees. The fan opens
@@ -40,7 +40,7 @@ impl Fan {
     ///
     /// # Errors
     /// When only some of the entries are there, or they are no numbers.
-    pub fn of(sequence: &Sequence) -> Result<Option<Self>, ReconstructError> {
+    pub fn of(sequence: &Sequence) -> Result<Option<Self>, FileError> {
         let found = KEYS.map(|key| sequence.fields.iter().find(|(k, _)| k == key));
         if found.iter().all(Option::is_none) {
             return Ok(None);
@@ -52,7 +52,7 @@ impl Fan {
             let words = words.ok().filter(|w| w.len() == count);
             let words = words.filter(|w| w.iter().all(|v| v.is_finite()));
             numbers.extend(words.ok_or_else(|| {
-                ReconstructError::new(
+                FileError::data(
                     format!("`{key}` of the sequence is `{text}`, not {count} numbers"),
                     "write all of FanOriginPixel, FanAnglesDeg, FanRadiusStartPixel and \
                      FanRadiusStopPixel into its header, or none",

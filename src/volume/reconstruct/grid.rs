@@ -2,8 +2,9 @@
 
 use glam::{DAffine3, DVec3};
 
+use super::MAX_VOXELS;
 use super::insert::Source;
-use super::{MAX_VOXELS, ReconstructError};
+use crate::issue::FileError;
 
 /// Places of the voxels.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,9 +19,9 @@ impl Lattice {
     ///
     /// # Errors
     /// When there are none or too many, or the numbers are none of space.
-    pub fn new(origin: DVec3, spacing: DVec3, size: [usize; 3]) -> Result<Self, ReconstructError> {
+    pub fn new(origin: DVec3, spacing: DVec3, size: [usize; 3]) -> Result<Self, FileError> {
         if !(spacing.is_finite() && spacing.cmpgt(DVec3::ZERO).all() && origin.is_finite()) {
-            return Err(ReconstructError::new(
+            return Err(FileError::data(
                 format!("voxels {spacing} mm apart from {origin} on are none"),
                 "give a spacing above zero, mm",
             ));
@@ -31,7 +32,7 @@ impl Lattice {
             .filter(|&n| n > 0 && n <= MAX_VOXELS);
         if count.is_none() {
             let [x, y, z] = size;
-            return Err(ReconstructError::new(
+            return Err(FileError::data(
                 format!("{x} x {y} x {z} voxels are none, or more than {MAX_VOXELS}"),
                 "change the spacing or the extent; check the size of a pixel in the transform",
             ));
@@ -45,7 +46,7 @@ impl Lattice {
         source: &Source,
         frames: &[(usize, DAffine3)],
         spacing: DVec3,
-    ) -> Result<Self, ReconstructError> {
+    ) -> Result<Self, FileError> {
         let corners = source.corners();
         let points = frames.iter().flat_map(|(_, pose)| corners.map(|c| pose.transform_point3(c)));
         let (low, high) =

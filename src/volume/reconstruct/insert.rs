@@ -2,7 +2,8 @@
 
 use glam::{DAffine3, DVec3};
 
-use super::{Compounding, Fan, Interpolation, Lattice, ReconstructError, Settings};
+use super::{Compounding, Fan, Interpolation, Lattice, Settings};
+use crate::issue::FileError;
 use crate::volume::Sequence;
 
 /// Weight of trilinear interpolation in the middle between eight voxels: maximum and latest ignore pixels
@@ -23,7 +24,7 @@ pub(super) struct Source<'s> {
 }
 
 impl<'s> Source<'s> {
-    pub fn new(sequence: &'s Sequence, settings: &Settings) -> Result<Self, ReconstructError> {
+    pub fn new(sequence: &'s Sequence, settings: &Settings) -> Result<Self, FileError> {
         let orientation = sequence.orientation.as_deref().unwrap_or("MF");
         let mut letters = orientation.chars();
         let flip = match (letters.next(), letters.next()) {
@@ -32,7 +33,7 @@ impl<'s> Source<'s> {
             (Some('M'), Some('N')) => [false, true],
             (Some('U'), Some('N')) => [true, true],
             _ => {
-                return Err(ReconstructError::new(
+                return Err(FileError::data(
                     format!("the orientation `{orientation}` of the pixels is none of an image"),
                     "give scan-converted images, `MF` or one of its mirror images",
                 ));
@@ -45,7 +46,7 @@ impl<'s> Source<'s> {
         };
         let (x, y) = (range(x, w, width), range(y, h, height));
         if x[0] > x[1] || y[0] > y[1] {
-            return Err(ReconstructError::new(
+            return Err(FileError::data(
                 format!("the clip rectangle lies outside the {width} x {height} pixels"),
                 "give x, y, width and height in pixels of the frames",
             ));

@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 
 use glam::DAffine3;
 
-use super::ReconstructError;
+use crate::issue::FileError;
 use crate::volume::{Pose, Sequence};
 
 /// Transforms that hold for every frame of a sequence, such as the calibration from `Image` to
@@ -38,7 +38,7 @@ impl Transforms {
         sequence: &Sequence,
         image: &str,
         reference: &str,
-    ) -> Result<Vec<Option<DAffine3>>, ReconstructError> {
+    ) -> Result<Vec<Option<DAffine3>>, FileError> {
         let ways = sequence.frames.iter().map(|f| self.between(&f.poses, image, reference));
         let ways: Vec<_> = ways.collect();
         if ways.iter().any(Option::is_some) {
@@ -49,7 +49,7 @@ impl Transforms {
         names.sort();
         names.dedup();
         names.truncate(12);
-        Err(ReconstructError::new(
+        Err(FileError::data(
             format!(
                 "nothing leads from `{image}` to `{reference}`; there is {}",
                 if names.is_empty() { "no transform".to_owned() } else { names.join(", ") }

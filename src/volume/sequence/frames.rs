@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::fields::{Field, Fields};
 use crate::volume::write::number;
 
@@ -105,7 +105,7 @@ pub(in crate::volume) fn in_header(fields: &Fields) -> bool {
 pub(super) fn parse(
     fields: &Fields,
     count: usize,
-) -> Result<BTreeMap<usize, TrackedFrame>, VolumeError> {
+) -> Result<BTreeMap<usize, TrackedFrame>, FileError> {
     let mut out: BTreeMap<usize, (TrackedFrame, BTreeMap<String, String>)> = BTreeMap::new();
     for field in &fields.list {
         let Some(rest) = field.key.strip_prefix(PREFIX) else {
@@ -155,7 +155,7 @@ pub(super) fn parse(
 }
 
 /// Sixteen numbers, row by row, the last row (0, 0, 0, 1).
-fn transform(fields: &Fields, field: &Field) -> Result<DAffine3, VolumeError> {
+fn transform(fields: &Fields, field: &Field) -> Result<DAffine3, FileError> {
     matrix(&field.value).map_err(|cause| {
         fields.error(field, cause, "write the sixteen numbers of a 4 x 4 matrix, row by row")
     })

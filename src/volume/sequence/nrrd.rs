@@ -11,11 +11,11 @@ use glam::{DAffine3, DVec3};
 
 use super::frames::PREFIX;
 use super::{KEYS, ORIENTATION, Sequence};
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::fields::{Field, Fields};
 use crate::volume::header::Header;
 use crate::volume::write::{create, number};
-use crate::volume::{VoxelType, nrrd};
+use crate::volume::{Voxels, nrrd};
 
 /// Extensions of these files.
 const EXTENSIONS: [&str; 2] = ["nrrd", "nhdr"];
@@ -55,7 +55,7 @@ fn words(field: &Field) -> impl Iterator<Item = &str> {
 }
 
 /// Pairs of a header as fields, and what it says of the pixels, its frames as slices.
-pub(super) fn header(path: &Path) -> Result<(Fields<'_>, Header), VolumeError> {
+pub(super) fn header(path: &Path) -> Result<(Fields<'_>, Header), FileError> {
     let (fields, pairs, _) = nrrd::fields(path)?;
     let mut header = nrrd::header(path)?;
     let layout = &mut header.layout;
@@ -72,7 +72,7 @@ pub(super) fn header(path: &Path) -> Result<(Fields<'_>, Header), VolumeError> {
     } else if layout.size[2] > 1 || !is_tracked(&pairs) {
         // PLUS writes a frame alone without a list.
         let message = "is a volume, not a sequence: none of its axes is of kind `list`";
-        return Err(VolumeError::file(path, message, remedy));
+        return Err(FileError::file(path, message, remedy));
     }
     // They are about volumes.
     header.warnings.clear();
@@ -85,18 +85,15 @@ pub(super) fn orientation<'f>(pairs: &'f Fields) -> Option<&'f Field> {
 }
 
 /// Writes a sequence (.nrrd).
-pub(super) fn write(sequence: &Sequence, path: &Path) -> Result<(), VolumeError> {
+pub(super) fn write(sequence: &Sequence, path: &Path) -> Result<(), FileError> {
     let [width, height] = sequence.size;
     let count = sequence.frames.len();
-    let kind = match sequence.pixels.kind() {
-        VoxelType::U8 => "uchar",
-        VoxelType::I8 => "signed char",
-        VoxelType::U16 => "ushort",
-        VoxelType::I16 => "short",
-        VoxelType::U32 => "uint",
-        VoxelType::I32 => "int",
-        VoxelType::F32 => "float",
-        VoxelType::F64 => "double",
+    let kind = match sequence.pixels {
+        Voxels::U8(_) => "uchar",
+        Voxels::I8(_) => "signed char",
+        Voxels::U16(_) => "ushort",
+        Voxels::I16(_) => "short",
+        Voxels::F32(_) => "float",
     };
     let placed = placed(sequence);
     let vector = |v: DVec3| format!("({})", v.to_array().map(number).join(","));

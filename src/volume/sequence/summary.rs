@@ -5,7 +5,7 @@ use std::fmt;
 use std::path::Path;
 
 use super::{frames, nrrd};
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::{self, meta};
 
 /// Frames, poses and times of a sequence.
@@ -24,7 +24,7 @@ impl Summary {
     ///
     /// # Errors
     /// A wrong header.
-    pub fn read(path: &Path) -> Result<Option<Self>, VolumeError> {
+    pub fn read(path: &Path) -> Result<Option<Self>, FileError> {
         let (fields, header) = if nrrd::is_meant(path) {
             let (_, list, _) = volume::nrrd::fields(path)?;
             if !nrrd::is_tracked(&list) {

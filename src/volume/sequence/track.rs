@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::frames::{self, TrackedFrame};
-use crate::volume::error::VolumeError;
+use crate::issue::FileError;
 use crate::volume::fields::Fields;
 use crate::volume::{meta, nrrd};
 
@@ -12,14 +12,14 @@ use crate::volume::{meta, nrrd};
 ///
 /// # Errors
 /// A header that cannot be read, or describes no frame.
-pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, VolumeError> {
+pub fn track(path: &Path) -> Result<Vec<TrackedFrame>, FileError> {
     let fields = match super::nrrd::is_meant(path) {
         true => Fields { path, list: nrrd::fields(path)?.1 },
         false => meta::fields(path)?.0,
     };
     let found = frames::parse(&fields, usize::MAX)?;
     if found.is_empty() {
-        return Err(VolumeError::file(
+        return Err(FileError::file(
             path,
             "describes no frame of a tracked sequence",
             "give a file with entries such as Seq_Frame0000_ProbeToTrackerTransform",

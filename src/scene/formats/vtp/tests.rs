@@ -1,5 +1,7 @@
 use std::io::Write as _;
 
+use base64::Engine as _;
+use base64::engine::general_purpose::STANDARD;
 use flate2::Compression;
 use flate2::write::ZlibEncoder;
 
@@ -9,7 +11,7 @@ fn load(bytes: impl AsRef<[u8]>) -> Result<Parts, Vec<Issue>> {
     read(Path::new("x.vtp"), bytes.as_ref())
 }
 
-/// How a test writes its numbers.
+/// Encoding of a test's numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Way {
     Text,

@@ -35,7 +35,7 @@ impl Worker {
         self.fitted = None;
         self.left = None;
         self.pace.forget();
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         // Orders for the scene before mean nothing here.
         state.order = None;
         state.frozen = false;
@@ -48,7 +48,7 @@ impl Worker {
         &mut self,
         simulator: &mut Simulator,
     ) -> Result<Option<Pictured>, SimError> {
-        let look = self.shared.lock().look.clone();
+        let look = self.shared.state.lock().look.clone();
         let (Some(look), Some(left)) = (look, &self.left) else {
             return Ok(None);
         };
@@ -122,7 +122,7 @@ impl Worker {
         // Tables and buffers of the scene's own counts are made once; their time is not part of a frame's.
         let (simulator, settings) = self.prepare(simulator, &order.settings)?;
         let prepared = began.elapsed();
-        let looked_at = self.shared.lock().look.is_some();
+        let looked_at = self.shared.state.lock().look.is_some();
         self.pace.share(if looked_at { IMAGE_SHARE } else { 1.0 });
         let level = match taken.level {
             Some(level) => level,
@@ -160,7 +160,7 @@ impl Worker {
             false => None,
         };
         self.left = Some(Imaged { order: order.clone(), index: taken.index, pose, seconds, level });
-        let mut state = self.shared.lock();
+        let mut state = self.shared.state.lock();
         state.looks_new = state.look.is_some();
         drop(state);
         let constants = simulator.constants();

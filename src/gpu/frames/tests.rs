@@ -1,0 +1,48 @@
+use ash::vk;
+
+use super::{QueueUser, SubmissionSlot};
+use crate::gpu::{Commands, GpuError, test_device};
+
+#[test]
+fn stages_in_many_batches_are_timed_and_so_is_what_follows() {
+    let device = test_device();
+    let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
+    let mut commands = Commands::begin(&mut slot, 0).unwrap();
+    for _ in 0..4096 {
+        commands.scope("trace");
+        commands.scope("scatter");
+    }
+    commands.scope("beam");
+    drop(commands);
+    slot.submit(0).unwrap();
+    // SAFETY: the device is alive.
+    unsafe { device.raw.device_wait_idle() }.unwrap();
+    let times = slot.timer.collect().unwrap();
+    let [trace, beam] = ["trace", "beam"].map(|n| times.iter().filter(|t| t.0 == n).count());
+    assert!(trace > 100 && beam == 1, "{trace} {beam}");
+    assert!(device.validation_messages().is_empty());
+}
+
+/// No driver at hand can be made to lose its device, so the code is planted.
+#[test]
+fn a_lost_device_names_the_last_pass_that_began() {
+    let device = test_device();
+    let mut slot = SubmissionSlot::new(&device, "test", QueueUser::Work).unwrap();
+    let mut commands = Commands::begin(&mut slot, 0).unwrap();
+    commands.scope("trace");
+    commands.scope("scatter");
+    drop(commands);
+    let lost = vk::Result::ERROR_DEVICE_LOST;
+    let text = slot.failure(lost, "waiting").to_string();
+    assert!(text.contains("'none'") && text.contains("trace, scatter"), "{text}");
+
+    slot.submit(0).unwrap();
+    // SAFETY: the device is alive.
+    unsafe { device.raw.device_wait_idle() }.unwrap();
+    let text = slot.failure(lost, "waiting").to_string();
+    assert!(text.contains("ERROR_DEVICE_LOST") && text.contains("'scatter'"), "{text}");
+    let other = slot.failure(vk::Result::ERROR_OUT_OF_HOST_MEMORY, "waiting");
+    let kept = vk::Result::ERROR_OUT_OF_HOST_MEMORY;
+    assert!(matches!(other, GpuError::Vulkan { code, .. } if code == kept));
+    assert!(device.validation_messages().is_empty());
+}
