@@ -1,0 +1,66 @@
+// Echoes and segments that a path of trace.comp writes.
+//
+// The includer declares frame, tissues[], rows[], surface_echoes[], segments[], segment_count[], counters and media,
+// and includes deposit.glsl, path.glsl and media.glsl.
+
+// `dither` randomises rounding: each of N paths deposits an N-th, and rounded to the nearest, faint echoes would vanish
+// as N grows.
+void deposit_surface(uint line, float time, vec2 amplitude, bool incoherent, uvec4 dither) {
+    uint l = line % frame.scanlines;
+    float y = elevation(line / frame.scanlines);
+    float kappa = frame.speed * time / frame.sample_pitch;
+    float before = floor(kappa);
+    vec4 shares = deposit_shares(kappa - before);
+    vec2 q = carrier(time);
+    q = vec2(amplitude.x * q.x - amplitude.y * q.y, amplitude.x * q.y + amplitude.y * q.x);
+    for (int i = 0; i < 4; ++i) {
+        float at = before + float(i - 1);
+        if (!(at >= 0.0 && at < float(frame.samples))) continue;
+        uint k = uint(whole(at));
+        float sigma = rows[k].sigma_elevation;
+        float gain = rows[k].surface_gain * exp(-0.5 * y * y / (sigma * sigma));
+        if (incoherent) gain *= rows[k].incoherent_gain;
+        vec2 v = q * gain * shares[i];
+        uint slot = 2u * (l * frame.samples + k);
+        int re = to_fixed(v.x, frame.surface_scale, float(dither[i] >> 16u) * (1.0 / 65536.0));
+        int im = to_fixed(v.y, frame.surface_scale, float(dither[i] & 0xffffu) * (1.0 / 65536.0));
+        if (re != 0) atomicAdd(surface_echoes[slot], re);
+        if (im != 0) atomicAdd(surface_echoes[slot + 1u], im);
+    }
+}
+
+// True if all paths of a line are equal up to their first reflection.
+bool paths_are_alike() {
+    return frame.origin_jitter <= 0.0 && frame.emission_lobe <= 0.0
+        && (frame.flags & FLAG_ROUGH_TRANSMISSION) == 0u;
+}
+
+// Writes a segment, unless another path writes it. Its weight and share say which part of the volume echoes this path
+// stands for, and over how many paths they average.
+void emit_segment(inout Path path, uint line, uint n, uint instance, float extent) {
+    bool whole = paths_are_alike() && (frame.sampling == SAMPLING_MAIN_PATH
+        || (frame.sampling == SAMPLING_SHARED_PRIMARY && path.interactions == 0u));
+    if (whole && n != 0u) return;
+    if (!is_heard(media)) return;
+    uint tissue = tissue_of(instance);
+    if (!(extent > 0.0) || (tissues[tissue].presence <= 0.0 && frame.points == 0u)) return;
+    if (path.branch && path.weight * path.survival * rows[row_of(path.time)].compensation < frame.volume_floor) return;
+    uint slot = atomicAdd(segment_count[line], 1u);
+    if (slot >= frame.segment_capacity) {
+        atomicAdd(counters.segments_dropped, 1u);
+        return;
+    }
+    uint at = line * frame.segment_capacity + slot;
+    // Speckle adds in power.
+    float weight = path.weight * sqrt(path.survival) * mix(path.share, 1.0, whole);
+    float share = mix(max(1.0, path.probability / (path.survival * path.share)), 1.0, whole);
+    segments[at].origin_length = vec4(path.origin, extent);
+    segments[at].direction_time = vec4(path.direction, path.time);
+    segments[at].lateral_weight = vec4(path.lateral, weight);
+    segments[at].spread = vec4(path.spread, share);
+    segments[at].lens = vec4(path.lens, 0.0);
+    segments[at].tissue = tissue;
+    segments[at].instance = instance;
+    segments[at].line = line;
+    segments[at].handedness = path.handedness;
+}

@@ -1,0 +1,126 @@
+// A segment of a path as scatter.comp hears it: where its samples lie, how wide and how loud the beam is along it.
+//
+// The includer declares frame, tissues[], rows[] and segments[], and includes transform.glsl, probe.glsl and field.glsl.
+
+// A segment in the frame of its scatterers.
+struct Stretch {
+    vec3 o; vec3 d; vec3 e_l; vec3 e_e;
+    float extent; float time; float weight;
+    vec3 spread; float share;
+    vec3 lens;
+    float speed; float absorption;
+    vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
+    float layer_y;       // elevation of the line's layer, mm
+    uint tissue; uint instance;
+};
+
+Stretch world_stretch(uint at) {
+    Stretch s;
+    vec4 a = segments[at].origin_length;
+    vec4 b = segments[at].direction_time;
+    vec4 c = segments[at].lateral_weight;
+    vec4 w = segments[at].spread;
+    s.o = a.xyz;
+    s.extent = a.w;
+    s.d = b.xyz;
+    s.time = b.w;
+    s.e_l = c.xyz;
+    s.weight = c.w;
+    s.e_e = segments[at].handedness * cross(s.d, s.e_l);
+    s.spread = w.xyz;
+    s.share = w.w;
+    s.lens = segments[at].lens.xyz;
+    s.tissue = segments[at].tissue;
+    s.instance = segments[at].instance;
+    s.speed = tissues[s.tissue].speed;
+    s.absorption = tissues[s.tissue].absorption;
+    uint line = segments[at].line;
+    s.layer_y = elevation(line / frame.scanlines);
+    s.off = vec2(0.0);
+    if (frame.beam_width > 0.0) {
+        vec3 o, d, lateral;
+        probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
+        s.off = vec2(dot(probe_point(s.o) - o, lateral), dot(probe_vector(s.d), lateral));
+    }
+    return s;
+}
+
+Stretch texture_stretch(uint at) {
+    Stretch s = world_stretch(at);
+    s.o = texture_point(s.instance, s.o);
+    s.d = texture_vector(s.instance, s.d);
+    s.e_l = texture_vector(s.instance, s.e_l);
+    s.e_e = texture_vector(s.instance, s.e_e);
+    return s;
+}
+
+float samples_per_mm(Stretch s) { return frame.speed / (s.speed * frame.sample_pitch); }
+float kappa_at(Stretch s, float x) { return frame.speed * s.time / frame.sample_pitch + x * samples_per_mm(s); }
+float distance_at(Stretch s, float kappa) {
+    return (kappa * frame.sample_pitch / frame.speed - s.time) * s.speed;
+}
+
+uint row_at(float kappa) { return sample_at(kappa); }
+
+// A stretch with NaN or infinity has no echoes. NaN fails every comparison.
+bool is_finite(Stretch s) {
+    return abs(s.extent) < 1e18 && abs(s.time) < 1e18 && abs(s.weight) < 1e18 && abs(s.share) < 1e18
+        && all(lessThan(abs(s.o), vec3(1e18))) && all(lessThan(abs(s.d), vec3(2.0)))
+        && all(lessThan(abs(s.e_l), vec3(2.0))) && all(lessThan(abs(s.spread), vec3(1e18)))
+        && all(lessThan(abs(s.lens), vec3(1e18)));
+}
+
+bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
+
+bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
+
+// The factor on amplitudes: echoes that a rough reflection spreads over many resolution cells average out; a path off the
+// geometric scanline is received more weakly. `shape` is that of the row.
+float thinning(Stretch s, float x, vec4 shape) {
+    float variance = s.spread.x + x * (2.0 * s.spread.y + x * s.spread.z);
+    float beam = beam_weight(s.off.x + x * s.off.y);
+    if (variance <= 0.0) return beam;
+    vec2 widened = 1.0 + variance * INVERSE_FALL * shape.xy;
+    float cells = sqrt(widened.x * widened.y);
+    return beam * min(1.0, sqrt(s.share / cells));
+}
+
+// 1 / sigma^2 across over that of an even wavefront, at distance x: transmitted and received beam each are wider by the
+// lens, the product of both by half its square. `fall` is 1 / sigma^2 of the row.
+float narrowing(Stretch s, float x, float fall) {
+    float off = s.lens.x + x * (s.lens.y + x * s.lens.z);
+    return 1.0 / (1.0 + min(0.5 * off * off * fall, MOST_WIDENED));
+}
+
+// The beam's shape at a row: as it is behind even surfaces, wider and as much fainter behind those that bend the wavefront.
+vec4 shape_at(Stretch s, uint row) {
+    vec4 shape = rows[row].shape;
+    float narrow = narrowing(s, distance_at(s, float(row) + 0.5), INVERSE_FALL * shape.x);
+    return vec4(shape.x * narrow, shape.y, shape.z + 0.5 * log2(narrow), shape.w);
+}
+
+// Level of its speckle at distance x: one-way weight times echogenicity, log2.
+float level_at(Stretch s, float x) {
+    uint row = row_at(kappa_at(s, x));
+    float weight = s.weight * thinning(s, x, rows[row].shape);
+    return log2(weight) - s.absorption * LOG2_E * x + tissues[s.tissue].level;
+}
+
+// First and last bin that a stretch passes; if it passes none, the last is before the first.
+ivec2 bins_of(Stretch s) {
+    float begin = kappa_at(s, 0.0), end = kappa_at(s, s.extent);
+    if (!(end > 0.0) || !(begin < float(frame.samples))) return ivec2(0, -1);
+    return ivec2(row_at(begin) / SCATTER_BIN, row_at(end) / SCATTER_BIN);
+}
+
+// First and last slot that a stretch fills, up to half a sample at either end: stretches also end where the
+// recording ends, and rounding must not decide whether the last slot is filled.
+ivec2 slots_of(Stretch s) {
+    vec2 ends = clamp(vec2(kappa_at(s, 0.0), kappa_at(s, s.extent)), vec2(0.0), vec2(float(frame.samples))) / float(SCATTER_SLOT);
+    return ivec2(whole(ceil(ends.x - SLOT_MARGIN)), whole(floor(ends.y + SLOT_MARGIN)) - 1);
+}
+
+// Level of a stretch for the comparison with the others in a bin.
+float level_in(Stretch s, int bin) {
+    return level_at(s, clamp(distance_at(s, float(bin) * float(SCATTER_BIN) + 0.5 * float(SCATTER_BIN)), 0.0, s.extent));
+}
