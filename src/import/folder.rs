@@ -166,7 +166,7 @@ fn name_of(path: &Path) -> String {
 /// Reads a mesh in mm and LPS, and looks its name up.
 fn load(file: &Path, options: &Options) -> Result<(Organ, Vec<Issue>), FileError> {
     let reading = mesh::Options { units: options.units, ..mesh::Options::default() };
-    let mesh::Inspected { mesh, facts, issues, .. } = mesh::inspect(file, &reading);
+    let mesh::Inspected { mesh, facts, ras, issues, .. } = mesh::inspect(file, &reading);
     let Some(read) = mesh else {
         let worst = issues.into_iter().find(Issue::is_error).expect("a reason");
         let remedy = match facts == Facts::default() {
@@ -177,7 +177,7 @@ fn load(file: &Path, options: &Options) -> Result<(Organ, Vec<Issue>), FileError
     };
     // A file that states its frame was read into LPS.
     let turn = match (frame_of_mesh(file)?, options.frame) {
-        (Frame::Unstated, Some(Frame::Ras)) => -1.0,
+        (Frame::Unstated, Some(Frame::Ras)) if !ras => -1.0,
         _ => 1.0,
     };
     let place = |[x, y, z]: &[f32; 3]| [turn * x, turn * y, *z];

@@ -85,6 +85,8 @@ pub struct Inspected {
     pub mesh: Option<Mesh>,
     /// Measures after repair.
     pub facts: check::Facts,
+    /// True if the file states that its frame is RAS; then the mesh has been turned into LPS.
+    pub ras: bool,
     /// Names of objects, groups or nodes that hold triangles.
     pub parts: Vec<String>,
     /// All findings.
@@ -98,7 +100,7 @@ pub(super) struct Parts {
     pub issues: Vec<Issue>,
     /// The unit, where format or file say it.
     pub units: Option<Units>,
-    /// True where the file states, by means of its format, that its frame is RAS.
+    /// True where the file states that its frame is RAS.
     pub ras: bool,
 }
 
@@ -134,7 +136,7 @@ pub fn inspect(path: &Path, options: &Options) -> Inspected {
 
 /// All chosen triangles of a file, mm. None if it could not be read; the reason is then among the issues.
 fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(Soup, Units)> {
-    let Parts { parts, issues, units, .. } = match read_parts(path, options) {
+    let Parts { parts, issues, units, ras } = match read_parts(path, options) {
         Ok(parts) => parts,
         Err(issues) => {
             found.issues = issues;
@@ -142,6 +144,7 @@ fn read_raw(path: &Path, options: &Options, found: &mut Inspected) -> Option<(So
         }
     };
     found.issues = issues;
+    found.ras = ras;
     found.parts = parts.iter().map(|p| p.name.clone()).collect();
 
     let parts = match &options.node {
@@ -187,7 +190,8 @@ fn read_parts(path: &Path, options: &Options) -> Result<Parts, Vec<Issue>> {
         let message = format!("is read as {found:?}, as which it begins, whatever its name says");
         out.issues.push(Issue::warning(path, 1, message, "give it the extension of its format"));
     }
-    if out.ras || kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes) {
+    out.ras |= kind.is_some_and(Kind::is_text) && formats::states_ras(&bytes);
+    if out.ras {
         let positions = out.parts.iter_mut().flat_map(|part| &mut part.positions);
         positions.for_each(|[x, y, _]| (*x, *y) = (-*x, -*y));
         let message = "states that its frame is RAS: turned into LPS, in which volumes are";

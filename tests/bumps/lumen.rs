@@ -1,4 +1,4 @@
-//! How much of a lumen is dark.
+//! The dark part of a lumen.
 
 use insonify::probe::Probe;
 use insonify::scene::Scene;
@@ -74,7 +74,7 @@ pub fn levels(simulator: &mut Simulator, scene: &Scene) -> Vec<f32> {
     simulator.log_image().expect("an image")
 }
 
-/// How much of the lumen is dark.
+/// The part of the lumen that is dark, 0 to 1.
 pub fn share(dark: &[bool], lumen: &[bool]) -> f64 {
     let inside = lumen.iter().filter(|&&l| l).count();
     dark.iter().zip(lumen).filter(|&(&d, &l)| d && l).count() as f64 / inside as f64

@@ -45,8 +45,8 @@ fn crossings(scene: &Scene, o: DVec3, d: DVec3) -> Vec<Vec<f64>> {
     scene.instances.iter().map(of).collect()
 }
 
-/// Whether each sample lies in one of [`LUMINA`], straight along its scanline; and whether its neighbours 2.5 mm before
-/// and behind it do, so that it is no vessel narrower than the resolution.
+/// For each sample, true if it lies in one of [`LUMINA`], straight along its scanline, and its neighbours 2.5 mm
+/// before and behind it do, too, so that it is no vessel narrower than the resolution.
 fn in_lumina(scene: &Scene) -> Vec<bool> {
     let probe = &scene.probe;
     let samples = probe.samples as usize;

@@ -34,7 +34,7 @@ fn make() -> Option<PathBuf> {
     Some(python)
 }
 
-/// What a script prints in JSON.
+/// The JSON that a script prints.
 pub fn run(python: &Path, script: &str, args: &[&str]) -> Value {
     let out = Command::new(python).args(["-c", script]).args(args).output();
     let out = out.expect("Python starts");

@@ -83,7 +83,7 @@ fn a_trajectory_comes_back_from_the_loop() {
     }
 }
 
-/// Where the pixel (i, j) of a frame lies in RAS by the rules of 3D Slicer and SlicerIGSIO, from the lines of a header.
+/// The place in RAS of pixel (i, j) of a frame by the rules of 3D Slicer and SlicerIGSIO, from the lines of a header.
 struct Slicer {
     /// RAS of the volume node from pixels.
     node: DAffine3,

@@ -71,6 +71,24 @@ pub fn obj(mesh: &Mesh, change: impl Fn(DVec3) -> DVec3) -> String {
     out
 }
 
+/// A mesh in VTK's XML, with the frame that 3D Slicer states in its field data.
+pub fn vtp_in_ras(mesh: &Mesh, change: impl Fn(DVec3) -> DVec3) -> String {
+    let points = mesh.positions.iter().map(|p| change(DVec3::from(p.map(f64::from))));
+    let points: String = points.map(|p| format!("{} {} {} ", p.x, p.y, p.z)).collect();
+    let corners: String = mesh.triangles.iter().flatten().map(|v| format!("{v} ")).collect();
+    let ends: String = (1..=mesh.triangles.len()).map(|n| format!("{} ", 3 * n)).collect();
+    let (vertices, triangles) = (mesh.positions.len(), mesh.triangles.len());
+    format!(
+        "<VTKFile type=\"PolyData\" version=\"0.1\" byte_order=\"LittleEndian\"><PolyData>\
+         <FieldData><DataArray type=\"String\" Name=\"SPACE\" format=\"ascii\">82 65 83 0</DataArray></FieldData>\
+         <Piece NumberOfPoints=\"{vertices}\" NumberOfPolys=\"{triangles}\"><Points>\
+         <DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{points}</DataArray></Points>\
+         <Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">{corners}</DataArray>\
+         <DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">{ends}</DataArray></Polys>\
+         </Piece></PolyData></VTKFile>"
+    )
+}
+
 /// A folder with the scene, and the known transforms.
 pub struct Case {
     pub folder: tempfile::TempDir,

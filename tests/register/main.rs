@@ -12,7 +12,7 @@ mod mistakes;
 #[path = "../common/program.rs"]
 mod program;
 
-use case::{Case, SCENE, apex, model, obj};
+use case::{Case, SCENE, apex, model, obj, vtp_in_ras};
 
 const SURFACE: [&str; 4] = ["--surface", "model", "--points", "points.csv"];
 
@@ -117,10 +117,14 @@ fn a_segmented_mesh_does_as_well_in_either_frame() {
     case.write("lps.obj", &lps);
     case.write("said.obj", &format!("# written by 3D Slicer SPACE=RAS\n{ras}"));
     case.write("ras.obj", &ras);
+    let turned = |p| placed.transform_point3(p) * DVec3::new(-1.0, -1.0, 1.0);
+    case.write("said.vtp", &vtp_in_ras(&case.mesh, turned));
     let common = ["--surface", "model", "-o", "new.toml", "--samples", "2000"];
     for args in [
         &["--volume-surface", "lps.obj"][..],
         &["--volume-surface", "said.obj"],
+        &["--volume-surface", "said.vtp"],
+        &["--volume-surface", "said.vtp", "--frame", "ras"],
         &["--volume-surface", "ras.obj", "--frame", "ras"],
     ] {
         case.register(&[&common[..], args].concat());

@@ -48,7 +48,7 @@ pub fn of(volume: &Volume, scene: &Scene, stations: &[Station]) -> dicom::Volume
     }
 }
 
-/// What of the probe's pose changes over the stations.
+/// The changes of the probe's pose over the stations: of its place, its direction, both or none.
 fn motion(stations: &[Station]) -> Motion {
     let pose = |station: &Station| station.world_from_probe;
     let first = pose(&stations[0]);

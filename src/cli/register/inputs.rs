@@ -11,7 +11,7 @@ use insonify::scene::graph::{Placed, is_even};
 use insonify::scene::{Acquired, Mesh, Scene, mesh};
 use insonify::settings::suggest;
 use insonify::volume::Frame;
-use miette::{Report, Result, miette};
+use miette::{Result, miette};
 
 use super::Register;
 use crate::cli::common::notes;
@@ -25,8 +25,8 @@ pub fn points(args: &Register) -> Result<Option<Vec<DVec3>>> {
     let Some(file) = &args.volume_surface else {
         return Ok(None);
     };
-    let mesh = mesh_file(file)?;
-    let said = points::frame_of_mesh(file)?;
+    let (mesh, ras) = mesh_file(file)?;
+    let said = if ras { Frame::Ras } else { points::frame_of_mesh(file)? };
     let frame = points::agreed(file, said, args.frame)?;
     // A file that states its frame was read into LPS.
     let read = if said == Frame::Unstated { frame } else { Frame::Lps };
@@ -87,7 +87,7 @@ pub fn surface(args: &Register, scene: &Scene) -> Result<TriangleSurface> {
     for name in &args.surface {
         let instances = instances(scene, name);
         if instances.is_empty() {
-            triangles.extend(placed(&mesh_file(&file(scene, name)?)?, &DAffine3::IDENTITY));
+            triangles.extend(placed(&mesh_file(&file(scene, name)?)?.0, &DAffine3::IDENTITY));
         }
         for i in instances {
             if !scene.instances[i].shown {
@@ -166,14 +166,16 @@ fn file(scene: &Scene, name: &str) -> Result<PathBuf> {
     }
 }
 
-fn mesh_file(path: &Path) -> Result<Mesh> {
-    let (mesh, issues) = mesh::load(path, &mesh::Options::default()).map_err(|issues| {
+/// The mesh of a file; true if the file states that its frame is RAS, from which it has been turned into LPS.
+fn mesh_file(path: &Path) -> Result<(Mesh, bool)> {
+    let mesh::Inspected { mesh, ras, issues, .. } = mesh::inspect(path, &mesh::Options::default());
+    let Some(mesh) = mesh else {
         let first = issues.into_iter().find(insonify::scene::Issue::is_error);
         let (message, remedy) = first.map_or_else(Default::default, |i| (i.message, i.remedy));
-        Report::from(FileError::file(path, message, remedy))
-    })?;
+        return Err(FileError::file(path, message, remedy).into());
+    };
     notes(issues);
-    Ok(mesh)
+    Ok((mesh, ras))
 }
 
 fn placed(mesh: &Mesh, world_from_object: &DAffine3) -> Vec<Triangle> {

@@ -1,4 +1,4 @@
-//! What the frames of a render become: an image each, or one file of all.
+//! The files that the frames of a render become: an image each, or one file of all.
 
 use std::path::Path;
 

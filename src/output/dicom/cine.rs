@@ -10,7 +10,7 @@ use super::{DicomError, Transducer};
 /// Code of centimetres in a region (PS3.3, C.8.5.5.1.15).
 const CENTIMETRES: u16 = 3;
 
-/// What a loop shows.
+/// Scene, scale and pace of a loop.
 #[derive(Clone, Debug, PartialEq)]
 pub struct About {
     /// Name of what is imaged; it stands for the patient's.

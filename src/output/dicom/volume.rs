@@ -19,7 +19,7 @@ const MOMENT: &str = "%Y%m%d%H%M%S%.6f+0000";
 /// Cosine to an axis of the patient from which on a plane counts as lying across it: ten degrees.
 const ALONG: f64 = 0.985;
 
-/// What changes between transducer and volume while it is acquired.
+/// Movement of the transducer against the volume while it is acquired.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Nothing.
@@ -59,7 +59,7 @@ pub struct Volume {
     pub first: DVec3,
     /// The patient's LPS from the transducer's frame, rigid, mm.
     pub patient_from_transducer: DAffine3,
-    /// What changed.
+    /// Movement of the transducer meanwhile.
     pub motion: Motion,
     /// Time from the first frame to the last, s.
     pub duration: f64,

@@ -23,7 +23,7 @@ pub struct Work {
 }
 
 impl Work {
-    /// What is to be said of a scene; nothing as a rule.
+    /// The excess of work that a scene asks for; none as a rule.
     pub fn of(scene: &Scene) -> Option<Self> {
         let cells = Calibration::new(scene).lattice_cells();
         (cells > MANY).then(|| Self {

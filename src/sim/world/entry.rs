@@ -21,7 +21,7 @@ pub(super) enum EntryGeometry {
     Mesh(usize),
     /// The latest shape that the device computed for an instance that changes its shape.
     Changing {
-        /// How many times it was computed.
+        /// Number of times that it was computed.
         version: u64,
     },
     /// The keyframe that the instance's row names.
