@@ -70,10 +70,8 @@ bool passes_sphere(Stretch s, vec4 sphere) {
     // An offset by a lens is largest at an end of the part, or at its turning point.
     float turn = clamp(-0.5 * s.lens.y / mix(s.lens.z, 1.0, s.lens.z == 0.0), max(x - r, 0.0), min(x + r, s.extent));
     vec3 at = vec3(max(x - r, 0.0), min(x + r, s.extent), turn);
-    vec3 off = s.lens.x + at * (s.lens.y + at * s.lens.z);
-    float most = max(max(abs(off.x), abs(off.y)), abs(off.z));
-    vec2 sigma = vec2(rows[ends.x].sigma_lateral, rows[ends.y].sigma_lateral);
-    sigma *= sqrt(1.0 + min(0.5 * most * most / (sigma * sigma), MOST_WIDENED));
-    float width = 4.0 * max(sigma.x, sigma.y);
+    vec3 off = abs(offset_at(s, at));
+    float sigma = max(rows[ends.x].sigma_lateral, rows[ends.y].sigma_lateral);
+    float width = 4.0 * sigma * sqrt(widened(max(max(off.x, off.y), off.z), 1.0 / (sigma * sigma)));
     return abs(dot(rel, s.e_l)) <= width + r;
 }

@@ -85,12 +85,15 @@ float thinning(Stretch s, float x, vec4 shape) {
     return beam * min(1.0, sqrt(s.share / cells));
 }
 
-// 1 / sigma^2 across over that of an even wavefront, at distance x: transmitted and received beam each are wider by the
-// lens, the product of both by half its square. `fall` is 1 / sigma^2 of the row.
-float narrowing(Stretch s, float x, float fall) {
-    float off = s.lens.x + x * (s.lens.y + x * s.lens.z);
-    return 1.0 / (1.0 + min(0.5 * off * off * fall, MOST_WIDENED));
-}
+// Offset, at distances x, of what comes one deviation beside the beam's axis, mm.
+vec3 offset_at(Stretch s, vec3 x) { return s.lens.x + x * (s.lens.y + x * s.lens.z); }
+
+// Variance across over that of an even wavefront, whose 1 / sigma^2 is `fall`: transmitted and received beam each are
+// wider by the offset, the product of both by half its square.
+float widened(float off, float fall) { return 1.0 + min(0.5 * off * off * fall, MOST_WIDENED); }
+
+// 1 / sigma^2 across over that of an even wavefront at distance x, `fall` as above.
+float narrowing(Stretch s, float x, float fall) { return 1.0 / widened(offset_at(s, vec3(x)).x, fall); }
 
 // The beam's shape at a row: as it is behind even surfaces, wider and as much fainter behind those that bend the wavefront.
 vec4 shape_at(Stretch s, uint row) {

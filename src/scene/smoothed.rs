@@ -8,9 +8,9 @@
 //! is near only through space, as the next vessel of a bundle, has no part in it. Neither has a surface behind an
 //! edge sharper than [`CREASE`].
 //!
-//! Where a body is thinner than the beam is wide, as at the edge of the liver, the area reaches around it to the far
-//! side, whose normals cancel those of the near one: the mean is short. That length goes with the direction, as the
-//! measure of how much of the wavefront the surface turns; the rest passes the body by.
+//! The mean is short where a body is thinner than the beam is wide, as at the edge of the liver: the area reaches around
+//! it to the far side, whose normals cancel those of the near one. That length goes with the direction, as the measure
+//! of how much of the wavefront the surface turns; the rest passes the body by.
 
 use glam::DVec3;
 

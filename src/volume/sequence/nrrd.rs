@@ -135,7 +135,7 @@ pub(super) fn write(sequence: &Sequence, path: &Path) -> Result<(), FileError> {
     create(path, &text, &encoder.finish().expect("memory"))
 }
 
-/// Where the planes of all frames are, as far as they are in one place: in the probe's frame by their calibration, else in
+/// The place of the planes of all frames, as far as it is one: in the probe's frame by their calibration, else in
 /// their own, by the size of a pixel.
 fn placed(sequence: &Sequence) -> DAffine3 {
     let mut frames = sequence.frames.iter().map(|f| f.poses.get(CALIBRATION));

@@ -60,8 +60,8 @@ fn main_weights(out: &Traced) -> Vec<f64> {
     straight.map(|s| s.weight).collect()
 }
 
-/// Where a wavefront as wide as can be computed for passes the top of a sphere of radius R, it is bent by
-/// (c2 / c1 - 1) / R per mm; the lens grows with the square of the way.
+/// A wavefront that passes the top of a sphere of radius R is bent by (c2 / c1 - 1) / R per mm; the lens grows with the
+/// square of the way.
 #[test]
 fn a_sphere_is_a_thin_lens() {
     let [c1, c2, radius, aperture] = [1.5, 1.6, 40.0, 0.1];
