@@ -1,46 +1,34 @@
 //! The text of an error: message and causes, the lines of the file that it is about, the remedy.
 
-use std::fmt::{Error, Formatter, Result, Write as _};
-use std::io::{IsTerminal, stderr};
+use std::fmt::Write as _;
 
-use miette::{Diagnostic, ReportHandler, SourceCode, SourceSpan};
+use miette::{Diagnostic, SourceCode, SourceSpan};
 
-/// Makes errors of all commands appear in this form.
-pub fn install() {
-    let red = stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|v| v.is_empty());
-    miette::set_hook(Box::new(move |_| Box::new(Teller { red }))).expect("set once");
-}
-
-struct Teller {
-    /// True for text in colour.
-    red: bool,
-}
-
-impl ReportHandler for Teller {
-    fn debug(&self, error: &dyn Diagnostic, f: &mut Formatter<'_>) -> Result {
-        let title = if self.red { "\x1b[1;31merror\x1b[0m" } else { "error" };
-        write!(f, "{title}: {error}")?;
-        // The help and the place may be those of an error that others are about.
-        let mut inner = error;
-        while let Some(cause) = inner.diagnostic_source() {
-            inner = cause;
-            write!(f, "\n  because: {inner}")?;
-        }
-        let mut cause = inner.source();
-        while let Some(error) = cause {
-            write!(f, "\n  because: {error}")?;
-            cause = error.source();
-        }
-        let source = error.source_code().or(inner.source_code());
-        let mut labels = error.labels().or(inner.labels()).into_iter().flatten();
-        if let (Some(source), Some(label)) = (source, labels.next()) {
-            write!(f, "\n{}", lines(source, label.inner()).ok_or(Error)?)?;
-        }
-        if let Some(help) = error.help().or(inner.help()) {
-            write!(f, "\n  help: {help}")?;
-        }
-        Ok(())
+/// The text of an error, several lines: message, causes, lines of the file, remedy.
+pub fn told(error: &dyn Diagnostic) -> String {
+    let mut out = error.to_string();
+    // The help and the place may be those of an error that others are about.
+    let mut inner = error;
+    while let Some(cause) = inner.diagnostic_source() {
+        inner = cause;
+        out += &format!("\n  because: {inner}");
     }
+    let mut cause = inner.source();
+    while let Some(error) = cause {
+        out += &format!("\n  because: {error}");
+        cause = error.source();
+    }
+    let source = error.source_code().or(inner.source_code());
+    let mut labels = error.labels().or(inner.labels()).into_iter().flatten();
+    if let (Some(source), Some(label)) = (source, labels.next())
+        && let Some(lines) = lines(source, label.inner())
+    {
+        out += &format!("\n{lines}");
+    }
+    if let Some(help) = error.help().or(inner.help()) {
+        out += &format!("\n  help: {help}");
+    }
+    out
 }
 
 /// The line in which `span` begins, with the one before it, and a mark below the span.
