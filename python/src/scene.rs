@@ -54,7 +54,6 @@ impl State {
             self.scene.settings = draft.settings()?;
         } else {
             let (scene, warnings) = draft.scene()?;
-            // A live mesh keeps the shape that it has taken.
             self.scene = scene;
             self.warnings = texts(&warnings);
             self.generation += 1;
@@ -81,6 +80,25 @@ impl State {
     /// Paths of the keys that were set by hand.
     pub fn by_hand(&self) -> impl Iterator<Item = &str> {
         self.draft.overridden()
+    }
+
+    fn reshape(&mut self, name: &str, positions: &[[f32; 3]]) -> PyResult<()> {
+        let instance = self.instance(name)?;
+        let surface = self.surfaces.get(name).ok_or_else(|| {
+            PyValueError::new_err(format!(
+                "mesh `{name}` is that of a file; only meshes made of arrays take other vertices"
+            ))
+        })?;
+        if positions.len() != surface.vertices() {
+            let (given, own) = (positions.len(), surface.vertices());
+            return Err(PyValueError::new_err(format!(
+                "mesh `{name}` has {own} vertices, not {given}"
+            )));
+        }
+        let shape = surface.shape(positions);
+        self.draft.give(name, shape.clone());
+        self.scene.reshape(instance, shape);
+        Ok(())
     }
 
     fn instance(&self, name: &str) -> PyResult<usize> {
@@ -333,6 +351,19 @@ impl Scene {
         state.pose = Some(pose);
         state.scene.world_from_probe = pose;
         Ok(())
+    }
+
+    /// Gives a mesh that was made of arrays other positions of its vertices, [N, 3] in mm.
+    fn set_vertices(
+        &self,
+        py: Python<'_>,
+        mesh: &str,
+        vertices: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let positions = arrays::positions(vertices)?;
+        py.detach(|| {
+            self.state.lock().unwrap_or_else(PoisonError::into_inner).reshape(mesh, &positions)
+        })
     }
 
     /// World from object space of a mesh.

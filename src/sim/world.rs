@@ -4,6 +4,7 @@ mod arrays;
 mod changing;
 mod entry;
 mod joined;
+mod live;
 mod refit;
 mod top;
 
@@ -59,6 +60,8 @@ pub struct World {
     top: TopLevel,
     rows: Vec<layout::Instance>,
     mask: RayMask,
+    /// For each instance the number of shapes that a program had set when they were last taken.
+    revisions: Vec<u64>,
     /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
     kernels: Arc<ShapeKernels>,
@@ -178,6 +181,7 @@ impl World {
             apart,
             rows: arrays.instances,
             mask: RayMask::default(),
+            revisions: scene.instances.iter().map(|i| i.keyframes.revision).collect(),
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             kernels: Arc::clone(kernels),
         };
@@ -244,6 +248,7 @@ impl World {
             self.instances(),
             "instances were added or removed after the upload"
         );
+        self.take_shapes(commands, scene)?;
         let reshaped = self.changing.record(
             commands,
             scene,
