@@ -45,7 +45,8 @@ float power_of(Stretch s, uint k, uint layer) {
     vec4 shape = rows[k].shape;
     float amplitude = s.weight * thinning(s, x, shape) * exp(-s.absorption * x) * exp2(tissues[s.tissue].level);
     float power = amplitude * amplitude;
-    if ((frame.flags & FLAG_VOXEL) == 0u) power *= sqrt(narrowing(s, x, INVERSE_FALL * shape.x));
+    // In faster tissue a sample is longer and holds more scatterers.
+    if ((frame.flags & FLAG_VOXEL) == 0u) power *= s.speed / frame.speed * sqrt(narrowing(s, x, INVERSE_FALL * shape.x));
     return power * (to - from) * speckle[k * frame.layers + layer];
 }
 

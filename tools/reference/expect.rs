@@ -33,7 +33,8 @@ pub fn expect(world: &World, segments: &[Segment], speckle: &[f32]) -> Vec<[f64;
             let echo = tube.weight(x, row) * tube.absorbed(x) * f64::from(tissue.level).exp2();
             let mut power = echo * echo * (to - from);
             if frame.flags & FLAG_VOXEL == 0 {
-                // As much wider, and twice as much fainter.
+                // As much wider, and twice as much fainter; a sample is as much longer as sound is faster.
+                power *= f64::from(tissue.speed) / f64::from(frame.speed);
                 power /= tube.widened(x, falling(row)[0]).sqrt();
             }
             let at = (scanline * frame.samples + k) as usize;
