@@ -252,7 +252,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     float lowest = 1e9, highest = -1e9;
     int spans = clamp(whole(ceil(min((x.y - x.x) / LEVEL_SPAN, 64.0))), 2, 64);
     for (int i = 0; i <= spans; ++i) {
-        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))].shape.w, drowned);
+        float wanted = wanted_level(s.tissue, shape_at(s, row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))).w, drowned);
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }

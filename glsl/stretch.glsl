@@ -91,10 +91,12 @@ float widened(float off, float fall) { return 1.0 + min(0.5 * off * off * fall, 
 float narrowing(Stretch s, float x, float fall) { return 1.0 / widened(offset_at(s, vec3(x)).x, fall); }
 
 // The beam's shape at a row: as it is behind even surfaces, wider and as much fainter behind those that bend the wavefront.
+// Of what is wider, fewer scatterers are enough.
 vec4 shape_at(Stretch s, uint row) {
     vec4 shape = rows[row].shape;
     float narrow = narrowing(s, distance_at(s, float(row) + 0.5), INVERSE_FALL * shape.x);
-    return vec4(shape.x * narrow, shape.y, shape.z + 0.5 * log2(narrow), shape.w);
+    float fainter = 0.5 * log2(narrow);
+    return vec4(shape.x * narrow, shape.y, shape.z + fainter, mix(shape.w - fainter, shape.w, shape.w <= ALL_LEVELS));
 }
 
 // Level of its speckle at distance x: one-way weight times echogenicity, log2.

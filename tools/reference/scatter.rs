@@ -10,7 +10,7 @@ use super::geometry::{beam_weight, probe, world_line};
 use super::world::World;
 use super::{Accumulator, Segment};
 use insonify::sim::layout::{
-    FLAG_VOXEL, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
+    ALL_LEVELS, FLAG_VOXEL, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
 };
 
 /// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
@@ -251,6 +251,16 @@ impl<'a> Tube<'a> {
         let [a, b, c] = self.segment.lens;
         let off = a + x * (b + x * c);
         1.0 + (0.5 * off * off * fall).min(MOST_WIDENED.into())
+    }
+
+    /// Lattice level that the beam asks for at sample `k`: one that is wider has more scatterers in it.
+    fn wanted(&self, k: usize) -> f64 {
+        let row = &self.world.rows[k];
+        if row.shape[3] <= ALL_LEVELS {
+            return row.shape[3].into();
+        }
+        let widened = self.widened(self.distance(k as f64 + 0.5), falling(row)[0]);
+        f64::from(row.shape[3]) + 0.5 * widened.log2()
     }
 
     /// Half the beam's width at sample `k`, mm: the beam's section is an ellipse, of which the
