@@ -12,6 +12,7 @@ fn segment(length: f64) -> Segment {
         weight: 1.0,
         spread: [0.0; 3],
         lens: [0.0; 3],
+        reflections: 0,
         share: 1.0,
         tissue: 0,
         instance: NONE,
