@@ -8,6 +8,7 @@ use super::{Origins, Scene, Tissue, Warning};
 mod anatomy;
 mod contact;
 mod document;
+mod draft;
 mod error;
 mod fusion;
 mod graph;
@@ -29,6 +30,7 @@ mod trajectory;
 mod vary;
 
 pub use document::quoted;
+pub use draft::{Draft, Known, known};
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
@@ -67,7 +69,8 @@ impl Scene {
         path: &Path,
         overrides: &[(String, String)],
     ) -> Result<(Self, Vec<Warning>), SceneError> {
-        Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
+        let (scene, _, warnings) = Self::of_source(&Source::read(path, overrides)?, false)?;
+        Ok((scene, warnings))
     }
 
     /// Like [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
@@ -79,16 +82,15 @@ impl Scene {
         path: &Path,
         overrides: &[(String, String)],
     ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
-        Self::load_with(path, overrides, true)
+        Self::of_source(&Source::read(path, overrides)?, true)
     }
 
     /// Loads a scene with its variants; with `suggested` also those of parameters that the file does not vary.
-    fn load_with(
-        path: &Path,
-        overrides: &[(String, String)],
+    fn of_source(
+        source: &Source,
         suggested: bool,
     ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
-        let source = Source::read(path, overrides)?;
+        let path = &source.path;
         let document = source.document()?;
         let file = document.parse()?;
         let mut warnings = Vec::new();
