@@ -127,8 +127,9 @@ vec3 place_before(uint instance, vec3 p) {
     if (instance == NONE) return p;
     vec3 q = apply_point(instances[instance].texture_from_world, p);
     uint now = field_of(instance), then = instances_before[instance].field;
+    // Without a field then, the reference shape was shown.
+    if (now != NONE) q = reference_point(load_field(now), q);
     if (now != NONE && then != NONE) {
-        q = reference_point(load_field(now), q);
         past = true;
         q = displaced(load_field(then), q);
         past = false;

@@ -1,10 +1,10 @@
-// A segment of a path as scatter.comp hears it: where its samples lie, how wide and how loud the beam is along it.
+// A segment of a path as scatter.comp and expect.comp hear it: where its samples lie, how wide and how loud the beam is along it.
 //
 // The includer declares frame, tissues[], rows[] and segments[], and includes transform.glsl and probe.glsl.
 
 const float LOG2_E = 1.44269504;
+const float INVERSE_FALL = 1.38629436;    // 2 ln 2: times `shape.x` or `shape.y` it is 1 / sigma^2
 const float SLOT_MARGIN = 0.5 / float(SCATTER_SLOT);
-const float INVERSE_FALL = 1.38629436;   // 2 ln 2: times `shape.x` or `shape.y` it is 1 / sigma^2
 
 // A segment in the frame of its scatterers.
 struct Stretch {

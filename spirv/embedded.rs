@@ -22,6 +22,7 @@
     ("origin_bvh", include_bytes!("origin_bvh.spv")),
     ("origin_count", include_bytes!("origin_count.spv")),
     ("origin_query", include_bytes!("origin_query.spv")),
+    ("paint", include_bytes!("paint.spv")),
     ("rays_bvh", include_bytes!("rays_bvh.spv")),
     ("rays_count", include_bytes!("rays_count.spv")),
     ("rays_query", include_bytes!("rays_query.spv")),

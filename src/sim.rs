@@ -89,6 +89,7 @@ pub struct Simulator {
     /// The kernel and buffers of the 3D view; made when it is first asked for.
     viewer3d: Option<Viewer3d>,
     tinted_on: Option<(Image, Tint)>,
+    painted_on: Option<(Image, f32)>,
     read_out: ReadOut,
     update_time: Duration,
 }
@@ -180,6 +181,7 @@ impl Simulator {
             shown_on: None,
             viewer3d: None,
             tinted_on: None,
+            painted_on: None,
             read_out: ReadOut::default(),
             update_time: Duration::ZERO,
             passes: Passes {
@@ -253,6 +255,10 @@ impl Simulator {
         if let (Some((image, tint)), true) = (&self.tinted_on, self.fused) {
             let tinted = passes.tint(&mut cmd, tint)?;
             cmd.copy_to_image(tinted, image)?;
+        }
+        if let (Some((image, opacity)), true) = (&self.painted_on, labelled) {
+            let painted = passes.paint(&mut cmd, scene, *opacity, self.fused)?;
+            cmd.copy_to_image(painted, image)?;
         }
         self.read_out.record(&mut cmd, passes.pixels(self.fused))?;
         cmd.submit()?;

@@ -11,9 +11,9 @@ use insonify_tools::harness::{self, Case, Element, Job, SUBJECTS, Size, dump};
 
 const GLSL: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/glsl");
 
-/// Kernels of pictures for the user, without a twin: tests/view3d.rs and tests/fusion.rs compare them with
-/// closed forms.
-const CLOSED_FORMS: [&str; 3] = ["view3d_bvh", "view3d_query", "tint"];
+/// Kernels of pictures for the user, without a twin: tests/view3d.rs, tests/fusion.rs and tests/labels compare them
+/// with closed forms.
+const CLOSED_FORMS: [&str; 4] = ["view3d_bvh", "view3d_query", "tint", "paint"];
 
 fn subject(name: &str) {
     let subject = SUBJECTS.iter().find(|s| s.name == name).unwrap();

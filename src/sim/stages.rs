@@ -14,6 +14,7 @@ pub use inputs::{ANATOMY, INPUTS};
 pub use label::LABEL;
 pub use mask::MASK;
 pub use origin::ORIGIN;
+pub use paint::PAINT;
 pub use pyramid::{COLLAPSE, DIFFERENCE, REDUCE};
 pub use scatter::SCATTER;
 pub use shadow::{DARKEN, SHADOW};
@@ -32,6 +33,7 @@ mod inputs;
 mod label;
 mod mask;
 mod origin;
+pub(super) mod paint;
 pub(super) mod pyramid;
 mod scatter;
 mod shadow;
@@ -51,7 +53,7 @@ pub const FUSION: [&Pass; 10] =
 
 /// All stages.
 pub fn all() -> impl Iterator<Item = &'static Pass> {
-    IMAGE.into_iter().chain(LABELS).chain(FUSION)
+    IMAGE.into_iter().chain(LABELS).chain([&PAINT]).chain(FUSION)
 }
 
 /// Names of all stages, in order; the time of a stage is reported under its name.
@@ -64,7 +66,7 @@ pub fn names() -> Vec<&'static str> {
 /// Stages that frames of a scene may run, with any settings.
 pub(super) fn of(scene: &Scene) -> impl Iterator<Item = &'static Pass> {
     let fusion = scene.volume.is_some().then_some(FUSION);
-    IMAGE.into_iter().chain(LABELS).chain(fusion.into_iter().flatten())
+    IMAGE.into_iter().chain(LABELS).chain([&PAINT]).chain(fusion.into_iter().flatten())
 }
 
 /// The buffers that a frame of `scene` needs.

@@ -102,6 +102,7 @@ pub(super) fn show(
     grey_bar(&painter, area, &place, frame);
     orientation(&painter, &place, frame);
     real::legend(&painter, area, frame, model);
+    real::tissues(&painter, area, frame, model);
     Some(place)
 }
 

@@ -47,13 +47,19 @@ pub(super) fn show(ui: &mut Ui, model: &mut Model, state: &mut State, now: Insta
             section(ui, "Registration", false, |ui| registration::show(ui, model, planes));
         }
         let (settings, loaded) = (&mut model.settings, &model.loaded);
+        let mut layer = model.layer;
         section(ui, "Tissues", false, |ui| {
+            anatomy::layer(ui, &mut layer);
             anatomy::tissues(ui, settings, loaded, &mut state.tissue);
         });
         let meshes = &model.meshes;
         section(ui, "Surfaces", false, |ui| {
             anatomy::surfaces(ui, settings, loaded, meshes, &mut state.mesh);
         });
+        if layer != model.layer {
+            model.layer = layer;
+            model.touch(now);
+        }
     });
     model.note(&before, now);
 }

@@ -68,6 +68,8 @@ pub struct Frame {
     pub image: Image,
     /// The same image with its acquired pixels coloured; only where asked for and where there are some.
     pub tinted: Option<Image>,
+    /// The same image with the tissues that are seen in their colours; only where asked for.
+    pub painted: Option<Image>,
     /// Place of the image in the probe's space.
     pub sector: Sector,
     /// The probe that it was made with.

@@ -41,6 +41,7 @@ enum Action {
     Timing,
     Mmode,
     Real,
+    Layer,
     Help,
     Close,
     Quit,
@@ -133,7 +134,7 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
         "save settings (with Shift: as), load settings or a scene",
     ),
     (
-        "C V G T M B",
+        "C V G T M B I",
         &[
             (Key::C, false, Action::Console),
             (Key::V, false, Action::View3d),
@@ -141,8 +142,9 @@ const BINDINGS: &[(&str, &[Binding], &str)] = &[
             (Key::T, false, Action::Timing),
             (Key::M, false, Action::Mmode),
             (Key::B, false, Action::Real),
+            (Key::I, false, Action::Layer),
         ],
-        "console, 3D view, planes of the volume, timings, M-mode, which pixels are real",
+        "console, 3D view, planes of the volume, timings, M-mode, which pixels are real, tissues in colours",
     ),
     (
         "? Esc",
@@ -278,6 +280,10 @@ fn carry_out(
         Action::Mmode => mmode::toggle(model, now),
         Action::Real => {
             model.real.shown = !model.real.shown;
+            model.touch(now);
+        }
+        Action::Layer => {
+            model.layer.shown = !model.layer.shown;
             model.touch(now);
         }
         Action::Help => state.help = !state.help,

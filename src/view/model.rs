@@ -9,6 +9,7 @@ mod devices;
 mod entries;
 mod history;
 pub mod hold;
+mod layer;
 pub mod mmode;
 mod pad;
 mod pose;
@@ -35,6 +36,7 @@ pub use clock::Clock;
 pub use devices::{Devices, Source};
 use history::History;
 use hold::Hold;
+pub use layer::Layer;
 use mmode::Strip;
 pub use pad::{Control, Pad, Press};
 pub use pose::{Axis, STEP, moved};
@@ -73,6 +75,8 @@ pub struct Model {
     pub mmode: Option<Strip>,
     /// The placed meshes, as [`Settings::surfaces`].
     pub meshes: Vec<Placed>,
+    /// The tissue around them: index into [`Settings::tissues`].
+    pub background: usize,
     /// The 3D view; changes of it are no new revision, since the image stays.
     pub view3d: View3d,
     /// The settings of the scene file.
@@ -87,6 +91,8 @@ pub struct Model {
     pub file: File,
     /// The marking of acquired pixels.
     pub real: Real,
+    /// The tissues that are seen, in colours.
+    pub layer: Layer,
     history: History,
     revision: u64,
     opened: Instant,
@@ -117,6 +123,8 @@ pub struct Order {
     pub settings: Settings,
     /// Colours of the acquired pixels in a second image, if wanted.
     pub tint: Option<Tint>,
+    /// Opacity of the tissues' colours in a third image, if wanted.
+    pub paint: Option<f32>,
     /// World from probe, unless a replay moves it.
     pose: DAffine3,
     /// The trajectory that the probe follows.
@@ -178,12 +186,14 @@ impl Model {
                     switch: scene.origins.instances.get(index).map(entries::switch),
                 })
                 .collect(),
+            background: scene.background,
             view3d: View3d::new(scene),
             home: scene.world_from_probe,
             hold: Hold::of(scene),
             registration: Registration::of(scene),
             file,
             real: Real::default(),
+            layer: Layer::default(),
             history: History::default(),
             revision: 0,
             opened: now,
@@ -312,6 +322,7 @@ impl Model {
         Order {
             settings: self.settings.clone(),
             tint: self.real.tint(),
+            paint: self.layer.paint(),
             pose: self.pose,
             clock: self.clock,
             replay: self.trajectory.replay.clone(),

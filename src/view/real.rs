@@ -1,4 +1,4 @@
-//! The image with marked acquired pixels, and its legend.
+//! The image with marked acquired pixels, or with the tissues in colours, and its legend.
 
 use egui::{Align2, Color32, FontId, Rect, pos2, vec2};
 
@@ -7,11 +7,38 @@ use super::model::Model;
 use super::model::real::COLOUR;
 use super::style;
 use crate::gpu::Image;
+use crate::scene::palette;
 
 /// The image of a frame to be shown.
 pub(super) fn image<'f>(frame: &'f Frame, model: &Model) -> &'f Image {
+    let painted = frame.painted.as_ref().filter(|_| model.layer.shown);
     let tinted = frame.tinted.as_ref().filter(|_| model.real.shown);
-    tinted.unwrap_or(&frame.image)
+    painted.or(tinted).unwrap_or(&frame.image)
+}
+
+/// Draws the colours of the tissues of meshes and background below each other at the upper right of `area`.
+pub(super) fn tissues(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
+    if !model.layer.shown || frame.painted.is_none() {
+        return;
+    }
+    let used = |index: &usize| {
+        *index == model.background || model.meshes.iter().any(|m| m.tissue == *index)
+    };
+    let mut y = area.top() + 49.0;
+    for index in (0..frame.settings.tissues.len()).filter(used) {
+        let name = &frame.settings.tissues[index].name;
+        let at = pos2(area.right() - 12.0, y);
+        let font = FontId::proportional(12.0);
+        let place = painter.text(at, Align2::RIGHT_CENTER, name, font, style::TEXT);
+        let [r, g, b] = palette::look(name, index).0;
+        let swatch = Rect::from_min_size(pos2(place.left() - 20.0, y - 5.0), vec2(15.0, 10.0));
+        painter.rect_filled(swatch, 2.0, Color32::from_rgb(r, g, b));
+        y += 16.0;
+        // As many as have room.
+        if y > area.bottom() {
+            break;
+        }
+    }
 }
 
 /// Grey level of the legend's samples.
@@ -19,7 +46,7 @@ const GREY: u8 = 110;
 
 /// Draws the meaning of the colours at the upper right of `area`; where nothing is coloured, the reason.
 pub(super) fn legend(painter: &egui::Painter, area: Rect, frame: &Frame, model: &Model) {
-    if !model.real.shown {
+    if !model.real.shown || model.layer.shown {
         return;
     }
     let font = FontId::proportional(12.0);

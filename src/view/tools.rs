@@ -85,8 +85,9 @@ impl Tools {
         if self.cine.newest().is_some_and(|last| !is_like(last)) {
             self.cine.clear();
         }
-        let tinted = frame.tinted.as_ref().map_or(0, Image::bytes);
-        let (bytes, at) = (frame.image.bytes() + tinted, frame.finished);
+        let images = [Some(&frame.image), frame.tinted.as_ref(), frame.painted.as_ref()];
+        let bytes = images.into_iter().flatten().map(Image::bytes).sum();
+        let at = frame.finished;
         match frame.grade.at_rest && !self.cine.is_empty() {
             true => self.cine.replace_newest(frame, bytes),
             false => self.cine.push(frame, bytes, at),

@@ -10,13 +10,14 @@ use insonify::sim::layout::{Label, NONE};
 use super::scenes::{add_box, add_layer, linear, tissue};
 use super::{TRACERS, at, labels, place};
 
-/// Where the images of two sets overlap, over where either is.
-fn overlap(pairs: impl Iterator<Item = (bool, bool)>) -> f64 {
-    let (mut both, mut either) = (0, 0);
-    for (a, b) in pairs {
-        both += usize::from(a && b);
-        either += usize::from(a || b);
-    }
+/// How many places two sets have in common, and how many are in either.
+fn overlap(pairs: impl Iterator<Item = (bool, bool)>) -> [usize; 2] {
+    pairs.fold([0; 2], |[both, either], (a, b)| {
+        [both + usize::from(a && b), either + usize::from(a || b)]
+    })
+}
+
+fn ratio([both, either]: [usize; 2]) -> f64 {
     both as f64 / either.max(1) as f64
 }
 
@@ -57,6 +58,7 @@ fn labels_of_the_phantom_s_cysts_are_their_circles() {
         let frame = insonify::sim::tables::frame(&scene, 0);
         let found = cysts(&scene);
         assert_eq!(found.len(), 16);
+        let mut all = [0; 2];
         for (number, [x, z], radius) in found {
             let inside = |p: DVec3| (p.x - x).hypot(p.z - z) < radius;
             let of_samples = |of: fn(&Label) -> u32| {
@@ -73,17 +75,30 @@ fn labels_of_the_phantom_s_cysts_are_their_circles() {
                     (of(l) == number, inside(DVec3::new(x, 0.0, z)))
                 }))
             };
-            // Meshes of 48 sides have 0.3 % less area than their circles, those of 32 sides 0.6 %.
-            let samples = [of_samples(|l| l.true_instance), of_samples(|l| l.instance)];
-            let pixels = [of_pixels(|l| l.true_instance), of_pixels(|l| l.instance)];
-            println!("{tracer} {} mm at {z}: samples {samples:?}, pixels {pixels:?}", 2.0 * radius);
-            assert!(samples.iter().all(|iou| *iou >= 0.99), "{number}: {samples:?}");
+            let samples = of_samples(|l| l.instance);
+            assert_eq!(
+                samples,
+                of_samples(|l| l.true_instance),
+                "one speed: what is seen is there"
+            );
+            all = [all[0] + samples[0], all[1] + samples[1]];
+            let [samples, pixels] = [samples, of_pixels(|l| l.instance)].map(ratio);
+            println!(
+                "{tracer} {:.1} mm at {z}: samples {samples:.4}, pixels {pixels:.4}",
+                2.0 * radius
+            );
+            // Meshes of 48 sides have 0.3 % less area than their circles, those of 32 sides 0.6 %; and the smallest
+            // have 400 samples, of which one or two lie at the border by chance.
+            assert!(samples >= if radius > 2.0 { 0.99 } else { 0.98 }, "{number}: {samples}");
             // The nearest sample is off by up to half the grid's pitch, a quarter on the average, in both axes: the circle's
             // border by as much.
             let along = scene.probe.sample_pitch().max(f64::from(frame.pixel_pitch));
             let least = 0.99 - (scene.probe.line_pitch(z) + along) / 4.0 * 2.0 / radius;
-            assert!(pixels.iter().all(|iou| *iou >= least), "{number}: {pixels:?}");
+            assert!(pixels >= least, "{number}: {pixels} of {least}");
         }
+        let all = ratio(all);
+        println!("{tracer} all: {all:.4}");
+        assert!(all >= 0.99, "{tracer}: {all}");
     }
 }
 

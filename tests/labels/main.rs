@@ -3,6 +3,7 @@
 mod files;
 mod geometry;
 mod motion;
+mod painted;
 mod power;
 #[path = "../common/program.rs"]
 mod program;

@@ -75,6 +75,30 @@ fn a_body_that_moves_takes_its_tissue_along_and_the_rest_stays() {
     }
 }
 
+#[test]
+fn a_shape_that_a_program_sets_moves_its_tissue_from_the_first_time_on() {
+    for tracer in TRACERS {
+        let mut scene = scene();
+        let mut simulator = simulator(&mut scene, tracer);
+        frame(&mut simulator, &scene, 0);
+        let middle = DVec3::new(0.3, 0.1, 30.0);
+        let rest = scene.meshes[0].clone();
+        let mut before = 1.0;
+        for (index, squeeze) in [(1, 0.9), (2, 0.8)] {
+            let mut shape = rest.clone();
+            shape.positions.iter_mut().for_each(|p| p[2] *= squeeze as f32);
+            scene.reshape(0, shape);
+            let labels = frame(&mut simulator, &scene, index);
+            let (error, seen) = worst(&labels.samples.labels, 0, |p| {
+                DVec3::Z * (p.z - middle.z) * (1.0 - before / squeeze)
+            });
+            println!("{tracer} {squeeze}: {error} mm of {seen}");
+            assert!(error < 0.01 && seen > 1000, "{tracer} {squeeze}: {error} mm of {seen}");
+            before = squeeze;
+        }
+    }
+}
+
 /// A body whose second keyframe is the first one mapped by `map` about its middle.
 fn deforming(map: DMat3, strategy: Strategy) -> Scene {
     let mut scene = scene();

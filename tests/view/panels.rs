@@ -261,7 +261,9 @@ fn each_key_does_what_the_list_says_and_its_opposite_takes_it_back() {
     desk.press(Key::Home);
     desk.wait_for("home", |d| difference(&d.grab(IMAGE), &home) < 0.2);
     // Panels; the loop, the calipers and the strip have tests of their own.
-    for (name, key) in [("console", 'c'), ("timings", 't'), ("M-mode", 'm'), ("real", 'b')] {
+    for (name, key) in
+        [("console", 'c'), ("timings", 't'), ("M-mode", 'm'), ("real", 'b'), ("tissues", 'i')]
+    {
         let all = [0, 0, 1280, 680];
         let before = desk.settle(all);
         desk.press(letter(key));

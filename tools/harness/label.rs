@@ -93,7 +93,9 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let mut owned = worlds::owned(job);
     // The echo properties of surfaces do not matter here: in the twin all are mirrors.
     let mirror = Surface { roughness: 1e9, ..Surface::default() };
-    owned.surfaces = vec![mirror; 2];
+    let sides = owned.instances.iter();
+    let sides = sides.map(|i| i.surface_outside.max(i.surface_inside) as usize + 1);
+    owned.surfaces = vec![mirror; sides.max().unwrap_or(0)];
     let (world, frame) = (owned.world(), owned.frame);
     let before: Frame = job.one("frame_before");
     let instances: Vec<Instance> = job.get("instances_before");

@@ -101,9 +101,12 @@ pub fn place_before(world: &World, past: &Past, instance: u32, p: DVec3) -> DVec
     let now = affine(&world.instances[instance as usize].texture_from_world);
     let before = &past.instances[instance as usize];
     let mut q = now.transform_point3(p);
-    if let Some(field) = world.field(instance).filter(|_| before.field != NONE) {
-        let rest = field.reference(q);
-        q = rest + Field::new(past.fields, before.field).displacement(rest);
+    if let Some(field) = world.field(instance) {
+        q = field.reference(q);
+        // Without a field then, the reference shape was shown.
+        if before.field != NONE {
+            q += Field::new(past.fields, before.field).displacement(q);
+        }
     }
     affine(&before.texture_from_world).inverse().transform_point3(q)
 }

@@ -1,10 +1,10 @@
 //! Inspectors: the acoustic table, and how surfaces reflect.
 
-use egui::{ComboBox, Ui};
+use egui::{ComboBox, Slider, Ui};
 
 use super::controls::group;
 use crate::settings::{Group, Tissue};
-use crate::view::model::{Placed, Settings};
+use crate::view::model::{Layer, Placed, Settings};
 use crate::view::style::button;
 
 /// A list to choose one name from; the last choice may be gone with another scene.
@@ -19,6 +19,18 @@ fn pick<'n>(ui: &mut Ui, id: &str, names: impl Iterator<Item = &'n str>, chosen:
                 ui.selectable_value(chosen, index, *name);
             }
         });
+}
+
+/// The switch of the tissues' colours over the image.
+pub(super) fn layer(ui: &mut Ui, layer: &mut Layer) {
+    ui.checkbox(&mut layer.shown, "Tissues in colours").on_hover_text(
+        "Colours each pixel by the tissue that is seen there, where refracted sound shows it (I). \
+             Saved images are not coloured.",
+    );
+    if layer.shown {
+        let slider = Slider::new(&mut layer.opacity, 0.05..=1.0).max_decimals(2).text("opacity");
+        ui.add(slider).on_hover_text("Of the colours; 1 hides the image's grey levels");
+    }
 }
 
 pub(super) fn tissues(ui: &mut Ui, settings: &mut Settings, loaded: &Settings, chosen: &mut usize) {

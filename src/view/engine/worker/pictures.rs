@@ -113,6 +113,7 @@ impl Worker {
         let began = Instant::now();
         let (order, pose, seconds) = (&taken.order, taken.pose, taken.seconds);
         order.settings.apply(&mut self.scene);
+        self.scene.simulation.labels |= order.paint.is_some();
         self.scene.world_from_probe = pose;
         let at_rest = taken.level.is_some();
         if !at_rest {
@@ -139,11 +140,17 @@ impl Worker {
             None => None,
         };
         simulator.tint_on(tinted.clone());
+        let painted = match order.paint {
+            Some(opacity) => Some((self.ring.free(image_size(scene))?, opacity)),
+            None => None,
+        };
+        simulator.paint_on(painted.clone());
         // The scene's own picture is the one of `render`, with the noise of its first frame.
         let index = if level == 0 && at_rest { 0 } else { taken.index };
         let submitted = simulator.frame(scene, index);
         simulator.show_on(None);
         simulator.tint_on(None);
+        simulator.paint_on(None);
         submitted?;
         let timings = simulator.wait()?.pop().unwrap_or_default();
         let wall = began.elapsed();
@@ -174,6 +181,7 @@ impl Worker {
             },
             image,
             tinted: tinted.map(|(image, _)| image),
+            painted: painted.map(|(image, _)| image),
             probe: order.settings.probe.clone(),
             grade: self.pace.grade(level, scene, at_rest),
             settings,

@@ -1,0 +1,66 @@
+//! `paint`: the finished image with the tissues that are seen in their colours.
+
+use super::super::labels::colours;
+use super::super::pass::{Array, Pass, Sizes, per_pixel};
+use super::super::passes::Passes;
+use super::super::{SimError, Simulator};
+use crate::gpu::{Buffer, Commands, GpuError, Image, Stage};
+use crate::output::npy::Element::Word;
+use crate::scene::Scene;
+
+/// The stage.
+pub const PAINT: Pass = Pass {
+    name: "paint",
+    binds: &["frame", "pixels", "pixel_labels", "colours", "painted"],
+    makes: &[
+        Array::new("colours", Word, 1, |s| s.tissues),
+        Array::new("painted", Word, 1, Sizes::pixels),
+    ],
+    extent: Some(per_pixel),
+    then: Stage::Transfer,
+    // Nothing in a scene needs it; `Simulator::paint_on` asks for it.
+    needed: |_| false,
+    ..Pass::USUAL
+};
+
+impl Passes {
+    /// Colours the finished image into a buffer of its own, ready to be copied; after `chart`.
+    pub(in crate::sim) fn paint(
+        &mut self,
+        cmd: &mut Commands<'_>,
+        scene: &Scene,
+        opacity: f32,
+        fused: bool,
+    ) -> Result<&Buffer, GpuError> {
+        self.buffers.add(cmd.device(), PAINT.makes.iter())?;
+        let colours = colours(scene).into_iter().map(|[r, g, b]| u32::from_le_bytes([r, g, b, 0]));
+        let colours: Vec<u32> = colours.collect();
+        cmd.write(&self.buffers["colours"], 0, bytemuck::cast_slice(&colours))?;
+        cmd.barrier(Stage::Transfer, Stage::Compute);
+        cmd.barrier(Stage::Compute, Stage::Compute);
+        cmd.scope(PAINT.name);
+        let given = [("pixels", self.pixels(fused))];
+        self.record(cmd, &PAINT, per_pixel(&self.frame), &opacity.to_ne_bytes(), &given)?;
+        Ok(&self.buffers["painted"])
+    }
+}
+
+impl Simulator {
+    /// Colours the tissues that are seen in the next frames in an image of their size, with an opacity of 0 to 1, beside
+    /// the one of [`Self::show_on`], which does not change; none stops it. Frames without labels leave the image
+    /// unchanged.
+    pub fn paint_on(&mut self, painted: Option<(Image, f32)>) {
+        self.painted_on = painted;
+    }
+
+    /// The last frame with its tissues in colours, RGBA bytes row by row; none if this was not asked for or the frame
+    /// had no labels.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn painted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
+        let asked =
+            self.labelled && self.painted_on.is_some() && self.passes.buffers.has("painted");
+        asked.then(|| self.read("painted")).transpose()
+    }
+}
