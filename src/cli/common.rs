@@ -145,7 +145,8 @@ impl Common {
             simulation.seed = seed;
         }
         if let Some(quality) = self.quality {
-            set_quality(simulation, quality, device, &self.overrides);
+            let by_hand = self.overrides.iter().map(|(key, _)| key.as_str());
+            simulation.set_quality_except(quality, sim::machine(device), by_hand);
         }
     }
 
@@ -230,29 +231,6 @@ fn too_large(error: &GpuError) -> Report {
         }
     };
     miette!(help = help, "{error}")
-}
-
-/// Sets the counts of `quality` for this device, except those that the user set by hand.
-fn set_quality(
-    simulation: &mut Simulation,
-    quality: Quality,
-    device: &Device,
-    overrides: &[(String, String)],
-) {
-    let by_hand = simulation.clone();
-    simulation.set_quality(quality, sim::machine(device));
-    for (key, _) in overrides {
-        match key.as_str() {
-            "simulation.paths" => simulation.paths = by_hand.paths,
-            "simulation.cell" => simulation.cell = by_hand.cell,
-            "simulation.scatterers_per_resolution_cell" => {
-                simulation.scatterers_per_resolution_cell = by_hand.scatterers_per_resolution_cell
-            }
-            "simulation.volume_floor" => simulation.volume_floor = by_hand.volume_floor,
-            "simulation.branch_floor" => simulation.branch_floor = by_hand.branch_floor,
-            _ => {}
-        }
-    }
 }
 
 /// The losses of a frame, each with a remedy.

@@ -32,12 +32,25 @@ impl Element {
 /// # Errors
 /// Errors of the file system.
 pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> std::io::Result<()> {
-    assert_eq!(
-        4 * shape.iter().product::<usize>(),
-        bytes.len(),
-        "shape and data of {}",
-        path.display()
-    );
+    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
+    file.write_all(&header(element, shape, bytes))?;
+    file.write_all(bytes)?;
+    file.flush()
+}
+
+/// The file of words as an array of `shape` in C order.
+///
+/// # Panics
+/// When the shape does not hold exactly these words.
+pub fn bytes(element: Element, shape: &[usize], bytes: &[u8]) -> Vec<u8> {
+    let mut out = header(element, shape, bytes);
+    out.extend_from_slice(bytes);
+    out
+}
+
+/// What stands before these words.
+fn header(element: Element, shape: &[usize], bytes: &[u8]) -> Vec<u8> {
+    assert_eq!(4 * shape.iter().product::<usize>(), bytes.len(), "an array of {shape:?}");
     let descr = element.descr();
     let shape: Vec<_> = shape.iter().map(|n| format!("{n},")).collect();
     let shape = shape.join(" ");
@@ -48,12 +61,10 @@ pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> st
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
     let length = u16::try_from(header.len()).expect("a short header");
-    let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
-    file.write_all(b"\x93NUMPY\x01\x00")?;
-    file.write_all(&length.to_le_bytes())?;
-    file.write_all(header.as_bytes())?;
-    file.write_all(bytes)?;
-    file.flush()
+    let mut out = b"\x93NUMPY\x01\x00".to_vec();
+    out.extend(length.to_le_bytes());
+    out.extend(header.into_bytes());
+    out
 }
 
 /// Reads the data of an array of 32-bit words of any shape, as bytes in C order.

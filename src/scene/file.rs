@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::vary::Variant;
 use super::{Origins, Scene, Tissue, Warning};
 
+mod again;
 mod anatomy;
 mod contact;
 mod document;
@@ -19,6 +20,7 @@ mod playing;
 mod probe;
 mod save;
 mod schema;
+mod setting;
 mod settings;
 mod shelf;
 mod study;
@@ -28,19 +30,22 @@ mod tracker;
 mod trajectory;
 mod vary;
 
+pub use again::SceneFile;
 pub use document::quoted;
+pub(crate) use document::{Document, Source};
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
+pub use probe::stated as stated_pose;
 pub use save::{Entry, Note, save, save_with};
 pub use schema::reference;
+pub(crate) use setting::setting;
 pub use settings::load_settings;
 pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
 use crate::settings::Settings;
-use document::{Document, Source};
 use schema::Title;
 
 /// Largest width of a picture, pixels: the limit of image files and messages.
@@ -88,7 +93,15 @@ impl Scene {
         overrides: &[(String, String)],
         suggested: bool,
     ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
-        let source = Source::read(path, overrides)?;
+        Self::of_source(&Source::read(path, overrides)?, suggested)
+    }
+
+    /// The scene of a text that was read.
+    fn of_source(
+        source: &Source,
+        suggested: bool,
+    ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
+        let path = &source.path;
         let document = source.document()?;
         let file = document.parse()?;
         let mut warnings = Vec::new();

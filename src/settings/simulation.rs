@@ -211,6 +211,29 @@ impl Simulation {
         self.density_scale.max(1.0).cbrt()
     }
 
+    /// Like [`Self::set_quality`], but keeps the counts whose keys, `simulation.paths` and the like, are `by_hand`.
+    pub fn set_quality_except<'k>(
+        &mut self,
+        quality: Quality,
+        machine: Machine,
+        by_hand: impl Iterator<Item = &'k str>,
+    ) {
+        let before = self.clone();
+        self.set_quality(quality, machine);
+        for key in by_hand {
+            match key {
+                "simulation.paths" => self.paths = before.paths,
+                "simulation.cell" => self.cell = before.cell,
+                "simulation.scatterers_per_resolution_cell" => {
+                    self.scatterers_per_resolution_cell = before.scatterers_per_resolution_cell
+                }
+                "simulation.volume_floor" => self.volume_floor = before.volume_floor,
+                "simulation.branch_floor" => self.branch_floor = before.branch_floor,
+                _ => {}
+            }
+        }
+    }
+
     /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
     pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
         let (paths, cell, scatterers, volume_floor, branch_floor) = match (quality, machine) {
