@@ -263,6 +263,14 @@ impl Plan {
         self.splits.iter().map(|s| s.samples.end).max().unwrap_or(0)
     }
 
+    /// Name of the scene of a sample.
+    ///
+    /// # Panics
+    /// When the plan has no sample of this number.
+    pub fn scene_of(&self, number: u32) -> &str {
+        &self.scenes[self.sample(number).scene].name
+    }
+
     /// All parts: those of the first split, then those of the next.
     pub fn parts(&self) -> Vec<Part> {
         let mut out = Vec::new();
