@@ -58,7 +58,7 @@ void emit_segment(inout Path path, uint line, uint n, uint instance, float exten
     segments[at].direction_time = vec4(path.direction, path.time);
     segments[at].lateral_weight = vec4(path.lateral, weight);
     segments[at].spread = vec4(path.spread, share);
-    segments[at].lens = vec4(path.lens, 0.0);
+    segments[at].lens = vec4(path.lens, float(path.reflections));
     segments[at].tissue = tissue;
     segments[at].instance = instance;
     segments[at].line = line;

@@ -13,7 +13,11 @@ uint field_of(uint instance) {
     return instances[instance].field;
 }
 
-vec3 field_vector(uint i) { return fields[i].xyz; }
+// An includer with more than one set of fields says which is read.
+#ifndef FIELD_VECTOR
+#define FIELD_VECTOR(i) fields[i].xyz
+#endif
+vec3 field_vector(uint i) { return FIELD_VECTOR(i); }
 
 Field load_field(uint at) {
     Field f;

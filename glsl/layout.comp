@@ -18,6 +18,7 @@ layout(std430, binding = 7) buffer FusionBuffer { Fusion fusions[]; };
 layout(std430, binding = 8) buffer View3dBuffer { View3d views[]; };
 layout(std430, binding = 9) buffer InteractionBuffer { Interaction interactions[]; };
 layout(std430, binding = 10) buffer ScanlineBuffer { Scanline scanlines[]; };
+layout(std430, binding = 11) buffer LabelBuffer { Label labels[]; };
 
 void main() {
     frames[0].kind = 0u;
@@ -31,4 +32,5 @@ void main() {
     views[0].flags = 0u;
     interactions[0].path = 0u;
     scanlines[0].x = 0.0;
+    labels[0].tissue = 0u;
 }

@@ -1,6 +1,6 @@
 // A path and its steps between interfaces.
 //
-// The includer declares frame, stacks[] and triangles[], and includes random.glsl, probe.glsl, transform.glsl,
+// The includer declares frame and triangles[], and includes random.glsl, probe.glsl, transform.glsl,
 // acoustics.glsl and media.glsl.
 
 struct Path {
@@ -34,43 +34,27 @@ float clearance(vec3 p) {
     return 4e-6 * max(max(abs(p.x), abs(p.y)), max(abs(p.z), 1.0));
 }
 
-// Path n of a line and the media around it, at the start that origin gives.
-void start(uint line, uint n, out Path path, inout Media media) {
-    vec3 o, d, lateral;
-    probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
-    path.direction = world_vector(d);
-    path.lateral = world_vector(lateral);
-    uvec4 bits = draw(n, 0u, PURPOSE_JITTER);
-    path.origin = world_point(o) + frame.origin_jitter * gaussian(bits.x) * path.lateral;
+// A path at its start, before anything random: its place, its direction and its lateral axis in the world.
+void begin(vec3 origin, vec3 direction, vec3 lateral, out Path path) {
+    path.origin = origin;
+    path.direction = direction;
+    path.lateral = lateral;
     path.spread = vec3(frame.origin_jitter * frame.origin_jitter, 0.0, 0.0);
-    if (frame.emission_lobe > 0.0) {
-        path.direction = power_cosine(path.direction, frame.emission_lobe, vec2(unit(bits.y), unit(bits.z)));
-        path.lateral = normalize(path.lateral - dot(path.lateral, path.direction) * path.direction);
-        path.spread.z = 1.0 / (frame.emission_lobe + 2.0);
-    }
+    if (frame.emission_lobe > 0.0) path.spread.z = 1.0 / (frame.emission_lobe + 2.0);
     path.lens = vec3(0.0);
     path.handedness = 1.0;
     path.t_min = 0.0;
+    path.weight = 1.0;
     path.share = 1.0 / float(frame.paths);
     path.probability = 1.0;
     path.time = 0.0;
+    path.interactions = 0u;
     path.reflections = 0u;
     path.crossings = 0u;
     path.branch = false;
     path.survival = 1.0;
     path.left_instance = NONE;
     path.left_primitive = NONE;
-    uint at = line * START_WORDS;
-    media.count = stacks[at];
-    for (uint i = 0u; i < media.count; ++i) media.ids[i] = stacks[at + 1u + i];
-    float travelled = uintBitsToFloat(stacks[at + MAX_STACK + 1u]);
-    if (travelled > 0.0) {
-        path.origin += travelled * path.direction;
-        path.time = travelled / frame.speed;
-        path.t_min = clearance(path.origin);
-    }
-    path.weight = uintBitsToFloat(stacks[at + MAX_STACK + 2u]);
-    path.interactions = stacks[at + MAX_STACK + 3u];
 }
 
 // True if by rounding the ray meets again the triangle on which the path starts, which a straight line meets

@@ -38,14 +38,11 @@ const bool DEFORMING = false;
 
 const uint THREADS = 64u;
 const float POINT_SHIFT = 0.01234;   // shift of the layers' borders, in their pitch
-const float LOG2_E = 1.44269504;
-const float INVERSE_FALL = 1.38629436;    // 2 ln 2: times `shape.x` or `shape.y` it is 1 / sigma^2
 const float LEVEL_SPAN = 3.0;             // mm of depth between the rows whose lattice level is looked up
 const float SHAPE_SPAN = 0.6;             // mm of depth to either side, for differences of the beam's shape
 const uint BINS = SCATTER_WINDOW / SCATTER_BIN;
 const int BESIDE = 2;                     // bins on each side whose scatterers may echo in the window
 const uint SLOTS = SCATTER_BIN / SCATTER_SLOT;    // per bin
-const float SLOT_MARGIN = 0.5 / float(SCATTER_SLOT);
 const int SLOTS_BESIDE = BESIDE * int(SLOTS);
 const uint PIECES = SCATTER_BIN / SCATTER_PIECE;  // per bin, in deformed tissue
 const float LEVEL_UNIT = 65536.0;         // integers per unit of level, for comparisons
@@ -62,6 +59,17 @@ shared uint shared_deposits;
 uint window_begin;
 
 #include "stretch.glsl"
+
+Stretch texture_stretch(uint at) {
+    Stretch s = world_stretch(at);
+    s.o = texture_point(s.instance, s.o);
+    s.d = texture_vector(s.instance, s.d);
+    s.e_l = texture_vector(s.instance, s.e_l);
+    s.e_e = texture_vector(s.instance, s.e_e);
+    return s;
+}
+
+bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
 
 // The slab of a layer about its middle, mm. Borders of layers avoid the round numbers at which cells have their
 // centres: by rounding a cell could belong to two layers or to none.
@@ -244,7 +252,7 @@ uvec3 march_bin(Stretch s, int bin, int piece) {
     float lowest = 1e9, highest = -1e9;
     int spans = clamp(whole(ceil(min((x.y - x.x) / LEVEL_SPAN, 64.0))), 2, 64);
     for (int i = 0; i <= spans; ++i) {
-        float wanted = wanted_level(s.tissue, rows[row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))].shape.w, drowned);
+        float wanted = wanted_level(s.tissue, shape_at(s, row_at(kappa_at(s, mix(x.x, x.y, float(i) / float(spans))))).w, drowned);
         lowest = min(lowest, wanted);
         highest = max(highest, wanted);
     }

@@ -44,15 +44,12 @@ layout(std430, binding = 11) restrict readonly buffer ScanlineBuffer { Scanline 
 #include "footprint.glsl"
 #include "media.glsl"
 #include "path.glsl"
+#include "start.glsl"
 #include "wavefront.glsl"
 
 // Level, in nepers of amplitude, that stands for no sound at all.
 const float DARK = -200.0;
 const float NOTHING = 1e-30;
-
-Medium current_medium(inout Media media) {
-    return medium_of(tissue_of(current_instance(media)));
-}
 
 // The middle of the beam: the path of `trace` before anything random.
 void middle(uint line, out Path path, inout Media media) {
@@ -63,105 +60,47 @@ void middle(uint line, out Path path, inout Media media) {
     path.lateral = world_vector(lateral);
     path.origin = world_point(o) + path.time * frame.speed * path.direction;
     path.spread = vec3(0.0);
-    path.lens = vec3(0.0);
 }
 
-// Transmits the path; returns the reflected part of its intensity, 1 if nothing is transmitted.
-float pass(inout Path path, Met here, Medium t1, Medium t2) {
-    Slope slope = slope_at(here, path, sample_at(frame.speed * path.time / frame.sample_pitch), 0.0);
-    float reflected = reflectance_at(slope, path.direction, t1, t2);
-    bool through = transmit_path(path, slope.refracting, slope.geometric, t1.speed, t2.speed) || slope.width > 0.0;
-    return through ? reflected : 1.0;
+uint next, last;             // the line's next piece, and its last
+float level = 0.0;
+float surrounding;           // absorption of the tissue around the mask
+float excess = 0.0;          // absorption beyond that
+bool heard_before = true;
+
+#include "transmitted.glsl"
+
+bool is_over(Path path) { return next + 1u == last; }
+
+void begin_way(Path path, uint instance, Medium way, bool heard, bool ends) {
+    if (!heard) surrounding = way.absorption;
+    excess = heard ? way.absorption - surrounding : 0.0;
+    if (heard || heard_before || ends) {
+        float kappa = next + MAX_PIECES - 1u == last ? 0.0 : frame.speed * path.time / frame.sample_pitch;
+        float slope = ends ? 0.0 : excess * way.speed * frame.sample_pitch / frame.speed;
+        pieces[next] = vec4(kappa, level, slope, 0.0);
+        next += 1u;
+    }
+    heard_before = heard;
 }
+
+void pass_way(float t) { level -= excess * t; }
+
+void pass_surface(Path path, vec3 normal, float transmitted) {
+    level = transmitted <= 0.0 ? DARK : level + log(max(transmitted, NOTHING));
+}
+
+// Marks the end of the list; the last piece extends to the end of the line.
+void end_ways() { pieces[next] = vec4(FAR_PIECE, 0.0, 0.0, 0.0); }
 
 void main() {
     uint line = gl_GlobalInvocationID.x;
     if (line >= frame.scanlines * frame.layers) return;
     Path path;
-    Media media, after;
+    Media media;
     middle(line, path, media);
-    float time_end = frame.depth / frame.speed;
-    uint limit = 64u + frame.max_interactions;
-    uint next = line * MAX_PIECES;
-    uint last = next + MAX_PIECES - 1u;
-    float surrounding = tissues[frame.background].absorption;
-    float level = 0.0;
-    bool fresh = true;
-    // True if no mask lies on the line, or nothing is transmitted at a surface.
-    bool lost = path.weight <= 0.0;
-    // True while the first of two coincident surfaces has been found and the ray searches for the other.
-    bool pairing = false;
-    Met first = surface_met(Hit(0.0, NONE, NONE, 0.0, 0.0));
-    float close = 0.0;
-    uint crossing = 0u;
-    while (true) {
-        Medium t1 = current_medium(media);
-        bool heard = is_heard(media);
-        // Around the mask sound travels at the speed assumed by the recording.
-        Medium way = t1;
-        if (!heard) {
-            way.speed = frame.speed;
-            surrounding = t1.absorption;
-        }
-        float excess = heard ? t1.absorption - surrounding : 0.0;
-        bool ends = lost || crossing == limit || next + 1u == last;
-        if (!pairing && (fresh || ends)) {
-            float kappa = crossing == 0u ? 0.0 : frame.speed * path.time / frame.sample_pitch;
-            float slope = ends ? 0.0 : excess * t1.speed * frame.sample_pitch / frame.speed;
-            pieces[next] = vec4(kappa, level, slope, 0.0);
-            next += 1u;
-            fresh = false;
-        }
-        float t_end = (time_end - path.time) * way.speed;
-        // With t_max = -1 the ray meets nothing.
-        Hit hit = closest_hit(path.origin, path.direction, pairing ? max(first.hit.t - close, 0.0) : path.t_min,
-            pairing ? first.hit.t + close : (ends ? -1.0 : t_end), pairing ? first.hit.instance : NONE);
-        Met here = surface_met(hit);
-        Met other = Met(Hit(hit.t, NONE, NONE, 0.0, 0.0), vec3(0.0), vec3(0.0));
-        if (pairing) {
-            other = here;
-            here = first;
-            pairing = false;
-        } else if (hit.instance == NONE) {
-            // Marks the end of the list; the last piece extends to the end of the line.
-            pieces[next] = vec4(FAR_PIECE, 0.0, 0.0, 0.0);
-            break;
-        } else {
-            close = clearance(here.position);
-            if ((frame.flags & FLAG_COINCIDENT) != 0u) {
-                first = here;
-                pairing = true;
-                continue;
-            }
-        }
-        crossing += 1u;
-        float past = here.hit.t + close;
-        if (other.hit.instance != NONE) past = max(past, other.hit.t + close);
-        if (other.hit.instance < here.hit.instance) {
-            Met found = here;
-            here = other;
-            other = found;
-        }
-        copy_media(after, media);
-        cross_interface(after, here.hit.instance, dot(path.direction, here.normal) < 0.0);
-        if (other.hit.instance != NONE) cross_interface(after, other.hit.instance, dot(path.direction, other.normal) < 0.0);
-        bool heard_after = is_heard(after);
-        bool same = current_instance(after) == current_instance(media);
-        if (same && heard == heard_after) {
-            path.t_min = past;
-            copy_media(media, after);
-            continue;
-        }
-        advance(path, here.hit.t, way, here.position);
-        level -= excess * here.hit.t;
-        fresh = heard || heard_after;
-        if (same || !fresh) {
-            path.t_min = max(path.t_min, past - here.hit.t);
-        } else {
-            float reflected = pass(path, here, t1, current_medium(after));
-            lost = reflected >= 1.0;
-            level = lost ? DARK : level + log(max(1.0 - reflected, NOTHING));
-        }
-        copy_media(media, after);
-    }
+    next = line * MAX_PIECES;
+    last = next + MAX_PIECES - 1u;
+    surrounding = tissues[frame.background].absorption;
+    follow(path, media);
 }

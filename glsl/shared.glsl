@@ -156,7 +156,7 @@ struct Segment {
     vec4 lateral_weight;   // unit lateral axis e_l carried along the path; weight at the origin
     vec4 spread;           // lateral variance a + 2 b x + c x^2 (mm^2) after rough reflections; path share
     vec4 lens;             // lateral offset a + b x + c x^2 (mm) of what comes one deviation beside the beam's axis, by
-                           // surfaces that bend its wavefront; w unused
+                           // surfaces that bend its wavefront; number of reflections on the way
     uint tissue; uint instance; uint line; float handedness; // e_e = handedness * cross(d, e_l)
 };
 
@@ -183,6 +183,23 @@ struct Fusion {
     float slope; float intercept;                 // texel to grey level 0..1
     uint blend; uint mask_speed;                  // BLEND_*, MASK_SPEED_*
 };
+
+// What is known of an axial sample of a scanline, or of a pixel. Lengths in mm, in the probe's frame.
+struct Label {
+    uint true_tissue; uint true_instance;   // that the scan plane has there; NONE: no mesh
+    uint tissue; uint instance;             // where the main path is when the sample's echo is made; tissue NONE: nowhere,
+                                            // and place, loss and movement are 0
+    vec4 place_loss;                        // where that is; dB lost on the way there and back
+    vec4 moved_incidence;                   // how the tissue there has moved since the last frame; degrees from the normal
+                                            // of the surface that the main path meets there, below 0: none
+    float contact;                          // share of the probe's contact with the skin
+    float level;                            // dB: expected power of the echoes, that of a perfect mirror is 0
+    float reverberation;                    // share of it that paths have brought which were reflected before
+    float unused;
+};
+
+const float LEAST_POWER = 1e-30;    // of the level that is told of a sample; that of a perfect mirror is 1
+const float POWER_UNITS = 2.8823037615171174e17;  // 2^58: units in a power that is summed in 64 bits
 
 const uint VIEW3D_CUT = 1u;         // the anatomy in front of the image plane is cut away
 const uint VIEW3D_IMAGE = 2u;       // the B-mode image is shown in its place

@@ -1,6 +1,10 @@
 // A segment of a path as scatter.comp hears it: where its samples lie, how wide and how loud the beam is along it.
 //
-// The includer declares frame, tissues[], rows[] and segments[], and includes transform.glsl, probe.glsl and field.glsl.
+// The includer declares frame, tissues[], rows[] and segments[], and includes transform.glsl and probe.glsl.
+
+const float LOG2_E = 1.44269504;
+const float SLOT_MARGIN = 0.5 / float(SCATTER_SLOT);
+const float INVERSE_FALL = 1.38629436;   // 2 ln 2: times `shape.x` or `shape.y` it is 1 / sigma^2
 
 // A segment in the frame of its scatterers.
 struct Stretch {
@@ -8,6 +12,7 @@ struct Stretch {
     float extent; float time; float weight;
     vec3 spread; float share;
     vec3 lens;
+    bool reflected;      // on its way to its start
     float speed; float absorption;
     vec2 off;            // distance from the geometric scanline, mm: at the start and per mm
     float layer_y;       // elevation of the line's layer, mm
@@ -30,6 +35,7 @@ Stretch world_stretch(uint at) {
     s.spread = w.xyz;
     s.share = w.w;
     s.lens = segments[at].lens.xyz;
+    s.reflected = segments[at].lens.w > 0.5;
     s.tissue = segments[at].tissue;
     s.instance = segments[at].instance;
     s.speed = tissues[s.tissue].speed;
@@ -42,15 +48,6 @@ Stretch world_stretch(uint at) {
         probe_ray(line % frame.scanlines, line / frame.scanlines, o, d, lateral);
         s.off = vec2(dot(probe_point(s.o) - o, lateral), dot(probe_vector(s.d), lateral));
     }
-    return s;
-}
-
-Stretch texture_stretch(uint at) {
-    Stretch s = world_stretch(at);
-    s.o = texture_point(s.instance, s.o);
-    s.d = texture_vector(s.instance, s.d);
-    s.e_l = texture_vector(s.instance, s.e_l);
-    s.e_e = texture_vector(s.instance, s.e_e);
     return s;
 }
 
@@ -69,8 +66,6 @@ bool is_finite(Stretch s) {
         && all(lessThan(abs(s.e_l), vec3(2.0))) && all(lessThan(abs(s.spread), vec3(1e18)))
         && all(lessThan(abs(s.lens), vec3(1e18)));
 }
-
-bool deforms(Stretch s) { return DEFORMING && field_of(s.instance) != NONE; }
 
 bool sounds(Stretch s) { return tissues[s.tissue].presence > 0.0 && s.weight > 0.0 && is_finite(s); }
 
@@ -96,10 +91,12 @@ float widened(float off, float fall) { return 1.0 + min(0.5 * off * off * fall, 
 float narrowing(Stretch s, float x, float fall) { return 1.0 / widened(offset_at(s, vec3(x)).x, fall); }
 
 // The beam's shape at a row: as it is behind even surfaces, wider and as much fainter behind those that bend the wavefront.
+// Of what is wider, fewer scatterers are enough.
 vec4 shape_at(Stretch s, uint row) {
     vec4 shape = rows[row].shape;
     float narrow = narrowing(s, distance_at(s, float(row) + 0.5), INVERSE_FALL * shape.x);
-    return vec4(shape.x * narrow, shape.y, shape.z + 0.5 * log2(narrow), shape.w);
+    float fainter = 0.5 * log2(narrow);
+    return vec4(shape.x * narrow, shape.y, shape.z + fainter, mix(shape.w - fainter, shape.w, shape.w <= ALL_LEVELS));
 }
 
 // Level of its speckle at distance x: one-way weight times echogenicity, log2.

@@ -74,6 +74,7 @@ bool masks_only = false;
 #include "media.glsl"
 #include "deposit.glsl"
 #include "path.glsl"
+#include "start.glsl"
 #include "wavefront.glsl"
 #include "count.glsl"
 

@@ -18,13 +18,12 @@ mod members;
 mod plan;
 mod pose;
 mod reading;
-mod segmentation;
 mod sheet;
 mod split;
 mod store;
 mod studio;
 
-pub use plan::{Array, Format, Part, Plan, Sample, Split};
+pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
 pub use sheet::Gallery;
 pub use store::{Store, Told};
 pub use studio::{Made, Studio};

@@ -3,8 +3,10 @@
 
 pub mod dicom;
 pub mod files;
+pub mod indexed;
 pub mod movie;
 pub mod npy;
+pub mod npz;
 pub mod plot;
 pub mod sheet;
 

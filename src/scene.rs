@@ -20,6 +20,7 @@ mod load_obj;
 pub mod mesh;
 pub mod normals;
 mod origin;
+pub mod palette;
 pub mod shapes;
 pub mod smoothed;
 pub mod tissue;

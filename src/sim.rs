@@ -6,9 +6,11 @@ pub mod bvh;
 pub mod calibration;
 pub mod contact;
 pub mod dump;
+mod expected;
 pub mod facts;
 pub mod fields;
 pub mod fusion;
+pub mod labels;
 pub mod layout;
 pub mod memory;
 pub mod pass;
@@ -42,7 +44,7 @@ use passes::{PassKernels, Passes, frame_constants};
 use read_out::ReadOut;
 pub use resize::image_size;
 use shaders::Library;
-use stages::{AXIAL, BEAM, DISPLAY, LABEL, ORIGIN, SCATTER};
+use stages::{AXIAL, BEAM, CHART, DISPLAY, EXPECT, LABEL, LEVEL, ORIGIN, SCATTER};
 use tables::Tables;
 pub use tracer::Tracer;
 use view3d::Viewer3d;
@@ -79,6 +81,8 @@ pub struct Simulator {
     counting: bool,
     /// True if the last frame was mixed with an acquired volume.
     fused: bool,
+    /// True if the last frame has labels.
+    labelled: bool,
     /// The image into which the next frames are copied.
     shown_on: Option<Image>,
     /// The kernel and buffers of the 3D view; made when it is first asked for.
@@ -171,6 +175,7 @@ impl Simulator {
             table_cache: TableCache::default(),
             counting: false,
             fused: false,
+            labelled: false,
             shown_on: None,
             viewer3d: None,
             tinted_on: None,
@@ -185,6 +190,7 @@ impl Simulator {
                 world,
                 frame,
                 shown: frame,
+                began: false,
                 batches,
             },
         };
@@ -194,7 +200,8 @@ impl Simulator {
 
     fn upload_tables(&self) -> Result<(), GpuError> {
         let buffers = &self.passes.buffers;
-        let arrays = self.tables.arrays().map(|(name, bytes)| (&buffers[name], 0, bytes));
+        let arrays = self.tables.arrays().into_iter().filter(|(_, bytes)| !bytes.is_empty());
+        let arrays: Vec<_> = arrays.map(|(name, bytes)| (&buffers[name], 0, bytes)).collect();
         self.device.upload_many(&arrays)
     }
 
@@ -208,6 +215,7 @@ impl Simulator {
     /// A Vulkan error; a lost device names the last pass.
     pub fn frame(&mut self, scene: &Scene, index: u32) -> Result<Vec<FrameTimings>, SimError> {
         let exchanged = self.adopt(scene)?;
+        let labelled = scene.simulation.labels;
         let passes = &mut self.passes;
         let mut cmd = self.frames.begin()?;
         self.update_time = exchanged + passes.update(&mut cmd, scene, self.coincident, index)?;
@@ -218,14 +226,24 @@ impl Simulator {
         for begin in (0..passes.frame.paths).step_by(passes.batches.paths as usize) {
             passes.trace(&mut cmd, begin, &mut turn)?;
             passes.run(&mut cmd, &SCATTER)?;
+            if labelled {
+                passes.run(&mut cmd, &EXPECT)?;
+            }
+        }
+        if labelled {
+            passes.direct_echoes(&mut cmd)?;
         }
         passes.run(&mut cmd, &BEAM)?;
         passes.run(&mut cmd, &AXIAL)?;
         // From here on the frame is not abandoned, so that the picture is replaced as a whole.
         cmd.keep_on();
         passes.run(&mut cmd, &DISPLAY)?;
-        if scene.simulation.labels {
+        self.labelled = labelled;
+        if labelled {
             passes.run(&mut cmd, &LABEL)?;
+            passes.surface_samples(&mut cmd)?;
+            passes.run(&mut cmd, &LEVEL)?;
+            passes.run(&mut cmd, &CHART)?;
         }
         self.fused = scene.shows_volume() && passes.fuse(&mut cmd, scene)?;
         if let Some(image) = &self.shown_on {
@@ -261,6 +279,7 @@ impl Simulator {
             let left = std::mem::replace(&mut self.tables, tables);
             let before = std::mem::replace(&mut self.sources, sources);
             self.table_cache.put(before, left);
+            self.passes.buffers.add(&self.device, stages::needed(scene))?;
             self.upload_tables()?;
         }
         if self.passes.world.serves(scene) {

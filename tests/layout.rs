@@ -4,8 +4,8 @@
 use std::mem::size_of;
 
 use insonify::sim::layout::{
-    CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Row, Scanline, Segment, Surface,
-    Tissue, View3d,
+    CONSTANTS, Counters, Frame, Fusion, Instance, Interaction, Label, Row, Scanline, Segment,
+    Surface, Tissue, View3d,
 };
 use insonify::sim::shaders::{Library, words_of};
 use spirq::ReflectConfig;
@@ -25,7 +25,7 @@ macro_rules! mirrors {
     };
 }
 
-fn mirrors() -> [Mirror; 11] {
+fn mirrors() -> [Mirror; 12] {
     mirrors!(
         Frame,
         Tissue,
@@ -37,7 +37,8 @@ fn mirrors() -> [Mirror; 11] {
         Fusion,
         View3d,
         Interaction,
-        Scanline
+        Scanline,
+        Label
     )
 }
 

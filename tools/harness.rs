@@ -9,6 +9,7 @@ mod angles;
 mod axial;
 mod beam;
 mod blur;
+mod chart;
 pub mod check;
 mod collapse;
 mod convert;
@@ -17,11 +18,13 @@ mod detect;
 mod difference;
 mod display;
 pub mod dump;
+mod expect;
 mod fuse;
 mod geometry;
 mod inputs;
 mod interpolate;
 mod label;
+mod level;
 mod mask;
 mod origin;
 mod rays;
@@ -293,7 +296,7 @@ impl Subject {
 }
 
 /// Every kernel of the image, in the order of a frame after the three that only tests use.
-pub const SUBJECTS: [Subject; 23] = [
+pub const SUBJECTS: [Subject; 26] = [
     angles::SUBJECT,
     geometry::SUBJECT,
     rays::SUBJECT,
@@ -307,7 +310,10 @@ pub const SUBJECTS: [Subject; 23] = [
     axial::SUBJECT,
     detect::SUBJECT,
     display::SUBJECT,
+    expect::SUBJECT,
     label::SUBJECT,
+    level::SUBJECT,
+    chart::SUBJECT,
     mask::SUBJECT,
     shadow::SUBJECT,
     darken::SUBJECT,

@@ -9,10 +9,12 @@ pub mod angles;
 pub mod axial;
 pub mod beam;
 pub mod blur;
+pub mod chart;
 pub mod convert;
 pub mod darken;
 pub mod detect;
 pub mod display;
+pub mod expect;
 pub mod field;
 #[cfg(test)]
 mod fixture;
@@ -24,6 +26,7 @@ pub mod interpolate;
 pub mod intersect;
 pub mod label;
 pub mod lattice;
+pub mod level;
 pub mod mask;
 pub mod origin;
 mod owned;
@@ -38,6 +41,7 @@ pub mod stack;
 pub mod straight;
 pub mod texture;
 pub mod trace;
+mod transmitted;
 mod wavefront;
 pub mod world;
 

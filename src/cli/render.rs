@@ -21,8 +21,10 @@ use insonify::sim::{Simulator, Tracer};
 use insonify::statistics::Statistics;
 
 mod film;
+mod labels;
 
 use film::Film;
+use labels::LabelFiles;
 
 /// Frames per second of an animation whose scene time stands still.
 const SHOWN: f64 = 10.0;
@@ -55,6 +57,12 @@ pub struct Render {
     trajectory: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
+    /// Writes what every sample and every pixel shows, for each frame. NAME.npz: all arrays of docs/labels.md (tissue and
+    /// mesh that are there and that are seen, position, loss, incidence, displacement, contact, expected level,
+    /// reverberation), the legend in legend.json. NAME.png: the tissue that is seen, as an index with a colour; 255
+    /// is outside. Several frames are numbered as images are.
+    #[arg(long, value_name = "FILE")]
+    labels: Option<PathBuf>,
     /// Writes every stage as a numbered array with its axes into this folder.
     #[arg(long, value_name = "DIR")]
     dump: Option<PathBuf>,
@@ -87,6 +95,10 @@ pub fn run(args: &Render) -> Result<()> {
     let output = args.output.clone().unwrap_or_else(|| default_output(&args.scene));
     film::check(&output)?;
     let mut scene = args.common.scene(&args.scene)?;
+    if let Some(labels) = &args.labels {
+        labels::check(labels, &scene)?;
+        scene.simulation.labels = true;
+    }
     let device = args.common.device()?;
     let tracer = args.common.tracer(&device, &scene)?;
     args.common.settle(&mut scene, &device);
@@ -278,6 +290,7 @@ fn simulate(
     let frames = u32::try_from(moments.len()).expect("no more than can be asked for");
     let shown = args.fps.or_else(|| pace(args, &moments)).unwrap_or(SHOWN);
     let mut film = Film::new(output, simulator, scene, &moments, shown)?;
+    let labels = args.labels.as_ref().map(|path| LabelFiles::new(path, frames)).transpose()?;
     let mut progress = Progress::new(frames, "frames");
     let mut timings = Vec::new();
     let mut unseen = scene.masks_off_the_image();
@@ -293,6 +306,9 @@ fn simulate(
         }
         timings.extend(simulator.frame(scene, index).into_diagnostic()?);
         film.add(index, simulator, scene)?;
+        if let Some(labels) = &labels {
+            labels.add(index, simulator, scene)?;
+        }
         progress.done(index + 1);
     }
     for mask in unseen {
@@ -301,6 +317,9 @@ fn simulate(
     timings.extend(simulator.wait().into_diagnostic()?);
     progress.finish();
     film.finish(output)?;
+    if let Some(labels) = labels {
+        labels.finish();
+    }
     Ok(timings)
 }
 

@@ -7,8 +7,11 @@ use serde_json::{Map, Value, json};
 
 use super::plan::{Array, Plan};
 use super::studio::Made;
+use crate::output::indexed::{self, NOTHING};
 use crate::output::npy::{self, Element};
 use crate::scene::file::stated_pose;
+use crate::scene::palette;
+use crate::sim::labels::LabelValues;
 
 /// Extension of the image.
 pub(super) const IMAGE: &str = "png";
@@ -16,33 +19,47 @@ pub(super) const IMAGE: &str = "png";
 pub(super) const SEGMENTATION: &str = "seg.png";
 
 /// Extensions of a sample's files, in the order in which they are written.
-pub(super) fn extensions(plan: &Plan) -> Vec<&'static str> {
-    let arrays = plan.arrays.iter().map(|array| match array {
-        Array::Envelope => "envelope.npy",
-        Array::Iq => "iq.npy",
-    });
-    [IMAGE, SEGMENTATION].into_iter().chain(arrays).chain(["json"]).collect()
+pub(super) fn extensions(plan: &Plan) -> Vec<String> {
+    let arrays = plan.arrays.iter().map(|array| format!("{}.npy", array.name()));
+    let pictures = [IMAGE, SEGMENTATION].map(str::to_owned);
+    pictures.into_iter().chain(arrays).chain(["json".to_owned()]).collect()
 }
 
 /// The bytes of a sample's files, in the order of [`extensions`].
 pub(super) fn members(plan: &Plan, made: &Made) -> Vec<Vec<u8>> {
-    let Made { settings, .. } = made;
-    let shape = [settings.probe.scanlines as usize, settings.probe.samples as usize];
-    let file = |extension: &&str| match *extension {
-        IMAGE => grey(made),
-        SEGMENTATION => indexed(made),
-        "envelope.npy" => {
-            let values = made.envelope.as_deref().expect("the plan asks for it");
-            npy::bytes(Element::Float, &shape, bytemuck::cast_slice(values))
+    let mut out = vec![grey(made), indexed(plan, made)];
+    out.extend(plan.arrays.iter().map(|array| npy(*array, made)));
+    let facts = serde_json::to_string_pretty(&facts(plan, made)).expect("plain values") + "\n";
+    out.push(facts.into_bytes());
+    out
+}
+
+/// An array as a NumPy file.
+fn npy(array: Array, made: &Made) -> Vec<u8> {
+    let probe = &made.settings.probe;
+    let [lines, samples] = [probe.scanlines as usize, probe.samples as usize];
+    let asked = "the plan asks for it";
+    let (element, shape, bytes): (_, Vec<usize>, &[u8]) = match array {
+        Array::Envelope => {
+            let values = made.envelope.as_deref().expect(asked);
+            (Element::Float, vec![lines, samples], bytemuck::cast_slice(values))
         }
-        "iq.npy" => {
-            let values = made.iq.as_deref().expect("the plan asks for it");
-            npy::bytes(Element::Float, &[shape[0], shape[1], 2], bytemuck::cast_slice(values))
+        Array::Iq => {
+            let values = made.iq.as_deref().expect(asked);
+            (Element::Float, vec![lines, samples, 2], bytemuck::cast_slice(values))
         }
-        _ => (serde_json::to_string_pretty(&facts(plan, made)).expect("plain values") + "\n")
-            .into_bytes(),
+        Array::Label(name) => {
+            let label = made.labels.iter().find(|label| label.kind.name == name).expect(asked);
+            let (element, bytes) = match &label.values {
+                LabelValues::Indices(values) => (Element::Integer, bytemuck::cast_slice(values)),
+                LabelValues::Quantities(values) => (Element::Float, bytemuck::cast_slice(values)),
+            };
+            (element, label.shape.clone(), bytes)
+        }
     };
-    extensions(plan).iter().map(file).collect()
+    let mut out = Vec::new();
+    npy::write_to(&mut out, element, &shape, bytes).expect("written to memory");
+    out
 }
 
 /// The image as a PNG file of 8-bit grey.
@@ -57,38 +74,17 @@ fn grey(made: &Made) -> Vec<u8> {
     out
 }
 
-/// The segmentation as a PNG file whose pixels are classes, and whose palette has a color for each.
-fn indexed(made: &Made) -> Vec<u8> {
+/// The segmentation as a PNG file whose pixels are classes, with their colours and names.
+fn indexed(plan: &Plan, made: &Made) -> Vec<u8> {
     let (width, height) = made.image.dimensions();
-    let mut out = Vec::new();
-    let mut encoder = png::Encoder::new(&mut out, width, height);
-    encoder.set_color(png::ColorType::Indexed);
-    encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_palette((0..=u8::MAX).flat_map(color).collect::<Vec<u8>>());
-    let mut writer = encoder.write_header().expect("written to memory");
-    writer.write_image_data(&made.segmentation).expect("a byte per pixel");
-    writer.finish().expect("written to memory");
-    out
+    let legend = json!({ "classes": plan.classes }).to_string();
+    indexed::bytes([width, height], &made.segmentation, &colours(plan), &legend)
 }
 
-/// The color of a class: black beside the sector, else hues a golden angle apart.
-pub(super) fn color(class: u8) -> [u8; 3] {
-    if class == 0 {
-        return [0; 3];
-    }
-    // The golden angle is 0.381966 of a circle; here of 6 x 256 steps.
-    let hue = (u32::from(class - 1) * 587) % 1536;
-    let ramp = (hue % 256) as u8;
-    let bright = |v: u8| 64 + v / 4 * 3;
-    [
-        [255, ramp, 0],
-        [255 - ramp, 255, 0],
-        [0, 255, ramp],
-        [0, 255 - ramp, 255],
-        [ramp, 0, 255],
-        [255, 0, 255 - ramp],
-    ][(hue / 256) as usize]
-        .map(bright)
+/// The colour of each class.
+pub(super) fn colours(plan: &Plan) -> Vec<[u8; 3]> {
+    let numbered = plan.classes.iter().enumerate();
+    numbered.map(|(i, name)| palette::look(name, i).0).collect()
 }
 
 /// What was drawn for a sample, where the probe stood, and what its pixels are.
@@ -104,7 +100,7 @@ pub(super) fn facts(plan: &Plan, made: &Made) -> Value {
         all.iter().map(|(name, number)| (name.clone(), json!(number))).collect()
     };
     let mut pixels = Map::new();
-    for (class, name) in (1u8..=u8::MAX).zip(&plan.classes) {
+    for (class, name) in (0..NOTHING).zip(&plan.classes) {
         let count = made.segmentation.iter().filter(|c| **c == class).count();
         if count > 0 {
             pixels.insert(name.clone(), json!({ "class": class, "pixels": count }));
@@ -162,14 +158,6 @@ pub(super) fn wxyz(place: &DAffine3) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn classes_have_colors_that_are_told_apart() {
-        let far = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).any(|(a, b)| a.abs_diff(b) > 30);
-        for class in 0..=12 {
-            assert!((0..class).all(|other| far(color(class), color(other))), "{class}");
-        }
-    }
 
     #[test]
     fn values_of_entries_are_those_of_the_file() {

@@ -12,19 +12,21 @@ use super::pose::Poses;
 use super::reading::{self, Read, Target};
 use super::split;
 use crate::issue;
+use crate::output::indexed::NOTHING;
 use crate::scene::animation::Track;
 use crate::scene::file::{Document, SceneFile, Source, load_trajectory, quoted};
 use crate::scene::{Scene, SceneError, Warning};
 use crate::settings::units::DURATION;
-use crate::settings::{Facts, Form, Quality};
+use crate::settings::{Facts, Form, Quality, suggest};
 use crate::sim::calibration::Work;
+use crate::sim::labels::KINDS;
 
 /// Largest plan, bytes.
 const MAX_PLAN: u64 = 4 << 20;
 /// Most samples of a plan: their numbers have nine digits.
 const MAX_SAMPLES: u64 = 1_000_000_000;
-/// Most classes of a segmentation: a byte, of which 0 is beside the sector.
-const MAX_CLASSES: usize = 255;
+/// Most classes of a segmentation: a byte, of which one value shows nothing.
+const MAX_CLASSES: usize = NOTHING as usize;
 /// Samples of a part, unless the plan says it.
 const PART: u32 = 100;
 /// The scene's time.
@@ -54,13 +56,41 @@ impl Format {
 }
 
 /// An array beside the image.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Array {
     /// Envelope after TGC, relative to a perfect mirror: [scanline, sample].
     Envelope,
     /// Complex baseband before TGC: [scanline, sample, real and imaginary].
     Iq,
+    /// Labels of the image's pixels, by their name in [`KINDS`]: [row, column], some of them with three numbers each.
+    Label(&'static str),
+}
+
+impl Array {
+    /// All that a plan may name. What has moved since the last frame is not among them: a sample has no last frame.
+    pub fn all() -> impl Iterator<Item = Self> + Clone {
+        let labels = KINDS.iter().map(|kind| kind.name).filter(|name| *name != "displacement");
+        [Self::Envelope, Self::Iq].into_iter().chain(labels.map(Self::Label))
+    }
+
+    /// Its name in plans and in names of files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Envelope => "envelope",
+            Self::Iq => "iq",
+            Self::Label(name) => name,
+        }
+    }
+}
+
+/// The tissue that a segmentation shows at a pixel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Segmented {
+    /// The one that is seen there: in which the refracted beam is when the echo is made.
+    Seen,
+    /// The one that the scan plane has there.
+    True,
 }
 
 /// A plan that has been checked.
@@ -75,9 +105,11 @@ pub struct Plan {
     pub formats: Vec<Format>,
     /// Arrays beside the images.
     pub arrays: Vec<Array>,
+    /// The tissue that segmentations show.
+    pub segmentation: Segmented,
     /// The splits, in their order.
     pub splits: Vec<Split>,
-    /// Names of the classes of segmentations, from 1 on; 0 is beside the sector.
+    /// Names of the classes of segmentations, from 0 on: the tissues of all scenes.
     pub classes: Vec<String>,
     pub(super) part: u32,
     pub(super) scenes: Vec<PlanScene>,
@@ -149,7 +181,9 @@ struct PlanTable {
     quality: Option<String>,
     formats: Vec<Format>,
     #[serde(default)]
-    arrays: Vec<Array>,
+    arrays: Vec<String>,
+    #[serde(default = "seen")]
+    segmentation: Segmented,
     samples_per_part: Option<u32>,
     #[serde(default)]
     split: Table,
@@ -159,6 +193,10 @@ struct PlanTable {
     draw: Table,
     #[serde(default)]
     scene: Vec<SceneTable>,
+}
+
+fn seen() -> Segmented {
+    Segmented::Seen
 }
 
 #[derive(Deserialize)]
@@ -201,7 +239,8 @@ impl Plan {
             seed: table.seed,
             quality,
             formats: Format::ALL.into_iter().filter(|f| table.formats.contains(f)).collect(),
-            arrays: table.arrays.clone(),
+            arrays: arrays(&document, &table.arrays)?,
+            segmentation: table.segmentation,
             splits: Vec::new(),
             classes: Vec::new(),
             part,
@@ -362,6 +401,17 @@ fn quality(document: &Document<'_>, word: Option<&str>) -> Result<Option<Quality
         let message = format!("unknown quality `{word}`");
         document.fail("quality", message, "choose one of `draft`, `standard`, `reference`")
     })
+}
+
+fn arrays(document: &Document<'_>, names: &[String]) -> Result<Vec<Array>, SceneError> {
+    let found = |(i, name): (usize, &String)| {
+        let found = Array::all().find(|array| array.name() == name);
+        found.ok_or_else(|| {
+            let remedy = suggest::among(name, Array::all().map(Array::name));
+            document.fail(&format!("arrays.{i}"), format!("there is no array `{name}`"), remedy)
+        })
+    };
+    names.iter().enumerate().map(found).collect()
 }
 
 /// Numbers of each scene's samples: split by split, each in the order of its scenes.

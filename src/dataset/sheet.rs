@@ -1,9 +1,9 @@
-//! A contact sheet of samples with their segmentation in color.
+//! A contact sheet of samples with their segmentation in colour.
 
 use image::{GrayImage, Luma, Rgb, RgbImage, imageops};
 
 use super::DatasetError;
-use super::members::color;
+use super::members::colours;
 use super::plan::{Part, Plan};
 use super::store::Store;
 use super::studio::{Made, Studio};
@@ -17,7 +17,7 @@ const COLUMNS: usize = 8;
 const HEIGHT: u32 = 160;
 /// Names of classes in a tile.
 const LINES: usize = 10;
-/// Share of the class's color in a pixel of the segmented image.
+/// Share of the class's colour in a pixel of the segmented image.
 const SHARE: f64 = 0.45;
 
 /// Samples for a contact sheet, spread evenly over those of a shard.
@@ -88,30 +88,32 @@ impl<'p> Gallery<'p> {
         });
         let tiles = captions.zip(&pairs).map(|(caption, image)| Tile::Image { caption, image });
         let mut tiles: Vec<_> = tiles.collect();
-        // Room for the color before each name.
+        // Room for the colour before each name.
         let legend: Vec<_> = plan.classes.iter().map(|name| format!("   {name}")).collect();
         tiles.extend(legend.chunks(LINES).map(|lines| Tile::Text(lines.to_vec())));
         let sheet = Sheet { title: plan.title.clone(), columns: COLUMNS.min(tiles.len()), tiles };
         let drawn = sheet.draw();
+        let colours = colours(plan);
         let mut page = RgbImage::from_fn(drawn.image.width(), drawn.image.height(), |x, y| {
             Rgb([drawn.image.get_pixel(x, y).0[0]; 3])
         });
         for (place, [image, classes]) in drawn.places.iter().zip(pictures()) {
             for (x, y, Luma([class])) in classes.enumerate_pixels() {
+                let Some(colour) = colours.get(usize::from(*class)) else { continue };
                 let at = page.get_pixel_mut(place[0] + image.width() + x, place[1] + y);
-                let own = color(*class).map(f64::from);
+                let own = colour.map(f64::from);
                 let mixed = |i: usize| (1.0 - SHARE) * f64::from(at.0[i]) + SHARE * own[i];
                 *at = Rgb([0, 1, 2].map(|i| mixed(i).round() as u8));
             }
         }
         let edge = drawn.line * 2 / 3;
-        for (entry, class) in (0..plan.classes.len()).zip(1u8..) {
+        for (entry, colour) in colours.iter().enumerate() {
             let [left, top] = drawn.places[self.places.len() + entry / LINES];
             let line = (entry % LINES) as u32;
             for (x, y) in (0..edge).flat_map(|x| (0..edge).map(move |y| (x, y))) {
                 let at = (left + x, top + line * drawn.line + drawn.line / 6 + y);
                 if let Some(pixel) = page.get_pixel_mut_checked(at.0, at.1) {
-                    *pixel = Rgb(color(class));
+                    *pixel = Rgb(*colour);
                 }
             }
         }

@@ -34,6 +34,8 @@ pub struct Store<'p> {
     plan: &'p Plan,
     root: PathBuf,
     digits: usize,
+    /// Extensions of a sample's files.
+    extensions: Vec<String>,
 }
 
 /// The file of an archive that is being written.
@@ -43,7 +45,7 @@ impl<'p> Store<'p> {
     /// The folder `root` for samples of `plan`.
     pub fn new(plan: &'p Plan, root: &Path) -> Self {
         let digits = plan.samples().to_string().len().max(DIGITS);
-        Self { plan, root: root.to_owned(), digits }
+        Self { plan, root: root.to_owned(), digits, extensions: extensions(plan) }
     }
 
     /// Name of a sample's files, without extension.
@@ -162,7 +164,8 @@ impl<'p> Store<'p> {
             "samples": plan.samples(),
             "splits": splits,
             "formats": plan.formats.iter().map(|f| f.word()).collect::<Vec<_>>(),
-            "files": extensions(plan),
+            "files": self.extensions,
+            "segmentation": format!("{:?}", plan.segmentation).to_lowercase(),
             "classes": plan.classes,
         })
     }
@@ -178,8 +181,7 @@ impl<'p> Store<'p> {
     /// True if any file of a part is there.
     fn is_begun(&self, part: &Part) -> bool {
         let tarred = self.writes(Format::WebDataset) && self.archive(part).exists();
-        let lies =
-            |number| extensions(self.plan).iter().any(|e| self.file(part, number, e).exists());
+        let lies = |number| self.extensions.iter().any(|e| self.file(part, number, e).exists());
         tarred || (self.writes(Format::Folder) && part.samples.clone().any(lies))
     }
 
@@ -249,13 +251,13 @@ impl<'p> Store<'p> {
                     self.compare(part, number, &files)?;
                     compared = true;
                 }
-                for (extension, bytes) in extensions(self.plan).into_iter().zip(&files) {
+                for (extension, bytes) in self.extensions.iter().zip(&files) {
                     if let Some(archive) = &mut archive {
                         let name = format!("{}.{extension}", self.name(number));
                         append(archive, &name, bytes)
                             .map_err(|e| DatasetError::writing(&path, e))?;
                     }
-                    if lacking.contains(&extension) {
+                    if lacking.contains(extension) {
                         self.write(&self.file(part, number, extension), bytes)?;
                     }
                 }
@@ -277,11 +279,11 @@ impl<'p> Store<'p> {
     }
 
     /// Extensions of a sample's files that are not in the folder of files and should be.
-    fn lacking(&self, part: &Part, number: u32) -> Vec<&'static str> {
+    fn lacking(&self, part: &Part, number: u32) -> Vec<String> {
         if !self.writes(Format::Folder) {
             return Vec::new();
         }
-        let all = extensions(self.plan).into_iter();
+        let all = self.extensions.iter().cloned();
         all.filter(|extension| !self.file(part, number, extension).exists()).collect()
     }
 
@@ -291,9 +293,9 @@ impl<'p> Store<'p> {
         part: &Part,
         number: u32,
     ) -> Result<Option<Vec<Vec<u8>>>, DatasetError> {
-        let all = extensions(self.plan);
+        let all = &self.extensions;
         if self.writes(Format::Folder) {
-            let read = |extension: &&str| {
+            let read = |extension: &String| {
                 let path = self.file(part, number, extension);
                 match std::fs::read(&path) {
                     Ok(bytes) => Ok(Some(bytes)),
@@ -329,8 +331,7 @@ impl<'p> Store<'p> {
     ) -> Result<Option<[GrayImage; 2]>, DatasetError> {
         let Some(files) = self.kept(part, number)? else { return Ok(None) };
         let of = |wanted: &str| {
-            let place =
-                extensions(self.plan).iter().position(|e| *e == wanted).expect("always written");
+            let place = self.extensions.iter().position(|e| *e == wanted).expect("always written");
             let spoilt = |_| {
                 let path = self.file(part, number, wanted);
                 DatasetError::File(FileError::file(

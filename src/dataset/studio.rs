@@ -5,14 +5,16 @@ use std::sync::Arc;
 use glam::DAffine3;
 use image::GrayImage;
 
+use super::DatasetError;
 use super::draws::Count;
-use super::plan::{Array, Plan, Sample};
-use super::{DatasetError, segmentation};
+use super::plan::{Array, Plan, Sample, Segmented};
 use crate::gpu::Device;
+use crate::output::indexed::NOTHING;
 use crate::scene::Scene;
 use crate::scene::file::{SceneError, stated_pose};
 use crate::sim::contact::{SkinContact, Skins};
-use crate::sim::layout::{Counters, Frame};
+use crate::sim::labels::{LabelArray, LabelGrid};
+use crate::sim::layout::{Counters, Frame, Label};
 use crate::sim::shaders::Library;
 use crate::sim::{Simulator, Tracer, machine};
 
@@ -26,7 +28,7 @@ pub struct Made {
     pub world_from_probe: DAffine3,
     /// The B-mode image, black beside the sector.
     pub image: GrayImage,
-    /// Class of each pixel, row by row: 0 beside the sector, else a place in [`Plan::classes`] counted from 1.
+    /// Class of each pixel, row by row: a place in [`Plan::classes`], or [`NOTHING`].
     pub segmentation: Vec<u8>,
     /// Left upper corner of the image in the probe's plane, mm.
     pub corner: [f64; 2],
@@ -38,6 +40,8 @@ pub struct Made {
     pub envelope: Option<Vec<f32>>,
     /// Complex pairs of the baseband before TGC, [scanline, sample]; where the plan asks for it.
     pub iq: Option<Vec<f32>>,
+    /// Labels of the image's pixels; those for which the plan asks, in its order.
+    pub labels: Vec<LabelArray>,
     /// Losses of the frame.
     pub counters: Counters,
 }
@@ -150,7 +154,7 @@ fn made(
     let (width, height, rgba) = simulator.pixels()?;
     let grey: Vec<u8> = rgba.chunks_exact(4).map(|p| p[0]).collect();
     let frame: Frame = *simulator.constants();
-    let labels = simulator.straight_labels()?;
+    let labels = simulator.labels()?.expect("the scene asks for them").pixels;
     let samples = frame.samples as usize;
     let count = frame.scanlines as usize * samples;
     let wants = |array: Array| plan.arrays.contains(&array);
@@ -168,7 +172,8 @@ fn made(
         settings: scene.settings.clone(),
         world_from_probe: scene.world_from_probe,
         image: GrayImage::from_raw(width, height, grey).expect("a byte per pixel"),
-        segmentation: segmentation::classes(&frame, scene, &labels, &plan.classes),
+        segmentation: classes(plan, scene, &labels),
+        labels: wanted(plan, &labels),
         corner: [f64::from(frame.image_left), f64::from(frame.image_top)],
         pixel: f64::from(frame.pixel_pitch),
         contact: simulator.contact(),
@@ -177,4 +182,36 @@ fn made(
         counters: simulator.counters()?,
         sample,
     })
+}
+
+/// Class of each pixel.
+fn classes(plan: &Plan, scene: &Scene, pixels: &LabelGrid) -> Vec<u8> {
+    let class =
+        |name: &str| plan.classes.iter().position(|c| c == name).expect("all are classes") as u8;
+    let of_tissue: Vec<u8> = scene.tissues.iter().map(|t| class(&t.name)).collect();
+    let tissue = |label: &Label| match plan.segmentation {
+        Segmented::Seen => label.tissue,
+        Segmented::True => label.true_tissue,
+    };
+    let class = |label| of_tissue.get(tissue(label) as usize).copied().unwrap_or(NOTHING);
+    pixels.labels.iter().map(class).collect()
+}
+
+/// The arrays for which the plan asks.
+fn wanted(plan: &Plan, pixels: &LabelGrid) -> Vec<LabelArray> {
+    let names: Vec<_> = plan
+        .arrays
+        .iter()
+        .filter_map(|array| match array {
+            Array::Label(name) => Some(*name),
+            _ => None,
+        })
+        .collect();
+    if names.is_empty() {
+        return Vec::new();
+    }
+    let all = pixels.arrays();
+    let found =
+        |name| all.iter().find(|array| array.kind.name == name).cloned().expect("a kind of labels");
+    names.into_iter().map(found).collect()
 }

@@ -33,24 +33,24 @@ impl Element {
 /// Errors of the file system.
 pub fn write(path: &Path, element: Element, shape: &[usize], bytes: &[u8]) -> std::io::Result<()> {
     let mut file = std::io::BufWriter::new(std::fs::File::create(path)?);
-    file.write_all(&header(element, shape, bytes))?;
-    file.write_all(bytes)?;
+    write_to(&mut file, element, shape, bytes)?;
     file.flush()
 }
 
-/// The file of words as an array of `shape` in C order.
+/// Writes the same to `out`.
 ///
 /// # Panics
-/// When the shape does not hold exactly these words.
-pub fn bytes(element: Element, shape: &[usize], bytes: &[u8]) -> Vec<u8> {
-    let mut out = header(element, shape, bytes);
-    out.extend_from_slice(bytes);
-    out
-}
-
-/// What stands before these words.
-fn header(element: Element, shape: &[usize], bytes: &[u8]) -> Vec<u8> {
-    assert_eq!(4 * shape.iter().product::<usize>(), bytes.len(), "an array of {shape:?}");
+/// As [`write`].
+///
+/// # Errors
+/// Those of `out`.
+pub fn write_to(
+    out: &mut impl Write,
+    element: Element,
+    shape: &[usize],
+    bytes: &[u8],
+) -> std::io::Result<()> {
+    assert_eq!(4 * shape.iter().product::<usize>(), bytes.len(), "{shape:?} and its data");
     let descr = element.descr();
     let shape: Vec<_> = shape.iter().map(|n| format!("{n},")).collect();
     let shape = shape.join(" ");
@@ -61,10 +61,10 @@ fn header(element: Element, shape: &[usize], bytes: &[u8]) -> Vec<u8> {
     header.extend(std::iter::repeat_n(' ', padding));
     header.push('\n');
     let length = u16::try_from(header.len()).expect("a short header");
-    let mut out = b"\x93NUMPY\x01\x00".to_vec();
-    out.extend(length.to_le_bytes());
-    out.extend(header.into_bytes());
-    out
+    out.write_all(b"\x93NUMPY\x01\x00")?;
+    out.write_all(&length.to_le_bytes())?;
+    out.write_all(header.as_bytes())?;
+    out.write_all(bytes)
 }
 
 /// Reads the data of an array of 32-bit words of any shape, as bytes in C order.

@@ -172,8 +172,8 @@ group! {
         /// Factor on the `thickness` of every surface.
         thickness_scale: f64 = 1.0,
             Facts::number(0.0, 100.0).label("Thickness").usual(0.0, 5.0);
-        /// Frames also name the mesh and the tissue in which each sample lies, straight along the scanlines: the
-        /// buffer `labels` of `render --dump`, an instance (4294967295: none) and a tissue for each sample.
+        /// Frames also say what each sample and each pixel shows (labels.md): tissue and mesh that are there and that
+        /// are seen, where that is, what the sound has lost, how tissue has moved. `render --labels` writes it.
         labels: bool = false,
             Facts::switch().under("Paths").label("Labels");
         /// Seed of every random number.

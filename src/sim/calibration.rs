@@ -127,7 +127,7 @@ impl<'a> Calibration<'a> {
         probe.slice_thickness / (2.0 * f64::from(probe.elevation_layers))
     }
 
-    fn elevations(&self) -> impl Iterator<Item = f64> + '_ {
+    fn elevations(&self) -> impl Iterator<Item = f64> + Clone + '_ {
         let probe = &self.scene.probe;
         (0..probe.elevation_layers).map(|e| probe.elevation(e))
     }
@@ -164,19 +164,20 @@ impl<'a> Calibration<'a> {
         (kept(&layers, layer_pitch) * kept(&lines, probe.line_pitch(z))).sqrt().recip()
     }
 
-    /// Energy of the whole two-way beam across and in elevation, pi sigma_x sigma_e, divided by the part that
-    /// the layers receive: each receives its slab, to the edge of an ellipse of [`LATERAL_CUT`] sigmas.
-    pub fn beam_power(&self, z: f64) -> f64 {
+    /// The part of the energy of the whole two-way beam, pi sigma_x sigma_e, that each layer receives at depth `z`: its
+    /// slab, to the edge of an ellipse of [`LATERAL_CUT`] sigmas.
+    fn heard(&self, z: f64) -> impl Iterator<Item = f64> + '_ {
         let (sigma, reach) = (self.sigma_elevation(z), self.elevation_reach());
-        let heard: f64 = self
-            .elevations()
-            .map(|y| {
-                let nearest = (y.abs() - reach).max(0.0) / (LATERAL_CUT * sigma);
-                let width = LATERAL_CUT * (1.0 - nearest * nearest).max(0.0).sqrt();
-                erf(width) * (erf((y + reach) / sigma) - erf((y - reach) / sigma)) / 2.0
-            })
-            .sum();
-        (1.0 / heard.max(1e-12)).min(ELEVATION_GAIN_LIMIT)
+        self.elevations().map(move |y| {
+            let nearest = (y.abs() - reach).max(0.0) / (LATERAL_CUT * sigma);
+            let width = LATERAL_CUT * (1.0 - nearest * nearest).max(0.0).sqrt();
+            erf(width) * (erf((y + reach) / sigma) - erf((y - reach) / sigma)) / 2.0
+        })
+    }
+
+    /// Energy of the whole two-way beam across and in elevation, divided by the part that the layers receive.
+    pub fn beam_power(&self, z: f64) -> f64 {
+        (1.0 / self.heard(z).sum::<f64>().max(1e-12)).min(ELEVATION_GAIN_LIMIT)
     }
 
     /// The resolution cell at depth `z`, mm^3: the volume whose scatterers make as much of the fourth
@@ -264,6 +265,25 @@ impl<'a> Calibration<'a> {
 
     fn speckle_target(&self) -> f64 {
         amplitude(LIVER_LEVEL + self.scene.simulation.speckle_gain)
+    }
+
+    /// Expected power per sample, at depth `z`, of the speckle of a tissue of 0 dB that nothing weakens, of each elevation
+    /// layer; together that of [`Self::speckle_gain`].
+    pub fn speckle_powers(&self, z: f64) -> Vec<f64> {
+        let target = self.speckle_target().powi(2);
+        let heard: Vec<f64> = match self.scene.simulation.scatter_mode {
+            ScatterMode::Lattice => {
+                let lost = self.beam_power(z);
+                self.heard(z).map(|share| share * lost).collect()
+            }
+            ScatterMode::Voxel => {
+                let sigma = self.sigma_elevation(z);
+                let layers = self.elevations().map(|y| (-y * y / (sigma * sigma)).exp());
+                let sum = layers.clone().sum::<f64>().max(1e-12);
+                layers.map(|share| share / sum).collect()
+            }
+        };
+        heard.into_iter().map(|share| target * share).collect()
     }
 
     /// The factor on a scatterer's calibrated amplitude at depth `z`, before attenuation compensation.

@@ -140,6 +140,11 @@ constants! {
     /// Growth of a beam's variance across behind a lens, over its own, that is not exceeded.
     pub const MOST_WIDENED: f32 = 8.0;
 
+    /// Smallest power whose level is told of a sample; that of a perfect mirror is 1.
+    pub const LEAST_POWER: f32 = 1e-30;
+    /// Units in a power that is summed in 64 bits: 2^58.
+    pub const POWER_UNITS: f32 = (1_u64 << 58) as f32;
+
     /// The anatomy in front of the image plane is cut away.
     pub const VIEW3D_CUT: u32 = 1;
     /// The B-mode image is shown in its place.
@@ -236,6 +241,13 @@ shared! {
         before: u32, behind: u32,
         interactions: u32, crossings: u32,
         enclosing: u32, media: [u32; MAX_STACK],
+    }
+    /// What is known of an axial sample of a scanline, or of a pixel.
+    struct Label {
+        true_tissue: u32, true_instance: u32, tissue: u32, instance: u32,
+        place_loss: [f32; 4],
+        moved_incidence: [f32; 4],
+        contact: f32, level: f32, reverberation: f32, unused: f32,
     }
     /// The constants with which an acquired volume is mixed with the simulation.
     struct Fusion {

@@ -29,6 +29,8 @@ pub(super) struct Passes {
     pub(super) frame: layout::Frame,
     /// Constants of the frame whose picture is complete.
     pub(super) shown: layout::Frame,
+    /// True if a frame has been made: what labels say has moved has moved since the last one.
+    pub(super) began: bool,
     pub(super) batches: Batches,
 }
 
@@ -43,6 +45,10 @@ impl Passes {
     ) -> Result<Duration, SimError> {
         cmd.scope("update");
         let began = Instant::now();
+        self.buffers.add(cmd.device(), stages::needed(scene))?;
+        if self.began {
+            self.remember(cmd, scene)?;
+        }
         self.world.update(cmd, scene)?;
         // A frame of fewer lines than the buffers were made for must not want more segments.
         let budget = FrameBudget {
@@ -51,12 +57,24 @@ impl Passes {
         };
         (self.frame, self.batches) =
             frame_constants(scene, &self.world, coincident, index, &budget);
-        self.buffers.add(cmd.device(), stages::needed(scene))?;
+        if !self.began {
+            self.remember(cmd, scene)?;
+            self.began = true;
+        }
         cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&self.frame))?;
         if let Some(fusion) = &mut self.fusion {
             fusion.update(cmd, scene, &self.buffers)?;
         }
         Ok(began.elapsed())
+    }
+
+    /// Keeps what the last frame was made of, where labels say what has moved since; of the first frame its own.
+    fn remember(&mut self, cmd: &mut Commands, scene: &Scene) -> Result<(), GpuError> {
+        if scene.simulation.labels {
+            self.world.remember(cmd)?;
+            cmd.write(&self.buffers["frame_before"], 0, bytemuck::bytes_of(&self.frame))?;
+        }
+        Ok(())
     }
 
     /// Computes which elements of the probe's face are coupled to the skin, and writes them to the device.

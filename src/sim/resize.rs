@@ -34,7 +34,7 @@ impl Simulator {
         self.sources = Sources::of(scene);
         self.read_out = super::ReadOut::default();
         // The new buffers hold no frame yet.
-        self.fused = false;
+        (self.fused, self.labelled) = (false, false);
         self.upload_tables()?;
         Ok(true)
     }

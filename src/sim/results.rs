@@ -50,14 +50,6 @@ impl Simulator {
         self.floats("iq")
     }
 
-    /// Labels of the last frame, which asked for them: instance (`u32::MAX`: none) and tissue of each sample, [L][K].
-    ///
-    /// # Errors
-    /// A Vulkan error.
-    pub fn straight_labels(&mut self) -> Result<Vec<[u32; 2]>, SimError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read("labels")?))
-    }
-
     /// Log-compressed envelope, 0..1: [L][K].
     ///
     /// # Errors

@@ -5,8 +5,10 @@ use crate::scene::Scene;
 pub use axial::AXIAL;
 pub use beam::BEAM;
 pub use blur::BLUR;
+pub use chart::CHART;
 pub use convert::CONVERT;
 pub use display::DISPLAY;
+pub use expect::{EXPECT, LEVEL};
 pub use fuse::FUSE;
 pub use inputs::{ANATOMY, INPUTS};
 pub use label::LABEL;
@@ -21,8 +23,10 @@ pub use trace::TRACE;
 mod axial;
 mod beam;
 pub mod blur;
+mod chart;
 mod convert;
 mod display;
+mod expect;
 mod fuse;
 mod inputs;
 mod label;
@@ -34,9 +38,12 @@ mod shadow;
 pub(super) mod tint;
 mod trace;
 
-/// Stages of every frame, in order; the last, labels, runs only where labels are wanted.
-pub const IMAGE: [&Pass; 9] =
-    [&ORIGIN, &TRACE[0], &TRACE[1], &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY, &LABEL];
+/// Stages of every frame, in order.
+pub const IMAGE: [&Pass; 8] =
+    [&ORIGIN, &TRACE[0], &TRACE[1], &TRACE[2], &SCATTER, &BEAM, &AXIAL, &DISPLAY];
+
+/// Stages of frames that have labels, in order; the first after each [`SCATTER`].
+pub const LABELS: [&Pass; 4] = [&EXPECT, &LABEL, &LEVEL, &CHART];
 
 /// Stages of frames that show an acquired volume, in order.
 pub const FUSION: [&Pass; 10] =
@@ -44,7 +51,7 @@ pub const FUSION: [&Pass; 10] =
 
 /// All stages.
 pub fn all() -> impl Iterator<Item = &'static Pass> {
-    IMAGE.into_iter().chain(FUSION)
+    IMAGE.into_iter().chain(LABELS).chain(FUSION)
 }
 
 /// Names of all stages, in order; the time of a stage is reported under its name.
@@ -57,7 +64,7 @@ pub fn names() -> Vec<&'static str> {
 /// Stages that frames of a scene may run, with any settings.
 pub(super) fn of(scene: &Scene) -> impl Iterator<Item = &'static Pass> {
     let fusion = scene.volume.is_some().then_some(FUSION);
-    IMAGE.into_iter().chain(fusion.into_iter().flatten())
+    IMAGE.into_iter().chain(LABELS).chain(fusion.into_iter().flatten())
 }
 
 /// The buffers that a frame of `scene` needs.

@@ -117,6 +117,8 @@ pub struct Tables {
     pub points: Vec<[f32; 4]>,
     /// Grey level of each of 256 values.
     pub grey: Vec<u32>,
+    /// Expected power of speckle, by sample and layer; empty where no labels are wanted.
+    pub speckle: Vec<f32>,
 }
 
 impl Tables {
@@ -129,11 +131,12 @@ impl Tables {
             surfaces: surfaces(scene),
             points: with_spheres(points(scene)),
             grey: grey_map(&scene.imaging),
+            speckle: if scene.simulation.labels { speckle(scene) } else { Vec::new() },
         }
     }
 
     /// Names of the buffers that the tables fill, with their content.
-    pub fn arrays(&self) -> [(&'static str, &[u8]); 6] {
+    pub fn arrays(&self) -> [(&'static str, &[u8]); 7] {
         [
             ("scanlines", bytemuck::cast_slice(&self.scanlines)),
             ("rows", bytemuck::cast_slice(&self.rows)),
@@ -141,8 +144,17 @@ impl Tables {
             ("surfaces", bytemuck::cast_slice(&self.surfaces)),
             ("points", bytemuck::cast_slice(&self.points)),
             ("grey", bytemuck::cast_slice(&self.grey)),
+            ("speckle", bytemuck::cast_slice(&self.speckle)),
         ]
     }
+}
+
+/// Expected power of the speckle of a tissue of 0 dB that nothing weakens, by sample and layer: [K][E].
+fn speckle(scene: &Scene) -> Vec<f32> {
+    let calibration = Calibration::new(scene);
+    let pitch = scene.probe.sample_pitch();
+    let powers = |k: u32| calibration.speckle_powers(f64::from(k) * pitch);
+    (0..scene.probe.samples).flat_map(powers).map(|power| power as f32).collect()
 }
 
 /// Start and direction of each scanline; the last entry is the edge of the face.

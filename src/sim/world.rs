@@ -4,6 +4,7 @@ mod arrays;
 mod changing;
 mod entry;
 mod joined;
+mod past;
 mod refit;
 mod top;
 
@@ -22,6 +23,7 @@ use arrays::GeometryRange;
 use changing::ChangingInstances;
 use entry::RayMask;
 use joined::SharingSets;
+use past::Past;
 use top::TopLevel;
 
 /// The error of an anatomy that cannot be put on the device.
@@ -59,6 +61,8 @@ pub struct World {
     top: TopLevel,
     rows: Vec<layout::Instance>,
     mask: RayMask,
+    /// Rows and fields of the last frame; none where nothing has asked for them.
+    past: Option<Past>,
     /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
     kernels: Arc<ShapeKernels>,
@@ -178,6 +182,7 @@ impl World {
             apart,
             rows: arrays.instances,
             mask: RayMask::default(),
+            past: None,
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             kernels: Arc::clone(kernels),
         };
@@ -218,7 +223,9 @@ impl World {
         let mut apart = self.apart.clone();
         self.sets.mark_apart(scene, &mut apart);
         let (tracer, splits) = (self.tracer, self.splits);
+        let left = Past::left(&self.geometry);
         *self = Self::with_fields(device, &self.kernels, scene, tracer, splits, fields, apart)?;
+        self.past = Some(left);
         Ok(())
     }
 
@@ -278,6 +285,17 @@ impl World {
         Ok(changed)
     }
 
+    /// Keeps rows and fields as they are on the device, before [`Self::update`] changes them: they are those of the last
+    /// frame then.
+    ///
+    /// # Errors
+    /// Device out of memory.
+    pub(super) fn remember(&mut self, commands: &mut Commands<'_>) -> Result<(), GpuError> {
+        let past = self.past.take();
+        self.past = Some(Past::of(commands, &self.geometry, past)?);
+        Ok(())
+    }
+
     /// The tracer of this world.
     pub fn tracer(&self) -> Tracer {
         self.tracer
@@ -293,6 +311,11 @@ impl World {
         &self.geometry.fields
     }
 
+    /// Rows and fields of the last frame, where labels have asked for them.
+    pub(super) fn past(&self) -> Option<[&Buffer; 2]> {
+        self.past.as_ref().map(|past| [&past.instances, &past.fields])
+    }
+
     /// The binding of `name`, if it is a part of the anatomy ([`super::stages::ANATOMY`]).
     pub fn binding(&self, name: &str) -> Option<Binding<'_>> {
         let geometry = &self.geometry;
@@ -304,6 +327,8 @@ impl World {
             "smoothed" => &geometry.smoothed,
             "triangles" => &geometry.triangles,
             "fields" => &geometry.fields,
+            "instances_before" => &self.past.as_ref()?.instances,
+            "fields_before" => &self.past.as_ref()?.fields,
             _ => return None,
         }))
     }

@@ -11,7 +11,6 @@ mod history;
 pub mod hold;
 pub mod mmode;
 mod pad;
-mod palette;
 mod pose;
 pub mod real;
 pub mod registration;
@@ -27,6 +26,7 @@ use std::time::Instant;
 
 use glam::DAffine3;
 
+pub use crate::scene::palette::Show;
 pub use age::age;
 pub use camera::{Camera, Ray};
 pub use cine::Cine;
@@ -36,7 +36,6 @@ use history::History;
 use hold::Hold;
 use mmode::Strip;
 pub use pad::{Control, Pad, Press};
-pub use palette::Show;
 pub use pose::{Axis, STEP, moved};
 use real::Real;
 use registration::Registration;

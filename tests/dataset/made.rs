@@ -155,7 +155,7 @@ fn a_contact_sheet_shows_each_sample_with_its_labels() {
     let sheet = image::open(desk.path("whole/sheet.png")).expect("a PNG").into_rgb8();
     let colored = sheet
         .pixels()
-        .filter(|p| p.0[0].abs_diff(p.0[1]) > 20 || p.0[1].abs_diff(p.0[2]) > 20)
+        .filter(|p| p.0[0].abs_diff(p.0[1]) > 8 || p.0[1].abs_diff(p.0[2]) > 8)
         .count();
     // Twenty images of 48 x 80 pixels are colored.
     assert!(colored > 20 * 48 * 80 / 2, "{colored}");

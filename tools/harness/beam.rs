@@ -24,6 +24,18 @@ pub const SUBJECT: Subject = Subject {
     ..Subject::of(&stages::BEAM)
 };
 
+/// Shares of the scanlines, and sums of the elements that are not coupled.
+pub(super) fn contact(frame: &Frame, random: &mut Random) -> Vec<f32> {
+    let mut contact = random.floats(frame.scanlines as usize, 0.0, 1.0);
+    let mut air = 0.0;
+    contact.push(air);
+    for coupled in random.floats(frame.scanlines as usize, 0.0, 1.0) {
+        air += coupled.round();
+        contact.push(air);
+    }
+    contact
+}
+
 fn job(case: Case, size: Size) -> Job {
     let mut frame = frame(case, size);
     let mut rows = rows(&frame);
@@ -37,13 +49,7 @@ fn job(case: Case, size: Size) -> Job {
         (0..2 * samples(&frame)).map(|_| random.within(-ECHO, ECHO) as i32).collect()
     };
     let (mut surface, volume) = (echoes(), echoes());
-    let mut contact = random.floats(frame.scanlines as usize, 0.0, 1.0);
-    let mut air = 0.0;
-    contact.push(air);
-    for coupled in random.floats(frame.scanlines as usize, 0.0, 1.0) {
-        air += coupled.round();
-        contact.push(air);
-    }
+    let contact = contact(&frame, &mut random);
     if case == Case::NotFinite {
         rows[3].surface_undo = f32::NAN;
         rows[5].volume_undo = f32::INFINITY;

@@ -33,7 +33,7 @@ pub const RIGID: Subject = Subject {
 };
 
 /// Segments found by the twin of `trace`, in the device's slots.
-fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
+pub(super) fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
     let owned = worlds::owned(job);
     let mut world = owned.world();
     let rows = rows(frame);
@@ -45,26 +45,11 @@ fn segments(job: &Job, frame: &Frame) -> (Vec<layout::Segment>, Vec<u32>) {
     let mut counts = Vec::new();
     for (slot, found) in slots.chunks_mut(capacity).zip(&traced.segments) {
         for (slot, segment) in slot.iter_mut().zip(found) {
-            *slot = narrow(segment);
+            *slot = layout::Segment::from(segment);
         }
         counts.push(found.len().min(capacity) as u32);
     }
     (slots, counts)
-}
-
-fn narrow(s: &Segment) -> layout::Segment {
-    let four = |v: glam::DVec3, w: f64| v.extend(w).as_vec4().to_array();
-    layout::Segment {
-        origin_length: four(s.origin, s.length),
-        direction_time: four(s.direction, s.time),
-        lateral_weight: four(s.lateral, s.weight),
-        spread: four(s.spread.into(), s.share),
-        lens: four(s.lens.into(), 0.0),
-        tissue: s.tissue,
-        instance: s.instance,
-        line: s.line,
-        handedness: s.handedness as f32,
-    }
 }
 
 fn job(case: Case, size: Size) -> Job {
@@ -72,7 +57,7 @@ fn job(case: Case, size: Size) -> Job {
 }
 
 /// The world of a case. Its tissues are finite: here it is the segments that are not.
-fn scene(case: Case, size: Size) -> Job {
+pub(super) fn scene(case: Case, size: Size) -> Job {
     let case = match case {
         Case::NotFinite => Case::Random,
         case => case,
@@ -132,7 +117,7 @@ fn job_of(mut job: Job, case: Case) -> Job {
 }
 
 /// One bad number in the first segment of each of nine lines.
-fn spoil(segments: &mut [layout::Segment], counts: &[u32], capacity: usize) {
+pub(super) fn spoil(segments: &mut [layout::Segment], counts: &[u32], capacity: usize) {
     let bad = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
     let firsts = (0..counts.len()).filter(|&line| counts[line] > 0);
     for (i, line) in firsts.take(9).enumerate() {
@@ -145,18 +130,20 @@ fn spoil(segments: &mut [layout::Segment], counts: &[u32], capacity: usize) {
     }
 }
 
+/// The segments in the device's slots.
+pub(super) fn held(segments: &[layout::Segment], counts: &[u32], frame: &Frame) -> Vec<Segment> {
+    let lines = segments.chunks(frame.segment_capacity as usize).zip(counts);
+    let held = lines.flat_map(|(slots, &count)| slots.iter().take(count as usize));
+    held.map(Segment::from).collect()
+}
+
 fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let owned = worlds::owned(job);
     let world = owned.world();
     let frame = world.frame;
     let segments: Vec<layout::Segment> = job.get("segments");
     let counts: Vec<u32> = job.get("segment_count");
-    let held: Vec<Segment> = segments
-        .chunks(frame.segment_capacity as usize)
-        .zip(&counts)
-        .flat_map(|(slots, &count)| slots.iter().take(count as usize))
-        .map(Segment::from)
-        .collect();
+    let held = held(&segments, &counts, &frame);
     let twin = scatter::scatter(&world, &held);
     let echoes: Vec<i32> = job.after(outputs, "volume_echoes");
     let echoes: Vec<f64> = echoes.into_iter().map(f64::from).collect();

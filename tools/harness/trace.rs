@@ -178,5 +178,6 @@ fn alike(a: &Segment, b: &Segment) -> bool {
         && relative(a.weight, b.weight)
         && relative(a.share, b.share)
         && (0..3).all(|i| close(a.spread[i], b.spread[i], 1e-3 * b.spread[i].abs() + 1e-6))
+        && a.reflections == b.reflections
         && (0..3).all(|i| close(a.lens[i], b.lens[i], 5e-3 * b.lens[i].abs() + LENS[i]))
 }

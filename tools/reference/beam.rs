@@ -66,7 +66,7 @@ pub fn saturated(surface: &[i32], volume: &[i32]) -> u32 {
 
 /// The factor on the echoes of line `l`: coupled share of the transmit aperture times that of the receive
 /// aperture, element by element.
-fn coupling(frame: &Frame, row: &Row, contact: &[f32], l: u32) -> f64 {
+pub(super) fn coupling(frame: &Frame, row: &Row, contact: &[f32], l: u32) -> f64 {
     let (transmit, air) = contact.split_at(frame.scanlines as usize);
     let count = f64::from(frame.scanlines);
     let middle = match frame.kind {

@@ -18,18 +18,25 @@ pub fn origin(world: &World) -> (Vec<Start>, u32) {
             let line = world_line(world.frame, l, e);
             let mut crossings = world.crossings(line.origin, line.direction, [0.0, f64::INFINITY]);
             crossings.truncate(CROSSINGS);
-            let mut media = enclosing(&crossings);
-            overflow += u32::from(media.len() > MAX_STACK);
-            media.truncate(MAX_STACK);
-            if media.is_empty() && world.frame.couplant != NONE {
-                media.push(world.frame.couplant);
-            }
-            let (start, full) = world.start(Stack(media), &crossings);
+            let (media, full) = media(world, &crossings);
+            overflow += u32::from(full);
+            let (start, full) = world.start(media, &crossings);
             overflow += full;
             starts.push(start);
         }
     }
     (starts, overflow)
+}
+
+/// The media at the start of a straight line with these crossings, and true if not all fit into a stack.
+pub(super) fn media(world: &World, crossings: &[Crossing]) -> (Stack, bool) {
+    let mut media = enclosing(crossings);
+    let full = media.len() > MAX_STACK;
+    media.truncate(MAX_STACK);
+    if media.is_empty() && world.frame.couplant != NONE {
+        media.push(world.frame.couplant);
+    }
+    (Stack(media), full)
 }
 
 /// Instances left more often than entered; the one whose last exit is farthest comes first.

@@ -10,7 +10,7 @@ use super::geometry::{beam_weight, probe, world_line};
 use super::world::World;
 use super::{Accumulator, Segment};
 use insonify::sim::layout::{
-    FLAG_VOXEL, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
+    ALL_LEVELS, FLAG_VOXEL, MOST_WIDENED, Row, SCATTER_BIN, SCATTER_SLOT, Tissue, UNHEARD,
 };
 
 /// Shift of the layers' borders, in their pitch, off the round numbers at which points lie: by rounding a point
@@ -18,7 +18,7 @@ use insonify::sim::layout::{
 const POINT_SHIFT: f64 = 0.012_34;
 
 /// A segment in one space: the world's or that of its texture.
-struct Tube<'a> {
+pub(super) struct Tube<'a> {
     world: &'a World<'a>,
     segment: &'a Segment,
     tissue: &'a Tissue,
@@ -36,7 +36,7 @@ struct Tube<'a> {
 
 /// A field and its bounds.
 #[derive(Clone, Copy)]
-struct Deformed<'a> {
+pub(super) struct Deformed<'a> {
     field: Field<'a>,
     /// mm.
     reach: f64,
@@ -60,6 +60,13 @@ impl Deformed<'_> {
 /// For each slot of a scanline, [`Tube::level`] of the loudest segment that fills it.
 type Loudest = Vec<f64>;
 
+/// True if a segment has numbers only.
+pub(super) fn is_finite(s: &Segment) -> bool {
+    let numbers = [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread).chain(s.lens);
+    let vectors = [s.origin, s.direction, s.lateral];
+    numbers.into_iter().all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
+}
+
 /// Echoes of all segments, in units of 1 / volume_scale.
 pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
     let mut out = Accumulator::new(world.frame);
@@ -71,18 +78,11 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
         })
     };
     let fields: Vec<_> = (0..world.instances.len() as u32).map(deformed).collect();
-    let numbers = |s: &Segment| {
-        [s.length, s.time, s.weight, s.share].into_iter().chain(s.spread).chain(s.lens)
-    };
-    let finite = |s: &&Segment| {
-        let vectors = [s.origin, s.direction, s.lateral];
-        numbers(s).all(f64::is_finite) && vectors.iter().all(|v| v.is_finite())
-    };
     let slots = world.frame.samples.div_ceil(SCATTER_SLOT) as usize;
     let mut loudest = vec![vec![f64::NEG_INFINITY; slots]; world.frame.scanlines as usize];
     for tube in segments
         .iter()
-        .filter(finite)
+        .filter(|s| is_finite(s))
         .map(|s| Tube::textured(world, s, &fields))
         .filter(Tube::sounds)
     {
@@ -92,7 +92,7 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
             *here = here.max(tube.level(tube.distance(middle), &out));
         }
     }
-    for segment in segments.iter().filter(finite) {
+    for segment in segments.iter().filter(|s| is_finite(s)) {
         let tube = Tube::textured(world, segment, &fields);
         if tube.sounds() {
             if world.frame.flags & FLAG_VOXEL == 0 {
@@ -107,12 +107,12 @@ pub fn scatter(world: &World, segments: &[Segment]) -> Accumulator {
 }
 
 /// 1 / sigma^2 of the beam laterally and in elevation.
-fn falling(row: &Row) -> [f64; 2] {
+pub(super) fn falling(row: &Row) -> [f64; 2] {
     [row.sigma_lateral, row.sigma_elevation].map(|sigma| f64::from(sigma).powi(-2))
 }
 
 impl<'a> Tube<'a> {
-    fn new(
+    pub(super) fn new(
         world: &'a World,
         segment: &'a Segment,
         space: DAffine3,
@@ -146,7 +146,7 @@ impl<'a> Tube<'a> {
         Self::new(world, segment, world.texture(segment.instance), field)
     }
 
-    fn sounds(&self) -> bool {
+    pub(super) fn sounds(&self) -> bool {
         self.tissue.presence > 0.0 && self.segment.weight > 0.0
     }
 
@@ -156,7 +156,7 @@ impl<'a> Tube<'a> {
     }
 
     /// Distance at which sample `kappa` lies.
-    fn distance(&self, kappa: f64) -> f64 {
+    pub(super) fn distance(&self, kappa: f64) -> f64 {
         let frame = self.world.frame;
         let time = kappa * f64::from(frame.sample_pitch) / f64::from(frame.speed);
         (time - self.segment.time) * f64::from(self.tissue.speed)
@@ -168,7 +168,7 @@ impl<'a> Tube<'a> {
 
     /// Weight at distance `x` without absorption: smaller off the scanline, and averaged where a rough
     /// reflection has spread the path over many resolution cells.
-    fn weight(&self, x: f64, row: &Row) -> f64 {
+    pub(super) fn weight(&self, x: f64, row: &Row) -> f64 {
         let [a, b, c] = self.segment.spread;
         let variance = a + 2.0 * b * x + c * x * x;
         let wider = |sigma: f32| (1.0 + variance / f64::from(sigma).powi(2)).sqrt();
@@ -179,7 +179,7 @@ impl<'a> Tube<'a> {
             * beam_weight(self.world.frame, self.off[0] + x * self.off[1])
     }
 
-    fn absorbed(&self, x: f64) -> f64 {
+    pub(super) fn absorbed(&self, x: f64) -> f64 {
         (-f64::from(self.tissue.absorption) * x).exp()
     }
 
@@ -247,10 +247,20 @@ impl<'a> Tube<'a> {
 
     /// Variance across of the beam at distance `x`, over that behind even surfaces, whose 1 / sigma^2 is `fall`: lenses
     /// widen the transmitted and the received beam, and the product of both by half as much.
-    fn widened(&self, x: f64, fall: f64) -> f64 {
+    pub(super) fn widened(&self, x: f64, fall: f64) -> f64 {
         let [a, b, c] = self.segment.lens;
         let off = a + x * (b + x * c);
         1.0 + (0.5 * off * off * fall).min(MOST_WIDENED.into())
+    }
+
+    /// Lattice level that the beam asks for at sample `k`: one that is wider has more scatterers in it.
+    fn wanted(&self, k: usize) -> f64 {
+        let row = &self.world.rows[k];
+        if row.shape[3] <= ALL_LEVELS {
+            return row.shape[3].into();
+        }
+        let widened = self.widened(self.distance(k as f64 + 0.5), falling(row)[0]);
+        f64::from(row.shape[3]) + 0.5 * widened.log2()
     }
 
     /// Half the beam's width at sample `k`, mm: the beam's section is an ellipse, of which the

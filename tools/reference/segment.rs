@@ -24,6 +24,8 @@ pub struct Segment {
     /// Lateral offset a + b x + c x^2, mm, of what comes one deviation beside the beam's axis, by surfaces that bend its
     /// wavefront.
     pub lens: [f64; 3],
+    /// Number of reflections on the way to its start.
+    pub reflections: u32,
     /// Share of the path among those that replace it.
     pub share: f64,
     /// Index of the tissue.
@@ -48,6 +50,7 @@ impl From<&layout::Segment> for Segment {
             weight: s.lateral_weight[3].into(),
             spread: [s.spread[0].into(), s.spread[1].into(), s.spread[2].into()],
             lens: [s.lens[0].into(), s.lens[1].into(), s.lens[2].into()],
+            reflections: s.lens[3] as u32,
             share: s.spread[3].into(),
             tissue: s.tissue,
             instance: s.instance,
@@ -65,7 +68,7 @@ impl From<&Segment> for layout::Segment {
             direction_time: pack(s.direction, s.time),
             lateral_weight: pack(s.lateral, s.weight),
             spread: pack(DVec3::from(s.spread), s.share),
-            lens: pack(DVec3::from(s.lens), 0.0),
+            lens: pack(DVec3::from(s.lens), f64::from(s.reflections)),
             tissue: s.tissue,
             instance: s.instance,
             line: s.line,

@@ -2,9 +2,9 @@
 //! tissue around the mask would cause.
 
 use super::geometry::world_line;
-use super::interface::{self, Interface};
-use super::path::{Path, Role, step};
-use super::straight::{Start, Toggled};
+use super::path::Path;
+use super::straight::Start;
+use super::transmitted::{middle, sample, ways};
 use super::world::World;
 use insonify::sim::layout::MAX_PIECES;
 
@@ -35,107 +35,46 @@ pub fn shadow(world: &World, starts: &[Start]) -> Vec<Vec<Piece>> {
     lines
         .zip(starts)
         .map(|(line, start)| match start.weight > 0.0 {
-            true => follow(world, middle(world, line, start)),
+            true => follow(world, path(world, line, start)),
             false => vec![Piece { begin: 0.0, level: 0.0, slope: 0.0 }],
         })
         .collect()
 }
 
-/// The path of the beam's middle.
-fn middle(world: &World, line: u32, begin: &Start) -> Path {
+fn path(world: &World, line: u32, start: &Start) -> Path {
     let frame = world.frame;
-    let start = world_line(frame, line % frame.scanlines, line / frame.scanlines);
-    let origin = start.origin + begin.travelled * start.direction;
-    Path {
-        role: Role::Main,
-        n: 0,
-        line,
-        weight: 1.0,
-        share: 1.0,
-        probability: 1.0,
-        time: begin.travelled / f64::from(frame.speed),
-        origin,
-        direction: start.direction,
-        lateral: start.lateral,
-        handedness: 1.0,
-        interactions: 0,
-        reflections: 0,
-        spread: [0.0; 3],
-        lens: [0.0; 3],
-        survival: 1.0,
-        stack: begin.media.clone(),
-        t_min: if begin.travelled > 0.0 { step(origin) } else { 0.0 },
-    }
+    let along = world_line(frame, line % frame.scanlines, line / frame.scanlines);
+    Path { weight: 1.0, interactions: 0, ..middle(frame, line, along, start) }
 }
 
-/// Refracts the path; false at total reflection of the whole beam.
-fn refract(world: &World, path: &mut Path, interface: &Interface) -> bool {
-    let Some(direction) = interface.turned(world, path, interface.refracting) else {
-        return false;
-    };
-    path.direction = direction;
-    path.lateral = (path.lateral - path.lateral.dot(direction) * direction).normalize();
-    true
-}
-
-fn follow(world: &World, mut path: Path) -> Vec<Piece> {
+fn follow(world: &World, path: Path) -> Vec<Piece> {
     let frame = world.frame;
-    let end = f64::from(frame.depth) / f64::from(frame.speed);
     let samples = f64::from(frame.speed) / f64::from(frame.sample_pitch);
     let mut pieces: Vec<Piece> = Vec::new();
     let mut surrounding = f64::from(world.tissues[frame.background as usize].absorption);
-    let (mut level, mut fresh, mut lost) = (0.0, true, false);
-    for crossing in 0.. {
-        let tissue = &world.tissues[world.medium(&path.stack).0 as usize];
-        let (mut speed, absorption) = (f64::from(tissue.speed), f64::from(tissue.absorption));
-        let heard = world.is_heard(&path.stack);
-        if !heard {
-            // Around the mask sound travels at the speed assumed by the recording.
-            speed = frame.speed.into();
-            surrounding = absorption;
+    let (mut level, mut heard_before) = (0.0, true);
+    for way in ways(world, path, |_, _| false) {
+        if let Some(surface) = way.surface {
+            level = if surface.transmitted > 0.0 { level + surface.transmitted.ln() } else { DARK };
         }
-        let excess = if heard { absorption - surrounding } else { 0.0 };
+        if !way.heard {
+            surrounding = way.absorption;
+        }
+        let excess = if way.heard { way.absorption - surrounding } else { 0.0 };
         // The device's list keeps its last place for the piece that marks the end.
-        let full = pieces.len() + 2 == MAX_PIECES;
-        let ends = lost || full || crossing == 64 + frame.max_interactions;
-        if fresh || ends {
+        let ends = way.ends || pieces.len() + 2 == MAX_PIECES;
+        if way.heard || heard_before || ends {
             pieces.push(Piece {
-                begin: if crossing == 0 { 0.0 } else { samples * path.time },
+                begin: if pieces.is_empty() { 0.0 } else { sample(frame, &way.path) },
                 level,
-                slope: if ends { 0.0 } else { excess * speed / samples },
+                slope: if ends { 0.0 } else { excess * way.speed / samples },
             });
         }
-        let range = [path.t_min, (end - path.time) * speed];
-        let crossings = world.crossings(path.origin, path.direction, range);
-        if ends || crossings.is_empty() {
+        if ends {
             break;
         }
-        let toggled = world.toggled(&path.stack, &crossings);
-        let Toggled { hit, after, last, .. } = toggled;
-        let hears = world.is_heard(&after);
-        let same = world.medium(&path.stack) == world.medium(&after);
-        if same && heard == hears {
-            path.t_min = last + step(path.origin + last * path.direction);
-            path.stack = after;
-            fresh = false;
-            continue;
-        }
-        path.origin += hit.t * path.direction;
-        path.time += hit.t / speed;
-        path.t_min = step(path.origin);
-        level -= excess * hit.t;
-        fresh = heard || hears;
-        if same || !fresh {
-            path.t_min += last - hit.t;
-        } else {
-            let row = (samples * path.time).floor() as i64;
-            let row = &world.rows[row.clamp(0, i64::from(frame.samples) - 1) as usize];
-            let interface = interface::meet(world, row, &path, &hit, &after);
-            let passes = 1.0 - interface.reflectance;
-            lost = !refract(world, &mut path, &interface) || passes <= 0.0;
-            level = if lost { DARK } else { level + passes.ln() };
-        }
-        path.stack = after;
+        heard_before = way.heard;
+        level -= excess * way.length;
     }
     pieces
 }

@@ -359,6 +359,7 @@ impl Tracer<'_> {
             weight,
             spread: path.spread,
             lens: path.lens,
+            reflections: path.reflections,
             share,
             tissue,
             instance,

@@ -27,12 +27,13 @@ fn text(bytes: &[u8]) -> String {
 
 /// Settings for which no point of a wire, half a millimetre apart, lies on the border of two layers, where rounding
 /// decides which of them sees it; and one kind of cylinder reflects.
-const REPLAYED: [(&str, &str); 6] = [
+const REPLAYED: [(&str, &str); 7] = [
     ("probe.scanlines", "12"),
     ("probe.samples", "512"),
     ("probe.elevation_layers", "3"),
     ("probe.slice_thickness", "8.7mm"),
     ("simulation.paths", "2"),
+    ("simulation.labels", "true"),
     ("tissues.plus_6.speed", "1600m/s"),
 ];
 
@@ -52,11 +53,11 @@ fn every_kernel_of_a_dumped_frame_runs_alone_and_equals_its_twin() {
         let command = ["run", name, "--size", "small", "--input", input];
         kernels(&command).output().expect("the program starts")
     };
-    let names = stages::IMAGE.map(|pass| pass.name).map(|name| match name {
+    let names = stages::IMAGE.into_iter().chain(stages::LABELS).map(|pass| match pass.name {
         "scatter" => "scatter_rigid",
         name => name,
     });
-    for name in names.into_iter().chain(["detect"]) {
+    for name in names.chain(["detect"]) {
         let out = run(name);
         let said = text(&out.stdout) + &text(&out.stderr);
         assert!(out.status.success(), "{said}");

@@ -30,6 +30,14 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
     }
     let fields = simulator.device.read_back(simulator.passes.world.fields());
     let fields = fields.map_err(SimError::from)?;
+    let before =
+        simulator.passes.world.past().map(|past| past.map(|b| simulator.device.read_back(b)));
+    let [instances_before, fields_before] = match before {
+        Some([instances, fields]) => {
+            [instances.map_err(SimError::from)?, fields.map_err(SimError::from)?]
+        }
+        None => [bytemuck::cast_slice(&instances).to_vec(), fields.clone()],
+    };
     let frame = *simulator.constants();
     let write = |name, element, words: usize, values: &[u8]| {
         let path = dir.join(format!("{name}.npy"));
@@ -47,7 +55,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         }
         write(array.name, array.element, array.words, &values)?;
     }
-    let anatomy: [&[u8]; 7] = [
+    let anatomy: [&[u8]; 9] = [
         bytemuck::cast_slice(&instances),
         bytemuck::cast_slice(&arrays.vertices),
         bytemuck::cast_slice(&arrays.normals),
@@ -55,6 +63,8 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         bytemuck::cast_slice(&arrays.triangles),
         bytemuck::cast_slice(nodes),
         &fields,
+        &instances_before,
+        &fields_before,
     ];
     for (array, values) in stages::ANATOMY.iter().zip(anatomy) {
         write(array.name, array.element, array.words, values)?;

@@ -25,7 +25,7 @@ pub static INPUTS: [Array; 9] = [
 ];
 
 /// The anatomy, held by [`super::super::World`].
-pub static ANATOMY: [Array; 7] = [
+pub static ANATOMY: [Array; 9] = [
     Array::anatomy("instances", Word, size_of::<Instance>() / 4),
     Array::anatomy("vertices", Float, 3),
     Array::anatomy("normals", Float, 3),
@@ -33,4 +33,7 @@ pub static ANATOMY: [Array; 7] = [
     Array::anatomy("triangles", Word, 3),
     Array::anatomy("nodes", Word, 20),
     Array::anatomy("fields", Float, 4),
+    // Those of the last frame.
+    Array::anatomy("instances_before", Word, size_of::<Instance>() / 4),
+    Array::anatomy("fields_before", Float, 4),
 ];

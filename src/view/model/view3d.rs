@@ -3,9 +3,9 @@
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::camera::Camera;
-use super::palette::{self, Show};
 use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
+use crate::scene::palette::{self, Show};
 use crate::sim::view3d::CameraView;
 
 /// Opacity of a see-through surface, looked at squarely.

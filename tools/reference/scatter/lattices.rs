@@ -73,7 +73,7 @@ impl Tube<'_> {
 
     /// Share of the power of lattice `number` at distance `x`, which lies in `bin`.
     fn power(&self, number: u32, x: f64, bin: u32, loudest: &Loudest, out: &Accumulator) -> f64 {
-        let wanted = f64::from(self.row(x, out).shape[3]);
+        let wanted = self.wanted(self.sample(x, out));
         let drowned = self.drowned(bin, loudest, out);
         drowned.map_or(0.0, |d| level_power(wanted_level(self.tissue, wanted, d), number))
     }

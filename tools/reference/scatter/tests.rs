@@ -12,6 +12,7 @@ fn segment(length: f64) -> Segment {
         weight: 1.0,
         spread: [0.0; 3],
         lens: [0.0; 3],
+        reflections: 0,
         share: 1.0,
         tissue: 0,
         instance: NONE,
@@ -287,6 +288,29 @@ fn every_level_is_as_bright_as_the_finest() {
         let ratio = got / expected;
         assert!((ratio - 1.0).abs() < 0.08, "level {level}: {ratio}");
     }
+}
+
+// A beam twice as wide behind a lens needs half of the scatterers; its level stays the same.
+#[test]
+fn a_widened_beam_is_as_bright_with_fewer_scatterers() {
+    let mut fixture = Fixture::new(vec![tissue(1.5, 1.5, 0.0)]);
+    let s = Segment { lens: [1.0, 0.0, 0.0], ..segment(60.0) };
+    let mut measured = |level: f32, s: Segment| {
+        for row in &mut fixture.rows {
+            row.shape[3] = level;
+        }
+        let (mut power, mut deposits) = (0.0, 0);
+        for seed in 0..20 {
+            fixture.frame.cell = 0.25 + 1e-3 * seed as f32;
+            power += mean_power(&mut fixture, &[s]) / 20.0;
+            deposits += scatter(&fixture.world(), &[s]).deposits.iter().sum::<u32>();
+        }
+        (power, f64::from(deposits))
+    };
+    let (fine, thinned) = (measured(ALL_LEVELS, s), measured(1.0, s));
+    let even = measured(1.0, segment(60.0));
+    assert!((thinned.0 / fine.0 - 1.0).abs() < 0.1, "{thinned:?} {fine:?}");
+    assert!((thinned.1 / even.1 - 1.0).abs() < 0.1, "{thinned:?} {even:?}");
 }
 
 // If a second path is 20 dB louder, the first one needs a hundredth of its scatterers; its level stays the same.

@@ -1,4 +1,4 @@
-//! The look of tissues in the 3D view.
+//! The look of tissues in pictures of the anatomy and of its labels.
 
 /// Visibility of a surface, and of the things behind it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
