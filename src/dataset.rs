@@ -12,16 +12,21 @@ use crate::issue::FileError;
 use crate::scene::SceneError;
 use crate::sim::SimError;
 
+mod archive;
 mod distribution;
 mod draws;
+mod exchange;
+mod links;
 mod members;
 mod plan;
 mod pose;
 mod reading;
+mod scenes;
 mod sheet;
 mod split;
 mod store;
 mod studio;
+mod tables;
 
 pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
 pub use sheet::Gallery;

@@ -5,26 +5,22 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
-use toml::Table;
 
 use super::draws::{Count, Draw, Drawn, draw, word};
 use super::pose::Poses;
-use super::reading::{self, Read, Target};
+use super::scenes::Reading;
 use super::split;
+use super::tables::{PlanTable, arrays, numbers, outlines, quality};
 use crate::issue;
 use crate::output::indexed::NOTHING;
-use crate::scene::animation::Track;
-use crate::scene::file::{Document, SceneFile, Source, load_trajectory, quoted};
-use crate::scene::{Scene, SceneError, Warning};
+use crate::scene::file::{SceneFile, Source};
+use crate::scene::{SceneError, Warning};
 use crate::settings::units::DURATION;
-use crate::settings::{Facts, Form, Quality, suggest};
-use crate::sim::calibration::Work;
+use crate::settings::{Facts, Quality};
 use crate::sim::labels::KINDS;
 
 /// Largest plan, bytes.
 const MAX_PLAN: u64 = 4 << 20;
-/// Most samples of a plan: their numbers have nine digits.
-const MAX_SAMPLES: u64 = 1_000_000_000;
 /// Most classes of a segmentation: a byte, of which one value shows nothing.
 const MAX_CLASSES: usize = NOTHING as usize;
 /// Samples of a part, unless the plan says it.
@@ -40,17 +36,23 @@ pub enum Format {
     Folder,
     /// Archives of the same files, one of each part: `train-000007.tar`.
     WebDataset,
+    /// Files of zea (HDF5), one a sample: image, segmentation, pose, and of the plan's arrays envelope and IQ.
+    Zea,
+    /// Files of UFF (HDF5), one a sample: beamformed baseband on its scan.
+    Uff,
 }
 
 impl Format {
     /// All, in the order in which they are written.
-    pub const ALL: [Self; 2] = [Self::Folder, Self::WebDataset];
+    pub const ALL: [Self; 4] = [Self::Folder, Self::WebDataset, Self::Zea, Self::Uff];
 
     /// Its name in plans, and that of its folder.
     pub fn word(self) -> &'static str {
         match self {
             Self::Folder => "folder",
             Self::WebDataset => "webdataset",
+            Self::Zea => "zea",
+            Self::Uff => "uff",
         }
     }
 }
@@ -169,49 +171,6 @@ pub struct Sample {
     /// Seed of the frame.
     pub seed: u32,
     pub(super) scene: usize,
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct PlanTable {
-    #[serde(default)]
-    title: String,
-    #[serde(default)]
-    seed: u32,
-    quality: Option<String>,
-    formats: Vec<Format>,
-    #[serde(default)]
-    arrays: Vec<String>,
-    #[serde(default = "seen")]
-    segmentation: Segmented,
-    samples_per_part: Option<u32>,
-    #[serde(default)]
-    split: Table,
-    #[serde(default)]
-    variable: Table,
-    #[serde(default)]
-    draw: Table,
-    #[serde(default)]
-    scene: Vec<SceneTable>,
-}
-
-fn seen() -> Segmented {
-    Segmented::Seen
-}
-
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-struct SceneTable {
-    name: String,
-    file: String,
-    samples: u32,
-    anatomy: Option<String>,
-    split: Option<String>,
-    time: Option<toml::Value>,
-    #[serde(default)]
-    pose: Table,
-    #[serde(default)]
-    draw: Table,
 }
 
 impl Plan {
@@ -392,230 +351,4 @@ impl Plan {
         }
         Ok(())
     }
-}
-
-fn quality(document: &Document<'_>, word: Option<&str>) -> Result<Option<Quality>, SceneError> {
-    let Some(word) = word else { return Ok(None) };
-    let found = <Quality as clap::ValueEnum>::from_str(word, false);
-    found.map(Some).map_err(|_| {
-        let message = format!("unknown quality `{word}`");
-        document.fail("quality", message, "choose one of `draft`, `standard`, `reference`")
-    })
-}
-
-fn arrays(document: &Document<'_>, names: &[String]) -> Result<Vec<Array>, SceneError> {
-    let found = |(i, name): (usize, &String)| {
-        let found = Array::all().find(|array| array.name() == name);
-        found.ok_or_else(|| {
-            let remedy = suggest::among(name, Array::all().map(Array::name));
-            document.fail(&format!("arrays.{i}"), format!("there is no array `{name}`"), remedy)
-        })
-    };
-    names.iter().enumerate().map(found).collect()
-}
-
-/// Numbers of each scene's samples: split by split, each in the order of its scenes.
-fn numbers(table: &PlanTable, of_scene: &[usize], splits: usize) -> Vec<Range<u32>> {
-    let mut out = vec![0..0; table.scene.len()];
-    let mut next = 0;
-    for split in 0..splits {
-        for (i, scene) in table.scene.iter().enumerate().filter(|(i, _)| of_scene[*i] == split) {
-            out[i] = next..next + scene.samples;
-            next += scene.samples;
-        }
-    }
-    out
-}
-
-/// Checks what the types of the tables do not express.
-fn outlines(document: &Document<'_>, table: &PlanTable) -> Result<(), SceneError> {
-    let fail = |at: &str, message: String, remedy: &str| Err(document.fail(at, message, remedy));
-    if table.formats.is_empty() {
-        return fail(
-            "formats",
-            "there is no format".to_owned(),
-            "name one: \"folder\" or \"webdataset\"",
-        );
-    }
-    if table.samples_per_part == Some(0) {
-        return fail("samples_per_part", "a part of no samples".to_owned(), "give at least 1");
-    }
-    if table.scene.is_empty() {
-        return fail(
-            "scene",
-            "there is no scene".to_owned(),
-            "add one: [[scene]] with name, file and samples",
-        );
-    }
-    let total: u64 = table.scene.iter().map(|s| u64::from(s.samples)).sum();
-    if total > MAX_SAMPLES {
-        let remedy = format!("the limit is {MAX_SAMPLES}: make several plans");
-        return fail("scene", format!("these are {total} samples"), &remedy);
-    }
-    for (i, scene) in table.scene.iter().enumerate() {
-        let at = format!("scene.{i}");
-        if scene.name.trim().is_empty() {
-            return fail(&format!("{at}.name"), "this scene has no name".to_owned(), "give it one");
-        }
-        if table.scene[..i].iter().any(|s| s.name == scene.name) {
-            let message = format!("there are two scenes of the name `{}`", scene.name);
-            return fail(&format!("{at}.name"), message, "rename one");
-        }
-        if scene.samples == 0 {
-            let message = format!("no sample of `{}` is made", scene.name);
-            return fail(
-                &format!("{at}.samples"),
-                message,
-                "give at least 1, or leave the scene out",
-            );
-        }
-    }
-    Ok(())
-}
-
-/// A scene's table while it is read.
-struct Reading<'a> {
-    document: &'a Document<'a>,
-    table: &'a PlanTable,
-    /// Its place in the plan: `scene.2`.
-    at: String,
-    of: &'a SceneTable,
-    folder: &'a Path,
-}
-
-impl Reading<'_> {
-    /// The scene with its draws, checked on the scene file, which is loaded once. `used` says of each draw of a
-    /// tissue, by its place in the plan, whether any scene has that tissue.
-    fn scene(
-        &self,
-        split: usize,
-        samples: Range<u32>,
-        used: &mut BTreeMap<String, (String, bool)>,
-    ) -> Result<(PlanScene, Scene, Vec<Warning>), SceneError> {
-        let (document, of, at) = (self.document, self.of, &self.at);
-        let path = self.folder.join(&of.file);
-        let named = |error: SceneError| match error.line {
-            0 => document.fail(
-                &format!("{at}.file"),
-                error.to_string(),
-                error.remedy.unwrap_or_default(),
-            ),
-            _ => error,
-        };
-        let file = SceneFile::read(&path).map_err(named)?;
-        let (mut scene, warnings) = file.load(&[])?;
-        let mut read = self.variables()?;
-        read.extend(reading::settings(document, "draw", &self.table.draw)?);
-        read.extend(reading::settings(document, &format!("{at}.draw"), &of.draw)?);
-        read.retain(|one| self.fits(&one.draw, &scene, used));
-        read.extend(self.time()?);
-        let trajectory = self.trajectory()?;
-        let mut poses = Poses::new(document, &format!("{at}.pose"), &of.pose, trajectory, &scene)?;
-        read.extend(poses.read(document, &format!("{at}.pose"), &of.pose)?);
-        let draws = reading::linked(document, read)?;
-        poses.find(&draws);
-        let heavy =
-            draws.iter().any(|d| is_entry(d, &poses, &draws) && !SceneFile::is_light(&d.name));
-        let made = PlanScene {
-            name: of.name.clone(),
-            anatomy: of.anatomy.clone().unwrap_or_else(|| of.name.clone()),
-            split,
-            samples,
-            file,
-            path,
-            draws,
-            poses,
-            heavy,
-        };
-        self.ends(&made, &mut scene)?;
-        Ok((made, scene, warnings))
-    }
-
-    /// True if a draw of a tissue is of one that the scene has; true for all other draws.
-    fn fits(
-        &self,
-        draw: &Draw,
-        scene: &Scene,
-        used: &mut BTreeMap<String, (String, bool)>,
-    ) -> bool {
-        let Some(rest) = draw.name.strip_prefix("tissues.") else { return true };
-        let fits = scene.tissues.iter().any(|t| rest.starts_with(&format!("{}.", quoted(&t.name))));
-        used.entry(draw.at.clone()).or_insert_with(|| (draw.name.clone(), false)).1 |= fits;
-        fits
-    }
-
-    fn variables(&self) -> Result<Vec<Read>, SceneError> {
-        let document = self.document;
-        let one = |(name, value): (&String, &toml::Value)| {
-            let at = format!("variable.{}", quoted(name));
-            let target = Target { name: name.clone(), at, facts: None, document };
-            target.read(value, Form::Number)
-        };
-        self.table.variable.iter().map(one).collect()
-    }
-
-    fn time(&self) -> Result<Option<Read>, SceneError> {
-        let at = format!("{}.time", self.at);
-        let target =
-            Target { name: TIME.key.to_owned(), at, facts: Some(&TIME), document: self.document };
-        self.of.time.as_ref().map(|value| target.read(value, TIME.form)).transpose()
-    }
-
-    fn trajectory(&self) -> Result<Option<Track>, SceneError> {
-        let Some(given) = self.of.pose.get("trajectory") else { return Ok(None) };
-        let at = format!("{}.pose.trajectory", self.at);
-        let Some(name) = given.as_str() else {
-            return Err(self.document.fail(
-                &at,
-                "this is no name of a file",
-                "name a trajectory (.csv, .toml)",
-            ));
-        };
-        let path = self.folder.join(name);
-        match load_trajectory(&path) {
-            Err(error) if error.line == 0 => {
-                Err(self.document.fail(&at, error.to_string(), error.remedy.unwrap_or_default()))
-            }
-            read => read.map(Some),
-        }
-    }
-
-    /// Checks the ends of every range on the scene file, beside what is always the same.
-    fn ends(&self, made: &PlanScene, scene: &mut Scene) -> Result<(), SceneError> {
-        let entries = || made.draws.iter().filter(|d| is_entry(d, &made.poses, &made.draws));
-        let fixed = |d: &&Draw| matches!(d.kind, super::draws::Kind::Constant(_));
-        let always: Vec<_> = entries()
-            .filter(fixed)
-            .map(|d| (d.name.clone(), d.ends(&made.draws)[0].text.clone()))
-            .collect();
-        for draw in entries() {
-            for end in draw.ends(&made.draws) {
-                let mut all = always.clone();
-                all.push((draw.name.clone(), end.text.clone()));
-                let put = match made.heavy {
-                    true => made.file.check(&all),
-                    false => made.file.put(&all, scene),
-                };
-                put.map_err(|error| {
-                    let message = format!(
-                        "{} cannot be {} in `{}`: {}",
-                        draw.name, end.text, made.name, error.message
-                    );
-                    self.document.fail(&draw.at, message, error.remedy.unwrap_or_default())
-                })?;
-                if let Some(Work { too_much: true, message, remedy }) = Work::of(scene) {
-                    let message =
-                        format!("{} at {} in `{}`: {message}", draw.name, end.text, made.name);
-                    return Err(self.document.fail(&draw.at, message, remedy));
-                }
-            }
-        }
-        Ok(())
-    }
-}
-
-/// True if a draw is an entry of the scene file: neither a variable nor the time nor a part of the pose.
-fn is_entry(draw: &Draw, poses: &Poses, all: &[Draw]) -> bool {
-    let place = all.iter().position(|other| other.name == draw.name);
-    draw.facts.is_some() && draw.name != TIME.key && !place.is_some_and(|i| poses.holds(i))
 }

@@ -1,6 +1,7 @@
 //! The folder of a data set: samples by format, each file whole or not there.
 
-use std::io::{ErrorKind, Write};
+use std::borrow::Cow;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -8,11 +9,13 @@ use image::GrayImage;
 use serde_json::{Map, Value, json};
 
 use super::DatasetError;
+use super::archive::{self, Archive};
+use super::exchange;
 use super::members::{IMAGE, SEGMENTATION, extensions, members};
 use super::plan::{Format, Part, Plan};
 use super::studio::{Made, Studio};
 use crate::issue::FileError;
-use crate::output::files::{self, Draft};
+use crate::output::files;
 
 const MANIFEST: &str = "manifest.json";
 const PLAN: &str = "plan.toml";
@@ -34,18 +37,28 @@ pub struct Store<'p> {
     plan: &'p Plan,
     root: PathBuf,
     digits: usize,
-    /// Extensions of a sample's files.
+    /// Extensions of a sample's files in a folder of files, and in archives.
     extensions: Vec<String>,
+    /// The files that each sample has to itself: the format, and the extension in it.
+    own: Vec<(Format, String)>,
 }
-
-/// The file of an archive that is being written.
-type Archive = tar::Builder<Draft>;
 
 impl<'p> Store<'p> {
     /// The folder `root` for samples of `plan`.
     pub fn new(plan: &'p Plan, root: &Path) -> Self {
         let digits = plan.samples().to_string().len().max(DIGITS);
-        Self { plan, root: root.to_owned(), digits, extensions: extensions(plan) }
+        let extensions = extensions(plan);
+        let own = plan.formats.iter().flat_map(|format| {
+            let of_format = match format {
+                Format::Folder => extensions.clone(),
+                Format::WebDataset => Vec::new(),
+                Format::Zea => vec!["hdf5".to_owned()],
+                Format::Uff => vec!["uff".to_owned()],
+            };
+            of_format.into_iter().map(|extension| (*format, extension))
+        });
+        let own = own.collect();
+        Self { plan, root: root.to_owned(), digits, extensions, own }
     }
 
     /// Name of a sample's files, without extension.
@@ -72,14 +85,14 @@ impl<'p> Store<'p> {
     fn folder(&self, format: Format, split: usize) -> PathBuf {
         let root = self.root.join(format.word());
         match format {
-            Format::Folder => root.join(&self.plan.splits[split].name),
             Format::WebDataset => root,
+            _ => root.join(&self.plan.splits[split].name),
         }
     }
 
-    fn file(&self, part: &Part, number: u32, extension: &str) -> PathBuf {
-        let folder = self.folder(Format::Folder, part.split);
-        folder.join(format!("{}.{extension}", self.name(number)))
+    /// The path of a file that a sample has to itself.
+    fn file(&self, part: &Part, number: u32, (format, extension): &(Format, String)) -> PathBuf {
+        self.folder(*format, part.split).join(format!("{}.{extension}", self.name(number)))
     }
 
     fn archive(&self, part: &Part) -> PathBuf {
@@ -181,8 +194,8 @@ impl<'p> Store<'p> {
     /// True if any file of a part is there.
     fn is_begun(&self, part: &Part) -> bool {
         let tarred = self.writes(Format::WebDataset) && self.archive(part).exists();
-        let lies = |number| self.extensions.iter().any(|e| self.file(part, number, e).exists());
-        tarred || (self.writes(Format::Folder) && part.samples.clone().any(lies))
+        let lies = |number| self.own.iter().any(|own| self.file(part, number, own).exists());
+        tarred || part.samples.clone().any(lies)
     }
 
     /// Removes what a killed run left of these parts; other shards may be writing theirs.
@@ -198,7 +211,7 @@ impl<'p> Store<'p> {
                     let number: Option<u32> = stem.parse().ok();
                     let is_own = |part: &&Part| match format {
                         Format::WebDataset => stem == self.part_name(part),
-                        Format::Folder => {
+                        _ => {
                             number.is_some_and(|n| part.split == split && part.samples.contains(&n))
                         }
                     };
@@ -234,12 +247,14 @@ impl<'p> Store<'p> {
         let mut compared = false;
         for part in parts {
             let path = self.archive(part);
+            let tarring = |e| DatasetError::writing(&path, e);
             let mut archive = match self.writes(Format::WebDataset) && !path.exists() {
-                true => Some(self.open(&path)?),
+                true => Some(Archive::new(&path).map_err(tarring)?),
                 false => None,
             };
             for number in part.samples.clone() {
-                let lacking = self.lacking(part, number);
+                let own = |own: &&(Format, String)| !self.file(part, number, own).exists();
+                let lacking: Vec<_> = self.own.iter().filter(own).collect();
                 let kept = archive.is_none() && lacking.is_empty();
                 if kept && compared {
                     told(Told::Kept)?;
@@ -248,79 +263,73 @@ impl<'p> Store<'p> {
                 let made = studio.make(number)?;
                 let files = members(self.plan, &made);
                 if kept {
-                    self.compare(part, number, &files)?;
+                    self.compare(part, &made, &files)?;
                     compared = true;
                 }
-                for (extension, bytes) in self.extensions.iter().zip(&files) {
-                    if let Some(archive) = &mut archive {
-                        let name = format!("{}.{extension}", self.name(number));
-                        append(archive, &name, bytes)
-                            .map_err(|e| DatasetError::writing(&path, e))?;
+                if let Some(archive) = &mut archive {
+                    for (name, bytes) in self.names(number).iter().zip(&files) {
+                        archive.add(name, bytes).map_err(tarring)?;
                     }
-                    if lacking.contains(extension) {
-                        self.write(&self.file(part, number, extension), bytes)?;
-                    }
+                }
+                for own in lacking {
+                    self.write(&self.file(part, number, own), &self.bytes(own, &made, &files))?;
                 }
                 told(Told::Made(&made))?;
             }
             if let Some(archive) = archive {
-                let finished = archive.into_inner().and_then(Draft::finish);
-                finished.map_err(|e| DatasetError::writing(&path, e))?;
+                archive.finish().map_err(tarring)?;
             }
             told(Told::Part(part))?;
         }
         Ok(())
     }
 
-    fn open(&self, path: &Path) -> Result<Archive, DatasetError> {
-        let folder = path.parent().expect("it lies in the data set");
-        let opened = std::fs::create_dir_all(folder).and_then(|()| Draft::new(path));
-        opened.map(tar::Builder::new).map_err(|e| DatasetError::writing(path, e))
+    /// Names of a sample's files in archives.
+    fn names(&self, number: u32) -> Vec<String> {
+        let name = self.name(number);
+        self.extensions.iter().map(|extension| format!("{name}.{extension}")).collect()
     }
 
-    /// Extensions of a sample's files that are not in the folder of files and should be.
-    fn lacking(&self, part: &Part, number: u32) -> Vec<String> {
-        if !self.writes(Format::Folder) {
-            return Vec::new();
-        }
-        let all = self.extensions.iter().cloned();
-        all.filter(|extension| !self.file(part, number, extension).exists()).collect()
-    }
-
-    /// The files of a sample that is there, in the order of their extensions; none where one is missing.
-    pub(super) fn kept(
+    /// The bytes of a file that a sample has to itself; `files` are those of its extensions.
+    fn bytes<'f>(
         &self,
-        part: &Part,
-        number: u32,
-    ) -> Result<Option<Vec<Vec<u8>>>, DatasetError> {
-        let all = &self.extensions;
-        if self.writes(Format::Folder) {
-            let read = |extension: &String| {
-                let path = self.file(part, number, extension);
-                match std::fs::read(&path) {
-                    Ok(bytes) => Ok(Some(bytes)),
-                    Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
-                    Err(e) => Err(DatasetError::reading(&path, e)),
-                }
-            };
-            return all.iter().map(read).collect();
-        }
-        let path = self.archive(part);
-        let names = all.iter().map(|extension| format!("{}.{extension}", self.name(number)));
-        let names: Vec<String> = names.collect();
-        let mut found = vec![None; names.len()];
-        let reading = |e| DatasetError::reading(&path, e);
-        let mut archive = tar::Archive::new(std::fs::File::open(&path).map_err(reading)?);
-        for entry in archive.entries().map_err(reading)? {
-            let mut entry = entry.map_err(reading)?;
-            let name = entry.path().map_err(reading)?.to_string_lossy().into_owned();
-            if let Some(place) = names.iter().position(|n| *n == name) {
-                let mut bytes = Vec::new();
-                std::io::Read::read_to_end(&mut entry, &mut bytes).map_err(reading)?;
-                found[place] = Some(bytes);
+        (format, extension): &(Format, String),
+        made: &Made,
+        files: &'f [Vec<u8>],
+    ) -> Cow<'f, [u8]> {
+        match format {
+            Format::Zea => exchange::zea(self.plan, made).into(),
+            Format::Uff => exchange::uff(self.plan, made).into(),
+            Format::Folder | Format::WebDataset => {
+                let place = self.extensions.iter().position(|e| e == extension);
+                files[place.expect("one of its files")][..].into()
             }
         }
-        Ok(found.into_iter().collect())
+    }
+
+    /// The files of a sample that is there, in the order of their extensions; none where one is missing, or no format
+    /// has them.
+    fn kept(&self, part: &Part, number: u32) -> Result<Option<Vec<Vec<u8>>>, DatasetError> {
+        if self.writes(Format::Folder) {
+            let all = self.extensions.iter();
+            let all =
+                all.map(|e| self.read(&self.file(part, number, &(Format::Folder, e.clone()))));
+            return all.collect();
+        }
+        if !self.writes(Format::WebDataset) {
+            return Ok(None);
+        }
+        let path = self.archive(part);
+        archive::read(&path, &self.names(number)).map_err(|e| DatasetError::reading(&path, e))
+    }
+
+    /// The bytes of a file; none where it is not there.
+    fn read(&self, path: &Path) -> Result<Option<Vec<u8>>, DatasetError> {
+        match std::fs::read(path) {
+            Ok(bytes) => Ok(Some(bytes)),
+            Err(e) if e.kind() == ErrorKind::NotFound => Ok(None),
+            Err(e) => Err(DatasetError::reading(path, e)),
+        }
     }
 
     /// Image and classes of a sample that is there.
@@ -333,9 +342,8 @@ impl<'p> Store<'p> {
         let of = |wanted: &str| {
             let place = self.extensions.iter().position(|e| *e == wanted).expect("always written");
             let spoilt = |_| {
-                let path = self.file(part, number, wanted);
                 DatasetError::File(FileError::file(
-                    &path,
+                    Path::new(&self.name(number)),
                     "is no picture any more",
                     "remove it, and go on with --resume",
                 ))
@@ -346,8 +354,21 @@ impl<'p> Store<'p> {
     }
 
     /// Fails where the files of a sample are not those of the earlier run.
-    fn compare(&self, part: &Part, number: u32, files: &[Vec<u8>]) -> Result<(), DatasetError> {
-        if self.kept(part, number)?.as_deref() == Some(files) {
+    fn compare(&self, part: &Part, made: &Made, files: &[Vec<u8>]) -> Result<(), DatasetError> {
+        let number = made.sample.number;
+        let mut same = match self.writes(Format::WebDataset) {
+            true => {
+                let path = self.archive(part);
+                let read = archive::read(&path, &self.names(number));
+                read.map_err(|e| DatasetError::reading(&path, e))?.as_deref() == Some(files)
+            }
+            false => true,
+        };
+        for own in &self.own {
+            let before = self.read(&self.file(part, number, own))?;
+            same &= before.as_deref() == Some(&*self.bytes(own, made, files));
+        }
+        if same {
             return Ok(());
         }
         let message = format!(
@@ -368,19 +389,6 @@ fn picture(bytes: &[u8]) -> Result<GrayImage, png::DecodingError> {
     let mut pixels = vec![0; width as usize * height as usize];
     reader.next_frame(&mut pixels)?;
     Ok(GrayImage::from_raw(width, height, pixels).expect("a byte per pixel"))
-}
-
-/// Adds a file to an archive, with nothing that depends on time or user.
-fn append(archive: &mut tar::Builder<impl Write>, name: &str, bytes: &[u8]) -> std::io::Result<()> {
-    let mut header = tar::Header::new_ustar();
-    header.set_path(name)?;
-    header.set_size(bytes.len() as u64);
-    header.set_mode(0o644);
-    header.set_mtime(0);
-    header.set_uid(0);
-    header.set_gid(0);
-    header.set_cksum();
-    archive.append(&header, bytes)
 }
 
 /// Name of the first fact that differs between the two.

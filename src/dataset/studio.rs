@@ -7,7 +7,7 @@ use image::GrayImage;
 
 use super::DatasetError;
 use super::draws::Count;
-use super::plan::{Array, Plan, Sample, Segmented};
+use super::plan::{Array, Format, Plan, Sample, Segmented};
 use crate::gpu::Device;
 use crate::output::indexed::NOTHING;
 use crate::scene::Scene;
@@ -38,7 +38,7 @@ pub struct Made {
     pub contact: Option<SkinContact>,
     /// Envelope after TGC, [scanline, sample]; where the plan asks for it.
     pub envelope: Option<Vec<f32>>,
-    /// Complex pairs of the baseband before TGC, [scanline, sample]; where the plan asks for it.
+    /// Complex pairs of the baseband before TGC, [scanline, sample]; where the plan asks for it or writes UFF.
     pub iq: Option<Vec<f32>>,
     /// Labels of the image's pixels; those for which the plan asks, in its order.
     pub labels: Vec<LabelArray>,
@@ -158,8 +158,9 @@ fn made(
     let samples = frame.samples as usize;
     let count = frame.scanlines as usize * samples;
     let wants = |array: Array| plan.arrays.contains(&array);
+    let keeps = wants(Array::Iq) || plan.formats.contains(&Format::Uff);
     let mut iq = Vec::new();
-    if wants(Array::Iq) || wants(Array::Envelope) {
+    if keeps || wants(Array::Envelope) {
         iq = simulator.iq()?;
         iq.truncate(2 * count);
     }
@@ -178,7 +179,7 @@ fn made(
         pixel: f64::from(frame.pixel_pitch),
         contact: simulator.contact(),
         envelope,
-        iq: wants(Array::Iq).then_some(iq),
+        iq: keeps.then_some(iq),
         counters: simulator.counters()?,
         sample,
     })
