@@ -54,6 +54,7 @@ translate = [0, 0, 12]
 const PLAN: &str = r#"
 title = "Plates"
 seed = 3
+segmentation = "true"
 formats = ["folder", "webdataset"]
 arrays = ["envelope", "iq"]
 samples_per_part = 2

@@ -81,8 +81,9 @@ fn webdataset_reads_the_archives() {
 
 const ZEA: &str = r#"
 import os, sys, json, glob
+# zea logs there.
+printed, sys.stdout = sys.stdout, sys.stderr
 os.environ["KERAS_BACKEND"] = "numpy"
-import logging
 import numpy as np
 from PIL import Image
 from zea import File
@@ -113,7 +114,7 @@ for path in sorted(glob.glob(sys.argv[1] + "/zea/*/*.hdf5")):
         "iq": bool((data.beamformed_data.values[0] == iq.transpose(1, 0, 2)).all()),
         "deepest": float(data.beamformed_data.coordinates[-1, 0, 2]) * 1000, "subject": str(spec.metadata.subject.id),
     })
-json.dump(out, sys.stdout)
+json.dump(out, printed)
 "#;
 
 #[test]
