@@ -20,6 +20,7 @@ mod report;
 mod serve;
 mod study;
 mod vary;
+#[cfg(feature = "window")]
 mod view;
 
 /// Real-time ultrasound by Monte-Carlo path tracing.
@@ -59,6 +60,7 @@ enum Command {
     #[command(alias = "sweep")]
     Vary(Box<vary::Vary>),
     /// Open a window: the live image, the probe under the keyboard, every setting
+    #[cfg(feature = "window")]
     View(Box<view::View>),
 }
 
@@ -78,6 +80,7 @@ pub fn run() -> ExitCode {
         Command::Serve(serve) => serve::run(&serve).map(|()| ExitCode::SUCCESS),
         Command::Study(study) => study::run(&study).map(|()| ExitCode::SUCCESS),
         Command::Vary(vary) => vary::run(&vary).map(|()| ExitCode::SUCCESS),
+        #[cfg(feature = "window")]
         Command::View(view) => view::run(&view).map(|()| ExitCode::SUCCESS),
     };
     match result {

@@ -11,6 +11,8 @@
 
 // Here alone: Cargo.toml denies it.
 #![allow(unsafe_code)]
+// Queues and submissions for a window are part of the device, whether or not there are windows.
+#![cfg_attr(not(feature = "window"), allow(dead_code))]
 
 mod accel;
 mod adapter;
@@ -29,13 +31,17 @@ mod instance;
 mod kept;
 mod kernel;
 mod memory;
+#[cfg(feature = "window")]
 mod overlay;
+#[cfg(feature = "window")]
 mod painter;
 mod pieces;
 mod process;
 mod queues;
 mod reflect;
+#[cfg(feature = "window")]
 mod surface;
+#[cfg(feature = "window")]
 mod swapchain;
 mod timer;
 mod tlas;
@@ -56,8 +62,9 @@ pub use instance::ValidationLog;
 pub use kept::cache_folder;
 pub use kernel::Kernel;
 pub use memory::{Buffer, BufferKind, MemoryUse};
+#[cfg(feature = "window")]
 pub use painter::{InterfaceFrame, Painted, Painter, PlacedImage, Screenshot};
-pub use process::prepare_process;
+pub use process::{driver_environment, prepare_process};
 pub use reflect::{BindingInfo, BindingKind};
 pub use timer::FrameTimings;
 pub use tlas::{Tlas, TlasInstance};

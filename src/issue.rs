@@ -1,11 +1,15 @@
 //! Findings of checks on files, and mistakes that end the work: place, cause, and remedy.
 
+mod told;
+
 use std::fmt;
 use std::io::Read as _;
 use std::path::{Path, PathBuf};
 
 use miette::Diagnostic;
 use thiserror::Error;
+
+pub use told::told;
 
 /// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]

@@ -23,5 +23,6 @@ pub mod settings;
 pub mod sim;
 pub mod statistics;
 pub mod study;
+#[cfg(feature = "window")]
 pub mod view;
 pub mod volume;

@@ -19,6 +19,7 @@ pub mod placement;
 mod read_out;
 mod resize;
 mod results;
+mod rf;
 pub mod rounds;
 pub mod shaders;
 pub mod special;

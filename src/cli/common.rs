@@ -145,7 +145,7 @@ impl Common {
             simulation.seed = seed;
         }
         if let Some(quality) = self.quality {
-            let by_hand = self.overrides.iter().map(|(key, _)| key.as_str());
+            let by_hand = self.overrides.iter().map(|(path, _)| path.as_str());
             simulation.set_quality_except(quality, sim::machine(device), by_hand);
         }
     }

@@ -107,14 +107,14 @@ fn table(adapters: &[Adapter]) -> String {
 }
 
 /// Test of a device and one of its queue families: true where it can present to the window.
-pub(crate) type Presents<'a> = &'a dyn Fn(vk::PhysicalDevice, u32) -> bool;
+pub(crate) type Presents<'a> = dyn Fn(vk::PhysicalDevice, u32) -> bool + 'a;
 
 /// The device named by `selector` (index, or part of the name in any case), or the best usable one, with the
 /// queues to take. For a window, devices that can show pictures in it come first.
 pub(crate) fn choose(
     instance: &Instance,
     selector: Option<&str>,
-    presents: Option<Presents<'_>>,
+    presents: Option<&Presents<'_>>,
 ) -> Result<(Adapter, QueuePlan), GpuError> {
     let plan = |adapter: &Adapter| match presents {
         None => QueuePlan::alone(&adapter.families),

@@ -9,7 +9,6 @@ use std::sync::Arc;
 use ash::{ext, khr, vk};
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use parking_lot::Mutex;
-use winit::window::Window;
 
 use super::adapter::{self, AdapterKind, DeviceInfo};
 use super::error::GpuError;
@@ -17,12 +16,15 @@ use super::instance::{Instance, LOADER_LISTS, ValidationLog};
 use super::kept::{self, PipelineStore};
 use super::memory::{MemoryUse, MemoryUseCounter};
 use super::queues::Queues;
-use super::surface::PresentProbe;
 
 /// Size of the blocks that the allocator takes from the driver. Its default of 256 MiB would make the memory
 /// of a small scene look like that of a large one; larger buffers get a block of their own anyway.
 const DEVICE_BLOCK_BYTES: u64 = 32 << 20;
 const HOST_BLOCK_BYTES: u64 = 16 << 20;
+
+/// Makes the test whether a device can show pictures in a window; it is dropped before the instance. The error is the
+/// window system's message.
+pub(super) type Showing<'a> = &'a dyn Fn(&Instance) -> Result<Box<adapter::Presents<'a>>, String>;
 
 /// Options for opening a device.
 #[derive(Clone, Debug, Default)]
@@ -107,31 +109,23 @@ impl Device {
         Self::open(options, None)
     }
 
-    /// Opens the chosen device, or the best one that can show pictures in `window`, with a queue for the
-    /// simulation and one for the window ([`super::Painter`]), which may be the same.
-    ///
-    /// # Errors
-    /// Those of [`Self::new`]; a device that cannot show pictures in this window.
-    pub fn for_window(options: &DeviceOptions, window: &Window) -> Result<Arc<Self>, GpuError> {
-        Self::open(options, Some(window))
-    }
-
-    fn open(options: &DeviceOptions, window: Option<&Window>) -> Result<Arc<Self>, GpuError> {
+    /// Opens the chosen device; with a `window`, the best one that can show pictures in it.
+    pub(super) fn open(
+        options: &DeviceOptions,
+        window: Option<Showing<'_>>,
+    ) -> Result<Arc<Self>, GpuError> {
         let from_environment = std::env::var_os("INSONIFY_VALIDATE").is_some_and(|v| v == "1");
         // Before the driver makes its folders.
         let jit_forgotten = kept::llvmpipe_has_nothing();
         let instance = Instance::new(options.validate || from_environment, window.is_some())?;
-        let probe = window.map(|window| PresentProbe::new(&instance, window)).transpose();
-        let probe = probe.map_err(|reason| GpuError::Window {
+        let presents = window.map(|showing| showing(&instance)).transpose();
+        let presents = presents.map_err(|reason| GpuError::Window {
             device: options.selector.clone().unwrap_or_else(|| "any device".into()),
             reason,
         })?;
-        let presents =
-            |physical, family| probe.as_ref().is_some_and(|p| p.presents(physical, family));
-        let presents = window.is_some().then_some(&presents as adapter::Presents<'_>);
         let (mut adapter, plan) =
-            adapter::choose(&instance, options.selector.as_deref(), presents)?;
-        drop(probe);
+            adapter::choose(&instance, options.selector.as_deref(), presents.as_deref())?;
+        drop(presents);
         let without = options.without_acceleration_structures;
         adapter.info.ray_query &= !(options.without_ray_query || without);
         let traces = adapter.info.ray_query || adapter.ray_tracing_pipeline;

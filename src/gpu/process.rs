@@ -1,5 +1,8 @@
 //! Settings of the whole process before a driver is opened.
 
+use std::ffi::OsString;
+use std::path::PathBuf;
+
 use super::kept;
 
 /// Makes llvmpipe, Mesa's driver for the processor, compile kernels for vectors of four: that takes it a third of the
@@ -13,22 +16,27 @@ use super::kept;
 ///
 /// To be called first in `main`. Once there are other threads, it does nothing.
 pub fn prepare_process() {
-    const NAMES: [&str; 2] = ["LP_NATIVE_VECTOR_WIDTH", "MESA_SHADER_CACHE_DIR"];
     let alone = std::fs::read_dir("/proc/self/task").is_ok_and(|threads| threads.count() == 1);
     if alone {
         share_heaps();
     }
-    let set = NAMES.iter().any(|name| std::env::var_os(name).is_some());
-    let (true, false, Some(folder)) = (alone, set, kept::mesa_folder()) else {
-        return;
-    };
-    // Mesa makes no folders above its own.
-    if std::fs::create_dir_all(&folder).is_ok() {
-        // SAFETY: this is the only thread, so that none reads the environment meanwhile.
-        unsafe {
-            std::env::set_var(NAMES[0], "128");
-            std::env::set_var(NAMES[1], folder);
+    if alone {
+        for (name, value) in driver_environment() {
+            // SAFETY: this is the only thread, so that none reads the environment meanwhile.
+            unsafe { std::env::set_var(name, value) };
         }
+    }
+}
+
+/// The variables that [`prepare_process`] sets, with their values; none where one of them is set.
+pub fn driver_environment() -> Vec<(&'static str, OsString)> {
+    const NAMES: [&str; 2] = ["LP_NATIVE_VECTOR_WIDTH", "MESA_SHADER_CACHE_DIR"];
+    let set = NAMES.iter().any(|name| std::env::var_os(name).is_some());
+    // Mesa makes no folders above its own.
+    let made = |folder: &PathBuf| std::fs::create_dir_all(folder).is_ok();
+    match kept::mesa_folder().filter(made) {
+        Some(folder) if !set => NAMES.into_iter().zip(["128".into(), folder.into()]).collect(),
+        _ => Vec::new(),
     }
 }
 

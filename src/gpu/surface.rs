@@ -6,7 +6,7 @@ use ash::{khr, vk};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::Window;
 
-use super::device::Device;
+use super::device::{Device, DeviceOptions};
 use super::error::{GpuError, during};
 use super::instance::Instance;
 use super::queues::QueueUser;
@@ -62,6 +62,23 @@ impl Drop for PresentProbe<'_> {
     fn drop(&mut self) {
         // SAFETY: nothing was made of the surface.
         unsafe { self.functions.destroy_surface(self.handle, None) };
+    }
+}
+
+impl Device {
+    /// Opens the chosen device, or the best one that can show pictures in `window`, with a queue for the
+    /// simulation and one for the window ([`super::Painter`]), which may be the same.
+    ///
+    /// # Errors
+    /// Those of [`Self::new`]; a device that cannot show pictures in this window.
+    pub fn for_window(options: &DeviceOptions, window: &Window) -> Result<Arc<Self>, GpuError> {
+        Self::open(
+            options,
+            Some(&|instance| {
+                let probe = PresentProbe::new(instance, window)?;
+                Ok(Box::new(move |physical, family| probe.presents(physical, family)))
+            }),
+        )
     }
 }
 

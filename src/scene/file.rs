@@ -9,6 +9,7 @@ mod again;
 mod anatomy;
 mod contact;
 mod document;
+mod draft;
 mod error;
 mod fusion;
 mod graph;
@@ -33,6 +34,7 @@ mod vary;
 pub use again::SceneFile;
 pub use document::quoted;
 pub(crate) use document::{Document, Source};
+pub use draft::{Draft, Known, known};
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
@@ -72,7 +74,8 @@ impl Scene {
         path: &Path,
         overrides: &[(String, String)],
     ) -> Result<(Self, Vec<Warning>), SceneError> {
-        Self::load_with(path, overrides, false).map(|(scene, _, warnings)| (scene, warnings))
+        let (scene, _, warnings) = Self::of_source(&Source::read(path, overrides)?, false)?;
+        Ok((scene, warnings))
     }
 
     /// Like [`Scene::load`], with the variants of the scene that its table `[vary]` describes: in the
@@ -84,19 +87,10 @@ impl Scene {
         path: &Path,
         overrides: &[(String, String)],
     ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
-        Self::load_with(path, overrides, true)
+        Self::of_source(&Source::read(path, overrides)?, true)
     }
 
     /// Loads a scene with its variants; with `suggested` also those of parameters that the file does not vary.
-    fn load_with(
-        path: &Path,
-        overrides: &[(String, String)],
-        suggested: bool,
-    ) -> Result<(Self, Vec<Variant>, Vec<Warning>), SceneError> {
-        Self::of_source(&Source::read(path, overrides)?, suggested)
-    }
-
-    /// The scene of a text that was read.
     fn of_source(
         source: &Source,
         suggested: bool,

@@ -9,6 +9,7 @@ use crate::issue::{self, Issue};
 mod animated;
 mod keyframes;
 mod recipe;
+mod surface;
 
 pub use animated::{
     Animated, AnimatedMesh, AnimatedNode, Choice, Placement, animations, load_animated,
@@ -16,6 +17,7 @@ pub use animated::{
 pub(super) use keyframes::bounded;
 pub use keyframes::{MAX_SHAPES, load_keyframes};
 pub use recipe::weld;
+pub use surface::Surface;
 
 use recipe::Recipe;
 

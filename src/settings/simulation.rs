@@ -2,6 +2,7 @@
 
 use super::group;
 use super::imaging::Machine;
+use super::key::Group;
 use super::units::{LENGTH, LEVEL};
 use super::words;
 
@@ -182,15 +183,17 @@ group! {
     }
 }
 
-/// A preset of quality: the work per frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub enum Quality {
-    /// A first look. Software driver: 2 paths, 5 scatterers per resolution cell. GPU: 8 paths, 8 scatterers.
-    Draft,
-    /// Software driver: 8 paths, 8 scatterers per resolution cell. GPU: 32 paths, 16 scatterers.
-    Standard,
-    /// A proof, on any device: 128 paths, lattice cells 2/3 as long, no scatterer left out.
-    Reference,
+words! {
+    /// A preset of quality: the work per frame.
+    #[derive(clap::ValueEnum)]
+    pub enum Quality {
+        /// A first look. Software driver: 2 paths, 5 scatterers per resolution cell. GPU: 8 paths, 8 scatterers.
+        Draft = "draft",
+        /// Software driver: 8 paths, 8 scatterers per resolution cell. GPU: 32 paths, 16 scatterers.
+        Standard = "standard",
+        /// A proof, on any device: 128 paths, lattice cells 2/3 as long, no scatterer left out.
+        Reference = "reference",
+    }
 }
 
 impl Simulation {
@@ -211,29 +214,6 @@ impl Simulation {
         self.density_scale.max(1.0).cbrt()
     }
 
-    /// Like [`Self::set_quality`], but keeps the counts whose keys, `simulation.paths` and the like, are `by_hand`.
-    pub fn set_quality_except<'k>(
-        &mut self,
-        quality: Quality,
-        machine: Machine,
-        by_hand: impl Iterator<Item = &'k str>,
-    ) {
-        let before = self.clone();
-        self.set_quality(quality, machine);
-        for key in by_hand {
-            match key {
-                "simulation.paths" => self.paths = before.paths,
-                "simulation.cell" => self.cell = before.cell,
-                "simulation.scatterers_per_resolution_cell" => {
-                    self.scatterers_per_resolution_cell = before.scatterers_per_resolution_cell
-                }
-                "simulation.volume_floor" => self.volume_floor = before.volume_floor,
-                "simulation.branch_floor" => self.branch_floor = before.branch_floor,
-                _ => {}
-            }
-        }
-    }
-
     /// Replaces the scene's path and scatterer counts by those of the table in docs/quality.md.
     pub fn set_quality(&mut self, quality: Quality, machine: Machine) {
         let (paths, cell, scatterers, volume_floor, branch_floor) = match (quality, machine) {
@@ -251,6 +231,23 @@ impl Simulation {
         // The edge of a voxel changes the texture, not the cost: there is one lookup per sample for any edge.
         if self.scatter_mode == ScatterMode::Lattice {
             self.cell *= cell;
+        }
+    }
+
+    /// Like [`Self::set_quality`], but for the keys at these paths (`simulation.paths`), which the user set by hand.
+    pub fn set_quality_except<'p>(
+        &mut self,
+        quality: Quality,
+        machine: Machine,
+        by_hand: impl Iterator<Item = &'p str>,
+    ) {
+        let own = self.clone();
+        self.set_quality(quality, machine);
+        for path in by_hand {
+            let key = path.strip_prefix(Self::TABLE).and_then(|key| key.strip_prefix('.'));
+            if let Some(row) = key.and_then(Self::row) {
+                (row.set)(self, &(row.get)(&own));
+            }
         }
     }
 }

@@ -1,7 +1,6 @@
 //! Writes the last frame into a folder: the stages of image formation, and the bindings of every kernel.
 
 mod bindings;
-mod rf;
 mod stages;
 
 use std::path::{Path, PathBuf};

@@ -174,6 +174,20 @@ impl Fields {
         changed
     }
 
+    /// Updates the field of the last keyframe of instance `i`, which has taken another shape. Returns its range in
+    /// [`Self::values`]; none of an instance without a field.
+    pub fn follow_shape(&mut self, scene: &Scene, i: usize) -> Option<Range<usize>> {
+        let slots = self.slots[i]?;
+        let last = scene.instances[i].keyframes.meshes.len() - 1;
+        let begin = slots.first as usize + last * slots.stride as usize;
+        let range = begin + HEADER as usize..begin + slots.stride as usize;
+        // At rest nothing moves.
+        let made = make(scene, i, &self.rests).and_then(|mut made| made.keyframes.pop());
+        let moved = made.unwrap_or_else(|| vec![[0.0; 3]; range.len()]);
+        self.values[range.clone()].copy_from_slice(&moved);
+        Some(range)
+    }
+
     /// Present displacements, at the nodes, of an instance that placements scale: those of its keyframes followed
     /// by the affine map from its texture space at rest to the present one.
     fn squeezed(&self, instance: &Instance, rest: &DAffine3, slots: FieldOffsets) -> Vec<[f32; 3]> {

@@ -1,7 +1,8 @@
 //! Results of the last frame, read from its buffers.
 
 use super::pass::Sizes;
-use super::{SimError, Simulator, layout};
+use super::{SimError, Simulator, layout, rf};
+use crate::probe::Probe;
 
 impl Simulator {
     /// The counters of the last frame.
@@ -56,6 +57,31 @@ impl Simulator {
     /// A Vulkan error.
     pub fn log_image(&mut self) -> Result<Vec<f32>, SimError> {
         self.floats("log_image")
+    }
+
+    /// Envelope after TGC, relative to a perfect mirror: [L][K].
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn envelope(&mut self) -> Result<Vec<f32>, SimError> {
+        let samples = self.passes.frame.samples as usize;
+        let iq = self.iq()?;
+        let rows = &self.tables.rows;
+        let detected = |(i, z): (usize, &[f32])| z[0].hypot(z[1]) * rows[i % samples].tgc;
+        Ok(iq.chunks_exact(2).enumerate().map(detected).collect())
+    }
+
+    /// Radio-frequency lines before TGC, and how many of their samples there are for each axial one:
+    /// [L][K * factor]. `probe` is that of the last frame.
+    ///
+    /// # Errors
+    /// A Vulkan error.
+    pub fn rf(&mut self, probe: &Probe) -> Result<(usize, Vec<f32>), SimError> {
+        let layout::Frame { axial_sigma, scanlines, samples, .. } = self.passes.frame;
+        let factor = rf::oversampling(probe);
+        let (lines, samples) = (scanlines as usize, samples as usize);
+        let lateral = self.lateral()?;
+        Ok((factor, rf::lines(probe, axial_sigma, lines, samples, &lateral, factor)))
     }
 
     pub(super) fn floats(&mut self, name: &str) -> Result<Vec<f32>, SimError> {

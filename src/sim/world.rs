@@ -4,6 +4,7 @@ mod arrays;
 mod changing;
 mod entry;
 mod joined;
+mod live;
 mod past;
 mod refit;
 mod top;
@@ -61,6 +62,8 @@ pub struct World {
     top: TopLevel,
     rows: Vec<layout::Instance>,
     mask: RayMask,
+    /// For each instance the number of shapes that a program had set when they were last taken.
+    revisions: Vec<u64>,
     /// Rows and fields of the last frame; none where nothing has asked for them.
     past: Option<Past>,
     /// The keyframes for which the memory was made; present shapes do not matter.
@@ -182,6 +185,7 @@ impl World {
             apart,
             rows: arrays.instances,
             mask: RayMask::default(),
+            revisions: scene.instances.iter().map(|i| i.keyframes.revision).collect(),
             past: None,
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             kernels: Arc::clone(kernels),
@@ -251,6 +255,7 @@ impl World {
             self.instances(),
             "instances were added or removed after the upload"
         );
+        self.take_shapes(commands, scene)?;
         let reshaped = self.changing.record(
             commands,
             scene,

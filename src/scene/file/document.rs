@@ -1,8 +1,10 @@
 //! The text of a scene file with its overrides, and the place of each value in it.
 
 use std::borrow::Cow;
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use serde::de::DeserializeOwned;
 use toml::Spanned;
@@ -11,6 +13,7 @@ use toml_edit::Key;
 
 use super::error::{SceneError, advice};
 use super::schema::File;
+use crate::scene::Mesh;
 use crate::settings::{Facts, Value, suggest};
 
 /// Largest scene file, bytes: they hold names and numbers, not meshes.
@@ -20,10 +23,13 @@ const MAX_TEXT: u64 = 4 << 20;
 pub(super) const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
 
 /// The text of a scene file and of the overrides.
+#[derive(Clone)]
 pub(crate) struct Source {
     pub path: PathBuf,
     text: String,
     overrides: Vec<Override>,
+    /// Meshes that are in no file, by name.
+    pub given: BTreeMap<String, Arc<Mesh>>,
 }
 
 /// One `path = value` of the command line or of a study. Its spans count from `start`, after the file's text.
@@ -71,8 +77,7 @@ impl Source {
             let kind = if utf16 { "is text in UTF-16" } else { "is not text in UTF-8" };
             fail(format!("{kind}: line {line}, byte {at}"), "save it as UTF-8 in a text editor")
         })?;
-        let source = Self { path: path.to_owned(), text, overrides: Vec::new() };
-        Ok(source.with(overrides))
+        Ok(Self::of(path, text).with(overrides))
     }
 
     /// The same with more overrides.
@@ -98,12 +103,12 @@ impl Source {
             });
             start = end + 1;
         }
-        Self { path: self.path.clone(), text: self.text.clone(), overrides: all }
+        Self { overrides: all, ..self.clone() }
     }
 
     /// A text that is to become the file `path`; no overrides.
     pub fn of(path: &Path, text: String) -> Self {
-        Self { path: path.to_owned(), text, overrides: Vec::new() }
+        Self { path: path.to_owned(), text, overrides: Vec::new(), given: BTreeMap::new() }
     }
 
     /// The file's text, without the overrides.
@@ -147,12 +152,23 @@ impl Source {
         Ok(table.into_inner())
     }
 
+    /// The override in which a span lies, and its place in what that shows; none of a span in the file.
+    fn in_override(&self, span: &Range<usize>) -> Option<(&Override, Range<usize>)> {
+        let set = self.overrides.iter().rev().find(|o| span.start >= o.start)?;
+        let local = |at: usize| at.saturating_sub(set.start).min(set.shown.len());
+        Some((set, local(span.start)..local(span.end)))
+    }
+
+    fn text_at(&self, span: Range<usize>) -> Option<&str> {
+        match self.in_override(&span) {
+            Some((set, span)) => set.shown.get(span),
+            None => self.text.get(span),
+        }
+    }
+
     fn error(&self, span: Range<usize>, message: String, remedy: Option<String>) -> SceneError {
-        let set = self.overrides.iter().rev().find(|o| span.start >= o.start);
-        match set {
-            Some(set) => {
-                let local = |at: usize| at.saturating_sub(set.start).min(set.shown.len());
-                let span = local(span.start)..local(span.end);
+        match self.in_override(&span) {
+            Some((set, span)) => {
                 SceneError::at(Path::new("--set"), &set.shown, span, message, remedy)
             }
             None => SceneError::at(&self.path, &self.text, span, message, remedy),
@@ -240,6 +256,13 @@ impl Document<'_> {
         }
     }
 
+    /// The value at a dotted path, as TOML writes it.
+    pub fn stated(&self, path: &str) -> Option<String> {
+        let segments = segments(path);
+        let value = find(&self.root, &segments.iter().map(String::as_str).collect::<Vec<_>>())?;
+        self.source.text_at(value.span()).map(str::to_owned)
+    }
+
     /// True if the top-level `table` has a key other than `but`.
     pub fn says_of(&self, table: &str, but: &str) -> bool {
         let table = self.root.get(table).and_then(|v| v.get_ref().as_table());
@@ -300,7 +323,10 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
     for part in rest {
         value = match value.get_ref() {
             DeValue::Table(table) => table.get(*part)?,
-            DeValue::Array(array) => array.get(part.parse::<usize>().ok()?)?,
+            DeValue::Array(array) => {
+                let called = || array.iter().position(|v| name_of(v).as_deref() == Some(*part));
+                array.get(part.parse::<usize>().ok().or_else(called)?)?
+            }
             _ => return None,
         };
     }

@@ -114,6 +114,10 @@ impl Shelf {
         let keys: MeshKeys = stated.get("");
         let given = ["file", "keyframes", "shape"].into_iter().filter(|key| stated.has(key));
         let given: Vec<_> = given.collect();
+        if let (Some(mesh), []) = (document.source.given.get(name), &given[..]) {
+            let mesh = self.add(name, Mesh::clone(mesh));
+            return Ok(Shapes { name: name.to_owned(), mesh, keyframes: Vec::new() });
+        }
         let [given] = given[..] else {
             return Err(document.fail(
                 path,

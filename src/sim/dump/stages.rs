@@ -5,7 +5,7 @@ use std::path::Path;
 use serde_json::json;
 
 use super::super::Simulator;
-use super::{DumpError, png, rf};
+use super::{DumpError, png};
 use crate::output::npy::{self, Element};
 use crate::scene::Scene;
 
@@ -79,9 +79,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         &[axis("kind", "surface, volume", 0.0, 1.0, 2), scanline(), depth(), complex()],
         &undone,
     )?;
-    let lateral = simulator.lateral()?;
-    let factor = rf::oversampling(&scene.probe);
-    let rf = rf::lines(&scene.probe, frame.axial_sigma, lines, samples, &lateral, factor);
+    let (factor, rf) = simulator.rf(&scene.probe)?;
     write(
         "1_rf",
         "radio-frequency line before TGC",
@@ -89,21 +87,11 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
         &rf,
     )?;
     let iq = simulator.iq()?;
-    write("2_iq", "complex baseband before TGC", &[scanline(), depth(), complex()], &iq[..count])?;
-    let envelope: Vec<f32> = iq
-        .chunks_exact(2)
-        .take(lines * samples)
-        .enumerate()
-        .map(|(i, z)| z[0].hypot(z[1]) * rows[i % samples].tgc)
-        .collect();
+    write("2_iq", "complex baseband before TGC", &[scanline(), depth(), complex()], &iq)?;
+    let envelope = simulator.envelope()?;
     write("3_envelope", "envelope after TGC", &[scanline(), depth()], &envelope)?;
     let log = simulator.log_image()?;
-    write(
-        "4_log",
-        "log-compressed envelope, 0 black to 1 white",
-        &[scanline(), depth()],
-        &log[..lines * samples],
-    )?;
+    write("4_log", "log-compressed envelope, 0 black to 1 white", &[scanline(), depth()], &log)?;
     let (width, height, rgba) = simulator.pixels()?;
     png(&dir.join("5_bmode.png"), width, height, &rgba)?;
     let (x, z, pixel) =

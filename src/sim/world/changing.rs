@@ -13,10 +13,10 @@ use crate::sim::bvh::MeshBvh;
 use crate::sim::fields::Fields;
 use crate::sim::tracer::Tracer;
 
-/// The shape of an instance: a mesh of the scene, or keyframes with their weights.
+/// The shape of an instance: a mesh of the scene and its revision, or keyframes with their weights.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum InstanceShape {
-    Mesh(usize),
+    Mesh(usize, u64),
     Blend([(usize, f64); 4]),
 }
 
@@ -24,7 +24,7 @@ impl InstanceShape {
     fn of(instance: &Instance) -> Self {
         match instance.keyframes.strategy {
             Strategy::Interpolate => Self::Blend(instance.keyframes.blend),
-            _ => Self::Mesh(instance.mesh),
+            _ => Self::Mesh(instance.mesh, instance.keyframes.revision),
         }
     }
 }

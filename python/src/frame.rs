@@ -1,0 +1,225 @@
+//! Frames of Python: an image and what it was made of.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use glam::{DAffine3, DVec3};
+use insonify::probe::Probe;
+use insonify::sim::labels::{LabelValues, Labels};
+use insonify::sim::layout;
+use pyo3::exceptions::PyRuntimeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::arrays::{self, shaped};
+use crate::simulator::Simulator;
+
+/// What a frame has besides its image.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Kind {
+    Iq,
+    Envelope,
+    Log,
+    Rf,
+    Labels,
+}
+
+impl Kind {
+    /// All, by the names that Python knows.
+    pub const ALL: [(&'static str, Self); 5] = [
+        ("iq", Self::Iq),
+        ("envelope", Self::Envelope),
+        ("log", Self::Log),
+        ("rf", Self::Rf),
+        ("labels", Self::Labels),
+    ];
+}
+
+/// What was read from the device.
+#[derive(Clone)]
+pub enum Contents {
+    /// Rows of scanlines, and the values for each axial sample.
+    Rows(Vec<f32>, usize),
+    /// Labels and what their numbers mean, as JSON; none of a frame without them.
+    Labels(Arc<Option<(Labels, String)>>),
+}
+
+/// The image of a frame, and how it was made.
+pub struct Picture {
+    pub constants: layout::Frame,
+    pub probe: Probe,
+    pub width: u32,
+    pub height: u32,
+    pub rgba: Vec<u8>,
+    pub passes: Vec<(String, f64)>,
+    pub pose: DAffine3,
+}
+
+#[pyclass(frozen, module = "insonify")]
+pub struct Frame {
+    simulator: Py<Simulator>,
+    number: u64,
+    picture: Picture,
+    contents: Mutex<Vec<(Kind, Contents)>>,
+}
+
+impl Frame {
+    pub fn new(
+        simulator: Py<Simulator>,
+        number: u64,
+        picture: Picture,
+        contents: Vec<(Kind, Contents)>,
+    ) -> Self {
+        Self { simulator, number, picture, contents: Mutex::new(contents) }
+    }
+
+    fn shape(&self) -> [usize; 2] {
+        [self.picture.height as usize, self.picture.width as usize]
+    }
+
+    /// What the frame has of a kind, read from the device when it is first asked for.
+    fn read(&self, py: Python<'_>, kind: Kind) -> PyResult<Contents> {
+        let all = || self.contents.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = all().iter().find(|(known, _)| *known == kind).map(|(_, kept)| kept.clone());
+        if let Some(kept) = kept {
+            return Ok(kept);
+        }
+        let simulator = self.simulator.get();
+        let contents = simulator.contents(py, self.number, kind, &self.picture.probe)?;
+        all().push((kind, contents.clone()));
+        Ok(contents)
+    }
+
+    fn array<'py>(&self, py: Python<'py>, kind: Kind) -> PyResult<Bound<'py, PyAny>> {
+        let Contents::Rows(values, per_sample) = self.read(py, kind)? else {
+            unreachable!("labels are no rows")
+        };
+        let frame = &self.picture.constants;
+        let shape = [frame.scanlines as usize, frame.samples as usize * per_sample];
+        if kind != Kind::Iq {
+            return shaped(py, values, &shape);
+        }
+        let complex = |z: &[f32]| numpy::Complex32::new(z[0], z[1]);
+        shaped(py, values.chunks_exact(2).map(complex).collect(), &shape)
+    }
+
+    fn labelled(&self, py: Python<'_>) -> PyResult<Arc<Option<(Labels, String)>>> {
+        match self.read(py, Kind::Labels)? {
+            Contents::Labels(labels) if labels.is_some() => Ok(labels),
+            _ => Err(PyRuntimeError::new_err(
+                "this frame was made without labels: sim.frame(want=[\"labels\"]), or \
+                 scene[\"simulation.labels\"] = True",
+            )),
+        }
+    }
+}
+
+#[pymethods]
+impl Frame {
+    /// Grey levels, uint8 [H, W]; 0 outside the sector.
+    #[getter]
+    fn bmode<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        shaped(py, self.picture.rgba.chunks_exact(4).map(|p| p[0]).collect(), &self.shape())
+    }
+
+    /// True inside the sector, bool [H, W].
+    #[getter]
+    fn sector<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        shaped(py, self.picture.rgba.chunks_exact(4).map(|p| p[3] != 0).collect(), &self.shape())
+    }
+
+    #[getter]
+    fn iq<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, Kind::Iq)
+    }
+
+    #[getter]
+    fn envelope<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, Kind::Envelope)
+    }
+
+    #[getter]
+    fn log<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, Kind::Log)
+    }
+
+    #[getter]
+    fn rf<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.array(py, Kind::Rf)
+    }
+
+    /// Labels by name: of the samples [L, K], of the pixels [H, W] behind `pixel_`; places and ways [.., 3].
+    #[getter]
+    fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let labelled = self.labelled(py)?;
+        let (labels, _) = labelled.as_ref().as_ref().expect("checked");
+        let out = PyDict::new(py);
+        for (prefix, grid) in [("", &labels.samples), ("pixel_", &labels.pixels)] {
+            for array in grid.arrays() {
+                let values = match array.values {
+                    LabelValues::Indices(values) => shaped(py, values, &array.shape)?,
+                    LabelValues::Quantities(values) => shaped(py, values, &array.shape)?,
+                };
+                out.set_item(format!("{prefix}{}", array.kind.name), values)?;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Meaning of the labels: tissues, meshes and arrays.
+    #[getter]
+    fn legend<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let labelled = self.labelled(py)?;
+        let (_, legend) = labelled.as_ref().as_ref().expect("checked");
+        py.import("json")?.call_method1("loads", (legend,))
+    }
+
+    /// World from probe space, [4, 4].
+    #[getter]
+    fn pose<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        arrays::rows(py, &self.picture.pose)
+    }
+
+    /// Milliseconds on the device by stage.
+    #[getter]
+    fn timings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let out = PyDict::new(py);
+        for (name, ms) in &self.picture.passes {
+            let before: f64 = out.get_item(name)?.map_or(Ok(0.0), |v| v.extract())?;
+            out.set_item(name, before + ms)?;
+        }
+        Ok(out)
+    }
+
+    /// Coordinates of all arrays, mm in probe space.
+    #[getter]
+    fn axes<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let Picture { constants: frame, probe, width, height, .. } = &self.picture;
+        let pitch = f64::from(frame.pixel_pitch);
+        let centres = |first: f32, count: u32| -> Vec<f64> {
+            (0..count).map(|i| f64::from(first) + (f64::from(i) + 0.5) * pitch).collect()
+        };
+        let lines = frame.scanlines as usize;
+        let rays: Vec<(DVec3, DVec3)> = (0..frame.scanlines)
+            .map(|l| {
+                let (origin, direction) = probe.ray(l, 0);
+                (origin.with_y(0.0), direction)
+            })
+            .collect();
+        let vectors = |of: fn(&(DVec3, DVec3)) -> DVec3| -> Vec<f64> {
+            rays.iter().flat_map(|ray| of(ray).to_array()).collect()
+        };
+        let depths = (0..frame.samples).map(|k| f64::from(k) * probe.sample_pitch()).collect();
+        let out = PyDict::new(py);
+        out.set_item("x", shaped(py, centres(frame.image_left, *width), &[*width as usize])?)?;
+        out.set_item("z", shaped(py, centres(frame.image_top, *height), &[*height as usize])?)?;
+        out.set_item("depth", shaped::<f64>(py, depths, &[frame.samples as usize])?)?;
+        out.set_item("origins", shaped(py, vectors(|ray| ray.0), &[lines, 3])?)?;
+        out.set_item("directions", shaped(py, vectors(|ray| ray.1), &[lines, 3])?)?;
+        Ok(out)
+    }
+
+    fn __repr__(&self) -> String {
+        let [height, width] = self.shape();
+        format!("<insonify.Frame {width} x {height}, {} lines>", self.picture.constants.scanlines)
+    }
+}

@@ -1,0 +1,60 @@
+//! The Python module `insonify._insonify`: scenes, simulators and their frames.
+//!
+//! Python never waits for a lock here while it holds the interpreter, and the interpreter is free while the device
+//! works. Every fault is an exception.
+
+// What Python sees is described in insonify/_insonify.pyi.
+#![allow(missing_docs)]
+
+mod arrays;
+mod error;
+mod frame;
+mod scene;
+mod simulator;
+mod toml;
+
+use insonify::gpu;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use error::{InsonifyError, SceneError, raised};
+
+/// The Vulkan devices of this machine: a dictionary each.
+#[pyfunction]
+fn devices(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
+    let all = py.detach(gpu::list_devices).map_err(|e| raised(&e))?;
+    let dictionary = |info: gpu::DeviceInfo| {
+        let out = PyDict::new(py);
+        out.set_item("index", info.index)?;
+        out.set_item("name", info.name)?;
+        out.set_item("kind", format!("{:?}", info.kind).to_lowercase())?;
+        out.set_item("driver", info.driver)?;
+        out.set_item("vulkan", info.api_version)?;
+        out.set_item("memory_bytes", info.memory_bytes)?;
+        out.set_item("ray_query", info.ray_query)?;
+        out.set_item("usable", info.usable)?;
+        out.set_item("lacks", info.lacks)?;
+        Ok(out)
+    };
+    all.into_iter().map(dictionary).collect()
+}
+
+/// Variables of the environment with which Mesa's software driver compiles kernels in a third of the time; to be set
+/// before the first device is opened. Empty where they are set.
+#[pyfunction]
+fn driver_environment() -> Vec<(&'static str, std::ffi::OsString)> {
+    gpu::driver_environment()
+}
+
+#[pymodule]
+fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    let py = module.py();
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("InsonifyError", py.get_type::<InsonifyError>())?;
+    module.add("SceneError", py.get_type::<SceneError>())?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<simulator::Simulator>()?;
+    module.add_class::<frame::Frame>()?;
+    module.add_function(wrap_pyfunction!(devices, module)?)?;
+    module.add_function(wrap_pyfunction!(driver_environment, module)?)
+}
