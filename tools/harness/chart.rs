@@ -46,7 +46,7 @@ fn job(case: Case, size: Size) -> Job {
         let patch = i as u32 / 23;
         [label.true_tissue, label.true_instance] = [patch % 3, patch % 5];
         [label.tissue, label.instance] =
-            if patch % 7 == 0 { [NONE; 2] } else { [patch % 2, patch % 3] };
+            if patch.is_multiple_of(7) { [NONE; 2] } else { [patch % 2, patch % 3] };
         if random.word().is_multiple_of(6) {
             label.moved_incidence[3] = random.within(0.0, 90.0) as f32;
         }

@@ -143,7 +143,7 @@ fn check(job: &Job, outputs: &[Vec<u8>]) -> Vec<Check> {
     let frame = world.frame;
     let segments: Vec<layout::Segment> = job.get("segments");
     let counts: Vec<u32> = job.get("segment_count");
-    let held = held(&segments, &counts, &frame);
+    let held = held(&segments, &counts, frame);
     let twin = scatter::scatter(&world, &held);
     let echoes: Vec<i32> = job.after(outputs, "volume_echoes");
     let echoes: Vec<f64> = echoes.into_iter().map(f64::from).collect();
