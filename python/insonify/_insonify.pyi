@@ -65,7 +65,7 @@ class Scene:
         """unit, range, words (its choices) and meaning of a key."""
     @staticmethod
     def keys() -> list[str]:
-        """All keys of scene files: `tissues.NAME.speed` stands for those of every tissue."""
+        """All keys of scene files: `mesh.NAME.tissue` stands for those of every mesh."""
     @property
     def name(self) -> str: ...
     @property

@@ -294,14 +294,7 @@ impl Scene {
     /// Paths of all keys, as the manual's tables have them.
     #[staticmethod]
     fn keys() -> Vec<String> {
-        let tables = file::reference().into_iter();
-        let path = |table: &str, key: &str| match table {
-            "" => key.to_owned(),
-            _ => format!("{table}.{key}"),
-        };
-        tables
-            .flat_map(|(table, keys)| keys.into_iter().map(move |key| path(table, &key.path)))
-            .collect()
+        file::paths().collect()
     }
 
     #[getter]

@@ -34,7 +34,7 @@ mod vary;
 pub use again::SceneFile;
 pub use document::quoted;
 pub(crate) use document::{Document, Source};
-pub use draft::{Draft, Known, known};
+pub use draft::{Draft, Known, known, paths};
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;

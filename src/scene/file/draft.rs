@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use super::document::{Source, segments};
+use super::document::{LISTS, Source, segments};
 use super::error::SceneError;
 use super::{schema, settings};
 use crate::scene::{Mesh, Scene, Warning};
@@ -127,18 +127,27 @@ pub fn known(scene: &Scene, path: &str) -> Option<Known> {
         _ => None,
     };
     found.or_else(|| {
-        let named = ["tissues", "mesh", "group", "transform", "selector", "wire"];
+        let named = LISTS.contains(&parts[0].as_str()) && parts.len() > 2;
         let (table, key) = match parts.len() {
             1 => (String::new(), key(0)),
             _ if parts[0] == "tissues" && parts.len() > 2 => ("tissues.NAME".to_owned(), key(2)),
-            _ if named.contains(&parts[0].as_str()) && parts.len() > 2 => {
-                (parts[0].clone(), key(2))
-            }
-            _ => (parts[0].clone(), key(1)),
+            _ => (parts[0].clone(), key(1 + usize::from(named))),
         };
         let tables = schema::reference();
         let (_, keys) = tables.into_iter().find(|(name, _)| *name == table)?;
         let found = keys.into_iter().find(|known| known.path == key)?;
         Some(Known { facts: found.facts, value: None })
+    })
+}
+
+/// Paths of all keys of scene files; `NAME` stands for the name of a tissue, a mesh or another element of a list.
+pub fn paths() -> impl Iterator<Item = String> {
+    schema::reference().into_iter().flat_map(|(table, keys)| {
+        let before = match table {
+            "" => String::new(),
+            _ if LISTS.contains(&table) => format!("{table}.NAME."),
+            _ => format!("{table}."),
+        };
+        keys.into_iter().map(move |key| format!("{before}{}", key.path))
     })
 }
