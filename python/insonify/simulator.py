@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -15,13 +16,16 @@ class Frames:
     """Frames of a loop: arrays of N, one for each frame.
 
     bmode: uint8 [N, H, W]. pose: float64 [N, 4, 4], world from probe, mm. What else was wanted stands under its name:
-    iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples to a line).
+    iq complex64 [N, L, K], envelope, log and rf float32 [N, L, K] (rf with more samples to a line). labels is a
+    dictionary of such arrays, legend what their numbers mean.
     """
 
     bmode: np.ndarray
     pose: np.ndarray
     axes: dict[str, np.ndarray]
     others: dict[str, np.ndarray] = field(default_factory=dict)
+    labels: dict[str, np.ndarray] = field(default_factory=dict)
+    legend: dict[str, Any] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.bmode)
@@ -67,8 +71,10 @@ class Simulator(_insonify.Simulator):
         if count == 0:
             raise ValueError("no frames: poses, times or seeds are empty")
         wanted = list(want)
-        out: dict[str, np.ndarray] = {}
+        rows: dict[str, np.ndarray] = {}
+        labels: dict[str, np.ndarray] = {}
         axes: dict[str, np.ndarray] = {}
+        legend: dict[str, Any] = {}
         for i in _counted(count, progress):
             frame = self.frame(
                 None if poses is None else poses[i],
@@ -79,12 +85,20 @@ class Simulator(_insonify.Simulator):
             )
             axes = axes or frame.axes
             for name in ("bmode", "pose", *wanted):
-                values = getattr(frame, name)
-                if name not in out:
-                    out[name] = np.empty((count, *values.shape), values.dtype)
-                out[name][i] = values
-        bmode, pose = out.pop("bmode"), out.pop("pose")
-        return Frames(bmode, pose, axes, out)
+                if name != "labels":
+                    _put(rows, name, i, count, getattr(frame, name))
+                    continue
+                legend = legend or frame.legend
+                for label, values in frame.labels.items():
+                    _put(labels, label, i, count, values)
+        return Frames(rows.pop("bmode"), rows.pop("pose"), axes, rows, labels, legend)
+
+
+def _put(arrays: dict[str, np.ndarray], name: str, i: int, count: int, values: np.ndarray) -> None:
+    """Puts the values of frame i into an array of all frames."""
+    if name not in arrays:
+        arrays[name] = np.empty((count, *values.shape), values.dtype)
+    arrays[name][i] = values
 
 
 def _counted(count: int, progress: bool) -> Iterator[int]:

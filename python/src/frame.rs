@@ -1,10 +1,12 @@
 //! Frames of Python: an image and what it was made of.
 
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::{DAffine3, DVec3};
 use insonify::probe::Probe;
+use insonify::sim::labels::{LabelValues, Labels};
 use insonify::sim::layout;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -18,19 +20,27 @@ pub enum Kind {
     Envelope,
     Log,
     Rf,
+    Labels,
 }
 
 impl Kind {
     /// All, by the names that Python knows.
-    pub const ALL: [(&'static str, Self); 4] =
-        [("iq", Self::Iq), ("envelope", Self::Envelope), ("log", Self::Log), ("rf", Self::Rf)];
+    pub const ALL: [(&'static str, Self); 5] = [
+        ("iq", Self::Iq),
+        ("envelope", Self::Envelope),
+        ("log", Self::Log),
+        ("rf", Self::Rf),
+        ("labels", Self::Labels),
+    ];
 }
 
-/// An array that was read from the device.
-pub struct Contents {
-    pub values: Vec<f32>,
-    /// Values for each axial sample, of RF lines.
-    pub per_sample: usize,
+/// What was read from the device.
+#[derive(Clone)]
+pub enum Contents {
+    /// Rows of scanlines, and the values for each axial sample.
+    Rows(Vec<f32>, usize),
+    /// Labels and what their numbers mean, as JSON; none of a frame without them.
+    Labels(Arc<Option<(Labels, String)>>),
 }
 
 /// The image of a frame, and how it was made.
@@ -66,31 +76,39 @@ impl Frame {
         [self.picture.height as usize, self.picture.width as usize]
     }
 
-    /// An array, read from the device when it is first asked for.
+    /// What the frame has of a kind, read from the device when it is first asked for.
+    fn read(&self, py: Python<'_>, kind: Kind) -> PyResult<Contents> {
+        let all = || self.contents.lock().unwrap_or_else(PoisonError::into_inner);
+        let kept = all().iter().find(|(known, _)| *known == kind).map(|(_, kept)| kept.clone());
+        if let Some(kept) = kept {
+            return Ok(kept);
+        }
+        let simulator = self.simulator.get();
+        let contents = simulator.contents(py, self.number, kind, &self.picture.probe)?;
+        all().push((kind, contents.clone()));
+        Ok(contents)
+    }
+
     fn array<'py>(&self, py: Python<'py>, kind: Kind) -> PyResult<Bound<'py, PyAny>> {
-        let kept = |all: &[(Kind, Contents)]| {
-            let found = all.iter().find(|(known, _)| *known == kind);
-            found.map(|(_, contents)| (contents.values.clone(), contents.per_sample))
-        };
-        let read = kept(&self.contents.lock().unwrap_or_else(|e| e.into_inner()));
-        let (values, per_sample) = match read {
-            Some(read) => read,
-            None => {
-                let simulator = self.simulator.get();
-                let contents = simulator.contents(py, self.number, kind, &self.picture.probe)?;
-                let read = (contents.values.clone(), contents.per_sample);
-                self.contents.lock().unwrap_or_else(|e| e.into_inner()).push((kind, contents));
-                read
-            }
+        let Contents::Rows(values, per_sample) = self.read(py, kind)? else {
+            unreachable!("labels are no rows")
         };
         let frame = &self.picture.constants;
         let shape = [frame.scanlines as usize, frame.samples as usize * per_sample];
-        match kind {
-            Kind::Iq => {
-                let complex = |z: &[f32]| numpy::Complex32::new(z[0], z[1]);
-                shaped(py, values.chunks_exact(2).map(complex).collect(), &shape)
-            }
-            Kind::Envelope | Kind::Log | Kind::Rf => shaped(py, values, &shape),
+        if kind != Kind::Iq {
+            return shaped(py, values, &shape);
+        }
+        let complex = |z: &[f32]| numpy::Complex32::new(z[0], z[1]);
+        shaped(py, values.chunks_exact(2).map(complex).collect(), &shape)
+    }
+
+    fn labelled(&self, py: Python<'_>) -> PyResult<Arc<Option<(Labels, String)>>> {
+        match self.read(py, Kind::Labels)? {
+            Contents::Labels(labels) if labels.is_some() => Ok(labels),
+            _ => Err(PyRuntimeError::new_err(
+                "this frame was made without labels: sim.frame(want=[\"labels\"]), or \
+                 scene[\"simulation.labels\"] = True",
+            )),
         }
     }
 }
@@ -127,6 +145,32 @@ impl Frame {
     #[getter]
     fn rf<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.array(py, Kind::Rf)
+    }
+
+    /// Labels by name: of the samples [L, K], of the pixels [H, W] behind `pixel_`; places and ways [.., 3].
+    #[getter]
+    fn labels<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let labelled = self.labelled(py)?;
+        let (labels, _) = labelled.as_ref().as_ref().expect("checked");
+        let out = PyDict::new(py);
+        for (prefix, grid) in [("", &labels.samples), ("pixel_", &labels.pixels)] {
+            for array in grid.arrays() {
+                let values = match array.values {
+                    LabelValues::Indices(values) => shaped(py, values, &array.shape)?,
+                    LabelValues::Quantities(values) => shaped(py, values, &array.shape)?,
+                };
+                out.set_item(format!("{prefix}{}", array.kind.name), values)?;
+            }
+        }
+        Ok(out)
+    }
+
+    /// Meaning of the labels: tissues, meshes and arrays.
+    #[getter]
+    fn legend<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let labelled = self.labelled(py)?;
+        let (_, legend) = labelled.as_ref().as_ref().expect("checked");
+        py.import("json")?.call_method1("loads", (legend,))
     }
 
     /// World from probe space, [4, 4].

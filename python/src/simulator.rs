@@ -8,7 +8,7 @@ use insonify::scene;
 use insonify::settings::{Quality, Settings, Words};
 use insonify::sim::calibration::Work;
 use insonify::sim::shaders::Library;
-use insonify::sim::{self, Tracer};
+use insonify::sim::{self, Tracer, labels};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -25,6 +25,8 @@ pub struct Moment {
     pub seed: Option<u32>,
     /// Number of the frame in a loop: selects the noise.
     pub number: u32,
+    /// True if labels are wanted, whatever the scene says.
+    pub labels: bool,
 }
 
 /// A simulator.
@@ -44,6 +46,8 @@ pub struct Running {
     wanted: Option<Tracer>,
     quality: Option<Quality>,
     made: Option<Made>,
+    /// Meaning of the last frame's labels.
+    legend: String,
     /// Frames made so far: results that were not read belong to the last one.
     frames: u64,
     pub notes: Vec<String>,
@@ -60,6 +64,7 @@ impl Running {
         if let Some(seed) = moment.seed {
             state.scene.simulation.seed = seed;
         }
+        state.scene.simulation.labels |= moment.labels;
         if let Some(quality) = self.quality {
             let machine = sim::machine(&self.device);
             let by_hand: Vec<String> = state.by_hand().map(str::to_owned).collect();
@@ -86,6 +91,9 @@ impl Running {
         let (width, height, rgba) = simulator.pixels().map_err(|e| raised(&e))?;
         let FrameTimings { passes, .. } = timings;
         let constants = *simulator.constants();
+        if scene.simulation.labels {
+            self.legend = labels::legend(scene, &constants).to_string();
+        }
         Ok(Picture {
             constants,
             probe: scene.probe.clone(),
@@ -142,13 +150,16 @@ impl Running {
                  sim.frame(want=[\"iq\"])",
             ));
         };
+        let rows = |values| Contents::Rows(values, 1);
         let read = match kind {
-            Kind::Iq => simulator.iq().map(|values| Contents { values, per_sample: 1 }),
-            Kind::Envelope => simulator.envelope().map(|values| Contents { values, per_sample: 1 }),
-            Kind::Log => simulator.log_image().map(|values| Contents { values, per_sample: 1 }),
-            Kind::Rf => {
-                simulator.rf(probe).map(|(factor, values)| Contents { values, per_sample: factor })
-            }
+            Kind::Iq => simulator.iq().map(rows),
+            Kind::Envelope => simulator.envelope().map(rows),
+            Kind::Log => simulator.log_image().map(rows),
+            Kind::Rf => simulator.rf(probe).map(|(factor, values)| Contents::Rows(values, factor)),
+            Kind::Labels => simulator.labels().map(|labels| {
+                let explained = |labels| (labels, self.legend.clone());
+                Contents::Labels(Arc::new(labels.map(explained)))
+            }),
         };
         read.map_err(|e| raised(&e))
     }
@@ -256,6 +267,7 @@ impl Simulator {
             wanted,
             quality,
             made: None,
+            legend: String::new(),
             frames: 0,
             notes: Vec::new(),
         };
@@ -272,13 +284,14 @@ impl Simulator {
         want: Vec<String>,
     ) -> PyResult<Frame> {
         let py = slf.py();
+        let kinds = kinds(&want)?;
         let moment = Moment {
             pose: pose.map(arrays::pose).transpose()?,
             time: time.map(seconds).transpose()?,
             seed,
             number,
+            labels: kinds.contains(&Kind::Labels),
         };
-        let kinds = kinds(&want)?;
         let this = slf.clone();
         let mut running = this.get().running()?;
         let running = running.as_mut().expect("checked");

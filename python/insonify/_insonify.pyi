@@ -1,0 +1,173 @@
+"""Scenes, simulators and frames. Units: mm, microseconds, MHz, dB; times of a scene in seconds."""
+
+from collections.abc import Mapping, Sequence
+from os import PathLike
+from typing import Any, Literal, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__version__: str
+
+Want = Literal["iq", "envelope", "log", "rf", "labels"]
+
+class Device(TypedDict):
+    index: int
+    name: str
+    kind: str
+    driver: str
+    vulkan: str
+    memory_bytes: int
+    ray_query: bool
+    usable: bool
+    lacks: list[str]
+
+class InsonifyError(Exception):
+    """The simulator cannot do what it is told to: no device, no memory, too large a scene."""
+
+class SceneError(InsonifyError):
+    """A mistake in a scene, its settings or its files: place, cause and remedy, as the command line prints it."""
+
+def devices() -> list[Device]:
+    """The Vulkan devices of this machine. InsonifyError: there is no Vulkan loader."""
+
+def driver_environment() -> list[tuple[str, str]]:
+    """Variables that make Mesa's software driver compile in a third of the time; import sets them."""
+
+class Scene:
+    """What is imaged: anatomy, tissues, probe and every setting of the manual (docs/scenes.md).
+
+    Scene.load(path) reads a scene file. Scene(...) makes one of dictionaries with the tables of a scene file; a mesh
+    may have `vertices` [N, 3] in mm and `triangles` [M, 3] in place of a file:
+
+        Scene(
+            probe={"preset": "linear", "depth": 40},
+            tissues={"cyst": {"base": "water"}},
+            background="liver",
+            mesh={"cyst": {"tissue": "cyst", "vertices": v, "triangles": t}},
+        )
+
+    scene["imaging.gain"] reads a key, scene["imaging.gain"] = "20 dB" sets it, = None takes that back. Quantities are
+    read as numbers in the unit that describe(key) names, angles as text; numbers and text with a unit are taken.
+    """
+
+    def __init__(self, *, folder: str | PathLike[str] = ".", **tables: Any) -> None:
+        """folder: where the files are that the tables name. SceneError: a mistake in them."""
+    @staticmethod
+    def load(path: str | PathLike[str], overrides: Mapping[str, Any] | None = None) -> Scene:
+        """The scene of a file, with `overrides` as of `--set`. SceneError: a mistake, with file, line and remedy."""
+    def __getitem__(self, key: str) -> Any:
+        """The value of a key; None where it is not set and has no default. KeyError: scene files have no such key."""
+    def __setitem__(self, key: str, value: Any) -> None:
+        """Sets a key. Keys of probe, simulation and imaging at once; others read the scene again. SceneError: a value
+        that the key does not take; the scene is then as it was."""
+    def describe(self, key: str) -> dict[str, Any]:
+        """unit, range, words (its choices) and meaning of a key."""
+    @staticmethod
+    def keys() -> list[str]:
+        """All keys of scene files: `tissues.NAME.speed` stands for those of every tissue."""
+    @property
+    def name(self) -> str: ...
+    @property
+    def warnings(self) -> list[str]: ...
+    @property
+    def tissues(self) -> list[str]:
+        """Names of the tissues, in the order of their numbers in labels."""
+    @property
+    def meshes(self) -> list[str]:
+        """Names of the placed meshes, in the order of their numbers in labels."""
+    time: float
+    """The moment that is shown, s."""
+    pose: NDArray[np.float64]
+    """World from probe space [4, 4], mm: x lateral, y elevation, z depth, the origin in the middle of the face. Taken
+    only if it is a rotation with a shift."""
+    def set_vertices(self, mesh: str, vertices: ArrayLike) -> None:
+        """Moves the vertices [N, 3] (mm) of a mesh that was made of arrays; its tissue moves along. The next frame
+        shows it without reading or building anything anew."""
+    def placement(self, mesh: str) -> NDArray[np.float64]:
+        """World from object space [4, 4] of a mesh."""
+    def place(self, mesh: str, world_from_object: ArrayLike | None) -> None:
+        """Places a mesh, whatever motions the scene has for it; None gives it back to these."""
+
+class Frame:
+    """An image, and on request what it was made of.
+
+    Arrays besides the image are those named in frame(want=...), or of the simulator's last frame any.
+    L scanlines, K axial samples, an image of H rows and W columns.
+    """
+
+    @property
+    def bmode(self) -> NDArray[np.uint8]:
+        """Grey levels [H, W]; 0 outside the sector."""
+    @property
+    def sector(self) -> NDArray[np.bool_]:
+        """True inside the sector [H, W]."""
+    @property
+    def iq(self) -> NDArray[np.complex64]:
+        """Complex baseband before time-gain compensation, relative to a perfect mirror [L, K]."""
+    @property
+    def envelope(self) -> NDArray[np.float32]:
+        """Envelope after time-gain compensation [L, K]."""
+    @property
+    def log(self) -> NDArray[np.float32]:
+        """Log-compressed envelope, 0 black to 1 white [L, K]."""
+    @property
+    def rf(self) -> NDArray[np.float32]:
+        """Radio-frequency lines before time-gain compensation [L, n K], n samples to each axial one."""
+    @property
+    def labels(self) -> dict[str, NDArray[Any]]:
+        """Labels (docs/labels.md): of samples [L, K], of pixels [H, W] with `pixel_` before the name."""
+    @property
+    def legend(self) -> dict[str, Any]:
+        """Meaning of the labels: names of tissues and meshes, units."""
+    @property
+    def pose(self) -> NDArray[np.float64]:
+        """World from probe space [4, 4]."""
+    @property
+    def timings(self) -> dict[str, float]:
+        """Milliseconds on the device by stage."""
+    @property
+    def axes(self) -> dict[str, NDArray[np.float64]]:
+        """Coordinates in probe space, mm: x [W] and z [H] of pixels' centres, depth [K] of samples, origins and
+        directions [L, 3] of scanlines."""
+
+class Simulator:
+    def __new__(
+        cls,
+        scene: Scene,
+        *,
+        device: str | None = None,
+        tracer: Literal["auto", "bvh", "ray-query"] = "auto",
+        quality: Literal["draft", "standard", "reference"] | None = None,
+        validate: bool = False,
+    ) -> Simulator: ...
+    def frame(
+        self,
+        pose: ArrayLike | None = None,
+        time: float | None = None,
+        seed: int | None = None,
+        *,
+        number: int = 0,
+        want: Sequence[Want] = (),
+    ) -> Frame:
+        """Simulates a frame of the scene as it is, or at another pose, time or seed; the scene stays as it was.
+
+        number: of the frame in a loop, by which the noise of the receiver differs. want: arrays to be read with it.
+        RuntimeError: the simulator is closed, or another thread has it. InsonifyError: the device fails.
+        """
+    @property
+    def scene(self) -> Scene: ...
+    @property
+    def device(self) -> str: ...
+    @property
+    def tracer(self) -> str | None:
+        """The tracer; None before the first frame."""
+    @property
+    def notes(self) -> list[str]:
+        """What was said about scene and device so far."""
+    @property
+    def validation_messages(self) -> list[str]: ...
+    def close(self) -> None:
+        """Gives the device's memory back. Frames keep what was read of them."""
+    def __enter__(self) -> Simulator: ...
+    def __exit__(self, *exception: object) -> None: ...

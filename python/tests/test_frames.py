@@ -1,0 +1,324 @@
+"""Frames: what is in them, equal to the command line's, and what misuse leads to."""
+
+import subprocess
+import threading
+import time
+
+import numpy as np
+import pytest
+from conftest import ROOT, ball, sphere
+
+import insonify
+
+
+def test_arrays_have_their_shapes_and_axes(simulator):
+    frame = simulator.frame()
+    assert frame.bmode.dtype == np.uint8 and frame.bmode.shape[0] == 200
+    assert frame.sector.shape == frame.bmode.shape and frame.sector.dtype == bool
+    assert (frame.bmode[~frame.sector] == 0).all() and frame.bmode.max() > 50
+    assert frame.iq.shape == (48, 512) and frame.iq.dtype == np.complex64
+    assert frame.envelope.shape == frame.log.shape == (48, 512)
+    assert frame.rf.shape[0] == 48 and frame.rf.shape[1] % 512 == 0
+    axes = frame.axes
+    assert axes["x"].shape == (frame.bmode.shape[1],) and axes["z"].shape == (200,)
+    assert axes["depth"][1] == 40 / 512 and axes["origins"].shape == axes["directions"].shape == (48, 3)
+    assert set(frame.timings) >= {"trace", "scatter", "beam"}
+    assert (frame.pose == np.eye(4)).all()
+
+
+def test_the_picture_is_that_of_the_command_line(program, tmp_path):
+    settings = {"probe.scanlines": 48, "simulation.paths": 2, "imaging.gain": 18}
+    path = ROOT / "scenes/phantom.toml"
+    sets = [part for key, value in settings.items() for part in ("--set", f"{key}={value}")]
+    command = [program, "render", path, "--quality", "draft", "--seed", "7", "--tracer", "bvh", *sets]
+    command += ["--dump", tmp_path / "dump", "-o", tmp_path / "a.png"]
+    subprocess.run(command, check=True, capture_output=True)
+    scene = insonify.Scene.load(path, settings)
+    with insonify.Simulator(scene, quality="draft", tracer="bvh") as simulator:
+        frame = simulator.frame(seed=7)
+        dumped = np.load(tmp_path / "dump/2_iq.npy")
+        assert (frame.iq == dumped[..., 0] + 1j * dumped[..., 1]).all()
+        assert (frame.envelope == np.load(tmp_path / "dump/3_envelope.npy")).all()
+        assert (frame.rf == np.load(tmp_path / "dump/1_rf.npy")).all()
+        # The scene's own counts come back behind a frame of another quality.
+        assert scene["simulation.scatterers_per_resolution_cell"] == 8.0
+
+
+def test_frames_are_the_single_frames_to_the_bit(simulator):
+    poses = np.repeat(np.eye(4)[None], 3, 0)
+    poses[:, 0, 3] = 0, 1, 2
+    loop = simulator.frames(poses, seeds=[1, 2, 3], want=["iq"])
+    assert loop.bmode.shape[0] == len(loop) == 3 and loop.iq.shape == (3, 48, 512)
+    for i in range(3):
+        single = simulator.frame(poses[i], seed=i + 1, number=i, want=["iq"])
+        assert (single.iq == loop.iq[i]).all() and (single.bmode == loop.bmode[i]).all()
+        assert (loop.pose[i] == poses[i]).all()
+    assert (loop.iq[0] != loop.iq[1]).any()
+
+
+def test_another_seed_or_number_is_another_frame_and_the_same_is_the_same(simulator):
+    first = simulator.frame(want=["iq"])
+    assert (simulator.frame(want=["iq"]).iq == first.iq).all()
+    assert (simulator.frame(number=1, want=["iq"]).iq != first.iq).any()
+    assert (simulator.frame(seed=5, want=["iq"]).iq != first.iq).any()
+    assert (simulator.frame(want=["iq"]).iq == first.iq).all()
+
+
+def test_the_front_of_a_ball_is_where_it_is(simulator):
+    """Its front wall on the middle scanline, and again where the ball was moved to."""
+    scene = simulator.scene
+    scene["simulation.refraction"] = "ray"
+    scene["tissues.liver.echogenicity"] = "-inf dB"
+    for shift in (0.0, 3.0):
+        placed = np.eye(4)
+        placed[2, 3] = shift
+        scene.place("ball", placed)
+        frame = simulator.frame()
+        line = np.abs(frame.envelope[23:25]).mean(0)
+        front = frame.axes["depth"][line[: int((20 + shift) / 40 * 512)].argmax()]
+        # Of liver's speed the probe's is a little off.
+        expected = (15 + shift) * scene["probe.speed"] / scene["tissues.liver.speed"]
+        assert abs(front - expected) < 0.1, (front, expected)
+
+
+@pytest.mark.parametrize("tracer", ["bvh", "ray-query"])
+def test_a_live_mesh_is_imaged_as_one_that_is_so_from_the_start(tracer):
+    if tracer == "ray-query" and not insonify.devices()[0]["ray_query"]:
+        pytest.skip("skipped: no ray query")
+    vertices, triangles = sphere(centre=(0, 0, 20))
+    still = {"texture_space": "object", "paths": 2}
+    bent = np.where(vertices[:, 2:] < 20, vertices + [0, 0, -2.0], vertices)
+    live = ball(vertices, triangles, simulation=still)
+    with insonify.Simulator(live, tracer=tracer) as simulator:
+        rest = simulator.frame(want=["iq"])
+        live.set_vertices("ball", bent)
+        shown = simulator.frame(want=["iq"])
+        # Again by refitting, there and back.
+        live.set_vertices("ball", vertices)
+        back = simulator.frame(want=["iq"])
+        live.set_vertices("ball", bent)
+        again = simulator.frame(want=["iq"])
+    with insonify.Simulator(ball(bent, triangles, simulation=still), tracer=tracer) as simulator:
+        wanted = simulator.frame(want=["iq"])
+    assert (rest.iq != shown.iq).any()
+    assert (back.iq == rest.iq).all() and (again.iq == shown.iq).all()
+    assert (shown.iq == wanted.iq).all()
+
+
+def test_tissue_moves_with_a_live_mesh():
+    """A ball of liver, pushed sideways as a whole, takes its speckle along."""
+    vertices, triangles = sphere(centre=(0, 0, 20))
+    scene = ball(vertices, triangles, simulation={"paths": 2, "labels": True})
+    scene["mesh.ball.tissue"] = "kidney"
+    with insonify.Simulator(scene, tracer="bvh") as simulator:
+        simulator.frame()
+        scene.set_vertices("ball", vertices + [0, 0, 1e-3])
+        simulator.frame()
+        scene.set_vertices("ball", vertices + [0, 0, 0.5])
+        labels = simulator.frame(want=["labels"]).labels
+    inside = labels["true_instance"] == 0
+    moved = labels["displacement"][inside]
+    assert np.nanmedian(np.abs(moved - [0, 0, 0.499])) < 0.02
+
+
+def test_vertices_that_do_not_fit_are_refused(scene):
+    vertices, _ = sphere()
+    with pytest.raises(ValueError, match="has 258 vertices, not 257"):
+        scene.set_vertices("ball", vertices[:-1])
+    with pytest.raises(ValueError, match="nan"):
+        scene.set_vertices("ball", vertices * np.nan)
+    with pytest.raises(KeyError):
+        scene.set_vertices("bell", vertices)
+    file = insonify.Scene.load(ROOT / "scenes/phantom.toml")
+    with pytest.raises(ValueError, match="is that of a file"):
+        file.set_vertices(file.meshes[0], vertices)
+
+
+def test_labels_come_with_a_legend(simulator):
+    frame = simulator.frame(want=["labels"])
+    labels, legend = frame.labels, frame.legend
+    assert labels["tissue"].shape == (48, 512) and labels["pixel_tissue"].shape == frame.bmode.shape
+    assert labels["position"].shape == (48, 512, 3)
+    names = {tissue["id"]: tissue["name"] for tissue in legend["tissues"]}
+    assert names[int(labels["pixel_true_tissue"][100, frame.bmode.shape[1] // 2])] == "water"
+    with pytest.raises(RuntimeError, match="without labels"):
+        simulator.frame().labels
+    stacked = simulator.frames(seeds=[1, 2], want=["labels"])
+    assert stacked.labels["pixel_tissue"].shape == (2, *frame.bmode.shape) and stacked.legend == legend
+
+
+def test_what_was_not_asked_for_is_gone_with_the_next_frame(simulator):
+    first = simulator.frame()
+    kept = simulator.frame()
+    assert kept.iq.shape == (48, 512)
+    with pytest.raises(RuntimeError, match="another frame since"):
+        first.iq
+    simulator.frame()
+    # What was read once stays.
+    assert kept.iq.shape == (48, 512)
+
+
+def test_use_after_close(scene):
+    simulator = insonify.Simulator(scene)
+    frame = simulator.frame()
+    simulator.close()
+    simulator.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        simulator.frame()
+    with pytest.raises(RuntimeError, match="closed"):
+        frame.iq
+    assert frame.bmode.max() > 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error", "text"),
+    [
+        ({"pose": np.eye(3)}, ValueError, "shape"),
+        ({"pose": "here"}, TypeError, "real numbers"),
+        ({"time": float("nan")}, ValueError, "no time"),
+        ({"seed": -1}, OverflowError, ""),
+        ({"seed": 2**32}, OverflowError, ""),
+        ({"number": 1.5}, TypeError, ""),
+        ({"want": ["iqq"]}, ValueError, '"iq", "envelope"'),
+    ],
+)
+def test_arguments_that_are_none_are_refused(simulator, arguments, error, text):
+    with pytest.raises(error, match=text):
+        simulator.frame(**arguments)
+
+
+def test_simulators_that_cannot_be(scene):
+    with pytest.raises(ValueError, match='"auto", "bvh", "ray-query"'):
+        insonify.Simulator(scene, tracer="cuda")
+    with pytest.raises(ValueError, match='"draft"'):
+        insonify.Simulator(scene, quality="good")
+    with pytest.raises(insonify.InsonifyError, match="no such card"):
+        insonify.Simulator(scene, device="no such card")
+    with pytest.raises(TypeError):
+        insonify.Simulator("scene")
+
+
+def test_loops_that_do_not_fit_are_refused(simulator):
+    with pytest.raises(ValueError, match="not as many of each"):
+        simulator.frames(np.eye(4)[None], seeds=[1, 2])
+    with pytest.raises(ValueError, match="no frames"):
+        simulator.frames(np.zeros((0, 4, 4)))
+    with pytest.raises(ValueError, match="needs poses, times or seeds"):
+        simulator.frames()
+    with pytest.raises(ValueError, match="shape"):
+        simulator.frames(np.zeros((2, 3, 4)))
+
+
+def test_a_frame_with_more_of_everything_finds_room(simulator):
+    small = simulator.frame(want=["iq"])
+    scene = simulator.scene
+    scene["probe.scanlines"] = 64
+    scene["imaging.image_height"] = 300
+    large = simulator.frame(want=["iq"])
+    assert large.iq.shape == (64, 512) and large.bmode.shape[0] == 300
+    scene["probe.scanlines"] = 48
+    scene["imaging.image_height"] = 200
+    assert (simulator.frame(want=["iq"]).iq == small.iq).all()
+
+
+def test_two_threads_on_one_simulator_get_an_exception_at_worst(simulator):
+    simulator.frame()
+    refused, made = [], []
+
+    def work():
+        for _ in range(40):
+            try:
+                made.append(simulator.frame().bmode.max())
+            except RuntimeError as error:
+                refused.append(str(error))
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(made) + len(refused) == 120 and made
+    assert refused and all("another thread" in text for text in refused)
+
+
+def test_the_interpreter_is_free_while_the_device_works(simulator):
+    simulator.scene["simulation.paths"] = 64
+    simulator.frame()
+    counted, stop = [0], threading.Event()
+
+    def count():
+        while not stop.is_set():
+            counted[0] += 1
+            time.sleep(0)
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = counted[0]
+    simulator.frame(seed=2)
+    during = counted[0] - before
+    stop.set()
+    thread.join()
+    assert during > 10
+
+
+def test_memory_stays_flat(scene):
+    def resident():
+        with open("/proc/self/statm") as file:
+            return int(file.read().split()[1]) * 4096
+
+    scene["probe.scanlines"] = 8
+    scene["probe.samples"] = 64
+    scene["imaging.image_height"] = 16
+    vertices, _ = sphere(centre=(0, 0, 20))
+    with insonify.Simulator(scene, tracer="bvh") as simulator:
+        def call(count):
+            for i in range(count):
+                scene["imaging.gain"] = i % 7
+                scene.set_vertices("ball", vertices * (1 + 1e-4 * (i % 5 + 1)))
+                simulator.frame(seed=i % 3, want=["iq", "labels"]).labels
+
+        call(100)
+        before = resident()
+        call(300)
+        grown = resident() - before
+    assert grown < 4 << 20, grown
+
+
+def test_no_validation_message():
+    scene = ball(simulation={"labels": True})
+    try:
+        simulator = insonify.Simulator(scene, validate=True)
+    except insonify.InsonifyError as error:
+        pytest.skip(f"skipped: {error}")
+    with simulator:
+        simulator.frame()
+        scene.set_vertices("ball", sphere(centre=(0, 0, 19))[0])
+        simulator.frame()
+        assert simulator.validation_messages == []
+
+
+def test_nothing_but_the_c_library_is_linked():
+    """Vulkan is opened at run time, and there is no window: neither libvulkan nor libudev."""
+    tree = subprocess.run(
+        ["cargo", "tree", "--offline", "-p", "insonify-python", "-e", "normal", "--prefix", "none"],
+        cwd=ROOT, capture_output=True, text=True,
+    )
+    if tree.returncode:
+        pytest.skip("skipped: no cargo")
+    crates = {line.split()[0] for line in tree.stdout.splitlines() if line}
+    assert "ash" in crates and not crates & {"libudev-sys", "gilrs", "winit", "egui"}
+
+
+def test_the_stubs_say_what_there_is():
+    """Names of the stub file and of the module are the same."""
+    import ast
+
+    source = (ROOT / "python/insonify/_insonify.pyi").read_text()
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.ClassDef) and hasattr(insonify._insonify, node.name):
+            stated = {n.name for n in node.body if isinstance(n, ast.FunctionDef)}
+            stated |= {n.target.id for n in node.body if isinstance(n, ast.AnnAssign)}
+            there = {n for n in vars(getattr(insonify._insonify, node.name)) if not n.startswith("__")}
+            assert {n for n in stated if not n.startswith("__")} == there, node.name
+
+

@@ -1,0 +1,149 @@
+"""Scenes: read, made, changed; every mistake is an exception with a place and a remedy."""
+
+import numpy as np
+import pytest
+from conftest import QUICK, ROOT, ball, sphere
+
+import insonify
+
+
+def test_settings_are_read_and_set_as_the_manual_says(scene):
+    scene["imaging.gain"] = "20 dB"
+    assert scene["imaging.gain"] == 20.0
+    scene["imaging.gain"] = -3
+    assert scene["imaging.gain"] == -3.0
+    assert scene["probe.depth"] == 40.0 and scene["probe.scanlines"] == 48
+    assert scene["simulation.refraction"] == "beam"
+    scene["simulation.labels"] = True
+    assert scene["simulation.labels"] is True
+    assert scene.describe("imaging.gain")["unit"] == "dB"
+    assert "white" in scene.describe("imaging.gain")["meaning"]
+
+
+def test_none_takes_a_value_back(scene):
+    before = scene["imaging.gain"]
+    scene["imaging.gain"] = before + 5
+    scene["imaging.gain"] = None
+    assert scene["imaging.gain"] == before
+
+
+def test_tissues_and_meshes_are_keys_too(scene):
+    scene["tissues.liver.attenuation"] = "0.9 dB/cm/MHz"
+    assert scene["tissues.liver.attenuation"] == 0.9
+    scene["mesh.ball.tissue"] = "fat"
+    assert scene["mesh.ball.tissue"] == "fat"
+    assert scene.tissues == ["liver", "fat"] and scene.meshes == ["ball"]
+
+
+def test_every_key_of_the_manual_is_known(scene):
+    keys = insonify.Scene.keys()
+    assert len(keys) > 200
+    for key in keys:
+        assert scene.describe(key.replace("NAME", "liver"))["meaning"], key
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "cause", "remedy"),
+    [
+        ("imaging.gain", 999, "gain is 999 dB", "between -200 and 200 dB"),
+        ("imaging.gian", 1, "unknown field `gian`", "did you mean `gain`?"),
+        ("imaging.gain", "20 mm", "unit `mm` does not fit", "dB"),
+        ("imaging.gain", [1, 2], "imaging.gain", ""),
+        ("mesh.bal.tissue", "fat", "there is no mesh `bal`", "did you mean `ball`?"),
+        ("mesh.ball.tissue", "fatt", "fatt", "fat"),
+        ("probe.scanlines", 0, "scanlines is 0", ""),
+        ("imaging.gain", float("nan"), "NaN", ""),
+    ],
+)
+def test_a_mistake_has_cause_and_remedy_and_changes_nothing(scene, key, value, cause, remedy):
+    before = (scene["imaging.gain"], scene["probe.scanlines"], scene.tissues)
+    with pytest.raises(insonify.SceneError) as error:
+        scene[key] = value
+    assert cause in str(error.value) and remedy in str(error.value), str(error.value)
+    assert (scene["imaging.gain"], scene["probe.scanlines"], scene.tissues) == before
+
+
+def test_what_is_no_setting_is_a_type_error(scene):
+    with pytest.raises(TypeError, match="not object"):
+        scene["imaging.gain"] = object()
+    with pytest.raises(KeyError, match="no key"):
+        scene["imaging.gian"]
+
+
+def test_a_file_is_loaded_with_overrides():
+    scene = insonify.Scene.load(ROOT / "scenes/phantom.toml", {"imaging.gain": "20 dB", "probe.scanlines": 32})
+    assert scene["imaging.gain"] == 20.0 and scene["probe.scanlines"] == 32
+    assert "phantom" in scene.name.lower() and len(scene.meshes) > 20
+    with pytest.raises(insonify.SceneError, match="cannot be read"):
+        insonify.Scene.load("nowhere.toml")
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "text"),
+    [
+        (lambda v, t: (v[:, :2], t), ValueError, r"vertices has the shape \[\d+, 2\], not \[N, 3\]"),
+        (lambda v, t: (v.astype(complex), t), TypeError, "complex128"),
+        (lambda v, t: (v.astype(str), t), TypeError, "not of real numbers"),
+        (lambda v, t: (np.where(np.arange(len(v))[:, None] == 3, np.nan, v), t), ValueError, "vertices holds nan"),
+        (lambda v, t: (v, t + 1), insonify.SceneError, "name no vertex"),
+        (lambda v, t: (v, t - 1), ValueError, "name vertex -1"),
+        (lambda v, t: (v, t.astype(float)), TypeError, "whole numbers"),
+        (lambda v, t: (v, t[:, :2]), ValueError, r"not \[N, 3\]"),
+        (lambda v, t: (v, t[:0]), insonify.SceneError, "no triangles"),
+        (lambda v, t: (v * 0, t), insonify.SceneError, "mesh `ball`"),
+    ],
+)
+def test_arrays_that_are_no_mesh_are_refused(change, error, text):
+    vertices, triangles = change(*sphere())
+    with pytest.raises(error, match=text):
+        ball(vertices, triangles)
+
+
+def test_a_mesh_needs_both_arrays_and_a_name():
+    vertices, triangles = sphere()
+    with pytest.raises(ValueError, match="both"):
+        insonify.Scene(mesh={"a": {"tissue": "fat", "vertices": vertices}}, **QUICK)
+    with pytest.raises(ValueError, match="name"):
+        insonify.Scene(mesh=[{"tissue": "fat", "vertices": vertices, "triangles": triangles}], **QUICK)
+    with pytest.raises(insonify.SceneError, match="neither `file` nor `keyframes` nor `shape`"):
+        insonify.Scene(mesh={"a": {"tissue": "fat"}}, **QUICK)
+    with pytest.raises(TypeError, match="dict of dicts"):
+        insonify.Scene(mesh=3, **QUICK)
+
+
+def test_poses_are_rigid(scene):
+    pose = np.eye(4)
+    pose[:3, 3] = 1, 2, 3
+    scene.pose = pose
+    assert (scene.pose == pose).all()
+    with pytest.raises(ValueError, match="transposed"):
+        scene.pose = pose.T
+    with pytest.raises(ValueError, match="no rotation"):
+        scene.pose = np.diag([2.0, 1, 1, 1])
+    with pytest.raises(ValueError, match="no rotation"):
+        scene.pose = np.diag([-1.0, 1, 1, 1])
+    with pytest.raises(ValueError, match=r"shape \[3, 3\]"):
+        scene.pose = np.eye(3)
+    # Another key that reads the scene again leaves the pose.
+    scene["tissues.liver.attenuation"] = 0.4
+    assert (scene.pose == pose).all()
+
+
+def test_placements(scene):
+    map = np.eye(4)
+    map[0, 3] = 2
+    scene.place("ball", map)
+    assert (scene.placement("ball") == map).all()
+    scene.place("ball", None)
+    assert (scene.placement("ball") == np.eye(4)).all()
+    with pytest.raises(KeyError, match="did you mean `ball`"):
+        scene.place("bal", map)
+    with pytest.raises(ValueError, match="flattens"):
+        scene.place("ball", np.diag([1.0, 1, 0, 1]))
+
+
+def test_a_time_is_finite(scene):
+    scene.time = 1.5
+    assert scene.time == 1.5
+    with pytest.raises(ValueError, match="no time"):
+        scene.time = float("inf")
