@@ -8,11 +8,11 @@ use insonify::output;
 mod acquire;
 mod check;
 mod common;
+mod dataset;
 mod images;
 mod import;
 mod info;
 mod matching;
-mod order;
 mod reconstruct;
 mod register;
 mod render;
@@ -37,6 +37,8 @@ enum Command {
     Acquire(Box<acquire::Acquire>),
     /// Check a scene, a mesh or a volume and say what it holds; exits 1 on errors
     Check(check::Check),
+    /// Make labelled samples of scenes by a plan: a data set, shard by shard
+    Dataset(Box<dataset::Dataset>),
     /// Make a scene from a segmentation or from meshes
     Import(Box<import::Import>),
     /// List the Vulkan devices and what each lacks
@@ -68,6 +70,7 @@ pub fn run() -> ExitCode {
     let result = match Cli::parse().command {
         Command::Acquire(args) => acquire::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Check(check) => check.run(),
+        Command::Dataset(args) => dataset::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Import(args) => import::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Info(info) => info::run(&info).map(|()| ExitCode::SUCCESS),
         Command::Match(args) => matching::run(&args).map(|()| ExitCode::SUCCESS),

@@ -7,6 +7,7 @@
 #![warn(missing_docs)]
 
 pub mod acquire;
+pub mod dataset;
 pub mod gpu;
 pub mod igtl;
 pub mod import;

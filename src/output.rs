@@ -9,6 +9,8 @@ pub mod npy;
 pub mod npz;
 pub mod plot;
 pub mod sheet;
+pub mod uff;
+pub mod zea;
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write, stderr, stdout};

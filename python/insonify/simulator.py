@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import _insonify
+
+if TYPE_CHECKING:
+    from ._insonify import Want
 
 
 @dataclass
@@ -54,7 +57,7 @@ class Simulator(_insonify.Simulator):
         times: Sequence[float] | None = None,
         seeds: Sequence[int] | None = None,
         *,
-        want: Sequence[str] = (),
+        want: Sequence[Want] = (),
         progress: bool = False,
     ) -> Frames:
         """Simulates N frames, each at its pose [N, 4, 4], time [N] (s) and seed [N]; what is None stays the scene's.
@@ -106,7 +109,7 @@ def _counted(count: int, progress: bool) -> Iterator[int]:
     if not progress:
         return iter(range(count))
     try:
-        from tqdm.auto import tqdm
+        from tqdm.auto import tqdm  # type: ignore[import-untyped]
     except ImportError:
         return _told(count)
     return iter(tqdm(range(count), unit="frame"))

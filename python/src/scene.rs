@@ -24,8 +24,8 @@ pub struct State {
     /// How many times the anatomy was read; simulators upload it again when it has grown.
     pub generation: u64,
     surfaces: HashMap<String, Surface>,
-    /// Placements that a program gave, by instance: the graph of the scene has no say in them.
-    pub placed: BTreeMap<usize, DAffine3>,
+    /// Placements that a program gave, by instance, each with the one before: the graph of the scene has no say in them.
+    placed: BTreeMap<usize, [DAffine3; 2]>,
     /// The pose that a program gave.
     pose: Option<DAffine3>,
     pub time: f64,
@@ -72,7 +72,7 @@ impl State {
     /// Sets everything to its state at `seconds`.
     pub fn at(&mut self, seconds: f64) {
         self.scene.set_time(seconds);
-        for (&instance, &placement) in &self.placed {
+        for (&instance, &[placement, _]) in &self.placed {
             self.scene.instances[instance].world_from_object = placement;
         }
     }
@@ -228,7 +228,7 @@ impl Scene {
     fn new(py: Python<'_>, folder: PathBuf, tables: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let empty = PyDict::new(py);
         let Written { text, surfaces } = Written::new(tables.unwrap_or(&empty))?;
-        let mut draft = Draft::of(&folder.join("Scene(...)"), text);
+        let mut draft = Draft::of(&folder.join("Scene()"), text);
         let mut kept = HashMap::new();
         for (name, surface, mesh) in surfaces {
             draft.give(&name, mesh);
@@ -392,9 +392,11 @@ impl Scene {
         }
         let mut state = self.lock(py);
         let instance = state.instance(mesh)?;
+        let now = state.scene.instances[instance].world_from_object;
+        let before = state.placed.remove(&instance).map_or(now, |[_, before]| before);
         match wanted {
-            Some(map) => _ = state.placed.insert(instance, map),
-            None => _ = state.placed.remove(&instance),
+            Some(map) => _ = state.placed.insert(instance, [map, before]),
+            None => state.scene.instances[instance].world_from_object = before,
         }
         let time = state.time;
         state.at(time);

@@ -100,9 +100,12 @@ def test_a_live_mesh_is_imaged_as_one_that_is_so_from_the_start(tracer):
         again = simulator.frame(want=["iq"])
     with insonify.Simulator(ball(bent, triangles, simulation=still), tracer=tracer) as simulator:
         wanted = simulator.frame(want=["iq"])
-    assert (rest.iq != shown.iq).any()
-    assert (back.iq == rest.iq).all() and (again.iq == shown.iq).all()
-    assert (shown.iq == wanted.iq).all()
+    # The device makes normals anew: they differ in the last digits.
+    peak = np.abs(rest.iq).max()
+    assert np.abs(rest.iq - shown.iq).max() > 0.1 * peak
+    assert np.abs(shown.iq - wanted.iq).max() < 1e-3 * peak
+    assert np.abs(back.iq - rest.iq).max() < 1e-3 * peak
+    assert (again.iq == shown.iq).all()
 
 
 def test_tissue_moves_with_a_live_mesh():
@@ -125,7 +128,7 @@ def test_vertices_that_do_not_fit_are_refused(scene):
     vertices, _ = sphere()
     with pytest.raises(ValueError, match="has 258 vertices, not 257"):
         scene.set_vertices("ball", vertices[:-1])
-    with pytest.raises(ValueError, match="nan"):
+    with pytest.raises(ValueError, match="NaN"):
         scene.set_vertices("ball", vertices * np.nan)
     with pytest.raises(KeyError):
         scene.set_vertices("bell", vertices)
@@ -176,9 +179,9 @@ def test_use_after_close(scene):
         ({"pose": np.eye(3)}, ValueError, "shape"),
         ({"pose": "here"}, TypeError, "real numbers"),
         ({"time": float("nan")}, ValueError, "no time"),
-        ({"seed": -1}, OverflowError, ""),
-        ({"seed": 2**32}, OverflowError, ""),
-        ({"number": 1.5}, TypeError, ""),
+        ({"seed": -1}, OverflowError, None),
+        ({"seed": 2**32}, OverflowError, None),
+        ({"number": 1.5}, TypeError, None),
         ({"want": ["iqq"]}, ValueError, '"iq", "envelope"'),
     ],
 )

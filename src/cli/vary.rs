@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 use clap::{Args, ValueEnum};
 use insonify::output;
 use insonify::output::sheet::{Sheet, Tile};
+use insonify::random::order;
 use insonify::scene::Scene;
 use insonify::sim::shaders::Library;
 use miette::{Context, IntoDiagnostic, Result, miette};
 
 use super::common::{self, Common};
-use super::order::order;
 use pictures::{Picture, Studio};
 use record::Record;
 

@@ -1,28 +1,135 @@
 //! Files that are written whole or not at all.
 
-use std::io::Write as _;
-use std::path::Path;
+use std::fs::File;
+use std::io::{Error, ErrorKind, Result, Write};
+use std::path::{Path, PathBuf};
 
-/// Writes `bytes` beside `path` (as `.NAME.` with the number of the process), then takes its place: no
-/// failure leaves half a file. A link stays one; permissions stay as they were.
+/// Most drafts of one file at a time: of processes of the same number, on machines that share a folder.
+const DRAFTS: u32 = 100;
+
+/// A file that is being written beside its place, as `.NAME.` with a number, and takes its place when it is
+/// finished: no failure leaves half a file. Dropped before, it is removed.
+pub struct Draft {
+    path: PathBuf,
+    beside: PathBuf,
+    /// None once the file has taken its place.
+    file: Option<File>,
+}
+
+impl Draft {
+    /// Begins the file that is to become `path`. A link stays one; permissions stay as they were.
+    ///
+    /// # Errors
+    /// Errors of the file system; `path` is then unchanged.
+    pub fn new(path: &Path) -> Result<Self> {
+        let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let mine = std::process::id();
+        let free = (mine..mine.saturating_add(DRAFTS)).find_map(|number| {
+            let beside = path.with_file_name(format!(".{name}.{number}"));
+            match File::create_new(&beside) {
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => None,
+                made => Some(made.map(|file| (beside, file))),
+            }
+        });
+        let all_taken = || Err(Error::from(ErrorKind::AlreadyExists));
+        let (beside, file) = free.unwrap_or_else(all_taken)?;
+        let draft = Self { path, beside, file: Some(file) };
+        if let Ok(before) = std::fs::metadata(&draft.path) {
+            draft.open().set_permissions(before.permissions())?;
+        }
+        Ok(draft)
+    }
+
+    fn open(&self) -> &File {
+        self.file.as_ref().expect("it is finished only once")
+    }
+
+    /// Puts what was written into its place, once it is on the disk.
+    ///
+    /// # Errors
+    /// Errors of the file system; the place is then unchanged.
+    pub fn finish(mut self) -> Result<()> {
+        self.open().sync_all()?;
+        std::fs::rename(&self.beside, &self.path)?;
+        self.file = None;
+        Ok(())
+    }
+}
+
+impl Write for Draft {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        self.open().write(bytes)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        self.open().flush()
+    }
+}
+
+impl Drop for Draft {
+    fn drop(&mut self) {
+        if self.file.is_some() {
+            // A partial file is of no use; the first error is the one to report.
+            let _ = std::fs::remove_file(&self.beside);
+        }
+    }
+}
+
+/// The file of which the file name `name` is a draft; none for other names.
+pub fn draft_of(name: &str) -> Option<&str> {
+    let (file, number) = name.strip_prefix('.')?.rsplit_once('.')?;
+    let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
+    (is_number && !file.is_empty()).then_some(file)
+}
+
+/// Writes `bytes` as the file `path`, by a [`Draft`].
 ///
 /// # Errors
 /// Errors of the file system; `path` is then unchanged.
-pub fn replace(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let path = path.canonicalize().unwrap_or_else(|_| path.to_owned());
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let beside = path.with_file_name(format!(".{name}.{}", std::process::id()));
-    let written = || {
-        let mut file = std::fs::File::create_new(&beside)?;
-        file.write_all(bytes)?;
-        if let Ok(before) = std::fs::metadata(&path) {
-            file.set_permissions(before.permissions())?;
+pub fn replace(path: &Path, bytes: &[u8]) -> Result<()> {
+    let mut draft = Draft::new(path)?;
+    draft.write_all(bytes)?;
+    draft.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_draft_takes_its_place_when_finished_and_leaves_nothing_when_dropped() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tar");
+        let names = || {
+            let all = std::fs::read_dir(folder.path()).unwrap();
+            let mut names: Vec<_> =
+                all.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+            names.sort();
+            names
+        };
+        replace(&path, b"before").unwrap();
+        let mut draft = Draft::new(&path).unwrap();
+        let mut other = Draft::new(&path).unwrap();
+        draft.write_all(b"after").unwrap();
+        other.write_all(b"lost").unwrap();
+        let drafts: Vec<_> =
+            names().iter().filter_map(|n| draft_of(n).map(str::to_owned)).collect();
+        assert_eq!(drafts, ["a.tar", "a.tar"]);
+        drop(other);
+        assert_eq!(std::fs::read(&path).unwrap(), b"before");
+        draft.finish().unwrap();
+        assert_eq!(
+            (names(), std::fs::read(&path).unwrap()),
+            (vec!["a.tar".to_owned()], b"after".to_vec())
+        );
+    }
+
+    #[test]
+    fn names_of_drafts_are_told_from_others() {
+        assert_eq!(draft_of(".train-000007.tar.4711"), Some("train-000007.tar"));
+        for name in ["a.png", ".hidden", ".a.png", ".5", ".a.png.4x", "a.1"] {
+            assert_eq!(draft_of(name), None, "{name}");
         }
-        file.sync_all()?;
-        std::fs::rename(&beside, &path)
-    };
-    written().inspect_err(|_| {
-        // A partial file is of no use; the first error is the one to report.
-        let _ = std::fs::remove_file(&beside);
-    })
+    }
 }

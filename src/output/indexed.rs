@@ -7,21 +7,34 @@ use super::files;
 /// The index of pixels that show nothing; transparent.
 pub const NOTHING: u8 = 255;
 
-/// Writes `indices`, row by row, as PNG with a colour for each of them (sRGB; of those without one black), and a `text`
-/// under the keyword `insonify`; whole or not at all.
+/// Writes [`bytes`] as the file `path`, whole or not at all.
 ///
 /// # Panics
-/// When there is not one index per pixel, or there are more colours than indices below [`NOTHING`].
+/// Those of [`bytes`].
 ///
 /// # Errors
 /// Errors of the file system.
 pub fn write(
     path: &Path,
-    [width, height]: [u32; 2],
+    size: [u32; 2],
     indices: &[u8],
     colours: &[[u8; 3]],
     text: &str,
 ) -> std::io::Result<()> {
+    files::replace(path, &bytes(size, indices, colours, text))
+}
+
+/// A PNG file of `indices`, row by row, with a colour for each of them (sRGB; of those without one black), and a `text`
+/// under the keyword `insonify`; `size` is width and height.
+///
+/// # Panics
+/// When there is not one index per pixel, or there are more colours than indices below [`NOTHING`].
+pub fn bytes(
+    [width, height]: [u32; 2],
+    indices: &[u8],
+    colours: &[[u8; 3]],
+    text: &str,
+) -> Vec<u8> {
     assert!(
         colours.len() <= usize::from(NOTHING),
         "an index for each of {} colours",
@@ -44,7 +57,7 @@ pub fn write(
         writer.finish()
     });
     written.expect("one byte per pixel, into memory");
-    files::replace(path, &out)
+    out
 }
 
 #[cfg(test)]

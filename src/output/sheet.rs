@@ -45,6 +45,8 @@ pub struct Page {
     pub image: GrayImage,
     /// Left upper corner of every tile, px.
     pub places: Vec<[u32; 2]>,
+    /// Height of a line of text, px.
+    pub line: u32,
 }
 
 /// Letters of one size.
@@ -144,7 +146,7 @@ impl Sheet<'_> {
                 }
             }
         }
-        Page { image: page, places }
+        Page { image: page, places, line }
     }
 
     /// Letters with which every caption fits below its image, and every text into its tile.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::vary::Variant;
 use super::{Origins, Scene, Tissue, Warning};
 
+mod again;
 mod anatomy;
 mod contact;
 mod document;
@@ -20,6 +21,7 @@ mod playing;
 mod probe;
 mod save;
 mod schema;
+mod setting;
 mod settings;
 mod shelf;
 mod study;
@@ -29,20 +31,23 @@ mod tracker;
 mod trajectory;
 mod vary;
 
+pub use again::SceneFile;
 pub use document::quoted;
+pub(crate) use document::{Document, Source};
 pub use draft::{Draft, Known, known};
 pub use error::SceneError;
 pub use paper::paper;
 pub use placing::SCALES;
+pub use probe::stated as stated_pose;
 pub use save::{Entry, Note, save, save_with};
 pub use schema::reference;
+pub(crate) use setting::setting;
 pub use settings::load_settings;
 pub use study::{Plan, Question, Scenario, Slice};
 pub use table::{Key, changes, differing, entries};
 pub use trajectory::load_trajectory;
 
 use crate::settings::Settings;
-use document::{Document, Source};
 use schema::Title;
 
 /// Largest width of a picture, pixels: the limit of image files and messages.

@@ -6,9 +6,11 @@
 //! elements: the echo that it hears has the share of those that send and are coupled, times the share of
 //! those that receive from its depth and are, in amplitude.
 
+mod hand;
 mod skin;
 
 use crate::scene::Scene;
+pub use hand::{Body, Hand, PRESS, Spot};
 pub use skin::{Skin, Skins};
 
 /// Points of the face in a row, at least; a whole number of them belongs to each scanline.

@@ -62,10 +62,10 @@ pub struct World {
     top: TopLevel,
     rows: Vec<layout::Instance>,
     mask: RayMask,
-    /// For each instance the number of shapes that a program had set when they were last taken.
-    revisions: Vec<u64>,
     /// Rows and fields of the last frame; none where nothing has asked for them.
     past: Option<Past>,
+    /// For each instance the number of shapes that a program had set when they were last taken.
+    revisions: Vec<u64>,
     /// The keyframes for which the memory was made; present shapes do not matter.
     made_for: Vec<Keyframes>,
     kernels: Arc<ShapeKernels>,
@@ -185,8 +185,8 @@ impl World {
             apart,
             rows: arrays.instances,
             mask: RayMask::default(),
-            revisions: scene.instances.iter().map(|i| i.keyframes.revision).collect(),
             past: None,
+            revisions: scene.instances.iter().map(|i| i.keyframes.revision).collect(),
             made_for: scene.instances.iter().map(|i| i.keyframes.clone()).collect(),
             kernels: Arc::clone(kernels),
         };

@@ -6,11 +6,11 @@ use egui::{Color32, CursorIcon, Painter, PointerButton, Pos2, Response, Shape, S
 use glam::{DAffine3, DVec3};
 
 use super::model::hold::Seen;
-use super::model::skin::Spot;
 use super::model::{Axis, Camera, Model, Source};
 use super::style;
 use super::view3d::Place;
 use crate::probe::Probe;
+use crate::sim::contact::Spot;
 use crate::sim::view3d::{HANDLE, HEAD};
 
 /// Distance within which the pointer means the probe, points.

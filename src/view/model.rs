@@ -19,7 +19,6 @@ mod saving;
 mod settings;
 pub mod sheet;
 pub mod sidecar;
-pub mod skin;
 pub mod trajectory;
 mod trajectory_state;
 mod view3d;

@@ -6,6 +6,11 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 
+#[path = "../common/python.rs"]
+mod common;
+
+use common::with;
+
 use crate::shared_data::skip::{Lacking, skip};
 
 /// A Python that has pydicom, in a folder of the build; none where it cannot be had. Made once, whoever asks first.
@@ -20,28 +25,15 @@ pub fn python() -> Option<PathBuf> {
 }
 
 fn make() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("pydicom");
-    let python = folder.join("bin/python");
-    let runs = |command: &mut Command| command.output().is_ok_and(|out| out.status.success());
-    let ready = || runs(Command::new(&python).args(["-c", "import numpy, pydicom"]));
-    if !ready() {
-        let made = runs(Command::new("python3").args(["-m", "venv"]).arg(&folder));
-        let install = ["-m", "pip", "install", "--quiet", "pydicom==3.0.1", "numpy"];
-        if !(made && runs(Command::new(&python).args(install)) && ready()) {
-            return None;
-        }
-    }
-    Some(python)
+    with("pydicom", "import numpy, pydicom", &["pydicom==3.0.1", "numpy"])
 }
 
 /// The JSON that a script prints.
 pub fn run(python: &Path, script: &str, args: &[&str]) -> Value {
-    let out = Command::new(python).args(["-c", script]).args(args).output();
-    let out = out.expect("Python starts");
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let (value, said) = common::run(python, script, args);
     // Warnings of pydicom are faults of ours.
-    assert_eq!(String::from_utf8_lossy(&out.stderr), "");
-    serde_json::from_slice(&out.stdout).expect("JSON")
+    assert_eq!(said, "");
+    value
 }
 
 /// The errors that dicom3tools' validator finds in a file of a kind; none where there is no validator.

@@ -1,13 +1,12 @@
 //! The cases of a study: their images and numbers.
 
+use insonify::random::order;
 use insonify::scene::file::Plan;
 use insonify::scene::vary::Variant;
 use insonify::scene::{Scene, SceneError};
 use insonify::settings::{Surroundings, Words};
 use insonify::study::key::{Row, UNPERTURBED};
 use miette::Result;
-
-use super::super::order::order;
 
 /// A scenario's loaded scene with its variants.
 pub struct Loaded {

@@ -123,12 +123,9 @@ impl Folder {
             };
             for entry in all.flatten() {
                 let name = entry.file_name().to_string_lossy().into_owned();
-                // The names that `files::replace` uses: .NAME. and the number of a process.
-                let number = name.rsplit('.').next().unwrap_or_default();
-                let is_number = !number.is_empty() && number.bytes().all(|b| b.is_ascii_digit());
-                let kinds = [".png.", ".json.", ".csv.", ".html."];
-                let is_ours = kinds.iter().any(|kind| name.contains(kind));
-                if name.starts_with('.') && is_number && is_ours {
+                let kinds = [".png", ".json", ".csv", ".html"];
+                let file = files::draft_of(&name);
+                if file.is_some_and(|file| kinds.iter().any(|kind| file.ends_with(kind))) {
                     std::fs::remove_file(entry.path())?;
                 }
             }

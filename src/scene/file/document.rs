@@ -20,11 +20,11 @@ use crate::settings::{Facts, Value, suggest};
 const MAX_TEXT: u64 = 4 << 20;
 
 /// Tables of which a file may have several.
-const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
+pub(super) const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
 
 /// The text of a scene file and of the overrides.
 #[derive(Clone)]
-pub(super) struct Source {
+pub(crate) struct Source {
     pub path: PathBuf,
     text: String,
     overrides: Vec<Override>,
@@ -45,7 +45,7 @@ struct Override {
 }
 
 /// The parsed file with the overrides in place.
-pub(super) struct Document<'s> {
+pub(crate) struct Document<'s> {
     pub source: &'s Source,
     root: DeTable<'s>,
 }
@@ -334,11 +334,11 @@ fn find<'a, 's>(root: &'a DeTable<'s>, path: &[&str]) -> Option<&'a Spanned<DeVa
 }
 
 /// The fault of a setting, and the remedy.
-pub(super) type Misfit = (String, String);
+pub(crate) type Misfit = (String, String);
 
 /// The parts of a path as the command line and the program itself write it. Names with dots stand in quotes, as in
 /// TOML; others need none, and may hold what a bare key of TOML may not.
-pub(super) fn segments(path: &str) -> Vec<String> {
+pub(crate) fn segments(path: &str) -> Vec<String> {
     match Key::parse(path) {
         Ok(keys) => keys.iter().map(|key| key.get().to_owned()).collect(),
         Err(_) => path.split('.').map(str::to_owned).collect(),

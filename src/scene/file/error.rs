@@ -33,7 +33,7 @@ pub struct SceneError {
 
 impl SceneError {
     /// An error without a place inside the file.
-    pub(super) fn file(file: &Path, message: String, remedy: &str) -> Self {
+    pub(crate) fn file(file: &Path, message: String, remedy: &str) -> Self {
         Self {
             message,
             remedy: Some(remedy.to_owned()),

@@ -122,3 +122,22 @@ pub(super) fn look(
     }
     Ok(DAffine3::from_mat3_translation(DMat3::from_cols(x, z.cross(x), z), position))
 }
+
+/// The pose nearest to `exact` on a grid of 0.1 um, and the entry of a scene file, path and value without blanks, that
+/// says it to the last bit.
+pub fn stated(exact: DAffine3) -> (DAffine3, (String, String)) {
+    // Adding zero turns -0 into 0.
+    let rounded = |v: DVec3, unit: f64| (v * unit).round() / unit + DVec3::ZERO;
+    let position = rounded(exact.translation, 1e4);
+    let direction = rounded(exact.matrix3.z_axis, 1e7);
+    let lateral = rounded(exact.matrix3.x_axis, 1e7);
+    let pose = look(position, direction, lateral).expect("the axes of a frame");
+    let list = |v: DVec3| format!("[{},{},{}]", v.x, v.y, v.z);
+    let value = format!(
+        "{{position={},direction={},lateral={}}}",
+        list(position),
+        list(direction),
+        list(lateral)
+    );
+    (pose, ("probe.pose".to_owned(), value))
+}

@@ -3,13 +3,13 @@
 
 use std::path::{Path, PathBuf};
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 use serde::Deserialize;
 
 use super::document::Source;
 use super::error::SceneError;
 use super::placing::{Placed, placement};
-use super::probe::{self, look, pose};
+use super::probe::{self, pose};
 use super::table::{Key, Keys, Table, defaults};
 use crate::issue;
 use crate::scene::Scene;
@@ -103,20 +103,7 @@ impl Slice {
             Pose::Absolute(pose) => pose,
             Pose::Relative(pose) => scene.world_from_probe * pose,
         };
-        // Adding zero turns -0 into 0.
-        let rounded = |v: DVec3, unit: f64| (v * unit).round() / unit + DVec3::ZERO;
-        let position = rounded(exact.translation, 1e4);
-        let direction = rounded(exact.matrix3.z_axis, 1e7);
-        let lateral = rounded(exact.matrix3.x_axis, 1e7);
-        let pose = look(position, direction, lateral).expect("the axes of a frame");
-        let list = |v: DVec3| format!("[{},{},{}]", v.x, v.y, v.z);
-        let value = format!(
-            "{{position={},direction={},lateral={}}}",
-            list(position),
-            list(direction),
-            list(lateral)
-        );
-        (pose, ("probe.pose".to_owned(), value))
+        probe::stated(exact)
     }
 }
 

@@ -4,11 +4,10 @@ use std::time::Instant;
 
 use glam::{DAffine3, DVec3};
 
-use super::skin::{Body, Hand, PRESS, Spot};
 use super::{Axis, Model, Ray, Source, moved};
 use crate::probe::Probe;
 use crate::scene::Scene;
-use crate::sim::contact::Skin;
+use crate::sim::contact::{Body, Hand, PRESS, Skin, Spot};
 
 /// Least and greatest depth to which the probe is pressed in, mm; below 0 it is held above the skin.
 pub const PRESSES: [f64; 2] = [-10.0, 20.0];
@@ -113,12 +112,12 @@ impl Model {
         let (skin, _) = self.skin(now)?;
         let hand = Hand::new(&skin, &self.settings.probe);
         match seen {
-            Seen::Whole => hand.pick(ray),
+            Seen::Whole => hand.pick(ray.origin, ray.direction),
             Seen::BehindPlane => {
                 let origin = ray.origin + across(&pose, ray)? * ray.direction;
                 // There is no skin on the cut through the body.
                 skin.gap(origin, ray.direction).filter(|gap| *gap > 0.0)?;
-                hand.pick(&Ray { origin, ..*ray })
+                hand.pick(origin, ray.direction)
             }
         }
     }

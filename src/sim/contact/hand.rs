@@ -1,11 +1,10 @@
-//! The probe on the skin: the place that a ray of the 3D view meets, and the pose that slides there.
+//! The probe on the skin: the place that a ray meets, and the pose that slides there.
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::Ray;
+use super::{Skin, Skins};
 use crate::probe::Probe;
 use crate::scene::{Mesh, Scene};
-use crate::sim::contact::{Skin, Skins};
 
 /// Depth to which a probe put on the skin is pressed in, mm.
 pub const PRESS: f64 = 1.5;
@@ -84,9 +83,9 @@ impl<'s> Hand<'s> {
         Self { skin, probe }
     }
 
-    /// The place where a ray meets the skin.
-    pub fn pick(&self, ray: &Ray) -> Option<Spot> {
-        let (point, normal) = self.skin.hit(ray.origin, ray.direction)?;
+    /// The place where a ray (world, mm; `direction` a unit vector) meets the skin.
+    pub fn pick(&self, origin: DVec3, direction: DVec3) -> Option<Spot> {
+        let (point, normal) = self.skin.hit(origin, direction)?;
         Some(self.spot(point, normal))
     }
 

@@ -3,7 +3,6 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 
-use super::super::Ray;
 use super::{Body, Hand, PRESS, Spot};
 use crate::probe::{Kind, Probe};
 use crate::scene::Scene;
@@ -33,8 +32,7 @@ fn angle(a: &DAffine3, b: &DAffine3) -> f64 {
 
 /// The place straight below `from` (world, mm), seen from far outside.
 fn seen(hand: &Hand<'_>, from: DVec3) -> Spot {
-    let ray = Ray { origin: from, direction: -from.normalize() };
-    hand.pick(&ray).unwrap()
+    hand.pick(from, -from.normalize()).unwrap()
 }
 
 #[test]
@@ -179,8 +177,7 @@ fn rays_beside_the_body_pick_nothing_and_the_far_side_is_reached_without_a_spin(
     let skin = skin("sphere = { radius = 30, subdivisions = 5 }");
     let probe = Probe { kind: Kind::Linear { width: 20.0 }, ..Probe::linear() };
     let hand = Hand::new(&skin, &probe);
-    let miss = Ray { origin: DVec3::new(40.0, 0.0, 100.0), direction: -DVec3::Z };
-    assert_eq!(hand.pick(&miss), None);
+    assert_eq!(hand.pick(DVec3::new(40.0, 0.0, 100.0), -DVec3::Z), None);
     let pose = above(30.0);
     let from = hand.held(&pose);
     let to = seen(&hand, -DVec3::Z * 100.0);

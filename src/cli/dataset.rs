@@ -1,0 +1,197 @@
+//! `insonify dataset`: labelled samples by a plan, shard by shard.
+
+use std::path::PathBuf;
+use std::time::Instant;
+
+use clap::Args;
+use miette::{IntoDiagnostic, Result, miette};
+use serde_json::json;
+
+use super::common::{self, Progress, TracerChoice};
+use insonify::dataset::{DatasetError, Gallery, Made, Part, Plan, Store, Studio, Told};
+use insonify::gpu::{Device, DeviceOptions, cache_folder};
+use insonify::output;
+use insonify::sim::Tracer;
+
+/// Arguments of `insonify dataset`.
+#[derive(Debug, Args)]
+pub struct Dataset {
+    /// The plan (.toml): scenes, poses, ranges of settings, counts, splits and formats.
+    plan: PathBuf,
+    /// Folder of the data set. Shards may share it.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// Makes only shard I of N, counted from 0: the same bytes as in the whole.
+    #[arg(long, value_name = "I/N", value_parser = shard, default_value = "0/1")]
+    shard: [u32; 2],
+    /// Goes on with what a run that was stopped left of this shard; the result is the same.
+    #[arg(long)]
+    resume: bool,
+    /// Checks the plan and says what it makes, and makes nothing.
+    #[arg(long)]
+    check: bool,
+    /// Tracer.
+    #[arg(long, value_enum, default_value = "auto")]
+    tracer: TracerChoice,
+    /// Vulkan device: part of its name, or its index in `insonify info`.
+    #[arg(long)]
+    device: Option<String>,
+    /// Runs with Vulkan's validation layers and fails on any message.
+    #[arg(long)]
+    validate: bool,
+}
+
+fn shard(text: &str) -> Result<[u32; 2], String> {
+    let parts = text.split_once('/').map(|(i, n)| [i, n].map(|part| part.trim().parse::<u32>()));
+    match parts {
+        Some([Ok(index), Ok(count)]) if index < count => Ok([index, count]),
+        Some([Ok(_), Ok(count)]) if count > 0 => {
+            Err(format!("shards are counted from 0: the last is {}/{count}", count - 1))
+        }
+        _ => Err("write it like 7/10".to_owned()),
+    }
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Every mistake of the user and every error of the device, reported once.
+pub fn run(args: &Dataset) -> Result<()> {
+    let (plan, warnings) = Plan::load(&args.plan)?;
+    common::notes(&warnings);
+    let [index, count] = args.shard;
+    let parts = plan.shard(index, count);
+    plan.check(parts.iter().flat_map(|part| part.samples.clone()))?;
+    let samples: u32 = parts.iter().map(|part| part.samples.len() as u32).sum();
+    if args.check {
+        said(&plan, &parts, samples);
+        return Ok(());
+    }
+    if parts.is_empty() {
+        let all = plan.parts().len();
+        output::note(format!(
+            "the plan has {all} parts: shard {index} of {count} has none of them"
+        ));
+        return Ok(());
+    }
+    let device = Device::new(&DeviceOptions {
+        without_acceleration_structures: args.tracer == TracerChoice::Bvh,
+        selector: args.device.clone(),
+        validate: args.validate,
+        kept_in: cache_folder(),
+        ..DeviceOptions::default()
+    })
+    .into_diagnostic()?;
+    let wanted = match args.tracer {
+        TracerChoice::Auto => None,
+        TracerChoice::RayQuery if !device.supports_ray_query() => {
+            return Err(miette!(
+                help = "use --tracer bvh, which runs everywhere, or another --device",
+                "{} has no ray query",
+                device.name()
+            ));
+        }
+        TracerChoice::RayQuery => Some(Tracer::RayQuery),
+        TracerChoice::Bvh => Some(Tracer::Bvh),
+    };
+    let store = Store::new(&plan, &args.output);
+    let about = json!({
+        "name": device.name(), "driver": device.driver(), "tracer": wanted.map(|tracer| tracer.to_string()),
+    });
+    store.begin(&parts, &about, args.resume)?;
+    let mut studio = Studio::new(&plan, &device, wanted);
+    let mut gallery = Gallery::new(&plan, &parts);
+    let mut log = Log::new(samples);
+    store.fill(&mut studio, &parts, &mut |told| {
+        if let Told::Made(made) = &told {
+            gallery.take(made);
+        }
+        log.told(&store, told)
+    })?;
+    log.progress.finish();
+    let sheet = match count {
+        1 => "sheet.png".to_owned(),
+        _ => format!("sheet-{index}-of-{count}.png"),
+    };
+    let page = gallery.draw(&store, &mut studio)?;
+    let mut png = std::io::Cursor::new(Vec::new());
+    page.write_to(&mut png, image::ImageFormat::Png).into_diagnostic()?;
+    let sheet = store.path(&sheet);
+    store.write(&sheet, png.get_ref())?;
+    output::line(format!(
+        "{}: {} samples made, {} were there; {}",
+        args.output.display(),
+        log.made,
+        log.kept,
+        sheet.display()
+    ));
+    let messages = device.validation_messages();
+    match messages.first() {
+        Some(first) if args.validate => {
+            Err(miette!("{} validation messages, the first: {first}", messages.len()))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Says what a plan makes.
+fn said(plan: &Plan, parts: &[Part], samples: u32) {
+    for split in &plan.splits {
+        output::line(format!("{}: {} samples", split.name, split.samples.len()));
+    }
+    output::line(format!("{} classes: {}", plan.classes.len(), plan.classes.join(", ")));
+    output::line(format!(
+        "this shard: {} parts of {}, {samples} samples",
+        parts.len(),
+        plan.parts().len()
+    ));
+}
+
+/// Progress, and a line for each part.
+struct Log {
+    progress: Progress,
+    begun: Instant,
+    made: u32,
+    kept: u32,
+    /// Kinds of losses that were told.
+    lost: Vec<String>,
+}
+
+impl Log {
+    fn new(samples: u32) -> Self {
+        let progress = Progress::new(samples, "samples");
+        Self { progress, begun: Instant::now(), made: 0, kept: 0, lost: Vec::new() }
+    }
+
+    fn told(&mut self, store: &Store<'_>, told: Told<'_>) -> Result<(), DatasetError> {
+        match told {
+            Told::Made(made) => {
+                self.made += 1;
+                self.losses(store, made);
+            }
+            Told::Kept => self.kept += 1,
+            Told::Part(part) => {
+                let hours = self.begun.elapsed().as_secs_f64() / 3600.0;
+                let rate = f64::from(self.made) / hours.max(1e-9);
+                let count = part.samples.len();
+                output::line(format!(
+                    "{}: {count} samples, {rate:.0} an hour",
+                    store.part_name(part)
+                ));
+            }
+        }
+        self.progress.done(self.made + self.kept);
+        Ok(())
+    }
+
+    /// Tells of each kind of loss once.
+    fn losses(&mut self, store: &Store<'_>, made: &Made) {
+        for lost in common::lost(&made.counters) {
+            let kind = lost.trim_start_matches(|c: char| c.is_ascii_digit()).to_owned();
+            if !self.lost.contains(&kind) {
+                output::note(format!("warning: sample {}: {lost}", store.name(made.sample.number)));
+                self.lost.push(kind);
+            }
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! A scene file from whose text the scene is made again with other entries.
+
+use std::path::Path;
+
+use super::document::{Source, segments};
+use super::error::SceneError;
+use super::tissues::Tissues;
+use super::{presentable, probe, settings};
+use crate::scene::{Scene, Warning};
+
+/// Tables whose entries [`SceneFile::put`] serves.
+const LIGHT: [&str; 4] = ["probe", "simulation", "imaging", "tissues"];
+
+/// The text of a scene file.
+pub struct SceneFile {
+    source: Source,
+}
+
+impl SceneFile {
+    /// Reads the file.
+    ///
+    /// # Errors
+    /// A file that cannot be read.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        Ok(Self { source: Source::read(path, &[])? })
+    }
+
+    /// The text.
+    pub fn text(&self) -> &str {
+        self.source.text()
+    }
+
+    /// The scene with `entries` put in, like [`Scene::load`]: reads the files that it names.
+    ///
+    /// # Errors
+    /// Those of [`Scene::load`].
+    pub fn load(&self, entries: &[(String, String)]) -> Result<(Scene, Vec<Warning>), SceneError> {
+        let source = self.source.with(entries);
+        Scene::of_source(&source, false).map(|(scene, _, warnings)| (scene, warnings))
+    }
+
+    /// True if a change of the entry at `path` needs no file that the scene names, so that [`Self::put`] makes it.
+    pub fn is_light(path: &str) -> bool {
+        segments(path).first().is_some_and(|table| LIGHT.contains(&table.as_str()))
+    }
+
+    /// Gives `scene`, which was loaded from this file, the settings, tissues and pose of the probe that the file gives
+    /// with `entries`, whatever they are now.
+    ///
+    /// # Errors
+    /// The first entry that does not fit; `scene` is then unchanged.
+    pub fn put(&self, entries: &[(String, String)], scene: &mut Scene) -> Result<(), SceneError> {
+        let source = self.source.with(entries);
+        let document = source.document()?;
+        let file = document.parse()?;
+        let mut tissues = Tissues::new(&document, &file.tissues)?;
+        for tissue in &scene.tissues {
+            tissues.index("tissues", &tissue.name)?;
+        }
+        let settings = settings::settings(&document, &file, None)?;
+        let pose = probe::pose(&document, "probe", &file.probe.stated)?;
+        presentable(&document, &settings)?;
+        scene.tissues = tissues.used();
+        scene.settings = settings;
+        scene.world_from_probe = pose;
+        Ok(())
+    }
+
+    /// Fails at the first of `entries` that the file cannot have or whose value is out of its range, as far as the
+    /// text alone says it.
+    ///
+    /// # Errors
+    /// The fault of the entry.
+    pub fn check(&self, entries: &[(String, String)]) -> Result<(), SceneError> {
+        let source = self.source.with(entries);
+        source.document()?.parse().map(drop)
+    }
+}

@@ -1,0 +1,27 @@
+#!/usr/bin/env bash
+# Tests of the Python package: makes a virtual environment in target/python with what they need (from PyPI), builds
+# the module with the features of the other tests, and runs pytest. Arguments go to pytest.
+#   ./tools/python.sh -k labels
+# FEATURES  features of the build, as of the other tests [default: anatomy]
+set -eu
+cd "$(dirname "$0")/.."
+python=target/python/bin/python
+packages=(numpy==2.4.6 pytest==9.2.0 mypy==2.4.1)
+wanted=target/python/packages.txt
+if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
+  made() {
+    python3 -m venv target/python && "$python" -m pip install --quiet --disable-pip-version-check "${packages[@]}"
+  }
+  if ! made; then
+    echo "tools/python.sh: no virtual environment with ${packages[*]}: is there a network, and Debian's python3-venv?" >&2
+    [ -z "${INSONIFY_NO_SKIP:-}" ] || exit 1
+    echo "skipped: tests of the Python package"
+    exit 0
+  fi
+  echo "${packages[*]}" >"$wanted"
+fi
+# One set of features with the other tests: only the module itself is built anew.
+cargo build --features "${FEATURES:-anatomy}"
+cp target/debug/lib_insonify.so python/insonify/_insonify.abi3.so
+"$python" -m mypy --no-error-summary --cache-dir target/mypy python/insonify
+PYTHONPATH=python "$python" -m pytest -q -p no:cacheprovider python/tests "$@"
