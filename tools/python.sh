@@ -14,7 +14,8 @@ if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
   }
   if ! made; then
     echo "tools/python.sh: no virtual environment with ${packages[*]}: is there a network, and Debian's python3-venv?" >&2
-    [ -z "${INSONIFY_NO_SKIP:-}" ] || exit 1
+    # From the network, like data.
+    [ "${INSONIFY_NO_SKIP:-}" != all ] || exit 1
     echo "skipped: tests of the Python package"
     exit 0
   fi

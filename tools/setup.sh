@@ -54,6 +54,7 @@ if [ "$mode" != run ]; then
   command -v c++ >/dev/null || want+=(g++)
   command -v make >/dev/null || want+=(make)
   command -v python3 >/dev/null || want+=(python3)
+  python3 -c 'import ensurepip' 2>/dev/null || want+=(python3-venv)
 fi
 driver=
 has_driver || driver=mesa-vulkan-drivers

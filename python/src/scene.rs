@@ -1,13 +1,14 @@
 //! Scenes of Python: read from a file or made of dictionaries and arrays, changed key by key.
 
 use std::collections::{BTreeMap, HashMap};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use glam::DAffine3;
-use insonify::scene::file::{self, Draft, quoted};
+use insonify::scene::file::{self, SceneFile, quoted};
 use insonify::scene::mesh::Surface;
 use insonify::scene::{self, Warning};
+use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::{PyKeyError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
@@ -18,7 +19,9 @@ use crate::toml;
 
 /// A scene with everything that a program has changed in it.
 pub struct State {
-    draft: Draft,
+    file: SceneFile,
+    /// What was put in place of the file's entries.
+    entries: Vec<(String, String)>,
     pub scene: scene::Scene,
     warnings: Vec<String>,
     /// How many times the anatomy was read; simulators upload it again when it has grown.
@@ -32,10 +35,15 @@ pub struct State {
 }
 
 impl State {
-    fn new(draft: Draft, surfaces: HashMap<String, Surface>) -> Result<Self, file::SceneError> {
-        let (scene, warnings) = draft.scene()?;
+    fn new(
+        file: SceneFile,
+        entries: Vec<(String, String)>,
+        surfaces: HashMap<String, Surface>,
+    ) -> Result<Self, file::SceneError> {
+        let (scene, warnings) = file.load(&entries)?;
         Ok(Self {
-            draft,
+            file,
+            entries,
             scene,
             warnings: texts(&warnings),
             generation: 0,
@@ -48,23 +56,24 @@ impl State {
 
     /// Puts a value at a path; none takes back what was put there.
     fn set(&mut self, path: &str, value: Option<String>) -> Result<(), file::SceneError> {
-        let mut draft = self.draft.clone();
-        draft.set(path, value)?;
-        if Draft::is_setting(path) {
-            self.scene.settings = draft.settings()?;
+        let mut entries = self.entries.clone();
+        entries.retain(|(put, _)| put != path);
+        entries.extend(value.map(|value| (path.to_owned(), value)));
+        if SceneFile::is_light(path) {
+            self.file.put(&entries, &mut self.scene)?;
         } else {
-            let (scene, warnings) = draft.scene()?;
+            let (scene, warnings) = self.file.load(&entries)?;
             self.scene = scene;
             self.warnings = texts(&warnings);
             self.generation += 1;
-            if path.starts_with("probe.pose") {
-                self.pose = None;
-            }
-            if let Some(pose) = self.pose {
-                self.scene.world_from_probe = pose;
-            }
         }
-        self.draft = draft;
+        self.entries = entries;
+        if path.starts_with("probe.pose") {
+            self.pose = None;
+        }
+        if let Some(pose) = self.pose {
+            self.scene.world_from_probe = pose;
+        }
         self.at(self.time);
         Ok(())
     }
@@ -79,7 +88,7 @@ impl State {
 
     /// Paths of the keys that were set by hand.
     pub fn by_hand(&self) -> impl Iterator<Item = &str> {
-        self.draft.overridden()
+        self.entries.iter().map(|(path, _)| path.as_str())
     }
 
     fn reshape(&mut self, name: &str, positions: &[[f32; 3]]) -> PyResult<()> {
@@ -96,7 +105,7 @@ impl State {
             )));
         }
         let shape = surface.shape(positions);
-        self.draft.give(name, shape.clone());
+        self.file.give(name, shape.clone());
         self.scene.reshape(instance, shape);
         Ok(())
     }
@@ -228,13 +237,13 @@ impl Scene {
     fn new(py: Python<'_>, folder: PathBuf, tables: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let empty = PyDict::new(py);
         let Written { text, surfaces } = Written::new(tables.unwrap_or(&empty))?;
-        let mut draft = Draft::of(&folder.join("Scene()"), text);
+        let mut file = SceneFile::of(&folder.join("Scene()"), text);
         let mut kept = HashMap::new();
         for (name, surface, mesh) in surfaces {
-            draft.give(&name, mesh);
+            file.give(&name, mesh);
             kept.insert(name, surface);
         }
-        Self::made(py.detach(|| State::new(draft, kept)))
+        Self::made(py.detach(|| State::new(file, Vec::new(), kept)))
     }
 
     #[staticmethod]
@@ -245,29 +254,18 @@ impl Scene {
         overrides: Option<&Bound<'_, PyDict>>,
     ) -> PyResult<Self> {
         let overrides = overrides.map_or(Ok(Vec::new()), toml::entries)?;
-        let load = |path: &Path| {
-            let mut draft = Draft::read(path)?;
-            for (path, value) in overrides {
-                draft.set(&path, Some(value))?;
-            }
-            State::new(draft, HashMap::new())
-        };
-        Self::made(py.detach(|| load(&path)))
+        let load = || State::new(SceneFile::read(&path)?, overrides, HashMap::new());
+        Self::made(py.detach(load))
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyAny>> {
+        let facts = file::facts(key).map_err(PyKeyError::new_err)?;
         let state = self.lock(py);
-        let known = file::known(&state.scene, key);
-        if let Some(file::Known { facts, value: Some(value) }) = &known {
-            return toml::object(py, value, facts.form);
+        if let Some(value) = file::value(&state.scene, key) {
+            return toml::object(py, &value, facts.form);
         }
-        match state.draft.stated(key).map_err(|e| mistaken(&e))? {
-            Some(text) => Ok(text.trim_matches('"').into_pyobject(py)?.into_any()),
-            None if known.is_some() => Ok(py.None().into_bound(py)),
-            None => Err(PyKeyError::new_err(format!(
-                "scene files have no key `{key}`; docs/scenes.md lists all"
-            ))),
-        }
+        let stated = state.file.stated(&state.entries, key).map_err(|e| mistaken(&e))?;
+        stated.map(|text| text.trim_matches('"').to_owned()).into_bound_py_any(py)
     }
 
     fn __setitem__(&self, py: Python<'_>, key: &str, value: &Bound<'_, PyAny>) -> PyResult<()> {
@@ -278,11 +276,7 @@ impl Scene {
 
     /// The facts about a key: unit, range, default, meaning.
     fn describe<'py>(&self, py: Python<'py>, key: &str) -> PyResult<Bound<'py, PyDict>> {
-        let state = self.lock(py);
-        let known = file::known(&state.scene, key);
-        let known =
-            known.ok_or_else(|| PyKeyError::new_err(format!("scene files have no key `{key}`")))?;
-        let facts = known.facts;
+        let facts = file::facts(key).map_err(PyKeyError::new_err)?;
         let out = PyDict::new(py);
         out.set_item("unit", facts.unit())?;
         out.set_item("range", facts.range)?;

@@ -1,12 +1,15 @@
 //! A scene file from whose text the scene is made again with other entries.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use super::document::{Source, segments};
 use super::error::SceneError;
+use super::shelf::MeshKeys;
+use super::table::Table;
 use super::tissues::Tissues;
-use super::{presentable, probe, settings};
-use crate::scene::{Scene, Warning};
+use super::{anatomy, presentable, probe, settings};
+use crate::scene::{Mesh, Origin, Scene, Warning};
 
 /// Tables whose entries [`SceneFile::put`] serves.
 const LIGHT: [&str; 4] = ["probe", "simulation", "imaging", "tissues"];
@@ -23,6 +26,28 @@ impl SceneFile {
     /// A file that cannot be read.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
         Ok(Self { source: Source::read(path, &[])? })
+    }
+
+    /// A file of this text that need not exist. Messages call it `path`, and what it names lies in the folder of that.
+    pub fn of(path: &Path, text: String) -> Self {
+        Self { source: Source::of(path, text) }
+    }
+
+    /// The shape of the mesh that the text calls `name`, whose table then says no `file`.
+    pub fn give(&mut self, name: &str, mesh: Mesh) {
+        self.source.given.insert(name.to_owned(), Arc::new(mesh));
+    }
+
+    /// The value that text or entries state at a path, as TOML writes it; none where they state none.
+    ///
+    /// # Errors
+    /// A text that is no TOML, an entry that does not fit into it.
+    pub fn stated(
+        &self,
+        entries: &[(String, String)],
+        path: &str,
+    ) -> Result<Option<String>, SceneError> {
+        Ok(self.source.with(entries).document()?.stated(path))
     }
 
     /// The text.
@@ -60,6 +85,16 @@ impl SceneFile {
         let settings = settings::settings(&document, &file, None)?;
         let pose = probe::pose(&document, "probe", &file.probe.stated)?;
         presentable(&document, &settings)?;
+        let mut surfaces = Vec::new();
+        for (instance, Origin { mesh, .. }) in scene.instances.iter().zip(&scene.origins.instances)
+        {
+            let named = |table: &&Table<MeshKeys>| table.stated.text("name") == Some(mesh);
+            let table = file.mesh.iter().find(named).expect("the scene was loaded from this file");
+            surfaces.push(anatomy::surfaces(&table.stated, tissues.get(instance.tissue)));
+        }
+        for (instance, surface) in scene.instances.iter_mut().zip(surfaces) {
+            instance.surface = surface;
+        }
         scene.tissues = tissues.used();
         scene.settings = settings;
         scene.world_from_probe = pose;

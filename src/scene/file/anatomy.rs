@@ -11,9 +11,9 @@ use super::nodes::NodeKeys;
 use super::placing::{PLACE, placed};
 use super::playing::{self, Following, Played, Playing};
 use super::shelf::{self, MeshKeys, Shelf};
-use super::table::Table;
+use super::table::{Stated, Table};
 use super::tissues::Tissues;
-use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Wire};
+use crate::scene::{Instance, Issue, Keyframes, Mesh, Origin, Surface, Tissue, Wire};
 use crate::settings::group;
 use crate::settings::units::{LENGTH, LEVEL};
 
@@ -91,7 +91,7 @@ pub(super) fn meshes(
             ));
         }
         let tissue = tissues.index(&format!("{path}.tissue"), &keys.tissue)?;
-        let mut outside = tissues.get(tissue).surface;
+        let surface = surfaces(stated, tissues.get(tissue));
         let playing = playing::read(document, (stated, &name), &path, &mut shelf, warnings)?;
         let shapes = match &playing {
             Some(playing) => playing.meshes.iter().map(Played::shapes).collect(),
@@ -99,9 +99,6 @@ pub(super) fn meshes(
         };
         shelf.bounded(document, &path)?;
         let rest = placed(document, &path, stated)?;
-        stated.put("", &mut outside);
-        let mut inside = outside;
-        stated.put("inside.", &mut inside);
         let first = out.instances.len();
         for shapes in shapes {
             names.insert(shapes.name.clone());
@@ -117,13 +114,22 @@ pub(super) fn meshes(
                 tissue,
                 priority: keys.priority,
                 world_from_object: rest,
-                surface: [outside, inside],
+                surface,
             });
         }
         out.placed.push(Placed { rest, instances: first..out.instances.len(), playing });
     }
     out.meshes = shelf.meshes;
     Ok(out)
+}
+
+/// Echo properties of a mesh of this tissue, from outside and from inside: the tissue's, but for what its table states.
+pub(super) fn surfaces(stated: &Stated, tissue: &Tissue) -> [Surface; 2] {
+    let mut outside = tissue.surface;
+    stated.put("", &mut outside);
+    let mut inside = outside;
+    stated.put("inside.", &mut inside);
+    [outside, inside]
 }
 
 /// Fails if the placed wires have more points than a frame may have.

@@ -20,7 +20,7 @@ use crate::settings::{Facts, Value, suggest};
 const MAX_TEXT: u64 = 4 << 20;
 
 /// Tables of which a file may have several.
-pub(super) pub(super) const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
+pub(super) const LISTS: [&str; 5] = ["group", "transform", "selector", "mesh", "wire"];
 
 /// The text of a scene file and of the overrides.
 #[derive(Clone)]

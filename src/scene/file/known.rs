@@ -1,0 +1,72 @@
+//! Keys of scene files by their paths, and their values in a scene.
+
+use super::document::{LISTS, segments};
+use super::schema::reference;
+use super::setting::setting;
+use crate::scene::Scene;
+use crate::settings::{Facts, Group, Value};
+
+/// The facts about the key at a path: `imaging.gain`, `tissues.liver.speed`.
+///
+/// # Errors
+/// Cause and remedy, where scene files have no such key.
+pub fn facts(path: &str) -> Result<&'static Facts, String> {
+    let parts = segments(path);
+    if let [key] = &parts[..] {
+        let tables = reference();
+        let title = tables.into_iter().find(|(table, _)| table.is_empty());
+        let found = title.and_then(|(_, keys)| keys.into_iter().find(|known| known.path == *key));
+        if let Some(found) = found {
+            return Ok(found.facts);
+        }
+    }
+    match setting(&parts) {
+        Ok(Some(found)) => Ok(found.facts),
+        Ok(None) => Err(format!("`{path}` is a table; name a key in it")),
+        Err((message, remedy)) => Err(format!("{message}; {remedy}")),
+    }
+}
+
+/// The value of a key in `scene`; none of keys that a scene holds in another form, as those of geometry.
+pub fn value(scene: &Scene, path: &str) -> Option<Value> {
+    fn of<T: Group>(settings: &T, key: &str) -> Option<Value> {
+        T::row(key).map(|row| (row.get)(settings))
+    }
+    let parts = segments(path);
+    let key = |at: usize| parts.get(at..).map(|parts| parts.join("."));
+    match parts[0].as_str() {
+        "probe" => of(&scene.probe, &key(1)?),
+        "simulation" => of(&scene.simulation, &key(1)?),
+        "imaging" => of(&scene.imaging, &key(1)?),
+        "live" => of(&scene.live, &key(1)?),
+        "tissues" => of(scene.tissues.iter().find(|t| Some(&t.name) == parts.get(1))?, &key(2)?),
+        _ => None,
+    }
+}
+
+/// Paths of all keys of scene files; `NAME` stands for the name of a tissue, a mesh or another element of a list.
+pub fn paths() -> impl Iterator<Item = String> {
+    reference().into_iter().flat_map(|(table, keys)| {
+        let before = match table {
+            "" => String::new(),
+            _ if LISTS.contains(&table) => format!("{table}.NAME."),
+            _ => format!("{table}."),
+        };
+        keys.into_iter().map(move |key| format!("{before}{}", key.path))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_key_of_the_reference_is_found_by_its_path() {
+        assert!(paths().count() > 150);
+        for path in paths() {
+            assert!(facts(&path).is_ok(), "{path}: {:?}", facts(&path).err());
+        }
+        assert!(facts("imaging.gian").unwrap_err().contains("did you mean `gain`?"));
+        assert!(facts("imaging").unwrap_err().contains("is a table"));
+    }
+}
