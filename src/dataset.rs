@@ -21,6 +21,7 @@ mod members;
 mod plan;
 mod pose;
 mod reading;
+mod run;
 mod scenes;
 mod sheet;
 mod split;
@@ -29,6 +30,7 @@ mod studio;
 mod tables;
 
 pub use plan::{Array, Format, Part, Plan, Sample, Segmented, Split};
+pub use run::Run;
 pub use sheet::Gallery;
 pub use store::{Store, Told};
 pub use studio::{Made, Studio};
@@ -47,6 +49,9 @@ pub enum DatasetError {
     #[error(transparent)]
     #[diagnostic(transparent)]
     File(#[from] FileError),
+    /// The program that makes the data set wants it to end.
+    #[error("it was stopped; go on with --resume (Python: resume=True)")]
+    Stopped,
 }
 
 impl From<SceneError> for DatasetError {

@@ -1,6 +1,6 @@
 """Scenes, simulators and frames. Units: mm, microseconds, MHz, dB; times of a scene in seconds."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from typing import Any, Literal, TypedDict
 
@@ -30,6 +30,18 @@ class SceneError(InsonifyError):
 
 def devices() -> list[Device]:
     """The Vulkan devices of this machine. InsonifyError: there is no Vulkan loader."""
+
+def make_dataset(
+    plan: str | PathLike[str],
+    output: str | PathLike[str],
+    shard: tuple[int, int],
+    resume: bool,
+    check: bool,
+    device: str | None,
+    tracer: str,
+    heard: Callable[[int, int], object],
+) -> dict[str, Any]:
+    """As insonify.make_dataset, which has the defaults."""
 
 def driver_environment() -> list[tuple[str, str]]:
     """Variables that make Mesa's software driver compile in a third of the time; import sets them."""

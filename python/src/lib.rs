@@ -7,6 +7,7 @@
 #![allow(missing_docs)]
 
 mod arrays;
+mod dataset;
 mod error;
 mod frame;
 mod scene;
@@ -55,6 +56,7 @@ fn _insonify(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<scene::Scene>()?;
     module.add_class::<simulator::Simulator>()?;
     module.add_class::<frame::Frame>()?;
+    module.add_function(wrap_pyfunction!(dataset::make_dataset, module)?)?;
     module.add_function(wrap_pyfunction!(devices, module)?)?;
     module.add_function(wrap_pyfunction!(driver_environment, module)?)
 }

@@ -3,7 +3,7 @@
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, TryLockError};
 
 use glam::DAffine3;
-use insonify::gpu::{Device, DeviceOptions, FrameTimings, cache_folder};
+use insonify::gpu::{Device, DeviceOptions, FrameTimings, GpuError, cache_folder};
 use insonify::scene;
 use insonify::settings::{Quality, Settings, Words};
 use insonify::sim::calibration::Work;
@@ -225,6 +225,28 @@ where
     })
 }
 
+/// The tracer that a word stands for; none for the device's best.
+pub fn tracer_of(word: &str) -> PyResult<Option<Tracer>> {
+    let tracers =
+        [("auto", None), ("bvh", Some(Tracer::Bvh)), ("ray-query", Some(Tracer::RayQuery))];
+    one_of("tracer", word, &tracers)
+}
+
+/// The device of this name or index, or the best one.
+pub fn opened(
+    selector: Option<String>,
+    wanted: Option<Tracer>,
+    validate: bool,
+) -> Result<Arc<Device>, GpuError> {
+    Device::new(&DeviceOptions {
+        selector,
+        validate,
+        kept_in: cache_folder(),
+        without_acceleration_structures: wanted == Some(Tracer::Bvh),
+        ..DeviceOptions::default()
+    })
+}
+
 fn kinds(want: &[String]) -> PyResult<Vec<Kind>> {
     want.iter().map(|word| one_of("what is wanted", word, &Kind::ALL)).collect()
 }
@@ -241,20 +263,11 @@ impl Simulator {
         quality: Option<&str>,
         validate: bool,
     ) -> PyResult<Self> {
-        let tracers =
-            [("auto", None), ("bvh", Some(Tracer::Bvh)), ("ray-query", Some(Tracer::RayQuery))];
-        let wanted = one_of("tracer", tracer, &tracers)?;
+        let wanted = tracer_of(tracer)?;
         let words: Vec<_> =
             Quality::WORDS.iter().copied().zip(Quality::ALL.iter().copied()).collect();
         let quality = quality.map(|word| one_of("quality", word, &words)).transpose()?;
-        let options = DeviceOptions {
-            selector: device,
-            validate,
-            kept_in: cache_folder(),
-            without_acceleration_structures: wanted == Some(Tracer::Bvh),
-            ..DeviceOptions::default()
-        };
-        let device = py.detach(|| Device::new(&options)).map_err(|e| raised(&e))?;
+        let device = py.detach(|| opened(device, wanted, validate)).map_err(|e| raised(&e))?;
         if wanted == Some(Tracer::RayQuery) && !device.supports_ray_query() {
             return Err(InsonifyError::new_err(format!(
                 "{} has no ray query\n  help: take tracer=\"bvh\", which runs everywhere, or another device",

@@ -5,10 +5,9 @@ use std::time::Instant;
 
 use clap::Args;
 use miette::{IntoDiagnostic, Result, miette};
-use serde_json::json;
 
 use super::common::{self, Progress, TracerChoice};
-use insonify::dataset::{DatasetError, Gallery, Made, Part, Plan, Store, Studio, Told};
+use insonify::dataset::{DatasetError, Made, Part, Plan, Run, Store, Told};
 use insonify::gpu::{Device, DeviceOptions, cache_folder};
 use insonify::output;
 use insonify::sim::Tracer;
@@ -59,16 +58,15 @@ fn shard(text: &str) -> Result<[u32; 2], String> {
 pub fn run(args: &Dataset) -> Result<()> {
     let (plan, warnings) = Plan::load(&args.plan)?;
     common::notes(&warnings);
-    let [index, count] = args.shard;
-    let parts = plan.shard(index, count);
-    plan.check(parts.iter().flat_map(|part| part.samples.clone()))?;
-    let samples: u32 = parts.iter().map(|part| part.samples.len() as u32).sum();
+    let run = Run { plan: &plan, root: &args.output, shard: args.shard, resume: args.resume };
+    run.check()?;
+    let (parts, samples) = (run.parts(), run.samples());
     if args.check {
         said(&plan, &parts, samples);
         return Ok(());
     }
     if parts.is_empty() {
-        let all = plan.parts().len();
+        let ([index, count], all) = (args.shard, plan.parts().len());
         output::note(format!(
             "the plan has {all} parts: shard {index} of {count} has none of them"
         ));
@@ -94,30 +92,9 @@ pub fn run(args: &Dataset) -> Result<()> {
         TracerChoice::RayQuery => Some(Tracer::RayQuery),
         TracerChoice::Bvh => Some(Tracer::Bvh),
     };
-    let store = Store::new(&plan, &args.output);
-    let about = json!({
-        "name": device.name(), "driver": device.driver(), "tracer": wanted.map(|tracer| tracer.to_string()),
-    });
-    store.begin(&parts, &about, args.resume)?;
-    let mut studio = Studio::new(&plan, &device, wanted);
-    let mut gallery = Gallery::new(&plan, &parts);
     let mut log = Log::new(samples);
-    store.fill(&mut studio, &parts, &mut |told| {
-        if let Told::Made(made) = &told {
-            gallery.take(made);
-        }
-        log.told(&store, told)
-    })?;
+    let sheet = run.make(&device, wanted, &mut |store, told| log.told(store, told))?;
     log.progress.finish();
-    let sheet = match count {
-        1 => "sheet.png".to_owned(),
-        _ => format!("sheet-{index}-of-{count}.png"),
-    };
-    let page = gallery.draw(&store, &mut studio)?;
-    let mut png = std::io::Cursor::new(Vec::new());
-    page.write_to(&mut png, image::ImageFormat::Png).into_diagnostic()?;
-    let sheet = store.path(&sheet);
-    store.write(&sheet, png.get_ref())?;
     output::line(format!(
         "{}: {} samples made, {} were there; {}",
         args.output.display(),
