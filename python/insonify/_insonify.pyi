@@ -54,7 +54,7 @@ class Scene:
 
         Scene(
             probe={"preset": "linear", "depth": 40},
-            tissues={"cyst": {"base": "water"}},
+            tissues={"cyst": {"based_on": "water"}},
             background="liver",
             mesh={"cyst": {"tissue": "cyst", "vertices": v, "triangles": t}},
         )
