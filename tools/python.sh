@@ -6,7 +6,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 python=target/python/bin/python
-packages=(numpy==2.4.6 pytest==9.2.0 mypy==2.4.1 ray==2.60.0)
+packages=(numpy==2.4.6 pytest==9.2.0 mypy==2.4.1 ray==2.60.0 gymnasium==1.4.0 matplotlib tqdm)
 wanted=target/python/packages.txt
 if [ ! -f "$wanted" ] || [ "$(cat "$wanted")" != "${packages[*]}" ]; then
   made() {
