@@ -5,6 +5,7 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat3, DQuat, DVec3};
 use insonify::scene::shapes;
+use insonify::sim::layout::{Label, NONE};
 use insonify::volume::track;
 
 use crate::obj;
@@ -135,10 +136,9 @@ fn a_device_set_of_plus_shows_its_surfaces_where_the_image_plane_cuts_them() {
     assert!(done, "{said}");
     let npy = std::fs::read(folder.join("stages/kernels/labels.npy")).expect("labels");
     let start = 10 + usize::from(u16::from_le_bytes([npy[8], npy[9]]));
-    let words: Vec<u32> =
-        npy[start..].as_chunks::<4>().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
+    let labels: Vec<Label> = bytemuck::pod_collect_to_vec(&npy[start..]);
     let (lines, samples) = (128, 1000);
-    assert_eq!(words.len(), 2 * lines * samples);
+    assert_eq!(labels.len(), lines * samples);
     // Positions of PLUS's scanlines: vtkPlusUsScanConvertLinear lays them out in pixels from the middle of the face.
     let m = world_from_image();
     let [across, along] = [m.matrix3.x_axis.length(), m.matrix3.y_axis.length()];
@@ -148,7 +148,7 @@ fn a_device_set_of_plus_shows_its_surfaces_where_the_image_plane_cuts_them() {
     let mut borders = 0;
     for line in 0..lines {
         let column = 410.0 + (line as f64 / (lines - 1) as f64 - 0.5) * 40.0 / 0.084;
-        let inside = |k: usize| words[2 * (line * samples + k)] != u32::MAX;
+        let inside = |k: usize| labels[line * samples + k].true_instance != NONE;
         for k in 1..samples {
             if inside(k) == inside(k - 1) {
                 continue;
