@@ -9,7 +9,7 @@ use crate::settings::{Facts, Form, Value};
 /// Digits that a drawn number keeps: enough for everything that can be set, and short to read.
 const DIGITS: usize = 6;
 
-/// Which of all draws: those of a sample, and for poses the attempt.
+/// The number of a draw: that of its sample, and for poses the attempt.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Count {
     pub seed: u32,

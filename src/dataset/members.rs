@@ -87,7 +87,7 @@ pub(super) fn colours(plan: &Plan) -> Vec<[u8; 3]> {
     numbered.map(|(i, name)| palette::look(name, i).0).collect()
 }
 
-/// What was drawn for a sample, where the probe stood, and what its pixels are.
+/// The description of a sample: its draws, the place of the probe, the meaning of its pixels.
 pub(super) fn facts(plan: &Plan, made: &Made) -> Value {
     let sample = &made.sample;
     let of = &plan.scenes[sample.scene];

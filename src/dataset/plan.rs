@@ -155,7 +155,7 @@ pub struct Part {
     pub samples: Range<u32>,
 }
 
-/// What was drawn for a sample, but for its pose, which needs the scene.
+/// The draws of a sample, but for its pose, which needs the scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sample {
     /// Its number in the plan.
@@ -291,7 +291,7 @@ impl Plan {
         self.parts().into_iter().skip(index as usize).step_by(count as usize).collect()
     }
 
-    /// What is drawn for a sample: a function of the plan's text and the number alone.
+    /// The draws of a sample: a function of the plan's text and the number alone.
     ///
     /// # Panics
     /// When the plan has no sample of this number.

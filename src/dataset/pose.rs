@@ -41,7 +41,7 @@ const DEPTH: usize = 2;
 const MOMENT: Facts =
     Facts::quantity(&DURATION, f64::NEG_INFINITY, f64::INFINITY).key("trajectory");
 
-/// Where the probe stands in the samples of a scene.
+/// Poses of the probe in the samples of a scene.
 #[derive(Clone, Debug)]
 pub(super) struct Poses {
     /// Least share of the face that touches the skin, where the probe is put on it.

@@ -46,7 +46,7 @@ impl Run<'_> {
     /// `wanted` is the tracer, none the device's best. Returns the sheet.
     ///
     /// # Errors
-    /// What keeps a sample from being made or written; what was finished before stays.
+    /// The cause that keeps a sample from being made or written; what was finished before stays.
     pub fn make(
         &self,
         device: &Arc<Device>,

@@ -63,7 +63,7 @@ impl PartialEq for LabelKind {
     }
 }
 
-/// Where a label has a quantity.
+/// The place of a quantity in a label.
 #[derive(Debug)]
 enum Part {
     Index(fn(&Label) -> u32),
