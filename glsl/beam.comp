@@ -14,7 +14,7 @@ layout(std430, binding = 2) restrict readonly buffer SurfaceBuffer { ivec2 surfa
 layout(std430, binding = 3) restrict readonly buffer VolumeBuffer { ivec2 volume_echoes[]; };
 layout(std430, binding = 4) restrict buffer CounterBuffer { Counters counters; };
 layout(std430, binding = 5) restrict buffer LateralBuffer { vec2 lateral[]; };
-// For each scanline the coupled share of the transmit aperture; from frame.scanlines on, for each element, the
+// For each scanline of the face the coupled share of the transmit aperture; then, for each element, the
 // number of elements before it that are not coupled.
 layout(std430, binding = 6) restrict readonly buffer ContactBuffer { float contact[]; };
 
@@ -88,7 +88,7 @@ void main() {
         if (voxel) { scatterers = v[n] * sqrt(energy_full / energies[n]); }
         vec2 iq = (s[n] * (surface_undo / weights[n]) + scatterers * volume_undo) * coupling(l, reach);
         if (frame.noise > 0.0) {
-            uvec4 bits = pcg4d(uvec4(l, k, frame.frame_index, frame.seed));
+            uvec4 bits = pcg4d(uvec4(frame.first_line + l, k, frame.frame_index, frame.seed));
             iq += frame.noise * vec2(gaussian(bits.x), gaussian(bits.y));
         }
         lateral[own] = iq;

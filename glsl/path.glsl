@@ -27,7 +27,10 @@ const uint PURPOSE_DITHER = 0x51ed270bu;
 const uint PURPOSE_SURVIVAL = 0x2545f491u;
 
 uvec4 line_random(uint line, uint n, uint key, uint purpose) {
-    return pcg4d(uvec4(line, n, key, frame.seed ^ purpose));
+    // As the same line has it among all of the face.
+    uint made = line % frame.scanlines, layer = line / frame.scanlines;
+    uint on_face = layer * face_lines() + frame.first_line + made;
+    return pcg4d(uvec4(on_face, n, key, frame.seed ^ purpose));
 }
 
 float clearance(vec3 p) {

@@ -9,11 +9,15 @@ float elevation(uint e) {
     return frame.slice_thickness * ((float(e) + 0.5) / float(frame.layers) - 0.5);
 }
 
+// Scanlines of the whole face; the frame may be made of some of them.
+uint face_lines() { return frame.scanlines + frame.lines_beside; }
+
 // Start, unit direction and unit lateral axis (in the scanline plane, perpendicular to the ray) of
 // scanline l in layer e.
 void probe_ray(uint l, uint e, out vec3 origin, out vec3 direction, out vec3 lateral) {
-    origin = vec3(scanlines[l].x, elevation(e), scanlines[l].z);
-    direction = vec3(scanlines[l].sine, 0.0, scanlines[l].cosine);
+    Scanline at = scanlines[frame.first_line + l];
+    origin = vec3(at.x, elevation(e), at.z);
+    direction = vec3(at.sine, 0.0, at.cosine);
     lateral = vec3(direction.z, 0.0, -direction.x);
 }
 
@@ -39,7 +43,7 @@ float face_distance(vec3 o, vec3 d) {
     if (frame.kind == KIND_LINEAR) {
         if (d.z >= 0.0) { return -1.0; }
         t = -o.z / d.z;
-        if (abs(o.x + t * d.x) > scanlines[frame.scanlines].x) { return -1.0; }
+        if (abs(o.x + t * d.x) > scanlines[face_lines()].x) { return -1.0; }
     } else if (frame.kind == KIND_CONVEX) {
         vec2 q = vec2(o.x, o.z + frame.radius);
         vec2 v = vec2(d.x, d.z);
@@ -54,7 +58,8 @@ float face_distance(vec3 o, vec3 d) {
         t = c / (sqrt(discriminant) - b);
         vec2 p = q + t * v;
         // Beyond the edge if the sine of the angle between the two is positive.
-        if (abs(p.x) * scanlines[frame.scanlines].cosine > p.y * scanlines[frame.scanlines].sine) { return -1.0; }
+        Scanline edge = scanlines[face_lines()];
+        if (abs(p.x) * edge.cosine > p.y * edge.sine) { return -1.0; }
     } else {
         return -1.0;
     }

@@ -298,7 +298,9 @@ ivec2 work_of(Stretch s, bool voxel) {
 }
 
 void main() {
-    uint scanline = gl_WorkGroupID.x;
+    // Of one line alone only its own scatterers are heard, but for voxels, which are smoothed like surfaces.
+    bool alone = (frame.flags & (FLAG_LINE | FLAG_VOXEL)) == FLAG_LINE;
+    uint scanline = alone ? uint(frame.image_left) : gl_WorkGroupID.x;
     uint thread = gl_LocalInvocationID.x;
     window_begin = gl_WorkGroupID.z * SCATTER_WINDOW;
     bool voxel = (frame.flags & FLAG_VOXEL) != 0u;

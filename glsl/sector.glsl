@@ -5,6 +5,10 @@
 
 // Column (scanline) and row (axial sample) of the centre of pixel (i, j); false outside the sector.
 bool sector(uint i, uint j, out vec2 column_row) {
+    if ((frame.flags & FLAG_LINE) != 0u) {
+        column_row = vec2(frame.image_left, (float(j) + 0.5) * frame.pixel_pitch / frame.sample_pitch);
+        return true;
+    }
     float x = frame.image_left + (float(i) + 0.5) * frame.pixel_pitch;
     float z = frame.image_top + (float(j) + 0.5) * frame.pixel_pitch;
     float rho = z;

@@ -44,6 +44,7 @@ const uint FLAG_SOBOL = 128u;       // paths draw from a Sobol sequence
 const uint FLAG_SLOTS = 256u;       // ray query: several top-level entries of an instance share a mask bit
 const uint FLAG_MASKED = 512u;      // only what a masking instance encloses gives echoes
 const uint FLAG_WAVEFRONT = 1024u;  // surfaces refract by their mean slope over the wavefront's width
+const uint FLAG_LINE = 2048u;       // the image is one scanline: column image_left of those made, from the face down
 const float LEAST_FACING = 0.125;   // cosine below which a surface is not taken to be more inclined
 const float LEAST_DESCENT = 0.001;  // part of its way by which a path goes down below a surface that it has met
 const float BENDING_STEP = 0.1;     // mm: how far from the axis the bending of a wavefront is found
@@ -93,7 +94,8 @@ struct Frame {
     float emission_lobe;                                                      // exponent of the cosine; 0: none
     uint ray_mask;                                                            // ray query: bits of the entries that are shown
     float branch_floor;                                                       // amplitude below which branches are followed by chance
-    uint couplant; float unused0; float unused1;
+    uint couplant;
+    uint first_line; uint lines_beside;   // number on the face of the first scanline made; scanlines of the face not made
 };
 
 // A scanline in probe space: its start (mm, without elevation) and its

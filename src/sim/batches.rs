@@ -16,12 +16,14 @@ pub(super) struct FrameBudget {
     pub(super) segments: u64,
     /// Threads that the device runs at once, approximately.
     pub(super) at_once: u32,
+    /// Main paths for whose interactions there is room.
+    pub(super) main_paths: u64,
 }
 
 impl FrameBudget {
     /// The budget on a device where no buffers have been made yet.
     pub(super) fn of(device: &Device) -> Self {
-        Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once() }
+        Self { segments: SEGMENT_BUDGET, at_once: device.threads_at_once(), main_paths: u64::MAX }
     }
 }
 
@@ -46,15 +48,20 @@ impl Batches {
             return Self {
                 capacity: per_path.min(affordable.max(1)),
                 paths: frame.paths,
-                rounds: Rounds::new(frame, frame.paths, budget.at_once),
+                rounds: Rounds::new(frame, frame.paths, budget.at_once).within(budget.main_paths),
             };
         }
-        let most = (affordable / per_path).min(rounds::most_paths(frame));
+        // Paths that choose a direction at every surface write no interactions down.
+        let room = match frame.sampling {
+            layout::SAMPLING_MAIN_PATH => u32::try_from(budget.main_paths).unwrap_or(u32::MAX),
+            _ => u32::MAX,
+        };
+        let most = (affordable / per_path).min(rounds::most_paths(frame)).min(room);
         let paths = most.clamp(1, frame.paths);
         Self {
             capacity: paths * per_path,
             paths,
-            rounds: Rounds::new(frame, paths, budget.at_once),
+            rounds: Rounds::new(frame, paths, budget.at_once).within(budget.main_paths),
         }
     }
 
@@ -75,4 +82,35 @@ impl Batches {
 pub(super) fn per_path(frame: &layout::Frame) -> u32 {
     let branches = frame.sampling == layout::SAMPLING_MAIN_PATH;
     (frame.max_interactions + 1) * if branches { 4 } else { 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A frame of 48 lines, whose 40 paths each have segments of their own, by a sampling.
+    fn frame(sampling: u32) -> layout::Frame {
+        layout::Frame {
+            scanlines: 48,
+            layers: 1,
+            paths: 40,
+            max_interactions: 8,
+            sampling,
+            flags: layout::FLAG_ROUGH_TRANSMISSION,
+            ..layout::Frame::default()
+        }
+    }
+
+    #[test]
+    fn room_for_main_paths_limits_frames_that_have_some() {
+        let paths = |sampling: u32, main_paths: u64| {
+            let budget = FrameBudget { segments: SEGMENT_BUDGET, at_once: 64, main_paths };
+            let batches = Batches::new(&frame(sampling), &budget);
+            (batches.paths, batches.rounds.main_paths())
+        };
+        assert_eq!(paths(layout::SAMPLING_MAIN_PATH, u64::MAX), (40, 40));
+        assert_eq!(paths(layout::SAMPLING_MAIN_PATH, 7), (7, 7));
+        // A frame of such paths alone leaves no room, and needs none.
+        assert_eq!(paths(layout::SAMPLING_PLAIN, 0), (40, 0));
+    }
 }

@@ -9,6 +9,9 @@ use super::stages;
 use crate::gpu::{Buffer, BufferKind, Commands, Device, GpuError};
 use crate::scene::Scene;
 
+/// Tables that all images of a frame share.
+const SHARED: [&str; 6] = ["scanlines", "rows", "surfaces", "points", "grey", "speckle"];
+
 /// All buffers of the frame but the geometry; made when a frame of the scene first needs them.
 pub(super) struct Buffers {
     made: BTreeMap<&'static str, (&'static Array, Buffer)>,
@@ -22,6 +25,23 @@ impl Buffers {
         let mut buffers = Self { made: BTreeMap::new(), room };
         buffers.add(device, stages::needed(scene))?;
         Ok(buffers)
+    }
+
+    /// The same buffers once more, but for the tables, which are shared.
+    pub(super) fn beside(&self, device: &Arc<Device>, scene: &Scene) -> Result<Self, GpuError> {
+        let shared = SHARED.iter().filter_map(|name| self.made.get_key_value(name));
+        let made = shared.map(|(name, (array, buffer))| (*name, (*array, buffer.clone())));
+        let mut buffers = Self { made: made.collect(), room: self.room };
+        buffers.add(device, stages::needed(scene))?;
+        Ok(buffers)
+    }
+
+    /// Bytes of the buffers that no other lane shares.
+    pub(super) fn own_bytes(&self) -> u64 {
+        let own = |(array, _): &&(&Array, Buffer)| {
+            array.within.is_none() && !SHARED.contains(&array.name)
+        };
+        self.made.values().filter(own).map(|(_, buffer)| buffer.size()).sum()
     }
 
     /// Makes those of `arrays` that do not exist yet.
@@ -64,24 +84,16 @@ impl Buffers {
         self.made.values().map(|(array, _)| *array).filter(|a| a.within.is_none()).collect()
     }
 
-    /// Sets to zero the buffers to which kernels add.
-    pub(super) fn clear(&self, cmd: &mut Commands<'_>) {
-        for (_, buffer) in self.made.values().filter(|(array, _)| array.zeroed) {
-            cmd.fill(buffer, 0);
+    /// Sets to zero what a frame of these sizes uses of the buffers to which kernels add.
+    pub(super) fn clear(&self, cmd: &mut Commands<'_>, sizes: &Sizes) {
+        for (array, buffer) in self.made.values().filter(|(array, _)| array.zeroed) {
+            cmd.fill_first(buffer, array.bytes(sizes).clamp(4, buffer.size()), 0);
         }
     }
 
-    /// The content of buffer `name` after the last frame, which had these `sizes`.
-    pub(super) fn read(
-        &self,
-        device: &Arc<Device>,
-        name: &str,
-        sizes: &Sizes,
-    ) -> Result<Vec<u8>, GpuError> {
-        let (array, buffer) = &self.made[name];
-        let mut bytes = vec![0; array.bytes(sizes) as usize];
-        device.read_into(buffer, 0, &mut bytes)?;
-        Ok(bytes)
+    /// Bytes of buffer `name` that a frame of these `sizes` uses.
+    pub(super) fn bytes(&self, name: &str, sizes: &Sizes) -> usize {
+        self.made[name].0.bytes(sizes) as usize
     }
 }
 

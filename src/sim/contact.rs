@@ -9,6 +9,8 @@
 mod hand;
 mod skin;
 
+use glam::DAffine3;
+
 use crate::scene::Scene;
 pub use hand::{Body, Hand, PRESS, Spot};
 pub use skin::{Skin, Skins};
@@ -40,9 +42,14 @@ pub struct Coupling {
 impl Coupling {
     /// The contact of the scene's probe where it is; none where the scene asks for no contact.
     pub fn of(scene: &Scene, skins: &mut Skins) -> Option<Self> {
+        Self::at(scene, &scene.world_from_probe, skins)
+    }
+
+    /// The contact that the scene's probe would have at another place.
+    pub fn at(scene: &Scene, place: &DAffine3, skins: &mut Skins) -> Option<Self> {
         let contact = scene.contact.as_ref()?;
         let skin = skins.of(scene);
-        let (probe, place) = (&scene.probe, scene.world_from_probe);
+        let probe = &scene.probe;
         let per_element = LEAST_COLUMNS.div_ceil(probe.scanlines.max(1));
         let columns = probe.scanlines * per_element;
         let (mut coupled, mut depth) = (vec![0u32; probe.scanlines as usize], 0.0);

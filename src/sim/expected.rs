@@ -1,6 +1,7 @@
 //! Surface echoes for the labels: the frame's own kernels once more, with other buffers in the place of the frame's, so
 //! that the picture is the same with labels and without.
 
+use super::lane::Lane;
 use super::layout::Frame;
 use super::pass::Extent;
 use super::passes::Passes;
@@ -15,25 +16,30 @@ impl Passes {
     /// What is random in an echo is that of the frame, so that the rest of its echoes are those that came by
     /// reflections. Runs behind the last `scatter` and in front of `beam`.
     pub(super) fn direct_echoes(&self, cmd: &mut Commands) -> Result<(), GpuError> {
-        let direct = Frame { max_reflections: 0, noise: 0.0, ..self.frame };
-        cmd.write(&self.buffers["direct_frame"], 0, bytemuck::bytes_of(&direct))?;
-        // Segments are not wanted: those of the frame stay.
-        cmd.fill(&self.buffers["direct_count"], FULL);
+        let direct = |frame: &Frame| Frame { max_reflections: 0, noise: 0.0, ..*frame };
+        for lane in self.active() {
+            let constants = direct(&lane.frame);
+            cmd.write(&lane.buffers["direct_frame"], 0, bytemuck::bytes_of(&constants))?;
+            // Segments are not wanted: those of the frame stay.
+            cmd.fill(&lane.buffers["direct_count"], FULL);
+        }
         cmd.barrier(Stage::Transfer, Stage::Compute);
         cmd.scope("expect");
-        let given = self.instead(&[
+        let instead = [
             ("frame", "direct_frame"),
             ("surface_echoes", "direct_echoes"),
             ("segment_count", "direct_count"),
             ("counters", "direct_counters"),
-        ]);
+        ];
+        let direct = direct(self.frame());
         let mut turn = 0;
         for begin in (0..direct.paths).step_by(self.batches.paths as usize) {
             let paths = begin..direct.paths.min(begin + self.batches.paths);
             for round in self.batches.rounds.of(&direct, paths, &mut turn) {
                 let threads = Extent::Threads([round.workers, 1, 1]);
                 let push = bytemuck::cast_slice(&round.push);
-                self.record(cmd, &TRACE[round.role as usize], threads, push, &given)?;
+                let pass = &TRACE[round.role as usize];
+                self.record(cmd, pass, threads, push, &|lane| named(lane, &instead))?;
             }
         }
         Ok(())
@@ -43,7 +49,7 @@ impl Passes {
     pub(super) fn surface_samples(&self, cmd: &mut Commands) -> Result<(), GpuError> {
         cmd.scope("level");
         for (echoes, iq) in [("surface_echoes", "surface_iq"), ("direct_echoes", "direct_iq")] {
-            let given = self.instead(&[
+            let instead = [
                 ("frame", "direct_frame"),
                 ("surface_echoes", echoes),
                 ("volume_echoes", "no_echoes"),
@@ -51,16 +57,18 @@ impl Passes {
                 ("lateral", "label_lateral"),
                 ("iq", iq),
                 ("log_image", "label_log_image"),
-            ]);
+            ];
             for pass in [&BEAM, &AXIAL] {
                 let extent = pass.extent.expect("a stage of every frame states its extent");
-                self.record(cmd, pass, extent(&self.frame), &[], &given)?;
+                let threads = extent(self.frame());
+                self.record(cmd, pass, threads, &[], &|lane| named(lane, &instead))?;
             }
         }
         Ok(())
     }
+}
 
-    fn instead<'a>(&'a self, pairs: &[(&'static str, &str)]) -> Vec<(&'static str, &'a Buffer)> {
-        pairs.iter().map(|&(name, other)| (name, &self.buffers[other])).collect()
-    }
+/// Names with the buffers of a lane that have the names beside them.
+fn named<'l>(lane: &'l Lane, pairs: &[(&'static str, &str)]) -> Vec<(&'static str, &'l Buffer)> {
+    pairs.iter().map(|&(name, other)| (name, &lane.buffers[other])).collect()
 }

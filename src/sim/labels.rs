@@ -23,6 +23,8 @@ pub struct LabelGrid {
     pub shape: [usize; 2],
     /// The labels, row by row, as the device has them.
     pub labels: Vec<Label>,
+    /// True if they have the level of echoes and its share of reverberation (`simulation.label_levels`).
+    pub levelled: bool,
 }
 
 /// One quantity of all labels of a grid.
@@ -60,6 +62,23 @@ pub struct LabelKind {
 impl PartialEq for LabelKind {
     fn eq(&self, other: &Self) -> bool {
         self.name == other.name
+    }
+}
+
+impl LabelKind {
+    /// True for indices, which are whole numbers.
+    pub fn is_index(&self) -> bool {
+        matches!(self.part, Part::Index(_))
+    }
+
+    /// True for what only labels with levels have.
+    pub fn is_of_level(&self) -> bool {
+        ["level", "reverberation"].contains(&self.name)
+    }
+
+    /// Numbers of it in a label.
+    pub fn parts(&self) -> usize {
+        if matches!(self.part, Part::Vector(_)) { 3 } else { 1 }
     }
 }
 
@@ -157,9 +176,10 @@ fn inside(label: &Label, number: f32) -> f32 {
 }
 
 impl LabelGrid {
-    /// Every quantity as an array, in the order of [`KINDS`].
+    /// Every quantity that they have as an array, in the order of [`KINDS`].
     pub fn arrays(&self) -> Vec<LabelArray> {
-        KINDS.iter().map(|kind| self.array(kind)).collect()
+        let has = |kind: &&LabelKind| self.levelled || !kind.is_of_level();
+        KINDS.iter().filter(has).map(|kind| self.array(kind)).collect()
     }
 
     fn array(&self, kind: &'static LabelKind) -> LabelArray {
@@ -188,9 +208,11 @@ impl Simulator {
             return Ok(None);
         }
         let frame = *self.constants();
+        let levelled = self.levelled;
         let mut grid = |name, rows: u32, columns: u32| {
-            let labels = bytemuck::pod_collect_to_vec(&self.read(name)?);
-            Ok::<_, SimError>(LabelGrid { shape: [rows, columns].map(|n| n as usize), labels })
+            let labels = bytemuck::pod_collect_to_vec(&self.read_again(name)?);
+            let shape = [rows, columns].map(|n| n as usize);
+            Ok::<_, SimError>(LabelGrid { shape, labels, levelled })
         };
         Ok(Some(Labels {
             samples: grid("labels", frame.scanlines, frame.samples)?,

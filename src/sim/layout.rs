@@ -131,6 +131,8 @@ constants! {
     pub const FLAG_MASKED: u32 = 512;
     /// Surfaces refract by their mean slope over the wavefront's width.
     pub const FLAG_WAVEFRONT: u32 = 1024;
+    /// The image is one scanline of those made, from the face down.
+    pub const FLAG_LINE: u32 = 2048;
     /// Cosine to a surface below which what the wavefront covers of it grows no more.
     pub const LEAST_FACING: f32 = 0.125;
     /// A path goes down below a surface that it has met by this part of its way at least.
@@ -185,7 +187,7 @@ shared! {
         noise: f32, inverse_reference: f32, inverse_range: f32, frame_index: u32,
         image_width: u32, image_height: u32, pixel_pitch: f32, image_left: f32,
         image_top: f32, beam_width: f32, emission_lobe: f32, ray_mask: u32,
-        branch_floor: f32, couplant: u32, unused0: f32, unused1: f32,
+        branch_floor: f32, couplant: u32, first_line: u32, lines_beside: u32,
     }
     /// Start and direction of a scanline, in probe space; the last entry is the edge of the face.
     struct Scanline { x: f32, z: f32, sine: f32, cosine: f32 }
@@ -268,6 +270,13 @@ shared! {
         deposits: u32, node_visits: u32, triangle_tests: u32, top_visits: u32,
         instances_reached: u32, false_unions: u32, false_boxes: u32, taken_even: u32,
         taken_odd: u32, unused0: u32, unused1: u32, unused2: u32,
+    }
+}
+
+impl Frame {
+    /// Scanlines of the probe's face, of which the frame may make only some.
+    pub fn face_lines(&self) -> u32 {
+        self.scanlines + self.lines_beside
     }
 }
 

@@ -5,193 +5,258 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::batches::{Batches, FrameBudget};
-use super::buffers::Buffers;
-use super::contact::{self, Coupling, SkinContact, Skins};
-use super::fusion::FusionResources;
-use super::pass::{Extent, Pass, Variants};
+use super::contact::{self, Coupling, Skins};
+use super::lane::{Lane, Shot};
+use super::line::OneLine;
+use super::pass::{Extent, Pass, Sizes, Variants};
 use super::shaders::Library;
-use super::stages::{self, CONVERT, DARKEN, FUSE, MASK, SHADOW, TRACE};
+use super::stages::{self, CONVERT, DARKEN, EXPECT, FUSE, MASK, ORIGIN, SCATTER, SHADOW, TRACE};
+use super::tables::Tables;
 use super::{SimError, World, layout, tables};
 use crate::gpu::{Binding, Buffer, Commands, Device, GpuError, Kernel, Stage};
 use crate::scene::Scene;
 use crate::settings::Blend;
 
+/// For a lane, the buffers that a dispatch binds instead of those of the same names.
+pub(super) type Instead<'g> = &'g dyn Fn(&Lane) -> Vec<(&'static str, &Buffer)>;
+
 /// The kernels, buffers and geometry on which the stages work.
 pub(super) struct Passes {
     pub(super) kernels: PassKernels,
-    pub(super) buffers: Buffers,
-    /// None where the scene has no acquired volume.
-    pub(super) fusion: Option<FusionResources>,
+    /// At least one.
+    pub(super) lanes: Vec<Lane>,
+    /// Lanes of the last frame: the first ones.
+    pub(super) active: usize,
     pub(super) skins: Skins,
-    /// The contact of the probe with the skin in the last frame.
-    pub(super) touch: Option<SkinContact>,
     pub(super) world: World,
-    pub(super) frame: layout::Frame,
-    /// Constants of the frame whose picture is complete.
+    /// Constants of the last complete picture.
     pub(super) shown: layout::Frame,
-    /// True if a frame has been made: what labels say has moved has moved since the last one.
-    pub(super) began: bool,
+    /// Constants of the last image: what labels say has moved has moved since then.
+    pub(super) last: Option<layout::Frame>,
+    /// True if the anatomy of the last image was kept for labels, and lines were made since.
+    pub(super) remembers: bool,
+    /// Those of all lanes.
     pub(super) batches: Batches,
 }
 
 impl Passes {
-    /// Brings the device up to date with `scene`; returns the processor time for it.
+    /// The lanes of the last frame.
+    pub(super) fn active(&self) -> &[Lane] {
+        &self.lanes[..self.active]
+    }
+
+    /// Constants of the last frame's first image. Others differ from it only by what a [`Shot`] says.
+    pub(super) fn frame(&self) -> &layout::Frame {
+        &self.lanes[0].frame
+    }
+
+    /// Brings the device up to date with `scene` and as many lanes as there are shots; returns the processor time for
+    /// it.
     pub(super) fn update(
         &mut self,
         cmd: &mut Commands,
         scene: &Scene,
+        tables: &Tables,
         coincident: bool,
-        index: u32,
+        shots: &[Shot],
+        line: Option<OneLine>,
     ) -> Result<Duration, SimError> {
         cmd.scope("update");
         let began = Instant::now();
-        self.buffers.add(cmd.device(), stages::needed(scene))?;
-        if self.began {
-            self.remember(cmd, scene)?;
+        let labelled = scene.simulation.labels;
+        self.lanes[0].buffers.add(cmd.device(), stages::needed(scene))?;
+        while self.lanes.len() < shots.len() {
+            self.lanes.push(self.lanes[0].beside(cmd.device(), scene)?);
         }
+        self.active = shots.len();
+        if labelled && self.last.is_some() && !self.remembers {
+            self.world.remember(cmd)?;
+        }
+        // Labels say what has moved since the last image, whatever lines were made between.
+        self.remembers = labelled && line.is_some();
         self.world.update(cmd, scene)?;
-        // A frame of fewer lines than the buffers were made for must not want more segments.
+        // A frame of fewer lines than the buffers were made for must not want more room.
+        let buffers = &self.lanes[0].buffers;
         let budget = FrameBudget {
-            segments: self.buffers["segments"].size(),
+            segments: buffers["segments"].size(),
             at_once: self.batches.rounds.at_once,
+            main_paths: buffers.room().main_paths,
         };
-        (self.frame, self.batches) =
-            frame_constants(scene, &self.world, coincident, index, &budget);
-        if !self.began {
-            self.remember(cmd, scene)?;
-            self.began = true;
+        let frame;
+        (frame, self.batches) =
+            frame_constants(scene, &self.world, coincident, &budget, line.as_ref());
+        if labelled && self.last.is_none() {
+            self.world.remember(cmd)?;
         }
-        cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&self.frame))?;
-        if let Some(fusion) = &mut self.fusion {
-            fusion.update(cmd, scene, &self.buffers)?;
+        for (lane, shot) in self.lanes.iter_mut().zip(shots) {
+            let frame = shot.constants(&frame);
+            lane.set(cmd, frame, tables)?;
+            if line.is_some() {
+                continue;
+            }
+            // What the last image was made of, where labels say what has moved since; for the first one its own.
+            let last = self.last.replace(frame).unwrap_or(frame);
+            if labelled {
+                cmd.write(&lane.buffers["frame_before"], 0, bytemuck::bytes_of(&last))?;
+            }
+            if let Some(fusion) = &mut lane.fusion {
+                fusion.update(cmd, scene, &lane.buffers)?;
+            }
         }
         Ok(began.elapsed())
     }
 
-    /// Keeps what the last frame was made of, where labels say what has moved since; of the first frame its own.
-    fn remember(&mut self, cmd: &mut Commands, scene: &Scene) -> Result<(), GpuError> {
-        if scene.simulation.labels {
-            self.world.remember(cmd)?;
-            cmd.write(&self.buffers["frame_before"], 0, bytemuck::bytes_of(&self.frame))?;
+    /// Computes which elements of the probe's face are coupled to the skin, and writes them to the device.
+    pub(super) fn touch(
+        &mut self,
+        cmd: &mut Commands,
+        scene: &Scene,
+        shots: &[Shot],
+    ) -> Result<(), GpuError> {
+        for (lane, shot) in self.lanes.iter_mut().zip(shots) {
+            let coupling = Coupling::at(scene, &shot.world_from_probe, &mut self.skins);
+            let shares = contact::table(scene, coupling.as_ref());
+            cmd.write(&lane.buffers["contact"], 0, bytemuck::cast_slice(&shares))?;
+            lane.touch = coupling.map(|coupling| coupling.touch);
         }
         Ok(())
     }
 
-    /// Computes which elements of the probe's face are coupled to the skin, and writes them to the device.
-    pub(super) fn touch(&mut self, cmd: &mut Commands, scene: &Scene) -> Result<(), GpuError> {
-        let coupling = Coupling::of(scene, &mut self.skins);
-        let shares = contact::table(scene, coupling.as_ref());
-        cmd.write(&self.buffers["contact"], 0, bytemuck::cast_slice(&shares))?;
-        self.touch = coupling.map(|coupling| coupling.touch);
-        Ok(())
-    }
-
-    pub(super) fn clear(&self, cmd: &mut Commands) {
-        self.buffers.clear(cmd);
+    pub(super) fn clear(&self, cmd: &mut Commands, sizes: &Sizes) {
+        self.active().iter().for_each(|lane| lane.buffers.clear(cmd, sizes));
         cmd.barrier(Stage::Transfer, Stage::Compute);
     }
 
     /// Records a pass with the threads and buffers that it states.
     pub(super) fn run(&self, cmd: &mut Commands, pass: &Pass) -> Result<(), GpuError> {
-        self.run_with(cmd, pass, &[])
+        self.run_with(cmd, pass, &|_| Vec::new())
     }
 
-    /// Like [`Self::run`], with the buffers `given` instead of those of the same names.
+    /// Like [`Self::run`], with other buffers.
     pub(super) fn run_with(
         &self,
         cmd: &mut Commands,
         pass: &Pass,
-        given: &[(&str, &Buffer)],
+        instead: Instead<'_>,
     ) -> Result<(), GpuError> {
         cmd.scope(pass.name);
         let extent = pass.extent.expect("a pass recorded this way states its extent");
-        self.record(cmd, pass, extent(&self.frame), &[], given)
+        self.record(cmd, pass, extent(self.frame()), &[], instead)
     }
 
-    /// Records a dispatch of a pass and the barrier behind it; `given` as for [`Self::run_with`].
+    /// Records a dispatch of a pass for every lane, and the barrier behind all of them.
     pub(super) fn record(
         &self,
         cmd: &mut Commands,
         pass: &Pass,
         extent: Extent,
         push: &[u8],
-        given: &[(&str, &Buffer)],
+        instead: Instead<'_>,
     ) -> Result<(), GpuError> {
-        let kernel = self.kernels.of(pass);
+        let kernel = self.kernels.of(pass, self.world.deforms());
         // By number: what a kernel declares and does not use is not in its SPIR-V.
         let binds = kernel.bindings().iter().map(|info| pass.binds[info.binding as usize]);
-        let bindings: Vec<Binding> = binds.map(|name| self.binding(name, given)).collect();
-        match extent {
-            Extent::Threads(threads) => cmd.dispatch(kernel, threads, push, &bindings)?,
-            Extent::Groups(groups) => cmd.dispatch_groups(kernel, groups, push, &bindings)?,
+        let binds: Vec<&str> = binds.collect();
+        for lane in self.active() {
+            let given = instead(lane);
+            let bound = binds.iter().map(|name| self.binding(lane, name, &given));
+            let bindings: Vec<Binding> = bound.collect();
+            match extent {
+                Extent::Threads(threads) => cmd.dispatch(kernel, threads, push, &bindings)?,
+                Extent::Groups(groups) => cmd.dispatch_groups(kernel, groups, push, &bindings)?,
+            }
         }
         cmd.barrier(Stage::Compute, pass.then);
         Ok(())
     }
 
-    fn binding<'a>(&'a self, name: &str, given: &[(&str, &'a Buffer)]) -> Binding<'a> {
+    fn binding<'a>(
+        &'a self,
+        lane: &'a Lane,
+        name: &str,
+        given: &[(&str, &'a Buffer)],
+    ) -> Binding<'a> {
         if let Some((_, buffer)) = given.iter().find(|(of, _)| *of == name) {
             return Binding::Buffer(buffer);
         }
-        match (name, &self.fusion) {
+        match (name, &lane.fusion) {
             ("acquired", Some(fusion)) => Binding::Image(fusion.shown()),
-            _ => self.world.binding(name).unwrap_or_else(|| Binding::Buffer(&self.buffers[name])),
+            _ => self.world.binding(name).unwrap_or_else(|| Binding::Buffer(&lane.buffers[name])),
+        }
+    }
+
+    /// Records the echoes of all paths, batch after batch, and for labels of levels what is expected of them.
+    pub(super) fn echoes(&self, cmd: &mut Commands, levelled: bool) -> Result<(), GpuError> {
+        self.run(cmd, &ORIGIN)?;
+        let mut turn = 0;
+        for begin in (0..self.frame().paths).step_by(self.batches.paths as usize) {
+            self.trace(cmd, begin, &mut turn)?;
+            self.run(cmd, &SCATTER)?;
+            if levelled {
+                self.run(cmd, &EXPECT)?;
+            }
+        }
+        match levelled {
+            true => self.direct_echoes(cmd),
+            false => Ok(()),
         }
     }
 
     /// Traces a batch of paths; `turn` is that of [`super::rounds::Rounds::of`].
-    pub(super) fn trace(
-        &self,
-        cmd: &mut Commands,
-        path_begin: u32,
-        turn: &mut u32,
-    ) -> Result<(), GpuError> {
+    fn trace(&self, cmd: &mut Commands, path_begin: u32, turn: &mut u32) -> Result<(), GpuError> {
         if path_begin > 0 {
             cmd.barrier(Stage::Compute, Stage::Transfer);
-            cmd.fill(&self.buffers["segment_count"], 0);
+            self.active().iter().for_each(|lane| cmd.fill(&lane.buffers["segment_count"], 0));
             cmd.barrier(Stage::Transfer, Stage::Compute);
         }
-        let path_end = self.frame.paths.min(path_begin + self.batches.paths);
+        let path_end = self.frame().paths.min(path_begin + self.batches.paths);
         cmd.scope("trace");
-        for round in self.batches.rounds.of(&self.frame, path_begin..path_end, turn) {
+        for round in self.batches.rounds.of(self.frame(), path_begin..path_end, turn) {
             let threads = Extent::Threads([round.workers, 1, 1]);
             let push = bytemuck::cast_slice(&round.push);
-            self.record(cmd, &TRACE[round.role as usize], threads, push, &[])?;
+            self.record(cmd, &TRACE[round.role as usize], threads, push, &|_| Vec::new())?;
         }
         Ok(())
     }
 
-    /// Mixes the image with the acquired volume, if there is one.
+    /// Mixes the images with the acquired volume, if there is one.
     pub(super) fn fuse(&self, cmd: &mut Commands, scene: &Scene) -> Result<bool, GpuError> {
-        let (Some(fused), Some(fusion)) = (&self.fusion, &scene.fusion) else {
+        let (true, Some(fusion)) = (scene.volume.is_some(), &scene.fusion) else {
             return Ok(false);
         };
         // The output of `display` is read by kernels here, not only copied.
         cmd.barrier(Stage::Compute, Stage::Compute);
         self.run(cmd, &MASK)?;
-        let mut prescan = &self.buffers["prescan"];
+        let mut prescan = "prescan";
         if fusion.background_shadows {
             self.run(cmd, &SHADOW)?;
             self.run(cmd, &DARKEN)?;
-            prescan = &self.buffers["shaded"];
+            prescan = "shaded";
         }
-        self.run_with(cmd, &CONVERT, &[("prescan", prescan)])?;
-        // Without blending by bands, the kernel binds any buffer as `change` and does not read it.
-        let mut change = &self.buffers["background"];
+        self.run_with(cmd, &CONVERT, &|lane| vec![("prescan", &lane.buffers[prescan])])?;
         match fusion.blend {
             Blend::Multiband => {
-                self.bands(cmd, &fused.pyramid, fusion.levels())?;
-                change = fused.pyramid.change();
+                self.bands(cmd, fusion.levels())?;
+                self.run_with(cmd, &FUSE, &|lane| vec![("change", lane.pyramid().change())])?;
             }
-            Blend::Linear | Blend::Smooth => self.blur(cmd)?,
+            // Without blending by bands, the kernel binds any buffer as `change` and does not read it.
+            Blend::Linear | Blend::Smooth => {
+                self.blur(cmd)?;
+                self.run_with(cmd, &FUSE, &|lane| vec![("change", &lane.buffers["background"])])?;
+            }
         }
-        self.run_with(cmd, &FUSE, &[("change", change)])?;
         Ok(true)
     }
 
-    /// The finished image.
-    pub(super) fn pixels(&self, fused: bool) -> &Buffer {
-        &self.buffers[if fused { "fused" } else { "pixels" }]
+    /// Records copies of results of a frame of these sizes that were read of the frame before.
+    pub(super) fn read_out(&mut self, cmd: &mut Commands, sizes: &Sizes) -> Result<(), GpuError> {
+        // Stages of labels may have been the last to write.
+        cmd.barrier(Stage::Compute, Stage::Transfer);
+        for lane in &mut self.lanes[..self.active] {
+            lane.read_out.record(cmd, &lane.buffers, sizes)?;
+        }
+        cmd.barrier(Stage::Transfer, Stage::Host);
+        Ok(())
     }
 }
 
@@ -201,8 +266,16 @@ pub(super) struct PassKernels(Vec<PassKernel>);
 struct PassKernel {
     pass: &'static Pass,
     kernel: Kernel,
+    /// The variant for deforming tissue, where there is one: a mesh that a program reshapes begins to deform.
+    deforming: Option<Kernel>,
     /// True if the frames that the scene began with run it.
     needed: bool,
+}
+
+impl PassKernel {
+    fn of(&self, deforms: bool) -> &Kernel {
+        self.deforming.as_ref().filter(|_| deforms).unwrap_or(&self.kernel)
+    }
 }
 
 impl PassKernels {
@@ -243,25 +316,34 @@ impl PassKernels {
                 Variants::One => None,
                 Variants::Counting if counting => Some("count"),
                 Variants::Tracer | Variants::Counting => Some(tracer),
-                Variants::Tissue if world.deforms() => Some("deforming"),
                 Variants::Tissue => Some("rigid"),
             };
-            let stem = suffix.map_or(pass.name.into(), |suffix| format!("{}_{suffix}", pass.name));
-            let kernel = Kernel::when_needed(device, &stem, library.words(&stem), pass.constants)?;
-            kernels.push(PassKernel { pass, kernel, needed });
+            let kernel = |suffix: Option<&str>| {
+                let stem =
+                    suffix.map_or(pass.name.into(), |suffix| format!("{}_{suffix}", pass.name));
+                Kernel::when_needed(device, &stem, library.words(&stem), pass.constants)
+            };
+            let deforming = match pass.variants {
+                Variants::Tissue => Some(kernel(Some("deforming"))?),
+                _ => None,
+            };
+            kernels.push(PassKernel { pass, kernel: kernel(suffix)?, deforming, needed });
         }
+        let deforms = world.deforms();
         // The kernels that take longest to compile begin first.
-        let mut due: Vec<_> = kernels.iter().filter(|made| made.needed).collect();
-        due.sort_by_key(|made| Reverse(library.words(made.kernel.name()).len()));
-        due.iter().for_each(|made| made.kernel.prepare());
+        let due = kernels.iter().filter(|made| made.needed);
+        let mut due: Vec<_> = due.map(|made| made.of(deforms)).collect();
+        due.sort_by_key(|kernel| Reverse(library.words(kernel.name()).len()));
+        due.iter().for_each(|kernel| kernel.prepare());
         Ok(Self(kernels))
     }
 
-    pub(super) fn of(&self, pass: &Pass) -> &Kernel {
+    /// The kernel of a pass, for a world whose tissue deforms or one whose tissue does not.
+    pub(super) fn of(&self, pass: &Pass, deforms: bool) -> &Kernel {
         let is = |made: &&PassKernel| {
             made.pass.name == pass.name && made.pass.constants == pass.constants
         };
-        &self.0.iter().find(is).expect("a pass of the scene").kernel
+        self.0.iter().find(is).expect("a pass of the scene").of(deforms)
     }
 }
 
@@ -270,10 +352,13 @@ pub(super) fn frame_constants(
     scene: &Scene,
     world: &World,
     coincident: bool,
-    index: u32,
     budget: &FrameBudget,
+    line: Option<&OneLine>,
 ) -> (layout::Frame, Batches) {
-    let mut frame = tables::frame(scene, index);
+    let mut frame = tables::frame(scene, 0);
+    if let Some(line) = line {
+        line.narrow(&mut frame);
+    }
     if coincident {
         frame.flags |= layout::FLAG_COINCIDENT;
     }

@@ -1,43 +1,55 @@
-//! A copy of the image made within its frame, if the image before was read: reading it then needs no
+//! Copies of results made within their frame, if those of the frame before were read: reading them then needs no
 //! submission of its own.
 
-use crate::gpu::{Buffer, BufferKind, Commands, GpuError, Stage};
+use std::collections::BTreeMap;
 
-/// The copy of the last frame's image, if there is one.
+use super::buffers::Buffers;
+use super::pass::Sizes;
+use crate::gpu::{Buffer, BufferKind, Commands, GpuError};
+
+/// The copies of the last frame's results.
 #[derive(Default)]
-pub(super) struct ReadOut {
+pub(super) struct ReadOut(BTreeMap<&'static str, ResultCopy>);
+
+/// A result that was read at least once.
+#[derive(Default)]
+struct ResultCopy {
     copy: Option<Buffer>,
-    /// True if the image of the last frame has been read.
+    /// True if the result of the last frame has been read.
     wanted: bool,
     /// True if the copy is of the last frame.
     is_current: bool,
 }
 
 impl ReadOut {
-    /// Records the copy of a finished image, if the image before was read.
+    /// Records copies of those results in finished `buffers`, of a frame of these sizes, that were read after the frame
+    /// before.
     pub(super) fn record(
         &mut self,
         cmd: &mut Commands<'_>,
-        pixels: &Buffer,
+        buffers: &Buffers,
+        sizes: &Sizes,
     ) -> Result<(), GpuError> {
-        self.is_current = std::mem::take(&mut self.wanted);
-        if !self.is_current {
-            return Ok(());
+        for (name, result) in &mut self.0 {
+            result.is_current = std::mem::take(&mut result.wanted);
+            if !result.is_current {
+                continue;
+            }
+            let from = &buffers[name];
+            let copy = match result.copy.take().filter(|copy| copy.size() >= from.size()) {
+                Some(copy) => copy,
+                None => cmd.device().buffer("read out", from.size(), BufferKind::Readback)?,
+            };
+            cmd.copy((from, 0), (&copy, 0), buffers.bytes(name, sizes) as u64)?;
+            result.copy = Some(copy);
         }
-        let size = pixels.size();
-        let copy = match self.copy.take().filter(|copy| copy.size() >= size) {
-            Some(copy) => copy,
-            None => cmd.device().buffer("image read out", size, BufferKind::Readback)?,
-        };
-        cmd.copy((pixels, 0), (&copy, 0), size)?;
-        cmd.barrier(Stage::Transfer, Stage::Host);
-        self.copy = Some(copy);
         Ok(())
     }
 
-    /// The copy of the last frame's image, if there is one; asks for a copy of the next.
-    pub(super) fn take(&mut self) -> Option<&Buffer> {
-        self.wanted = true;
-        self.copy.as_ref().filter(|_| self.is_current)
+    /// The copy of the last frame's result in buffer `name`, if there is one; asks for a copy of the next.
+    pub(super) fn take(&mut self, name: &'static str) -> Option<&Buffer> {
+        let result = self.0.entry(name).or_default();
+        result.wanted = true;
+        result.copy.as_ref().filter(|_| result.is_current)
     }
 }

@@ -1,9 +1,9 @@
 //! Frames larger than the simulator was made for, and the image in which they are shown.
 
 use super::batches::FrameBudget;
-use super::buffers::Buffers;
+use super::lane::Lane;
 use super::passes::frame_constants;
-use super::{FusionResources, SimError, Simulator, Sources, Tables};
+use super::{SimError, Simulator, Sources, Tables};
 use crate::gpu::Image;
 use crate::scene::Scene;
 
@@ -17,22 +17,21 @@ impl Simulator {
     pub fn fit(&mut self, scene: &Scene) -> Result<bool, SimError> {
         let world = &self.passes.world;
         let budget = FrameBudget::of(&self.device);
-        let (frame, batches) = frame_constants(scene, world, self.coincident, 0, &budget);
+        let (frame, batches) = frame_constants(scene, world, self.coincident, &budget, None);
         let tables = Tables::new(scene);
         let sizes = batches.sizes(&frame, &tables);
-        if self.passes.buffers.hold(&sizes) {
+        if self.passes.lanes[0].buffers.hold(&sizes) {
             return Ok(false);
         }
-        self.frames.wait()?;
-        let buffers = Buffers::new(&self.device, scene, sizes)?;
-        let fusion = FusionResources::new(&self.device, scene, self.passes.fusion.as_ref())?;
+        self.submissions.wait()?;
+        let volume_of = self.passes.lanes[0].fusion.as_ref();
+        let lane = Lane::new(&self.device, scene, sizes, volume_of)?;
         let passes = &mut self.passes;
-        (passes.buffers, passes.fusion) = (buffers, fusion);
-        (passes.frame, passes.batches) = (frame, batches);
+        (passes.lanes, passes.active, passes.batches) = (vec![lane], 1, batches);
         passes.shown = frame;
+        self.chosen = 0;
         self.tables = tables;
         self.sources = Sources::of(scene);
-        self.read_out = super::ReadOut::default();
         // The new buffers hold no frame yet.
         (self.fused, self.labelled) = (false, false);
         self.upload_tables()?;

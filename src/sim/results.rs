@@ -30,7 +30,7 @@ impl Simulator {
     pub fn segments(&mut self) -> Result<Vec<Vec<layout::Segment>>, SimError> {
         let counts: Vec<u32> = bytemuck::pod_collect_to_vec(&self.read("segment_count")?);
         let segments: Vec<layout::Segment> = bytemuck::pod_collect_to_vec(&self.read("segments")?);
-        let capacity = self.passes.frame.segment_capacity as usize;
+        let capacity = self.constants().segment_capacity as usize;
         let lines = segments.chunks(capacity).zip(&counts);
         Ok(lines.map(|(line, &count)| line[..capacity.min(count as usize)].to_vec()).collect())
     }
@@ -64,7 +64,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn envelope(&mut self) -> Result<Vec<f32>, SimError> {
-        let samples = self.passes.frame.samples as usize;
+        let samples = self.constants().samples as usize;
         let iq = self.iq()?;
         let rows = &self.tables.rows;
         let detected = |(i, z): (usize, &[f32])| z[0].hypot(z[1]) * rows[i % samples].tgc;
@@ -77,25 +77,29 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn rf(&mut self, probe: &Probe) -> Result<(usize, Vec<f32>), SimError> {
-        let layout::Frame { axial_sigma, scanlines, samples, .. } = self.passes.frame;
+        let layout::Frame { axial_sigma, scanlines, samples, .. } = *self.constants();
         let factor = rf::oversampling(probe);
         let (lines, samples) = (scanlines as usize, samples as usize);
         let lateral = self.lateral()?;
         Ok((factor, rf::lines(probe, axial_sigma, lines, samples, &lateral, factor)))
     }
 
-    pub(super) fn floats(&mut self, name: &str) -> Result<Vec<f32>, SimError> {
-        Ok(bytemuck::pod_collect_to_vec(&self.read(name)?))
+    pub(super) fn floats(&mut self, name: &'static str) -> Result<Vec<f32>, SimError> {
+        Ok(bytemuck::pod_collect_to_vec(&self.read_again(name)?))
     }
 
     /// The content of buffer `name` after the last frame.
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, SimError> {
-        self.frames.wait()?;
-        Ok(self.passes.buffers.read(&self.device, name, &self.sizes())?)
+        self.submissions.wait()?;
+        let sizes = self.sizes();
+        let buffers = &self.lane().buffers;
+        let mut bytes = vec![0; buffers.bytes(name, &sizes)];
+        self.device.read_into(&buffers[name], 0, &mut bytes)?;
+        Ok(bytes)
     }
 
     /// Sizes of the last frame.
     pub(super) fn sizes(&self) -> Sizes {
-        self.passes.batches.sizes(&self.passes.frame, &self.tables)
+        self.passes.batches.sizes(self.passes.frame(), &self.tables)
     }
 }

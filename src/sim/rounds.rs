@@ -100,6 +100,12 @@ impl Rounds {
         }
     }
 
+    /// The same, but with no more lines together than there is room for their main paths.
+    pub(super) fn within(self, main_paths: u64) -> Self {
+        let room = main_paths.checked_div(self.mains.into()).unwrap_or(u64::MAX);
+        Self { lines: self.lines.min(u32::try_from(room).unwrap_or(u32::MAX)).max(1), ..self }
+    }
+
     /// The roles of the dispatches.
     pub fn roles(&self) -> &'static [u32] {
         match self.mains {
@@ -236,6 +242,11 @@ mod tests {
         for role in [ROLE_MAIN, ROLE_BRANCHES] {
             assert_eq!(lines(&taken, role), [1; 192 * 7]);
         }
+        // A frame of 51 lines of one path would trace them together, but there is room for two groups of 100.
+        let [hundred, fewer] = [100, 51].map(|scanlines| Frame { scanlines, layers: 1, ..frame });
+        let room = Rounds::new(&hundred, 1, 51).main_paths();
+        assert_eq!((room, Rounds::new(&fewer, 1, 51).main_paths()), (50, 51));
+        assert_eq!(Rounds::new(&fewer, 1, 51).within(room).main_paths(), 50);
         // Even for 0 threads at once, one line is traced.
         assert_eq!(Rounds::new(&frame, 8, 0).main_paths(), 1);
     }

@@ -117,7 +117,7 @@ pub struct Tables {
     pub points: Vec<[f32; 4]>,
     /// Grey level of each of 256 values.
     pub grey: Vec<u32>,
-    /// Expected power of speckle, by sample and layer; empty where no labels are wanted.
+    /// Expected power of speckle, by sample and layer; empty where labels have no levels.
     pub speckle: Vec<f32>,
 }
 
@@ -131,16 +131,16 @@ impl Tables {
             surfaces: surfaces(scene),
             points: with_spheres(points(scene)),
             grey: grey_map(&scene.imaging),
-            speckle: if scene.simulation.labels { speckle(scene) } else { Vec::new() },
+            speckle: if scene.simulation.levelled() { speckle(scene) } else { Vec::new() },
         }
     }
 
-    /// Names of the buffers that the tables fill, with their content.
-    pub fn arrays(&self) -> [(&'static str, &[u8]); 7] {
+    /// Names of the buffers that the tables fill, with their content. Tissues are not among them: their seeds may be
+    /// others in every image.
+    pub fn arrays(&self) -> [(&'static str, &[u8]); 6] {
         [
             ("scanlines", bytemuck::cast_slice(&self.scanlines)),
             ("rows", bytemuck::cast_slice(&self.rows)),
-            ("tissues", bytemuck::cast_slice(&self.tissues)),
             ("surfaces", bytemuck::cast_slice(&self.surfaces)),
             ("points", bytemuck::cast_slice(&self.points)),
             ("grey", bytemuck::cast_slice(&self.grey)),
@@ -243,8 +243,7 @@ pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
                 } else {
                     1.0
                 },
-                // Distinct lattices, by Knuth's multiplicative hash of the index.
-                seed: scene.simulation.seed ^ (i as u32 + 1).wrapping_mul(2_654_435_761),
+                seed: tissue_seed(scene.simulation.seed, i),
                 density: calibration.scatterer_density(tissue) as f32,
                 amplitude: calibration.cell_amplitude(tissue) as f32,
                 level: (tissue.echogenicity / DECIBEL_PER_OCTAVE).max(f64::from(layout::ALL_LEVELS))
@@ -252,6 +251,11 @@ pub fn tissues(scene: &Scene) -> Vec<layout::Tissue> {
             }
         })
         .collect()
+}
+
+/// Seed of the lattice of tissue `index`: distinct ones, by Knuth's multiplicative hash of the index.
+pub(super) fn tissue_seed(seed: u32, index: usize) -> u32 {
+    seed ^ (index as u32 + 1).wrapping_mul(2_654_435_761)
 }
 
 /// Surfaces 2i (outside) and 2i + 1 (inside) of instance i.

@@ -156,18 +156,18 @@ impl Simulator {
         };
         if !viewer3d.holds(sight) {
             // Only buffers are made again, not the pipeline: dragging the window asks for many sizes.
-            self.frames.wait()?;
+            self.submissions.wait()?;
             [viewer3d.looks, viewer3d.picture] = buffers(&self.device, sight)?;
         }
         // Stored before recording, so that it is kept if the picture is abandoned.
         let viewer3d = self.viewer3d.insert(viewer3d);
-        let mut cmd = self.frames.begin()?;
+        let mut cmd = self.submissions.begin()?;
         cmd.scope("view3d");
         viewer3d.record(&mut cmd, sight, passes, self.fused)?;
         cmd.copy_to_image(&viewer3d.picture, image)?;
         cmd.submit()?;
-        self.frames.wait()?;
-        Ok(self.frames.take_timings().pop().unwrap_or_default())
+        self.submissions.wait()?;
+        Ok(self.submissions.take_timings().pop().unwrap_or_default())
     }
 }
 
@@ -179,7 +179,7 @@ impl Viewer3d {
         passes: &super::Passes,
         fused: bool,
     ) -> Result<(), GpuError> {
-        let (frame, world) = (&passes.buffers["frame"], &passes.world);
+        let (frame, world) = (&passes.lanes[0].buffers["frame"], &passes.world);
         // The constants of the last complete picture: the last frame may have been abandoned.
         let constants = sight.constants(&passes.shown);
         cmd.write(frame, 0, bytemuck::bytes_of(&passes.shown))?;
@@ -202,7 +202,7 @@ impl Viewer3d {
                 structure,
                 Binding::Buffer(&self.constants),
                 Binding::Buffer(&self.looks),
-                Binding::Buffer(passes.pixels(fused)),
+                Binding::Buffer(passes.lanes[0].pixels(fused)),
                 Binding::Buffer(&self.picture),
             ],
         )?;

@@ -46,7 +46,7 @@ pub(super) fn write(simulator: &mut Simulator, scene: &Scene, dir: &Path) -> Res
             .map_err(|e| DumpError::file(&path, e))
     };
 
-    for array in simulator.passes.buffers.arrays() {
+    for array in simulator.lane().buffers.arrays() {
         let mut values = simulator.read(array.name)?;
         if array.name == "segments" {
             let counts = simulator.read("segment_count")?;

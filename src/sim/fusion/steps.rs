@@ -27,7 +27,7 @@ impl Simulator {
         &mut self,
         scene: &Scene,
     ) -> Result<Vec<(&'static str, Vec<u8>)>, SimError> {
-        let (Some(fused), Some(acquired), true) = (&self.passes.fusion, &scene.volume, self.fused)
+        let (Some(fused), Some(acquired), true) = (&self.lane().fusion, &scene.volume, self.fused)
         else {
             return Ok(Vec::new());
         };
@@ -48,7 +48,7 @@ impl Simulator {
         if !self.fused {
             return Ok(None);
         }
-        let banded = self.passes.fusion.as_ref().is_some_and(|fused| fused.banded);
+        let banded = self.lane().fusion.as_ref().is_some_and(|fused| fused.banded);
         let mask = self.floats("mask")?;
         let sums = self.floats(if banded { "mask" } else { "sums" })?;
         let (masks, _) = mask.as_chunks::<2>();

@@ -30,12 +30,13 @@ pub fn extent([width, height]: [u32; 2], turned: bool) -> Extent {
 impl Passes {
     /// Sums the mask over the box.
     pub(in crate::sim) fn blur(&self, cmd: &mut Commands<'_>) -> Result<(), GpuError> {
-        let size = [self.frame.image_width, self.frame.image_height];
-        let down = &self.buffers["down"];
-        for (turned, given) in [(false, ("sums", down)), (true, ("mask", down))] {
+        let size = [self.frame().image_width, self.frame().image_height];
+        for (turned, name) in [(false, "sums"), (true, "mask")] {
             cmd.scope(BLUR.name);
             let push = u32::from(turned);
-            self.record(cmd, &BLUR, extent(size, turned), bytemuck::bytes_of(&push), &[given])?;
+            self.record(cmd, &BLUR, extent(size, turned), bytemuck::bytes_of(&push), &|lane| {
+                vec![(name, &lane.buffers["down"])]
+            })?;
         }
         Ok(())
     }

@@ -1,9 +1,8 @@
-//! `expect` and `level`: the power that the echoes of each sample have on the average; they run only where labels are
-//! wanted.
+//! `expect` and `level`: the power that the echoes of each sample have on the average; they run only where labels with
+//! levels are wanted.
 
 use super::super::layout::{Counters, Frame};
 use super::super::pass::{Array, Extent, Pass, Sizes};
-use super::label::wanted;
 use crate::output::npy::Element::{Float, Integer, Word};
 
 /// The stage that sums the power of scatterers along the segments.
@@ -26,7 +25,7 @@ pub const EXPECT: Pass = Pass {
         Array::new("expected", Word, 4, Sizes::samples).zeroed(),
     ],
     extent: Some(|f: &Frame| Extent::Groups([f.scanlines, f.samples.div_ceil(64), 1])),
-    needed: wanted,
+    needed: |scene| scene.simulation.levelled(),
     ..Pass::USUAL
 };
 
@@ -47,6 +46,6 @@ pub const LEVEL: Pass = Pass {
         Array::new("label_log_image", Float, 1, Sizes::samples),
     ],
     extent: Some(|f: &Frame| Extent::Threads([f.samples, f.scanlines, 1])),
-    needed: wanted,
+    needed: |scene| scene.simulation.levelled(),
     ..Pass::USUAL
 };

@@ -10,7 +10,7 @@ use crate::output::npy::Element::{Float, Word};
 /// kernel may add.
 pub static INPUTS: [Array; 9] = [
     Array::of::<Frame>("frame", Word, |_| 1),
-    Array::of::<Scanline>("scanlines", Float, |s| u64::from(s.frame.scanlines) + 1),
+    Array::of::<Scanline>("scanlines", Float, |s| u64::from(s.frame.face_lines()) + 1),
     Array::of::<Row>("rows", Float, |s| s.frame.samples.into()),
     Array::of::<Tissue>("tissues", Word, |s| s.tissues),
     // Two sides of every instance.
@@ -20,7 +20,7 @@ pub static INPUTS: [Array; 9] = [
         u64::from(s.frame.points) + u64::from(s.frame.points.div_ceil(POINT_GROUP))
     }),
     Array::new("grey", Word, 1, |_| 256),
-    Array::new("contact", Float, 1, |s| 2 * u64::from(s.frame.scanlines) + 1),
+    Array::new("contact", Float, 1, |s| 2 * u64::from(s.frame.face_lines()) + 1),
     Array::of::<Counters>("counters", Word, |_| 1).zeroed(),
 ];
 

@@ -24,7 +24,8 @@ pub const PAINT: Pass = Pass {
 };
 
 impl Passes {
-    /// Colours the finished image into a buffer of its own, ready to be copied; after `chart`.
+    /// Colours the finished images into buffers of their own, ready to be copied; after `chart`. Returns that of the
+    /// first one.
     pub(in crate::sim) fn paint(
         &mut self,
         cmd: &mut Commands<'_>,
@@ -32,16 +33,20 @@ impl Passes {
         opacity: f32,
         fused: bool,
     ) -> Result<&Buffer, GpuError> {
-        self.buffers.add(cmd.device(), PAINT.makes.iter())?;
         let colours = colours(scene).into_iter().map(|[r, g, b]| u32::from_le_bytes([r, g, b, 0]));
         let colours: Vec<u32> = colours.collect();
-        cmd.write(&self.buffers["colours"], 0, bytemuck::cast_slice(&colours))?;
+        for lane in &mut self.lanes[..self.active] {
+            lane.buffers.add(cmd.device(), PAINT.makes.iter())?;
+            cmd.write(&lane.buffers["colours"], 0, bytemuck::cast_slice(&colours))?;
+        }
         cmd.barrier(Stage::Transfer, Stage::Compute);
         cmd.barrier(Stage::Compute, Stage::Compute);
         cmd.scope(PAINT.name);
-        let given = [("pixels", self.pixels(fused))];
-        self.record(cmd, &PAINT, per_pixel(&self.frame), &opacity.to_ne_bytes(), &given)?;
-        Ok(&self.buffers["painted"])
+        let threads = per_pixel(self.frame());
+        self.record(cmd, &PAINT, threads, &opacity.to_ne_bytes(), &|lane| {
+            vec![("pixels", lane.pixels(fused))]
+        })?;
+        Ok(&self.lanes[0].buffers["painted"])
     }
 }
 
@@ -60,7 +65,7 @@ impl Simulator {
     /// A Vulkan error.
     pub fn painted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
         let asked =
-            self.labelled && self.painted_on.is_some() && self.passes.buffers.has("painted");
+            self.labelled && self.painted_on.is_some() && self.lane().buffers.has("painted");
         asked.then(|| self.read("painted")).transpose()
     }
 }

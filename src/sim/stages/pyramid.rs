@@ -76,39 +76,38 @@ impl Pyramid {
 
 impl Passes {
     /// Computes [`Pyramid::change`] over `top` levels above the finest.
-    pub(in crate::sim) fn bands(
-        &self,
-        cmd: &mut Commands<'_>,
-        pyramid: &Pyramid,
-        top: u32,
-    ) -> Result<(), GpuError> {
-        let (levels, top) = (&pyramid.0, top as usize);
-        let size = [self.frame.image_width, self.frame.image_height];
+    pub(in crate::sim) fn bands(&self, cmd: &mut Commands<'_>, top: u32) -> Result<(), GpuError> {
+        let top = top as usize;
+        let size = [self.frame().image_width, self.frame().image_height];
         let threads = |level: usize| {
             let [width, height] = size_at(size, level);
             Extent::Threads([width, height, 1])
         };
-        self.run_with(cmd, &DIFFERENCE, &[("level", &levels[0].sums)])?;
+        self.run_with(cmd, &DIFFERENCE, &|lane| vec![("level", &lane.pyramid().0[0].sums)])?;
         cmd.scope(REDUCE.name);
         for level in 0..top {
-            let given = [("fine", &levels[level].sums), ("coarse", &levels[level + 1].sums)];
             let push = size_at(size, level);
-            self.record(cmd, &REDUCE, threads(level + 1), bytemuck::bytes_of(&push), &given)?;
+            self.record(cmd, &REDUCE, threads(level + 1), bytemuck::bytes_of(&push), &|lane| {
+                let levels = &lane.pyramid().0;
+                vec![("fine", &levels[level].sums), ("coarse", &levels[level + 1].sums)]
+            })?;
         }
         cmd.scope(COLLAPSE.name);
         for level in (0..=top).rev() {
             let [width, height] = size_at(size, level);
             // The coarsest level does not read a coarser one; any buffer is bound in its place.
             let coarsest = level == top;
-            let (here, above) = (&levels[level], &levels[(level + 1).min(top)]);
-            let given = [
-                ("fine", &here.sums),
-                ("coarse", &above.sums),
-                ("coarse_change", if coarsest { &above.sums } else { &above.change }),
-                ("change", &here.change),
-            ];
             let push = [width, height, u32::from(coarsest)];
-            self.record(cmd, &COLLAPSE, threads(level), bytemuck::bytes_of(&push), &given)?;
+            self.record(cmd, &COLLAPSE, threads(level), bytemuck::bytes_of(&push), &|lane| {
+                let levels = &lane.pyramid().0;
+                let (here, above) = (&levels[level], &levels[(level + 1).min(top)]);
+                vec![
+                    ("fine", &here.sums),
+                    ("coarse", &above.sums),
+                    ("coarse_change", if coarsest { &above.sums } else { &above.change }),
+                    ("change", &here.change),
+                ]
+            })?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! `scatter`: the echoes of scatterers along the segments.
 
 use super::super::batches::per_path;
-use super::super::layout::{Frame, SCATTER_WINDOW};
+use super::super::layout::{FLAG_LINE, FLAG_VOXEL, Frame, SCATTER_WINDOW};
 use super::super::pass::{Array, Extent, Pass, Sizes, Variants};
 use crate::output::npy::Element::Integer;
 
@@ -32,5 +32,8 @@ pub const SCATTER: Pass = Pass {
 fn extent(frame: &Frame) -> Extent {
     let paths = frame.segment_capacity / per_path(frame);
     let parts = paths.div_ceil(8).clamp(1, 16);
-    Extent::Groups([frame.scanlines, parts, frame.samples.div_ceil(SCATTER_WINDOW)])
+    // The scatterers of lines beside one that is made alone are not heard: see the kernel.
+    let alone = frame.flags & (FLAG_LINE | FLAG_VOXEL) == FLAG_LINE;
+    let lines = if alone { 1 } else { frame.scanlines };
+    Extent::Groups([lines, parts, frame.samples.div_ceil(SCATTER_WINDOW)])
 }

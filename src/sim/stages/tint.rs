@@ -28,20 +28,23 @@ pub struct Tint {
 }
 
 impl Passes {
-    /// Colours the mixed image into a buffer of its own, ready to be copied; after [`Self::fuse`].
+    /// Colours the mixed images into buffers of their own, ready to be copied; after [`Self::fuse`]. Returns that of the
+    /// first one.
     pub(in crate::sim) fn tint(
         &mut self,
         cmd: &mut Commands<'_>,
         tint: &Tint,
     ) -> Result<&Buffer, GpuError> {
-        self.buffers.add(cmd.device(), TINT.makes.iter())?;
+        for lane in &mut self.lanes[..self.active] {
+            lane.buffers.add(cmd.device(), TINT.makes.iter())?;
+        }
         let mut push = tint.opacity.to_ne_bytes().to_vec();
         let [r, g, b] = tint.colour;
         push.extend(u32::from_le_bytes([r, g, b, 0]).to_ne_bytes());
         cmd.barrier(Stage::Compute, Stage::Compute);
         cmd.scope(TINT.name);
-        self.record(cmd, &TINT, per_pixel(&self.frame), &push, &[])?;
-        Ok(&self.buffers["tinted"])
+        self.record(cmd, &TINT, per_pixel(self.frame()), &push, &|_| Vec::new())?;
+        Ok(&self.lanes[0].buffers["tinted"])
     }
 }
 
@@ -59,7 +62,7 @@ impl Simulator {
     /// # Errors
     /// A Vulkan error.
     pub fn tinted_pixels(&mut self) -> Result<Option<Vec<u8>>, SimError> {
-        let asked = self.fused && self.tinted_on.is_some() && self.passes.buffers.has("tinted");
+        let asked = self.fused && self.tinted_on.is_some() && self.lane().buffers.has("tinted");
         asked.then(|| self.read("tinted")).transpose()
     }
 }

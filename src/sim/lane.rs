@@ -1,0 +1,175 @@
+//! Lanes: what images that are made side by side in one frame have each for themselves.
+//!
+//! A stage of a frame is recorded for all lanes and then one barrier, so that a device with more threads than one image
+//! needs works on several of them at once. Anatomy, kernels and tables are there once.
+
+use std::sync::Arc;
+
+use glam::DAffine3;
+
+use super::buffers::Buffers;
+use super::contact::SkinContact;
+use super::fusion::FusionResources;
+use super::layout::{self, Frame};
+use super::pass::Sizes;
+use super::read_out::ReadOut;
+use super::stages::pyramid::Pyramid;
+use super::tables::{Tables, tissue_seed};
+use super::{SimError, Simulator, machine, placement};
+use crate::gpu::{Buffer, Commands, Device, GpuError};
+use crate::scene::Scene;
+use crate::settings::Machine;
+
+/// Part of a GPU's memory that lanes may take together.
+const SHARE_OF_MEMORY: u64 = 8;
+/// The same of a software driver, which one image keeps busy.
+const SHARE_OF_HOST: u64 = 64;
+/// Most images of a frame; more would gain nothing and wait longer for the first of them.
+const MOST: u64 = 64;
+
+/// What images of the same scene at the same time may differ in.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shot {
+    /// World from probe, rigid, mm.
+    pub world_from_probe: DAffine3,
+    /// Seed of scatterers, paths and noise.
+    pub seed: u32,
+    /// The image's number; selects the noise.
+    pub index: u32,
+}
+
+impl Shot {
+    /// The image of a scene as it is.
+    pub fn of(scene: &Scene, index: u32) -> Self {
+        let (world_from_probe, seed) = (scene.world_from_probe, scene.simulation.seed);
+        Self { world_from_probe, seed, index }
+    }
+
+    /// The constants of this image; all others are those of `frame`.
+    pub(super) fn constants(&self, frame: &Frame) -> Frame {
+        Frame {
+            world_from_probe: placement::matrix_rows(&self.world_from_probe),
+            probe_from_world: placement::matrix_rows(&self.world_from_probe.inverse()),
+            seed: self.seed,
+            frame_index: self.index,
+            ..*frame
+        }
+    }
+}
+
+/// What one image of a frame has for itself.
+pub(super) struct Lane {
+    pub(super) buffers: Buffers,
+    /// None where the scene has no acquired volume.
+    pub(super) fusion: Option<FusionResources>,
+    pub(super) frame: Frame,
+    pub(super) read_out: ReadOut,
+    /// The contact of the probe with the skin.
+    pub(super) touch: Option<SkinContact>,
+}
+
+impl Lane {
+    /// The first lane, for images of up to these sizes.
+    pub(super) fn new(
+        device: &Arc<Device>,
+        scene: &Scene,
+        sizes: Sizes,
+        volume_of: Option<&FusionResources>,
+    ) -> Result<Self, GpuError> {
+        Ok(Self {
+            buffers: Buffers::new(device, scene, sizes)?,
+            fusion: FusionResources::new(device, scene, volume_of)?,
+            frame: sizes.frame,
+            read_out: ReadOut::default(),
+            touch: None,
+        })
+    }
+
+    /// Another lane, which shares tables and volume with this one.
+    pub(super) fn beside(&self, device: &Arc<Device>, scene: &Scene) -> Result<Self, GpuError> {
+        Ok(Self {
+            buffers: self.buffers.beside(device, scene)?,
+            fusion: FusionResources::new(device, scene, self.fusion.as_ref())?,
+            frame: self.frame,
+            read_out: ReadOut::default(),
+            touch: None,
+        })
+    }
+
+    /// Records the upload of the constants `frame`, and of the tissues with their seeds in it.
+    pub(super) fn set(
+        &mut self,
+        cmd: &mut Commands<'_>,
+        frame: Frame,
+        tables: &Tables,
+    ) -> Result<(), GpuError> {
+        let seeded = |(i, tissue): (usize, &layout::Tissue)| layout::Tissue {
+            seed: tissue_seed(frame.seed, i),
+            ..*tissue
+        };
+        let tissues: Vec<layout::Tissue> = tables.tissues.iter().enumerate().map(seeded).collect();
+        cmd.write(&self.buffers["tissues"], 0, bytemuck::cast_slice(&tissues))?;
+        cmd.write(&self.buffers["frame"], 0, bytemuck::bytes_of(&frame))?;
+        self.frame = frame;
+        Ok(())
+    }
+
+    /// The pyramid of a fused image that is blended by bands.
+    pub(super) fn pyramid(&self) -> &Pyramid {
+        &self.fusion.as_ref().expect("an image with a volume").pyramid
+    }
+
+    /// The finished image.
+    pub(super) fn pixels(&self, fused: bool) -> &Buffer {
+        &self.buffers[pixels(fused)]
+    }
+}
+
+/// Name of the buffer of the finished image.
+pub(super) fn pixels(fused: bool) -> &'static str {
+    if fused { "fused" } else { "pixels" }
+}
+
+impl Simulator {
+    /// Number of images that [`Self::frames`] makes of the scene at once, at most: as many as there is memory for.
+    pub fn most_shots(&self) -> usize {
+        let each = self.passes.lanes[0].buffers.own_bytes().max(1);
+        let share = match machine(&self.device) {
+            Machine::Gpu => SHARE_OF_MEMORY,
+            Machine::Software => SHARE_OF_HOST,
+        };
+        let most = self.device.info().memory_bytes / share / each;
+        most.clamp(1, MOST) as usize
+    }
+
+    /// Chooses the image of the last frame of which results are read from now on, by its place in the shots of
+    /// [`Self::frames`]; the next frame chooses its first again.
+    ///
+    /// # Panics
+    /// If the last frame had no such image.
+    pub fn choose(&mut self, shot: usize) {
+        assert!(shot < self.passes.active, "image {shot} of {}", self.passes.active);
+        self.chosen = shot;
+    }
+
+    /// The lane whose results are read.
+    pub(super) fn lane(&self) -> &Lane {
+        &self.passes.lanes[self.chosen]
+    }
+
+    /// The content of buffer `name` of the chosen lane after the last frame. It is copied within the next frame if it
+    /// was read after this one, so that reading it then takes no submission of its own.
+    pub(super) fn read_again(&mut self, name: &'static str) -> Result<Vec<u8>, SimError> {
+        let sizes = self.sizes();
+        let lane = &mut self.passes.lanes[self.chosen];
+        let mut bytes = vec![0; lane.buffers.bytes(name, &sizes)];
+        match lane.read_out.take(name) {
+            Some(copy) => self.submissions.read(copy, &mut bytes)?,
+            None => {
+                self.submissions.wait()?;
+                self.device.read_into(&lane.buffers[name], 0, &mut bytes)?;
+            }
+        }
+        Ok(bytes)
+    }
+}

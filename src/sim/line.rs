@@ -1,0 +1,72 @@
+//! One scanline at a time: what M-mode shows, many times a second.
+//!
+//! A line takes part of the face's scanlines: itself and those beside it that `beam` smooths over it. All else is as in
+//! an image, so that its samples are to the bit those of the image's line.
+
+use super::lane::{Shot, pixels};
+use super::layout::{self, LATERAL_REACH};
+use super::tables::Tables;
+use super::{SimError, Simulator};
+use crate::scene::Scene;
+
+/// A scanline that is made alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct OneLine {
+    /// Number on the face.
+    number: u32,
+    /// Grey levels from the face to the image's depth.
+    rows: u32,
+    /// Scanlines beside it, on each side, that it is smoothed with.
+    reach: u32,
+}
+
+impl OneLine {
+    /// The constants of a frame of this line alone.
+    pub(super) fn narrow(&self, frame: &mut layout::Frame) {
+        let lines = frame.scanlines;
+        let first = self.number.saturating_sub(self.reach);
+        frame.first_line = first;
+        frame.scanlines = (self.number + self.reach + 1).min(lines) - first;
+        frame.lines_beside = lines - frame.scanlines;
+        frame.flags |= layout::FLAG_LINE;
+        frame.image_width = 1;
+        frame.image_height = self.rows;
+        frame.image_left = (self.number - first) as f32;
+        frame.pixel_pitch = frame.depth / self.rows as f32;
+    }
+}
+
+/// Scanlines on each side over which `beam` smooths, at most, with these tables.
+fn reach(tables: &Tables) -> u32 {
+    let widest = tables.rows.iter().map(|row| row.lateral_lines).fold(0.0, f32::max);
+    ((3.0 * widest).ceil() as u32).min(LATERAL_REACH as u32)
+}
+
+impl Simulator {
+    /// The grey levels of one scanline of an image of `scene` as it is now: as many as `rows`, evenly from the face to
+    /// the image's depth, without an acquired volume. `index` is the number of the frame and selects the noise. Costs
+    /// the share of an image that the lines have over which the beam is smoothed.
+    ///
+    /// # Errors
+    /// Those of [`Self::frame`].
+    ///
+    /// # Panics
+    /// If the probe has no such scanline, without rows, or with more than the image has pixels.
+    pub fn line(
+        &mut self,
+        scene: &Scene,
+        index: u32,
+        number: u32,
+        rows: u32,
+    ) -> Result<Vec<u8>, SimError> {
+        assert!(number < scene.probe.scanlines, "no scanline {number}");
+        let most = self.passes.lanes[0].buffers.room().pixels();
+        assert!(rows > 0 && u64::from(rows) <= most, "{rows} rows of a line");
+        // Also the tables of settings that this frame is the first to have.
+        self.adopt(scene)?;
+        let line = OneLine { number, rows, reach: reach(&self.tables) };
+        self.make(scene, &[Shot::of(scene, index)], Some(line))?;
+        let rgba = self.read_again(pixels(false))?;
+        Ok(rgba.chunks_exact(4).map(|pixel| pixel[0]).collect())
+    }
+}
